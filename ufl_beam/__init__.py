@@ -1,0 +1,60 @@
+"""Planar flexible multibody dynamics with geometrically exact beams.  Units are SI."""
+
+from ufl_beam.beams import Beam, Place
+from ufl_beam.errors import ConvergenceError, SceneError
+from ufl_beam.ledger import Energy
+from ufl_beam.loads import FollowerLoad, Gravity, LineLoad, PointLoad, Table, ramp
+from ufl_beam.record import XDMF, History, Recorder
+from ufl_beam.scene import (
+    Clamped,
+    Joint,
+    Pinned,
+    PointMass,
+    Prescribed,
+    Revolute,
+    Rigid,
+    Roller,
+    Scene,
+    Support,
+    Velocity,
+)
+from ufl_beam.schemes import Midpoint, Static
+from ufl_beam.sections import Section
+from ufl_beam.simulate import Simulation, simulate
+from ufl_beam.solution import Solution
+from ufl_beam.solve import Newton
+
+__all__ = [
+    "XDMF",
+    "Beam",
+    "Clamped",
+    "ConvergenceError",
+    "Energy",
+    "FollowerLoad",
+    "Gravity",
+    "History",
+    "Joint",
+    "LineLoad",
+    "Midpoint",
+    "Newton",
+    "Pinned",
+    "Place",
+    "PointLoad",
+    "PointMass",
+    "Prescribed",
+    "Recorder",
+    "Revolute",
+    "Rigid",
+    "Roller",
+    "Scene",
+    "SceneError",
+    "Section",
+    "Simulation",
+    "Solution",
+    "Static",
+    "Support",
+    "Table",
+    "Velocity",
+    "ramp",
+    "simulate",
+]

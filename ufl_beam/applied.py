@@ -1,0 +1,182 @@
+"""Terms of the loads: their forces, tangents and works."""
+
+from __future__ import annotations
+
+from functools import singledispatch
+
+import numpy as np
+
+from ufl_beam.compat import Array, la
+from ufl_beam.grid import Share
+from ufl_beam.ledger import Ledger
+from ufl_beam.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, TimeFunction
+from ufl_beam.schemes import Scheme
+from ufl_beam.sparse import positions
+from ufl_beam.terms import Step
+
+
+class DeadLoads:
+    """Forces and moments that keep their direction: vectors times functions of time.
+
+    Args:
+        loads: What acts; all but follower loads.
+        share: The degrees of freedom of this process.
+        scheme: Says which forces do the work of a step.
+        ledger: Takes their work.
+
+    Attributes:
+        force: The loads in the equation of the step.
+    """
+
+    def __init__(self, loads: list[Load], share: Share, scheme: Scheme, ledger: Ledger) -> None:
+        vectors: dict[TimeFunction, Array] = {}
+        for load in loads:
+            vectors.setdefault(load.time, np.zeros(share.size))
+            vectors[load.time] += _forces(load, share)
+        self._vectors = list(vectors.items())
+        self._acting, self._ledger = scheme.acting, ledger
+        ledger.supplied["loads"] += 0.0
+        self._before = self.force = np.zeros(share.size)
+
+    def begin(self, step: Step) -> None:
+        """The loads of the step."""
+        self.force = self._at(step.t_load)
+
+    def carry_on(self, t: float) -> None:
+        """Take the state at time ``t`` as one that is in equilibrium with the loads."""
+        self._before = self._at(t)
+
+    def _at(self, t: float) -> Array:
+        (time, vector), *others = self._vectors
+        force = time(t) * vector
+        for time, vector in others:
+            force += time(t) * vector
+        return force
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Subtract the loads."""
+        r -= self.force
+
+    def add_tangent(self, q1: Array) -> None:
+        """Dead loads do not depend on the configuration."""
+
+    def accept(self, q1: Array, s: Array) -> None:
+        """Work of the loads."""
+        self._ledger.supplied["loads"] += float(self._acting(self._before, self.force) @ s)
+        self._before = self.force
+
+    def add_state(self, q: Array) -> None:
+        """Loads hold no energy; what a potential would hold is in their work."""
+
+
+class FollowerLoads:
+    """Forces that turn with the cross-section they act on.
+
+    Args:
+        loads: What acts.
+        share: The degrees of freedom of this process.
+        scheme: Says where in the step loads act, and which forces do the work of a step.
+        ledger: Takes their work.
+        A: Matrix that takes the tangent.
+
+    Attributes:
+        force: The loads in the latest residual.
+    """
+
+    def __init__(
+        self,
+        loads: list[FollowerLoad],
+        share: Share,
+        scheme: Scheme,
+        ledger: Ledger,
+        A: la.MatrixCSR,
+    ) -> None:
+        mine = [load for load in loads if share.owns(share.at(load.place)).all()]
+        dofs = np.array([share.local(share.at(load.place)) for load in mine], dtype=np.int64)
+        self._dofs = dofs.reshape(-1, 3)
+        self._forces = np.array([[*load.force, load.moment] for load in mine]).reshape(-1, 3)
+        self._times = [load.time for load in mine]
+        x, y, turn = self._dofs.T
+        self._entries = np.array([positions(A, x, turn), positions(A, y, turn)])
+        self._A = A
+        self._weight = scheme.load_weight
+        self._acting, self._ledger = scheme.acting, ledger
+        ledger.supplied["loads"] += 0.0
+        self._before = self.force = np.zeros(share.size)
+
+    def begin(self, step: Step) -> None:
+        """The size of the loads in the step."""
+        factors = np.array([time(step.t_load) for time in self._times])
+        self._sizes = self._forces * factors[:, None]
+        self._ψ0 = step.q0[self._dofs[:, 2]]
+
+    def _turned(self, q1: Array) -> tuple[Array, Array]:
+        """The forces in the plane, each (number of loads,)."""
+        ψ = self._ψ0 + self._weight * (q1[self._dofs[:, 2]] - self._ψ0)
+        cos, sin = np.cos(ψ), np.sin(ψ)
+        x, y = self._sizes[:, 0], self._sizes[:, 1]
+        return cos * x - sin * y, sin * x + cos * y
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Subtract the loads."""
+        x, y = self._turned(q1)
+        self.force = np.zeros_like(r)
+        np.add.at(self.force, self._dofs, np.column_stack([x, y, self._sizes[:, 2]]))
+        r -= self.force
+
+    def add_tangent(self, q1: Array) -> None:
+        """Subtract the derivative by the rotation."""
+        x, y = self._turned(q1)
+        np.add.at(self._A.data, self._entries[0], self._weight * y)
+        np.add.at(self._A.data, self._entries[1], -self._weight * x)
+
+    def accept(self, q1: Array, s: Array) -> None:
+        """Work of the loads."""
+        self._ledger.supplied["loads"] += float(self._acting(self._before, self.force) @ s)
+        self._before = self.force
+
+    def add_state(self, q: Array) -> None:
+        """Loads hold no energy; what a potential would hold is in their work."""
+
+
+@singledispatch
+def _forces(load: Load, share: Share) -> Array:
+    """Nodal forces of a dead load with factor one, consistent with linear displacements."""
+    raise TypeError(f"{type(load).__name__} is not a dead load")
+
+
+@_forces.register
+def _(load: PointLoad, share: Share) -> Array:
+    forces = np.zeros(share.size)
+    dofs = share.at(load.place)
+    mine = share.owns(dofs)
+    forces[share.local(dofs[mine])] = np.array([*load.force, load.moment])[mine]
+    return forces
+
+
+@_forces.register
+def _(load: LineLoad, share: Share) -> Array:
+    here = [beam is load.beam for beam in share.grid.scene.beams]
+    return _along_beams(np.outer(here, [*load.force, load.moment]), share)
+
+
+@_forces.register
+def _(load: Gravity, share: Share) -> Array:
+    scene = share.grid.scene
+    rhoA = [beam.section.rhoA for beam in scene.beams]
+    forces = _along_beams(np.outer(rhoA, [*load.acceleration, 0.0]), share)
+    for mass in scene.masses:
+        g_x, g_y = load.acceleration
+        forces += _forces(PointLoad(mass.place, force=(mass.mass * g_x, mass.mass * g_y)), share)
+    return forces
+
+
+def _along_beams(per_beam: Array, share: Share) -> Array:
+    """Nodal forces of line loads (num_beams, 3): each end of a cell carries a half of it."""
+    grid = share.grid
+    ends = grid.points[grid.cells[share.cells]]
+    half = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)[:, None] / 2
+    forces = np.zeros(share.size)
+    of_ends = np.repeat(per_beam[grid.beam_of_cell[share.cells]] * half, 2, axis=1)
+    np.add.at(forces, share.cell_dofs, of_ends)
+    return forces

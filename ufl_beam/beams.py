@@ -1,0 +1,179 @@
+"""Beams and the places on them: where the undeformed axis runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import KW_ONLY, dataclass, field
+from itertools import pairwise
+
+from ufl_beam.errors import SceneError, require_number, require_vector
+from ufl_beam.sections import Section
+
+Point = tuple[float, float]
+Curve = Callable[[float], Sequence[float]]
+
+
+@dataclass(frozen=True, eq=False)
+class Beam:
+    """A beam with straight cells along a curve; straight from ``a`` to ``b`` by default.
+
+    Args:
+        a: First end; m.
+        b: Last end; m.
+        section: Its cross-section.
+        cells: Number of cells, of equal length in the parameter of the curve.  Places that
+            something is attached to, and corners, become vertices too.
+        name: What error messages and pictures call it.
+        curve: Axis from ``s = 0`` at ``a`` to ``s = 1`` at ``b``.
+        corners: Parameters ``s`` that must be vertices.
+
+    Raises:
+        SceneError: Zero length, ``cells < 1`` or coordinates that are no finite numbers.
+    """
+
+    a: Point
+    b: Point
+    section: Section
+    _: KW_ONLY
+    cells: int = 8
+    name: str = "beam"
+    curve: Curve = field(default=None, repr=False)  # type: ignore[assignment]
+    corners: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        a, b = (require_vector(x, f"{self.name}: end") for x in (self.a, self.b))
+        object.__setattr__(self, "a", a)
+        object.__setattr__(self, "b", b)
+        if not isinstance(self.section, Section):
+            raise SceneError(f"{self.name}: section = {self.section!r} is not a Section")
+        if self.cells != int(self.cells) or self.cells < 1:
+            raise SceneError(f"{self.name}: cells = {self.cells} must be a whole number, at least 1")
+        if self.curve is None:
+            if a == b:
+                raise SceneError(f"{self.name}: zero length, both ends are at {a}")
+            object.__setattr__(self, "curve", lambda s: _between(a, b, s))
+        for s in (*self.corners, *(i / self.cells for i in range(self.cells + 1))):
+            require_vector(self.curve(s), f"{self.name}: curve({s:g})")
+
+    @classmethod
+    def arc(
+        cls,
+        center: Point,
+        radius: float,
+        angles: tuple[float, float],
+        section: Section,
+        *,
+        cells: int = 8,
+        name: str = "beam",
+    ) -> Beam:
+        """Circular arc from ``angles[0]`` to ``angles[1]`` (rad, counter-clockwise from x)."""
+        cx, cy = require_vector(center, f"{name}: center")
+        require_number(radius, f"{name}: radius", positive=True)
+        first, last = require_vector(angles, f"{name}: angles")
+        if first == last:
+            raise SceneError(f"{name}: zero length, both angles of the arc are {first:g}")
+
+        def curve(s: float) -> Point:
+            angle = first + s * (last - first)
+            return cx + radius * math.cos(angle), cy + radius * math.sin(angle)
+
+        return cls(curve(0), curve(1), section, cells=cells, name=name, curve=curve)
+
+    @classmethod
+    def polyline(
+        cls, points: Sequence[Point], section: Section, *, cells: int = 8, name: str = "beam"
+    ) -> Beam:
+        """Straight pieces through ``points``, rigidly joined; ``s`` is the part of the length."""
+        xy = [require_vector(p, f"{name}: point {i}") for i, p in enumerate(points)]
+        if len(xy) < 2:
+            raise SceneError(f"{name}: a polyline needs at least two points, not {len(xy)}")
+        ends = [0.0]
+        for p, q in pairwise(xy):
+            if p == q:
+                raise SceneError(f"{name}: zero length between two points at {p}")
+            ends.append(ends[-1] + math.dist(p, q))
+        at = [end / ends[-1] for end in ends]
+
+        def curve(s: float) -> Point:
+            i = next((k for k, limit in enumerate(at[1:-1]) if s <= limit), len(at) - 2)
+            return _between(xy[i], xy[i + 1], (s - at[i]) / (at[i + 1] - at[i]))
+
+        corners = tuple(at[1:-1])
+        return cls(xy[0], xy[-1], section, cells=cells, name=name, curve=curve, corners=corners)
+
+    @classmethod
+    def along(
+        cls, curve: Curve, section: Section, *, cells: int = 8, name: str = "beam"
+    ) -> Beam:
+        """Any curve ``s -> (x, y)``, ``s`` from 0 to 1; m."""
+        a = require_vector(curve(0.0), f"{name}: curve(0)")
+        b = require_vector(curve(1.0), f"{name}: curve(1)")
+        return cls(a, b, section, cells=cells, name=name, curve=curve)
+
+    def at(self, s: float) -> Place:
+        """Place at the parameter ``s`` of the axis, 0 at the start and 1 at the end.
+
+        On straight beams, arcs and polylines ``s`` is the part of the length.
+        """
+        return Place(self, s)
+
+    @property
+    def start(self) -> Place:
+        """First end."""
+        return Place(self, 0.0)
+
+    @property
+    def end(self) -> Place:
+        """Last end."""
+        return Place(self, 1.0)
+
+    def vertices(self, attached: Sequence[float]) -> list[float]:
+        """Parameters of the vertices: equal cells, the corners and what is ``attached``.
+
+        A place nearer to a regular vertex than 1e-9 of a cell is that vertex.
+        """
+        regular = [i / self.cells for i in range(self.cells + 1)]
+        vertices = sorted({*regular, *self.corners, *attached})
+        kept = [0.0]
+        for s in vertices[1:]:
+            if (s - kept[-1]) * self.cells > 1e-9:
+                kept.append(s)
+        kept[-1] = 1.0
+        return kept
+
+
+@dataclass(frozen=True)
+class Place:
+    """A point of a beam; made by ``beam.start``, ``beam.end`` and ``beam.at(s)``.
+
+    Attributes:
+        beam: The beam, by identity.
+        s: Parameter of its axis, from 0 to 1.
+    """
+
+    beam: Beam
+    s: float
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.beam, Beam):
+            raise SceneError(f"Place: {self.beam!r} is not a Beam")
+        require_number(self.s, f"{self.beam.name}.at(s): s")
+        if not 0.0 <= self.s <= 1.0:
+            raise SceneError(f"{self.beam.name}.at({self.s:g}): s must lie between 0 and 1")
+
+    @property
+    def point(self) -> Point:
+        """Coordinates in the undeformed scene; m."""
+        x, y = self.beam.curve(self.s)
+        return float(x), float(y)
+
+    def __str__(self) -> str:
+        ends = {0.0: "start", 1.0: "end"}
+        x, y = self.point
+        return f"{self.beam.name}.{ends.get(self.s, f'at({self.s:g})')} ({x:g}, {y:g})"
+
+
+def _between(p: Point, q: Point, s: float) -> Point:
+    """The point at part ``s`` of the way from ``p`` to ``q``; exact at both ends."""
+    return p[0] * (1 - s) + q[0] * s, p[1] * (1 - s) + q[1] * s

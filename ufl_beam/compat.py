@@ -1,0 +1,78 @@
+"""DOLFINx 0.9 to 0.11: every difference between the versions, and nothing else."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+
+try:
+    import basix.ufl
+    import dolfinx
+    import ufl
+    from dolfinx import cpp, fem, io, la, mesh
+except ImportError as error:  # pragma: no cover - depends on the machine
+    raise ImportError(
+        "ufl_beam needs DOLFINx 0.9 or newer, which is not on PyPI. "
+        "Run through ./env of the source tree, or see docs/installation.md."
+    ) from error
+
+Array = npt.NDArray[np.float64]
+
+VERSION = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
+if VERSION < (0, 9):  # pragma: no cover - depends on the machine
+    raise ImportError(
+        f"ufl_beam needs DOLFINx 0.9 or newer, this is {dolfinx.__version__}; "
+        "run through ./env of the source tree, or see docs/installation.md"
+    )
+
+
+def line_mesh(points: Array, cells: npt.NDArray[np.int64]) -> mesh.Mesh:
+    """Mesh of straight cells in the plane, on this process alone.
+
+    Args:
+        points: Vertices; shape (num_points, 2); m.
+        cells: Vertices of each cell; shape (num_cells, 2).
+    """
+    line = ufl.Mesh(basix.ufl.element("Lagrange", "interval", 1, shape=(2,)))
+    more = {} if VERSION < (0, 10) else {"max_facet_to_cell_links": 2}
+    return mesh.create_mesh(MPI.COMM_SELF, cells=cells, x=points, e=line, **more)
+
+
+def space_with_dofs(
+    domain: mesh.Mesh, element: Any, cell_dofs: npt.NDArray[np.int32], size: int
+) -> fem.FunctionSpace:
+    """Function space whose cells share the degrees of freedom that ``cell_dofs`` says.
+
+    Args:
+        domain: Mesh on this process.
+        element: Scalar, vector or mixed element with unblocked dofs.
+        cell_dofs: Degrees of freedom of each cell; shape (num_cells, dofs per cell).
+        size: Number of degrees of freedom.
+    """
+    plain = fem.functionspace(domain, element)
+    index_map = cpp.common.IndexMap(MPI.COMM_SELF, size)
+    adjacency = cpp.graph.AdjacencyList_int32(np.ascontiguousarray(cell_dofs, dtype=np.int32))
+    dofmap = cpp.fem.DofMap(plain.dofmap.dof_layout, index_map, 1, adjacency, 1)
+    arguments = [domain._cpp_object, plain.element, dofmap]
+    if VERSION < (0, 11):
+        arguments.append(list(element.reference_value_shape))
+    return fem.FunctionSpace(domain, element, cpp.fem.FunctionSpace_float64(*arguments))
+
+
+def csr_matrix(domain: mesh.Mesh, cell_dofs: npt.NDArray[np.int64], size: int) -> la.MatrixCSR:
+    """Empty matrix that couples all degrees of freedom of a cell, on this process alone.
+
+    Args:
+        domain: Mesh on this process.
+        cell_dofs: Degrees of freedom of each cell; shape (num_cells, dofs per cell).
+        size: Number of degrees of freedom.
+    """
+    index_map = cpp.common.IndexMap(MPI.COMM_SELF, size)
+    pattern = cpp.la.SparsityPattern(domain.comm, [index_map, index_map], [1, 1])
+    for dofs in cell_dofs.astype(np.int32):
+        pattern.insert(dofs, dofs)
+    pattern.finalize()
+    return la.matrix_csr(pattern)

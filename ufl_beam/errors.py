@@ -1,0 +1,56 @@
+"""What can go wrong, and the checks of numbers that all records share."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+
+class SceneError(ValueError):
+    """The scene or the call is wrong; raised before any mesh exists.
+
+    The message says which object, what is wrong and what to do.
+    """
+
+
+class ConvergenceError(RuntimeError):
+    """A step found no equilibrium, even after it was cut; nothing before it is lost.
+
+    Attributes:
+        time: Time of the last accepted state; s.
+        dt: The smallest step that was tried; s.
+        solution: The :class:`~ufl_beam.solution.Solution` up to ``time``.
+    """
+
+    def __init__(self, message: str, *, time: float, dt: float, solution: Any) -> None:
+        super().__init__(message)
+        self.time = time
+        self.dt = dt
+        self.solution = solution
+
+
+def require_number(
+    value: float, what: str, *, positive: bool = False, at_least: float = -math.inf
+) -> None:
+    """Raise :class:`SceneError` naming ``what`` unless ``value`` is a finite number in range."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise SceneError(f"{what} = {value!r} is not a number") from None
+    if not math.isfinite(number):
+        raise SceneError(f"{what} = {number} is not finite")
+    if positive and number <= 0:
+        raise SceneError(f"{what} = {number:g} must be positive")
+    if number < at_least:
+        raise SceneError(f"{what} = {number:g} must be at least {at_least:g}")
+
+
+def require_vector(value: Any, what: str) -> tuple[float, float]:
+    """``value`` as a pair of finite floats, or :class:`SceneError` naming ``what``."""
+    try:
+        x, y = value
+    except (TypeError, ValueError):
+        raise SceneError(f"{what} = {value!r} must be a pair (x, y)") from None
+    require_number(x, f"{what}[0]")
+    require_number(y, f"{what}[1]")
+    return float(x), float(y)

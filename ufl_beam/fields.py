@@ -1,0 +1,76 @@
+"""The finite element spaces of a share of the grid, and the functions that forms are written in."""
+
+from __future__ import annotations
+
+import basix.ufl
+import numpy as np
+import ufl
+
+from ufl_beam.compat import Array, csr_matrix, fem, la, line_mesh, space_with_dofs
+from ufl_beam.grid import Index, Share
+from ufl_beam.kinematics import Axis
+
+
+class Fields:
+    """Mesh and function spaces of the cells of one process.
+
+    Attributes:
+        share: The cells and degrees of freedom of this process.
+        axis: Undeformed axis, in UFL.
+        space: Configurations (u_x, u_y, ψ), with the degrees of freedom that joints share.
+        cell_dofs: Local degrees of freedom in the order of the cells of the mesh; (num_cells, 6).
+        order: Position in ``share.cells`` of each cell of the mesh.
+    """
+
+    def __init__(self, share: Share) -> None:
+        self.share = share
+        grid = share.grid
+        vertices, cells = np.unique(grid.cells[share.cells], return_inverse=True)
+        self.mesh = line_mesh(grid.points[vertices], cells.reshape(-1, 2))
+        self.order: Index = np.asarray(self.mesh.topology.original_cell_index, dtype=np.int64)
+        self._require_direction(grid.points[grid.cells[share.cells[self.order]]])
+        self.cell_dofs = share.cell_dofs[self.order]
+        self.axis = Axis(self.mesh)
+        line = basix.ufl.element("Lagrange", "interval", 1)
+        self.space = space_with_dofs(
+            self.mesh, basix.ufl.mixed_element([line, line, line]), self.cell_dofs, share.size
+        )
+
+    def matrix(self) -> la.MatrixCSR:
+        """A new matrix on the degrees of freedom of this process."""
+        return csr_matrix(self.mesh, self.cell_dofs, self.share.size)
+
+    def _require_direction(self, ends: Array) -> None:
+        """The mesh must keep the order of the vertices of a cell, which orients the beam."""
+        found = self.mesh.geometry.x[self.mesh.geometry.dofmap][:, :, :2]
+        if not np.array_equal(found, ends):
+            raise RuntimeError("this version of DOLFINx turns cells around; please report it")
+
+    def dx(self, degree: int) -> ufl.Measure:
+        """Integration over the cells; one degree per form, see :mod:`ufl_beam.forms`."""
+        return ufl.Measure("dx", domain=self.mesh, metadata={"quadrature_degree": degree})
+
+    def configuration(self) -> fem.Function:
+        """A new configuration (u_x, u_y, ψ)."""
+        return fem.Function(self.space)
+
+    def stiffness(self) -> fem.Function:
+        """(EA, GA, EI) of the cells; N, N, N m²."""
+        return self._of_sections("EA", "GA", "EI")
+
+    def inertia(self) -> fem.Function:
+        """(rhoA, rhoI) of the cells; kg/m, kg m."""
+        return self._of_sections("rhoA", "rhoI")
+
+    def _of_sections(self, *names: str) -> fem.Function:
+        grid = self.share.grid
+        of_beam = np.array([[getattr(b.section, n) for n in names] for b in grid.scene.beams])
+        element = basix.ufl.element("DG", "interval", 0, shape=(len(names),))
+        function = fem.Function(fem.functionspace(self.mesh, element))
+        cells = self.share.cells[self.order]
+        function.x.array[:] = of_beam[grid.beam_of_cell[cells]].ravel()
+        return function
+
+    def constant(self, value: float) -> fem.Constant:
+        """A number that forms are not compiled for anew."""
+        return fem.Constant(self.mesh, value)

@@ -1,0 +1,130 @@
+"""Strains of the Reissner beam and their algorithmic variation over a time step, in UFL.
+
+Pure functions: configurations ``(u_x, u_y, ψ)`` in, strains ``(Σ, Γ, K)`` out; no state, no mesh
+but the one that the arguments live on.  The letters are the paper's; P(n) is its equation n.
+"""
+
+import ufl
+from ufl.core.expr import Expr
+
+
+class Axis:
+    """Undeformed axis of the beams on a mesh of straight cells.
+
+    Attributes:
+        t0: Unit tangent of the cell, from its first to its last vertex; shape (2,).
+        n0: Unit normal, ``t0`` turned by +90°; shape (2,).
+        h: Length of the cell; m.
+    """
+
+    def __init__(self, mesh: ufl.Mesh) -> None:
+        J = ufl.Jacobian(mesh)
+        self.h = ufl.sqrt(J[0, 0] ** 2 + J[1, 0] ** 2)
+        self.t0 = ufl.as_vector([J[0, 0] / self.h, J[1, 0] / self.h])
+        self.n0 = ufl.as_vector([-self.t0[1], self.t0[0]])
+
+    def d(self, f: Expr) -> Expr:
+        """Derivative along the axis, ``f' = grad(f)·t0``."""
+        return ufl.dot(ufl.grad(f), self.t0)
+
+
+def _pull_back(a: Expr, ψ: Expr, axis: Axis) -> tuple[Expr, Expr]:
+    """Components of the plane vector ``a`` in the frame (t0, n0) turned by ``ψ``: Λᵀ a."""
+    along, across = ufl.dot(a, axis.t0), ufl.dot(a, axis.n0)
+    return (
+        ufl.cos(ψ) * along + ufl.sin(ψ) * across,
+        -ufl.sin(ψ) * along + ufl.cos(ψ) * across,
+    )
+
+
+def _turn(a: Expr) -> Expr:
+    """W a: the plane vector ``a`` turned by +90°."""
+    return ufl.as_vector([-a[1], a[0]])
+
+
+def split(q: Expr) -> tuple[Expr, Expr]:
+    """Displacement (2,) and rotation of a configuration (3,)."""
+    return ufl.as_vector([q[0], q[1]]), q[2]
+
+
+def strain(q: Expr, axis: Axis) -> Expr:
+    """Reissner's generalised strain (Σ, Γ, K).
+
+    Args:
+        q: Configuration (u_x, u_y, ψ); shape (3,); m, m, rad.
+        axis: Undeformed axis.
+
+    Returns:
+        (Σ, Γ, K): axial strain, shear strain, curvature; shape (3,); 1, 1, 1/m.
+
+    Equations:
+        P(6), P(10), for any initial direction of the axis.
+    """
+    u, ψ = split(q)
+    Σ, Γ = _pull_back(axis.t0 + axis.d(u), ψ, axis)
+    return ufl.as_vector([Σ - 1, Γ, axis.d(ψ)])  # P(6)
+
+
+def virtual_strain(q: Expr, w: Expr, axis: Axis) -> Expr:
+    """Variation of :func:`strain` at ``q`` in the direction ``w``.
+
+    Args:
+        q: Configuration; shape (3,).
+        w: Direction (w_u, w_ψ), usually a test function; shape (3,).
+        axis: Undeformed axis.
+
+    Returns:
+        (w_Σ, w_Γ, w_K); shape (3,).
+
+    Equations:
+        P(21), pulled back.
+    """
+    (u, ψ), (w_u, w_ψ) = split(q), split(w)
+    w_Σ, w_Γ = _pull_back(axis.d(w_u) - _turn(axis.t0 + axis.d(u)) * w_ψ, ψ, axis)  # P(21)
+    return ufl.as_vector([w_Σ, w_Γ, axis.d(w_ψ)])
+
+
+def _over_tan(x: Expr) -> Expr:
+    """x / tan x, smooth at zero: the series below 1e-2 has a remainder under 1e-18."""
+    x2 = x**2
+    series = 1 - x2 / 3 * (1 + x2 / 15 * (1 + x2 * 2 / 21 * (1 + x2 / 10)))
+    small = ufl.lt(x2, 1e-4)
+    safe = ufl.conditional(small, 1.0, x)
+    return ufl.conditional(small, series, safe * ufl.cos(safe) / ufl.sin(safe))
+
+
+def virtual_strain_over_step(q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
+    """Algorithmic variation of the strain over one step, exact for energy and momentum.
+
+    With ``w = (Δu, 2 tan(Δψ/2))`` at the nodes it is ``strain(q1) - strain(q0)`` to round-off, which
+    makes the work of the algorithmic resultants the increment of stored energy; and it vanishes for
+    rigid rotations about any point, which makes angular momentum exact.  P(82) as printed has
+    neither property beyond O(Δψ²); docs/errata.md derives this form.
+
+    Valid on two-node cells with a one-point rule, for ``|Δψ| < π``.
+
+    Args:
+        q0: Configuration at t_n; shape (3,).
+        q1: Configuration at t_n+1; shape (3,).
+        w: Direction (w_u, w_ψ); shape (3,).
+        axis: Undeformed axis.
+
+    Returns:
+        (w_Σ, w_Γ, w_K); shape (3,).
+
+    Equations:
+        P(82) in its corrected form.
+    """
+    (u0, ψ0), (u1, ψ1), (w_u, w_ψ) = split(q0), split(q1), split(w)
+    # Half the increments of rotation at both nodes of the cell are δ - e and δ + e.
+    δ = (ψ1 - ψ0) / 2
+    e = axis.h / 4 * axis.d(ψ1 - ψ0)
+    tan_δ, tan_e = ufl.sin(δ) / ufl.cos(δ), ufl.sin(e) / ufl.cos(e)
+    shift = -tan_δ * tan_e / 2
+    stretch = (1 - tan_δ**2 * tan_e**2) / (1 + tan_δ**2) * _over_tan(e)
+
+    φ_m = axis.t0 + axis.d((u0 + u1) / 2)
+    a = axis.d(w_u) - _turn(φ_m) * (w_ψ + shift * axis.h * axis.d(w_ψ))
+    # The mean of both frames is cos δ times the frame of the mean rotation.
+    w_Σ, w_Γ = ((x0 + x1) / 2 for x0, x1 in zip(_pull_back(a, ψ0, axis), _pull_back(a, ψ1, axis)))
+    return ufl.as_vector([w_Σ, w_Γ, stretch * axis.d(w_ψ)])  # P(82)!

@@ -1,0 +1,91 @@
+"""The ledger: every joule that is in the scene, came in, or went out."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ufl_beam.compat import Array
+
+
+@dataclass
+class Ledger:
+    """Energies of one process at one time; terms write into it when a step is accepted.
+
+    Terms make their entries when they are made, so that all processes know the same ones.
+
+    Attributes:
+        state: Energies that depend on the state: kinetic, stored; J.
+        supplied: Work that came in since the beginning, by source; J.
+        lost: Energy that went out since the beginning, by sink; never negative; J.
+    """
+
+    state: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
+    supplied: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
+    lost: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
+
+    def begin(self) -> None:
+        """Forget the state; what was supplied and lost remains."""
+        for name in self.state:
+            self.state[name] = 0.0
+
+
+@dataclass(frozen=True)
+class Energy:
+    """The ledger of a run.
+
+    Attributes:
+        state: Arrays by name, "kinetic" and "stored"; each (n+1,); J.
+        supplied: Work since the beginning, by source: "loads", "supports"; each (n+1,); J.
+        lost: Energy that went out since the beginning, by sink: "numerical", ...; each (n+1,); J.
+    """
+
+    state: dict[str, Array]
+    supplied: dict[str, Array]
+    lost: dict[str, Array]
+
+    def __getitem__(self, name: str) -> Array:
+        """The entry ``name``; (n+1,); J.  Entries of effects that the scene lacks do not exist."""
+        return {**self.state, **self.supplied, **self.lost}[name]
+
+    @property
+    def total(self) -> Array:
+        """Energy in the scene; (n+1,); J."""
+        return _sum(self.state)
+
+    @property
+    def imbalance(self) -> Array:
+        """What the ledger does not explain; (n+1,); J."""
+        total = self.total
+        return total - total[0] - _sum(self.supplied) + _sum(self.lost)
+
+    @property
+    def throughput(self) -> float:
+        """Energy that went through: the most that the scene held, and all work on or by it; J."""
+        works = sum(float(np.sum(np.abs(np.diff(work)))) for work in self.supplied.values())
+        return float(np.max(self.total)) + works
+
+    @property
+    def worst(self) -> float:
+        """Largest imbalance, as a part of the energy that went through."""
+        largest = float(np.max(np.abs(self.imbalance)))
+        return largest / self.throughput if self.throughput > 0 else largest
+
+    def __str__(self) -> str:
+        lines = [
+            f"  {kind:9s} {name:12s} {values[-1]: .6e} J"
+            for kind, entries in (
+                ("in scene", self.state),
+                ("supplied", self.supplied),
+                ("lost", self.lost),
+            )
+            for name, values in entries.items()
+        ]
+        lines.append(f"  imbalance at most {self.worst:.1e} of {self.throughput:.6e} J throughput")
+        return "\n".join(["energy at the end", *lines])
+
+
+def _sum(entries: dict[str, Array]) -> Array:
+    return np.asarray(sum(entries.values(), np.zeros(1)))

@@ -1,0 +1,166 @@
+"""Loads, and how they vary in time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from ufl_beam.beams import Beam, Place
+from ufl_beam.errors import SceneError, require_number, require_vector
+
+TimeFunction = Callable[[float], float]
+
+
+def steady(t: float) -> float:
+    """The time function of a load that is always there: 1."""
+    return 1.0
+
+
+def ramp(duration: float) -> TimeFunction:
+    """The time function that grows linearly from 0 to 1 within ``duration`` (s) and stays."""
+    require_number(duration, "ramp: duration", positive=True)
+    return Table((0.0, duration), (0.0, 1.0))
+
+
+@dataclass(frozen=True)
+class Table:
+    """A time function through points, linear between them and constant outside.
+
+    Args:
+        times: Increasing times; s.
+        values: Value at each time.
+
+    Raises:
+        SceneError: Different lengths, or times that do not increase.
+    """
+
+    times: Sequence[float]
+    values: Sequence[float]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "times", tuple(self.times))
+        object.__setattr__(self, "values", tuple(self.values))
+        if len(self.times) != len(self.values) or len(self.times) < 1:
+            raise SceneError(
+                f"Table: {len(self.times)} times and {len(self.values)} values; give as many of each"
+            )
+        for kind, numbers in (("times", self.times), ("values", self.values)):
+            for i, number in enumerate(numbers):
+                require_number(number, f"Table: {kind}[{i}]")
+        for i, (before, after) in enumerate(pairwise(self.times)):
+            if after <= before:
+                raise SceneError(
+                    f"Table: times must increase, but times[{i}] = {before:g} is followed by {after:g}"
+                )
+
+    def __call__(self, t: float) -> float:
+        """Value at time ``t``."""
+        return float(np.interp(t, self.times, self.values))
+
+
+def require_time_function(function: TimeFunction, what: str) -> None:
+    """Raise :class:`SceneError` naming ``what`` unless ``function`` gives a number at t = 0."""
+    if not callable(function):
+        raise SceneError(f"{what}: time = {function!r} must be a function of t, such as ub.Table")
+    try:
+        value = float(function(0.0))
+    except Exception as error:
+        raise SceneError(f"{what}: the time function fails at t = 0: {error!r}") from error
+    if not math.isfinite(value):
+        raise SceneError(f"{what}: the time function is {value} at t = 0")
+
+
+@dataclass(frozen=True, eq=False)
+class PointLoad:
+    """Dead force and moment at a place: they keep their direction in the plane.
+
+    Args:
+        place: Where.
+        force: (F_x, F_y); N.
+        moment: Counter-clockwise; N m.
+        time: Factor at time t.
+    """
+
+    place: Place
+    force: tuple[float, float] = (0.0, 0.0)
+    moment: float = 0.0
+    time: TimeFunction = steady
+
+    def __post_init__(self) -> None:
+        _check_point_load(self, "PointLoad")
+
+
+@dataclass(frozen=True, eq=False)
+class FollowerLoad:
+    """Force at a place that turns with the cross-section; not conservative.
+
+    Args:
+        place: Where.
+        force: (F_x, F_y) before any rotation; N.
+        moment: Counter-clockwise; N m.
+        time: Factor at time t.
+    """
+
+    place: Place
+    force: tuple[float, float] = (0.0, 0.0)
+    moment: float = 0.0
+    time: TimeFunction = steady
+
+    def __post_init__(self) -> None:
+        _check_point_load(self, "FollowerLoad")
+
+
+def _check_point_load(load: PointLoad | FollowerLoad, kind: str) -> None:
+    if not isinstance(load.place, Place):
+        raise SceneError(f"{kind}: {load.place!r} is not a place; use beam.start, .end or .at(s)")
+    require_vector(load.force, f"{kind} at {load.place}: force")
+    require_number(load.moment, f"{kind} at {load.place}: moment")
+    require_time_function(load.time, f"{kind} at {load.place}")
+
+
+@dataclass(frozen=True, eq=False)
+class LineLoad:
+    """Dead force and moment along a whole beam, per undeformed length.
+
+    Args:
+        beam: Where.
+        force: (f_x, f_y); N/m.
+        moment: Counter-clockwise; N m/m.
+        time: Factor at time t.
+    """
+
+    beam: Beam
+    force: tuple[float, float] = (0.0, 0.0)
+    moment: float = 0.0
+    time: TimeFunction = steady
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.beam, Beam):
+            raise SceneError(f"LineLoad: {self.beam!r} is not a Beam")
+        require_vector(self.force, f"LineLoad on {self.beam.name}: force")
+        require_number(self.moment, f"LineLoad on {self.beam.name}: moment")
+        require_time_function(self.time, f"LineLoad on {self.beam.name}")
+
+
+@dataclass(frozen=True, eq=False)
+class Gravity:
+    """Weight of all beams and point masses.
+
+    Args:
+        acceleration: (g_x, g_y); m/s².
+        time: Factor at time t.
+    """
+
+    acceleration: tuple[float, float] = (0.0, -9.81)
+    time: TimeFunction = steady
+
+    def __post_init__(self) -> None:
+        require_vector(self.acceleration, "Gravity: acceleration")
+        require_time_function(self.time, "Gravity")
+
+
+Load = PointLoad | FollowerLoad | LineLoad | Gravity

@@ -1,0 +1,172 @@
+"""Files that a run writes on the way."""
+
+from __future__ import annotations
+
+import csv
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import basix.ufl
+import numpy as np
+from mpi4py import MPI
+
+from ufl_beam.beams import Place
+from ufl_beam.compat import fem, io, line_mesh
+from ufl_beam.errors import SceneError
+
+if TYPE_CHECKING:
+    from ufl_beam.simulate import Simulation
+
+
+class Recorder(ABC):
+    """Something that looks at each accepted step; all processes call it together."""
+
+    @abstractmethod
+    def require_writable(self) -> None:
+        """Raise :class:`SceneError` if the output cannot be written; before the run."""
+
+    @abstractmethod
+    def open(self, simulation: Simulation) -> None:
+        """Begin, with the initial state."""
+
+    @abstractmethod
+    def write(self, simulation: Simulation) -> None:
+        """Record the state after a step."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """End; also called when the run fails."""
+
+
+class XDMF(Recorder):
+    """Time series for ParaView: displacement and rotation at vertices, N, V, M in cells.
+
+    Args:
+        path: File, ending in ``.xdmf``; the data are beside it in ``.h5``.
+        every: Write every so many steps.
+
+    Raises:
+        SceneError: ``every`` is less than 1.
+    """
+
+    def __init__(self, path: str | Path, *, every: int = 1) -> None:
+        if every < 1:
+            raise SceneError(f"XDMF {path}: every = {every} must be at least 1")
+        self._path, self._every = Path(path), every
+        self._files: list[Any] = []
+
+    def require_writable(self) -> None:
+        """Raise :class:`SceneError` if the file cannot be written."""
+        _require_writable(self._path)
+
+    def open(self, simulation: Simulation) -> None:
+        """Write the mesh and the initial state."""
+        self._count = 0
+        if simulation.comm.rank == 0:
+            grid = simulation.grid
+            domain = line_mesh(grid.points, grid.cells)
+            self._order = domain.topology.original_cell_index
+            line = basix.ufl.element("Lagrange", "interval", 1)
+            vectors = basix.ufl.element("Lagrange", "interval", 1, shape=(3,))
+            constants = basix.ufl.element("DG", "interval", 0)
+            self._displacement = _named(domain, vectors, "displacement")
+            self._rotation = _named(domain, line, "rotation")
+            self._resultants = [_named(domain, constants, name) for name in "NVM"]
+            dofmap = self._rotation.function_space.dofmap.list
+            self._vertex_of_dof = np.empty(len(grid.points), dtype=np.int64)
+            self._vertex_of_dof[dofmap] = grid.cells[self._order]
+            self._files = [io.XDMFFile(MPI.COMM_SELF, self._path, "w")]
+            self._files[0].write_mesh(domain)
+        self._put(simulation)
+
+    def write(self, simulation: Simulation) -> None:
+        """Record every so many steps."""
+        self._count += 1
+        if self._count % self._every == 0:
+            self._put(simulation)
+
+    def _put(self, simulation: Simulation) -> None:
+        q = simulation.share.gather(simulation.q)
+        resultants = simulation.section_forces()
+        for file in self._files:
+            at_dofs = q[simulation.grid.dofs[self._vertex_of_dof]]
+            self._displacement.x.array.reshape(-1, 3)[:, :2] = at_dofs[:, :2]
+            self._rotation.x.array[:] = at_dofs[:, 2]
+            for component, function in enumerate(self._resultants):
+                function.x.array[:] = resultants[self._order, component]
+            for function in (self._displacement, self._rotation, *self._resultants):
+                file.write_function(function, simulation.t)
+
+    def close(self) -> None:
+        """Close the file."""
+        for file in self._files:
+            file.close()
+        self._files = []
+
+
+class History(Recorder):
+    """Table of the motion of places and of the ledger, one row a step, complete if the run dies.
+
+    Columns: t; u, v, psi of each place; then the entries of the ledger (J).
+
+    Args:
+        path: File, ending in ``.csv``.
+        places: Places to follow.
+    """
+
+    def __init__(self, path: str | Path, places: Sequence[Place] = ()) -> None:
+        self._path, self._places = Path(path), tuple(places)
+        self._files: list[Any] = []
+
+    def require_writable(self) -> None:
+        """Raise :class:`SceneError` if the file cannot be written."""
+        _require_writable(self._path)
+
+    def open(self, simulation: Simulation) -> None:
+        """Write the header and the initial state."""
+        self._around = [simulation.grid.weights(place) for place in self._places]
+        if simulation.comm.rank == 0:
+            self._files = [self._path.open("w", newline="")]
+        names = [f"{c} {place}" for place in self._places for c in ("u", "v", "psi")]
+        self._write_row(["t", *names, *simulation.ledger_names()])
+        self.write(simulation)
+
+    def write(self, simulation: Simulation) -> None:
+        """Write the row of the state."""
+        q = simulation.share.gather(simulation.q)
+        dofs = simulation.grid.dofs
+        motion = [w @ q[dofs[vertices]] for vertices, w in self._around]
+        entries = {name: e for group in simulation.entries() for name, e in group.items()}
+        energies = [entries.get(name, 0.0) for name in simulation.ledger_names()]
+        numbers = [simulation.t, *np.ravel(motion), *energies]
+        self._write_row([repr(float(x)) for x in numbers])
+
+    def _write_row(self, row: list[str]) -> None:
+        for file in self._files:
+            csv.writer(file).writerow(row)
+            file.flush()
+
+    def close(self) -> None:
+        """Close the file."""
+        for file in self._files:
+            file.close()
+        self._files = []
+
+
+def _named(domain: Any, element: Any, name: str) -> fem.Function:
+    return fem.Function(fem.functionspace(domain, element), name=name)
+
+
+def _require_writable(path: Path) -> None:
+    if not path.parent.is_dir():
+        raise SceneError(f"output {path}: there is no directory {path.parent}; make it first")
+    new = not path.exists()
+    try:
+        with path.open("ab"):
+            pass
+    except OSError as error:
+        raise SceneError(f"output {path} cannot be written: {error.strerror}") from None
+    if new:
+        path.unlink()

@@ -1,0 +1,148 @@
+"""Time schemes: how two states of the scene become the equation of a step.
+
+A scheme says, in UFL, which strains vary and which resultants act during a step, how velocities
+follow from displacements, and at what time loads act.  Neither the laws of the material nor the
+solver know which scheme runs; a new one (Newmark, generalised-α, ...) is one more class here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import ufl
+from ufl.core.expr import Expr
+
+from ufl_beam import kinematics
+from ufl_beam.compat import Array
+from ufl_beam.errors import SceneError, require_number
+from ufl_beam.kinematics import Axis
+
+Constant = Callable[[float], Expr]
+"""Makes a number of the scheme a constant of the form, so that changing it compiles nothing."""
+
+
+class Scheme(Protocol):
+    """What a time scheme must say."""
+
+    dynamic: bool
+    """Whether the scene has inertia."""
+
+    load_weight: float
+    """Loads act at the part ``load_weight`` of the step, in time and in rotation."""
+
+    def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
+        """Variation of the strains that the resultants work on; shape (3,)."""
+
+    def resultants(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> Expr:
+        """(N, V, M) that act during the step, from stiffness and strains at both ends."""
+
+    def losses(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> tuple[Expr, ...]:
+        """Energies per length that the resultants lose numerically in the step; often none."""
+
+    def turn(self, increment: Array) -> Array:
+        """What moments work on in a step, from the increments of rotation."""
+
+    def acting(self, before: Array, now: Array) -> Array:
+        """Forces that do the work of a step, from those in its equation and in the one before."""
+
+
+@dataclass(frozen=True)
+class Static:
+    """Equilibrium at the end of each step; no inertia, time is the load parameter."""
+
+    dynamic = False
+    load_weight = 1.0
+
+    def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
+        """The variation at the end of the step."""
+        return kinematics.virtual_strain(q1, w, axis)
+
+    def resultants(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> Expr:
+        """C e at the end of the step; the components are uncoupled."""
+        return _scaled(C, e1)
+
+    def losses(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> tuple[Expr, ...]:
+        """None."""
+        return ()
+
+    def turn(self, increment: Array) -> Array:
+        """Moments work on the increments themselves."""
+        return increment
+
+    def acting(self, before: Array, now: Array) -> Array:
+        """The mean of both ends: the trapezoidal rule, exact where forces grow in proportion."""
+        return (before + now) / 2
+
+
+@dataclass(frozen=True)
+class Midpoint:
+    """Midpoint rule that conserves energy and momentum exactly, or loses energy as it is told.
+
+    ``alpha = beta = 0`` conserves energy, linear and angular momentum to solver tolerance at any
+    step size.  Positive values take energy out of the high frequencies, never in: ``alpha`` through
+    the resultants, which keeps the momenta exact; ``beta`` through the velocities, which gives
+    up angular momentum.  What they take is the entry "numerical" of the ledger.
+
+    Args:
+        alpha: Dissipation by the resultants, from 0 to 1/2.
+        beta: Dissipation by the velocities, from 0 to 1/2.
+
+    Raises:
+        SceneError: A number outside [0, 1/2].
+
+    Equations:
+        P(77)-P(91); P(82) corrected, see docs/errata.md.
+    """
+
+    alpha: float = 0.0
+    beta: float = 0.0
+
+    dynamic = True
+    load_weight = 0.5
+
+    def __post_init__(self) -> None:
+        for name, value in (("alpha", self.alpha), ("beta", self.beta)):
+            require_number(value, f"Midpoint: {name}", at_least=0.0)
+            if value > 0.5:
+                raise SceneError(f"Midpoint: {name} = {value:g} must lie between 0 and 1/2")
+
+    def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
+        """The variation that turns the step into the increment of the strains."""
+        return kinematics.virtual_strain_over_step(q0, q1, w, axis)
+
+    def resultants(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> Expr:
+        """The mean of both ends, and more of the end the more energy is to go."""
+        mean = _scaled(C, (e0 + e1) / 2)  # P(83)
+        if self.alpha == 0:
+            return mean
+        return mean + constant(self.alpha) * _scaled(C, e1 - e0)  # P(89)
+
+    def losses(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> tuple[Expr, ...]:
+        """What ``alpha`` takes."""
+        if self.alpha == 0:
+            return ()
+        return (constant(self.alpha) * ufl.dot(_scaled(C, e1 - e0), e1 - e0),)  # P(90)
+
+    def turn(self, increment: Array) -> Array:
+        """Moments work on 2 tan(Δψ/2); see docs/errata.md."""
+        turn = increment * 0.5
+        np.tan(turn, out=turn)
+        turn *= 2.0
+        return turn
+
+    def acting(self, before: Array, now: Array) -> Array:
+        """The forces in the equation of the step."""
+        return now
+
+    def velocity_weights(self, dt: float) -> tuple[float, float]:
+        """(a, b) of v1 = a s - b v0, with the step s = (Δu, 2 tan(Δψ/2)) of the nodes."""
+        keep = 0.5 + self.beta
+        return 1 / (dt * keep), (0.5 - self.beta) / keep  # P(87)
+
+
+def _scaled(C: Expr, e: Expr) -> Expr:
+    """Component by component product; shape (3,)."""
+    return ufl.as_vector([C[i] * e[i] for i in range(3)])

@@ -1,0 +1,354 @@
+"""From a scene to its motion: build what the scene requires, then step through time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+from mpi4py import MPI
+from tqdm import tqdm
+
+from ufl_beam.applied import DeadLoads, FollowerLoads
+from ufl_beam.compat import Array
+from ufl_beam.errors import ConvergenceError, SceneError, require_number
+from ufl_beam.fields import Fields
+from ufl_beam.grid import Grid, Share
+from ufl_beam.ledger import Ledger
+from ufl_beam.loads import FollowerLoad
+from ufl_beam.mechanism import require_no_mechanism
+from ufl_beam.record import Recorder
+from ufl_beam.scene import Scene
+from ufl_beam.schemes import Midpoint, Scheme
+from ufl_beam.solution import Solution
+from ufl_beam.solve import Newton, Solver, StepFailed
+from ufl_beam.sparse import as_slice
+from ufl_beam.supports import Supports
+from ufl_beam.terms import ElasticBeams, Inertia, NodalStep, SectionForces, Step, Term
+
+SMALLEST_PART = 2**12
+"""A step is cut into at most this number of parts."""
+
+LARGEST_TURN = 0.75 * math.pi
+"""A step that turns a node further is cut; the algorithmic strains end at π."""
+
+
+def simulate(
+    scene: Scene,
+    scheme: Scheme,
+    *,
+    t: tuple[float, float],
+    dt: float,
+    record: Sequence[Recorder] | Recorder = (),
+    every: int = 1,
+    start: Solution | None = None,
+    newton: Newton | None = None,
+    progress: bool = True,
+    comm: MPI.Intracomm = MPI.COMM_WORLD,
+) -> Solution:
+    """Simulate a scene.
+
+    Args:
+        scene: What is modelled.
+        scheme: :class:`Static` or :class:`Midpoint`.
+        t: Beginning and end; s.  In statics time is the load parameter.
+        dt: Step; s.  The last step ends at the end, so all steps are a little shorter if ``dt`` does
+            not divide the time.  A step without convergence is cut into parts.
+        record: Files to write on the way, such as :class:`XDMF` and :class:`History`.
+        every: Keep every so many steps in the solution; the last one always.
+        start: Solution of the same beams whose last state is the initial state.
+        newton: Tolerances and PETSc options.
+        progress: Show a progress bar if the output is a terminal.
+        comm: Processes that share the scene.
+
+    Returns:
+        The motion, the forces and the ledger.
+
+    Raises:
+        SceneError: The call or the scene is wrong; nothing was computed.
+        ConvergenceError: A step failed; it carries the solution so far, and files are complete.
+    """
+    t0, t1 = _require_times(t, dt)
+    if every < 1:
+        raise SceneError(f"simulate: every = {every} must be at least 1")
+    recorders = [record] if isinstance(record, Recorder) else list(record)
+    for recorder in recorders:
+        recorder.require_writable()
+    simulation = Simulation(scene, scheme, t0=t0, start=start, newton=newton, comm=comm)
+    # A step is never longer than asked for; the slack is for the rounding of (t1 - t0) / dt.
+    steps = max(1, math.ceil((t1 - t0) / dt * (1 - 1e-9)))
+    solution = simulation.solution
+    try:
+        for recorder in recorders:
+            recorder.open(simulation)
+        solution.keep(simulation)
+        quiet = None if progress and comm.rank == 0 else True
+        for n in tqdm(range(1, steps + 1), unit="step", disable=quiet, mininterval=0.5):
+            simulation.step_to(t0 + (t1 - t0) * n / steps)
+            if n % every == 0 or n == steps:
+                solution.keep(simulation)
+            for recorder in recorders:
+                recorder.write(simulation)
+    finally:
+        for recorder in recorders:
+            recorder.close()
+        simulation.close()
+    return solution
+
+
+def _require_times(t: tuple[float, float], dt: float) -> tuple[float, float]:
+    try:
+        t0, t1 = t
+    except (TypeError, ValueError):
+        raise SceneError(f"simulate: t = {t!r} must be a pair (beginning, end)") from None
+    require_number(t0, "simulate: t[0]")
+    require_number(t1, "simulate: t[1]")
+    require_number(dt, "simulate: dt", positive=True)
+    if t1 <= t0:
+        raise SceneError(f"simulate: the end t[1] = {t1:g} must come after the beginning {t0:g}")
+    return float(t0), float(t1)
+
+
+class Simulation:
+    """A scene in motion: one state, and the step to the next.
+
+    :func:`simulate` is a loop over :meth:`step_to`; use this class for loops of your own.
+
+    Args:
+        scene: What is modelled.
+        scheme: :class:`Static` or :class:`Midpoint`.
+        t0: Time of the initial state; s.
+        start: Solution of the same beams whose last state is the initial state.
+        newton: Tolerances and PETSc options.
+        comm: Processes that share the scene.
+
+    Attributes:
+        t: Time; s.
+        q: Configuration at the local degrees of freedom.
+        ledger: Energies of this process.
+        solution: The motion so far.
+        parts: Number of parts that steps were cut into, those not cut included.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        scheme: Scheme,
+        *,
+        t0: float = 0.0,
+        start: Solution | None = None,
+        newton: Newton | None = None,
+        comm: MPI.Intracomm = MPI.COMM_WORLD,
+    ) -> None:
+        if not scheme.dynamic:
+            require_no_mechanism(scene)
+        self.scene, self.scheme, self.comm = scene, scheme, comm
+        self.grid = Grid(scene)
+        self.share = Share(self.grid, comm)
+        self.fields = Fields(self.share)
+        self._A = self.fields.matrix()
+        self.t = t0
+        self.q = np.zeros(self.share.size)
+        self.ledger = Ledger()
+        self.parts = 0
+
+        self.beams = ElasticBeams(self.fields, scheme, self._A, self.ledger)
+        self.loads = self._make_loads()
+        self.terms: list[Term] = [self.beams, *self.loads]
+        if isinstance(scheme, Midpoint):
+            self.inertia = Inertia(
+                self.fields, scheme, self._A, self.ledger, self._initial_velocity()
+            )
+            self.terms.append(self.inertia)
+        self.supports = Supports(self.share, scheme, self.ledger, self._A)
+        if start is not None:
+            self._carry_on(start)
+        self._q_before, self._dt_before = self.q, math.inf
+        self._nodal_step = NodalStep(self.share, scheme)
+        self._rotations = as_slice(self.share.rotations())
+        for term in self.terms:
+            term.add_state(self.q)
+        self._solver = Solver(
+            self.share,
+            self._A,
+            residual=self._residual,
+            complete=self.supports.hold,
+            tangent=self._tangent,
+            forces=lambda: [self.beams.force, *(load.force for load in self.loads)],
+            newton=newton or Newton(),
+        )
+        self.solution = Solution(scene, self.grid)
+
+    # -- building ------------------------------------------------------------------------------
+
+    def _make_loads(self) -> list[DeadLoads | FollowerLoads]:
+        followers = [load for load in self.scene.loads if isinstance(load, FollowerLoad)]
+        dead = [load for load in self.scene.loads if not isinstance(load, FollowerLoad)]
+        loads: list[DeadLoads | FollowerLoads] = []
+        if dead:
+            loads.append(DeadLoads(dead, self.share, self.scheme, self.ledger))
+        if followers:
+            loads.append(FollowerLoads(followers, self.share, self.scheme, self.ledger, self._A))
+        return loads
+
+    def _initial_velocity(self) -> Array:
+        """Velocities of :class:`Velocity`, at the local degrees of freedom."""
+        v = np.full(self.grid.size, np.nan)
+        for velocity in self.scene.initial:
+            for beam in velocity.beams:
+                vertices = self.grid.vertices_of(beam)
+                new = np.array([velocity.at(x, y) for x, y in self.grid.points[vertices]])
+                dofs = self.grid.dofs[vertices]
+                apart = np.abs(v[dofs] - new) > 1e-9 * np.abs(new).max()
+                if apart.any():
+                    x, y = self.grid.points[vertices[np.flatnonzero(apart.any(axis=1))[0]]]
+                    raise SceneError(
+                        f"Velocity: {beam.name} gets two different velocities at ({x:g}, {y:g}), "
+                        "from itself or from a beam that it is joined to"
+                    )
+                v[dofs] = new
+        return np.nan_to_num(v)[self.share.dofs]
+
+    def _carry_on(self, start: Solution) -> None:
+        if start.grid.scene.beams != self.scene.beams or start.grid.size != self.grid.size:
+            raise SceneError(
+                "start: the solution is of other beams or joints; use the same Beam objects"
+            )
+        self.q = start.q[-1][self.share.dofs]
+        if self.scheme.dynamic and len(start.v):
+            self.inertia.v = start.v[-1][self.share.dofs]
+        for load in self.loads:
+            load.carry_on(self.t)
+
+    # -- the equation of a step ----------------------------------------------------------------
+
+    def _residual(self, x: Array, r: Array) -> None:
+        q1 = self.supports.in_plane(x)
+        r.fill(0.0)
+        for term in self.terms:
+            term.add_residual(q1, r)
+        self.supports.enter(r)
+
+    def _tangent(self, x: Array) -> None:
+        q1 = self.supports.in_plane(x)
+        self._A.data.fill(0.0)
+        for term in self.terms:
+            term.add_tangent(q1)
+        self.supports.hold_matrix(self._A.data)
+
+    # -- stepping ------------------------------------------------------------------------------
+
+    def step_to(self, t1: float) -> None:
+        """Go to the time ``t1``, in one step or, where that fails, in parts.
+
+        Raises:
+            ConvergenceError: Even the smallest part failed; the state is that of the last part that
+                was accepted, which the solution of the error ends with.
+        """
+        t0, done, part = self.t, 0, SMALLEST_PART
+        while done < SMALLEST_PART:
+            end = t1 if done + part == SMALLEST_PART else t0 + (t1 - t0) * (done + part) / SMALLEST_PART
+            try:
+                self._advance(end)
+            except StepFailed as failure:
+                if part == 1:
+                    self._give_up(failure, end)
+                part //= 2
+                continue
+            done += part
+            # A part grows again where the larger one would begin anyway.
+            if done % (2 * part) == 0 and part < SMALLEST_PART:
+                part *= 2
+
+    def _advance(self, t1: float) -> None:
+        """One step of the scheme; the state changes only if it succeeds."""
+        weight = self.scheme.load_weight
+        step = Step(self.t, t1, self.t + weight * (t1 - self.t), self.q)
+        for term in self.terms:
+            term.begin(step)
+        guess = self.q + (self.q - self._q_before) * (step.dt / self._dt_before)
+        self.supports.enter(guess)
+        self.supports.move(guess, t1)
+        q1 = self._solver.solve(guess)
+        self.supports.leave(q1)
+        s = self._nodal_step(self.q, q1)
+        self._require_small_turns(q1)
+        for term in self.terms:
+            term.accept(q1, s)
+        self.supports.enter(s)
+        self.supports.accept(s)
+        self._q_before, self._dt_before = self.q, step.dt
+        self.q, self.t = q1, t1
+        self.parts += 1
+        self.ledger.begin()
+        for term in self.terms:
+            term.add_state(q1)
+
+    def _require_small_turns(self, q1: Array) -> None:
+        turn = np.max(np.abs(q1[self._rotations] - self.q[self._rotations]), initial=0.0)
+        if self.comm.size > 1:
+            turn = self.comm.allreduce(turn, op=MPI.MAX)
+        if turn > LARGEST_TURN and self.scheme.dynamic:
+            raise StepFailed(
+                f"a node turns by {turn:.3g} rad in the step, and |Δψ| must stay below π; reduce dt"
+            )
+
+    def _give_up(self, failure: StepFailed, end: float) -> None:
+        self.solution.keep(self)
+        dt = end - self.t
+        raise ConvergenceError(
+            f"no equilibrium after t = {self.t:.9g} s, even with dt = {dt:.3g} s: {failure}. "
+            "Try a smaller dt, a scheme that takes energy out of high frequencies such as "
+            "Midpoint(alpha=0.05, beta=0.05), or loads that grow more slowly",
+            time=self.t,
+            dt=dt,
+            solution=self.solution,
+        ) from failure
+
+    # -- what recorders and solutions ask ------------------------------------------------------
+
+    @property
+    def iterations(self) -> int:
+        """Newton iterations so far."""
+        return self._solver.iterations
+
+    def velocities(self) -> list[Array]:
+        """Velocities at the local degrees of freedom; none in statics."""
+        return [self.inertia.v] if self.scheme.dynamic else []
+
+    def reactions(self) -> Array:
+        """Forces of all supports on the scene; (num_supports, 3); N, N, N m."""
+        if not self.scene.supports:
+            return np.zeros((0, 3))
+        if self.parts == 0:
+            return np.full((len(self.scene.supports), 3), np.nan)
+        everywhere = self.share.gather(self.supports.all_reactions(self.share.size))
+        return np.array([everywhere[self.share.at(s.place)] for s in self.scene.supports])
+
+    def entries(self) -> tuple[dict[str, float], ...]:
+        """The ledger over all processes: state, supplied, lost; J."""
+        groups = (self.ledger.state, self.ledger.supplied, self.ledger.lost)
+        if self.comm.size == 1:
+            return tuple(dict(group) for group in groups)
+        everyone = self.comm.allgather([dict(group) for group in groups])
+        return tuple(
+            {name: sum(one[g][name] for one in everyone) for name in group}
+            for g, group in enumerate(groups)
+        )
+
+    def ledger_names(self) -> list[str]:
+        """Names of the entries of the ledger."""
+        return [*self.ledger.state, *self.ledger.supplied, *self.ledger.lost]
+
+    def section_forces(self) -> Array:
+        """(N, V, M) in all cells; (num_cells, 3); N, N, N m; all processes call it together."""
+        return self.share.gather_cells(self._section_forces(self.q))
+
+    @cached_property
+    def _section_forces(self) -> SectionForces:
+        return SectionForces(self.fields)
+
+    def close(self) -> None:
+        """Give back what PETSc holds."""
+        self._solver.destroy()

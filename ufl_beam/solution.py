@@ -1,0 +1,167 @@
+"""What a run gives back: the motion, the forces and the ledger."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from mpi4py import MPI
+
+from ufl_beam.beams import Beam, Place
+from ufl_beam.compat import Array
+from ufl_beam.errors import SceneError
+from ufl_beam.fields import Fields
+from ufl_beam.grid import Grid, Share
+from ufl_beam.ledger import Energy
+from ufl_beam.scene import Scene, Support
+from ufl_beam.sparse import Product
+from ufl_beam.terms import SectionForces, mass_matrix
+
+if TYPE_CHECKING:
+    from ufl_beam.simulate import Simulation
+
+
+class Solution:
+    """The motion of a scene at the times that were kept; the same on every process.
+
+    Attributes:
+        scene: What was modelled.
+        grid: Its vertices, cells and numbering.
+        parts: Number of steps that were taken, parts of cut steps counted each.
+        iterations: Number of Newton iterations.
+    """
+
+    def __init__(self, scene: Scene, grid: Grid) -> None:
+        self.scene, self.grid = scene, grid
+        self.parts = 0
+        self.iterations = 0
+        self._times: list[float] = []
+        self._q: list[Array] = []
+        self._v: list[Array] = []
+        self._reactions: list[Array] = []
+        self._entries: list[tuple[dict[str, float], ...]] = []
+
+    def keep(self, simulation: Simulation) -> None:
+        """Append the state of the simulation; all processes call it together."""
+        share = simulation.share
+        self._times.append(simulation.t)
+        self._q.append(share.gather(simulation.q))
+        self._v.extend(share.gather(v) for v in simulation.velocities())
+        self._reactions.append(simulation.reactions())
+        self._entries.append(simulation.entries())
+        self.parts, self.iterations = simulation.parts, simulation.iterations
+
+    # -- motion --------------------------------------------------------------------------------
+
+    @property
+    def times(self) -> Array:
+        """Times that were kept, n after the initial one; (n+1,); s."""
+        return np.array(self._times)
+
+    @property
+    def q(self) -> Array:
+        """Configurations, all degrees of freedom in the order of the grid; (n+1, size)."""
+        return np.array(self._q)
+
+    @property
+    def v(self) -> Array:
+        """Velocities, as :attr:`q`; empty in statics."""
+        return np.array(self._v)
+
+    def displacement(self, place: Place) -> Array:
+        """Displacement and rotation (u, v, ψ) of a place; (n+1, 3); m, m, rad.
+
+        Linear between the vertices.
+
+        Raises:
+            SceneError: The beam of the place is not in the scene.
+        """
+        return self._at(place, self._q)
+
+    def velocity(self, place: Place) -> Array:
+        """Velocity (du/dt, dv/dt, dψ/dt) of a place; (n+1, 3); m/s, m/s, rad/s.
+
+        Raises:
+            SceneError: The run was static, or the beam of the place is not in the scene.
+        """
+        if not self._v:
+            raise SceneError("velocity: the run was static; there is none")
+        return self._at(place, self._v)
+
+    def position(self, place: Place) -> Array:
+        """Coordinates of a place; (n+1, 2); m."""
+        vertices, weights = self.grid.weights(place)
+        return np.asarray(weights @ self.grid.points[vertices] + self.displacement(place)[:, :2])
+
+    def _at(self, place: Place, kept: list[Array]) -> Array:
+        vertices, weights = self.grid.weights(place)
+        first, second = self.grid.dofs[vertices]
+        return np.array([weights[0] * x[first] + weights[1] * x[second] for x in kept])
+
+    def shape(self, beam: Beam, n: int = -1) -> Array:
+        """Coordinates of the vertices of a beam at the n-th kept time; (num_vertices, 2); m."""
+        vertices = self.grid.vertices_of(beam)
+        return np.asarray(self.grid.points[vertices] + self._q[n][self.grid.dofs[vertices, :2]])
+
+    # -- forces --------------------------------------------------------------------------------
+
+    def reaction(self, support: Support) -> Array:
+        """Force and moment of a support on the scene; (n+1, 3); N, N, N m.
+
+        In dynamics they are those that act during the step that ends at each time; the first row is
+        NaN where no step came before.
+
+        Raises:
+            SceneError: The support is not in the scene.
+        """
+        if support not in self.scene.supports:
+            raise SceneError(f"reaction: {support} is not in the scene")
+        return np.array(self._reactions)[:, self.scene.supports.index(support)]
+
+    @cached_property
+    def _fields(self) -> Fields:
+        """The whole scene on this process: what is computed afterwards needs no communication."""
+        return Fields(Share(self.grid, MPI.COMM_SELF))
+
+    @cached_property
+    def _section_forces(self) -> SectionForces:
+        return SectionForces(self._fields)
+
+    def section_forces(self, beam: Beam, n: int = -1) -> Array:
+        """(N, V, M) in the cells of a beam at the n-th kept time; (num_cells, 3); N, N, N m."""
+        cells = self.grid.cells_of(beam)
+        return self._section_forces(self._q[n])[cells]
+
+    # -- balances ------------------------------------------------------------------------------
+
+    @property
+    def energy(self) -> Energy:
+        """The ledger."""
+        groups = []
+        for group in range(3):
+            names = dict.fromkeys(name for entries in self._entries for name in entries[group])
+            groups.append(
+                {n: np.array([e[group].get(n, 0.0) for e in self._entries]) for n in names}
+            )
+        return Energy(*groups)
+
+    def momentum(self) -> Array:
+        """(p_x, p_y, L), L about the origin; (n+1, 3); N s, N s, N m s.
+
+        Raises:
+            SceneError: The run was static.
+        """
+        if not self._v:
+            raise SceneError("momentum: the run was static; there is none")
+        times = Product(mass_matrix(self._fields))
+        _, first = np.unique(self.grid.dofs[:, 0], return_index=True)
+        u, v, ψ = self.grid.dofs[first, 0], self.grid.dofs[first, 1], np.unique(self.grid.dofs[:, 2])
+        X, Y = self.grid.points[first].T
+
+        def of(q: Array, velocity: Array) -> tuple[float, float, float]:
+            p = times(velocity)
+            turning = (X + q[u]) * p[v] - (Y + q[v]) * p[u]
+            return p[u].sum(), p[v].sum(), turning.sum() + p[ψ].sum()
+
+        return np.array([of(q, velocity) for q, velocity in zip(self._q, self._v, strict=True)])

@@ -1,0 +1,233 @@
+"""One equilibrium by PETSc SNES: vectors, the matrix, tolerances without a dimension."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from ufl_beam.compat import Array, la
+from ufl_beam.errors import SceneError, require_number
+from ufl_beam.grid import Share
+from ufl_beam.sparse import petsc_matrix, rows_of_entries
+
+PREFIX = "ub_"
+"""Prefix of the PETSc options of the solver, as in ``-ub_snes_monitor``."""
+
+JOINTS_IN_NATURAL_ORDER = 60
+"""Up to this number of shared degrees of freedom the order of the grid fills in least."""
+
+
+@dataclass(frozen=True)
+class Newton:
+    """How exactly and how long each equilibrium is sought.
+
+    Args:
+        rtol: Residual to be reached, as a part of the forces in the scene.
+        max_iterations: Iterations before a step is cut.
+        petsc: PETSc options without their prefix, such as ``{"snes_monitor": None}``; options of the
+            command line or ``PETSC_OPTIONS`` have the prefix ``ub_``.
+    """
+
+    rtol: float = 1e-10
+    max_iterations: int = 20
+    petsc: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        require_number(self.rtol, "Newton: rtol", positive=True)
+        if self.max_iterations < 1:
+            raise SceneError(f"Newton: max_iterations = {self.max_iterations} must be at least 1")
+
+
+class StepFailed(Exception):
+    """No equilibrium was found for a step; the message says why."""
+
+
+class Solver:
+    """Finds the configuration in which a residual vanishes.
+
+    Args:
+        share: The degrees of freedom of this process.
+        A: Matrix that ``tangent`` fills.
+        residual: Writes the local part of the residual at x into r: ``residual(x, r)``.
+        complete: Called with the summed residual; removes what supports carry.
+        tangent: Fills ``A`` at x: ``tangent(x)``.
+        forces: Internal forces and loads in the latest residual, the scale of convergence.
+        newton: Tolerances.
+    """
+
+    def __init__(
+        self,
+        share: Share,
+        A: la.MatrixCSR,
+        *,
+        residual: Callable[[Array, Array], None],
+        complete: Callable[[Array], None],
+        tangent: Callable[[Array], None],
+        forces: Callable[[], list[Array]],
+        newton: Newton,
+    ) -> None:
+        self._share, self._A, self._newton = share, A, newton
+        self._residual, self._complete, self._tangent = residual, complete, tangent
+        self._forces = forces
+        self._parallel = share.comm.size > 1
+        self._views: dict[int, Array] = {}
+        self._weights = self._force_weights()
+        self._diagonal = np.flatnonzero(rows_of_entries(A) == A.indices)
+        self._x, self._matrix = self._vector(), self._make_matrix()
+        self._snes = self._make_snes()
+        self.iterations = 0
+
+    # -- vectors and the matrix ----------------------------------------------------------------
+
+    def _vector(self) -> PETSc.Vec:
+        share = self._share
+        size = (share.num_owned, share.grid.size)
+        return PETSc.Vec().createGhost(share.ghosts, size=size, comm=share.comm)
+
+    def _view(self, vector: PETSc.Vec) -> Array:
+        """Local values of a vector, ghosts included; PETSc keeps them where they are."""
+        handle = vector.handle
+        view = self._views.get(handle)
+        if view is None:
+            with vector.localForm() as local:
+                view = self._views[handle] = local.array_w
+        return view
+
+    def _make_matrix(self) -> PETSc.Mat:
+        if not self._parallel:
+            return petsc_matrix(self._A)
+        share = self._share
+        matrix = PETSc.Mat().create(share.comm)
+        matrix.setSizes([(share.num_owned, share.grid.size)] * 2)
+        matrix.setType("mpiaij")
+        matrix.setLGMap(*[self._x.getLGMap()] * 2)
+        matrix.setUp()
+        matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, False)
+        return matrix
+
+    def _make_snes(self) -> PETSc.SNES:
+        snes = PETSc.SNES().create(self._share.comm)
+        snes.setOptionsPrefix(PREFIX)
+        snes.setFunction(self._function, self._vector())
+        snes.setJacobian(self._jacobian, self._matrix)
+        snes.setConvergenceTest(self._test)
+        snes.setTolerances(max_it=self._newton.max_iterations)
+        snes.setType("newtonls")
+        ksp = snes.getKSP()
+        ksp.setType("preonly")
+        factors = ksp.getPC()
+        factors.setType("lu")
+        factors.setFactorSolverType("mumps" if self._parallel else "petsc")
+        if not self._parallel:
+            few_joints = self._share.grid.num_shared <= JOINTS_IN_NATURAL_ORDER
+            factors.setFactorOrdering("natural" if few_joints else "nd")
+        # The norm of a line search would add forces and moments, so the full step is the default.
+        database = PETSc.Options(PREFIX)
+        before = database.getAll()
+        chosen = {"snes_linesearch_type": "basic", **before, **self._newton.petsc}
+        for name, value in chosen.items():
+            database[name] = value
+        snes.setFromOptions()
+        for name in chosen:
+            del database[name]
+        for name, value in before.items():
+            database[name] = value
+        return snes
+
+    # -- what SNES calls -----------------------------------------------------------------------
+
+    def _function(self, snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
+        if self._parallel:
+            x.ghostUpdate(PETSc.InsertMode.INSERT, PETSc.ScatterMode.FORWARD)
+        r = self._view(f)
+        self._residual(self._view(x), r)
+        if self._parallel:
+            f.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
+        f.stateIncrease()
+        self._complete(r)
+
+    def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, J: PETSc.Mat, P: PETSc.Mat) -> None:
+        self._tangent(self._view(x))
+        if self._parallel:
+            P.zeroEntries()
+            P.setValuesLocalCSR(
+                self._A.indptr.astype(PETSc.IntType),
+                self._A.indices.astype(PETSc.IntType),
+                self._A.data,
+                addv=PETSc.InsertMode.ADD,
+            )
+            P.assemble()
+        else:
+            P.stateIncrease()
+
+    # -- convergence ---------------------------------------------------------------------------
+
+    def _force_weights(self) -> Array:
+        """One for forces, one over the size of the scene for moments."""
+        weights = np.ones(self._share.size)
+        weights[self._share.rotations()] = 1 / self._share.grid.scene.size
+        return weights
+
+    def _size(self, forces: Array) -> float:
+        """Euclidean norm over the scene of forces and moments over its size; N."""
+        owned = self._share.num_owned
+        weighted = forces[:owned] * self._weights[:owned]
+        return self._share.total(float(weighted @ weighted)) ** 0.5
+
+    def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, ...]) -> int:
+        residual = self._size(self._view(snes.getFunction()[0]))
+        if not np.isfinite(residual):
+            return int(PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN)
+        scale = sum(self._size(f) for f in self._forces())
+        if residual <= self._newton.rtol * scale:
+            return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE)
+        if iteration > 0 and residual <= self._round_off():
+            return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS)
+        return int(PETSc.SNES.ConvergedReason.ITERATING)
+
+    def _round_off(self) -> float:
+        """Residual that the last digit of the configuration makes: stiffness times its spacing; N.
+
+        Fine meshes of stiff beams cannot be solved any better.
+        """
+        x = self._view(self._x)
+        return 2.0 * self._size(self._A.data[self._diagonal] * np.spacing(x))
+
+    # -- the call ------------------------------------------------------------------------------
+
+    def solve(self, guess: Array) -> Array:
+        """The configuration, found from ``guess``; local values, ghosts included; a new array.
+
+        Raises:
+            StepFailed: No convergence.
+        """
+        x = self._view(self._x)
+        x[:] = guess
+        self._x.stateIncrease()
+        self._snes.solve(None, self._x)
+        self.iterations += self._snes.getIterationNumber()
+        reason = self._snes.getConvergedReason()
+        if reason <= 0:
+            raise StepFailed(self._explain(reason))
+        if self._parallel:
+            self._x.ghostUpdate(PETSc.InsertMode.INSERT, PETSc.ScatterMode.FORWARD)
+        return x.copy()
+
+    def _explain(self, reason: int) -> str:
+        r = self._view(self._snes.getFunction()[0])
+        names = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int)}
+        scale = sum(self._size(f) for f in self._forces())
+        return (
+            f"SNES {names.get(reason, reason)} after {self._snes.getIterationNumber()} iterations; "
+            f"residual {self._size(r):.3e} N, forces in the scene {scale:.3e} N"
+        )
+
+    def destroy(self) -> None:
+        """Give back what PETSc holds."""
+        self._snes.destroy()
+        self._x.destroy()
+        self._matrix.destroy()

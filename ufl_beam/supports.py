@@ -1,0 +1,127 @@
+"""Supports and prescribed motions: degrees of freedom whose values are given."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ufl_beam.compat import Array, la
+from ufl_beam.grid import Index, Share
+from ufl_beam.ledger import Ledger
+from ufl_beam.schemes import Scheme
+from ufl_beam.sparse import as_slice, rows_of_entries
+
+
+class TurnedAxes:
+    """The displacement of one place in axes turned by an angle, as supports at an angle hold it."""
+
+    def __init__(self, dofs: Index, angle: float, A: la.MatrixCSR) -> None:
+        self._i, self._j = dofs
+        self._c, self._s = math.cos(angle), math.sin(angle)
+        self._rows = [slice(A.indptr[d], A.indptr[d + 1]) for d in dofs]
+        self._columns = [np.flatnonzero(A.indices == d) for d in dofs]
+
+    def enter(self, x: Array) -> None:
+        """From the axes of the plane to the turned axes, in place."""
+        i, j, c, s = self._i, self._j, self._c, self._s
+        x[i], x[j] = c * x[i] + s * x[j], c * x[j] - s * x[i]
+
+    def leave(self, x: Array) -> None:
+        """From the turned axes to the axes of the plane, in place."""
+        i, j, c, s = self._i, self._j, self._c, self._s
+        x[i], x[j] = c * x[i] - s * x[j], c * x[j] + s * x[i]
+
+    def enter_matrix(self, data: Array) -> None:
+        """Rows and columns of a matrix to the turned axes, in place."""
+        c, s = self._c, self._s
+        # Both dofs belong to the same cells, so their rows, and their columns, have one sparsity.
+        for i, j in (self._rows, self._columns):
+            first, second = data[i].copy(), data[j]
+            data[i], data[j] = c * first + s * second, c * second - s * first
+
+
+class Supports:
+    """All supports of a scene.
+
+    Unknowns and residuals of the solver are in the turned axes of the supports, those of the terms in
+    the axes of the plane; :meth:`enter` and :meth:`leave` change between them.
+
+    Attributes:
+        reactions: Forces of the supports on the scene in the latest residual, at the degrees of
+            freedom that are held, in turned axes.
+    """
+
+    def __init__(self, share: Share, scheme: Scheme, ledger: Ledger, A: la.MatrixCSR) -> None:
+        self._turned: list[TurnedAxes] = []
+        held: list[int] = []
+        self._motions = []
+        for support in share.grid.scene.supports:
+            dofs = share.at(support.place)
+            if support.angle and len(share.local(dofs[:2])):
+                self._turned.append(TurnedAxes(share.local(dofs[:2]), support.angle, A))
+            for component, motion in support.held.items():
+                held.extend(share.local(dofs[[component]]))
+                if component in support.moving:
+                    self._motions.extend((d, motion) for d in share.local(dofs[[component]]))
+        self.dofs = np.array(sorted(held), dtype=np.int64)
+        self._held = as_slice(self.dofs)
+        rows, columns = rows_of_entries(A), A.indices
+        zero = np.isin(rows, self.dofs) | np.isin(columns, self.dofs)
+        self._zero = np.flatnonzero(zero)
+        self._diagonal = np.flatnonzero(zero & (rows == columns))
+        self._owned = self.dofs < share.num_owned
+        self._acting, self._ledger = scheme.acting, ledger
+        if any(support.moving for support in share.grid.scene.supports):
+            ledger.supplied["supports"] += 0.0
+        self._before = self.reactions = np.zeros(len(self.dofs))
+
+    def enter(self, x: Array) -> None:
+        """From the axes of the plane to those of the supports, in place."""
+        for axes in self._turned:
+            axes.enter(x)
+
+    def leave(self, x: Array) -> None:
+        """From the axes of the supports to those of the plane, in place."""
+        for axes in self._turned:
+            axes.leave(x)
+
+    def in_plane(self, x: Array) -> Array:
+        """``x`` in the axes of the plane; a copy only if an axis is turned."""
+        if not self._turned:
+            return x
+        q = x.copy()
+        self.leave(q)
+        return q
+
+    def move(self, x: Array, t: float) -> None:
+        """Set what is prescribed at time ``t``."""
+        for dof, motion in self._motions:
+            x[dof] = motion(t)
+
+    def hold(self, r: Array) -> None:
+        """Note the reactions in a residual that is complete, and remove them from it."""
+        self.reactions = r[self._held].copy()
+        r[self._held] = 0.0
+
+    def hold_matrix(self, data: Array) -> None:
+        """Turn a tangent into the axes of the supports and hold what is held."""
+        for axes in self._turned:
+            axes.enter_matrix(data)
+        data[self._zero] = 0.0
+        data[self._diagonal] = 1.0
+
+    def accept(self, s: Array) -> None:
+        """Work of the supports that move; ``s`` in their axes."""
+        if self._motions:
+            work = self._acting(self._before, self.reactions) * s[self._held]
+            self._ledger.supplied["supports"] += float(np.sum(work[self._owned]))
+        self._before = self.reactions
+
+    def all_reactions(self, size: int) -> Array:
+        """The reactions as a vector of all local degrees of freedom, in the axes of the plane."""
+        r = np.zeros(size)
+        r[self._held] = self.reactions
+        self.leave(r)
+        return r
+

@@ -1,0 +1,242 @@
+"""Virtual works, one class each: what a scene may contribute to the equation of a step.
+
+A term adds its part of the residual and of the tangent at the end of the step, and says what the step
+did to the energy.  Vectors hold the local degrees of freedom of a process, ghosts included; what
+several processes add to one degree of freedom is summed by the solver.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import ufl
+
+from ufl_beam.compat import Array, la
+from ufl_beam.fields import Fields
+from ufl_beam.forms import Kernel, Refresh
+from ufl_beam.grid import Share
+from ufl_beam.kinematics import split, strain
+from ufl_beam.ledger import Ledger
+from ufl_beam.schemes import Midpoint, Scheme
+from ufl_beam.sparse import Product, as_slice, positions
+
+
+@dataclass
+class Step:
+    """A step in time and what the terms may ask about it.
+
+    Attributes:
+        t0: Beginning; s.
+        t1: End; s.
+        t_load: When loads act; s.
+        q0: Configuration at the beginning.
+    """
+
+    t0: float
+    t1: float
+    t_load: float
+    q0: Array
+
+    @property
+    def dt(self) -> float:
+        """Length of the step; s."""
+        return self.t1 - self.t0
+
+
+class NodalStep:
+    """The step of the nodes that virtual works are works on: (Δu, turn of Δψ)."""
+
+    def __init__(self, share: Share, scheme: Scheme) -> None:
+        self._turning = as_slice(share.rotations())
+        self._turn = scheme.turn
+
+    def __call__(self, q0: Array, q1: Array) -> Array:
+        """The step from ``q0`` to ``q1``; a new array."""
+        s = q1 - q0
+        s[self._turning] = self._turn(s[self._turning])
+        return s
+
+
+class Term(Protocol):
+    """A virtual work."""
+
+    def begin(self, step: Step) -> None:
+        """Take note of the step that is to be solved."""
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Add the virtual work at ``q1`` to ``r``."""
+
+    def add_tangent(self, q1: Array) -> None:
+        """Add the derivative at ``q1`` to the matrix that the term was made with."""
+
+    def accept(self, q1: Array, s: Array) -> None:
+        """Take the end of the step as the new state, and enter what the step supplied or lost.
+
+        ``s`` is the step of the nodes that the virtual works are works on.
+        """
+
+    def add_state(self, q: Array) -> None:
+        """Enter the energy that the term holds in the accepted state ``q``."""
+
+
+class ElasticBeams:
+    """Resultants of all cells working on the virtual strains, P(12).
+
+    Attributes:
+        force: Internal forces at the latest residual.
+    """
+
+    def __init__(
+        self, fields: Fields, scheme: Scheme, A: la.MatrixCSR, ledger: Ledger
+    ) -> None:
+        q0, q1 = fields.configuration(), fields.configuration()
+        w, dx, axis = ufl.TestFunction(fields.space), fields.dx(1), fields.axis
+        C = fields.stiffness()
+        e0, e1 = strain(q0, axis), strain(q1, axis)
+
+        r = scheme.resultants(C, e0, e1, fields.constant)
+        virtual_work = ufl.dot(r, scheme.virtual_strain(q0, q1, w, axis)) * dx  # P(12)
+        tangent = ufl.derivative(virtual_work, q1, ufl.TrialFunction(fields.space))
+        losses = [d * dx for d in scheme.losses(C, e0, e1, fields.constant)]
+
+        self._force, self._tangent = Kernel(virtual_work), Kernel(tangent)
+        self._tangent.share(self._force)
+        self._stored = Kernel(sum(C[i] * e1[i] ** 2 / 2 for i in range(3)) * dx)  # P(9)
+        self._losses = [Kernel(loss) for loss in losses]
+        self._set_q0 = Refresh(fields.cell_dofs, q0, [self._force, *self._losses])
+        self._set_q1 = Refresh(fields.cell_dofs, q1, [self._force])
+        self._set_stored = Refresh(fields.cell_dofs, q1, [self._stored])
+        self._set_loss = Refresh(fields.cell_dofs, q1, self._losses)
+        self._A, self._ledger = A, ledger
+        if losses:
+            ledger.lost["numerical"] += 0.0
+        self.force = np.zeros(fields.share.size)
+
+    def begin(self, step: Step) -> None:
+        """Remember the strains at the beginning."""
+        self._set_q0(step.q0)
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Add the internal forces."""
+        self._set_q1(q1)
+        self.force.fill(0.0)
+        self._force.add_to_vector(self.force)
+        r += self.force
+
+    def add_tangent(self, q1: Array) -> None:
+        """Add the stiffness, material and geometric."""
+        self._set_q1(q1)
+        self._tangent.add_to_matrix(self._A)
+
+    def accept(self, q1: Array, s: Array) -> None:
+        """What the scheme lost."""
+        if self._losses:
+            self._set_loss(q1)
+            for loss in self._losses:
+                self._ledger.lost["numerical"] += loss.value()
+
+    def add_state(self, q: Array) -> None:
+        """Stored energy."""
+        self._set_stored(q)
+        self._ledger.state["stored"] += self._stored.value()
+
+
+class SectionForces:
+    """(N, V, M) in the cells, from the strains of a configuration, P(7)."""
+
+    def __init__(self, fields: Fields) -> None:
+        q = fields.configuration()
+        C, e = fields.stiffness(), strain(q, fields.axis)
+        z = ufl.TestFunction(C.function_space)
+        mean = sum(C[i] * e[i] * z[i] for i in range(3)) / fields.axis.h  # P(7)
+        self._kernel = Kernel(mean * fields.dx(1))
+        self._set_q = Refresh(fields.cell_dofs, q, [self._kernel])
+        self._order = fields.order
+
+    def __call__(self, q: Array) -> Array:
+        """Resultants at ``q``, in the order of the share; (num_cells, 3); N, N, N m."""
+        values = np.zeros(3 * len(self._order))
+        self._set_q(q)
+        self._kernel.add_to_vector(values)
+        resultants = np.empty((len(self._order), 3))
+        resultants[self._order] = values.reshape(-1, 3)
+        return resultants
+
+
+def mass_matrix(fields: Fields) -> la.MatrixCSR:
+    """Consistent mass of the beams, and the point masses."""
+    share = fields.share
+    (u, ψ), (w_u, w_ψ) = (split(f(fields.space)) for f in (ufl.TrialFunction, ufl.TestFunction))
+    ρ = fields.inertia()
+    M = fields.matrix()
+    Kernel((ρ[0] * ufl.dot(u, w_u) + ρ[1] * ψ * w_ψ) * fields.dx(2)).add_to_matrix(M)  # P(67)
+    for mass in share.grid.scene.masses:
+        dofs = share.at(mass.place)
+        mine = share.owns(dofs)
+        here = share.local(dofs[mine])
+        M.data[positions(M, here, here)] += np.array([mass.mass, mass.mass, mass.inertia])[mine]
+    return M
+
+
+class Inertia:
+    """Consistent inertia of the beams and inertia of point masses: a constant matrix, P(18).
+
+    Attributes:
+        v: Velocities at the end of the last accepted step.
+        M: The mass matrix.
+    """
+
+    def __init__(
+        self, fields: Fields, scheme: Midpoint, A: la.MatrixCSR, ledger: Ledger, v: Array
+    ) -> None:
+        share = fields.share
+        self.M = mass_matrix(fields)
+        self._times = Product(self.M)
+        turning = share.rotations()
+        self._step = NodalStep(share, scheme)
+        self._entries = np.flatnonzero(np.isin(self.M.indices, turning) & (self.M.data != 0))
+        self._columns = self.M.indices[self._entries]
+        self._A, self._ledger = A, ledger
+        if scheme.beta:
+            ledger.lost["numerical"] += 0.0
+        self._scheme = scheme
+        self.v = v
+        self._dt = 0.0
+
+    def begin(self, step: Step) -> None:
+        """Prepare the parts that stay constant in the step."""
+        self._q0 = step.q0
+        if step.dt != self._dt:
+            self._dt = step.dt
+            self._a, self._b = self._scheme.velocity_weights(step.dt)
+            self._scaled = self.M.data * (self._a / step.dt)
+        self._before = self.v * ((1 + self._b) / step.dt)
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Add mass times the acceleration of the step."""
+        s = self._step(self._q0, q1)
+        s *= self._a / self._dt
+        s -= self._before
+        r += self._times(s)  # P(78)
+
+    def add_tangent(self, q1: Array) -> None:
+        """Add mass times the derivative of the acceleration."""
+        half = np.tan((q1[self._columns] - self._q0[self._columns]) / 2)
+        data = self._A.data
+        data += self._scaled
+        data[self._entries] += self._scaled[self._entries] * half**2
+
+    def accept(self, q1: Array, s: Array) -> None:
+        """New velocities, and what the scheme lost."""
+        v = self._a * s
+        v -= self._b * self.v  # P(87)
+        if self._scheme.beta:
+            change = v - self.v
+            self._ledger.lost["numerical"] += self._scheme.beta * float(change @ self._times(change))  # P(88)
+        self.v = v
+
+    def add_state(self, q: Array) -> None:
+        """Kinetic energy."""
+        self._ledger.state["kinetic"] += float(self.v @ self._times(self.v)) / 2  # P(18)
