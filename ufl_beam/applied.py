@@ -6,12 +6,12 @@ from functools import singledispatch
 
 import numpy as np
 
-from ufl_beam.compat import Array, la
+from ufl_beam.compat import Array
 from ufl_beam.grid import Share
 from ufl_beam.ledger import Ledger
 from ufl_beam.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, TimeFunction
 from ufl_beam.schemes import Scheme
-from ufl_beam.sparse import positions
+from ufl_beam.sparse import Csr
 from ufl_beam.terms import Step
 
 
@@ -89,7 +89,7 @@ class FollowerLoads:
         share: Share,
         scheme: Scheme,
         ledger: Ledger,
-        A: la.MatrixCSR,
+        A: Csr,
     ) -> None:
         mine = [load for load in loads if share.owns(share.at(load.place)).all()]
         dofs = np.array([share.local(share.at(load.place)) for load in mine], dtype=np.int64)
@@ -97,7 +97,7 @@ class FollowerLoads:
         self._forces = np.array([[*load.force, load.moment] for load in mine]).reshape(-1, 3)
         self._times = [load.time for load in mine]
         x, y, turn = self._dofs.T
-        self._entries = np.array([positions(A, x, turn), positions(A, y, turn)])
+        self._entries = np.array([A.positions(x, turn), A.positions(y, turn)])
         self._A = A
         self._weight = scheme.load_weight
         self._acting, self._ledger = scheme.acting, ledger

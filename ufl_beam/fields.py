@@ -6,9 +6,10 @@ import basix.ufl
 import numpy as np
 import ufl
 
-from ufl_beam.compat import Array, csr_matrix, fem, la, line_mesh, space_with_dofs
+from ufl_beam.compat import Array, csr_matrix, fem, line_mesh, space_with_dofs
 from ufl_beam.grid import Index, Share
 from ufl_beam.kinematics import Axis
+from ufl_beam.sparse import Csr
 
 
 class Fields:
@@ -36,9 +37,9 @@ class Fields:
             self.mesh, basix.ufl.mixed_element([line, line, line]), self.cell_dofs, share.size
         )
 
-    def matrix(self) -> la.MatrixCSR:
+    def matrix(self) -> Csr:
         """A new matrix on the degrees of freedom of this process."""
-        return csr_matrix(self.mesh, self.cell_dofs, self.share.size)
+        return Csr(csr_matrix(self.mesh, self.cell_dofs, self.share.size))
 
     def _require_direction(self, ends: Array) -> None:
         """The mesh must keep the order of the vertices of a cell, which orients the beam."""

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 import ufl
 
-from ufl_beam.compat import Array, cpp, fem, la
+from ufl_beam.compat import Array, cpp, fem
 from ufl_beam.grid import Index
+from ufl_beam.sparse import Csr
 
 
 class Kernel:
@@ -59,9 +60,9 @@ class Kernel:
         """Add the linear form to ``b``."""
         cpp.fem.assemble_vector(b, self._form, self._constants, self._packed)
 
-    def add_to_matrix(self, A: la.MatrixCSR) -> None:
+    def add_to_matrix(self, A: Csr) -> None:
         """Add the bilinear form to ``A``."""
-        cpp.fem.assemble_matrix(A._cpp_object, self._form, self._constants, self._packed, [])
+        cpp.fem.assemble_matrix(A.matrix._cpp_object, self._form, self._constants, self._packed, [])
 
     def value(self) -> float:
         """Value of the functional."""

@@ -160,6 +160,13 @@ class Share:
         """Local numbers of all rotations."""
         return np.unique(self.local(self.grid.dofs[:, 2]))
 
+    def lengths(self) -> Array:
+        """What a strain of one is to each local degree of freedom: a cell's length, or a radian."""
+        ends = self.grid.points[self.grid.cells[self.cells]]
+        lengths = np.ones(self.size)
+        lengths[self.cell_dofs[:, :4]] = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)[:, None]
+        return lengths
+
     def local(self, dofs: Index) -> Index:
         """Local numbers of those ``dofs`` (numbers of the grid) that this process has."""
         found = self._local[dofs]

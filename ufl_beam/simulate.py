@@ -175,7 +175,7 @@ class Simulation:
             residual=self._residual,
             complete=self.supports.hold,
             tangent=self._tangent,
-            forces=lambda: [self.beams.force, *(load.force for load in self.loads)],
+            forces=lambda: self.beams.force,
             newton=newton or Newton(),
         )
         self.solution = Solution(scene, self.grid)
@@ -270,7 +270,7 @@ class Simulation:
         guess = self.q + (self.q - self._q_before) * (step.dt / self._dt_before)
         self.supports.enter(guess)
         self.supports.move(guess, t1)
-        q1 = self._solver.solve(guess)
+        q1 = self._solver.solve(guess, [load.force for load in self.loads])
         self.supports.leave(q1)
         s = self._nodal_step(self.q, q1)
         self._require_small_turns(q1)
@@ -286,7 +286,7 @@ class Simulation:
             term.add_state(q1)
 
     def _require_small_turns(self, q1: Array) -> None:
-        turn = np.max(np.abs(q1[self._rotations] - self.q[self._rotations]), initial=0.0)
+        turn = float(np.abs(q1[self._rotations] - self.q[self._rotations]).max(initial=0.0))
         if self.comm.size > 1:
             turn = self.comm.allreduce(turn, op=MPI.MAX)
         if turn > LARGEST_TURN and self.scheme.dynamic:

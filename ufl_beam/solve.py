@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -9,10 +10,15 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from ufl_beam.compat import Array, la
+from ufl_beam.compat import Array
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.grid import Share
-from ufl_beam.sparse import petsc_matrix, rows_of_entries
+from ufl_beam.sparse import Csr
+
+CONVERGED = int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE)
+AT_ROUND_OFF = int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS)
+ITERATING = int(PETSc.SNES.ConvergedReason.ITERATING)
+DIVERGED_NAN = int(PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN)
 
 PREFIX = "ub_"
 """Prefix of the PETSc options of the solver, as in ``-ub_snes_monitor``."""
@@ -55,19 +61,19 @@ class Solver:
         residual: Writes the local part of the residual at x into r: ``residual(x, r)``.
         complete: Called with the summed residual; removes what supports carry.
         tangent: Fills ``A`` at x: ``tangent(x)``.
-        forces: Internal forces and loads in the latest residual, the scale of convergence.
+        forces: Internal forces in the latest residual; with the loads, the scale of convergence.
         newton: Tolerances.
     """
 
     def __init__(
         self,
         share: Share,
-        A: la.MatrixCSR,
+        A: Csr,
         *,
         residual: Callable[[Array, Array], None],
         complete: Callable[[Array], None],
         tangent: Callable[[Array], None],
-        forces: Callable[[], list[Array]],
+        forces: Callable[[], Array],
         newton: Newton,
     ) -> None:
         self._share, self._A, self._newton = share, A, newton
@@ -76,7 +82,8 @@ class Solver:
         self._parallel = share.comm.size > 1
         self._views: dict[int, Array] = {}
         self._weights = self._force_weights()
-        self._diagonal = np.flatnonzero(rows_of_entries(A) == A.indices)
+        self._lengths = share.lengths()
+        self._diagonal = np.flatnonzero(A.rows() == A.indices)
         self._x, self._matrix = self._vector(), self._make_matrix()
         self._snes = self._make_snes()
         self.iterations = 0
@@ -99,7 +106,7 @@ class Solver:
 
     def _make_matrix(self) -> PETSc.Mat:
         if not self._parallel:
-            return petsc_matrix(self._A)
+            return self._A.petsc()
         share = self._share
         matrix = PETSc.Mat().create(share.comm)
         matrix.setSizes([(share.num_owned, share.grid.size)] * 2)
@@ -112,7 +119,9 @@ class Solver:
     def _make_snes(self) -> PETSc.SNES:
         snes = PETSc.SNES().create(self._share.comm)
         snes.setOptionsPrefix(PREFIX)
-        snes.setFunction(self._function, self._vector())
+        f = self._vector()
+        self._r = self._view(f)
+        snes.setFunction(self._function, f)
         snes.setJacobian(self._jacobian, self._matrix)
         snes.setConvergenceTest(self._test)
         snes.setTolerances(max_it=self._newton.max_iterations)
@@ -167,44 +176,53 @@ class Solver:
     # -- convergence ---------------------------------------------------------------------------
 
     def _force_weights(self) -> Array:
-        """One for forces, one over the size of the scene for moments."""
+        """Of squares: one for forces, one over the squared size of the scene for moments."""
         weights = np.ones(self._share.size)
-        weights[self._share.rotations()] = 1 / self._share.grid.scene.size
-        return weights
+        weights[self._share.rotations()] = 1 / self._share.grid.scene.size**2
+        return weights[: self._share.num_owned]
 
     def _size(self, forces: Array) -> float:
         """Euclidean norm over the scene of forces and moments over its size; N."""
-        owned = self._share.num_owned
-        weighted = forces[:owned] * self._weights[:owned]
-        return self._share.total(float(weighted @ weighted)) ** 0.5
+        owned = forces[: len(self._weights)] if self._parallel else forces
+        return self._share.total(float((owned * self._weights) @ owned)) ** 0.5
 
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, ...]) -> int:
-        residual = self._size(self._view(snes.getFunction()[0]))
-        if not np.isfinite(residual):
-            return int(PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN)
-        scale = sum(self._size(f) for f in self._forces())
+        residual = self._size(self._r)
+        if not math.isfinite(residual):
+            return DIVERGED_NAN
+        scale = self._loads + self._size(self._forces())
         if residual <= self._newton.rtol * scale:
-            return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE)
-        if iteration > 0 and residual <= self._round_off():
-            return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS)
-        return int(PETSc.SNES.ConvergedReason.ITERATING)
+            return CONVERGED
+        if iteration > 0:
+            floor = self._round_off()
+            # Where Newton's method no longer halves the residual, a little more noise is the floor.
+            if residual <= floor or self._last / 2 < residual <= 10 * floor:
+                return AT_ROUND_OFF
+        self._last = residual
+        return ITERATING
 
     def _round_off(self) -> float:
-        """Residual that the last digit of the configuration makes: stiffness times its spacing; N.
+        """Residual that the last digit of displacements, strains and rotations makes; N.
 
-        Fine meshes of stiff beams cannot be solved any better.
+        A strain is the difference of two numbers near one, so stiff or finely divided beams cannot be
+        solved any better, however small the forces are.
         """
-        x = self._view(self._x)
-        return 2.0 * self._size(self._A.data[self._diagonal] * np.spacing(x))
+        digits = np.spacing(np.abs(self._view(self._x)) + self._lengths)
+        return 0.5 * self._size(self._A.data[self._diagonal] * digits)
 
     # -- the call ------------------------------------------------------------------------------
 
-    def solve(self, guess: Array) -> Array:
+    def solve(self, guess: Array, loads: list[Array]) -> Array:
         """The configuration, found from ``guess``; local values, ghosts included; a new array.
+
+        Args:
+            guess: Where to begin.
+            loads: Vectors of the loads, for the scale of convergence.
 
         Raises:
             StepFailed: No convergence.
         """
+        self._loads = sum(self._size(load) for load in loads)
         x = self._view(self._x)
         x[:] = guess
         self._x.stateIncrease()
@@ -218,12 +236,11 @@ class Solver:
         return x.copy()
 
     def _explain(self, reason: int) -> str:
-        r = self._view(self._snes.getFunction()[0])
         names = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int)}
-        scale = sum(self._size(f) for f in self._forces())
+        scale = self._loads + self._size(self._forces())
         return (
             f"SNES {names.get(reason, reason)} after {self._snes.getIterationNumber()} iterations; "
-            f"residual {self._size(r):.3e} N, forces in the scene {scale:.3e} N"
+            f"residual {self._size(self._r):.3e} N, forces in the scene {scale:.3e} N"
         )
 
     def destroy(self) -> None:

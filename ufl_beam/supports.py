@@ -6,17 +6,17 @@ import math
 
 import numpy as np
 
-from ufl_beam.compat import Array, la
+from ufl_beam.compat import Array
 from ufl_beam.grid import Index, Share
 from ufl_beam.ledger import Ledger
 from ufl_beam.schemes import Scheme
-from ufl_beam.sparse import as_slice, rows_of_entries
+from ufl_beam.sparse import Csr, as_slice
 
 
 class TurnedAxes:
     """The displacement of one place in axes turned by an angle, as supports at an angle hold it."""
 
-    def __init__(self, dofs: Index, angle: float, A: la.MatrixCSR) -> None:
+    def __init__(self, dofs: Index, angle: float, A: Csr) -> None:
         self._i, self._j = dofs
         self._c, self._s = math.cos(angle), math.sin(angle)
         self._rows = [slice(A.indptr[d], A.indptr[d + 1]) for d in dofs]
@@ -52,7 +52,7 @@ class Supports:
             freedom that are held, in turned axes.
     """
 
-    def __init__(self, share: Share, scheme: Scheme, ledger: Ledger, A: la.MatrixCSR) -> None:
+    def __init__(self, share: Share, scheme: Scheme, ledger: Ledger, A: Csr) -> None:
         self._turned: list[TurnedAxes] = []
         held: list[int] = []
         self._motions = []
@@ -66,7 +66,7 @@ class Supports:
                     self._motions.extend((d, motion) for d in share.local(dofs[[component]]))
         self.dofs = np.array(sorted(held), dtype=np.int64)
         self._held = as_slice(self.dofs)
-        rows, columns = rows_of_entries(A), A.indices
+        rows, columns = A.rows(), A.indices
         zero = np.isin(rows, self.dofs) | np.isin(columns, self.dofs)
         self._zero = np.flatnonzero(zero)
         self._diagonal = np.flatnonzero(zero & (rows == columns))

@@ -13,14 +13,14 @@ from typing import Protocol
 import numpy as np
 import ufl
 
-from ufl_beam.compat import Array, la
+from ufl_beam.compat import Array
 from ufl_beam.fields import Fields
 from ufl_beam.forms import Kernel, Refresh
 from ufl_beam.grid import Share
 from ufl_beam.kinematics import split, strain
 from ufl_beam.ledger import Ledger
 from ufl_beam.schemes import Midpoint, Scheme
-from ufl_beam.sparse import Product, as_slice, positions
+from ufl_beam.sparse import Csr, Product, as_slice
 
 
 @dataclass
@@ -58,6 +58,10 @@ class NodalStep:
         s[self._turning] = self._turn(s[self._turning])
         return s
 
+    def turns(self, q0: Array, q1: Array) -> Array:
+        """The entries of the step that belong to rotations."""
+        return self._turn(q1[self._turning] - q0[self._turning])
+
 
 class Term(Protocol):
     """A virtual work."""
@@ -89,7 +93,7 @@ class ElasticBeams:
     """
 
     def __init__(
-        self, fields: Fields, scheme: Scheme, A: la.MatrixCSR, ledger: Ledger
+        self, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger
     ) -> None:
         q0, q1 = fields.configuration(), fields.configuration()
         w, dx, axis = ufl.TestFunction(fields.space), fields.dx(1), fields.axis
@@ -121,9 +125,10 @@ class ElasticBeams:
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the internal forces."""
         self._set_q1(q1)
-        self.force.fill(0.0)
-        self._force.add_to_vector(self.force)
-        r += self.force
+        force = self.force
+        force.fill(0.0)
+        self._force.add_to_vector(force)
+        r += force
 
     def add_tangent(self, q1: Array) -> None:
         """Add the stiffness, material and geometric."""
@@ -165,7 +170,7 @@ class SectionForces:
         return resultants
 
 
-def mass_matrix(fields: Fields) -> la.MatrixCSR:
+def mass_matrix(fields: Fields) -> Csr:
     """Consistent mass of the beams, and the point masses."""
     share = fields.share
     (u, ψ), (w_u, w_ψ) = (split(f(fields.space)) for f in (ufl.TrialFunction, ufl.TestFunction))
@@ -176,7 +181,7 @@ def mass_matrix(fields: Fields) -> la.MatrixCSR:
         dofs = share.at(mass.place)
         mine = share.owns(dofs)
         here = share.local(dofs[mine])
-        M.data[positions(M, here, here)] += np.array([mass.mass, mass.mass, mass.inertia])[mine]
+        M.data[M.positions(here, here)] += np.array([mass.mass, mass.mass, mass.inertia])[mine]
     return M
 
 
@@ -189,15 +194,15 @@ class Inertia:
     """
 
     def __init__(
-        self, fields: Fields, scheme: Midpoint, A: la.MatrixCSR, ledger: Ledger, v: Array
+        self, fields: Fields, scheme: Midpoint, A: Csr, ledger: Ledger, v: Array
     ) -> None:
         share = fields.share
         self.M = mass_matrix(fields)
         self._times = Product(self.M)
-        turning = share.rotations()
         self._step = NodalStep(share, scheme)
+        turning = share.rotations()
         self._entries = np.flatnonzero(np.isin(self.M.indices, turning) & (self.M.data != 0))
-        self._columns = self.M.indices[self._entries]
+        self._turn_of_entry = np.searchsorted(turning, self.M.indices[self._entries])
         self._A, self._ledger = A, ledger
         if scheme.beta:
             ledger.lost["numerical"] += 0.0
@@ -206,27 +211,29 @@ class Inertia:
         self._dt = 0.0
 
     def begin(self, step: Step) -> None:
-        """Prepare the parts that stay constant in the step."""
+        """Prepare what stays constant in the step."""
         self._q0 = step.q0
         if step.dt != self._dt:
             self._dt = step.dt
             self._a, self._b = self._scheme.velocity_weights(step.dt)
             self._scaled = self.M.data * (self._a / step.dt)
+            self._scaled_turning = self._scaled[self._entries] / 4
         self._before = self.v * ((1 + self._b) / step.dt)
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add mass times the acceleration of the step."""
-        s = self._step(self._q0, q1)
-        s *= self._a / self._dt
-        s -= self._before
-        r += self._times(s)  # P(78)
+        a = self._step(self._q0, q1)
+        a *= self._a / self._dt
+        a -= self._before
+        r += self._times(a)  # P(78)
 
     def add_tangent(self, q1: Array) -> None:
         """Add mass times the derivative of the acceleration."""
-        half = np.tan((q1[self._columns] - self._q0[self._columns]) / 2)
         data = self._A.data
         data += self._scaled
-        data[self._entries] += self._scaled[self._entries] * half**2
+        # The derivative of 2 tan(Δψ/2) is one more than the square of its half.
+        squares = self._step.turns(self._q0, q1) ** 2
+        data[self._entries] += self._scaled_turning * squares[self._turn_of_entry]
 
     def accept(self, q1: Array, s: Array) -> None:
         """New velocities, and what the scheme lost."""
