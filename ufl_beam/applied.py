@@ -10,9 +10,8 @@ from ufl_beam.compat import Array
 from ufl_beam.grid import Share
 from ufl_beam.ledger import Ledger
 from ufl_beam.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, TimeFunction
-from ufl_beam.schemes import Scheme
+from ufl_beam.schemes import Scheme, Step
 from ufl_beam.sparse import Csr
-from ufl_beam.terms import Step
 
 
 class DeadLoads:
@@ -40,7 +39,9 @@ class DeadLoads:
 
     def begin(self, step: Step) -> None:
         """The loads of the step."""
-        self.force = self._at(step.t_load)
+        self.force = self._at(step.load_time)
+        if step.toward < 1:
+            self.force = self._before + step.toward * (self.force - self._before)
 
     def carry_on(self, t: float) -> None:
         """Take the state at time ``t`` as one that is in equilibrium with the loads."""
@@ -100,14 +101,17 @@ class FollowerLoads:
         self._entries = np.array([A.positions(x, turn), A.positions(y, turn)])
         self._A = A
         self._weight = scheme.load_weight
+        self._sizes_before = np.zeros_like(self._forces)
         self._acting, self._ledger = scheme.acting, ledger
         ledger.supplied["loads"] += 0.0
         self._before = self.force = np.zeros(share.size)
 
     def begin(self, step: Step) -> None:
         """The size of the loads in the step."""
-        factors = np.array([time(step.t_load) for time in self._times])
-        self._sizes = self._forces * factors[:, None]
+        factors = np.array([time(step.load_time) for time in self._times])
+        self._sizes = self._sizes_before + step.toward * (
+            self._forces * factors[:, None] - self._sizes_before
+        )
         self._ψ0 = step.q0[self._dofs[:, 2]]
 
     def _turned(self, q1: Array) -> tuple[Array, Array]:
@@ -133,7 +137,7 @@ class FollowerLoads:
     def accept(self, q1: Array, s: Array) -> None:
         """Work of the loads."""
         self._ledger.supplied["loads"] += float(self._acting(self._before, self.force) @ s)
-        self._before = self.force
+        self._before, self._sizes_before = self.force, self._sizes
 
     def add_state(self, q: Array) -> None:
         """Loads hold no energy; what a potential would hold is in their work."""

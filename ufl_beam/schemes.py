@@ -24,6 +24,32 @@ Constant = Callable[[float], Expr]
 """Makes a number of the scheme a constant of the form, so that changing it compiles nothing."""
 
 
+@dataclass(frozen=True)
+class Step:
+    """A step in time.
+
+    Attributes:
+        t0: Beginning; s.
+        t1: End; s.
+        q0: Configuration at the beginning, local degrees of freedom.
+        load_time: Time at which loads are taken; s.
+        motion_time: Time at which prescribed motions are taken; s.
+        toward: How far the step goes from the loads and motions before it to these; 1 is all the way.
+    """
+
+    t0: float
+    t1: float
+    q0: Array
+    load_time: float
+    motion_time: float
+    toward: float
+
+    @property
+    def dt(self) -> float:
+        """Length of the step; s."""
+        return self.t1 - self.t0
+
+
 class Scheme(Protocol):
     """What a time scheme must say."""
 
@@ -31,7 +57,10 @@ class Scheme(Protocol):
     """Whether the scene has inertia."""
 
     load_weight: float
-    """Loads act at the part ``load_weight`` of the step, in time and in rotation."""
+    """Follower loads turn with the rotation at this part of the step."""
+
+    def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
+        """The step from ``t0`` to ``t1``, perhaps a part of one that goes on to ``end``."""
 
     def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
         """Variation of the strains that the resultants work on; shape (3,)."""
@@ -55,6 +84,13 @@ class Static:
 
     dynamic = False
     load_weight = 1.0
+
+    def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
+        """Parts of a step go in proportion to the loads and motions of its end.
+
+        So loads that are there at once can be reached in parts as well as those that grow.
+        """
+        return Step(t0, t1, q0, load_time=end, motion_time=end, toward=(t1 - t0) / (end - t0))
 
     def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
         """The variation at the end of the step."""
@@ -102,6 +138,10 @@ class Midpoint:
 
     dynamic = True
     load_weight = 0.5
+
+    def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
+        """Loads act in the middle of the step, motions arrive at its end."""
+        return Step(t0, t1, q0, load_time=(t0 + t1) / 2, motion_time=t1, toward=1.0)
 
     def __post_init__(self) -> None:
         for name, value in (("alpha", self.alpha), ("beta", self.beta)):

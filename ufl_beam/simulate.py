@@ -25,7 +25,7 @@ from ufl_beam.solution import Solution
 from ufl_beam.solve import Newton, Solver, StepFailed
 from ufl_beam.sparse import as_slice
 from ufl_beam.supports import Supports
-from ufl_beam.terms import ElasticBeams, Inertia, NodalStep, SectionForces, Step, Term
+from ufl_beam.terms import ElasticBeams, Inertia, NodalStep, SectionForces, Term
 
 SMALLEST_PART = 2**12
 """A step is cut into at most this number of parts."""
@@ -250,7 +250,7 @@ class Simulation:
         while done < SMALLEST_PART:
             end = t1 if done + part == SMALLEST_PART else t0 + (t1 - t0) * (done + part) / SMALLEST_PART
             try:
-                self._advance(end)
+                self._advance(end, t1)
             except StepFailed as failure:
                 if part == 1:
                     self._give_up(failure, end)
@@ -261,15 +261,14 @@ class Simulation:
             if done % (2 * part) == 0 and part < SMALLEST_PART:
                 part *= 2
 
-    def _advance(self, t1: float) -> None:
-        """One step of the scheme; the state changes only if it succeeds."""
-        weight = self.scheme.load_weight
-        step = Step(self.t, t1, self.t + weight * (t1 - self.t), self.q)
+    def _advance(self, t1: float, end: float) -> None:
+        """One step of the scheme, or a part of one to ``end``; the state changes if it succeeds."""
+        step = self.scheme.step(self.t, t1, end, self.q)
         for term in self.terms:
             term.begin(step)
         guess = self.q + (self.q - self._q_before) * (step.dt / self._dt_before)
         self.supports.enter(guess)
-        self.supports.move(guess, t1)
+        self.supports.move(guess, self.supports.in_axes(self.q), step)
         q1 = self._solver.solve(guess, [load.force for load in self.loads])
         self.supports.leave(q1)
         s = self._nodal_step(self.q, q1)

@@ -84,7 +84,8 @@ class Solver:
         self._weights = self._force_weights()
         self._lengths = share.lengths()
         self._diagonal = np.flatnonzero(A.rows() == A.indices)
-        self._x, self._matrix = self._vector(), self._make_matrix()
+        self._x = self._vector()
+        self._matrix = self._make_matrix()
         self._snes = self._make_snes()
         self.iterations = 0
 

@@ -9,7 +9,7 @@ import numpy as np
 from ufl_beam.compat import Array
 from ufl_beam.grid import Index, Share
 from ufl_beam.ledger import Ledger
-from ufl_beam.schemes import Scheme
+from ufl_beam.schemes import Scheme, Step
 from ufl_beam.sparse import Csr, as_slice
 
 
@@ -86,6 +86,14 @@ class Supports:
         for axes in self._turned:
             axes.leave(x)
 
+    def in_axes(self, q: Array) -> Array:
+        """``q`` in the axes of the supports; a copy only if an axis is turned."""
+        if not self._turned:
+            return q
+        x = q.copy()
+        self.enter(x)
+        return x
+
     def in_plane(self, x: Array) -> Array:
         """``x`` in the axes of the plane; a copy only if an axis is turned."""
         if not self._turned:
@@ -94,10 +102,10 @@ class Supports:
         self.leave(q)
         return q
 
-    def move(self, x: Array, t: float) -> None:
-        """Set what is prescribed at time ``t``."""
+    def move(self, x: Array, x0: Array, step: Step) -> None:
+        """Set in ``x`` what is prescribed for the step that begins at ``x0``."""
         for dof, motion in self._motions:
-            x[dof] = motion(t)
+            x[dof] = x0[dof] + step.toward * (motion(step.motion_time) - x0[dof])
 
     def hold(self, r: Array) -> None:
         """Note the reactions in a residual that is complete, and remove them from it."""

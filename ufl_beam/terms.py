@@ -7,7 +7,6 @@ several processes add to one degree of freedom is summed by the solver.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -19,30 +18,8 @@ from ufl_beam.forms import Kernel, Refresh
 from ufl_beam.grid import Share
 from ufl_beam.kinematics import split, strain
 from ufl_beam.ledger import Ledger
-from ufl_beam.schemes import Midpoint, Scheme
+from ufl_beam.schemes import Midpoint, Scheme, Step
 from ufl_beam.sparse import Csr, Product, as_slice
-
-
-@dataclass
-class Step:
-    """A step in time and what the terms may ask about it.
-
-    Attributes:
-        t0: Beginning; s.
-        t1: End; s.
-        t_load: When loads act; s.
-        q0: Configuration at the beginning.
-    """
-
-    t0: float
-    t1: float
-    t_load: float
-    q0: Array
-
-    @property
-    def dt(self) -> float:
-        """Length of the step; s."""
-        return self.t1 - self.t0
 
 
 class NodalStep:

@@ -1,0 +1,47 @@
+# Every target runs through ./env, which brings DOLFINx where it is missing. `make` lists the targets.
+.DEFAULT_GOAL := help
+.PHONY: help demo test test-mpi verify demos check bench
+
+# Natively as root Open MPI refuses to start; with more ranks than cores, too (the last two lines: versions 5 and 6).
+# ./env sets the same in its root.
+export OMPI_ALLOW_RUN_AS_ROOT = 1
+export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM = 1
+export PRTE_MCA_rmaps_default_mapping_policy = :oversubscribe
+export PRTE_MCA_mapby = :oversubscribe
+
+# $(call mpi,N) COMMAND...: only the first rank writes to the terminal; what another writes is shown if it fails.
+mpi = ./env mpirun -n $(1) sh -c 'rank=$${OMPI_COMM_WORLD_RANK:-$${PMI_RANK:-0}}; [ $$rank = 0 ] && exec "$$@"; \
+	log=.rank$$rank.log; "$$@" >$$log 2>&1 && exec rm $$log; status=$$?; echo "rank $$rank:"; cat $$log; exit $$status' -
+pytest_mpi = python3 -m pytest -q --color=no -p no:cacheprovider tests/unit tests/properties
+cheap_demos = demos/demo_four_beam_swing.py
+
+help: ## this list
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 12
+
+demo: ## the first demo: a four-beam swing
+	@./env python3 demos/demo_four_beam_swing.py
+
+test: ## the tests, without the slow ones
+	@./env python3 -m pytest
+
+test-mpi: ## unit and property tests on 2 and on 3 ranks
+	@$(call mpi,2) $(pytest_mpi)
+	@$(call mpi,3) $(pytest_mpi)
+
+verify: ## the slow verification studies
+	@./env python3 -m pytest -m slow
+
+demos: ## all demos one after the other, then the cheap ones on 2 ranks
+	@set -e; for demo in demos/demo_*.py; do echo "== $$demo"; ./env python3 $$demo; done
+	@set -e; for demo in $(cheap_demos); do echo "== $$demo, 2 ranks"; $(call mpi,2) python3 $$demo; done
+
+check: ## lint, format and types
+	@./env sh -ec '$(with_ruff); $$ruff check; $$ruff format --check; python3 -m mypy'
+
+bench: ## time per step
+	@./env python3 benchmarks/bench_step.py
+
+# ruff, which Debian lacks: from a venv beside the root of ./env, made on first use; its version is in pyproject.toml.
+with_ruff = tools=$${XDG_CACHE_HOME:-$$HOME/.cache}/ufl_beam/tools; ruff=$$tools/bin/ruff; \
+	$$ruff --version >/dev/null 2>&1 || { python3 -m venv --system-site-packages $$tools; \
+	$$tools/bin/pip install -q "ruff$$(sed -n "s/^required-version = \"\([^\"]*\)\".*/\1/p" pyproject.toml)"; }
