@@ -30,6 +30,9 @@ from ufl_beam.terms import ElasticBeams, Inertia, NodalStep, SectionForces, Term
 SMALLEST_PART = 2**12
 """A step is cut into at most this number of parts."""
 
+PATH = 0.1
+"""Part of the work of a static step that may be unaccounted for before the step is cut."""
+
 LARGEST_TURN = 0.75 * math.pi
 """A step that turns a node further is cut; the algorithmic strains end at π."""
 
@@ -167,6 +170,9 @@ class Simulation:
         self._q_before, self._dt_before = self.q, math.inf
         self._nodal_step = NodalStep(self.share, scheme)
         self._rotations = as_slice(self.share.rotations())
+        self._force_before = np.zeros(self.share.size)
+        if not scheme.dynamic:
+            self.beams.add_residual(self.q, self._force_before)
         for term in self.terms:
             term.add_state(self.q)
         self._solver = Solver(
@@ -273,6 +279,8 @@ class Simulation:
         self.supports.leave(q1)
         s = self._nodal_step(self.q, q1)
         self._require_small_turns(q1)
+        if not self.scheme.dynamic:
+            self._require_followed(q1, s)
         for term in self.terms:
             term.accept(q1, s)
         self.supports.enter(s)
@@ -292,6 +300,22 @@ class Simulation:
             raise StepFailed(
                 f"a node turns by {turn:.3g} rad in the step, and |Δψ| must stay below π; reduce dt"
             )
+
+    def _require_followed(self, q1: Array, s: Array) -> None:
+        """A static step must be so small that the forces on its way account for what it stores.
+
+        Otherwise Newton's method may have found another branch of equilibria than the one followed.
+        """
+        force = self.beams.force
+        work = self.share.total(float(self.scheme.acting(self._force_before, force) @ s))
+        change = self.share.total(self.beams.stored(q1) - self.beams.stored(self.q))
+        held = self.share.total(self.beams.stored(self.q))
+        if abs(work - change) > PATH * (abs(work) + abs(change)) + 1e-9 * held:
+            raise StepFailed(
+                f"the step stores {change:.3e} J, but the forces along it do {work:.3e} J of work: "
+                "it leaps to another branch of equilibria, or is too long to tell"
+            )
+        self._force_before = force.copy()
 
     def _give_up(self, failure: StepFailed, end: float) -> None:
         self.solution.keep(self)

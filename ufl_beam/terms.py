@@ -121,8 +121,12 @@ class ElasticBeams:
 
     def add_state(self, q: Array) -> None:
         """Stored energy."""
+        self._ledger.state["stored"] += self.stored(q)
+
+    def stored(self, q: Array) -> float:
+        """Elastic energy of the cells of this process; J."""
         self._set_stored(q)
-        self._ledger.state["stored"] += self._stored.value()
+        return self._stored.value()
 
 
 class SectionForces:
