@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ try:
     import basix.ufl
     import dolfinx
     import ufl
-    from dolfinx import cpp, fem, io, la, mesh
+    from dolfinx import cpp, fem, io, jit, la, mesh
 except ImportError as error:  # pragma: no cover - depends on the machine
     raise ImportError(
         "ufl_beam needs DOLFINx 0.9 or newer, which is not on PyPI. "
@@ -27,6 +28,26 @@ if VERSION < (0, 9):  # pragma: no cover - depends on the machine
         f"ufl_beam needs DOLFINx 0.9 or newer, this is {dolfinx.__version__}; "
         "run through ./env of the source tree, or see docs/installation.md"
     )
+
+
+TABULATE = (
+    "double *A, const double *w, const double *c, const double *x, const int *entity, "
+    "const uint8_t *permutation" + ("" if VERSION < (0, 10) else ", void *data"),
+    "" if VERSION < (0, 10) else ", 0",
+)
+"""Arguments of the kernels of FFCx, and what a call adds after the first six."""
+
+
+def jit_directory() -> Path:
+    """Where DOLFINx keeps what it compiled."""
+    return Path(jit.get_options()["cache_dir"])
+
+
+def pack(form: fem.Form) -> tuple[Array, Array]:
+    """Constants of a form, and coefficients of its cells; shapes (n,), (num_cells, m)."""
+    coefficients = cpp.fem.pack_coefficients(form._cpp_object)
+    (cells,) = coefficients.values()
+    return cpp.fem.pack_constants(form._cpp_object), np.array(cells)
 
 
 def line_mesh(points: Array, cells: npt.NDArray[np.int64]) -> mesh.Mesh:

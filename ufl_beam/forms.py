@@ -11,75 +11,101 @@ from typing import Any
 import numpy as np
 import ufl
 
-from ufl_beam.compat import Array, cpp, fem
+from ufl_beam.compat import Array, fem, pack
 from ufl_beam.grid import Index
+from ufl_beam.loops import doubles, integers, kernel, lib
 from ufl_beam.sparse import Csr
 
 
 class Kernel:
     """A compiled cell form together with the packed values of its coefficients.
 
+    Args:
+        form: Cell integrals with one quadrature rule.
+        unknown: The configuration that most calls change; it need not appear in the form.
+        cell_dofs: Its degrees of freedom; shape (num_cells, 6).
+
     Attributes:
         compiled: The DOLFINx form.
     """
 
-    def __init__(self, form: ufl.Form) -> None:
+    def __init__(self, form: ufl.Form, unknown: fem.Function, cell_dofs: Index) -> None:
         self.compiled = fem.form(form)
-        self._form = self.compiled._cpp_object
-        self._constants = cpp.fem.pack_constants(self._form)
-        self._packed: dict[Any, Array] = cpp.fem.pack_coefficients(self._form)
-        positions = self.compiled.ufcx_form.original_coefficient_positions
+        ufcx = self.compiled.ufcx_form
+        constants, self._packed = pack(self.compiled)
         everything = form.coefficients()
-        used = [everything[positions[i]] for i in range(self._form_num_coefficients())]
-        widths = [f.function_space.element.space_dimension for f in used]
-        ends = np.cumsum(widths)
-        self._columns = {f: slice(b - w, b) for f, w, b in zip(used, widths, ends, strict=True)}
+        used = [
+            everything[ufcx.original_coefficient_positions[i]] for i in range(ufcx.num_coefficients)
+        ]
+        ends = np.cumsum([f.function_space.element.space_dimension for f in used])
+        self._columns = {
+            f: slice(end - f.function_space.element.space_dimension, end)
+            for f, end in zip(used, ends, strict=True)
+        }
+        self._dofs = np.ascontiguousarray(cell_dofs, dtype=np.int32)
+        mesh = self.compiled.mesh
+        self._coordinates = np.ascontiguousarray(mesh.geometry.x[mesh.geometry.dofmap])
+        self._rows = self._rows_of_cells(form)
+        integral = ufcx.form_integrals[0]
+        at = self._columns[unknown].start if self.depends_on(unknown) else 0
+        self._head = (
+            kernel(integral.tabulate_tensor_float64, self.compiled.module.ffi),
+            len(self._dofs),
+            self._dofs.shape[1] if self.depends_on(unknown) else 0,
+            integers(self._dofs),
+        )
+        self._at, self._constants = at, doubles(constants)
+        self._prepare()
+
+    def _rows_of_cells(self, form: ufl.Form) -> Index:
+        """Entries of the vector that the cells add to; (num_cells, entries of a cell)."""
+        if not form.arguments():
+            return np.zeros((len(self._dofs), 1), dtype=np.int32)
+        dofmap = form.arguments()[0].ufl_function_space().dofmap
+        blocks = np.asarray(dofmap.list)[:, :, None] * dofmap.bs + np.arange(dofmap.bs)
+        return np.ascontiguousarray(blocks.reshape(len(blocks), -1), dtype=np.int32)
+
+    def _prepare(self) -> None:
+        """Pointers to all that stays where it is."""
+        self._middle = (
+            self._at,
+            doubles(self._packed),
+            self._packed.shape[1],
+            self._constants,
+            doubles(self._coordinates),
+            self._rows.shape[1],
+            integers(self._rows),
+        )
 
     def depends_on(self, function: fem.Function) -> bool:
         """Whether ``function`` appears in the form."""
         return function in self._columns
 
-    def _form_num_coefficients(self) -> int:
-        return int(self.compiled.ufcx_form.num_coefficients)
-
-    def coefficient(self, function: fem.Function) -> Array:
-        """Packed values of ``function``: a view, written to in the place of the function.
-
-        Shape (num_cells, dofs per cell).
-        """
-        (array,) = self._packed.values()
-        return array[:, self._columns[function]]
+    def set(self, function: fem.Function, q: Array) -> None:
+        """Give ``function`` the degrees of freedom ``q``, if it appears in the form."""
+        if self.depends_on(function):
+            self._packed[:, self._columns[function]] = q[self._dofs]
 
     def share(self, other: Kernel) -> None:
         """Use the packed values of ``other``, a form of the same coefficients."""
         if self._columns != other._columns:
             raise ValueError("the forms do not have the same coefficients")
         self._packed = other._packed
+        self._prepare()
 
-    def add_to_vector(self, b: Array) -> None:
-        """Add the linear form to ``b``."""
-        cpp.fem.assemble_vector(b, self._form, self._constants, self._packed)
+    def place(self, A: Csr) -> None:
+        """Let a bilinear form on the degrees of freedom of the cells add to ``A``."""
+        rows = np.repeat(self._dofs, self._dofs.shape[1], axis=1)
+        columns = np.tile(self._dofs, self._dofs.shape[1])
+        self._rows = A.positions(rows.ravel(), columns.ravel()).reshape(rows.shape)
+        self._prepare()
 
-    def add_to_matrix(self, A: Csr) -> None:
-        """Add the bilinear form to ``A``."""
-        cpp.fem.assemble_matrix(A.matrix._cpp_object, self._form, self._constants, self._packed, [])
+    def add(self, q: Array, b: Array) -> None:
+        """Add the form at the unknown ``q`` to a vector, or to the entries of the matrix."""
+        lib.cells_vector(*self._head, doubles(q), *self._middle, doubles(b))
 
-    def value(self) -> float:
-        """Value of the functional."""
-        return float(cpp.fem.assemble_scalar(self._form, self._constants, self._packed))
-
-
-class Refresh:
-    """Copies a configuration into the packed coefficients of kernels.
-
-    Kernels in which the configuration does not appear cost nothing.
-    """
-
-    def __init__(self, cell_dofs: Index, function: fem.Function, kernels: list[Kernel]) -> None:
-        self._dofs = np.ascontiguousarray(cell_dofs, dtype=np.intp)
-        self._targets = [k.coefficient(function) for k in kernels if k.depends_on(function)]
-
-    def __call__(self, q: Array) -> None:
-        """Write the local degrees of freedom ``q``."""
-        for target in self._targets:
-            target[:] = q[self._dofs]
+    def value(self, q: Array) -> float:
+        """Value of the functional at the unknown ``q``."""
+        total = np.zeros(1)
+        self.add(q, total)
+        return float(total[0])

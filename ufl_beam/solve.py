@@ -13,6 +13,7 @@ from petsc4py import PETSc
 from ufl_beam.compat import Array
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.grid import Share
+from ufl_beam.loops import doubles, lib
 from ufl_beam.sparse import Csr
 
 CONVERGED = int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE)
@@ -82,9 +83,11 @@ class Solver:
         self._parallel = share.comm.size > 1
         self._views: dict[int, Array] = {}
         self._weights = self._force_weights()
+        self._norm = (len(self._weights), doubles(self._weights))
         self._lengths = share.lengths()
         self._diagonal = np.flatnonzero(A.rows() == A.indices)
         self._x = self._vector()
+        self._view(self._x, writable=True)
         self._matrix = self._make_matrix()
         self._snes = self._make_snes()
         self.iterations = 0
@@ -93,16 +96,22 @@ class Solver:
 
     def _vector(self) -> PETSc.Vec:
         share = self._share
+        if not self._parallel:
+            return PETSc.Vec().createSeq(share.size)
         size = (share.num_owned, share.grid.size)
         return PETSc.Vec().createGhost(share.ghosts, size=size, comm=share.comm)
 
-    def _view(self, vector: PETSc.Vec) -> Array:
+    def _view(self, vector: PETSc.Vec, writable: bool = False) -> Array:
         """Local values of a vector, ghosts included; PETSc keeps them where they are."""
         handle = vector.handle
         view = self._views.get(handle)
         if view is None:
-            with vector.localForm() as local:
-                view = self._views[handle] = local.array_w
+            if self._parallel:
+                with vector.localForm() as local:
+                    view = local.array_w
+            else:
+                view = vector.array_w if writable else vector.array_r
+            self._views[handle] = view
         return view
 
     def _make_matrix(self) -> PETSc.Mat:
@@ -118,10 +127,10 @@ class Solver:
         return matrix
 
     def _make_snes(self) -> PETSc.SNES:
-        snes = PETSc.SNES().create(self._share.comm)
+        snes = PETSc.SNES().create(self._x.comm)
         snes.setOptionsPrefix(PREFIX)
         f = self._vector()
-        self._r = self._view(f)
+        self._r = self._view(f, writable=True)
         snes.setFunction(self._function, f)
         snes.setJacobian(self._jacobian, self._matrix)
         snes.setConvergenceTest(self._test)
@@ -153,7 +162,7 @@ class Solver:
     def _function(self, snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
         if self._parallel:
             x.ghostUpdate(PETSc.InsertMode.INSERT, PETSc.ScatterMode.FORWARD)
-        r = self._view(f)
+        r = self._view(f, writable=True)
         self._residual(self._view(x), r)
         if self._parallel:
             f.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
@@ -180,12 +189,12 @@ class Solver:
         """Of squares: one for forces, one over the squared size of the scene for moments."""
         weights = np.ones(self._share.size)
         weights[self._share.rotations()] = 1 / self._share.grid.scene.size**2
-        return weights[: self._share.num_owned]
+        return weights[: self._share.num_owned].copy()
 
     def _size(self, forces: Array) -> float:
         """Euclidean norm over the scene of forces and moments over its size; N."""
-        owned = forces[: len(self._weights)] if self._parallel else forces
-        return self._share.total(float((owned * self._weights) @ owned)) ** 0.5
+        square: float = lib.weighted_square(*self._norm, doubles(forces))
+        return math.sqrt(self._share.total(square))
 
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, ...]) -> int:
         residual = self._size(self._r)

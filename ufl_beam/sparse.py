@@ -7,6 +7,7 @@ from petsc4py import PETSc
 
 from ufl_beam.compat import Array, la
 from ufl_beam.grid import Index
+from ufl_beam.loops import doubles, integers, lib
 
 
 class Csr:
@@ -22,8 +23,8 @@ class Csr:
     def __init__(self, matrix: la.MatrixCSR) -> None:
         self.matrix = matrix
         self.data: Array = matrix.data
-        self.indices: Index = matrix.indices
-        self.indptr: Index = matrix.indptr
+        self.indices = matrix.indices.astype(np.int32, copy=False)
+        self.indptr = matrix.indptr.astype(np.int32)
 
     @property
     def size(self) -> int:
@@ -36,16 +37,16 @@ class Csr:
 
     def positions(self, rows: Index, columns: Index) -> Index:
         """Where :attr:`data` holds the entries (rows[k], columns[k]); they must exist."""
-        found = []
-        for row, column in zip(rows, columns, strict=True):
-            begin, end = self.indptr[row], self.indptr[row + 1]
-            (at,) = np.flatnonzero(self.indices[begin:end] == column)
-            found.append(begin + at)
-        return np.array(found, dtype=np.int64)
+        keys = self.rows() * self.size + self.indices
+        wanted = rows.astype(np.int64) * self.size + columns
+        found = np.searchsorted(keys, wanted)
+        if not np.array_equal(keys[found], wanted):
+            raise ValueError("the matrix has no such entry")
+        return found.astype(np.int32)
 
     def petsc(self) -> PETSc.Mat:
         """PETSc matrix on this process with the same arrays: no copy, before or after."""
-        indptr = self.indptr.astype(PETSc.IntType)
+        indptr = self.indptr.astype(PETSc.IntType, copy=False)
         indices = self.indices.astype(PETSc.IntType, copy=False)
         matrix = PETSc.Mat().createAIJWithArrays(
             self.size, (indptr, indices, self.data), comm=PETSc.COMM_SELF
@@ -68,15 +69,14 @@ class Product:
     """``x -> A x`` on this process, without allocating."""
 
     def __init__(self, A: Csr) -> None:
-        self._matrix = A.petsc()
-        self._x, self._y = np.zeros(A.size), np.zeros(A.size)
-        self._vectors = [
-            PETSc.Vec().createWithArray(a, comm=PETSc.COMM_SELF) for a in (self._x, self._y)
-        ]
-        self._mult = self._matrix.mult
+        self._arrays = (A.size, integers(A.indptr), integers(A.indices), doubles(A.data))
+
+    def add(self, x: Array, y: Array) -> None:
+        """Add the product to ``y``."""
+        lib.add_product(*self._arrays, doubles(x), doubles(y))
 
     def __call__(self, x: Array) -> Array:
-        """The product; overwritten by the next call."""
-        self._x[:] = x
-        self._mult(*self._vectors)
-        return self._y
+        """The product; a new array."""
+        y = np.zeros_like(x)
+        self.add(x, y)
+        return y

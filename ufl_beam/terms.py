@@ -14,7 +14,7 @@ import ufl
 
 from ufl_beam.compat import Array
 from ufl_beam.fields import Fields
-from ufl_beam.forms import Kernel, Refresh
+from ufl_beam.forms import Kernel
 from ufl_beam.grid import Share
 from ufl_beam.kinematics import split, strain
 from ufl_beam.ledger import Ledger
@@ -80,44 +80,40 @@ class ElasticBeams:
         r = scheme.resultants(C, e0, e1, fields.constant)
         virtual_work = ufl.dot(r, scheme.virtual_strain(q0, q1, w, axis)) * dx  # P(12)
         tangent = ufl.derivative(virtual_work, q1, ufl.TrialFunction(fields.space))
+        stored = sum(C[i] * e1[i] ** 2 / 2 for i in range(3)) * dx  # P(9)
         losses = [d * dx for d in scheme.losses(C, e0, e1, fields.constant)]
 
-        self._force, self._tangent = Kernel(virtual_work), Kernel(tangent)
+        self._q0 = q0
+        self._force, self._tangent, self._stored, *self._losses = (
+            Kernel(form, q1, fields.cell_dofs) for form in (virtual_work, tangent, stored, *losses)
+        )
         self._tangent.share(self._force)
-        self._stored = Kernel(sum(C[i] * e1[i] ** 2 / 2 for i in range(3)) * dx)  # P(9)
-        self._losses = [Kernel(loss) for loss in losses]
-        self._set_q0 = Refresh(fields.cell_dofs, q0, [self._force, *self._losses])
-        self._set_q1 = Refresh(fields.cell_dofs, q1, [self._force])
-        self._set_stored = Refresh(fields.cell_dofs, q1, [self._stored])
-        self._set_loss = Refresh(fields.cell_dofs, q1, self._losses)
+        self._tangent.place(A)
         self._A, self._ledger = A, ledger
         if losses:
             ledger.lost["numerical"] += 0.0
         self.force = np.zeros(fields.share.size)
 
     def begin(self, step: Step) -> None:
-        """Remember the strains at the beginning."""
-        self._set_q0(step.q0)
+        """Remember the configuration at the beginning."""
+        for kernel in (self._force, *self._losses):
+            kernel.set(self._q0, step.q0)
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the internal forces."""
-        self._set_q1(q1)
         force = self.force
         force.fill(0.0)
-        self._force.add_to_vector(force)
+        self._force.add(q1, force)
         r += force
 
     def add_tangent(self, q1: Array) -> None:
         """Add the stiffness, material and geometric."""
-        self._set_q1(q1)
-        self._tangent.add_to_matrix(self._A)
+        self._tangent.add(q1, self._A.data)
 
     def accept(self, q1: Array, s: Array) -> None:
         """What the scheme lost."""
-        if self._losses:
-            self._set_loss(q1)
-            for loss in self._losses:
-                self._ledger.lost["numerical"] += loss.value()
+        for loss in self._losses:
+            self._ledger.lost["numerical"] += loss.value(q1)
 
     def add_state(self, q: Array) -> None:
         """Stored energy."""
@@ -125,8 +121,7 @@ class ElasticBeams:
 
     def stored(self, q: Array) -> float:
         """Elastic energy of the cells of this process; J."""
-        self._set_stored(q)
-        return self._stored.value()
+        return self._stored.value(q)
 
 
 class SectionForces:
@@ -137,15 +132,13 @@ class SectionForces:
         C, e = fields.stiffness(), strain(q, fields.axis)
         z = ufl.TestFunction(C.function_space)
         mean = sum(C[i] * e[i] * z[i] for i in range(3)) / fields.axis.h  # P(7)
-        self._kernel = Kernel(mean * fields.dx(1))
-        self._set_q = Refresh(fields.cell_dofs, q, [self._kernel])
+        self._kernel = Kernel(mean * fields.dx(1), q, fields.cell_dofs)
         self._order = fields.order
 
     def __call__(self, q: Array) -> Array:
         """Resultants at ``q``, in the order of the share; (num_cells, 3); N, N, N m."""
         values = np.zeros(3 * len(self._order))
-        self._set_q(q)
-        self._kernel.add_to_vector(values)
+        self._kernel.add(np.ascontiguousarray(q), values)
         resultants = np.empty((len(self._order), 3))
         resultants[self._order] = values.reshape(-1, 3)
         return resultants
@@ -157,7 +150,10 @@ def mass_matrix(fields: Fields) -> Csr:
     (u, ψ), (w_u, w_ψ) = (split(f(fields.space)) for f in (ufl.TrialFunction, ufl.TestFunction))
     ρ = fields.inertia()
     M = fields.matrix()
-    Kernel((ρ[0] * ufl.dot(u, w_u) + ρ[1] * ψ * w_ψ) * fields.dx(2)).add_to_matrix(M)  # P(67)
+    work = (ρ[0] * ufl.dot(u, w_u) + ρ[1] * ψ * w_ψ) * fields.dx(2)  # P(67)
+    kernel = Kernel(work, fields.configuration(), fields.cell_dofs)
+    kernel.place(M)
+    kernel.add(np.zeros(share.size), M.data)
     for mass in share.grid.scene.masses:
         dofs = share.at(mass.place)
         mine = share.owns(dofs)
@@ -206,7 +202,7 @@ class Inertia:
         a = self._step(self._q0, q1)
         a *= self._a / self._dt
         a -= self._before
-        r += self._times(a)  # P(78)
+        self._times.add(a, r)  # P(78)
 
     def add_tangent(self, q1: Array) -> None:
         """Add mass times the derivative of the acceleration."""

@@ -1,0 +1,140 @@
+"""Time per step and per Newton iteration of the elastic flying beam, and where it goes.
+
+Run on an idle machine, one core::
+
+    make bench
+
+Prints a table and writes one JSON line per case to ``benchmarks/results/bench_step.jsonl``.  Each
+figure is the median over repeated runs of the whole time loop (load, predictor, Newton iterations,
+ledger, kept history), without building the scene; minimum and maximum are in the JSON.  The parts are
+timed by themselves, in a loop, at a state of the motion.
+"""
+
+import argparse
+import json
+import platform
+import statistics
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+import ufl_beam as ub
+from ufl_beam.compat import dolfinx
+
+CASES = ((8, 1000), (64, 500), (512, 200), (4096, 50), (32768, 20))  # cells, steps
+RESULTS = Path(__file__).parent / "results" / "bench_step.jsonl"
+
+
+def flying_beam(cells):
+    section = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=10.0)
+    beam = ub.Beam((6, 0), (0, 8), section, cells=cells)
+    load = ub.PointLoad(beam.start, force=(8, 0), moment=-80, time=lambda t: float(t < 2.5))
+    return ub.Scene([beam], loads=[load])
+
+
+def run(cells, steps, dt):
+    """Seconds of the time loop, its iterations, and the simulation at its end."""
+    simulation = ub.Simulation(flying_beam(cells), ub.Midpoint())
+    begin = time.perf_counter()
+    for n in range(1, steps + 1):
+        simulation.step_to(n * dt)
+        simulation.solution.keep(simulation)
+    return time.perf_counter() - begin, simulation.iterations, simulation
+
+
+def microseconds(function, seconds=0.2):
+    """Median time of one call, over about ``seconds``."""
+    function()
+    begin = time.perf_counter()
+    function()
+    count = max(1, int(0.02 / max(time.perf_counter() - begin, 1e-7)))
+    times = []
+    end = time.perf_counter() + seconds
+    while not times or time.perf_counter() < end:
+        begin = time.perf_counter()
+        for _ in range(count):
+            function()
+        times.append((time.perf_counter() - begin) / count)
+    return 1e6 * statistics.median(times)
+
+
+def parts(simulation):
+    """Microseconds of the parts of an iteration."""
+    solver = simulation._solver
+    x = solver._view(solver._x).copy()
+    r = np.zeros_like(x)
+    matrix, factors = solver._matrix, solver._snes.getKSP().getPC()
+    b, y = matrix.createVecs()
+    simulation._tangent(x)
+
+    def factor_and_solve():
+        matrix.stateIncrease()
+        factors.setUp()
+        factors.apply(b, y)
+
+    return {
+        "residual": microseconds(lambda: simulation._residual(x, r)),
+        "of it beams": microseconds(lambda: simulation.beams.add_residual(x, r)),
+        "tangent": microseconds(lambda: simulation._tangent(x)),
+        "of it beams ": microseconds(lambda: simulation.beams.add_tangent(x)),
+        "factor and solve": microseconds(factor_and_solve),
+        "convergence test": microseconds(lambda: solver._test(solver._snes, 1, ())),
+    }
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--repeat", type=int, default=7, help="runs of each case")
+    parser.add_argument("--dt", type=float, default=0.01, help="step (s)")
+    options = parser.parse_args()
+    commit = subprocess.run(
+        ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False
+    ).stdout.strip()
+    machine = {
+        "commit": commit or "unknown",
+        "python": platform.python_version(),
+        "dolfinx": dolfinx.__version__,
+        "machine": platform.machine(),
+        "processor": processor(),
+        "threads": 1,
+    }
+    print(f"flying beam, dt = {options.dt} s, median of {options.repeat} runs; {machine}")
+    print(f"{'cells':>6} {'µs/step':>10} {'iterations':>10} {'µs/iter':>9} {'µs/cell/iter':>12}  parts, µs")
+    RESULTS.parent.mkdir(exist_ok=True)
+    with RESULTS.open("a") as file:
+        for cells, steps in CASES:
+            run(cells, 2, options.dt)  # compiles
+            loops = [run(cells, steps, options.dt) for _ in range(options.repeat)]
+            iterations, simulation = loops[0][1:]
+            seconds = sorted(loop[0] for loop in loops)
+            median = 1e6 * statistics.median(seconds)
+            split = {name: round(t, 2) for name, t in parts(simulation).items()}
+            print(
+                f"{cells:6d} {median / steps:10.1f} {iterations / steps:10.2f} "
+                f"{median / iterations:9.1f} {median / iterations / cells:12.3f}  "
+                + ", ".join(f"{name.strip()} {t:.1f}" for name, t in split.items()),
+                flush=True,
+            )
+            case = {
+                "case": "flying beam", "cells": cells, "steps": steps, "dt": options.dt,
+                "iterations": iterations, "us_per_iteration": median / iterations,
+                "us_min": 1e6 * seconds[0] / iterations, "us_max": 1e6 * seconds[-1] / iterations,
+                "parts_us": split, **machine,
+            }  # fmt: skip
+            file.write(json.dumps(case) + "\n")
+
+
+def processor():
+    """Name of the processor, where the system tells."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor()
+    return next((x.split(":")[1].strip() for x in lines if x.startswith("model name")), "unknown")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

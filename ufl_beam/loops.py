@@ -1,0 +1,82 @@
+"""The loops over cells and rows, compiled once for the machine.
+
+They do what DOLFINx's assemblers do (a test compares both), but bring the unknowns of a cell up to date
+on the way and know beforehand where the entries of its matrix go.  At 8 cells that halves, at 4096 cells
+it takes a third off the time of an iteration.  FFCx needs a C compiler at run time anyway.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import os
+import sys
+import sysconfig
+import tempfile
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import cffi
+
+from ufl_beam.compat import TABULATE, jit_directory
+
+_DECLARATIONS = """
+void cells_vector(kernel *tabulate, int cells, int dofs_per_cell, const int32_t *dofs,
+                  const double *q, int at, double *w, int width, const double *constants,
+                  const double *coordinates, int rows, const int32_t *row, double *b);
+void add_product(int rows, const int32_t *indptr, const int32_t *indices, const double *data,
+                 const double *x, double *y);
+double weighted_square(int rows, const double *w, const double *f);
+"""
+
+
+def _load() -> ModuleType:
+    """The compiled module, from the cache of the JIT compiler or made anew."""
+    arguments, extra = TABULATE
+    source = "\n".join(
+        [
+            "#include <stdint.h>",
+            f"typedef void (kernel)({arguments});",
+            f"#define CALL(f, e, w, c, x) f(e, w, c, x, 0, 0{extra})",
+            Path(__file__).with_name("loops.c").read_text(),
+        ]
+    )
+    key = hashlib.sha256((source + _DECLARATIONS + sys.version).encode()).hexdigest()[:16]
+    name = f"ufl_beam_loops_{key}"
+    directory = jit_directory()
+    library = directory / (name + str(sysconfig.get_config_var("EXT_SUFFIX")))
+    if not library.exists():
+        builder = cffi.FFI()
+        builder.cdef(f"typedef void (kernel)({arguments});" + _DECLARATIONS)
+        builder.set_source(name, source, extra_compile_args=["-O2"])
+        directory.mkdir(parents=True, exist_ok=True)
+        # Other processes may compile the same at the same time; the last one wins.
+        with tempfile.TemporaryDirectory(dir=directory) as scratch:
+            os.replace(builder.compile(tmpdir=scratch), library)
+    spec = importlib.util.spec_from_file_location(name, library)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"cannot load {library}; remove it and try again")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+_module = _load()
+ffi: Any = _module.ffi  # type: ignore[attr-defined]
+lib: Any = _module.lib  # type: ignore[attr-defined]
+
+
+def doubles(array: Any) -> Any:
+    """Pointer to the contiguous array of float64; it keeps the array alive."""
+    return ffi.from_buffer("double[]", array)
+
+
+def integers(array: Any) -> Any:
+    """Pointer to the contiguous array of int32; it keeps the array alive."""
+    return ffi.from_buffer("int32_t[]", array)
+
+
+def kernel(pointer: Any, of: Any) -> Any:
+    """An FFCx kernel, given as a function pointer of the cffi instance ``of``."""
+    return ffi.cast("kernel *", int(of.cast("intptr_t", pointer)))
