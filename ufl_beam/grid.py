@@ -157,8 +157,8 @@ class Share:
         return self.grid.dofs[self.grid.vertex(place)]
 
     def rotations(self) -> Index:
-        """Local numbers of all rotations."""
-        return np.unique(self.local(self.grid.dofs[:, 2]))
+        """Local numbers of all rotations; int32."""
+        return np.unique(self.local(self.grid.dofs[:, 2])).astype(np.int32)
 
     def lengths(self) -> Array:
         """What a strain of one is to each local degree of freedom: a cell's length, or a radian."""
@@ -178,9 +178,12 @@ class Share:
         return np.asarray((found >= 0) & (found < self.num_owned))
 
     def gather(self, values: Array) -> Array:
-        """Values of all degrees of freedom, in the order of the grid, on every process."""
+        """Values of all degrees of freedom, in the order of the grid, on every process.
+
+        One process alone gets ``values`` back: states are new arrays in each step.
+        """
         if self.comm.size == 1:
-            return values.copy()
+            return values
         parts = np.concatenate(self.comm.allgather(values[: self.num_owned]))
         result = np.empty(self.grid.size)
         result[self._all_owned] = parts

@@ -27,6 +27,13 @@ void cells_vector(kernel *tabulate, int cells, int dofs_per_cell, const int32_t 
                   const double *coordinates, int rows, const int32_t *row, double *b);
 void add_product(int rows, const int32_t *indptr, const int32_t *indices, const double *data,
                  const double *x, double *y);
+void add_inertia(int rows, const int32_t *indptr, const int32_t *indices, const double *data,
+                 double factor, const double *s, const double *before, double *r);
+void add_inertia_tangent(int entries, const double *mass, int turning_entries,
+                         const int32_t *entry, const int32_t *column, const double *s,
+                         double *data);
+double step_of_nodes(int size, const double *q0, const double *q1, int rotations,
+                     const int32_t *rotation, double *s);
 double weighted_square(int rows, const double *w, const double *f);
 """
 
@@ -49,7 +56,7 @@ def _load() -> ModuleType:
     if not library.exists():
         builder = cffi.FFI()
         builder.cdef(f"typedef void (kernel)({arguments});" + _DECLARATIONS)
-        builder.set_source(name, source, extra_compile_args=["-O2"])
+        builder.set_source(name, source, extra_compile_args=["-O2"], libraries=["m"])
         directory.mkdir(parents=True, exist_ok=True)
         # Other processes may compile the same at the same time; the last one wins.
         with tempfile.TemporaryDirectory(dir=directory) as scratch:

@@ -18,7 +18,9 @@ from ufl.core.expr import Expr
 from ufl_beam import kinematics
 from ufl_beam.compat import Array
 from ufl_beam.errors import SceneError, require_number
+from ufl_beam.grid import Index
 from ufl_beam.kinematics import Axis
+from ufl_beam.loops import doubles, integers, lib
 
 Constant = Callable[[float], Expr]
 """Makes a number of the scheme a constant of the form, so that changing it compiles nothing."""
@@ -71,8 +73,11 @@ class Scheme(Protocol):
     def losses(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> tuple[Expr, ...]:
         """Energies per length that the resultants lose numerically in the step; often none."""
 
-    def turn(self, increment: Array) -> Array:
-        """What moments work on in a step, from the increments of rotation."""
+    def nodal_step(self, q0: Array, q1: Array, rotations: Index) -> tuple[Array, float]:
+        """What forces and moments work on in a step; and the largest turn of a node; rad.
+
+        ``rotations`` are the degrees of freedom that are rotations, as int32.
+        """
 
     def acting(self, before: Array, now: Array) -> Array:
         """Forces that do the work of a step, from those in its equation and in the one before."""
@@ -104,9 +109,9 @@ class Static:
         """None."""
         return ()
 
-    def turn(self, increment: Array) -> Array:
-        """Moments work on the increments themselves."""
-        return increment
+    def nodal_step(self, q0: Array, q1: Array, rotations: Index) -> tuple[Array, float]:
+        """The increments themselves; a step may turn a node as far as it likes."""
+        return q1 - q0, 0.0
 
     def acting(self, before: Array, now: Array) -> Array:
         """The mean of both ends: the trapezoidal rule, exact where forces grow in proportion."""
@@ -166,12 +171,13 @@ class Midpoint:
             return ()
         return (constant(self.alpha) * ufl.dot(_scaled(C, e1 - e0), e1 - e0),)  # P(90)
 
-    def turn(self, increment: Array) -> Array:
-        """Moments work on 2 tan(Δψ/2); see docs/errata.md."""
-        turn = increment * 0.5
-        np.tan(turn, out=turn)
-        turn *= 2.0
-        return turn
+    def nodal_step(self, q0: Array, q1: Array, rotations: Index) -> tuple[Array, float]:
+        """(Δu, 2 tan(Δψ/2)): with it works are exact increments; see docs/errata.md."""
+        s = np.empty_like(q1)
+        turn: float = lib.step_of_nodes(
+            len(s), doubles(q0), doubles(q1), len(rotations), integers(rotations), doubles(s)
+        )
+        return s, turn
 
     def acting(self, before: Array, now: Array) -> Array:
         """The forces in the equation of the step."""

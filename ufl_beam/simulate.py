@@ -23,12 +23,13 @@ from ufl_beam.scene import Scene
 from ufl_beam.schemes import Midpoint, Scheme
 from ufl_beam.solution import Solution
 from ufl_beam.solve import Newton, Solver, StepFailed
-from ufl_beam.sparse import as_slice
 from ufl_beam.supports import Supports
-from ufl_beam.terms import ElasticBeams, Inertia, NodalStep, SectionForces, Term
+from ufl_beam.terms import ElasticBeams, Inertia, SectionForces, Term
 
 SMALLEST_PART = 2**12
 """A step is cut into at most this number of parts."""
+
+NO_REACTIONS = np.zeros((0, 3))
 
 PATH = 0.1
 """Part of the work of a static step that may be unaccounted for before the step is cut."""
@@ -168,8 +169,7 @@ class Simulation:
         if start is not None:
             self._carry_on(start)
         self._q_before, self._dt_before = self.q, math.inf
-        self._nodal_step = NodalStep(self.share, scheme)
-        self._rotations = as_slice(self.share.rotations())
+        self._rotations = self.share.rotations()
         self._force_before = np.zeros(self.share.size)
         if not scheme.dynamic:
             self.beams.add_residual(self.q, self._force_before)
@@ -277,8 +277,8 @@ class Simulation:
         self.supports.move(guess, self.supports.in_axes(self.q), step)
         q1 = self._solver.solve(guess, [load.force for load in self.loads])
         self.supports.leave(q1)
-        s = self._nodal_step(self.q, q1)
-        self._require_small_turns(q1)
+        s, turn = self.scheme.nodal_step(self.q, q1, self._rotations)
+        self._require_small(turn)
         if not self.scheme.dynamic:
             self._require_followed(q1, s)
         for term in self.terms:
@@ -292,11 +292,11 @@ class Simulation:
         for term in self.terms:
             term.add_state(q1)
 
-    def _require_small_turns(self, q1: Array) -> None:
-        turn = float(np.abs(q1[self._rotations] - self.q[self._rotations]).max(initial=0.0))
+    def _require_small(self, turn: float) -> None:
+        """Raise if a node of any process turns too far in the step."""
         if self.comm.size > 1:
             turn = self.comm.allreduce(turn, op=MPI.MAX)
-        if turn > LARGEST_TURN and self.scheme.dynamic:
+        if not turn <= LARGEST_TURN:
             raise StepFailed(
                 f"a node turns by {turn:.3g} rad in the step, and |Δψ| must stay below π; reduce dt"
             )
@@ -343,7 +343,7 @@ class Simulation:
     def reactions(self) -> Array:
         """Forces of all supports on the scene; (num_supports, 3); N, N, N m."""
         if not self.scene.supports:
-            return np.zeros((0, 3))
+            return NO_REACTIONS
         if self.parts == 0:
             return np.full((len(self.scene.supports), 3), np.nan)
         everywhere = self.share.gather(self.supports.all_reactions(self.share.size))

@@ -75,6 +75,10 @@ class Product:
         """Add the product to ``y``."""
         lib.add_product(*self._arrays, doubles(x), doubles(y))
 
+    def add_combined(self, factor: float, x: Array, less: Array, y: Array) -> None:
+        """Add the product with ``factor * x - less`` to ``y``."""
+        lib.add_inertia(*self._arrays, factor, doubles(x), doubles(less), doubles(y))
+
     def __call__(self, x: Array) -> Array:
         """The product; a new array."""
         y = np.zeros_like(x)

@@ -109,15 +109,17 @@ class Supports:
 
     def hold(self, r: Array) -> None:
         """Note the reactions in a residual that is complete, and remove them from it."""
-        self.reactions = r[self._held].copy()
-        r[self._held] = 0.0
+        if len(self.dofs):
+            self.reactions = r[self._held].copy()
+            r[self._held] = 0.0
 
     def hold_matrix(self, data: Array) -> None:
         """Turn a tangent into the axes of the supports and hold what is held."""
         for axes in self._turned:
             axes.enter_matrix(data)
-        data[self._zero] = 0.0
-        data[self._diagonal] = 1.0
+        if len(self.dofs):
+            data[self._zero] = 0.0
+            data[self._diagonal] = 1.0
 
     def accept(self, s: Array) -> None:
         """Work of the supports that move; ``s`` in their axes."""

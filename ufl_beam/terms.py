@@ -15,29 +15,11 @@ import ufl
 from ufl_beam.compat import Array
 from ufl_beam.fields import Fields
 from ufl_beam.forms import Kernel
-from ufl_beam.grid import Share
 from ufl_beam.kinematics import split, strain
 from ufl_beam.ledger import Ledger
+from ufl_beam.loops import doubles, integers, lib
 from ufl_beam.schemes import Midpoint, Scheme, Step
-from ufl_beam.sparse import Csr, Product, as_slice
-
-
-class NodalStep:
-    """The step of the nodes that virtual works are works on: (Δu, turn of Δψ)."""
-
-    def __init__(self, share: Share, scheme: Scheme) -> None:
-        self._turning = as_slice(share.rotations())
-        self._turn = scheme.turn
-
-    def __call__(self, q0: Array, q1: Array) -> Array:
-        """The step from ``q0`` to ``q1``; a new array."""
-        s = q1 - q0
-        s[self._turning] = self._turn(s[self._turning])
-        return s
-
-    def turns(self, q0: Array, q1: Array) -> Array:
-        """The entries of the step that belong to rotations."""
-        return self._turn(q1[self._turning] - q0[self._turning])
+from ufl_beam.sparse import Csr, Product
 
 
 class Term(Protocol):
@@ -176,10 +158,10 @@ class Inertia:
         share = fields.share
         self.M = mass_matrix(fields)
         self._times = Product(self.M)
-        self._step = NodalStep(share, scheme)
-        turning = share.rotations()
-        self._entries = np.flatnonzero(np.isin(self.M.indices, turning) & (self.M.data != 0))
-        self._turn_of_entry = np.searchsorted(turning, self.M.indices[self._entries])
+        self._rotations = share.rotations()
+        turning = np.isin(self.M.indices, self._rotations) & (self.M.data != 0)
+        self._entries = np.flatnonzero(turning).astype(np.int32)
+        self._columns = self.M.indices[self._entries]
         self._A, self._ledger = A, ledger
         if scheme.beta:
             ledger.lost["numerical"] += 0.0
@@ -193,24 +175,22 @@ class Inertia:
         if step.dt != self._dt:
             self._dt = step.dt
             self._a, self._b = self._scheme.velocity_weights(step.dt)
-            self._scaled = self.M.data * (self._a / step.dt)
-            self._scaled_turning = self._scaled[self._entries] / 4
+            self._mass = self.M.data * (self._a / step.dt)
+            self._tangent = (
+                *(len(self._mass), doubles(self._mass)),
+                *(len(self._entries), integers(self._entries), integers(self._columns)),
+            )
         self._before = self.v * ((1 + self._b) / step.dt)
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add mass times the acceleration of the step."""
-        a = self._step(self._q0, q1)
-        a *= self._a / self._dt
-        a -= self._before
-        self._times.add(a, r)  # P(78)
+        s, _ = self._scheme.nodal_step(self._q0, q1, self._rotations)
+        self._times.add_combined(self._a / self._dt, s, self._before, r)  # P(78)
 
     def add_tangent(self, q1: Array) -> None:
         """Add mass times the derivative of the acceleration."""
-        data = self._A.data
-        data += self._scaled
-        # The derivative of 2 tan(Δψ/2) is one more than the square of its half.
-        squares = self._step.turns(self._q0, q1) ** 2
-        data[self._entries] += self._scaled_turning * squares[self._turn_of_entry]
+        s, _ = self._scheme.nodal_step(self._q0, q1, self._rotations)
+        lib.add_inertia_tangent(*self._tangent, doubles(s), doubles(self._A.data))
 
     def accept(self, q1: Array, s: Array) -> None:
         """New velocities, and what the scheme lost."""
