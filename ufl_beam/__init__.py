@@ -20,7 +20,7 @@ from ufl_beam.scene import (
 )
 from ufl_beam.schemes import Midpoint, Static
 from ufl_beam.sections import Section
-from ufl_beam.simulate import Simulation, simulate
+from ufl_beam.simulate import Simulation, say, simulate
 from ufl_beam.solution import Solution
 from ufl_beam.solve import Newton
 
@@ -56,5 +56,6 @@ __all__ = [
     "Table",
     "Velocity",
     "ramp",
+    "say",
     "simulate",
 ]

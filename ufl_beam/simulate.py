@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Sequence
 from functools import cached_property
 
@@ -79,6 +80,7 @@ def simulate(
     recorders = [record] if isinstance(record, Recorder) else list(record)
     for recorder in recorders:
         recorder.require_writable()
+    begin = time.perf_counter()
     simulation = Simulation(scene, scheme, t0=t0, start=start, newton=newton, comm=comm)
     # A step is never longer than asked for; the slack is for the rounding of (t1 - t0) / dt.
     steps = max(1, math.ceil((t1 - t0) / dt * (1 - 1e-9)))
@@ -98,6 +100,7 @@ def simulate(
         for recorder in recorders:
             recorder.close()
         simulation.close()
+        solution.seconds = time.perf_counter() - begin
     return solution
 
 
@@ -375,3 +378,9 @@ class Simulation:
     def close(self) -> None:
         """Give back what PETSc holds."""
         self._solver.destroy()
+
+
+def say(*words: object, sep: str = " ") -> None:
+    """Print from the first process only, as scripts do that may run under ``mpirun``."""
+    if MPI.COMM_WORLD.rank == 0:
+        print(*words, sep=sep, flush=True)  # noqa: T201

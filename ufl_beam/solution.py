@@ -30,12 +30,14 @@ class Solution:
         grid: Its vertices, cells and numbering.
         parts: Number of steps that were taken, parts of cut steps counted each.
         iterations: Number of Newton iterations.
+        seconds: Wall time of the run, building the scene included; s.
     """
 
     def __init__(self, scene: Scene, grid: Grid) -> None:
         self.scene, self.grid = scene, grid
         self.parts = 0
         self.iterations = 0
+        self.seconds = 0.0
         self._times: list[float] = []
         self._q: list[Array] = []
         self._v: list[Array] = []
@@ -133,6 +135,17 @@ class Solution:
         cells = self.grid.cells_of(beam)
         return self._section_forces(self._q[n])[cells]
 
+    def section_forces_at(self, place: Place) -> Array:
+        """(N, V, M) in the cell around a place, at a vertex the one before it; (n+1, 3); N, N, N m.
+
+        Raises:
+            SceneError: The beam of the place is not in the scene.
+        """
+        (first, _), _ = self.grid.weights(place)
+        beam = self.grid.vertices_of(place.beam)
+        cell = self.grid.cells_of(place.beam)[first - beam[0]]
+        return np.array([self._section_forces(q)[cell] for q in self._q])
+
     # -- balances ------------------------------------------------------------------------------
 
     @property
@@ -165,3 +178,12 @@ class Solution:
             return p[u].sum(), p[v].sum(), turning.sum() + p[ψ].sum()
 
         return np.array([of(q, velocity) for q, velocity in zip(self._q, self._v, strict=True)])
+
+    def __str__(self) -> str:
+        beams, cells = len(self.scene.beams), len(self.grid.cells)
+        return (
+            f"{beams} beam{'s' * (beams > 1)}, {cells} cells, {self.grid.size} degrees of freedom\n"
+            f"t = {self._times[0]:g} to {self._times[-1]:g} s in {self.parts} steps, "
+            f"{self.iterations / max(self.parts, 1):.2f} Newton iterations each, "
+            f"{self.seconds:.2f} s of wall time\n{self.energy}"
+        )

@@ -205,8 +205,9 @@ class Solver:
             return CONVERGED
         if iteration > 0:
             floor = self._round_off()
-            # Where Newton's method no longer halves the residual, a little more noise is the floor.
-            if residual <= floor or self._last / 2 < residual <= 10 * floor:
+            # Tenths of the last digit are luck; a residual of some digits that Newton's method no longer
+            # halves is all that can be had.
+            if residual <= floor / 10 or self._last / 2 < residual <= 2 * floor:
                 return AT_ROUND_OFF
         self._last = residual
         return ITERATING
@@ -218,7 +219,7 @@ class Solver:
         solved any better, however small the forces are.
         """
         digits = np.spacing(np.abs(self._view(self._x)) + self._lengths)
-        return 0.5 * self._size(self._A.data[self._diagonal] * digits)
+        return self._size(self._A.data[self._diagonal] * digits)
 
     # -- the call ------------------------------------------------------------------------------
 

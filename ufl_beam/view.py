@@ -1,0 +1,352 @@
+"""Pictures of a solution in its plane, by Matplotlib: what is drawn, and how it looks.
+
+Every function returns a Matplotlib figure, so that ``plot(solution, "M").savefig("portal.png")``
+works; it belongs to no window, needs no screen, and is gone when it is no longer used.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from itertools import cycle, groupby, islice
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from mpi4py import MPI
+
+from ufl_beam.beams import Place
+from ufl_beam.compat import Array
+from ufl_beam.errors import SceneError, require_number
+from ufl_beam.scene import Support
+from ufl_beam.solution import Solution
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+RESULTANTS = {"N": ("axial force", "N"), "V": ("shear force", "N"), "M": ("bending moment", "N m")}
+COMPONENTS = {
+    "u": ("displacement", "m"),
+    "v": ("displacement", "m"),
+    "psi": ("rotation", "rad"),
+    "du/dt": ("velocity", "m/s"),
+    "dv/dt": ("velocity", "m/s"),
+    "dpsi/dt": ("angular velocity", "rad/s"),
+}
+
+# Okabe and Ito's palette, which the colour-blind can tell apart.
+BLUE, RED, GREEN, PINK, ORANGE, SKY = (
+    "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9",
+)  # fmt: skip
+INK, GREY = "#222222", "#B5B5B5"
+
+STYLE = {
+    "font.size": 13.0,
+    "axes.titlesize": 14.0,
+    "axes.labelsize": 13.0,
+    "axes.edgecolor": "#888888",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+    "legend.fontsize": 12.0,
+    "lines.linewidth": 2.0,
+    "lines.solid_capstyle": "round",
+}
+
+# Symbols of supports that hold both displacements, one, everything; half a symbol is 1, the place
+# is the origin, the beam comes from above.
+_TRIANGLE = [(0.0, 0.0), (-0.6, -0.8), (0.6, -0.8), (0.0, 0.0)]
+_PIN = [_TRIANGLE, [(-1.0, -0.8), (1.0, -0.8)]]
+_ROLLER = [_TRIANGLE, [(-1.0, -1.0), (1.0, -1.0)]]
+_CLAMP = [[(-1.0, 0.0), (1.0, 0.0), (1.0, -0.5), (-1.0, -0.5), (-1.0, 0.0)]]
+_HOLD = [[(-0.5, 0.0), (0.0, 0.5), (0.5, 0.0), (0.0, -0.5), (-0.5, 0.0)]]
+
+
+# -- what users call ---------------------------------------------------------------------------
+
+
+def plot(
+    solution: Solution, what: str = "shape", *, n: int = -1, magnify: float = 1.0
+) -> Figure:
+    """The frame at the n-th kept time, with the diagram of a section force if ``what`` says so.
+
+    Diagrams are constant in each cell, like the section forces, and stand on the deformed axis:
+    M on the side in tension, positive N and V to the left of the way from start to end.  Their
+    extreme values are written beside them.
+
+    Args:
+        solution: What to show.
+        what: "shape", "N", "V" or "M".
+        n: Number of the kept time; negative from the end.
+        magnify: Factor on the displacements.
+
+    Raises:
+        SceneError: Unknown ``what``, no such time, or ``magnify`` is not positive.
+    """
+    _require(what, ("shape", *RESULTANTS), "plot: what")
+    points = moved_points(solution, n, magnify)
+    name = f"{RESULTANTS[what][0]} {what}" if what in RESULTANTS else "shape"
+    factor = f", displacements × {magnify:g}" if magnify != 1 else ""
+    with _picture(_plane_size(solution.grid.points, points)) as figure:
+        axes = _plane_axes(figure, f"{name} at t = {solution.times[n]:.4g} s{factor}")
+        _draw_axes(axes, solution, solution.grid.points, color=GREY, linewidth=1.2, zorder=1)
+        if what in RESULTANTS:
+            _draw_diagram(axes, solution, what, n, points)
+        _draw_axes(axes, solution, points, color=INK, linewidth=2.6, zorder=4)
+        _draw_symbols(axes, solution, points, solution.q[n])
+    return figure
+
+
+def plot_shapes(
+    solution: Solution,
+    times: Sequence[float] = (),
+    *,
+    count: int = 8,
+    magnify: float = 1.0,
+) -> Figure:
+    """Successive shapes in one picture, coloured by time.
+
+    Args:
+        solution: What to show.
+        times: The times, each replaced by the nearest that was kept; s.  Without, ``count`` of
+            them from the first to the last.
+        count: How many, if no times are given.
+        magnify: Factor on the displacements.
+
+    Raises:
+        SceneError: ``count`` is less than 1, or ``magnify`` is not positive.
+    """
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import ListedColormap, Normalize
+
+    require_number(count, "plot_shapes: count", at_least=1)
+    kept = solution.times
+    chosen = nearest(kept, times if len(times) else np.linspace(kept[0], kept[-1], int(count)))
+    shapes = [moved_points(solution, n, magnify) for n in chosen]
+    factor = f"displacements × {magnify:g}" if magnify != 1 else ""
+    with _picture(_plane_size(solution.grid.points, *shapes)) as figure:
+        # The bright end of the colour map would not be seen on white.
+        colors = ListedColormap(_colormap("viridis")(np.linspace(0.0, 0.88, 256)))
+        of_time = ScalarMappable(Normalize(kept[chosen[0]], kept[chosen[-1]]), colors)
+        axes = _plane_axes(figure, factor)
+        _draw_axes(axes, solution, solution.grid.points, color=GREY, linewidth=1.2, zorder=1)
+        for n, points in zip(chosen, shapes, strict=True):
+            color = of_time.to_rgba(kept[n])
+            _draw_axes(axes, solution, points, color=color, linewidth=2.2, zorder=3)
+            _draw_masses(axes, solution, points, color)
+        _draw_supports(axes, solution, shapes[-1], solution.q[chosen[-1]])
+        bar = figure.colorbar(of_time, ax=axes, shrink=0.85, aspect=25, pad=0.02)
+        bar.set_label("time t (s)")
+        bar.outline.set_visible(False)
+    return figure
+
+
+def plot_history(
+    solution: Solution, places: Place | Sequence[Place], *, component: str = "v"
+) -> Figure:
+    """A component of the motion of one or more places over time.
+
+    Args:
+        solution: What to show.
+        places: The places.
+        component: "u", "v", "psi", "du/dt", "dv/dt" or "dpsi/dt".
+
+    Raises:
+        SceneError: Unknown ``component``, a place that is not in the scene, or the velocity of a
+            static run.
+    """
+    _require(component, COMPONENTS, "plot_history: component")
+    followed = (places,) if isinstance(places, Place) else tuple(places)
+    number = list(COMPONENTS).index(component)
+    motion = solution.displacement if number < 3 else solution.velocity
+    quantity, unit = COMPONENTS[component]
+    with _picture((8.0, 4.2)) as figure:
+        axes = _time_axes(figure.add_subplot(), solution)
+        axes.axhline(0.0, color=GREY, linewidth=1.0, zorder=1)
+        for place, color in zip(followed, _cycle(len(followed)), strict=True):
+            values = motion(place)[:, number % 3]
+            axes.plot(solution.times, values, color=color, label=str(place))
+        axes.set_ylabel(f"{quantity} {component.replace('psi', 'ψ')} ({unit})")
+        axes.set_xlabel("time t (s)")
+        figure.legend(loc="outside upper left", ncols=2)
+    return figure
+
+
+def plot_energy(solution: Solution) -> Figure:
+    """The ledger over time, and below it what it does not explain.
+
+    Above: energy in the scene, solid; supplied, dashed; lost, dotted.  Below: the imbalance as a
+    part of the energy that went through, with the machine precision for comparison.
+    """
+    energy, precision = solution.energy, float(np.finfo(np.float64).eps)
+    entries = [
+        (name, values, line)
+        for group, line in ((energy.state, "-"), (energy.supplied, "--"), (energy.lost, ":"))
+        for name, values in group.items()
+    ]
+    with _picture((8.0, 6.0)) as figure:
+        ledger, check = figure.subplots(2, 1, sharex=True, height_ratios=(2.4, 1))
+        for (name, values, line), color in zip(entries, _cycle(len(entries)), strict=True):
+            ledger.plot(solution.times, values, line, color=color, label=name)
+        _time_axes(ledger, solution).set_ylabel("energy (J)")
+        ledger.plot(solution.times, energy.total, color=INK, linewidth=1.2, label="in the scene")
+        figure.legend(loc="outside upper left", ncols=4)
+        part = np.abs(energy.imbalance) / (energy.throughput or 1.0)
+        # Where the balance is exact, the logarithm is not: such points stand at the lower edge.
+        check.semilogy(solution.times, np.maximum(part, 1e-2 * precision), color=RED, linewidth=1.2)
+        check.axhline(precision, color=GREY, linewidth=1.0, zorder=1)
+        check.annotate(
+            "machine precision", (1.0, precision), (0, -3), va="top", ha="right", fontsize=11,
+            xycoords=check.get_yaxis_transform(), textcoords="offset points", color="#777777",
+        )  # fmt: skip
+        check.set_ylim(1e-2 * precision, 10 * max(float(part.max()), 10 * precision))
+        _time_axes(check, solution).set_ylabel("imbalance\nper throughput")
+        check.set_xlabel("time t (s)")
+    return figure
+
+
+# -- geometry and words that pictures of all kinds share ---------------------------------------
+
+
+def moved_points(solution: Solution, n: int, magnify: float) -> Array:
+    """Vertices of all beams at the n-th kept time; (num_vertices, 2); m.
+
+    Raises:
+        SceneError: No such time, or ``magnify`` is not positive.
+    """
+    kept = len(solution.times)
+    if not -kept <= n < kept:
+        raise SceneError(f"n = {n}: the solution kept {kept} times; give {-kept} to {kept - 1}")
+    require_number(magnify, "magnify", positive=True)
+    grid = solution.grid
+    return np.asarray(grid.points + magnify * solution.q[n][grid.dofs[:, :2]])
+
+
+def nearest(kept: Array, times: Sequence[float] | Array) -> list[int]:
+    """Numbers of the kept times nearest to ``times``, ascending."""
+    return [int(np.argmin(np.abs(kept - t))) for t in sorted(times)]
+
+
+def with_unit(value: float, unit: str) -> str:
+    """A value with three digits and a decimal prefix: "−12.3 kN m"."""
+    rounded = float(f"{value:.3g}")
+    if rounded == 0.0:
+        return f"0 {unit}"
+    power = min(max(math.floor(math.log10(abs(rounded)) / 3), -3), 3)
+    prefix = ("n", "µ", "m", "", "k", "M", "G")[power + 3]
+    return f"{rounded / 1000.0**power:.3g} {prefix}{unit}".replace("-", "−")
+
+
+def support_direction(support: Support, turned: float) -> float:
+    """Angle by which the symbol of a support is turned, away from its beam; rad.
+
+    Args:
+        support: The support.
+        turned: Rotation ψ of its place, which a clamp follows; rad.
+    """
+    inward = _inward(support.place)
+    if len(support.held) == 3:
+        return inward + turned - math.pi / 2
+    angle = support.angle - (0.0 if 1 in support.held else math.pi / 2)
+    return angle + (math.pi if math.sin(inward - angle) < -1e-6 else 0.0)
+
+
+def _inward(place: Place) -> float:
+    """Direction in which the beam leaves its end; upwards from a place in between; rad."""
+    if 0.0 < place.s < 1.0:
+        return math.pi / 2
+    (x, y), (X, Y) = place.point, place.beam.curve(1e-3 if place.s == 0.0 else 1.0 - 1e-3)
+    return math.atan2(Y - y, X - x)
+
+
+def _require(choice: str, choices: Sequence[str] | dict[str, Any], what: str) -> None:
+    if choice not in choices:
+        names = ", ".join(f'"{name}"' for name in choices)
+        raise SceneError(f"{what} = {choice!r} is not one of {names}")
+
+
+# -- drawing -----------------------------------------------------------------------------------
+
+
+@contextmanager
+def _picture(size: tuple[float, float]) -> Iterator[Figure]:
+    """A new figure (inch) whose contents get this module's style."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=size, dpi=150, layout="constrained")
+        if MPI.COMM_WORLD.rank > 0:
+            # All processes run the same script; one file must not be written by all of them.
+            figure.savefig = lambda *args, **options: None
+        yield figure
+
+
+def _plane_size(*shapes: Array) -> tuple[float, float]:
+    """Size of a figure for these points: 9 inches wide unless they stand upright."""
+    width, height = np.ptp(np.concatenate(shapes), axis=0)
+    return 9.0, float(np.clip(8.0 * height / max(width, 1e-12), 3.2, 6.8))
+
+
+def _plane_axes(figure: Figure, title: str) -> Axes:
+    axes = figure.add_subplot(aspect="equal")
+    axes.margins(0.06)
+    axes.set_xlabel("x (m)")
+    axes.set_ylabel("y (m)")
+    axes.set_title(title, loc="left", color=INK)
+    axes.tick_params(labelsize=12, color="#888888")
+    return axes
+
+
+def _time_axes(axes: Axes, solution: Solution) -> Axes:
+    axes.margins(x=0.0)
+    axes.grid(axis="y", color="#E8E8E8", linewidth=0.8)
+    axes.set_axisbelow(True)
+    axes.tick_params(labelsize=12, color="#888888")
+    return axes
+
+
+def _cycle(count: int) -> list[str]:
+    return list(islice(cycle((BLUE, RED, GREEN, PINK, ORANGE, SKY)), count))
+
+
+def _colormap(name: str) -> Any:
+    import matplotlib
+
+    return matplotlib.colormaps[name]
+
+
+def _draw_axes(axes: Axes, solution: Solution, points: Array, **line: Any) -> None:
+    for beam in solution.scene.beams:
+        axes.plot(*points[solution.grid.vertices_of(beam)].T, **line)
+
+
+def _draw_diagram(axes: Axes, solution: Solution, what: str, n: int, points: Array) -> None:
+    index, side = list(RESULTANTS).index(what), -1.0 if what == "M" else 1.0
+    beams = solution.scene.beams
+    forces = [solution.section_forces(beam, n)[:, index] for beam in beams]
+    # A strain of 1e-10 is what rounding and the tolerance of the iteration leave behind.
+    limits = [(b.section.EA, b.section.GA, b.section.EI / b.section.depth)[index] for b in beams]
+    if all(np.all(np.abs(f) <= 1e-10 * limit) for f, limit in zip(forces, limits, strict=True)):
+        return
+    largest = max(float(np.max(np.abs(f))) for f in forces)
+    scale = 0.13 * side * math.hypot(*np.ptp(points, axis=0)) / largest
+    ends = []
+    for beam, values in zip(beams, forces, strict=True):
+        chain = points[solution.grid.vertices_of(beam)]
+        along = np.diff(chain, axis=0)
+        left = along[:, ::-1] * (-1.0, 1.0) / np.linalg.norm(along, axis=1)[:, None]
+        ordinates = scale * values[:, None] * left
+        for positive, run in groupby(range(len(values)), lambda cell: bool(values[cell] > 0)):
+            cells = list(run)
+            axis = chain[cells[0] : cells[-1] + 2]
+            steps = np.repeat(ordinates[cells], 2, axis=0) + np.repeat(axis, 2, axis=0)[1:-1]
+            color = BLUE if positive else RED
+            outline = np.concatenate([axis[:1], steps, axis[:0:-1]])
+            axes.fill(*outline.T, facecolor=(color, 0.28), edgecolor=color, linewidth=1.0, zorder=2)
+        middles = (chain[1:] + chain[:-1]) / 2 + ordinates
+        ends += [(v, m, side * np.sign(v) * e) for v, m, e in zip(values, middles, left, strict=True)]
+    for value, tip, outward in (max(ends, key=_value), min(ends, key=_value)):
+        if value * (1.0 if (value, tip, outward) is None else 1.0) != 0.0:
+            pass
