@@ -77,7 +77,7 @@ def space_with_dofs(
     index_map = cpp.common.IndexMap(MPI.COMM_SELF, size)
     adjacency = cpp.graph.AdjacencyList_int32(np.ascontiguousarray(cell_dofs, dtype=np.int32))
     dofmap = cpp.fem.DofMap(plain.dofmap.dof_layout, index_map, 1, adjacency, 1)
-    arguments = [domain._cpp_object, plain.element, dofmap]
+    arguments = [domain._cpp_object, plain._cpp_object.element, dofmap]
     if VERSION < (0, 11):
         arguments.append(list(element.reference_value_shape))
     return fem.FunctionSpace(domain, element, cpp.fem.FunctionSpace_float64(*arguments))

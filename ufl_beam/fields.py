@@ -7,6 +7,7 @@ import numpy as np
 import ufl
 
 from ufl_beam.compat import Array, csr_matrix, fem, line_mesh, space_with_dofs
+from ufl_beam.forms import Kernel
 from ufl_beam.grid import Index, Share
 from ufl_beam.kinematics import Axis
 from ufl_beam.sparse import Csr
@@ -29,6 +30,8 @@ class Fields:
         vertices, cells = np.unique(grid.cells[share.cells], return_inverse=True)
         self.mesh = line_mesh(grid.points[vertices], cells.reshape(-1, 2))
         self.order: Index = np.asarray(self.mesh.topology.original_cell_index, dtype=np.int64)
+        geometry = self.mesh.geometry
+        self._coordinates = np.ascontiguousarray(geometry.x[geometry.dofmap])
         self._require_direction(grid.points[grid.cells[share.cells[self.order]]])
         self.cell_dofs = share.cell_dofs[self.order]
         self.axis = Axis(self.mesh)
@@ -37,14 +40,17 @@ class Fields:
             self.mesh, basix.ufl.mixed_element([line, line, line]), self.cell_dofs, share.size
         )
 
+    def kernel(self, form: ufl.Form, unknown: fem.Function) -> Kernel:
+        """A form on the cells, compiled; ``unknown`` is the configuration that changes."""
+        return Kernel(form, unknown, self.cell_dofs, self._coordinates)
+
     def matrix(self) -> Csr:
         """A new matrix on the degrees of freedom of this process."""
         return Csr(csr_matrix(self.mesh, self.cell_dofs, self.share.size))
 
     def _require_direction(self, ends: Array) -> None:
         """The mesh must keep the order of the vertices of a cell, which orients the beam."""
-        found = self.mesh.geometry.x[self.mesh.geometry.dofmap][:, :, :2]
-        if not np.array_equal(found, ends):
+        if not np.array_equal(self._coordinates[:, :, :2], ends):
             raise RuntimeError("this version of DOLFINx turns cells around; please report it")
 
     def dx(self, degree: int) -> ufl.Measure:

@@ -24,12 +24,15 @@ class Kernel:
         form: Cell integrals with one quadrature rule.
         unknown: The configuration that most calls change; it need not appear in the form.
         cell_dofs: Its degrees of freedom; shape (num_cells, 6).
+        coordinates: Vertices of the cells; shape (num_cells, 2, 3); m.
 
     Attributes:
         compiled: The DOLFINx form.
     """
 
-    def __init__(self, form: ufl.Form, unknown: fem.Function, cell_dofs: Index) -> None:
+    def __init__(
+        self, form: ufl.Form, unknown: fem.Function, cell_dofs: Index, coordinates: Array
+    ) -> None:
         self.compiled = fem.form(form)
         ufcx = self.compiled.ufcx_form
         constants, self._packed = pack(self.compiled)
@@ -43,8 +46,7 @@ class Kernel:
             for f, end in zip(used, ends, strict=True)
         }
         self._dofs = np.ascontiguousarray(cell_dofs, dtype=np.int32)
-        mesh = self.compiled.mesh
-        self._coordinates = np.ascontiguousarray(mesh.geometry.x[mesh.geometry.dofmap])
+        self._coordinates = coordinates
         self._rows = self._rows_of_cells(form)
         integral = ufcx.form_integrals[0]
         at = self._columns[unknown].start if self.depends_on(unknown) else 0

@@ -19,7 +19,7 @@ from ufl_beam.sparse import Csr
 CONVERGED = int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE)
 AT_ROUND_OFF = int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS)
 ITERATING = int(PETSc.SNES.ConvergedReason.ITERATING)
-DIVERGED_NAN = int(PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN)
+DIVERGED = int(PETSc.SNES.ConvergedReason.DIVERGED_DTOL)
 
 PREFIX = "ub_"
 """Prefix of the PETSc options of the solver, as in ``-ub_snes_monitor``."""
@@ -199,7 +199,7 @@ class Solver:
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, ...]) -> int:
         residual = self._size(self._r)
         if not math.isfinite(residual):
-            return DIVERGED_NAN
+            return DIVERGED
         scale = self._loads + self._size(self._forces())
         if residual <= self._newton.rtol * scale:
             return CONVERGED

@@ -14,7 +14,6 @@ import ufl
 
 from ufl_beam.compat import Array
 from ufl_beam.fields import Fields
-from ufl_beam.forms import Kernel
 from ufl_beam.kinematics import split, strain
 from ufl_beam.ledger import Ledger
 from ufl_beam.loops import doubles, integers, lib
@@ -67,7 +66,7 @@ class ElasticBeams:
 
         self._q0 = q0
         self._force, self._tangent, self._stored, *self._losses = (
-            Kernel(form, q1, fields.cell_dofs) for form in (virtual_work, tangent, stored, *losses)
+            fields.kernel(form, q1) for form in (virtual_work, tangent, stored, *losses)
         )
         self._tangent.share(self._force)
         self._tangent.place(A)
@@ -114,7 +113,7 @@ class SectionForces:
         C, e = fields.stiffness(), strain(q, fields.axis)
         z = ufl.TestFunction(C.function_space)
         mean = sum(C[i] * e[i] * z[i] for i in range(3)) / fields.axis.h  # P(7)
-        self._kernel = Kernel(mean * fields.dx(1), q, fields.cell_dofs)
+        self._kernel = fields.kernel(mean * fields.dx(1), q)
         self._order = fields.order
 
     def __call__(self, q: Array) -> Array:
@@ -133,7 +132,7 @@ def mass_matrix(fields: Fields) -> Csr:
     ρ = fields.inertia()
     M = fields.matrix()
     work = (ρ[0] * ufl.dot(u, w_u) + ρ[1] * ψ * w_ψ) * fields.dx(2)  # P(67)
-    kernel = Kernel(work, fields.configuration(), fields.cell_dofs)
+    kernel = fields.kernel(work, fields.configuration())
     kernel.place(M)
     kernel.add(np.zeros(share.size), M.data)
     for mass in share.grid.scene.masses:

@@ -92,6 +92,7 @@ def plot(
         axes = _plane_axes(figure, f"{name} at t = {solution.times[n]:.4g} s{factor}")
         _draw_axes(axes, solution, solution.grid.points, color=GREY, linewidth=1.2, zorder=1)
         if what in RESULTANTS:
+            axes.margins(0.15, 0.10)
             _draw_diagram(axes, solution, what, n, points)
         _draw_axes(axes, solution, points, color=INK, linewidth=2.6, zorder=4)
         _draw_symbols(axes, solution, points, solution.q[n])
@@ -191,7 +192,7 @@ def plot_energy(solution: Solution) -> Figure:
             ledger.plot(solution.times, values, line, color=color, label=name)
         _time_axes(ledger, solution).set_ylabel("energy (J)")
         ledger.plot(solution.times, energy.total, color=INK, linewidth=1.2, label="in the scene")
-        figure.legend(loc="outside upper left", ncols=4)
+        figure.legend(loc="outside upper left", ncols=5)
         part = np.abs(energy.imbalance) / (energy.throughput or 1.0)
         # Where the balance is exact, the logarithm is not: such points stand at the lower edge.
         check.semilogy(solution.times, np.maximum(part, 1e-2 * precision), color=RED, linewidth=1.2)
@@ -291,7 +292,7 @@ def _plane_size(*shapes: Array) -> tuple[float, float]:
 
 def _plane_axes(figure: Figure, title: str) -> Axes:
     axes = figure.add_subplot(aspect="equal")
-    axes.margins(0.06)
+    axes.margins(0.06, 0.10)
     axes.set_xlabel("x (m)")
     axes.set_ylabel("y (m)")
     axes.set_title(title, loc="left", color=INK)
@@ -332,21 +333,73 @@ def _draw_diagram(axes: Axes, solution: Solution, what: str, n: int, points: Arr
         return
     largest = max(float(np.max(np.abs(f))) for f in forces)
     scale = 0.13 * side * math.hypot(*np.ptp(points, axis=0)) / largest
-    ends = []
+    tips, outward = [], []
     for beam, values in zip(beams, forces, strict=True):
         chain = points[solution.grid.vertices_of(beam)]
         along = np.diff(chain, axis=0)
         left = along[:, ::-1] * (-1.0, 1.0) / np.linalg.norm(along, axis=1)[:, None]
         ordinates = scale * values[:, None] * left
-        for positive, run in groupby(range(len(values)), lambda cell: bool(values[cell] > 0)):
-            cells = list(run)
-            axis = chain[cells[0] : cells[-1] + 2]
-            steps = np.repeat(ordinates[cells], 2, axis=0) + np.repeat(axis, 2, axis=0)[1:-1]
-            color = BLUE if positive else RED
-            outline = np.concatenate([axis[:1], steps, axis[:0:-1]])
-            axes.fill(*outline.T, facecolor=(color, 0.28), edgecolor=color, linewidth=1.0, zorder=2)
-        middles = (chain[1:] + chain[:-1]) / 2 + ordinates
-        ends += [(v, m, side * np.sign(v) * e) for v, m, e in zip(values, middles, left, strict=True)]
-    for value, tip, outward in (max(ends, key=_value), min(ends, key=_value)):
-        if value * (1.0 if (value, tip, outward) is None else 1.0) != 0.0:
-            pass
+        _draw_steps(axes, chain, values, ordinates)
+        tips.append((chain[1:] + chain[:-1]) / 2 + ordinates)
+        outward.append(side * np.sign(values)[:, None] * left)
+    every = np.concatenate(forces)
+    for cell, color in ((np.argmax(every), BLUE), (np.argmin(every), RED)):
+        if every[cell] * (1 if color == BLUE else -1) > 0:
+            text = with_unit(every[cell], RESULTANTS[what][1])
+            _annotate(axes, text, color, np.concatenate(tips)[cell], np.concatenate(outward)[cell])
+
+
+def _draw_steps(axes: Axes, chain: Array, values: Array, ordinates: Array) -> None:
+    """The diagram of a beam: one area for each run of cells with the same sign."""
+    for positive, run in groupby(range(len(values)), lambda cell: bool(values[cell] > 0)):
+        cells = list(run)
+        axis = chain[cells[0] : cells[-1] + 2]
+        steps = np.repeat(axis, 2, axis=0)[1:-1] + np.repeat(ordinates[cells], 2, axis=0)
+        outline = np.concatenate([axis[:1], steps, axis[:0:-1]])
+        color = BLUE if positive else RED
+        axes.fill(*outline.T, facecolor=(color, 0.28), edgecolor=color, linewidth=1.0, zorder=2)
+
+
+def _annotate(axes: Axes, text: str, color: str, tip: Array, outward: Array) -> None:
+    x, y = outward
+    # The middle of the text, half a text and a gap away from the diagram; points.
+    offset = (x * (8 + 4.5 * len(text)), y * 17)
+    axes.annotate(
+        text, tip, offset, textcoords="offset points", color=color, weight="bold", zorder=6,
+        ha="center", va="center",
+        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0},
+    )  # fmt: skip
+
+
+def _draw_symbols(axes: Axes, solution: Solution, points: Array, q: Array) -> None:
+    _draw_supports(axes, solution, points, q)
+    for joint in solution.scene.joints:
+        turns = 2 not in joint.shared
+        marker, size, inside = ("o", 8.0, "white") if turns else ("s", 6.0, INK)
+        place = points[solution.grid.vertex(joint.places[0])]
+        axes.plot(*place, marker, ms=size, mfc=inside, mec=INK, mew=1.6, zorder=5)
+    _draw_masses(axes, solution, points, INK)
+
+
+def _draw_masses(axes: Axes, solution: Solution, points: Array, color: Any) -> None:
+    for mass in solution.scene.masses:
+        axes.plot(*points[solution.grid.vertex(mass.place)], "o", ms=10.0, color=color, zorder=5)
+
+
+def _draw_supports(axes: Axes, solution: Solution, points: Array, q: Array) -> None:
+    """Symbols at the supports; orange ones move."""
+    from matplotlib.markers import MarkerStyle
+    from matplotlib.path import Path
+
+    for support in solution.scene.supports:
+        vertex = solution.grid.vertex(support.place)
+        displacements = {0, 1} & set(support.held)
+        full = len(support.held) == 3
+        lines = _CLAMP if full else (_HOLD, _ROLLER, _PIN)[len(displacements)]
+        symbol = MarkerStyle(Path.make_compound_path(*map(Path, lines)))
+        turned = support_direction(support, q[solution.grid.dofs[vertex, 2]])
+        color = ORANGE if support.moving else "#808080"
+        axes.plot(
+            *points[vertex], marker=symbol.rotated(rad=turned), ms=24.0, mfc=color, mec=color,
+            mew=1.5, zorder=3.5,
+        )  # fmt: skip
