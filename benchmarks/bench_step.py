@@ -6,8 +6,8 @@ Run on an idle machine, one core::
 
 Prints a table and writes one JSON line per case to ``benchmarks/results/bench_step.jsonl``.  Each
 figure is the median over repeated runs of the whole time loop (load, predictor, Newton iterations,
-ledger, kept history), without building the scene; minimum and maximum are in the JSON.  The parts are
-timed by themselves, in a loop, at a state of the motion.
+ledger, kept history), without building the scene; minimum and maximum are in the JSON.  The parts
+are timed by themselves, in a loop, at a state of the motion.
 """
 
 import argparse
@@ -102,7 +102,10 @@ def main():
         "threads": 1,
     }
     print(f"flying beam, dt = {options.dt} s, median of {options.repeat} runs; {machine}")
-    print(f"{'cells':>6} {'µs/step':>10} {'iterations':>10} {'µs/iter':>9} {'µs/cell/iter':>12}  parts, µs")
+    print(
+        f"{'cells':>6} {'µs/step':>10} {'iterations':>10} {'µs/iter':>9} {'µs/cell/iter':>12}"
+        "  parts, µs"
+    )
     RESULTS.parent.mkdir(exist_ok=True)
     with RESULTS.open("a") as file:
         for cells, steps in CASES:

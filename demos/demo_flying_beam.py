@@ -1,8 +1,9 @@
 # %% [markdown]
 # # Flying beam: energy and momentum at any step size
 #
-# A soft beam is pushed and turned at one end for 2.5 s, then flies freely while it bends through large
-# rotations.  From then on its energy, its momentum and its angular momentum must not change.
+# A soft beam is pushed and turned at one end for 2.5 s, then flies freely while it bends through
+# large rotations.  From then on its energy, its momentum and its angular momentum must not
+# change.
 #
 # This demo emphasises
 #
@@ -70,8 +71,8 @@ ub.say("dt = 0.01 s\n" + str(flights[0.01][1]))
 # %% [markdown]
 # ## What the decaying scheme gives up
 #
-# `alpha` takes energy out of what the beam stores, and leaves both momenta exact; `beta` takes it from
-# the velocities, and angular momentum with it.
+# `alpha` takes energy out of what the beam stores, and leaves both momenta exact; `beta` takes it
+# from the velocities, and angular momentum with it.
 
 # %%
 with_alpha = fly(0.1, ub.Midpoint(alpha=0.1))[1]
@@ -84,8 +85,8 @@ assert drifts(with_alpha)[1] < 1e-10 < drifts(with_beta)[1]
 # %% [markdown]
 # ## Accuracy
 #
-# Conservation is not accuracy.  The free end at t = 5 s, against a run with a step of 1/640 s on the same
-# mesh, converges with the square of the step.
+# Conservation is not accuracy.  The free end at t = 5 s, against a run with a step of 1/640 s on
+# the same mesh, converges with the square of the step.
 
 # %%
 steps = np.array([1 / 10, 1 / 20, 1 / 40, 1 / 80])

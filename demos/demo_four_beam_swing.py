@@ -1,10 +1,11 @@
 # %% [markdown]
 # # Four-beam swing: what an energy-decaying scheme is for
 #
-# A flexible beam hangs from two rigid links and carries a heavy mass at mid-span.  A short push makes it
-# swing out; at t = 0.64 s the left link and the left half of the beam come into line and snap taut.  The
-# impact excites axial vibrations a thousand times faster than the swing.  A scheme that conserves energy
-# keeps them for ever; one that decays takes them out and leaves the swing alone.
+# A flexible beam hangs from two rigid links and carries a heavy mass at mid-span.  A short push
+# makes it swing out; at t = 0.64 s the left link and the left half of the beam come into line and
+# snap taut.  The impact excites axial vibrations a thousand times faster than the swing.  A
+# scheme that conserves energy keeps them for ever; one that decays takes them out and leaves the
+# swing alone.
 #
 # This demo emphasises
 #
@@ -13,8 +14,8 @@
 # * `Midpoint()` against `Midpoint(alpha, beta)`, and the ledger that accounts for the difference,
 # * the files: XDMF for ParaView, a history table, pictures.
 #
-# The problem is that of N. J. Theron (1994) and section 4.3 of the paper; the numbers at the end were
-# computed with an independent program.
+# The problem is that of N. J. Theron (1994) and section 4.3 of the paper; the numbers at the end
+# were computed with an independent program.
 
 # %%
 from pathlib import Path
@@ -29,8 +30,9 @@ output.mkdir(exist_ok=True)
 # %% [markdown]
 # ## Scene
 #
-# The beam lies at rest, horizontally, 0.36 m below the pivots; the left link is vertical, the right one
-# inclined by 45°.  The links stand for rigid bars: ten thousand times as stiff as the beam, without mass.
+# The beam lies at rest, horizontally, 0.36 m below the pivots; the left link is vertical, the
+# right one inclined by 45°.  The links stand for rigid bars: ten thousand times as stiff as the
+# beam, without mass.
 
 # %%
 E, nu, rho = 73e9, 0.3, 2700.0  # Pa, -, kg/m^3
@@ -75,10 +77,11 @@ ub.say("\nfour-beam swing, alpha = beta = 0.01\n" + str(decaying))
 # %% [markdown]
 # ## Pictures
 #
-# Both schemes agree on the swing until links and beam snap taut, and differ in the axial force afterwards.
+# Both schemes agree on the swing until links and beam snap taut, and differ in the axial force
+# afterwards.
 
 # %%
-from matplotlib.figure import Figure  # noqa: E402
+from matplotlib.figure import Figure
 
 shapes = ub.plot_shapes(decaying, times=np.linspace(0, 1.2, 13))
 energies = ub.plot_energy(decaying)
@@ -106,8 +109,9 @@ ub.say("\npictures and data:", *sorted(str(path) for path in output.glob("swing*
 # %% [markdown]
 # ## What the agreement proves
 #
-# The reference values come from an independent program with the same four cells and the same step, so
-# they check the scene, the element and the scheme to the digits given.  The ledger checks itself.
+# The reference values come from an independent program with the same four cells and the same
+# step, so they check the scene, the element and the scheme to the digits given.  The ledger
+# checks itself.
 
 # %%
 i = {t: int(np.argmin(np.abs(conserving.times - t))) for t in (0.256, 0.5, 0.7, 1.0, 1.5, 2.5)}

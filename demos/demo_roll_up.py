@@ -1,9 +1,9 @@
 # %% [markdown]
 # # Roll-up: a cantilever bent to a circle and beyond
 #
-# A moment at the free end bends a straight cantilever to an arc of constant curvature κ = M/EI, and
-# M = 2π EI/L closes the circle.  No other load makes so large a rotation with so simple an answer,
-# so this is where every geometrically exact beam begins.
+# A moment at the free end bends a straight cantilever to an arc of constant curvature κ = M/EI,
+# and M = 2π EI/L closes the circle.  No other load makes so large a rotation with so simple an
+# answer, so this is where every geometrically exact beam begins.
 #
 # This demo emphasises
 #
@@ -52,10 +52,10 @@ assert np.allclose(ψ, solution.times * turns * 2 * np.pi, atol=1e-9)
 # %% [markdown]
 # ## The error of the mesh
 #
-# A cell of length h that turns by κh between its ends is a chord of length h, whereas the arc it stands
-# for has the chord h sin(κh/2)/(κh/2).  The radius of the polygon is therefore too large by the factor
-# (κh/2)/sin(κh/2), an error of second order, and this is all the error there is: moment and curvature
-# are exact.  We look at half a circle, where the tip is at (0, 2/κ).
+# A cell of length h that turns by κh between its ends is a chord of length h, whereas the arc it
+# stands for has the chord h sin(κh/2)/(κh/2).  The radius of the polygon is therefore too large
+# by the factor (κh/2)/sin(κh/2), an error of second order, and this is all the error there is:
+# moment and curvature are exact.  We look at half a circle, where the tip is at (0, 2/κ).
 
 # %%
 meshes = np.array([4, 8, 16, 32, 64, 128])
@@ -94,8 +94,8 @@ ub.say("\npictures:", *sorted(str(p) for p in output.glob("roll_up*")), sep="\n 
 # %% [markdown]
 # ## What the agreement proves
 #
-# The computed error is the closed form of the polygon to solver tolerance: the element has no error but
-# that of its geometry, in particular no locking in shear or extension.
+# The computed error is the closed form of the polygon to solver tolerance: the element has no
+# error but that of its geometry, in particular no locking in shear or extension.
 
 # %%
 assert np.allclose(errors, exact_errors, rtol=1e-5)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import singledispatch
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from ufl_beam.compat import Array
 from ufl_beam.grid import Share
@@ -27,7 +30,7 @@ class DeadLoads:
         force: The loads in the equation of the step.
     """
 
-    def __init__(self, loads: list[Load], share: Share, scheme: Scheme, ledger: Ledger) -> None:
+    def __init__(self, loads: Sequence[Load], share: Share, scheme: Scheme, ledger: Ledger) -> None:
         vectors: dict[TimeFunction, Array] = {}
         for load in loads:
             vectors.setdefault(load.time, np.zeros(share.size))
@@ -35,7 +38,8 @@ class DeadLoads:
         self._vectors = list(vectors.items())
         self._acting, self._ledger = scheme.acting, ledger
         ledger.supplied["loads"] += 0.0
-        self._before = self.force = np.zeros(share.size)
+        self.force: Array = np.zeros(share.size)
+        self._before: Array = self.force
 
     def begin(self, step: Step) -> None:
         """The loads of the step."""
@@ -43,8 +47,8 @@ class DeadLoads:
         if step.toward < 1:
             self.force = self._before + step.toward * (self.force - self._before)
 
-    def carry_on(self, t: float) -> None:
-        """Take the state at time ``t`` as one that is in equilibrium with the loads."""
+    def carry_on(self, t: float, q: Array) -> None:
+        """Take the state ``q`` at time ``t`` as one that is in equilibrium with the loads."""
         self._before = self._at(t)
 
     def _at(self, t: float) -> Array:
@@ -86,7 +90,7 @@ class FollowerLoads:
 
     def __init__(
         self,
-        loads: list[FollowerLoad],
+        loads: Sequence[FollowerLoad],
         share: Share,
         scheme: Scheme,
         ledger: Ledger,
@@ -101,18 +105,34 @@ class FollowerLoads:
         self._entries = np.array([A.positions(x, turn), A.positions(y, turn)])
         self._A = A
         self._weight = scheme.load_weight
-        self._sizes_before = np.zeros_like(self._forces)
+        self._sizes_before: Array = np.zeros_like(self._forces)
         self._acting, self._ledger = scheme.acting, ledger
         ledger.supplied["loads"] += 0.0
-        self._before = self.force = np.zeros(share.size)
+        self.force: Array = np.zeros(share.size)
+        self._before: Array = self.force
 
     def begin(self, step: Step) -> None:
         """The size of the loads in the step."""
-        factors = np.array([time(step.load_time) for time in self._times])
-        self._sizes = self._sizes_before + step.toward * (
-            self._forces * factors[:, None] - self._sizes_before
-        )
+        target = self._sizes_at(step.load_time)
+        self._sizes = self._sizes_before + step.toward * (target - self._sizes_before)
         self._ψ0 = step.q0[self._dofs[:, 2]]
+
+    def carry_on(self, t: float, q: Array) -> None:
+        """Take the state ``q`` at time ``t`` as one that is in equilibrium with the loads."""
+        self._sizes_before = self._sizes = self._sizes_at(t)
+        self._ψ0 = q[self._dofs[:, 2]]
+        self.force = self._before = self._in_plane(q)
+
+    def _sizes_at(self, t: float) -> Array:
+        factors = np.array([time(t) for time in self._times])
+        return np.asarray(self._forces * factors.reshape(-1, 1))
+
+    def _in_plane(self, q: Array) -> Array:
+        """Nodal forces at ``q``."""
+        force = np.zeros_like(q)
+        x, y = self._turned(q)
+        np.add.at(force, self._dofs, np.column_stack([x, y, self._sizes[:, 2]]))
+        return force
 
     def _turned(self, q1: Array) -> tuple[Array, Array]:
         """The forces in the plane, each (number of loads,)."""
@@ -123,9 +143,7 @@ class FollowerLoads:
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Subtract the loads."""
-        x, y = self._turned(q1)
-        self.force = np.zeros_like(r)
-        np.add.at(self.force, self._dofs, np.column_stack([x, y, self._sizes[:, 2]]))
+        self.force = self._in_plane(q1)
         r -= self.force
 
     def add_tangent(self, q1: Array) -> None:
@@ -175,7 +193,7 @@ def _(load: Gravity, share: Share) -> Array:
     return forces
 
 
-def _along_beams(per_beam: Array, share: Share) -> Array:
+def _along_beams(per_beam: npt.NDArray[Any], share: Share) -> Array:
     """Nodal forces of line loads (num_beams, 3): each end of a cell carries a half of it."""
     grid = share.grid
     ends = grid.points[grid.cells[share.cells]]

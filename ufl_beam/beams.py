@@ -48,7 +48,9 @@ class Beam:
         if not isinstance(self.section, Section):
             raise SceneError(f"{self.name}: section = {self.section!r} is not a Section")
         if self.cells != int(self.cells) or self.cells < 1:
-            raise SceneError(f"{self.name}: cells = {self.cells} must be a whole number, at least 1")
+            raise SceneError(
+                f"{self.name}: cells = {self.cells} must be a whole number, at least 1"
+            )
         if self.curve is None:
             if a == b:
                 raise SceneError(f"{self.name}: zero length, both ends are at {a}")
@@ -103,9 +105,7 @@ class Beam:
         return cls(xy[0], xy[-1], section, cells=cells, name=name, curve=curve, corners=corners)
 
     @classmethod
-    def along(
-        cls, curve: Curve, section: Section, *, cells: int = 8, name: str = "beam"
-    ) -> Beam:
+    def along(cls, curve: Curve, section: Section, *, cells: int = 8, name: str = "beam") -> Beam:
         """Any curve ``s -> (x, y)``, ``s`` from 0 to 1; m."""
         a = require_vector(curve(0.0), f"{name}: curve(0)")
         b = require_vector(curve(1.0), f"{name}: curve(1)")

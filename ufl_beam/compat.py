@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from mpi4py import MPI
+
 import numpy as np
 import numpy.typing as npt
-from mpi4py import MPI
 
 try:
     import basix.ufl
@@ -21,6 +22,22 @@ except ImportError as error:  # pragma: no cover - depends on the machine
     ) from error
 
 Array = npt.NDArray[np.float64]
+
+__all__ = [
+    "TABULATE",
+    "VERSION",
+    "Array",
+    "cpp",
+    "csr_matrix",
+    "dolfinx",
+    "fem",
+    "io",
+    "jit_directory",
+    "la",
+    "line_mesh",
+    "pack",
+    "space_with_dofs",
+]
 
 VERSION = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
 if VERSION < (0, 9):  # pragma: no cover - depends on the machine

@@ -6,8 +6,6 @@ silently wrong in FFCx 0.9 to 0.11.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import ufl
 

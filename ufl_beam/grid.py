@@ -1,23 +1,27 @@
 """From a scene to vertices, cells and the numbering of degrees of freedom.
 
-Every process holds the numbering of the whole scene, a few integers a cell, and meshes only its own
-cells; so neither joints nor supports need communication, and files are written as if by one process.
+Every process holds the numbering of the whole scene, a few integers a cell, and meshes only its
+own cells; so neither joints nor supports need communication, and files are written as if by one
+process.
 """
 
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Any
+
+from mpi4py import MPI
 
 import numpy as np
 import numpy.typing as npt
-from mpi4py import MPI
 
 from ufl_beam.beams import Beam, Place
 from ufl_beam.compat import Array
 from ufl_beam.errors import SceneError
 from ufl_beam.scene import Scene
 
-Index = npt.NDArray[np.int64]
+Index = npt.NDArray[Any]
+"""Array of integers."""
 
 
 class Grid:
@@ -154,11 +158,12 @@ class Share:
 
     def at(self, place: Place) -> Index:
         """Degrees of freedom (numbers of the grid) of a place with a vertex; shape (3,)."""
-        return self.grid.dofs[self.grid.vertex(place)]
+        return np.asarray(self.grid.dofs[self.grid.vertex(place)])
 
     def rotations(self) -> Index:
         """Local numbers of all rotations; int32."""
-        return np.unique(self.local(self.grid.dofs[:, 2])).astype(np.int32)
+        rotations = np.unique(self.local(self.grid.dofs[:, 2]))
+        return rotations.astype(np.int32)
 
     def lengths(self) -> Array:
         """What a strain of one is to each local degree of freedom: a cell's length, or a radian."""

@@ -85,7 +85,7 @@ def virtual_strain(q: Expr, w: Expr, axis: Axis) -> Expr:
 
 
 def _over_tan(x: Expr) -> Expr:
-    """x / tan x, smooth at zero: the series below 1e-2 has a remainder under 1e-18."""
+    """X / tan x, smooth at zero: the series below 1e-2 has a remainder under 1e-18."""
     x2 = x**2
     series = 1 - x2 / 3 * (1 + x2 / 15 * (1 + x2 * 2 / 21 * (1 + x2 / 10)))
     small = ufl.lt(x2, 1e-4)
@@ -96,10 +96,10 @@ def _over_tan(x: Expr) -> Expr:
 def virtual_strain_over_step(q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
     """Algorithmic variation of the strain over one step, exact for energy and momentum.
 
-    With ``w = (Δu, 2 tan(Δψ/2))`` at the nodes it is ``strain(q1) - strain(q0)`` to round-off, which
-    makes the work of the algorithmic resultants the increment of stored energy; and it vanishes for
-    rigid rotations about any point, which makes angular momentum exact.  P(82) as printed has
-    neither property beyond O(Δψ²); docs/errata.md derives this form.
+    With ``w = (Δu, 2 tan(Δψ/2))`` at the nodes it is ``strain(q1) - strain(q0)`` to round-off,
+    which makes the work of the algorithmic resultants the increment of stored energy; and it
+    vanishes for rigid rotations about any point, which makes angular momentum exact.  P(82) as
+    printed has neither property beyond O(Δψ²); docs/errata.md derives this form.
 
     Valid on two-node cells with a one-point rule, for ``|Δψ| < π``.
 
@@ -126,5 +126,6 @@ def virtual_strain_over_step(q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
     φ_m = axis.t0 + axis.d((u0 + u1) / 2)
     a = axis.d(w_u) - _turn(φ_m) * (w_ψ + shift * axis.h * axis.d(w_ψ))
     # The mean of both frames is cos δ times the frame of the mean rotation.
-    w_Σ, w_Γ = ((x0 + x1) / 2 for x0, x1 in zip(_pull_back(a, ψ0, axis), _pull_back(a, ψ1, axis)))
+    (Σ0, Γ0), (Σ1, Γ1) = _pull_back(a, ψ0, axis), _pull_back(a, ψ1, axis)
+    w_Σ, w_Γ = (Σ0 + Σ1) / 2, (Γ0 + Γ1) / 2
     return ufl.as_vector([w_Σ, w_Γ, stretch * axis.d(w_ψ)])  # P(82)!

@@ -59,7 +59,7 @@ class Energy:
     def imbalance(self) -> Array:
         """What the ledger does not explain; (n+1,); J."""
         total = self.total
-        return total - total[0] - _sum(self.supplied) + _sum(self.lost)
+        return np.asarray(total - total[0] - _sum(self.supplied) + _sum(self.lost))
 
     @property
     def throughput(self) -> float:

@@ -46,7 +46,8 @@ class Table:
         object.__setattr__(self, "values", tuple(self.values))
         if len(self.times) != len(self.values) or len(self.times) < 1:
             raise SceneError(
-                f"Table: {len(self.times)} times and {len(self.values)} values; give as many of each"
+                f"Table: {len(self.times)} times and {len(self.values)} values; "
+                "give as many of each"
             )
         for kind, numbers in (("times", self.times), ("values", self.values)):
             for i, number in enumerate(numbers):
@@ -54,7 +55,8 @@ class Table:
         for i, (before, after) in enumerate(pairwise(self.times)):
             if after <= before:
                 raise SceneError(
-                    f"Table: times must increase, but times[{i}] = {before:g} is followed by {after:g}"
+                    f"Table: times must increase, but times[{i}] = {before:g} is followed "
+                    f"by {after:g}"
                 )
 
     def __call__(self, t: float) -> float:

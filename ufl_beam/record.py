@@ -8,9 +8,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mpi4py import MPI
+
 import basix.ufl
 import numpy as np
-from mpi4py import MPI
 
 from ufl_beam.beams import Place
 from ufl_beam.compat import fem, io, line_mesh

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import gc
+import importlib
+import math
 import os
 import shutil
 import subprocess
@@ -16,14 +18,23 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ufl_beam.beams import Beam
+from ufl_beam.beams import Beam, Place
 from ufl_beam.compat import Array
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.solution import Solution
-from ufl_beam.view import RESULTANTS, moved_points, nearest, require_choice, support_direction
+from ufl_beam.view import (
+    INK,
+    RESULTANTS,
+    decimal_prefix,
+    moved_points,
+    nearest,
+    require_choice,
+    support_direction,
+    support_symbol,
+)
 
 # Where the camera looks from, and what is up in the picture; the frame is in the plane of x and y.
-_TOWARDS = np.array([-0.30, -0.36, -1.0])
+_TOWARDS = np.array([-0.20, -0.28, -1.0])
 _UP = np.array([0.0, 1.0, 0.0])
 
 _QUANTITIES = {**RESULTANTS, "rotation": ("rotation", "rad")}
@@ -58,13 +69,15 @@ def render(
         ImportError: PyVista is missing.
         RuntimeError: There is neither a screen nor Xvfb.
     """
+    from matplotlib.image import imsave
+
     look = _Look(solution, color, thickness, magnify, size)
     path = _require_suffix(path, (".png",))
     moved_points(solution, n, magnify)
     if MPI.COMM_WORLD.rank == 0:
         with look.film([n]) as frames:
             for frame in frames:
-                _save_png(path, frame)
+                imsave(path, frame)
 
 
 def animate(
@@ -106,7 +119,7 @@ def animate(
     count = max(1, round(fps * seconds))
     shown = nearest(kept, np.linspace(kept[0], kept[-1], count))
     if MPI.COMM_WORLD.rank == 0:
-        with _writer(path, fps) as film, look.film(shown) as frames:
+        with look.film(shown) as frames, _writer(path, fps) as film:
             for frame in frames:
                 film.append_data(frame)
 
@@ -141,8 +154,9 @@ class _Look:
 
     @property
     def symbol(self) -> float:
-        """Size of the symbols of supports and masses; m."""
-        return 0.022 * self.solution.scene.size
+        """Half the size of the symbols of supports and masses; m."""
+        deepest = max(self.depth(beam) for beam in self.solution.scene.beams)
+        return max(0.022 * self.solution.scene.size, 0.7 * deepest)
 
     def depth(self, beam: Beam) -> float:
         """Depth in the plane; m."""
@@ -201,12 +215,163 @@ class _Look:
 
     def _frames(self, pyvista: Any, plotter: Any, shown: list[int]) -> Iterator[Any]:
         beams = self.solution.scene.beams
-        states = set(shown)
-        largest = max(float(np.abs(self.values(b, n)).max()) for b in beams for n in states)
+        largest = max(float(np.abs(self.values(b, n)).max()) for b in beams for n in set(shown))
         _set_camera(plotter, self.bounds(shown), self.size)
         plotter.set_background("white")
-        _add_axes(pyvista, plotter, self)
+        plotter.enable_anti_aliasing("ssaa")
         for n in shown:
-            _add_body(pyvista, plotter, self, n, largest or 1.0)
-            plotter.render()
-            yield plotter.screenshot(None, return_img=True)
+            points = moved_points(self.solution, n, self.magnify)
+            _add_beams(pyvista, plotter, self, n, points, largest)
+            _add_fittings(pyvista, plotter, self, n, points)
+            text = f"t = {self.solution.times[n]:.3f} s"
+            plotter.add_text(
+                text, (0.02, 0.92), self.size[1] // 36, "black", viewport=True, name="time"
+            )
+            plotter.reset_camera_clipping_range()
+            yield plotter.screenshot(return_img=True)
+
+
+def _set_camera(plotter: Any, bounds: Array, size: tuple[int, int]) -> None:
+    """Fit the box into the middle of the picture, above the colour bar and below the time."""
+    towards = _TOWARDS / np.linalg.norm(_TOWARDS)
+    right = np.cross(towards, _UP)
+    right /= np.linalg.norm(right)
+    up = np.cross(right, towards)
+    corners = np.array([[x, y, z] for x in bounds[:, 0] for y in bounds[:, 1] for z in bounds[:, 2]])
+    width, height = np.ptp(corners @ right), np.ptp(corners @ up)
+    scale = max(height / 0.76, width / 0.96 * size[1] / size[0]) / 2
+    focus = bounds.mean(axis=0) - 0.08 * scale * up
+    plotter.camera.parallel_projection = True
+    plotter.camera.parallel_scale = scale
+    plotter.camera.focal_point = focus
+    plotter.camera.position = focus - 4 * np.linalg.norm(np.ptp(bounds, axis=0)) * towards
+    plotter.camera.up = up
+    plotter.camera_set = True
+
+
+def _add_beams(
+    pyvista: Any, plotter: Any, look: _Look, n: int, points: Array, largest: float
+) -> None:
+    """The beams in colour, the undeformed axes in grey, and the colour bar."""
+    quantity, unit = _QUANTITIES[look.color]
+    factor, prefix = decimal_prefix(largest)
+    limit = largest / factor or 1.0
+    title = f"{quantity} {look.color.replace('rotation', '')}".strip() + f" ({prefix}{unit})"
+    height = look.size[1]
+    bar = {
+        "title": title, "color": "black", "n_labels": 5, "fmt": "%.3g", "width": 0.44,
+        "height": 0.12, "position_x": 0.28, "position_y": 0.01,
+        "title_font_size": height // 34, "label_font_size": height // 38,
+    }  # fmt: skip
+    for i, beam in enumerate(look.solution.scene.beams):
+        values = look.values(beam, n) / factor
+        corners = look.corners(beam, n, points)
+        first = 4 * np.arange(len(corners) // 4 - 1)[:, None]
+        body = pyvista.UnstructuredGrid({pyvista.CellType.HEXAHEDRON: first + np.arange(8)}, corners)
+        if look.color == "rotation":
+            body.point_data[title] = np.repeat(values, 4)
+        else:
+            body.cell_data[title] = values
+        plotter.add_mesh(
+            body, scalars=title, clim=(-limit, limit), cmap="coolwarm", name=f"beam {i}",
+            scalar_bar_args=bar, show_scalar_bar=i == 0, reset_camera=False, ambient=0.4,
+            diffuse=0.7,
+        )  # fmt: skip
+        axis = look.solution.grid.points[look.solution.grid.vertices_of(beam)]
+        line = pyvista.lines_from_points(np.insert(axis, 2, 0.0, axis=1))
+        plotter.add_mesh(line, color="#A0A0A0", name=f"axis {i}", reset_camera=False, line_width=2)
+
+
+def _add_fittings(pyvista: Any, plotter: Any, look: _Look, n: int, points: Array) -> None:
+    """Joints as pins across the plane, masses as balls, supports as their symbols."""
+    solution, scene, symbol = look.solution, look.solution.scene, look.symbol
+
+    def add(parts: list[Any], color: str, name: str) -> None:
+        if parts:
+            mesh = pyvista.merge(parts)
+            plotter.add_mesh(mesh, color=color, name=name, reset_camera=False, ambient=0.25)
+
+    def center(place: Place) -> Array:
+        return np.append(points[solution.grid.vertex(place)], 0.0)
+
+    pins = []
+    for joint in scene.joints:
+        beams = [place.beam for place in joint.places]
+        turns = 2 not in joint.shared
+        radius = max(max(map(look.depth, beams)) / 2, (0.4 if turns else 0.0) * symbol)
+        height = max(map(look.width, beams)) * (1.25 if turns else 1.02)
+        at = center(joint.places[0])
+        pins.append(pyvista.Cylinder(at, (0, 0, 1), radius, height, resolution=32))
+    add(pins, "#707070", "joints")
+    add([pyvista.Sphere(1.3 * symbol, center(m.place)) for m in scene.masses], INK, "masses")
+    supports = []
+    for support in scene.supports:
+        turned = solution.q[n][solution.grid.dofs[solution.grid.vertex(support.place), 2]]
+        angle, width = support_direction(support, turned), 1.2 * look.width(support.place.beam)
+        for outline in support_symbol(support):
+            flat = np.array([[x, y, -0.5 * width / symbol] for x, y in outline[:-1]]) * symbol
+            face = pyvista.PolyData(flat, [len(flat), *range(len(flat))])
+            block = face.triangulate().extrude((0.0, 0.0, width), capping=True)
+            supports.append(block.rotate_z(math.degrees(angle)).translate(center(support.place)))
+    add(supports, "#808080", "supports")
+
+
+# -- files and screens -------------------------------------------------------------------------
+
+
+def _import(module: str, package: str, why: str) -> Any:
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        raise ImportError(f"{why}; install it by: pip install {package}") from error
+
+
+def _require_suffix(path: str | Path, suffixes: tuple[str, ...]) -> Path:
+    path = Path(path)
+    if path.suffix.lower() not in suffixes:
+        raise SceneError(f"{path}: the name must end in {' or '.join(suffixes)}")
+    if not path.parent.is_dir():
+        raise SceneError(f"{path}: there is no directory {path.parent}; make it first")
+    return path
+
+
+def _writer(path: Path, fps: float) -> Any:
+    imageio = _import("imageio.v2", "ufl_beam[view]", "films need imageio")
+    if path.suffix.lower() == ".gif":
+        return imageio.get_writer(path, mode="I", duration=1000.0 / fps, loop=0)
+    _import("imageio_ffmpeg", "imageio-ffmpeg", "MP4 needs imageio-ffmpeg, GIF does not")
+    return imageio.get_writer(path, fps=fps, macro_block_size=2)
+
+
+@contextmanager
+def _screen(pyvista: Any) -> Iterator[None]:
+    """A screen, if VTK needs one and there is none: without, it ends the interpreter."""
+    needed = sys.platform == "linux" and tuple(pyvista.vtk_version_info) < (9, 4)
+    if not needed or os.environ.get("DISPLAY"):
+        yield
+        return
+    if shutil.which("Xvfb") is None:
+        raise RuntimeError(
+            "PyVista with this VTK needs a screen, and DISPLAY is not set; install Xvfb "
+            "(apt-get install xvfb) or VTK 9.4 or newer"
+        )
+    reader, writer = os.pipe()
+    server = subprocess.Popen(
+        ["Xvfb", "-displayfd", str(writer), "-screen", "0", "1280x1024x24", "-nolisten", "tcp"],
+        pass_fds=[writer],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    os.close(writer)
+    try:
+        with os.fdopen(reader) as answer:
+            number = answer.readline().strip()
+        if not number:
+            raise RuntimeError("Xvfb did not start; try: Xvfb -displayfd 1")
+        os.environ["DISPLAY"] = f":{number}"
+        yield
+    finally:
+        os.environ.pop("DISPLAY", None)
+        server.terminate()
+        server.wait()

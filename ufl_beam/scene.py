@@ -238,7 +238,9 @@ class Scene:
                 raise SceneError(f"Scene: beams[{i}] = {beam!r} is not a Beam")
             first = known.setdefault(beam, i)
             if first != i:
-                raise SceneError(f"Scene: {beam.name} is in the scene twice, as beams {first} and {i}")
+                raise SceneError(
+                    f"Scene: {beam.name} is in the scene twice, as beams {first} and {i}"
+                )
         _require_kinds(self)
         for owner, place in self._attachments():
             if place.beam not in known:

@@ -36,7 +36,7 @@ class Step:
         q0: Configuration at the beginning, local degrees of freedom.
         load_time: Time at which loads are taken; s.
         motion_time: Time at which prescribed motions are taken; s.
-        toward: How far the step goes from the loads and motions before it to these; 1 is all the way.
+        toward: How far the step goes from the loads and motions before it to these; 1: there.
     """
 
     t0: float

@@ -88,7 +88,9 @@ class Section:
         """Circular tube of outer diameter ``d`` and wall thickness ``t``; m."""
         _positive("tube", d=d, t=t)
         if 2 * t > d:
-            raise SceneError(f"Section.tube: wall t = {t} m is thicker than the radius of d = {d} m")
+            raise SceneError(
+                f"Section.tube: wall t = {t} m is thicker than the radius of d = {d} m"
+            )
         inner = d - 2 * t
         A, I = math.pi * (d**2 - inner**2) / 4, math.pi * (d**4 - inner**4) / 64
         return cls.of_shape(A=A, I=I, E=E, nu=nu, rho=rho, shear=shear, depth=d)
@@ -104,7 +106,8 @@ class Section:
         _positive("i_shape", h=h, b=b, tw=tw, tf=tf)
         if 2 * tf >= h or tw > b:
             raise SceneError(
-                f"Section.i_shape: web and flanges do not fit: h = {h}, b = {b}, tw = {tw}, tf = {tf} m"
+                f"Section.i_shape: web and flanges do not fit: h = {h}, b = {b}, tw = {tw}, "
+                f"tf = {tf} m"
             )
         web = h - 2 * tf
         A = 2 * b * tf + tw * web

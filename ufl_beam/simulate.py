@@ -7,8 +7,9 @@ import time
 from collections.abc import Sequence
 from functools import cached_property
 
-import numpy as np
 from mpi4py import MPI
+
+import numpy as np
 from tqdm import tqdm
 
 from ufl_beam.applied import DeadLoads, FollowerLoads
@@ -58,8 +59,8 @@ def simulate(
         scene: What is modelled.
         scheme: :class:`Static` or :class:`Midpoint`.
         t: Beginning and end; s.  In statics time is the load parameter.
-        dt: Step; s.  The last step ends at the end, so all steps are a little shorter if ``dt`` does
-            not divide the time.  A step without convergence is cut into parts.
+        dt: Step; s.  All steps are a little shorter if ``dt`` does not divide the time.  A step
+            without convergence is cut into parts.
         record: Files to write on the way, such as :class:`XDMF` and :class:`History`.
         every: Keep every so many steps in the solution; the last one always.
         start: Solution of the same beams whose last state is the initial state.
@@ -156,7 +157,7 @@ class Simulation:
         self.fields = Fields(self.share)
         self._A = self.fields.matrix()
         self.t = t0
-        self.q = np.zeros(self.share.size)
+        self.q: Array = np.zeros(self.share.size)
         self.ledger = Ledger()
         self.parts = 0
 
@@ -171,9 +172,10 @@ class Simulation:
         self.supports = Supports(self.share, scheme, self.ledger, self._A)
         if start is not None:
             self._carry_on(start)
-        self._q_before, self._dt_before = self.q, math.inf
+        self._q_before: Array = self.q
+        self._dt_before = math.inf
         self._rotations = self.share.rotations()
-        self._force_before = np.zeros(self.share.size)
+        self._force_before: Array = np.zeros(self.share.size)
         if not scheme.dynamic:
             self.beams.add_residual(self.q, self._force_before)
         for term in self.terms:
@@ -217,7 +219,7 @@ class Simulation:
                         "from itself or from a beam that it is joined to"
                     )
                 v[dofs] = new
-        return np.nan_to_num(v)[self.share.dofs]
+        return np.asarray(np.nan_to_num(v)[self.share.dofs])
 
     def _carry_on(self, start: Solution) -> None:
         if start.grid.scene.beams != self.scene.beams or start.grid.size != self.grid.size:
@@ -228,7 +230,7 @@ class Simulation:
         if self.scheme.dynamic and len(start.v):
             self.inertia.v = start.v[-1][self.share.dofs]
         for load in self.loads:
-            load.carry_on(self.t)
+            load.carry_on(self.t, self.q)
 
     # -- the equation of a step ----------------------------------------------------------------
 
@@ -257,7 +259,11 @@ class Simulation:
         """
         t0, done, part = self.t, 0, SMALLEST_PART
         while done < SMALLEST_PART:
-            end = t1 if done + part == SMALLEST_PART else t0 + (t1 - t0) * (done + part) / SMALLEST_PART
+            end = (
+                t1
+                if done + part == SMALLEST_PART
+                else t0 + (t1 - t0) * (done + part) / SMALLEST_PART
+            )
             try:
                 self._advance(end, t1)
             except StepFailed as failure:

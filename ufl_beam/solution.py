@@ -5,8 +5,9 @@ from __future__ import annotations
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-import numpy as np
 from mpi4py import MPI
+
+import numpy as np
 
 from ufl_beam.beams import Beam, Place
 from ufl_beam.compat import Array
@@ -169,7 +170,11 @@ class Solution:
             raise SceneError("momentum: the run was static; there is none")
         times = Product(mass_matrix(self._fields))
         _, first = np.unique(self.grid.dofs[:, 0], return_index=True)
-        u, v, ψ = self.grid.dofs[first, 0], self.grid.dofs[first, 1], np.unique(self.grid.dofs[:, 2])
+        u, v, ψ = (
+            self.grid.dofs[first, 0],
+            self.grid.dofs[first, 1],
+            np.unique(self.grid.dofs[:, 2]),
+        )
         X, Y = self.grid.points[first].T
 
         def of(q: Array, velocity: Array) -> tuple[float, float, float]:

@@ -7,8 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
 from petsc4py import PETSc
+
+import numpy as np
 
 from ufl_beam.compat import Array
 from ufl_beam.errors import SceneError, require_number
@@ -35,8 +36,8 @@ class Newton:
     Args:
         rtol: Residual to be reached, as a part of the forces in the scene.
         max_iterations: Iterations before a step is cut.
-        petsc: PETSc options without their prefix, such as ``{"snes_monitor": None}``; options of the
-            command line or ``PETSC_OPTIONS`` have the prefix ``ub_``.
+        petsc: PETSc options without their prefix, such as ``{"snes_monitor": None}``; in
+            ``PETSC_OPTIONS`` they have the prefix ``ub_``.
     """
 
     rtol: float = 1e-10
@@ -91,6 +92,7 @@ class Solver:
         self._matrix = self._make_matrix()
         self._snes = self._make_snes()
         self.iterations = 0
+        self._last = math.inf
 
     # -- vectors and the matrix ----------------------------------------------------------------
 
@@ -205,8 +207,8 @@ class Solver:
             return CONVERGED
         if iteration > 0:
             floor = self._round_off()
-            # Tenths of the last digit are luck; a residual of some digits that Newton's method no longer
-            # halves is all that can be had.
+            # A tenth of the last digit is luck; a few of them that Newton's method no longer halves
+            # are all that can be had.
             if residual <= floor / 10 or self._last / 2 < residual <= 2 * floor:
                 return AT_ROUND_OFF
         self._last = residual
@@ -215,8 +217,8 @@ class Solver:
     def _round_off(self) -> float:
         """Residual that the last digit of displacements, strains and rotations makes; N.
 
-        A strain is the difference of two numbers near one, so stiff or finely divided beams cannot be
-        solved any better, however small the forces are.
+        A strain is the difference of two numbers near one, so stiff or finely divided beams cannot
+        be solved any better, however small the forces are.
         """
         digits = np.spacing(np.abs(self._view(self._x)) + self._lengths)
         return self._size(self._A.data[self._diagonal] * digits)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
 from petsc4py import PETSc
+
+import numpy as np
 
 from ufl_beam.compat import Array, la
 from ufl_beam.grid import Index

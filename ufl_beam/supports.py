@@ -9,6 +9,7 @@ import numpy as np
 from ufl_beam.compat import Array
 from ufl_beam.grid import Index, Share
 from ufl_beam.ledger import Ledger
+from ufl_beam.loads import TimeFunction
 from ufl_beam.schemes import Scheme, Step
 from ufl_beam.sparse import Csr, as_slice
 
@@ -44,8 +45,8 @@ class TurnedAxes:
 class Supports:
     """All supports of a scene.
 
-    Unknowns and residuals of the solver are in the turned axes of the supports, those of the terms in
-    the axes of the plane; :meth:`enter` and :meth:`leave` change between them.
+    Unknowns and residuals of the solver are in the turned axes of the supports, those of the terms
+    in the axes of the plane; :meth:`enter` and :meth:`leave` change between them.
 
     Attributes:
         reactions: Forces of the supports on the scene in the latest residual, at the degrees of
@@ -55,7 +56,7 @@ class Supports:
     def __init__(self, share: Share, scheme: Scheme, ledger: Ledger, A: Csr) -> None:
         self._turned: list[TurnedAxes] = []
         held: list[int] = []
-        self._motions = []
+        self._motions: list[tuple[int, TimeFunction]] = []
         for support in share.grid.scene.supports:
             dofs = share.at(support.place)
             if support.angle and len(share.local(dofs[:2])):
@@ -74,7 +75,8 @@ class Supports:
         self._acting, self._ledger = scheme.acting, ledger
         if any(support.moving for support in share.grid.scene.supports):
             ledger.supplied["supports"] += 0.0
-        self._before = self.reactions = np.zeros(len(self.dofs))
+        self.reactions: Array = np.zeros(len(self.dofs))
+        self._before: Array = self.reactions
 
     def enter(self, x: Array) -> None:
         """From the axes of the plane to those of the supports, in place."""
@@ -134,4 +136,3 @@ class Supports:
         r[self._held] = self.reactions
         self.leave(r)
         return r
-

@@ -1,8 +1,8 @@
 """Virtual works, one class each: what a scene may contribute to the equation of a step.
 
-A term adds its part of the residual and of the tangent at the end of the step, and says what the step
-did to the energy.  Vectors hold the local degrees of freedom of a process, ghosts included; what
-several processes add to one degree of freedom is summed by the solver.
+A term adds its part of the residual and of the tangent at the end of the step, and says what the
+step did to the energy.  Vectors hold the local degrees of freedom of a process, ghosts included;
+what several processes add to one degree of freedom is summed by the solver.
 """
 
 from __future__ import annotations
@@ -50,9 +50,7 @@ class ElasticBeams:
         force: Internal forces at the latest residual.
     """
 
-    def __init__(
-        self, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger
-    ) -> None:
+    def __init__(self, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger) -> None:
         q0, q1 = fields.configuration(), fields.configuration()
         w, dx, axis = ufl.TestFunction(fields.space), fields.dx(1), fields.axis
         C = fields.stiffness()
@@ -151,9 +149,7 @@ class Inertia:
         M: The mass matrix.
     """
 
-    def __init__(
-        self, fields: Fields, scheme: Midpoint, A: Csr, ledger: Ledger, v: Array
-    ) -> None:
+    def __init__(self, fields: Fields, scheme: Midpoint, A: Csr, ledger: Ledger, v: Array) -> None:
         share = fields.share
         self.M = mass_matrix(fields)
         self._times = Product(self.M)
@@ -197,7 +193,9 @@ class Inertia:
         v -= self._b * self.v  # P(87)
         if self._scheme.beta:
             change = v - self.v
-            self._ledger.lost["numerical"] += self._scheme.beta * float(change @ self._times(change))  # P(88)
+            self._ledger.lost["numerical"] += self._scheme.beta * float(
+                change @ self._times(change)
+            )  # P(88)
         self.v = v
 
     def add_state(self, q: Array) -> None:

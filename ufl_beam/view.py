@@ -54,13 +54,14 @@ STYLE = {
     "lines.solid_capstyle": "round",
 }
 
-# Symbols of supports that hold both displacements, one, everything; half a symbol is 1, the place
-# is the origin, the beam comes from above.
+# Outlines of the symbols of supports; half a symbol is 1, the place is the origin, the beam comes
+# from above.
+Outline = list[tuple[float, float]]
 _TRIANGLE = [(0.0, 0.0), (-0.6, -0.8), (0.6, -0.8), (0.0, 0.0)]
-_PIN = [_TRIANGLE, [(-1.0, -0.8), (1.0, -0.8)]]
-_ROLLER = [_TRIANGLE, [(-1.0, -1.0), (1.0, -1.0)]]
-_CLAMP = [[(-1.0, 0.0), (1.0, 0.0), (1.0, -0.5), (-1.0, -0.5), (-1.0, 0.0)]]
-_HOLD = [[(-0.5, 0.0), (0.0, 0.5), (0.5, 0.0), (0.0, -0.5), (-0.5, 0.0)]]
+_CLAMP = [(-1.0, 0.0), (1.0, 0.0), (1.0, -0.5), (-1.0, -0.5), (-1.0, 0.0)]
+_PLATE = [(-1.0, -0.8), (1.0, -0.8), (1.0, -0.9), (-1.0, -0.9), (-1.0, -0.8)]
+_TRACK = [(-1.0, -1.0), (1.0, -1.0), (1.0, -1.1), (-1.0, -1.1), (-1.0, -1.0)]
+_DIAMOND = [(-0.6, 0.0), (0.0, 0.6), (0.6, 0.0), (0.0, -0.6), (-0.6, 0.0)]
 
 
 # -- what users call ---------------------------------------------------------------------------
@@ -84,7 +85,7 @@ def plot(
     Raises:
         SceneError: Unknown ``what``, no such time, or ``magnify`` is not positive.
     """
-    _require(what, ("shape", *RESULTANTS), "plot: what")
+    require_choice(what, ("shape", *RESULTANTS), "plot: what")
     points = moved_points(solution, n, magnify)
     name = f"{RESULTANTS[what][0]} {what}" if what in RESULTANTS else "shape"
     factor = f", displacements × {magnify:g}" if magnify != 1 else ""
@@ -92,10 +93,10 @@ def plot(
         axes = _plane_axes(figure, f"{name} at t = {solution.times[n]:.4g} s{factor}")
         _draw_axes(axes, solution, solution.grid.points, color=GREY, linewidth=1.2, zorder=1)
         if what in RESULTANTS:
-            axes.margins(0.15, 0.10)
             _draw_diagram(axes, solution, what, n, points)
         _draw_axes(axes, solution, points, color=INK, linewidth=2.6, zorder=4)
         _draw_symbols(axes, solution, points, solution.q[n])
+        _make_room(figure, axes)
     return figure
 
 
@@ -157,7 +158,7 @@ def plot_history(
         SceneError: Unknown ``component``, a place that is not in the scene, or the velocity of a
             static run.
     """
-    _require(component, COMPONENTS, "plot_history: component")
+    require_choice(component, COMPONENTS, "plot_history: component")
     followed = (places,) if isinstance(places, Place) else tuple(places)
     number = list(COMPONENTS).index(component)
     motion = solution.displacement if number < 3 else solution.velocity
@@ -229,14 +230,26 @@ def nearest(kept: Array, times: Sequence[float] | Array) -> list[int]:
     return [int(np.argmin(np.abs(kept - t))) for t in sorted(times)]
 
 
+def decimal_prefix(value: float) -> tuple[float, str]:
+    """Power of 1000 that leaves a value between 1 and 1000, and its prefix: (1000.0, "k")."""
+    rounded = abs(float(f"{value:.3g}"))
+    power = min(max(math.floor(math.log10(rounded) / 3), -3), 3) if rounded > 0.0 else 0
+    return 1000.0**power, ("n", "µ", "m", "", "k", "M", "G")[power + 3]
+
+
 def with_unit(value: float, unit: str) -> str:
     """A value with three digits and a decimal prefix: "−12.3 kN m"."""
-    rounded = float(f"{value:.3g}")
-    if rounded == 0.0:
-        return f"0 {unit}"
-    power = min(max(math.floor(math.log10(abs(rounded)) / 3), -3), 3)
-    prefix = ("n", "µ", "m", "", "k", "M", "G")[power + 3]
-    return f"{rounded / 1000.0**power:.3g} {prefix}{unit}".replace("-", "−")
+    factor, prefix = decimal_prefix(value)
+    return f"{value / factor:.3g} {prefix}{unit}".replace("-", "−")
+
+
+def support_symbol(support: Support) -> list[Outline]:
+    """Outlines of the symbol of a support; half a symbol is 1, the place is the origin."""
+    if len(support.held) == 3:
+        return [_CLAMP]
+    return {0: [_DIAMOND], 1: [_TRIANGLE, _TRACK], 2: [_TRIANGLE, _PLATE]}[
+        len({0, 1} & set(support.held))
+    ]
 
 
 def support_direction(support: Support, turned: float) -> float:
@@ -261,7 +274,8 @@ def _inward(place: Place) -> float:
     return math.atan2(Y - y, X - x)
 
 
-def _require(choice: str, choices: Sequence[str] | dict[str, Any], what: str) -> None:
+def require_choice(choice: str, choices: Sequence[str] | dict[str, Any], what: str) -> None:
+    """Raise :class:`SceneError` naming ``what`` unless ``choice`` is one of ``choices``."""
     if choice not in choices:
         names = ", ".join(f'"{name}"' for name in choices)
         raise SceneError(f"{what} = {choice!r} is not one of {names}")
@@ -371,6 +385,14 @@ def _annotate(axes: Axes, text: str, color: str, tip: Array, outward: Array) -> 
     )  # fmt: skip
 
 
+def _make_room(figure: Figure, axes: Axes) -> None:
+    """Extend the limits such that texts stay off the edge."""
+    figure.draw_without_rendering()
+    for text in axes.texts:
+        axes.update_datalim(axes.transData.inverted().transform(text.get_window_extent()))
+    axes.autoscale_view()
+
+
 def _draw_symbols(axes: Axes, solution: Solution, points: Array, q: Array) -> None:
     _draw_supports(axes, solution, points, q)
     for joint in solution.scene.joints:
@@ -393,13 +415,11 @@ def _draw_supports(axes: Axes, solution: Solution, points: Array, q: Array) -> N
 
     for support in solution.scene.supports:
         vertex = solution.grid.vertex(support.place)
-        displacements = {0, 1} & set(support.held)
-        full = len(support.held) == 3
-        lines = _CLAMP if full else (_HOLD, _ROLLER, _PIN)[len(displacements)]
-        symbol = MarkerStyle(Path.make_compound_path(*map(Path, lines)))
+        outline = Path.make_compound_path(*map(Path, support_symbol(support)))
+        symbol = MarkerStyle(outline)
         turned = support_direction(support, q[solution.grid.dofs[vertex, 2]])
         color = ORANGE if support.moving else "#808080"
         axes.plot(
             *points[vertex], marker=symbol.rotated(rad=turned), ms=24.0, mfc=color, mec=color,
-            mew=1.5, zorder=3.5,
+            mew=0.5, zorder=3.5,
         )  # fmt: skip
