@@ -5,6 +5,7 @@ from ufl_beam.errors import ConvergenceError, SceneError
 from ufl_beam.ledger import Energy
 from ufl_beam.loads import FollowerLoad, Gravity, LineLoad, PointLoad, Table, ramp
 from ufl_beam.record import XDMF, History, Recorder
+from ufl_beam.render import animate, render
 from ufl_beam.scene import (
     Clamped,
     Joint,
@@ -23,6 +24,7 @@ from ufl_beam.sections import Section
 from ufl_beam.simulate import Simulation, say, simulate
 from ufl_beam.solution import Solution
 from ufl_beam.solve import Newton
+from ufl_beam.view import plot, plot_energy, plot_history, plot_shapes
 
 __all__ = [
     "XDMF",
@@ -55,7 +57,13 @@ __all__ = [
     "Support",
     "Table",
     "Velocity",
+    "animate",
+    "plot",
+    "plot_energy",
+    "plot_history",
+    "plot_shapes",
     "ramp",
+    "render",
     "say",
     "simulate",
 ]

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from ufl_beam.beams import Beam, Place
 from ufl_beam.compat import Array
 from ufl_beam.errors import SceneError
-from ufl_beam.scene import Scene
+from ufl_beam.scene import COMPONENTS, Scene
 
 Index = npt.NDArray[Any]
 """Array of integers."""
@@ -89,6 +89,13 @@ class Grid:
         """The vertex at a place that something is attached to."""
         vertices, weights = self.weights(place)
         return int(vertices[np.argmax(weights)])
+
+    def describe(self, dof: int) -> str:
+        """A degree of freedom in words: its component, beam and point."""
+        vertex, component = np.argwhere(self.dofs == dof)[0]
+        beam = int(np.searchsorted(self._first, vertex, side="right")) - 1
+        x, y = self.points[vertex]
+        return f"{COMPONENTS[component]} of {self.scene.beams[beam].name} at ({x:g}, {y:g})"
 
     def _require_length(self) -> None:
         ends = self.points[self.cells]

@@ -1,4 +1,4 @@
-"""Solid pictures and films of a solution, by PyVista: what is built, and how it gets on a screen."""
+"""Solid pictures and films of a solution, by PyVista: what is built, and on which screen."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from mpi4py import MPI
+
+import numpy as np
 
 from ufl_beam.beams import Beam, Place
 from ufl_beam.compat import Array
@@ -218,16 +219,17 @@ class _Look:
         largest = max(float(np.abs(self.values(b, n)).max()) for b in beams for n in set(shown))
         _set_camera(plotter, self.bounds(shown), self.size)
         plotter.set_background("white")
-        plotter.enable_anti_aliasing("ssaa")
+        plotter.enable_anti_aliasing("msaa")
+        scaled = f", displacements × {self.magnify:g}" if self.magnify != 1 else ""
         for n in shown:
+            plotter.suppress_rendering = True
             points = moved_points(self.solution, n, self.magnify)
             _add_beams(pyvista, plotter, self, n, points, largest)
             _add_fittings(pyvista, plotter, self, n, points)
-            text = f"t = {self.solution.times[n]:.3f} s"
-            plotter.add_text(
-                text, (0.02, 0.92), self.size[1] // 36, "black", viewport=True, name="time"
-            )
+            _add_text(plotter, self, f"t = {self.solution.times[n]:.3f} s{scaled}", (0.02, 0.93))
             plotter.reset_camera_clipping_range()
+            plotter.suppress_rendering = False
+            plotter.render()
             yield plotter.screenshot(return_img=True)
 
 
@@ -237,7 +239,7 @@ def _set_camera(plotter: Any, bounds: Array, size: tuple[int, int]) -> None:
     right = np.cross(towards, _UP)
     right /= np.linalg.norm(right)
     up = np.cross(right, towards)
-    corners = np.array([[x, y, z] for x in bounds[:, 0] for y in bounds[:, 1] for z in bounds[:, 2]])
+    corners = np.stack(np.meshgrid(*bounds.T), axis=-1).reshape(-1, 3)
     width, height = np.ptp(corners @ right), np.ptp(corners @ up)
     scale = max(height / 0.76, width / 0.96 * size[1] / size[0]) / 2
     focus = bounds.mean(axis=0) - 0.08 * scale * up
@@ -257,17 +259,18 @@ def _add_beams(
     factor, prefix = decimal_prefix(largest)
     limit = largest / factor or 1.0
     title = f"{quantity} {look.color.replace('rotation', '')}".strip() + f" ({prefix}{unit})"
-    height = look.size[1]
     bar = {
-        "title": title, "color": "black", "n_labels": 5, "fmt": "%.3g", "width": 0.44,
-        "height": 0.12, "position_x": 0.28, "position_y": 0.01,
-        "title_font_size": height // 34, "label_font_size": height // 38,
+        "title": title, "color": "black", "n_labels": 5, "fmt": "%.3g", "width": 0.48,
+        "height": 0.09, "position_x": 0.46, "position_y": 0.01,
+        "label_font_size": look.size[1] // 36,
     }  # fmt: skip
+    _add_text(plotter, look, title, (0.02, 0.025))
     for i, beam in enumerate(look.solution.scene.beams):
         values = look.values(beam, n) / factor
         corners = look.corners(beam, n, points)
         first = 4 * np.arange(len(corners) // 4 - 1)[:, None]
-        body = pyvista.UnstructuredGrid({pyvista.CellType.HEXAHEDRON: first + np.arange(8)}, corners)
+        cells = {pyvista.CellType.HEXAHEDRON: first + np.arange(8)}
+        body = pyvista.UnstructuredGrid(cells, corners)
         if look.color == "rotation":
             body.point_data[title] = np.repeat(values, 4)
         else:
@@ -277,9 +280,17 @@ def _add_beams(
             scalar_bar_args=bar, show_scalar_bar=i == 0, reset_camera=False, ambient=0.4,
             diffuse=0.7,
         )  # fmt: skip
+        if i == 0:
+            # VTK would set the title over the numbers.
+            plotter.scalar_bars[title].SetTitle("")
         axis = look.solution.grid.points[look.solution.grid.vertices_of(beam)]
         line = pyvista.lines_from_points(np.insert(axis, 2, 0.0, axis=1))
-        plotter.add_mesh(line, color="#A0A0A0", name=f"axis {i}", reset_camera=False, line_width=2)
+        plotter.add_mesh(line, color="#A0A0A0", name=f"axis {i}", reset_camera=False)
+
+
+def _add_text(plotter: Any, look: _Look, text: str, position: tuple[float, float]) -> None:
+    size = look.size[1] // 40
+    plotter.add_text(text, position, size, "black", name=str(position), viewport=True)
 
 
 def _add_fittings(pyvista: Any, plotter: Any, look: _Look, n: int, points: Array) -> None:
@@ -303,7 +314,7 @@ def _add_fittings(pyvista: Any, plotter: Any, look: _Look, n: int, points: Array
         at = center(joint.places[0])
         pins.append(pyvista.Cylinder(at, (0, 0, 1), radius, height, resolution=32))
     add(pins, "#707070", "joints")
-    add([pyvista.Sphere(1.3 * symbol, center(m.place)) for m in scene.masses], INK, "masses")
+    add([pyvista.Sphere(1.1 * symbol, center(m.place)) for m in scene.masses], INK, "masses")
     supports = []
     for support in scene.supports:
         turned = solution.q[n][solution.grid.dofs[solution.grid.vertex(support.place), 2]]
@@ -359,6 +370,7 @@ def _screen(pyvista: Any) -> Iterator[None]:
     server = subprocess.Popen(
         ["Xvfb", "-displayfd", str(writer), "-screen", "0", "1280x1024x24", "-nolisten", "tcp"],
         pass_fds=[writer],
+        start_new_session=True,  # Ctrl-C is for this process; it still needs its screen to end
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,

@@ -153,7 +153,9 @@ class Simulation:
             require_no_mechanism(scene)
         self.scene, self.scheme, self.comm = scene, scheme, comm
         self.grid = Grid(scene)
-        self.share = Share(self.grid, comm)
+        # A scene with fewer cells than processes is computed by each of them.
+        together = comm.size <= len(self.grid.cells)
+        self.share = Share(self.grid, comm if together else MPI.COMM_SELF)
         self.fields = Fields(self.share)
         self._A = self.fields.matrix()
         self.t = t0
@@ -303,8 +305,8 @@ class Simulation:
 
     def _require_small(self, turn: float) -> None:
         """Raise if a node of any process turns too far in the step."""
-        if self.comm.size > 1:
-            turn = self.comm.allreduce(turn, op=MPI.MAX)
+        if self.share.comm.size > 1:
+            turn = self.share.comm.allreduce(turn, op=MPI.MAX)
         if not turn <= LARGEST_TURN:
             raise StepFailed(
                 f"a node turns by {turn:.3g} rad in the step, and |Δψ| must stay below π; reduce dt"
@@ -327,7 +329,8 @@ class Simulation:
         self._force_before = force.copy()
 
     def _give_up(self, failure: StepFailed, end: float) -> None:
-        self.solution.keep(self)
+        if self.t not in self.solution.times[-1:]:
+            self.solution.keep(self)
         dt = end - self.t
         raise ConvergenceError(
             f"no equilibrium after t = {self.t:.9g} s, even with dt = {dt:.3g} s: {failure}. "
@@ -361,9 +364,9 @@ class Simulation:
     def entries(self) -> tuple[dict[str, float], ...]:
         """The ledger over all processes: state, supplied, lost; J."""
         groups = (self.ledger.state, self.ledger.supplied, self.ledger.lost)
-        if self.comm.size == 1:
+        if self.share.comm.size == 1:
             return tuple(dict(group) for group in groups)
-        everyone = self.comm.allgather([dict(group) for group in groups])
+        everyone = self.share.comm.allgather([dict(group) for group in groups])
         return tuple(
             {name: sum(one[g][name] for one in everyone) for name in group}
             for g, group in enumerate(groups)

@@ -251,9 +251,13 @@ class Solver:
     def _explain(self, reason: int) -> str:
         names = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int)}
         scale = self._loads + self._size(self._forces())
+        weighted = np.zeros(self._share.size)
+        weighted[: len(self._weights)] = np.abs(self._r[: len(self._weights)]) * self._weights**0.5
+        worst = int(np.argmax(self._share.gather(weighted)))
         return (
             f"SNES {names.get(reason, reason)} after {self._snes.getIterationNumber()} iterations; "
-            f"residual {self._size(self._r):.3e} N, forces in the scene {scale:.3e} N"
+            f"residual {self._size(self._r):.3e} N, largest in {self._share.grid.describe(worst)}, "
+            f"forces in the scene {scale:.3e} N"
         )
 
     def destroy(self) -> None:

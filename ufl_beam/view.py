@@ -12,8 +12,9 @@ from contextlib import contextmanager
 from itertools import cycle, groupby, islice
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from mpi4py import MPI
+
+import numpy as np
 
 from ufl_beam.beams import Place
 from ufl_beam.compat import Array
@@ -67,14 +68,12 @@ _DIAMOND = [(-0.6, 0.0), (0.0, 0.6), (0.6, 0.0), (0.0, -0.6), (-0.6, 0.0)]
 # -- what users call ---------------------------------------------------------------------------
 
 
-def plot(
-    solution: Solution, what: str = "shape", *, n: int = -1, magnify: float = 1.0
-) -> Figure:
+def plot(solution: Solution, what: str = "shape", *, n: int = -1, magnify: float = 1.0) -> Figure:
     """The frame at the n-th kept time, with the diagram of a section force if ``what`` says so.
 
     Diagrams are constant in each cell, like the section forces, and stand on the deformed axis:
-    M on the side in tension, positive N and V to the left of the way from start to end.  Their
-    extreme values are written beside them.
+    M on the side in tension, positive N and V to the left of the way from start to end.  Positive
+    values are red, negative ones blue; the extreme values are written beside them.
 
     Args:
         solution: What to show.
@@ -140,7 +139,7 @@ def plot_shapes(
         _draw_supports(axes, solution, shapes[-1], solution.q[chosen[-1]])
         bar = figure.colorbar(of_time, ax=axes, shrink=0.85, aspect=25, pad=0.02)
         bar.set_label("time t (s)")
-        bar.outline.set_visible(False)
+        bar.ax.spines["outline"].set_visible(False)
     return figure
 
 
@@ -263,7 +262,7 @@ def support_direction(support: Support, turned: float) -> float:
     if len(support.held) == 3:
         return inward + turned - math.pi / 2
     angle = support.angle - (0.0 if 1 in support.held else math.pi / 2)
-    return angle + (math.pi if math.sin(inward - angle) < -1e-6 else 0.0)
+    return angle + (math.pi if math.sin(inward - angle) < -0.5 else 0.0)
 
 
 def _inward(place: Place) -> float:
@@ -287,14 +286,14 @@ def require_choice(choice: str, choices: Sequence[str] | dict[str, Any], what: s
 @contextmanager
 def _picture(size: tuple[float, float]) -> Iterator[Figure]:
     """A new figure (inch) whose contents get this module's style."""
-    import matplotlib
+    import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context(STYLE):
+    with mpl.rc_context(STYLE):
         figure = Figure(figsize=size, dpi=150, layout="constrained")
         if MPI.COMM_WORLD.rank > 0:
             # All processes run the same script; one file must not be written by all of them.
-            figure.savefig = lambda *args, **options: None
+            figure.savefig = lambda *args, **options: None  # type: ignore[method-assign]
         yield figure
 
 
@@ -327,9 +326,9 @@ def _cycle(count: int) -> list[str]:
 
 
 def _colormap(name: str) -> Any:
-    import matplotlib
+    import matplotlib as mpl
 
-    return matplotlib.colormaps[name]
+    return mpl.colormaps[name]
 
 
 def _draw_axes(axes: Axes, solution: Solution, points: Array, **line: Any) -> None:
@@ -357,8 +356,8 @@ def _draw_diagram(axes: Axes, solution: Solution, what: str, n: int, points: Arr
         tips.append((chain[1:] + chain[:-1]) / 2 + ordinates)
         outward.append(side * np.sign(values)[:, None] * left)
     every = np.concatenate(forces)
-    for cell, color in ((np.argmax(every), BLUE), (np.argmin(every), RED)):
-        if every[cell] * (1 if color == BLUE else -1) > 0:
+    for cell, sign, color in ((np.argmax(every), 1, RED), (np.argmin(every), -1, BLUE)):
+        if sign * every[cell] > 0:
             text = with_unit(every[cell], RESULTANTS[what][1])
             _annotate(axes, text, color, np.concatenate(tips)[cell], np.concatenate(outward)[cell])
 
@@ -370,7 +369,7 @@ def _draw_steps(axes: Axes, chain: Array, values: Array, ordinates: Array) -> No
         axis = chain[cells[0] : cells[-1] + 2]
         steps = np.repeat(axis, 2, axis=0)[1:-1] + np.repeat(ordinates[cells], 2, axis=0)
         outline = np.concatenate([axis[:1], steps, axis[:0:-1]])
-        color = BLUE if positive else RED
+        color = RED if positive else BLUE
         axes.fill(*outline.T, facecolor=(color, 0.28), edgecolor=color, linewidth=1.0, zorder=2)
 
 
@@ -379,8 +378,8 @@ def _annotate(axes: Axes, text: str, color: str, tip: Array, outward: Array) -> 
     # The middle of the text, half a text and a gap away from the diagram; points.
     offset = (x * (8 + 4.5 * len(text)), y * 17)
     axes.annotate(
-        text, tip, offset, textcoords="offset points", color=color, weight="bold", zorder=6,
-        ha="center", va="center",
+        text, (tip[0], tip[1]), offset, textcoords="offset points", ha="center", va="center",
+        color=color, weight="bold", zorder=6,
         bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0},
     )  # fmt: skip
 
