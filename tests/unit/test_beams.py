@@ -1,0 +1,155 @@
+"""Beams: where the axis runs, which vertices it gets, and what a place is."""
+
+import math
+
+import numpy as np
+import pytest
+
+import ufl_beam as ub
+from ufl_beam.grid import Grid
+
+SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0)
+
+
+def test_a_place_is_the_same_however_it_is_named():
+    beam = ub.Beam((0, 0), (3, 4), SECTION)
+    assert beam.at(0.0) == beam.start
+    assert beam.at(1.0) == beam.end
+    assert hash(beam.at(1)) == hash(beam.end)
+    assert beam.at(0.25) != beam.at(0.5)
+
+
+def test_places_of_equal_beams_differ():
+    one, other = (ub.Beam((0, 0), (1, 0), SECTION) for _ in range(2))
+    assert one != other
+    assert one.start != other.start
+
+
+def test_points_of_a_straight_beam():
+    beam = ub.Beam((1, 2), (4, 6), SECTION)
+    assert beam.start.point == (1, 2)
+    assert beam.end.point == (4, 6)
+    assert beam.at(0.5).point == (2.5, 4)
+
+
+def test_a_place_says_where_it_is():
+    beam = ub.Beam((1, 2), (4, 6), SECTION, name="strut")
+    assert str(beam.start) == "strut.start (1, 2)"
+    assert str(beam.end) == "strut.end (4, 6)"
+    assert str(beam.at(0.5)) == "strut.at(0.5) (2.5, 4)"
+
+
+def test_arc():
+    beam = ub.Beam.arc((1, 1), 2.0, (0, math.pi / 2), SECTION, cells=3)
+    assert beam.a == pytest.approx((3, 1))
+    assert beam.b == pytest.approx((1, 3))
+    half = 1 + 2 / math.sqrt(2)
+    assert beam.at(0.5).point == pytest.approx((half, half))
+
+
+def test_arc_clockwise():
+    beam = ub.Beam.arc((0, 0), 1.0, (math.pi / 2, 0), SECTION)
+    assert beam.start.point == pytest.approx((0, 1))
+    assert beam.at(1 / 3).point == pytest.approx((0.5, math.sqrt(3) / 2))
+
+
+def test_full_circle_may_close():
+    beam = ub.Beam.arc((0, 0), 1.0, (0, 2 * math.pi), SECTION, cells=12)
+    grid = Grid(ub.Scene([beam], joints=[ub.Rigid(beam.start, beam.end)]))
+    assert len(grid.points) == 13
+    assert grid.size == 36  # 12 vertices: the ends share all three
+
+
+def test_polyline_goes_by_length():
+    # Pieces of 3 and 1 m: the corner is at 3/4
+    beam = ub.Beam.polyline([(0, 0), (3, 0), (3, 1)], SECTION, cells=3)
+    assert beam.at(0.75).point == (3, 0)
+    assert beam.at(0.5).point == pytest.approx((2, 0))
+    assert beam.at(0.875).point == pytest.approx((3, 0.5))
+
+
+def test_corners_are_vertices():
+    beam = ub.Beam.polyline([(0, 0), (3, 0), (3, 1)], SECTION, cells=3)
+    assert beam.vertices(()) == pytest.approx([0, 1 / 3, 2 / 3, 3 / 4, 1])
+    points = Grid(ub.Scene([beam])).points
+    assert points == pytest.approx(
+        np.array([(0, 0), (4 / 3, 0), (8 / 3, 0), (3, 0), (3, 1)], dtype=float)
+    )
+
+
+def test_any_curve():
+    beam = ub.Beam.along(lambda s: (2 * s, s**2), SECTION, cells=4)
+    assert (beam.a, beam.b) == ((0, 0), (2, 1))
+    assert Grid(ub.Scene([beam])).points[:, 1] == pytest.approx([0, 1 / 16, 1 / 4, 9 / 16, 1])
+
+
+def test_vertices_are_regular_and_those_attached():
+    beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
+    assert beam.vertices(()) == [0, 0.25, 0.5, 0.75, 1]
+    assert beam.vertices([0.3, 0.5]) == [0, 0.25, 0.3, 0.5, 0.75, 1]
+
+
+def test_places_next_to_a_vertex_are_that_vertex():
+    # Nearer than 1e-9 of a cell; 0.1 + 0.2 and 3/10 differ in the last digit
+    beam = ub.Beam((0, 0), (1, 0), SECTION, cells=10)
+    assert len(beam.vertices([0.1 + 0.2, 1 - 1e-12, 1e-12])) == 11
+    assert beam.vertices([1 - 1e-12])[-1] == 1.0
+
+
+@pytest.mark.parametrize(
+    "attach",
+    [
+        lambda place: {"loads": [ub.PointLoad(place)]},
+        lambda place: {"loads": [ub.FollowerLoad(place)]},
+        lambda place: {"supports": [ub.Pinned(place)]},
+        lambda place: {"masses": [ub.PointMass(place, 1.0)]},
+        lambda place: {"joints": [ub.Revolute(place, EXTRA.start)], "beams": [place.beam, EXTRA]},
+    ],
+    ids=["load", "follower", "support", "mass", "joint"],
+)
+def test_attached_places_become_vertices(attach):
+    beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
+    parts = {"beams": [beam], **attach(beam.at(0.3))}
+    grid = Grid(ub.Scene(**parts))
+    vertices = grid.vertices_of(beam)
+    assert grid.points[vertices, 0] == pytest.approx([0, 0.3, 0.5, 1])
+    assert grid.vertex(beam.at(0.3)) == vertices[1]
+
+
+EXTRA = ub.Beam((0.3, 0), (0.3, 1), SECTION, cells=1)
+
+
+def test_joints_share_degrees_of_freedom():
+    # Three beams at a point: two rigid, one hinged to them.  12 + 12 + 12 of four-cell beams less
+    # one rigid (3) and one revolute (2)
+    beams = [ub.Beam((0, 0), end, SECTION, cells=3) for end in ((1, 0), (0, 1), (-1, 0))]
+    a, b, c = (beam.start for beam in beams)
+    scene = ub.Scene(beams, joints=[ub.Rigid(a, b), ub.Revolute(b, c)])
+    grid = Grid(scene)
+    assert grid.size == 36 - 5
+    at = [grid.dofs[grid.vertex(place)] for place in (a, b, c)]
+    assert (at[0] == at[1]).all()
+    assert (at[0][:2] == at[2][:2]).all()
+    assert at[0][2] != at[2][2]
+    assert sorted(set(grid.dofs.ravel())) == list(range(grid.size))
+
+
+def test_three_places_in_one_joint_are_as_two_joints():
+    beams = [ub.Beam((0, 0), end, SECTION, cells=1) for end in ((1, 0), (0, 1), (-1, 0))]
+    a, b, c = (beam.start for beam in beams)
+    together = Grid(ub.Scene(beams, joints=[ub.Revolute(a, b, c)]))
+    pairs = Grid(ub.Scene(beams, joints=[ub.Revolute(c, b), ub.Revolute(a, c)]))
+    assert together.size == pairs.size == 18 - 4
+
+
+def test_joints_whose_ends_are_apart_by_rounding_only():
+    one = ub.Beam((0, 0), (0.1 + 0.2, 0), SECTION)
+    other = ub.Beam((0.3, 0), (1, 0), SECTION)
+    assert Grid(ub.Scene([one, other], joints=[ub.Rigid(one.end, other.start)])).num_shared == 3
+
+
+def test_interpolation_between_vertices():
+    beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
+    vertices, weights = Grid(ub.Scene([beam])).weights(beam.at(0.3))
+    assert list(vertices) == [1, 2]
+    assert weights == pytest.approx([0.8, 0.2])

@@ -1,0 +1,209 @@
+"""The package as text: who imports what, each equation stated once, one version, documented names."""
+
+import ast
+import io
+import re
+import tokenize
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+import ufl_beam as ub
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = ROOT / "ufl_beam"
+MODULES = sorted(path.stem for path in PACKAGE.glob("*.py"))
+
+RECORDS = ["beams", "errors", "loads", "scene", "sections"]
+"""What users say; it must be readable and usable without any of the machinery."""
+
+MACHINERY = {"basix", "cffi", "dolfinx", "ffcx", "mpi4py", "petsc4py", "ufl"}
+
+
+def is_type_checking(node):
+    return isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING")
+
+
+def imports(module):
+    """Names of the modules that a module of the package imports, anywhere but for type checkers."""
+    found = set()
+
+    def visit(node):
+        for child in ast.iter_child_nodes(node):
+            if is_type_checking(child):
+                continue
+            if isinstance(child, ast.Import):
+                found.update(alias.name for alias in child.names)
+            elif isinstance(child, ast.ImportFrom):
+                assert child.level == 0, f"{module}: relative import"
+                if child.module == "ufl_beam":
+                    found.update(f"ufl_beam.{alias.name}" for alias in child.names)
+                else:
+                    found.add(child.module)
+            visit(child)
+
+    visit(ast.parse((PACKAGE / f"{module}.py").read_text(encoding="utf-8")))
+    return found
+
+
+def siblings(module):
+    """Modules of the package that a module imports."""
+    inside = {name.split(".")[1] for name in imports(module) if name.startswith("ufl_beam.")}
+    return inside & set(MODULES)
+
+
+def outside(module):
+    """Top-level packages that a module imports."""
+    return {name.split(".")[0] for name in imports(module)} - {"ufl_beam"}
+
+
+def reach(module):
+    """The module, and all modules of the package that come with it."""
+    found, todo = set(), {module}
+    while todo:
+        found |= todo
+        todo = set().union(*(siblings(m) for m in todo)) - found
+    return found
+
+
+# -- imports -----------------------------------------------------------------------------------
+
+
+def test_the_text_is_read():
+    # So that the tests below are about something
+    assert {"compat", "kinematics", "scene", "simulate"} <= set(MODULES)
+    assert "dolfinx" in outside("compat")
+    assert "beams" in siblings("scene")
+
+
+@pytest.mark.parametrize("module", [m for m in MODULES if m != "compat"])
+def test_only_compat_imports_dolfinx(module):
+    assert "dolfinx" not in outside(module)
+
+
+@pytest.mark.parametrize("module", [m for m in MODULES if m != "compat"])
+def test_only_compat_asks_for_versions(module):
+    names = {
+        node.id
+        for node in ast.walk(ast.parse((PACKAGE / f"{module}.py").read_text(encoding="utf-8")))
+        if isinstance(node, ast.Name)
+    }
+    assert "VERSION" not in names
+
+
+def test_kinematics_imports_ufl_alone():
+    assert outside("kinematics") == {"ufl"}
+    assert siblings("kinematics") == set()
+
+
+@pytest.mark.parametrize("module", RECORDS)
+def test_records_need_no_machinery(module):
+    """Directly, or through other modules of the package."""
+    assert reach(module) <= set(RECORDS)
+    for one in reach(module):
+        assert not outside(one) & MACHINERY, one
+
+
+def test_only_what_solves_imports_petsc():
+    assert {m for m in MODULES if "petsc4py" in outside(m)} <= {"solve", "sparse"}
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_pictures_are_at_the_end(module):
+    """Nothing but the package itself imports the modules of pictures."""
+    if module not in {"__init__", "view", "render"}:
+        assert not siblings(module) & {"view", "render"}
+        assert not outside(module) & {"matplotlib", "pyvista", "imageio"}
+
+
+def test_imports_have_no_cycles():
+    for module in MODULES:
+        if module != "__init__":
+            assert module not in set().union(*(reach(m) for m in siblings(module))), module
+
+
+# -- equations ---------------------------------------------------------------------------------
+
+
+def tags(path):
+    """(n, deviates) of all trailing comments `# P(n)` or `# P(n)!`."""
+    tokens = tokenize.generate_tokens(io.StringIO(path.read_text(encoding="utf-8")).readline)
+    for token in tokens:
+        if token.type == tokenize.COMMENT:
+            yield from re.findall(r"\bP\((\d+)\)(!?)", token.string)
+
+
+TAGS = [(int(n), mark == "!") for m in MODULES for n, mark in tags(PACKAGE / f"{m}.py")]
+
+
+def test_each_equation_is_stated_once():
+    assert len(TAGS) > 10
+    assert {n: count for n, count in Counter(n for n, _ in TAGS).items() if count > 1} == {}
+
+
+def test_deviations_from_print_are_explained():
+    errata = (ROOT / "docs" / "errata.md").read_text(encoding="utf-8")
+    deviating = [n for n, deviates in TAGS if deviates]
+    assert deviating
+    for n in deviating:
+        assert f"({n})" in errata, f"P({n})! has no entry in docs/errata.md"
+
+
+# -- names and versions ------------------------------------------------------------------------
+
+
+def version_in(name, pattern):
+    found = re.findall(pattern, (ROOT / name).read_text(encoding="utf-8"), flags=re.MULTILINE)
+    assert len(found) == 1, f"{name}: {found}"
+    return found[0]
+
+
+def test_one_version():
+    assert version_in("pyproject.toml", r'^version = "([^"]+)"') == version_in(
+        "CITATION.cff", r'^version: "?([^"\s]+)"?$'
+    )
+
+
+def test_public_names():
+    names = ub.__all__
+    constants = [n for n in names if n.isupper()]
+    classes = [n for n in names if n[0].isupper() and n not in constants]
+    others = [n for n in names if n[0].islower()]
+    assert names == sorted(constants) + sorted(classes) + sorted(others)  # the order of ruff
+    assert len(set(names)) == len(names)
+    for name in names:
+        thing = getattr(ub, name)
+        assert (thing.__doc__ or "").strip(), f"{name} has no docstring"
+        assert thing.__module__.startswith("ufl_beam."), name
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_what_is_public_has_a_docstring(module):
+    tree = ast.parse((PACKAGE / f"{module}.py").read_text(encoding="utf-8"))
+    assert ast.get_docstring(tree), module
+    missing = []
+
+    def visit(node, owner):
+        for child in ast.iter_child_nodes(node):
+            if isinstance(child, ast.ClassDef | ast.FunctionDef) and child.name[0] != "_":
+                if not ast.get_docstring(child):
+                    missing.append(f"{owner}.{child.name}")
+                if isinstance(child, ast.ClassDef):
+                    visit(child, f"{owner}.{child.name}")
+
+    visit(tree, module)
+    assert missing == []
+
+
+@pytest.mark.serial
+def test_the_script_of_the_readme_runs(tmp_path, monkeypatch):
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    (script,) = re.findall(r"^```python\n(import ufl_beam.*?)^```", readme, re.MULTILINE | re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    exec(script, names)
+    assert names["solution"].times[-1] == 0.4
+    assert names["solution"].energy.worst < 1e-9  # the ledger closes, design.md section 9
+    assert (tmp_path / "portal.png").stat().st_size > 1000
+    assert (tmp_path / "portal.h5").exists()

@@ -1,0 +1,109 @@
+"""Time functions, and that loads do what they say: by the reactions that balance them."""
+
+import math
+
+import numpy as np
+import pytest
+
+import ufl_beam as ub
+
+SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=3.0, rhoI=0.1)
+STIFF = ub.Section(EA=1e9, GA=1e9, EI=1e9, rhoA=3.0, rhoI=0.1)
+"""Deflections of 1e-9 m: reactions are those of the undeformed beam to that part."""
+
+
+def test_table_is_linear_between_and_constant_outside():
+    table = ub.Table([1, 2, 4], [0, 10, -10])
+    times = [-1, 1, 1.5, 2, 3, 3.5, 4, 99]
+    assert [table(t) for t in times] == [0, 0, 5, 10, 0, -5, -10, -10]  # exact in binary
+
+
+def test_table_of_one_point_is_constant():
+    assert ub.Table([1], [7])(-5) == ub.Table([1], [7])(5) == 7
+
+
+def test_table_keeps_what_it_was_given():
+    times, values = np.array([0.0, 1.0]), np.array([0.0, 1.0])
+    table = ub.Table(times, values)
+    values[1] = 5.0
+    assert table(1.0) == 1.0
+
+
+def test_equal_tables_are_equal():
+    assert ub.Table([0, 1], [0, 1]) == ub.Table((0, 1), (0, 1))
+
+
+def test_ramp():
+    ramp = ub.ramp(4.0)
+    assert [ramp(t) for t in (-1, 0, 1, 4, 5)] == [0, 0, 0.25, 1, 1]
+
+
+def reaction_of(*loads, masses=(), section=STIFF, at=1.0):
+    """(F_x, F_y, M) of a clamp at the origin that holds a beam of 2 m along x."""
+    beam = ub.Beam((0, 0), (2, 0), section, cells=4)
+    scene = ub.Scene(
+        [beam],
+        supports=[ub.Clamped(beam.start)],
+        loads=[load(beam) for load in loads],
+        masses=[mass(beam) for mass in masses],
+    )
+    solution = ub.simulate(scene, ub.Static(), t=(0, at), dt=at)
+    return solution.reaction(scene.supports[0])[-1]
+
+
+def check(reaction, expected):
+    # 1e-7: deflections of this part of the length; see STIFF
+    assert reaction == pytest.approx(expected, abs=1e-7 * np.abs(expected).max())
+
+
+def test_point_load():
+    load = lambda b: ub.PointLoad(b.at(0.75), force=(5, -7), moment=11)
+    # The reaction balances: -F, and the moment -(1.5 * F_y + M)
+    check(reaction_of(load), [-5, 7, 1.5 * 7 - 11])
+
+
+def test_line_load():
+    load = lambda b: ub.LineLoad(b, force=(3, -2), moment=5)
+    # Resultants 6, -4 at mid-span and 10
+    check(reaction_of(load), [-6, 4, 4 * 1 - 10])
+
+
+def test_gravity_weighs_beams_and_point_masses():
+    gravity = lambda b: ub.Gravity((0.5, -10))
+    mass = lambda b: ub.PointMass(b.end, 7.0, 99.0)
+    # 6 kg at 1 m and 7 kg at 2 m; rotary inertia weighs nothing
+    check(reaction_of(gravity, masses=[mass]), [-6.5, 130, 60 + 140])
+
+
+def test_follower_load_turns():
+    # At the tip of a beam bent by an end moment M into the angle M L / EI = 1; the follower is
+    # 1e-6 of it and bends by 1e-6 L: its reaction is minus the force, turned by 1 rad.
+    bend = lambda b: ub.PointLoad(b.end, moment=50.0)
+    follow = lambda b: ub.FollowerLoad(b.end, force=(1e-5, 0.0))
+    reaction = reaction_of(bend, follow, section=SECTION)
+    expected = [-1e-5 * math.cos(1), -1e-5 * math.sin(1)]
+    assert reaction[:2] == pytest.approx(expected, abs=1e-5 * 1e-5)
+
+
+def test_loads_of_one_time_function_and_of_several_add_up():
+    once = lambda t: 1.0
+    loads = [
+        lambda b: ub.PointLoad(b.end, force=(1, 0), time=once),
+        lambda b: ub.PointLoad(b.end, force=(2, 0), time=once),
+        lambda b: ub.PointLoad(b.at(0.5), force=(4, 0)),
+        lambda b: ub.FollowerLoad(b.end, force=(8, 0), time=ub.ramp(2.0)),
+    ]
+    check(reaction_of(*loads), [-(1 + 2 + 4 + 8 / 2), 0, 0])  # the ramp is at a half
+
+
+def test_a_load_where_nothing_else_is_makes_a_vertex():
+    # Not at a vertex of 4 regular cells; the moment is exact all the same.
+    check(reaction_of(lambda b: ub.PointLoad(b.at(0.3), force=(0, -10))), [0, 10, 6])
+
+
+def test_loads_in_dynamics_act_at_the_middle_of_the_step():
+    # A free mass on a ramp: the momentum is the mid-point sum of the force, exact for linear ones.
+    beam = ub.Beam((0, 0), (2, 0), SECTION, cells=2)
+    push = [ub.LineLoad(beam, force=(3, 0), time=lambda t: t)]
+    solution = ub.simulate(ub.Scene([beam], loads=push), ub.Midpoint(), t=(0, 2), dt=0.5)
+    assert solution.momentum()[:, 0] == pytest.approx(3 * solution.times**2, rel=1e-9)

@@ -1,0 +1,92 @@
+"""Sections: the resultants of shapes, from the formulas of any table book."""
+
+import math
+
+import pytest
+
+import ufl_beam as ub
+
+STEEL = {"E": 210e9, "nu": 0.25, "rho": 7850.0}
+G = 84e9  # E / 2.5
+
+CLOSE = 1e-14
+"""Relative; the same products in another order: a few units in the last place."""
+
+
+def check(section, *, A, I, shear_area):
+    assert section.EA == pytest.approx(210e9 * A, rel=CLOSE)
+    assert section.EI == pytest.approx(210e9 * I, rel=CLOSE)
+    assert section.GA == pytest.approx(G * shear_area, rel=CLOSE)
+    assert section.rhoA == pytest.approx(7850.0 * A, rel=CLOSE)
+    assert section.rhoI == pytest.approx(7850.0 * I, rel=CLOSE)
+
+
+def test_rectangle():
+    # b h, b h^3 / 12, shear factor 5/6
+    section = ub.Section.rectangle(b=0.1, h=0.3, **STEEL)
+    check(section, A=0.03, I=0.1 * 0.027 / 12, shear_area=0.025)
+    assert section.depth == 0.3
+
+
+def test_circle():
+    # pi r^2, pi r^4 / 4, shear factor 9/10
+    section = ub.Section.circle(0.2, **STEEL)
+    check(
+        section,
+        A=math.pi * 0.01,
+        I=math.pi * 1e-4 / 4,
+        shear_area=0.9 * math.pi * 0.01,
+    )
+    assert section.depth == 0.2
+
+
+def test_tube():
+    # radii 0.1 and 0.08: pi (R^2 - r^2), pi (R^4 - r^4) / 4; differences lose two digits
+    section = ub.Section.tube(0.2, 0.02, **STEEL)
+    A, I = math.pi * 0.0036, math.pi * (1e-4 - 0.4096e-4) / 4
+    assert section.EA == pytest.approx(210e9 * A, rel=1e-12)
+    assert section.EI == pytest.approx(210e9 * I, rel=1e-12)
+    assert section.GA == pytest.approx(G * A / 2, rel=1e-12)
+
+
+def test_tube_that_is_full_is_a_circle():
+    tube = ub.Section.tube(0.2, 0.1, **STEEL)
+    circle = ub.Section.circle(0.2, **STEEL)
+    assert tube.EA == pytest.approx(circle.EA, rel=CLOSE)
+    assert tube.EI == pytest.approx(circle.EI, rel=CLOSE)
+
+
+def test_i_shape():
+    # By flanges and web: 2 (b tf^3 / 12 + b tf d^2) + tw hw^3 / 12, d = (h - tf) / 2
+    h, b, tw, tf = 0.3, 0.15, 0.01, 0.02
+    web, d = 0.26, 0.14
+    section = ub.Section.i_shape(h, b, tw, tf, **STEEL)
+    A = 2 * 0.15 * 0.02 + 0.01 * 0.26
+    I = 2 * (b * tf**3 / 12 + b * tf * d**2) + tw * web**3 / 12
+    assert section.EA == pytest.approx(210e9 * A, rel=1e-13)
+    assert section.EI == pytest.approx(210e9 * I, rel=1e-12)  # a difference of cubes loses a digit
+    assert section.GA == pytest.approx(G * tw * (h - tf), rel=1e-13)
+
+
+def test_i_shape_without_web_opening_is_a_rectangle():
+    # A web as wide as the flanges fills the rectangle; only the shear area is another.
+    i_shape = ub.Section.i_shape(0.3, 0.1, 0.1, 0.05, **STEEL)
+    rectangle = ub.Section.rectangle(0.1, 0.3, **STEEL)
+    assert i_shape.EA == pytest.approx(rectangle.EA, rel=CLOSE)
+    assert i_shape.EI == pytest.approx(rectangle.EI, rel=CLOSE)
+
+
+def test_without_density_there_is_no_mass():
+    section = ub.Section.rectangle(0.1, 0.3, E=1.0, nu=0.0)
+    assert (section.rhoA, section.rhoI) == (0.0, 0.0)
+
+
+def test_default_depth_is_that_of_the_rectangle_of_the_same_stiffness():
+    # EI / EA = h^2 / 12
+    section = ub.Section(EA=12.0, GA=1.0, EI=4.0)
+    assert section.depth == pytest.approx(2.0, rel=CLOSE)
+
+
+def test_records_are_frozen():
+    with pytest.raises(AttributeError):
+        ub.Section(EA=1.0, GA=1.0, EI=1.0).EA = 2.0

@@ -1,0 +1,241 @@
+"""Every kind of load, support and axis against statics by hand, all [closed].
+
+Where nothing else is said, loads are so small (1e-5 in units of EI/L²) that what is nonlinear is
+1e-10 of the result; a tolerance of 1e-9 leaves room for that and for the solver's 1e-10.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from convergence.study import extrapolated, orders, romberg
+from scenes import beam_on_roller, cantilever, quarter_circle
+from scipy.special import ellipeinc, ellipj, ellipk
+
+import ufl_beam as ub
+
+STOCKY = ub.Section(EA=100.0, GA=50.0, EI=1.0, rhoA=2.0)
+EA, GA, EI = STOCKY.EA, STOCKY.GA, STOCKY.EI
+SMALL = 1e-5
+ARC = 1.7
+"""Radius; m."""
+
+
+def at_tip(scene, **options):
+    """(u, v, ψ) of the end of the first beam under the full load."""
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, progress=False, **options)
+    return solution.displacement(scene.beams[0].end)[-1]
+
+
+# -- loads along a beam --------------------------------------------------------------------------
+
+LENGTH = 1.5
+ALONG = {
+    "fx": ((SMALL, 0), 0, (SMALL * LENGTH**2 / (2 * EA), 0, 0)),
+    "fy": (
+        (0, SMALL),
+        0,
+        (0, SMALL * (LENGTH**4 / (8 * EI) + LENGTH**2 / (2 * GA)), SMALL * LENGTH**3 / (6 * EI)),
+    ),
+    "moment": ((0, 0), SMALL, (0, SMALL * LENGTH**3 / (3 * EI), SMALL * LENGTH**2 / (2 * EI))),
+}
+
+
+@pytest.mark.parametrize("kind", ALONG)
+def test_line_load_on_a_cantilever(kind):
+    """The errors of a mesh are multiples of h² and h⁴, so Romberg's limit of three is exact.
+
+    Components that are zero by hand are of second order in the load.
+    """
+    force, moment, exact = ALONG[kind]
+    exact = np.array(exact)
+
+    def line_load(beam):
+        return ub.LineLoad(beam, force=force, moment=moment, time=ub.ramp(1.0))
+
+    scenes = (cantilever(STOCKY, length=LENGTH, cells=n, loads=[line_load]) for n in (2, 4, 8))
+    limit = romberg(*(at_tip(scene) for scene in scenes))
+    np.testing.assert_allclose(limit[exact != 0], exact[exact != 0], rtol=1e-9)
+    assert np.abs(limit[exact == 0]).max() <= 10 * SMALL**2
+
+
+def test_gravity_on_a_cantilever():
+    """Weight of the beam, ρA g per length, and of a mass at its end."""
+    g, mass = 1e-5, 0.7
+
+    def scene(cells):
+        bare = cantilever(STOCKY, length=LENGTH, cells=cells)
+        beam = bare.beams[0]
+        return ub.Scene(
+            [beam],
+            supports=bare.supports,
+            loads=[ub.Gravity((0, -g), time=ub.ramp(1.0))],
+            masses=[ub.PointMass(beam.end, mass)],
+        )
+
+    q, P = STOCKY.rhoA * g, mass * g
+    bending = q * LENGTH**4 / (8 * EI) + P * LENGTH**3 / (3 * EI)
+    shear = q * LENGTH**2 / (2 * GA) + P * LENGTH / GA
+    limit = romberg(*(at_tip(scene(n)) for n in (2, 4, 8)))
+    assert limit[1] == pytest.approx(-bending - shear, rel=2e-9)
+    assert limit[2] == pytest.approx(-q * LENGTH**3 / (6 * EI) - P * LENGTH**2 / (2 * EI), rel=2e-9)
+
+
+# -- follower load -------------------------------------------------------------------------------
+
+
+def follower_elastica(a):
+    """(x, y, ψ) of the end under a force a = PL²/EI that stays normal to the end section.
+
+    With χ = ψ_end - ψ and σ from the end, χ'' = a cos χ, χ(0) = χ'(0) = 0: a pendulum let go at the
+    horizontal, sin χ = cn²(√a σ - K | 1/2).  Integrals over the length: ∫cos χ = χ'(1)/a,
+    and ∫sin χ = ∫cn² from 2 E(am) - σ√a.
+    """
+    root, K = math.sqrt(a), ellipk(0.5)
+    sn, cn, _, am = ellipj(root - K, 0.5)
+    _, _, _, am_start = ellipj(-K, 0.5)
+    ψ = math.pi / 2 + 2 * math.asin(sn / math.sqrt(2))
+    cosines = math.sqrt(2 / a) * abs(cn) * math.copysign(1, math.sin(ψ)) if ψ else 0.0
+    sines = (2 * (ellipeinc(am, 0.5) - ellipeinc(am_start, 0.5)) - root) / root
+    return (
+        math.cos(ψ) * cosines + math.sin(ψ) * sines,
+        math.sin(ψ) * cosines - math.cos(ψ) * sines,
+        ψ,
+    )
+
+
+def test_follower_force_at_the_end():
+    """Large deflections: Richardson's limit to the order that it leaves, as for the elastica."""
+    loads = np.array([1.0, 5.0, 10.0, 13.0])
+    exact = np.array([follower_elastica(a) for a in loads])
+
+    def computed(cells):
+        scene = cantilever(cells=cells, force=(0, 1), time=lambda t: t, load=ub.FollowerLoad)
+        solution = ub.simulate(scene, ub.Static(), t=(0, 13), dt=0.25, progress=False)
+        rows = np.rint(loads / 0.25).astype(int)
+        return solution.displacement(scene.beams[0].end)[rows] + (1, 0, 0)
+
+    coarse, medium, fine = (computed(n) for n in (32, 64, 128))
+    before, limit = extrapolated(coarse, medium), extrapolated(medium, fine)
+    tolerance = 2 / 15 * np.abs(limit - before).max(axis=1) + 1e-8 * loads
+    assert (np.abs(limit - exact).max(axis=1) <= tolerance).all()
+
+
+def test_small_follower_force_is_a_dead_force():
+    """They differ by what is nonlinear."""
+    follower, dead = (
+        at_tip(cantilever(STOCKY, force=(0, SMALL), load=load))
+        for load in (ub.FollowerLoad, ub.PointLoad)
+    )
+    np.testing.assert_allclose(follower[1:], dead[1:], rtol=1e-9)
+
+
+# -- roller --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("angle", [-0.7, 0.0, 0.5, 2.5])
+def test_roller_at_an_angle(angle):
+    """Large deflections: the end stays on the line, and all forces on the deformed beam balance.
+
+    Tolerances: the solver's 1e-10 of the forces, times the arms.
+    """
+    along = np.array([math.cos(angle), math.sin(angle)])
+    across = np.array([-along[1], along[0]])
+    force, s = np.array([1.0, -3.0]), 0.4
+    scene = beam_on_roller(STOCKY, along=tuple(along), force=tuple(force), s=s)
+    beam, (pin, roller) = scene.beams[0], scene.supports
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1, progress=False)
+
+    assert abs(solution.displacement(beam.end)[-1, :2] @ across) <= 1e-15
+    assert np.abs(solution.displacement(beam.end)[-1]).max() > 0.1
+    at_pin, at_roller = solution.reaction(pin)[-1], solution.reaction(roller)[-1]
+    assert abs(at_roller[:2] @ along) <= 1e-9
+    np.testing.assert_allclose(at_pin[:2] + at_roller[:2] + force, 0, atol=1e-9)
+    moments = [
+        x * fy - y * fx
+        for (x, y), (fx, fy) in (
+            (solution.position(beam.at(s))[-1], force),
+            (solution.position(beam.end)[-1], at_roller[:2]),
+        )
+    ]
+    assert abs(sum(moments)) <= 1e-9
+    assert at_pin[2] == at_roller[2] == 0
+
+
+@pytest.mark.parametrize("angle", [-0.7, 0.0, 0.5])
+def test_small_reaction_of_the_roller(angle):
+    """Moments about the pin of the undeformed beam: R cos(angle) L = P s L."""
+    along = (math.cos(angle), math.sin(angle))
+    scene = beam_on_roller(STOCKY, along=along, force=(0, -SMALL), s=0.4)
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1, progress=False)
+    R = 0.4 * SMALL / math.cos(angle)
+    expected = [-R * math.sin(angle), R * math.cos(angle), 0]
+    # The roller moves, and the arm with it, by the axial force over EA: SMALL/100.
+    np.testing.assert_allclose(
+        solution.reaction(scene.supports[1])[-1], expected, rtol=0, atol=SMALL**2
+    )
+
+
+# -- curved and cornered axes --------------------------------------------------------------------
+
+
+def quarter_circle_tip():
+    """(u, v, ψ) of the end under (0, -SMALL), by Castigliano.
+
+    At the angle θ from the clamp M = P R cos θ, N = -P cos θ, V = P sin θ.
+    """
+    P, R = SMALL, ARC
+    return (
+        P * R / 2 * (-(R**2) / EI + 1 / EA - 1 / GA),
+        -P * R * math.pi / 4 * (R**2 / EI + 1 / EA + 1 / GA),
+        P * R**2 / EI,
+    )
+
+
+def test_quarter_circle():
+    """Straight cells on an arc: second order, and Romberg's limit of the even powers."""
+    exact = quarter_circle_tip()
+    runs = [
+        at_tip(quarter_circle(STOCKY, radius=ARC, cells=n, force=(0, -SMALL)))
+        for n in (4, 8, 16, 32)
+    ]
+    errors = np.abs(np.array(runs) - exact)
+    for component in range(3):
+        # The fourth-order part is h²/10 of the error, (π/8)²/10 = 0.015 in the coarsest.
+        np.testing.assert_allclose(orders(errors[:, component]), 2, rtol=0, atol=0.05)
+    # Nonlinear parts are SMALL: the arc is stiffer or softer as its angle changes.
+    np.testing.assert_allclose(romberg(*runs), exact, rtol=3 * SMALL * ARC**2)
+
+
+def test_polyline_is_two_beams_rigidly_joined():
+    """A corner of 1 m by 1 m, bent far: the same to the solver's tolerance, here round-off."""
+    stick = ub.Beam.polyline([(0, 0), (0, 1), (1, 1)], STOCKY, cells=8)
+    post = ub.Beam((0, 0), (0, 1), STOCKY, cells=4, name="post")
+    arm = ub.Beam((0, 1), (1, 1), STOCKY, cells=4, name="arm")
+
+    def load(beam):
+        return [ub.PointLoad(beam.end, force=(-1, -3), time=ub.ramp(1.0))]
+
+    one = ub.Scene([stick], supports=[ub.Clamped(stick.start)], loads=load(stick))
+    two = ub.Scene(
+        [arm, post],
+        joints=[ub.Rigid(post.end, arm.start)],
+        supports=[ub.Clamped(post.start)],
+        loads=load(arm),
+    )
+    tight = ub.Newton(rtol=1e-13)
+    of_one, of_two = (
+        ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1, newton=tight, progress=False)
+        for scene in (one, two)
+    )
+    assert np.abs(of_one.displacement(stick.end)[-1, :2]).max() > 0.5
+    for here, there in ((stick.at(0.5), post.end), (stick.end, arm.end)):
+        np.testing.assert_allclose(
+            of_one.displacement(here), of_two.displacement(there), rtol=0, atol=1e-11
+        )
+    np.testing.assert_allclose(
+        of_one.section_forces(stick),
+        np.vstack([of_two.section_forces(post), of_two.section_forces(arm)]),
+        rtol=0,
+        atol=1e-9,
+    )

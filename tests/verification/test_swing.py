@@ -1,0 +1,128 @@
+"""Swing: a flexible beam with a mass at mid-span, hung on two rigid links; the links snap taut.
+
+Source: O. A. Bauchau, N. J. Theron, "Energy decaying scheme for non-linear beam models", Comput.
+Methods Appl. Mech. Eng. 134 (1996) 37-56; data from MBDyn's tests/stiff/Swing.  No response values
+are published, so all numbers are [calc], made with other programs.
+
+The links are massless beams of one cell, 10⁴ times as stiff as the beam: 10² is not enough for the
+last digit of the energies.
+"""
+
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from convergence.study import extrapolated
+from scenes import swing
+
+import ufl_beam as ub
+
+CONVERGED = np.loadtxt(Path(__file__).parents[1] / "data/swing.csv", delimiter=",")
+
+
+@lru_cache
+def run(*, cells=4, dt=1e-3, alpha=0.0, end=2.5, rigidity=1e4):
+    scene = swing(cells=cells, rigidity=rigidity)
+    return ub.simulate(scene, ub.Midpoint(alpha, alpha), t=(0, end), dt=dt, progress=False)
+
+
+def row(solution, t):
+    """Where the time t is."""
+    n = int(np.argmin(np.abs(solution.times - t)))
+    assert solution.times[n] == pytest.approx(t, abs=1e-9)
+    return n
+
+
+def places(solution):
+    """Mid-span, A, B."""
+    beam = solution.scene.beams[0]
+    return beam.at(0.5), beam.start, beam.end
+
+
+@pytest.mark.parametrize(
+    ("t", "mid", "A", "unit"),
+    [
+        (0.50, (0.184135, -0.010707), (0.190133, 0.054305), 1e-6),
+        (0.62, (0.243240, -0.019234), None, 1e-6),
+        (0.64, (0.25168, -0.01990), (0.30806, 0.17372), 1e-5),
+        (0.70, (0.24144, 0.00169), None, 1e-5),
+    ],
+)
+def test_mesh_of_the_paper(t, mid, A, unit):
+    """[calc] Four two-node cells, Δt = 1e-3 s, conserving: half a unit of the last digit."""
+    solution = run()
+    n = row(solution, t)
+    at_mid, at_A, _ = places(solution)
+    np.testing.assert_allclose(solution.displacement(at_mid)[n, :2], mid, rtol=0, atol=0.501 * unit)
+    if A:
+        np.testing.assert_allclose(solution.displacement(at_A)[n, :2], A, rtol=0, atol=0.501 * unit)
+
+
+def test_energy_of_the_mesh_of_the_paper():
+    """[calc] 0.063887 J from the end of the pulse on."""
+    solution = run()
+    energy = solution.energy.total[solution.times > 0.2561]
+    np.testing.assert_allclose(energy, 0.063887, rtol=0, atol=0.51e-6)
+
+
+def test_loss_of_energy():
+    """[calc] α = β = 0.01: half a unit of the printed digits, 1e-5 J."""
+    solution = run(alpha=0.01)
+    rows = [row(solution, t) for t in (0.7, 1.0, 1.5, 2.5)]
+    np.testing.assert_allclose(
+        solution.energy.total[rows], [0.05732, 0.05510, 0.05279, 0.05092], rtol=0, atol=0.51e-5
+    )
+    mid = solution.displacement(places(solution)[0])[row(solution, 1.0), :2]
+    np.testing.assert_allclose(mid, (0.2211, 0.1186), rtol=0, atol=0.51e-4)
+    assert (np.diff(solution.energy["numerical"]) >= 0).all()
+
+
+@pytest.mark.parametrize("alpha", [0.0, 0.01])
+@pytest.mark.parametrize("rigidity", [1e2, 1e3, 1e4])
+def test_ledger(rigidity, alpha):
+    """The ledger closes to 1e-9 of the work over 2.5 s, also with links near round-off.
+
+    Links 10⁴ times as stiff as the beam know their force to ε EA = 8e-7 N only.
+    """
+    energy = run(alpha=alpha, rigidity=rigidity).energy
+    assert np.abs(energy.imbalance).max() <= 1e-9 * energy["loads"][-1]
+
+
+@pytest.fixture(scope="module")
+def meshes():
+    """32 and 64 cells up to the snap, Δt = 4e-4 s, and 32 cells at half and a quarter of it."""
+    rows = {}
+    for cells, dt in ((32, 4e-4), (64, 4e-4), (32, 2e-4), (32, 1e-4)):
+        solution = run(cells=cells, dt=dt, end=0.64)
+        n = [row(solution, t) for t in CONVERGED[:, 0]]
+        mid, A, B = places(solution)
+        moved = [solution.displacement(place)[n, :2] for place in (mid, A, B)]
+        rows[cells, dt] = np.hstack([*moved, solution.velocity(mid)[n, :2]])
+    return rows
+
+
+def test_convergence_to_the_table(meshes):
+    """[calc] Displacements to the accuracy that the table claims, 3e-5 m.
+
+    Each mesh halves the step in space or time; their errors add, so do the two extrapolations.
+    """
+    in_space = extrapolated(meshes[32, 4e-4], meshes[64, 4e-4])
+    in_time = extrapolated(meshes[32, 2e-4], meshes[32, 1e-4]) - meshes[32, 4e-4]
+    limit = (in_space + in_time)[:, :6]
+    _, mid_u, mid_v, _, _, A_u, A_v, B_u, B_v = CONVERGED.T
+    table = np.column_stack([mid_u, mid_v, A_u, A_v, B_u, B_v])
+    np.testing.assert_allclose(limit, table, rtol=0, atol=3e-5)
+
+
+def test_velocity_before_the_snap(meshes):
+    """[calc] Mid-span to 0.63 s: half a unit of the fifth decimal and what Richardson leaves."""
+    fine = extrapolated(meshes[32, 4e-4], meshes[64, 4e-4])[:6, 6:]
+    left = np.abs(fine - meshes[64, 4e-4][:6, 6:]).max() / 4
+    np.testing.assert_allclose(fine, CONVERGED[:6, 3:5], rtol=0, atol=0.5e-5 + left)
+
+
+def test_work_of_the_pulse():
+    """[calc] Converged work 0.063905 J: half a unit of the last digit."""
+    coarse, fine = (run(cells=n, dt=4e-4, end=0.64).energy["loads"][-1] for n in (32, 64))
+    assert extrapolated(coarse, fine) == pytest.approx(0.063905, rel=0, abs=0.51e-6)
