@@ -116,6 +116,11 @@ class Solver:
             self._views[handle] = view
         return view
 
+    def _update_ghosts(self, vector: PETSc.Vec) -> None:
+        """Copies of values that other processes own; PETSc copies between vectors without them."""
+        if self._parallel:
+            vector.ghostUpdate(PETSc.InsertMode.INSERT, PETSc.ScatterMode.FORWARD)
+
     def _make_matrix(self) -> PETSc.Mat:
         if not self._parallel:
             return self._A.petsc()
@@ -162,8 +167,7 @@ class Solver:
     # -- what SNES calls -----------------------------------------------------------------------
 
     def _function(self, snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
-        if self._parallel:
-            x.ghostUpdate(PETSc.InsertMode.INSERT, PETSc.ScatterMode.FORWARD)
+        self._update_ghosts(x)
         r = self._view(f, writable=True)
         self._residual(self._view(x), r)
         if self._parallel:
@@ -172,6 +176,7 @@ class Solver:
         self._complete(r)
 
     def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, J: PETSc.Mat, P: PETSc.Mat) -> None:
+        self._update_ghosts(x)
         self._tangent(self._view(x))
         if self._parallel:
             P.zeroEntries()
@@ -243,9 +248,10 @@ class Solver:
         self.iterations += self._snes.getIterationNumber()
         reason = self._snes.getConvergedReason()
         if reason <= 0:
+            # MUMPS does not get over a factorisation that failed, unless it begins anew.
+            self._snes.getKSP().getPC().reset()
             raise StepFailed(self._explain(reason))
-        if self._parallel:
-            self._x.ghostUpdate(PETSc.InsertMode.INSERT, PETSc.ScatterMode.FORWARD)
+        self._update_ghosts(self._x)
         return x.copy()
 
     def _explain(self, reason: int) -> str:

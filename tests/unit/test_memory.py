@@ -1,0 +1,81 @@
+"""A long run needs no more memory than a short one."""
+
+import gc
+from pathlib import Path
+
+import pytest
+from petsc4py import PETSc
+from scenes import swing
+
+import ufl_beam as ub
+
+MEBIBYTE = 2**20
+
+
+def resident():
+    """Memory of this process that is in RAM; bytes."""
+    (line,) = [x for x in Path("/proc/self/status").read_text().splitlines() if "VmRSS" in x]
+    return int(line.split()[1]) * 1024
+
+
+def petsc_objects():
+    """Number that PETSc gives the next object; it counts all that were ever made."""
+    probe = PETSc.Vec().createSeq(1)
+    try:
+        return probe.id
+    finally:
+        probe.destroy()
+
+
+class Watch(ub.Recorder):
+    """Measures at some steps."""
+
+    def __init__(self, at):
+        self.at, self.step, self.memory, self.objects = at, 0, {}, {}
+
+    def require_writable(self):
+        pass
+
+    def open(self, simulation):
+        pass
+
+    def write(self, simulation):
+        self.step += 1
+        if self.step in self.at:
+            gc.collect()
+            self.memory[self.step] = resident()
+            self.objects[self.step] = petsc_objects()
+
+    def close(self):
+        pass
+
+
+@pytest.mark.serial
+def test_memory_does_not_grow():
+    """The four-beam swing with stiff links, 10 000 steps of 1 ms."""
+    watch = Watch({2_000, 10_000})
+    scheme = ub.Midpoint(alpha=0.05, beta=0.05)
+    solution = ub.simulate(
+        swing(rigidity=1e4), scheme, t=(0, 10), dt=1e-3, every=10_000, record=watch
+    )
+    assert solution.parts >= 10_000
+    # 8000 steps that each left one Python float behind would take 0.2 MB, one vector 2 MB
+    assert watch.memory[10_000] - watch.memory[2_000] < 1 * MEBIBYTE
+    # The probe itself is one; a step makes none
+    assert watch.objects[10_000] - watch.objects[2_000] == 1
+
+
+@pytest.mark.serial
+def test_a_simulation_gives_everything_back():
+    """200 runs one after the other."""
+    scene = swing()
+
+    def runs(count):
+        for _ in range(count):
+            ub.simulate(scene, ub.Midpoint(), t=(0, 2e-3), dt=1e-3)
+        gc.collect()
+        return resident()
+
+    before = runs(20)
+    # Meshes and spaces of a run take some 100 kB: 180 of them would be 18 MB
+    assert runs(180) - before < 4 * MEBIBYTE

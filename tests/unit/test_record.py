@@ -1,0 +1,225 @@
+"""Files of a run: their contents are the solution, on any number of ranks."""
+
+import csv
+
+import h5py
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import ufl_beam as ub
+
+SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
+
+
+def scene():
+    """Two beams at an angle; no two vertices at one point but those of the rigid corner."""
+    post = ub.Beam((0, 0), (0, 2), SECTION, cells=3, name="post")
+    arm = ub.Beam((0, 2), (3, 3), SECTION, cells=4, name="arm")
+    return ub.Scene(
+        [post, arm],
+        joints=[ub.Rigid(post.end, arm.start)],
+        supports=[ub.Clamped(post.start)],
+        loads=[ub.PointLoad(arm.end, force=(5, -30), time=ub.ramp(1.0))],
+    )
+
+
+def run(scene, *record, steps=6, scheme=None, **more):
+    return ub.simulate(
+        scene, scheme or ub.Midpoint(0.1, 0.1), t=(0, 1), dt=1 / steps, record=record, **more
+    )
+
+
+def read_h5(path):
+    """All data sets of an HDF5 file by name."""
+    found = {}
+    with h5py.File(path, "r") as file:
+        file.visititems(
+            lambda name, thing: found.__setitem__(name, thing[()]) if hasattr(thing, "shape") else None
+        )
+    return found
+
+
+def series(data, name):
+    """The values of a function in the order of time."""
+    group = {k.rsplit("/", 1)[1]: v for k, v in data.items() if k.startswith(f"Function/{name}/")}
+    return [group[key] for key in sorted(group, key=lambda k: float(k.replace("_", ".")))]
+
+
+def vertices_of(data, points):
+    """Number of the vertex of the grid at each point of the file; joined vertices move alike."""
+    apart = np.linalg.norm(points[None] - data["Mesh/mesh/geometry"][:, None, :2], axis=2)
+    assert apart.min(axis=1).max() == 0.0
+    return apart.argmin(axis=1)
+
+
+def test_xdmf_holds_the_solution(shared_path, on_first_rank):
+    frame = scene()
+    solution = run(frame, ub.XDMF(shared_path / "run.xdmf"))
+    data = on_first_rank(lambda: read_h5(shared_path / "run.h5"))
+    grid, count = solution.grid, len(solution.times)
+    assert count == 7
+    assert data["Mesh/mesh/geometry"].shape == (9, 2)
+    assert data["Mesh/mesh/topology"].shape == (7, 2)
+
+    vertices = vertices_of(data, grid.points)
+    shapes = {"displacement": (9, 3), "rotation": (9, 1), "N": (7, 1), "V": (7, 1), "M": (7, 1)}
+    names = {name.split("/")[1] for name in data if name.startswith("Function/")}
+    assert names == set(shapes)
+    for name, shape in shapes.items():
+        assert [values.shape for values in series(data, name)] == [shape] * count
+    for n in range(count):
+        q = solution.q[n][grid.dofs[vertices]]
+        # Copies, so equal to the last bit
+        assert (series(data, "displacement")[n][:, :2] == q[:, :2]).all()
+        assert (series(data, "displacement")[n][:, 2] == 0).all()
+        assert (series(data, "rotation")[n][:, 0] == q[:, 2]).all()
+
+    # Cells by their middle
+    middles = grid.points[grid.cells].mean(axis=1)
+    here = data["Mesh/mesh/geometry"][data["Mesh/mesh/topology"]][:, :, :2].mean(axis=1)
+    cells = np.linalg.norm(middles[None] - here[:, None], axis=2).argmin(axis=1)
+    assert sorted(cells) == list(range(7))
+    for n in range(count):
+        forces = np.concatenate([solution.section_forces(b, n) for b in frame.beams])
+        for component, name in enumerate("NVM"):
+            written = series(data, name)[n][:, 0]
+            # The same kernel on other meshes: round-off of EA
+            assert np.abs(written - forces[cells, component]).max() < 1e-16 * 1e4 * 10
+
+
+def test_xdmf_names_the_times(shared_path, on_first_rank):
+    run(scene(), ub.XDMF(shared_path / "run.xdmf"), steps=4)
+    text = on_first_rank(lambda: (shared_path / "run.xdmf").read_text())
+    for time in ("0", "0.25", "0.5", "0.75", "1"):
+        assert text.count(f'<Time Value="{time}" />') == 5  # once for each function
+    assert "run.h5:/Function/displacement/0_25" in text
+
+
+@pytest.mark.parametrize(("every", "kept"), [(1, [0, 1, 2, 3, 4, 5, 6]), (2, [0, 2, 4, 6]), (4, [0, 4])])
+def test_every(shared_path, on_first_rank, every, kept):
+    solution = run(scene(), ub.XDMF(shared_path / "run.xdmf", every=every))
+    data = on_first_rank(lambda: read_h5(shared_path / "run.h5"))
+    vertices = vertices_of(data, solution.grid.points)
+    rotations = [values[:, 0] for values in series(data, "rotation")]
+    assert len(rotations) == len(kept)
+    for n, values in zip(kept, rotations, strict=True):
+        assert (values == solution.q[n][solution.grid.dofs[vertices, 2]]).all()
+
+
+def test_every_of_the_solution_keeps_the_last():
+    all_of_it, some = (run(scene(), steps=7, every=k) for k in (1, 3))
+    assert list(some.times) == list(all_of_it.times[[0, 3, 6, 7]])
+    assert (some.q == all_of_it.q[[0, 3, 6, 7]]).all()
+    assert (some.energy.total == all_of_it.energy.total[[0, 3, 6, 7]]).all()
+
+
+def read_csv(path):
+    with path.open(newline="") as file:
+        header, *rows = csv.reader(file)
+    return header, np.array([[float(x) for x in row] for row in rows])
+
+
+def test_history_holds_the_solution(shared_path, on_first_rank):
+    frame = scene()
+    post, arm = frame.beams
+    places = [arm.end, post.at(0.4)]
+    solution = run(frame, ub.History(shared_path / "run.csv", places))
+    header, rows = on_first_rank(lambda: read_csv(shared_path / "run.csv"))
+    assert header == [
+        "t",
+        *(f"{c} arm.end (3, 3)" for c in ("u", "v", "psi")),
+        *(f"{c} post.at(0.4) (0, 0.8)" for c in ("u", "v", "psi")),
+        *("stored", "kinetic", "loads", "numerical"),
+    ]
+    # Numbers are written to the last digit; interpolation may round once more
+    assert (rows[:, 0] == solution.times).all()
+    for k, place in enumerate(places):
+        columns = rows[:, 1 + 3 * k : 4 + 3 * k]
+        assert np.abs(columns - solution.displacement(place)).max() < 1e-15
+    for name, column in zip(header[-4:], rows[:, -4:].T, strict=True):
+        assert (column == solution.energy[name]).all()
+
+
+def test_history_without_places(shared_path, on_first_rank):
+    solution = run(scene(), ub.History(shared_path / "run.csv"), scheme=ub.Static())
+    header, rows = on_first_rank(lambda: read_csv(shared_path / "run.csv"))
+    assert header == ["t", "stored", "loads"]
+    assert (rows[:, 1] == solution.energy["stored"]).all()
+
+
+def test_a_second_run_overwrites(shared_path, on_first_rank):
+    record = [ub.History(shared_path / "run.csv"), ub.XDMF(shared_path / "run.xdmf")]
+    run(scene(), *record, steps=9)
+    run(scene(), *record, steps=3)
+    header, rows = on_first_rank(lambda: read_csv(shared_path / "run.csv"))
+    data = on_first_rank(lambda: read_h5(shared_path / "run.h5"))
+    assert len(rows) == len(series(data, "N")) == 4
+
+
+class Count(ub.Recorder):
+    """A recorder of a user."""
+
+    def __init__(self, fail_at=None):
+        self.calls, self.times, self.fail_at = [], [], fail_at
+
+    def require_writable(self):
+        self.calls.append("require_writable")
+
+    def open(self, simulation):
+        self.calls.append("open")
+        self.times.append(simulation.t)
+
+    def write(self, simulation):
+        self.calls.append("write")
+        self.times.append(simulation.t)
+        if len(self.times) == self.fail_at:
+            raise KeyboardInterrupt
+
+    def close(self):
+        self.calls.append("close")
+
+
+def test_recorders_of_users():
+    count = Count()
+    solution = run(scene(), count, steps=2)
+    assert count.calls == ["require_writable", "open", "write", "write", "close"]
+    assert count.times == list(solution.times)
+    alone = Count()
+    ub.simulate(scene(), ub.Midpoint(), t=(0, 1), dt=0.5, record=alone)  # no list
+    assert alone.calls == count.calls
+
+
+def test_files_are_closed_when_a_run_is_stopped(shared_path, on_first_rank):
+    with pytest.raises(KeyboardInterrupt):
+        run(
+            scene(),
+            *(ub.History(shared_path / "run.csv"), ub.XDMF(shared_path / "run.xdmf")),
+            Count(fail_at=4),
+        )
+    header, rows = on_first_rank(lambda: read_csv(shared_path / "run.csv"))
+    data = on_first_rank(lambda: read_h5(shared_path / "run.h5"))
+    assert len(rows) == len(series(data, "N")) == 4  # the initial state and three steps
+
+
+def test_files_do_not_depend_on_the_number_of_ranks(shared_path, on_first_rank):
+    """Against the same run of one process alone; to round-off, since sums have another order."""
+    frame = scene()
+    places = [frame.beams[1].end]
+    run(frame, ub.History(shared_path / "all.csv", places), ub.XDMF(shared_path / "all.xdmf"))
+
+    def alone():
+        one, other = shared_path / "one.csv", shared_path / "one.xdmf"
+        run(frame, ub.History(one, places), ub.XDMF(other), comm=MPI.COMM_SELF)
+        return [(read_csv(shared_path / f"{n}.csv"), read_h5(shared_path / f"{n}.h5")) for n in ("all", "one")]
+
+    ((header, rows), data), ((header_1, rows_1), data_1) = on_first_rank(alone)
+    assert header == header_1
+    # Newton's method ends below 1e-10 of the forces and its last step squares that; energies are
+    # up to 10 J, motions up to 1 m
+    assert np.abs(rows - rows_1).max() < 1e-9
+    assert data.keys() == data_1.keys()
+    for name, values in data.items():
+        assert values.shape == data_1[name].shape
+        # Section forces are of the order of 100 N
+        assert np.abs(values - data_1[name]).max() < (1e-7 if name[9:11] in ("N/", "V/", "M/") else 1e-9)

@@ -1,0 +1,139 @@
+"""Where a run begins: at rest, in the state of another solution, in motion."""
+
+import math
+
+import numpy as np
+import pytest
+
+import ufl_beam as ub
+
+SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
+
+
+def bent(load=ub.PointLoad):
+    """A cantilever with a steady force that bends it by some 0.5 rad, and gravity."""
+    beam = ub.Beam((0, 0), (2, 1), SECTION, cells=4)
+    return ub.Scene(
+        [beam],
+        supports=[ub.Clamped(beam.start)],
+        loads=[load(beam.end, force=(5, -30)), ub.Gravity()],
+        masses=[ub.PointMass(beam.at(0.5), 1.0)],
+    )
+
+
+@pytest.mark.parametrize("load", [ub.PointLoad, ub.FollowerLoad])
+@pytest.mark.parametrize("scheme", [ub.Midpoint(), ub.Midpoint(0.1, 0.1)], ids=str)
+def test_dynamics_from_a_static_solution_stays_at_rest(load, scheme):
+    scene = bent(load)
+    static = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25)
+    end = static.displacement(scene.beams[0].end)[-1]
+    assert np.abs(end).max() > 0.3
+    solution = ub.simulate(scene, scheme, t=(0, 5), dt=0.1, start=static)
+    motion = solution.displacement(scene.beams[0].end)
+    assert (motion[0] == end).all()
+    # What Newton's method leaves, 1e-10 of 100 N, on 100 N/m of stiffness
+    assert np.abs(motion - end).max() < 1e-9
+    # A residual of 1e-8 N moves 1e-10 m at 1e-9 m/s
+    assert solution.energy["kinetic"].max() < 1e-15
+    assert np.abs(solution.velocity(scene.beams[0].end)).max() < 1e-7
+
+
+def test_from_rest_without_start_it_moves():
+    """That the test above can fail."""
+    scene = bent()
+    solution = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.1)
+    assert solution.energy["kinetic"].max() > 1
+
+
+def test_statics_from_a_static_solution():
+    scene = bent()
+    once = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25)
+    again = ub.simulate(scene, ub.Static(), t=(1, 2), dt=0.5, start=once)
+    assert (again.q[0] == once.q[-1]).all()
+    assert np.abs(again.q - once.q[-1]).max() < 1e-10  # as converged
+    assert again.energy.worst < 1e-9
+    assert again.energy["stored"][0] == pytest.approx(once.energy["stored"][-1], rel=1e-14)
+
+
+def test_a_run_in_two_parts_is_the_run():
+    """The state, configuration and velocities, is all that a run needs."""
+    scene = bent()
+    scheme = ub.Midpoint(0.05, 0.05)
+    whole = ub.simulate(scene, scheme, t=(0, 1), dt=0.05)
+    first = ub.simulate(scene, scheme, t=(0, 0.5), dt=0.05)
+    second = ub.simulate(scene, scheme, t=(0.5, 1), dt=0.05, start=first)
+    # The guess of the first step differs, and with it what Newton's method leaves
+    assert np.abs(second.q - whole.q[10:]).max() < 1e-9
+    assert np.abs(second.v - whole.v[10:]).max() < 1e-7
+    assert second.times == pytest.approx(whole.times[10:])
+
+
+def test_other_supports_and_loads_may_follow():
+    """A rope is cut: the static state of one scene, let go in another of the same beams."""
+    scene = bent()
+    beam = scene.beams[0]
+    held = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25)
+    free = ub.Scene([beam], supports=[ub.Clamped(beam.start)], masses=scene.masses)
+    solution = ub.simulate(free, ub.Midpoint(), t=(0, 2), dt=0.02, start=held)
+    assert solution.energy.total[0] == pytest.approx(held.energy["stored"][-1], rel=1e-14)
+    # Nothing comes in and nothing goes out
+    assert np.ptp(solution.energy.total) < 1e-9 * solution.energy.total[0]
+    assert solution.energy["kinetic"].max() > 0.5 * solution.energy.total[0]
+
+
+def test_velocity_gives_kinetic_energy_and_momentum():
+    # 1 m/s and 2 rad/s of a beam of 2 m and 6 kg with a mass of 4 kg at its end
+    beam = ub.Beam((0, 0), (2, 0), ub.Section(EA=1e4, GA=1e4, EI=1e4, rhoA=3.0, rhoI=0.5), cells=3)
+    throw = ub.Velocity([beam], linear=(1, 0), angular=2.0)
+    scene = ub.Scene([beam], masses=[ub.PointMass(beam.end, 4.0, 0.25)], initial=[throw])
+    solution = ub.simulate(scene, ub.Midpoint(), t=(0, 0.1), dt=0.1)
+    assert solution.velocity(beam.end)[0] == pytest.approx([1, 4, 2], rel=1e-15)
+    assert solution.velocity(beam.at(0.25))[0] == pytest.approx([1, 1, 2], rel=1e-15)
+    # m v^2 / 2 + (rhoI L + rhoA L^3 / 3 + 4 * 4 + 0.25) ω^2 / 2; the mass matrix is exact
+    inertia = 0.5 * 2 + 3 * 8 / 3 + 16 + 0.25
+    assert solution.energy["kinetic"][0] == pytest.approx(10 / 2 + inertia * 4 / 2, rel=1e-14)
+    assert solution.energy["stored"][0] == 0
+    # p = (m v, ω (3 * 2 * 1 + 4 * 2)), L about the origin = J ω
+    assert solution.momentum()[0] == pytest.approx([10, 2 * 14, inertia * 2], rel=1e-14)
+
+
+def test_velocity_about_a_point():
+    beam = ub.Beam((3, 1), (3, 5), SECTION, cells=2)
+    turn = ub.Velocity([beam], linear=(7, 0), angular=-2.0, about=(1, 1))
+    scene = ub.Scene([beam], initial=[turn])
+    solution = ub.simulate(scene, ub.Midpoint(), t=(0, 0.1), dt=0.1)
+    # v + ω W (x - c): the start is 2 m to the right of the point, the end 4 m above that
+    assert solution.velocity(beam.start)[0] == pytest.approx([7, -4, -2], rel=1e-15)
+    assert solution.velocity(beam.end)[0] == pytest.approx([7 + 8, -4, -2], rel=1e-15)
+
+
+def test_velocity_of_one_beam_of_two():
+    a = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
+    b = ub.Beam((5, 0), (6, 0), SECTION, cells=2)
+    scene = ub.Scene([a, b], initial=[ub.Velocity([b], linear=(0, 3))])
+    solution = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.5)
+    assert (solution.velocity(a.end) == 0).all()
+    # Free flight, to round-off of the solver
+    assert np.abs(solution.displacement(b.end)[:, 1] - 3 * solution.times).max() < 1e-10
+
+
+def test_start_takes_the_place_of_initial_velocities():
+    beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
+    scene = ub.Scene([beam], initial=[ub.Velocity([beam], linear=(0, 3))])
+    first = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.5)
+    second = ub.simulate(scene, ub.Midpoint(), t=(1, 2), dt=0.5, start=first)
+    assert (second.v[0] == first.v[-1]).all()
+    assert second.displacement(beam.end)[-1, 1] == pytest.approx(6, abs=1e-10)
+
+
+def test_a_rotating_bar_keeps_turning_through_many_turns():
+    """A stiff bar spins freely: ω is exact at the mid-point scheme's tangent of half the turn."""
+    stiff = ub.Section(EA=1e7, GA=1e7, EI=1e7, rhoA=1.0, rhoI=1.0)
+    beam = ub.Beam((-1, 0), (1, 0), stiff, cells=2)
+    scene = ub.Scene([beam], initial=[ub.Velocity([beam], angular=10.0)])
+    solution = ub.simulate(scene, ub.Midpoint(), t=(0, 10), dt=0.05)
+    # 2 tan(Δψ/2) = ω Δt, so Δψ = 2 atan(0.25) a step: 98 rad, some 16 turns
+    expected = 200 * 2 * math.atan(0.25)
+    # The bar stretches by its centrifugal force, 50 N / 1e7 N, and breathes by as much
+    assert solution.displacement(beam.at(0.5))[-1, 2] == pytest.approx(expected, rel=1e-4)
+    assert solution.energy.worst < 1e-9
