@@ -81,28 +81,27 @@ ub.say("\nfour-beam swing, alpha = beta = 0.01\n" + str(decaying))
 # afterwards.
 
 # %%
-from matplotlib.figure import Figure
 
 shapes = ub.plot_shapes(decaying, times=np.linspace(0, 1.2, 13))
 energies = ub.plot_energy(decaying)
 
-forces = Figure(figsize=(8, 4.5), layout="constrained")
-axes = forces.subplots(2, 1, sharex=True)
-runs = ((conserving, "conserving", "0.6"), (decaying, "decaying", "C0"))
-for solution, label, color in runs:
-    N = solution.section_forces_at(middle)[:, 0]
-    axes[0].plot(solution.times, N, color=color, lw=1, label=f"{label}")
-    axes[1].plot(solution.times, solution.energy.total, color=color, lw=2, label=label)
-axes[0].set_ylabel("axial force at mid-span, N")
-axes[1].set_ylabel("energy, J")
-axes[1].set_xlabel("time, s")
-axes[0].legend(frameon=False)
-for ax in axes:
-    ax.spines[["top", "right"]].set_visible(False)
+with ub.picture((9, 5.5)) as forces:
+    upper, lower = forces.subplots(2, 1, sharex=True)
+    for solution, label, color in (
+        (conserving, "Midpoint()", "0.65"),
+        (decaying, "Midpoint(alpha=0.01, beta=0.01)", "C0"),
+    ):
+        N = solution.section_forces_at(middle)[:, 0]
+        upper.plot(solution.times, N, color=color, lw=1, label=label)
+        lower.plot(solution.times, 1e3 * solution.energy.total, color=color, lw=2)
+    upper.set_ylabel("N at mid-span (N)")
+    upper.legend(frameon=False, loc="upper left")
+    lower.set_ylabel("energy (mJ)")
+    lower.set_xlabel("t (s)")
 
 pictures = {"swing_shapes": shapes, "swing_forces": forces, "swing_energy": energies}
 for name, figure in pictures.items():
-    ub.save(figure, output / f"{name}.png")
+    figure.savefig(output / f"{name}.png")
 ub.animate(decaying, output / "swing.gif", seconds=5, color="N", thickness=8)
 ub.say("\npictures and data:", *sorted(str(path) for path in output.glob("swing*")), sep="\n  ")
 

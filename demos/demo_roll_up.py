@@ -17,7 +17,6 @@
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 
 import ufl_beam as ub
 
@@ -78,17 +77,16 @@ for cells, error, order in zip(meshes, errors, ["", *(f"{o:.3f}" for o in orders
 
 # %%
 shapes = ub.plot_shapes(solution, count=9)
-ub.save(shapes, output / "roll_up_shapes.png")
+shapes.savefig(output / "roll_up_shapes.png")
 
-figure = Figure(figsize=(6, 4.5), layout="constrained")
-ax = figure.subplots()
-ax.loglog(meshes, exact_errors, color="0.7", lw=4, label="polygon, closed form")
-ax.loglog(meshes, errors, "o", color="C0", label="computed")
-ax.set_xlabel("cells")
-ax.set_ylabel("error of the tip after half a circle, m")
-ax.legend(frameon=False)
-ax.spines[["top", "right"]].set_visible(False)
-ub.save(figure, output / "roll_up_error.png")
+with ub.picture((7, 4.5)) as figure:
+    ax = figure.subplots()
+    ax.loglog(meshes, exact_errors, color="0.7", lw=4, label="polygon, closed form")
+    ax.loglog(meshes, errors, "o", color="C0", label="computed")
+    ax.set_xlabel("cells")
+    ax.set_ylabel("error of the tip after half a circle (m)")
+    ax.legend(frameon=False)
+figure.savefig(output / "roll_up_error.png")
 ub.say("\npictures:", *sorted(str(p) for p in output.glob("roll_up*")), sep="\n  ")
 
 # %% [markdown]

@@ -21,10 +21,10 @@ from ufl_beam.scene import (
 )
 from ufl_beam.schemes import Midpoint, Static
 from ufl_beam.sections import Section
-from ufl_beam.simulate import Simulation, say, simulate
+from ufl_beam.simulation import Simulation, say, simulate
 from ufl_beam.solution import Solution
 from ufl_beam.solve import Newton
-from ufl_beam.view import plot, plot_energy, plot_history, plot_shapes
+from ufl_beam.view import picture, plot, plot_energy, plot_history, plot_shapes
 
 __all__ = [
     "XDMF",
@@ -58,6 +58,7 @@ __all__ = [
     "Table",
     "Velocity",
     "animate",
+    "picture",
     "plot",
     "plot_energy",
     "plot_history",

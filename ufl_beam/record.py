@@ -18,7 +18,7 @@ from ufl_beam.compat import fem, io, line_mesh
 from ufl_beam.errors import SceneError
 
 if TYPE_CHECKING:
-    from ufl_beam.simulate import Simulation
+    from ufl_beam.simulation import Simulation
 
 
 class Recorder(ABC):

@@ -20,7 +20,7 @@ from ufl_beam.sparse import Product
 from ufl_beam.terms import SectionForces, mass_matrix
 
 if TYPE_CHECKING:
-    from ufl_beam.simulate import Simulation
+    from ufl_beam.simulation import Simulation
 
 
 class Solution:

@@ -41,7 +41,7 @@ class Newton:
     """
 
     rtol: float = 1e-10
-    max_iterations: int = 20
+    max_iterations: int = 30
     petsc: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -88,7 +88,7 @@ def plot(solution: Solution, what: str = "shape", *, n: int = -1, magnify: float
     points = moved_points(solution, n, magnify)
     name = f"{RESULTANTS[what][0]} {what}" if what in RESULTANTS else "shape"
     factor = f", displacements × {magnify:g}" if magnify != 1 else ""
-    with _picture(_plane_size(solution.grid.points, points)) as figure:
+    with picture(_plane_size(solution.grid.points, points)) as figure:
         axes = _plane_axes(figure, f"{name} at t = {solution.times[n]:.4g} s{factor}")
         _draw_axes(axes, solution, solution.grid.points, color=GREY, linewidth=1.2, zorder=1)
         if what in RESULTANTS:
@@ -126,7 +126,7 @@ def plot_shapes(
     chosen = nearest(kept, times if len(times) else np.linspace(kept[0], kept[-1], int(count)))
     shapes = [moved_points(solution, n, magnify) for n in chosen]
     factor = f"displacements × {magnify:g}" if magnify != 1 else ""
-    with _picture(_plane_size(solution.grid.points, *shapes)) as figure:
+    with picture(_plane_size(solution.grid.points, *shapes)) as figure:
         # The bright end of the colour map would not be seen on white.
         colors = ListedColormap(_colormap("viridis")(np.linspace(0.0, 0.88, 256)))
         of_time = ScalarMappable(Normalize(kept[chosen[0]], kept[chosen[-1]]), colors)
@@ -162,7 +162,7 @@ def plot_history(
     number = list(COMPONENTS).index(component)
     motion = solution.displacement if number < 3 else solution.velocity
     quantity, unit = COMPONENTS[component]
-    with _picture((8.0, 4.2)) as figure:
+    with picture((8.0, 4.2)) as figure:
         axes = _time_axes(figure.add_subplot(), solution)
         axes.axhline(0.0, color=GREY, linewidth=1.0, zorder=1)
         for place, color in zip(followed, _cycle(len(followed)), strict=True):
@@ -186,7 +186,7 @@ def plot_energy(solution: Solution) -> Figure:
         for group, line in ((energy.state, "-"), (energy.supplied, "--"), (energy.lost, ":"))
         for name, values in group.items()
     ]
-    with _picture((8.0, 6.0)) as figure:
+    with picture((8.0, 6.0)) as figure:
         ledger, check = figure.subplots(2, 1, sharex=True, height_ratios=(2.4, 1))
         for (name, values, line), color in zip(entries, _cycle(len(entries)), strict=True):
             ledger.plot(solution.times, values, line, color=color, label=name)
@@ -284,15 +284,20 @@ def require_choice(choice: str, choices: Sequence[str] | dict[str, Any], what: s
 
 
 @contextmanager
-def _picture(size: tuple[float, float]) -> Iterator[Figure]:
-    """A new figure (inch) whose contents get this module's style."""
+def picture(size: tuple[float, float]) -> Iterator[Figure]:
+    """A new figure in the style of this module, for pictures of your own.
+
+    Only the first process saves it, as all of them run the same script.
+
+    Args:
+        size: Width and height; inch.
+    """
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=size, dpi=150, layout="constrained")
         if MPI.COMM_WORLD.rank > 0:
-            # All processes run the same script; one file must not be written by all of them.
             figure.savefig = lambda *args, **options: None  # type: ignore[method-assign]
         yield figure
 

@@ -1,10 +1,11 @@
-"""What unit and property tests share under MPI: which of them run, and a directory for all ranks."""
+"""Unit and property tests under MPI: which of them run, and a directory for all ranks."""
 
 import gc
 from pathlib import Path
 
-import pytest
 from mpi4py import MPI
+
+import pytest
 
 COMM = MPI.COMM_WORLD
 

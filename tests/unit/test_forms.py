@@ -1,10 +1,10 @@
 """What is compiled: one quadrature rule per form, and nothing that the scene does not need."""
 
-import basix.ufl
+from mpi4py import MPI
+
 import numpy as np
 import pytest
 import ufl
-from mpi4py import MPI
 
 import ufl_beam as ub
 from ufl_beam import forms
@@ -75,9 +75,7 @@ def test_ffcx_is_still_wrong_about_forms_with_two_rules():
     q.x.array[:] = np.random.default_rng(0).normal(size=len(q.x.array))
 
     def vector(*degrees):
-        form = sum(
-            q * w * ufl.dx(domain=mesh, metadata={"quadrature_degree": d}) for d in degrees
-        )
+        form = sum(q * w * ufl.dx(domain=mesh, metadata={"quadrature_degree": d}) for d in degrees)
         return fem.assemble_vector(fem.form(form)).array
 
     apart, together = vector(2) + vector(1), vector(2, 1)
@@ -141,9 +139,7 @@ def test_follower_loads_only_where_there_are_some(compiled):
     dead = ub.Simulation(make(loads=[ub.Gravity()]), ub.Midpoint())
     beam = dead.scene.beams[0]
     follower = [ub.FollowerLoad(beam.end, force=(1, 0))]
-    both = ub.Simulation(
-        ub.Scene([beam], loads=[ub.Gravity(), *follower]), ub.Midpoint()
-    )
+    both = ub.Simulation(ub.Scene([beam], loads=[ub.Gravity(), *follower]), ub.Midpoint())
     alone = ub.Simulation(ub.Scene([beam], loads=follower), ub.Midpoint())
     assert names_of(dead) == ["ElasticBeams", "DeadLoads", "Inertia"]
     assert names_of(both) == ["ElasticBeams", "DeadLoads", "FollowerLoads", "Inertia"]
@@ -191,7 +187,9 @@ def test_changing_alpha_compiles_no_other_code(compiled):
     for alpha in (0.1, 0.2):
         ub.Simulation(make(), ub.Midpoint(alpha=alpha))
     half = len(compiled) // 2
-    one, other = ([form.signature() for form in some] for some in (compiled[:half], compiled[half:]))
+    one, other = (
+        [form.signature() for form in some] for some in (compiled[:half], compiled[half:])
+    )
     assert one == other
 
 

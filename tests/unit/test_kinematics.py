@@ -116,9 +116,7 @@ def of_step(cells, q0, q1, w):
 def test_increment_identity(cells, turn):
     """What makes the work of the resultants the increment of stored energy."""
     q0, q1, s = step(cells, turn * cells.random.uniform(-1, 1, 2 * CELLS))
-    e0, e1 = (
-        cells.at_points(kinematics.strain(cells.field(q), cells.axis)) for q in (q0, q1)
-    )
+    e0, e1 = (cells.at_points(kinematics.strain(cells.field(q), cells.axis)) for q in (q0, q1))
     change = of_step(cells, q0, q1, s)
     # Round-off of the terms that are summed: displacements of up to 2 and 2 tan(1.25) = 6 on
     # deformed tangents of up to 5, so terms of up to 30 at 2.5 rad
@@ -132,9 +130,7 @@ def test_increment_identity_for_equal_and_opposite_turns(cells, turn):
     apart = np.where(np.arange(2 * CELLS) % 2, turn, -turn)
     for increments in (np.full(2 * CELLS, turn), apart):
         q0, q1, s = step(cells, increments)
-        e0, e1 = (
-            cells.at_points(kinematics.strain(cells.field(q), cells.axis)) for q in (q0, q1)
-        )
+        e0, e1 = (cells.at_points(kinematics.strain(cells.field(q), cells.axis)) for q in (q0, q1))
         assert np.abs(of_step(cells, q0, q1, s) - (e1 - e0)).max() < 3e-13  # as above
 
 
@@ -162,9 +158,7 @@ def test_short_steps_give_the_variation(cells):
     assert np.abs(of_step(cells, q, q, w) - exact).max() < 1e-14  # the same sums
 
     d = cells.values(1.0)
-    errors = [
-        np.abs(of_step(cells, q - ε * d, q + ε * d, w) - exact).max() for ε in (1e-2, 1e-3)
-    ]
+    errors = [np.abs(of_step(cells, q - ε * d, q + ε * d, w) - exact).max() for ε in (1e-2, 1e-3)]
     # Second order about the middle of the step
     assert errors[0] / errors[1] == pytest.approx(100, rel=0.1)
 

@@ -1,4 +1,4 @@
-"""The package as text: who imports what, each equation stated once, one version, documented names."""
+"""The package as text: who imports what, equations stated once, one version, documented names."""
 
 import ast
 import io
@@ -199,7 +199,9 @@ def test_what_is_public_has_a_docstring(module):
 @pytest.mark.serial
 def test_the_script_of_the_readme_runs(tmp_path, monkeypatch):
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    (script,) = re.findall(r"^```python\n(import ufl_beam.*?)^```", readme, re.MULTILINE | re.DOTALL)
+    (script,) = re.findall(
+        r"^```python\n(import ufl_beam.*?)^```", readme, re.MULTILINE | re.DOTALL
+    )
     monkeypatch.chdir(tmp_path)
     names = {}
     exec(script, names)

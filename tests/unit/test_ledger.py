@@ -1,5 +1,7 @@
 """The ledger: its arithmetic, and that it closes in every scheme, at every step size."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -93,7 +95,7 @@ def test_work_of_gravity_is_the_height_that_is_lost():
     solution = ub.simulate(scene, ub.Midpoint(), t=(0, 0.8), dt=0.02)
     ends = [solution.displacement(beam.at(i / 3))[:, 1] for i in range(4)]
     # 2 kg in three cells, linear between the vertices, and 3 kg at the end
-    sunk = sum((a + b) / 2 * 2 / 3 for a, b in zip(ends, ends[1:], strict=False)) + 3 * ends[-1]
+    sunk = sum((a + b) / 2 * 2 / 3 for a, b in pairwise(ends)) + 3 * ends[-1]
     assert sunk.min() < -3  # it falls
     assert solution.energy["loads"] == pytest.approx(-10 * sunk, abs=1e-12 * 60)  # sums of 60 J
 
@@ -136,7 +138,9 @@ def busy():
 
 @pytest.mark.parametrize("dt", [1e-3, 1e-2, 0.1, 0.5])
 @pytest.mark.parametrize(
-    "scheme", [ub.Midpoint(), ub.Midpoint(0.1, 0.0), ub.Midpoint(0.0, 0.1), ub.Midpoint(0.5, 0.5)], ids=str
+    "scheme",
+    [ub.Midpoint(), ub.Midpoint(0.1, 0.0), ub.Midpoint(0.0, 0.1), ub.Midpoint(0.5, 0.5)],
+    ids=str,
 )
 def test_dynamics_closes(scheme, dt):
     # 40 steps, or the time of the slowest motion
@@ -161,7 +165,7 @@ def test_statics_closes_to_the_order_of_its_steps():
         ub.simulate(scene, ub.Static(), t=(0, 1), dt=dt).energy.worst for dt in (0.1, 0.05, 0.025)
     ]
     assert worst[-1] < 1e-3
-    for coarse, fine in zip(worst, worst[1:], strict=False):
+    for coarse, fine in pairwise(worst):
         assert coarse / fine == pytest.approx(4, rel=0.15)
 
 

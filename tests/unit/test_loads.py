@@ -1,6 +1,9 @@
 """Time functions, and that loads do what they say: by the reactions that balance them."""
 
 import math
+from itertools import pairwise
+
+from mpi4py import MPI
 
 import numpy as np
 import pytest
@@ -57,20 +60,28 @@ def check(reaction, expected):
 
 
 def test_point_load():
-    load = lambda b: ub.PointLoad(b.at(0.75), force=(5, -7), moment=11)
+    def load(b):
+        return ub.PointLoad(b.at(0.75), force=(5, -7), moment=11)
+
     # The reaction balances: -F, and the moment -(1.5 * F_y + M)
     check(reaction_of(load), [-5, 7, 1.5 * 7 - 11])
 
 
 def test_line_load():
-    load = lambda b: ub.LineLoad(b, force=(3, -2), moment=5)
+    def load(b):
+        return ub.LineLoad(b, force=(3, -2), moment=5)
+
     # Resultants 6, -4 at mid-span and 10
     check(reaction_of(load), [-6, 4, 4 * 1 - 10])
 
 
 def test_gravity_weighs_beams_and_point_masses():
-    gravity = lambda b: ub.Gravity((0.5, -10))
-    mass = lambda b: ub.PointMass(b.end, 7.0, 99.0)
+    def gravity(b):
+        return ub.Gravity((0.5, -10))
+
+    def mass(b):
+        return ub.PointMass(b.end, 7.0, 99.0)
+
     # 6 kg at 1 m and 7 kg at 2 m; rotary inertia weighs nothing
     check(reaction_of(gravity, masses=[mass]), [-6.5, 130, 60 + 140])
 
@@ -78,15 +89,21 @@ def test_gravity_weighs_beams_and_point_masses():
 def test_follower_load_turns():
     # At the tip of a beam bent by an end moment M into the angle M L / EI = 1; the follower is
     # 1e-6 of it and bends by 1e-6 L: its reaction is minus the force, turned by 1 rad.
-    bend = lambda b: ub.PointLoad(b.end, moment=50.0)
-    follow = lambda b: ub.FollowerLoad(b.end, force=(1e-5, 0.0))
+    def bend(b):
+        return ub.PointLoad(b.end, moment=50.0)
+
+    def follow(b):
+        return ub.FollowerLoad(b.end, force=(1e-5, 0.0))
+
     reaction = reaction_of(bend, follow, section=SECTION)
     expected = [-1e-5 * math.cos(1), -1e-5 * math.sin(1)]
     assert reaction[:2] == pytest.approx(expected, abs=1e-5 * 1e-5)
 
 
 def test_loads_of_one_time_function_and_of_several_add_up():
-    once = lambda t: 1.0
+    def once(t):
+        return 1.0
+
     loads = [
         lambda b: ub.PointLoad(b.end, force=(1, 0), time=once),
         lambda b: ub.PointLoad(b.end, force=(2, 0), time=once),
@@ -107,3 +124,28 @@ def test_loads_in_dynamics_act_at_the_middle_of_the_step():
     push = [ub.LineLoad(beam, force=(3, 0), time=lambda t: t)]
     solution = ub.simulate(ub.Scene([beam], loads=push), ub.Midpoint(), t=(0, 2), dt=0.5)
     assert solution.momentum()[:, 0] == pytest.approx(3 * solution.times**2, rel=1e-9)
+
+
+@pytest.mark.parametrize("joint", [ub.Rigid, ub.Revolute])
+@pytest.mark.parametrize("load", [ub.PointLoad, ub.FollowerLoad])
+def test_loads_at_joints_between_processes(joint, load):
+    """Six beams of one cell: some joint lies between the cells of 2, 3, ... processes.
+
+    There displacements and rotation of a place may belong to different ones.
+    """
+    beams = [ub.Beam((i, 0), (i + 1, 0), SECTION, cells=1) for i in range(6)]
+    scene = ub.Scene(
+        beams,
+        joints=[joint(a.end, b.start) for a, b in pairwise(beams)],
+        loads=[load(b.start, force=(1, i + 2), moment=-i) for i, b in enumerate(beams)],
+        masses=[ub.PointMass(b.start, i, i) for i, b in enumerate(beams)],
+    )
+    all_of_us, alone = (
+        ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.1, comm=comm)
+        for comm in (MPI.COMM_WORLD, MPI.COMM_SELF)
+    )
+    assert np.abs(alone.q[-1]).max() > 0.1
+    assert np.abs(all_of_us.q - alone.q).max() < 1e-9  # Newton's tolerance, on motions of 1 m
+    # Whatever the joints do, the momentum is the impulse: (6, 2 + ... + 7) N for 1 s
+    if load is ub.PointLoad:
+        assert all_of_us.momentum()[-1, :2] == pytest.approx([6, 27], rel=1e-9)

@@ -3,8 +3,9 @@
 import gc
 from pathlib import Path
 
-import pytest
 from petsc4py import PETSc
+
+import pytest
 from scenes import swing
 
 import ufl_beam as ub

@@ -2,10 +2,11 @@
 
 import csv
 
+from mpi4py import MPI
+
 import h5py
 import numpy as np
 import pytest
-from mpi4py import MPI
 
 import ufl_beam as ub
 
@@ -35,7 +36,9 @@ def read_h5(path):
     found = {}
     with h5py.File(path, "r") as file:
         file.visititems(
-            lambda name, thing: found.__setitem__(name, thing[()]) if hasattr(thing, "shape") else None
+            lambda name, thing: (
+                found.__setitem__(name, thing[()]) if hasattr(thing, "shape") else None
+            )
         )
     return found
 
@@ -96,7 +99,9 @@ def test_xdmf_names_the_times(shared_path, on_first_rank):
     assert "run.h5:/Function/displacement/0_25" in text
 
 
-@pytest.mark.parametrize(("every", "kept"), [(1, [0, 1, 2, 3, 4, 5, 6]), (2, [0, 2, 4, 6]), (4, [0, 4])])
+@pytest.mark.parametrize(
+    ("every", "kept"), [(1, [0, 1, 2, 3, 4, 5, 6]), (2, [0, 2, 4, 6]), (4, [0, 4])]
+)
 def test_every(shared_path, on_first_rank, every, kept):
     solution = run(scene(), ub.XDMF(shared_path / "run.xdmf", every=every))
     data = on_first_rank(lambda: read_h5(shared_path / "run.h5"))
@@ -152,7 +157,7 @@ def test_a_second_run_overwrites(shared_path, on_first_rank):
     record = [ub.History(shared_path / "run.csv"), ub.XDMF(shared_path / "run.xdmf")]
     run(scene(), *record, steps=9)
     run(scene(), *record, steps=3)
-    header, rows = on_first_rank(lambda: read_csv(shared_path / "run.csv"))
+    _, rows = on_first_rank(lambda: read_csv(shared_path / "run.csv"))
     data = on_first_rank(lambda: read_h5(shared_path / "run.h5"))
     assert len(rows) == len(series(data, "N")) == 4
 
@@ -197,7 +202,7 @@ def test_files_are_closed_when_a_run_is_stopped(shared_path, on_first_rank):
             *(ub.History(shared_path / "run.csv"), ub.XDMF(shared_path / "run.xdmf")),
             Count(fail_at=4),
         )
-    header, rows = on_first_rank(lambda: read_csv(shared_path / "run.csv"))
+    _, rows = on_first_rank(lambda: read_csv(shared_path / "run.csv"))
     data = on_first_rank(lambda: read_h5(shared_path / "run.h5"))
     assert len(rows) == len(series(data, "N")) == 4  # the initial state and three steps
 
@@ -211,7 +216,10 @@ def test_files_do_not_depend_on_the_number_of_ranks(shared_path, on_first_rank):
     def alone():
         one, other = shared_path / "one.csv", shared_path / "one.xdmf"
         run(frame, ub.History(one, places), ub.XDMF(other), comm=MPI.COMM_SELF)
-        return [(read_csv(shared_path / f"{n}.csv"), read_h5(shared_path / f"{n}.h5")) for n in ("all", "one")]
+        return [
+            (read_csv(shared_path / f"{n}.csv"), read_h5(shared_path / f"{n}.h5"))
+            for n in ("all", "one")
+        ]
 
     ((header, rows), data), ((header_1, rows_1), data_1) = on_first_rank(alone)
     assert header == header_1
@@ -222,4 +230,6 @@ def test_files_do_not_depend_on_the_number_of_ranks(shared_path, on_first_rank):
     for name, values in data.items():
         assert values.shape == data_1[name].shape
         # Section forces are of the order of 100 N
-        assert np.abs(values - data_1[name]).max() < (1e-7 if name[9:11] in ("N/", "V/", "M/") else 1e-9)
+        assert np.abs(values - data_1[name]).max() < (
+            1e-7 if name[9:11] in ("N/", "V/", "M/") else 1e-9
+        )

@@ -14,9 +14,9 @@ CLOSE = 1e-14
 
 
 def check(section, *, A, I, shear_area):
-    assert section.EA == pytest.approx(210e9 * A, rel=CLOSE)
-    assert section.EI == pytest.approx(210e9 * I, rel=CLOSE)
-    assert section.GA == pytest.approx(G * shear_area, rel=CLOSE)
+    assert pytest.approx(210e9 * A, rel=CLOSE) == section.EA
+    assert pytest.approx(210e9 * I, rel=CLOSE) == section.EI
+    assert pytest.approx(G * shear_area, rel=CLOSE) == section.GA
     assert section.rhoA == pytest.approx(7850.0 * A, rel=CLOSE)
     assert section.rhoI == pytest.approx(7850.0 * I, rel=CLOSE)
 
@@ -44,16 +44,16 @@ def test_tube():
     # radii 0.1 and 0.08: pi (R^2 - r^2), pi (R^4 - r^4) / 4; differences lose two digits
     section = ub.Section.tube(0.2, 0.02, **STEEL)
     A, I = math.pi * 0.0036, math.pi * (1e-4 - 0.4096e-4) / 4
-    assert section.EA == pytest.approx(210e9 * A, rel=1e-12)
-    assert section.EI == pytest.approx(210e9 * I, rel=1e-12)
-    assert section.GA == pytest.approx(G * A / 2, rel=1e-12)
+    assert pytest.approx(210e9 * A, rel=1e-12) == section.EA
+    assert pytest.approx(210e9 * I, rel=1e-12) == section.EI
+    assert pytest.approx(G * A / 2, rel=1e-12) == section.GA
 
 
 def test_tube_that_is_full_is_a_circle():
     tube = ub.Section.tube(0.2, 0.1, **STEEL)
     circle = ub.Section.circle(0.2, **STEEL)
-    assert tube.EA == pytest.approx(circle.EA, rel=CLOSE)
-    assert tube.EI == pytest.approx(circle.EI, rel=CLOSE)
+    assert pytest.approx(circle.EA, rel=CLOSE) == tube.EA
+    assert pytest.approx(circle.EI, rel=CLOSE) == tube.EI
 
 
 def test_i_shape():
@@ -63,17 +63,17 @@ def test_i_shape():
     section = ub.Section.i_shape(h, b, tw, tf, **STEEL)
     A = 2 * 0.15 * 0.02 + 0.01 * 0.26
     I = 2 * (b * tf**3 / 12 + b * tf * d**2) + tw * web**3 / 12
-    assert section.EA == pytest.approx(210e9 * A, rel=1e-13)
-    assert section.EI == pytest.approx(210e9 * I, rel=1e-12)  # a difference of cubes loses a digit
-    assert section.GA == pytest.approx(G * tw * (h - tf), rel=1e-13)
+    assert pytest.approx(210e9 * A, rel=1e-13) == section.EA
+    assert pytest.approx(210e9 * I, rel=1e-12) == section.EI  # a difference of cubes loses a digit
+    assert pytest.approx(G * tw * (h - tf), rel=1e-13) == section.GA
 
 
 def test_i_shape_without_web_opening_is_a_rectangle():
     # A web as wide as the flanges fills the rectangle; only the shear area is another.
     i_shape = ub.Section.i_shape(0.3, 0.1, 0.1, 0.05, **STEEL)
     rectangle = ub.Section.rectangle(0.1, 0.3, **STEEL)
-    assert i_shape.EA == pytest.approx(rectangle.EA, rel=CLOSE)
-    assert i_shape.EI == pytest.approx(rectangle.EI, rel=CLOSE)
+    assert pytest.approx(rectangle.EA, rel=CLOSE) == i_shape.EA
+    assert pytest.approx(rectangle.EI, rel=CLOSE) == i_shape.EI
 
 
 def test_without_density_there_is_no_mass():

@@ -87,7 +87,10 @@ def test_rigid_rotation():
     """A stiff beam driven at its start: position, rotation and velocity on the circle."""
     stiff = ub.Section(EA=1e9, GA=1e9, EI=1e9, rhoA=1.0, rhoI=1.0)
     beam = ub.Beam((1, 1), (3, 1), stiff, cells=2)
-    turn = lambda t: t**2
+
+    def turn(t):
+        return t**2
+
     scene = ub.Scene([beam], supports=[ub.Prescribed(beam.start, u=0, v=0, psi=turn)])
     solution = ub.simulate(scene, ub.Midpoint(0.1, 0.1), t=(0, 1), dt=0.01)
     t = solution.times
@@ -112,7 +115,11 @@ def frame():
     return ub.Scene(
         [a, b, c],
         joints=[ub.Rigid(a.end, b.start), ub.Revolute(b.end, c.start)],
-        supports=[ub.Clamped(a.start), ub.Roller(c.end, along=(2, 1)), ub.Prescribed(b.at(0.5), psi=0)],
+        supports=[
+            ub.Clamped(a.start),
+            ub.Roller(c.end, along=(2, 1)),
+            ub.Prescribed(b.at(0.5), psi=0),
+        ],
         loads=[
             ub.PointLoad(b.start, force=(5, -2), moment=3.0),
             ub.LineLoad(b, force=(0, -1), moment=0.5),
@@ -140,7 +147,7 @@ def test_reactions_balance_the_loads():
     total += moment(c.start, [4 * 1.0, 4 * -2.0, 0])
     for beam, line, cells in ((a, (0, 0, 0), 3), (b, (0, -1, 0.5), 4), (c, (0, 0, 0), 3)):
         length = 3.0 if beam is b else 4.0
-        f = np.array(line) + [1.0 * 1.0, 1.0 * -2.0, 0]  # the line load and 1 kg/m of weight
+        f = np.add(line, (1.0 * 1.0, 1.0 * -2.0, 0))  # the line load and 1 kg/m of weight
         for i in range(cells):  # half of a cell's load at each of its ends
             for s in (i / cells, (i + 1) / cells):
                 total += moment(beam.at(s), f * length / cells / 2)
@@ -163,13 +170,17 @@ def test_reactions_are_of_the_kind_of_the_support():
 def test_no_supports_no_reactions():
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
     solution = ub.simulate(ub.Scene([beam]), ub.Midpoint(), t=(0, 1), dt=0.5)
-    with pytest.raises(ub.SceneError, match="reaction: Clamped at beam.end .* is not in the scene"):
+    with pytest.raises(
+        ub.SceneError, match=r"reaction: Clamped at beam.end .* is not in the scene"
+    ):
         solution.reaction(ub.Clamped(beam.end))
 
 
 def test_reaction_drives_the_momentum():
     """In dynamics a reaction acts during the step that ends at its time."""
-    scene, beam = cantilever(lambda b: ub.PointLoad(b.end, force=(2, -8), time=lambda t: math.cos(t)))
+    scene, _ = cantilever(
+        lambda b: ub.PointLoad(b.end, force=(2, -8), time=lambda t: math.cos(t))
+    )
     solution = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05)
     t = solution.times
     forces = solution.reaction(scene.supports[0])[1:, :2] + np.outer(
@@ -208,9 +219,9 @@ def test_section_forces_in_any_direction():
         load = ub.PointLoad(beam.end, force=tuple(force))
         solution = static(ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load]), 1)
         N, V, M = solution.section_forces(beam).T
-        assert N == pytest.approx(4 * [1e-3], rel=1e-3)
-        assert V == pytest.approx(4 * [2e-3], rel=1e-3)
-        assert M == pytest.approx(2e-3 * np.array([1.75, 1.25, 0.75, 0.25]), rel=1e-3)
+        assert pytest.approx(4 * [1e-3], rel=1e-3) == N
+        assert pytest.approx(4 * [2e-3], rel=1e-3) == V
+        assert pytest.approx(2e-3 * np.array([1.75, 1.25, 0.75, 0.25]), rel=1e-3) == M
 
 
 def test_section_forces_at_a_place_are_those_of_its_cell():
@@ -251,14 +262,19 @@ def test_momentum_of_known_motions():
     assert p_y == pytest.approx(6 * 3 + 4 * v_end[1], rel=1e-14)
     # Beam: rhoI L ω + rhoA L^3 / 12 ω about its middle (the mass matrix is exact), + m x v
     spin = 0.5 * (0.5 * 2 + 3 * 8 / 12) + 6 * 1 * 3
-    assert L == pytest.approx(spin + 4 * 2 * v_end[1] + 0.25 * 0.5, rel=1e-14)
+    assert pytest.approx(spin + 4 * 2 * v_end[1] + 0.25 * 0.5, rel=1e-14) == L
 
 
 def test_a_solution_can_be_read():
     scene, _ = cantilever()
     text = str(ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.5))
-    assert text.startswith("1 beam, 4 cells, 15 degrees of freedom\nt = 0 to 1 s in 2 steps, ")
-    assert "imbalance" in text
+    for part in (
+        "1 beam",
+        "4 cells, 15 degrees of freedom",
+        "t = 0 to 1 s in 2 steps",
+        "imbalance",
+    ):
+        assert part in text
 
 
 def test_joined_places_move_alike():

@@ -1,8 +1,9 @@
 """Tangents against central differences of the residuals, at random states, for all terms."""
 
+from mpi4py import MPI
+
 import numpy as np
 import pytest
-from mpi4py import MPI
 from scipy.sparse import csr_array
 
 import ufl_beam as ub

@@ -36,6 +36,9 @@ NO_REACTIONS = np.zeros((0, 3))
 PATH = 0.1
 """Part of the work of a static step that may be unaccounted for before the step is cut."""
 
+SMALLEST_SHARE = 1000
+"""Scenes with fewer cells per process are computed by each process: talking would take longer."""
+
 LARGEST_TURN = 0.75 * math.pi
 """A step that turns a node further is cut; the algorithmic strains end at π."""
 
@@ -66,7 +69,7 @@ def simulate(
         start: Solution of the same beams whose last state is the initial state.
         newton: Tolerances and PETSc options.
         progress: Show a progress bar if the output is a terminal.
-        comm: Processes that share the scene.
+        comm: Processes that share the scene; a small one is computed by each of them.
 
     Returns:
         The motion, the forces and the ledger.
@@ -153,8 +156,7 @@ class Simulation:
             require_no_mechanism(scene)
         self.scene, self.scheme, self.comm = scene, scheme, comm
         self.grid = Grid(scene)
-        # A scene with fewer cells than processes is computed by each of them.
-        together = comm.size <= len(self.grid.cells)
+        together = len(self.grid.cells) >= comm.size * SMALLEST_SHARE
         self.share = Share(self.grid, comm if together else MPI.COMM_SELF)
         self.fields = Fields(self.share)
         self._A = self.fields.matrix()

@@ -1,0 +1,109 @@
+"""Energy, momentum and angular momentum of random scenes, exact at any step size."""
+
+import numpy as np
+import pytest
+from random_scenes import DRAWS, Built, draw, relative
+
+import ufl_beam as ub
+
+pytestmark = pytest.mark.parametrize("seed", DRAWS)
+
+SIZES = [0.005, 0.1]
+"""Time steps; s.  The larger is as long as many periods of the axial vibrations."""
+
+CLOSED = 1e-9
+"""Part of the energy that went through, the promise of design.md, section 9."""
+
+
+@pytest.mark.parametrize("step", SIZES)
+def test_energy(seed, step):
+    """Work is the increment of kinetic and stored energy."""
+    energy = Built(draw(seed)).run(ub.Midpoint(), step=step).solution.energy
+    assert energy.lost == {}
+    work = energy["loads"]
+    change = energy.total - energy.total[0]
+    assert np.abs(work - change).max() < CLOSED * energy.throughput
+    assert energy.throughput > 1e-3
+
+
+@pytest.mark.parametrize("step", SIZES)
+@pytest.mark.parametrize(
+    "scheme", [ub.Midpoint(0.1, 0.0), ub.Midpoint(0.0, 0.1), ub.Midpoint(0.2, 0.5)], ids=str
+)
+def test_numerical_loss(seed, step, scheme):
+    """It closes the ledger, and never gives anything back."""
+    energy = Built(draw(seed)).run(scheme, step=step).solution.energy
+    assert energy.worst < CLOSED
+    assert (np.diff(energy["numerical"]) >= 0).all()
+    assert energy["numerical"][-1] > 0
+
+
+def test_losses_converge_to_nothing(seed):
+    """A loss of the scheme, not of the scene: it goes with the step."""
+    scheme = ub.Midpoint(0.1, 0.1)
+    losses = [
+        Built(draw(seed)).run(scheme, step=0.1 / n, steps=n).solution.energy["numerical"][-1]
+        for n in (10, 80)
+    ]
+    assert losses[1] < losses[0] / 4
+
+
+@pytest.mark.parametrize("step", SIZES)
+@pytest.mark.parametrize("scheme", [ub.Midpoint(), ub.Midpoint(alpha=0.2)], ids=str)
+def test_momenta_of_free_flight(seed, step, scheme):
+    """Without loads linear and angular momentum are constant, also with `alpha`."""
+    numbers = draw(seed, free=True, dead=True)
+    numbers.forces, numbers.lines = [], []
+    solution = Built(numbers).run(scheme, step=step).solution
+    momentum = solution.momentum()
+    assert np.abs(solution.displacement(solution.scene.beams[0].end)).max() > 1e-3
+    # Of some 5 kg m/s: 1e-10 of forces of some 100 N in 15 steps of 0.1 s
+    assert np.ptp(momentum[:, :2], axis=0).max() < 1e-9 * np.abs(momentum).max()
+    assert np.ptp(momentum[:, 2]) < 1e-9 * np.abs(momentum).max()
+
+
+@pytest.mark.parametrize("step", [0.005, 0.05])
+@pytest.mark.parametrize(
+    "scheme", [ub.Midpoint(), ub.Midpoint(alpha=0.2), ub.Midpoint(beta=0.2)], ids=str
+)
+def test_impulses(seed, step, scheme):
+    """Momentum grows by the impulse, angular momentum by its moment unless `beta` > 0."""
+    numbers = draw(seed, free=True, dead=True)
+    numbers.lines = []
+    built = Built(numbers).run(scheme, step=step)
+    solution = built.solution
+    assert solution.parts == len(solution.times) - 1  # no step was cut, whose middles are others
+    t = solution.times
+    middle = (t[1:] + t[:-1]) / 2
+    expected = np.zeros((len(middle), 3))
+    for load in built.scene.loads:
+        size = np.array([load.time(x) for x in middle])
+        position = solution.position(load.place)
+        x, y = ((position[1:] + position[:-1]) / 2).T
+        f_x, f_y = load.force
+        arm = x * f_y - y * f_x + load.moment
+        expected += (size * np.diff(t))[:, None] * np.column_stack(
+            [np.full_like(x, f_x), np.full_like(x, f_y), arm]
+        )
+    momentum = solution.momentum()
+    error = np.abs(np.diff(momentum, axis=0) - expected).max(axis=0)
+    scale = np.abs(momentum).max()
+    assert error[:2].max() < 1e-9 * scale  # as in free flight
+    if scheme.beta == 0:
+        assert error[2] < 1e-9 * scale
+    elif step == 0.05:
+        assert error[2] > 1e-6 * scale  # beta gives it up, as its docstring says
+
+
+def test_statics_is_the_slow_limit(seed):
+    """Loads that grow in 100 steps of 10 s and then stay, with strong damping, and statics.
+
+    The highest loss makes the scheme backward Euler: the motion that is left shrinks by some
+    (ω Δt)² > 100 a step, as the slowest of these scenes have periods of seconds.
+    """
+    numbers = draw(seed, fixed=True, dead=True)
+    numbers.forces = [(*f[:4], 1000.0) for f in numbers.forces]
+    static = Built(numbers).run(ub.Static(), steps=20, step=50.0)
+    slow = Built(numbers).run(ub.Midpoint(0.5, 0.5), steps=120, step=10.0)
+    # Both to 1e-10 of the forces, which soft scenes multiply
+    assert relative(static.motion()[:, -1], slow.motion()[:, -1]) < 1e-7

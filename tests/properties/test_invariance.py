@@ -1,0 +1,113 @@
+"""One scene stated in two ways gives one result: units, axes, cuts, order, ranks."""
+
+from mpi4py import MPI
+
+import numpy as np
+import pytest
+from random_scenes import DRAWS, Built, Units, difference, draw
+
+import ufl_beam as ub
+
+SAME = 1e-9
+"""Part of the result.  Each step is solved to 1e-10 of the forces, by a method that squares its
+error and so mostly ends at round-off; 15 steps let that grow a little."""
+
+SCHEMES = [ub.Midpoint(), ub.Midpoint(0.05, 0.05)]
+SCHEME = SCHEMES[1]
+"""The one with all terms."""
+
+pytestmark = pytest.mark.parametrize("seed", DRAWS)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+def test_units(seed, scheme):
+    """No number in the package has a dimension."""
+    numbers = draw(seed)
+    random = np.random.default_rng(1000 + seed)
+    units = Units(*(float(x) for x in 10 ** random.uniform(-4, 4, 3)))
+    one, other = Built(numbers).run(scheme), Built(numbers, units=units).run(scheme)
+    assert difference(one, other) < SAME
+    assert one.solution.iterations == other.solution.iterations
+    assert one.solution.parts == other.solution.parts
+
+
+def test_units_in_statics(seed):
+    numbers = draw(seed, fixed=True)
+    random = np.random.default_rng(2000 + seed)
+    units = Units(*(float(x) for x in 10 ** random.uniform(-4, 4, 3)))
+    one, other = (
+        Built(numbers, units=u).run(ub.Static(), steps=5, step=0.1) for u in (Units(), units)
+    )
+    assert difference(one, other) < SAME
+    assert one.solution.iterations == other.solution.iterations
+    assert one.solution.parts == other.solution.parts
+
+
+def test_axes(seed):
+    """Objectivity: the whole scene turned by any angle."""
+    numbers = draw(seed)
+    angle = float(np.random.default_rng(3000 + seed).uniform(-np.pi, np.pi))
+    one, other = Built(numbers).run(SCHEME), Built(numbers, angle=angle).run(SCHEME)
+    assert difference(one, other) < SAME
+
+
+def test_axes_in_statics(seed):
+    numbers = draw(seed, fixed=True)
+    angle = float(np.random.default_rng(4000 + seed).uniform(-np.pi, np.pi))
+    one, other = (Built(numbers, angle=a).run(ub.Static(), steps=5, step=0.1) for a in (0.0, angle))
+    assert difference(one, other) < SAME
+
+
+def test_cuts(seed):
+    """A beam cut in two by a rigid joint is the same beam."""
+    numbers = draw(seed)
+    one = Built(numbers).run(SCHEME)
+    other = Built(numbers, cut=range(len(numbers.beams))).run(SCHEME)
+    assert len(other.scene.beams) == 2 * len(one.scene.beams)
+    assert other.solution.grid.size == one.solution.grid.size
+    assert difference(one, other) < SAME
+
+
+def test_cuts_in_statics(seed):
+    numbers = draw(seed, fixed=True)
+    one = Built(numbers).run(ub.Static(), steps=5, step=0.1)
+    other = Built(numbers, cut=[0]).run(ub.Static(), steps=5, step=0.1)
+    assert difference(one, other) < SAME
+
+
+def test_order(seed):
+    """The order of the beams in the scene."""
+    numbers = draw(seed)
+    one = Built(numbers).run(SCHEME)
+    order = np.random.default_rng(5000 + seed).permutation(len(numbers.beams))
+    other = Built(numbers, order=order[::-1]).run(SCHEME)
+    assert difference(one, other) < SAME
+
+
+def test_ranks(seed):
+    """The number of processes: against each process alone.  On one rank: a run can be repeated."""
+    numbers = draw(seed)
+    for scheme in SCHEMES:
+        one = Built(numbers).run(scheme)
+        other = Built(numbers).run(scheme, comm=MPI.COMM_SELF)
+        assert difference(one, other) < SAME
+        # On all ranks alike
+        everywhere = MPI.COMM_WORLD.allgather(one.motion().tobytes())
+        assert len(set(everywhere)) == 1
+        if MPI.COMM_WORLD.size == 1:
+            assert (one.motion() == other.motion()).all()
+
+
+def test_ranks_in_statics(seed):
+    numbers = draw(seed, fixed=True)
+    one, other = (
+        Built(numbers).run(ub.Static(), steps=5, step=0.1, comm=comm)
+        for comm in (MPI.COMM_WORLD, MPI.COMM_SELF)
+    )
+    assert difference(one, other) < SAME
+
+
+def test_something_happens(seed):
+    """The scenes are no trivial ones: they move by a good part of their size, and turn."""
+    motion = Built(draw(seed)).run(ub.Midpoint()).motion()
+    assert np.abs(motion).max() > 1e-3
