@@ -92,10 +92,10 @@ with ub.picture((9, 5.5)) as forces:
         (decaying, "Midpoint(alpha=0.01, beta=0.01)", "C0"),
     ):
         N = solution.section_forces_at(middle)[:, 0]
-        upper.plot(solution.times, N, color=color, lw=1, label=label)
-        lower.plot(solution.times, 1e3 * solution.energy.total, color=color, lw=2)
+        upper.plot(solution.times, N, color=color, lw=1)
+        lower.plot(solution.times, 1e3 * solution.energy.total, color=color, lw=2, label=label)
     upper.set_ylabel("N at mid-span (N)")
-    upper.legend(frameon=False, loc="upper left")
+    lower.legend(frameon=False, loc="lower right")
     lower.set_ylabel("energy (mJ)")
     lower.set_xlabel("t (s)")
 
