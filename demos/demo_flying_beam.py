@@ -93,6 +93,7 @@ assert drifts(with_alpha)[1] < 1e-10 < drifts(with_beta)[1]
 # same mesh, converges with the square of the step. This holds for a push that comes and goes
 # smoothly; a jump excites all frequencies of the mesh, and no step resolves the highest ones.
 
+
 # %%
 def pulse(t):
     """A push of the same impulse that comes and goes smoothly."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeGuard
 
 import numpy as np
 import ufl
@@ -83,9 +83,28 @@ class Scheme(Protocol):
         """Forces that do the work of a step, from those in its equation and in the one before."""
 
 
+class DynamicScheme(Scheme, Protocol):
+    """What a scheme with inertia must say besides."""
+
+    beta: float
+    """Part of the mass times the squared change of velocity that is lost numerically."""
+
+    def velocity_weights(self, dt: float) -> tuple[float, float]:
+        """(a, b) of the velocities v1 = a s - b v0 after the step s of the nodes."""
+
+
+def has_inertia(scheme: Scheme) -> TypeGuard[DynamicScheme]:
+    """Whether the scheme is a dynamic one."""
+    return scheme.dynamic
+
+
 @dataclass(frozen=True)
 class Static:
-    """Equilibrium at the end of each step; no inertia, time is the load parameter."""
+    """Equilibrium at the end of each step; no inertia, time is the load parameter.
+
+    The ledger counts works by the trapezoidal rule, so its imbalance is of second order in the step
+    and a measure of it; a step whose forces leave a tenth of what it stores unexplained is cut.
+    """
 
     dynamic = False
     load_weight = 1.0
@@ -184,7 +203,7 @@ class Midpoint:
         return now
 
     def velocity_weights(self, dt: float) -> tuple[float, float]:
-        """(a, b) of v1 = a s - b v0, with the step s = (Δu, 2 tan(Δψ/2)) of the nodes."""
+        """(a, b) of the velocities v1 = a s - b v0 after the step s of the nodes."""
         keep = 0.5 + self.beta
         return 1 / (dt * keep), (0.5 - self.beta) / keep  # P(87)
 

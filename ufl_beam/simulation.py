@@ -22,7 +22,7 @@ from ufl_beam.loads import FollowerLoad
 from ufl_beam.mechanism import require_no_mechanism
 from ufl_beam.record import Recorder
 from ufl_beam.scene import Scene
-from ufl_beam.schemes import Midpoint, Scheme
+from ufl_beam.schemes import Scheme, has_inertia
 from ufl_beam.solution import Solution
 from ufl_beam.solve import Newton, Solver, StepFailed
 from ufl_beam.supports import Supports
@@ -158,24 +158,25 @@ class Simulation:
         self.grid = Grid(scene)
         together = len(self.grid.cells) >= comm.size * SMALLEST_SHARE
         self.share = Share(self.grid, comm if together else MPI.COMM_SELF)
+        q, v = self._initial_state(start)
         self.fields = Fields(self.share)
         self._A = self.fields.matrix()
         self.t = t0
-        self.q: Array = np.zeros(self.share.size)
+        self.q: Array = q[self.share.dofs]
         self.ledger = Ledger()
         self.parts = 0
 
         self.beams = ElasticBeams(self.fields, scheme, self._A, self.ledger)
         self.loads = self._make_loads()
         self.terms: list[Term] = [self.beams, *self.loads]
-        if isinstance(scheme, Midpoint):
-            self.inertia = Inertia(
-                self.fields, scheme, self._A, self.ledger, self._initial_velocity()
-            )
+        if has_inertia(scheme):
+            v = v[self.share.dofs]
+            self.inertia = Inertia(self.fields, scheme, self._A, self.ledger, v)
             self.terms.append(self.inertia)
         self.supports = Supports(self.share, scheme, self.ledger, self._A)
         if start is not None:
-            self._carry_on(start)
+            for load in self.loads:
+                load.carry_on(self.t, self.q)
         self._q_before: Array = self.q
         self._dt_before = math.inf
         self._rotations = self.share.rotations()
@@ -207,8 +208,22 @@ class Simulation:
             loads.append(FollowerLoads(followers, self.share, self.scheme, self.ledger, self._A))
         return loads
 
+    def _initial_state(self, start: Solution | None) -> tuple[Array, Array]:
+        """Configuration and velocities at all degrees of freedom, before anything is built."""
+        q, v = np.zeros(self.grid.size), self._initial_velocity()
+        if start is None:
+            return q, v
+        if start.scene.beams != self.scene.beams or not np.array_equal(
+            start.grid.dofs, self.grid.dofs
+        ):
+            raise SceneError(
+                "start: the solution is of other beams or joints; use the same Beam objects, "
+                "joined alike"
+            )
+        return start.q[-1], start.v[-1] if len(start.v) else v
+
     def _initial_velocity(self) -> Array:
-        """Velocities of :class:`Velocity`, at the local degrees of freedom."""
+        """Velocities of :class:`Velocity`; zero elsewhere."""
         v = np.full(self.grid.size, np.nan)
         for velocity in self.scene.initial:
             for beam in velocity.beams:
@@ -223,18 +238,7 @@ class Simulation:
                         "from itself or from a beam that it is joined to"
                     )
                 v[dofs] = new
-        return np.asarray(np.nan_to_num(v)[self.share.dofs])
-
-    def _carry_on(self, start: Solution) -> None:
-        if start.grid.scene.beams != self.scene.beams or start.grid.size != self.grid.size:
-            raise SceneError(
-                "start: the solution is of other beams or joints; use the same Beam objects"
-            )
-        self.q = start.q[-1][self.share.dofs]
-        if self.scheme.dynamic and len(start.v):
-            self.inertia.v = start.v[-1][self.share.dofs]
-        for load in self.loads:
-            load.carry_on(self.t, self.q)
+        return np.asarray(np.nan_to_num(v))
 
     # -- the equation of a step ----------------------------------------------------------------
 

@@ -17,7 +17,7 @@ from ufl_beam.fields import Fields
 from ufl_beam.kinematics import split, strain
 from ufl_beam.ledger import Ledger
 from ufl_beam.loops import doubles, integers, lib
-from ufl_beam.schemes import Midpoint, Scheme, Step
+from ufl_beam.schemes import DynamicScheme, Scheme, Step
 from ufl_beam.sparse import Csr, Product
 
 
@@ -149,7 +149,9 @@ class Inertia:
         M: The mass matrix.
     """
 
-    def __init__(self, fields: Fields, scheme: Midpoint, A: Csr, ledger: Ledger, v: Array) -> None:
+    def __init__(
+        self, fields: Fields, scheme: DynamicScheme, A: Csr, ledger: Ledger, v: Array
+    ) -> None:
         share = fields.share
         self.M = mass_matrix(fields)
         self._times = Product(self.M)
