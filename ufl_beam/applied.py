@@ -31,11 +31,12 @@ class DeadLoads:
     """
 
     def __init__(self, loads: Sequence[Load], share: Share, scheme: Scheme, ledger: Ledger) -> None:
-        vectors: dict[TimeFunction, Array] = {}
+        # Loads of one time function are one vector; functions need not be hashable.
+        vectors: dict[int, tuple[TimeFunction, Array]] = {}
         for load in loads:
-            vectors.setdefault(load.time, np.zeros(share.size))
-            vectors[load.time] += _forces(load, share)
-        self._vectors = list(vectors.items())
+            _, vector = vectors.setdefault(id(load.time), (load.time, np.zeros(share.size)))
+            vector += _forces(load, share)
+        self._vectors = list(vectors.values())
         self._acting, self._ledger = scheme.acting, ledger
         ledger.supplied["loads"] += 0.0
         self.force: Array = np.zeros(share.size)

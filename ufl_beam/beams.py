@@ -47,10 +47,12 @@ class Beam:
         object.__setattr__(self, "b", b)
         if not isinstance(self.section, Section):
             raise SceneError(f"{self.name}: section = {self.section!r} is not a Section")
+        require_number(self.cells, f"{self.name}: cells")
         if self.cells != int(self.cells) or self.cells < 1:
             raise SceneError(
                 f"{self.name}: cells = {self.cells} must be a whole number, at least 1"
             )
+        object.__setattr__(self, "cells", int(self.cells))
         if self.curve is None:
             if a == b:
                 raise SceneError(f"{self.name}: zero length, both ends are at {a}")

@@ -45,6 +45,21 @@ def require_number(
         raise SceneError(f"{what} = {number:g} must be at least {at_least:g}")
 
 
+def require_sequence(value: Any, what: str) -> tuple[Any, ...]:
+    """``value`` as a tuple, or :class:`SceneError` naming ``what``."""
+    try:
+        return tuple(value)
+    except TypeError:
+        raise SceneError(f"{what} = {value!r} must be a list") from None
+
+
+def require_kind(value: Any, kind: type | tuple[type, ...], what: str) -> None:
+    """Raise :class:`SceneError` naming ``what`` unless ``value`` is of a kind."""
+    if not isinstance(value, kind):
+        kinds = kind if isinstance(kind, tuple) else (kind,)
+        raise SceneError(f"{what} = {value!r} is not a {' or '.join(k.__name__ for k in kinds)}")
+
+
 def require_vector(value: Any, what: str) -> tuple[float, float]:
     """``value`` as a pair of finite floats, or :class:`SceneError` naming ``what``."""
     try:

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from ufl_beam.beams import Beam, Place
 from ufl_beam.compat import Array
-from ufl_beam.errors import SceneError
+from ufl_beam.errors import SceneError, require_kind
 from ufl_beam.scene import COMPONENTS, Scene
 
 Index = npt.NDArray[Any]
@@ -61,14 +61,21 @@ class Grid:
     def _number_of_beam(self) -> dict[Beam, int]:
         return {beam: i for i, beam in enumerate(self.scene.beams)}
 
+    def _index(self, beam: Beam, asked: str = "") -> int:
+        """Number of a beam of the scene; ``asked`` says in messages what it is wanted for."""
+        require_kind(beam, Beam, "beam")
+        if beam not in self._number_of_beam:
+            raise SceneError(f"{asked}{beam.name} is not in the scene")
+        return self._number_of_beam[beam]
+
     def vertices_of(self, beam: Beam) -> Index:
         """Vertices of a beam from start to end."""
-        i = self._number_of_beam[beam]
+        i = self._index(beam)
         return np.arange(self._first[i], self._first[i + 1])
 
     def cells_of(self, beam: Beam) -> Index:
         """Cells of a beam from start to end."""
-        i = self._number_of_beam[beam]
+        i = self._index(beam)
         return np.arange(self._first[i] - i, self._first[i + 1] - i - 1)
 
     def weights(self, place: Place) -> tuple[Index, Array]:
@@ -77,9 +84,8 @@ class Grid:
         Raises:
             SceneError: The beam of the place is not in the scene.
         """
-        if place.beam not in self._number_of_beam:
-            raise SceneError(f"{place}: {place.beam.name} is not in the scene")
-        i = self._number_of_beam[place.beam]
+        require_kind(place, Place, "place")
+        i = self._index(place.beam, f"{place}: ")
         s = self._parameters[i]
         left = int(np.clip(np.searchsorted(s, place.s) - 1, 0, len(s) - 2))
         part = (place.s - s[left]) / (s[left + 1] - s[left])

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from ufl_beam.beams import Beam, Place
-from ufl_beam.errors import SceneError, require_number, require_vector
+from ufl_beam.errors import SceneError, require_number, require_sequence, require_vector
 
 TimeFunction = Callable[[float], float]
 
@@ -42,8 +42,8 @@ class Table:
     values: Sequence[float]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "times", tuple(self.times))
-        object.__setattr__(self, "values", tuple(self.values))
+        for name in ("times", "values"):
+            object.__setattr__(self, name, require_sequence(getattr(self, name), f"Table: {name}"))
         if len(self.times) != len(self.values) or len(self.times) < 1:
             raise SceneError(
                 f"Table: {len(self.times)} times and {len(self.values)} values; "

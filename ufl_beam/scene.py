@@ -8,7 +8,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from ufl_beam.beams import Beam, Place, Point
-from ufl_beam.errors import SceneError, require_number, require_vector
+from ufl_beam.errors import (
+    SceneError,
+    require_kind,
+    require_number,
+    require_sequence,
+    require_vector,
+)
 from ufl_beam.loads import (
     FollowerLoad,
     Gravity,
@@ -187,7 +193,9 @@ class Velocity:
     about: Point = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "beams", tuple(self.beams))
+        object.__setattr__(self, "beams", require_sequence(self.beams, "Velocity: beams"))
+        for i, beam in enumerate(self.beams):
+            require_kind(beam, Beam, f"Velocity: beams[{i}]")
         require_vector(self.linear, "Velocity: linear")
         require_number(self.angular, "Velocity: angular")
         require_vector(self.about, "Velocity: about")
@@ -229,13 +237,13 @@ class Scene:
 
     def __post_init__(self) -> None:
         for part in ("beams", "joints", "supports", "loads", "masses", "initial"):
-            object.__setattr__(self, part, tuple(getattr(self, part)))
+            records = require_sequence(getattr(self, part), f"Scene: {part}")
+            object.__setattr__(self, part, records)
         if not self.beams:
             raise SceneError("Scene: no beams")
         known: dict[Beam, int] = {}
         for i, beam in enumerate(self.beams):
-            if not isinstance(beam, Beam):
-                raise SceneError(f"Scene: beams[{i}] = {beam!r} is not a Beam")
+            require_kind(beam, Beam, f"Scene: beams[{i}]")
             first = known.setdefault(beam, i)
             if first != i:
                 raise SceneError(
@@ -343,6 +351,4 @@ def _require_kinds(scene: Scene) -> None:
     )
     for name, records, kind in kinds:
         for i, record in enumerate(records):
-            if not isinstance(record, kind):
-                expected = " or ".join(k.__name__ for k in kind)
-                raise SceneError(f"Scene: {name}[{i}] = {record!r} is not a {expected}")
+            require_kind(record, kind, f"Scene: {name}[{i}]")

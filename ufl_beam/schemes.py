@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, TypeGuard
+from typing import Protocol, TypeGuard, runtime_checkable
 
 import numpy as np
 import ufl
@@ -52,6 +52,7 @@ class Step:
         return self.t1 - self.t0
 
 
+@runtime_checkable
 class Scheme(Protocol):
     """What a time scheme must say."""
 

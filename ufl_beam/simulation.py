@@ -14,7 +14,13 @@ from tqdm import tqdm
 
 from ufl_beam.applied import DeadLoads, FollowerLoads
 from ufl_beam.compat import Array
-from ufl_beam.errors import ConvergenceError, SceneError, require_number
+from ufl_beam.errors import (
+    ConvergenceError,
+    SceneError,
+    require_kind,
+    require_number,
+    require_sequence,
+)
 from ufl_beam.fields import Fields
 from ufl_beam.grid import Grid, Share
 from ufl_beam.ledger import Ledger
@@ -81,8 +87,9 @@ def simulate(
     t0, t1 = _require_times(t, dt)
     if every < 1:
         raise SceneError(f"simulate: every = {every} must be at least 1")
-    recorders = [record] if isinstance(record, Recorder) else list(record)
-    for recorder in recorders:
+    recorders = (record,) if isinstance(record, Recorder) else require_sequence(record, "record")
+    for i, recorder in enumerate(recorders):
+        require_kind(recorder, Recorder, f"simulate: record[{i}]")
         recorder.require_writable()
     begin = time.perf_counter()
     simulation = Simulation(scene, scheme, t0=t0, start=start, newton=newton, comm=comm)
@@ -152,6 +159,10 @@ class Simulation:
         newton: Newton | None = None,
         comm: MPI.Intracomm = MPI.COMM_WORLD,
     ) -> None:
+        require_kind(scene, Scene, "scene")
+        if not isinstance(scheme, Scheme) or isinstance(scheme, type):
+            raise SceneError(f"scheme = {scheme!r} must be Static() or Midpoint()")
+        require_kind(newton or Newton(), Newton, "newton")
         if not scheme.dynamic:
             require_no_mechanism(scene)
         self.scene, self.scheme, self.comm = scene, scheme, comm
@@ -213,6 +224,7 @@ class Simulation:
         q, v = np.zeros(self.grid.size), self._initial_velocity()
         if start is None:
             return q, v
+        require_kind(start, Solution, "start")
         if start.scene.beams != self.scene.beams or not np.array_equal(
             start.grid.dofs, self.grid.dofs
         ):

@@ -155,13 +155,15 @@ class Solver:
         database = PETSc.Options(PREFIX)
         before = database.getAll()
         chosen = {"snes_linesearch_type": "basic", **before, **self._newton.petsc}
-        for name, value in chosen.items():
-            database[name] = value
-        snes.setFromOptions()
-        for name in chosen:
-            del database[name]
-        for name, value in before.items():
-            database[name] = value
+        try:
+            for name, value in chosen.items():
+                database[name] = value
+            snes.setFromOptions()
+        finally:
+            for name in chosen:
+                del database[name]
+            for name, value in before.items():
+                database[name] = value
         return snes
 
     # -- what SNES calls -----------------------------------------------------------------------

@@ -192,7 +192,7 @@ class Inertia:
     def accept(self, q1: Array, s: Array) -> None:
         """New velocities, and what the scheme lost."""
         v = self._a * s
-        v -= self._b * self.v  # P(87)
+        v -= self._b * self.v
         if self._scheme.beta:
             change = v - self.v
             self._ledger.lost["numerical"] += self._scheme.beta * float(

@@ -737,7 +737,6 @@ class Pulse:
         return isinstance(other, Pulse)
 
 
-@pytest.mark.xfail(raises=(AttributeError, TypeError, ValueError), reason="no check, no SceneError")
 @pytest.mark.parametrize(
     "call",
     [
@@ -766,25 +765,21 @@ def test_wrong_kinds_are_scene_errors(call):
     pytest.fail("no error at all")
 
 
-@pytest.mark.xfail(raises=TypeError, reason="2.0 passes the check and fails in the mesh")
 def test_whole_numbers_of_cells_may_be_floats():
     assert len(run(ub.Scene([beam(cells=2.0)])).grid.cells) == 2
 
 
-@pytest.mark.xfail(raises=TypeError, reason="loads are collected in a dict by time function")
 def test_time_functions_need_no_hash():
     one = beam()
     run(ub.Scene([one], loads=[ub.PointLoad(one.end, force=(1, 0), time=Pulse())]))
 
 
-@pytest.mark.xfail(raises=KeyError, reason="other questions raise SceneError")
 def test_section_forces_of_a_beam_elsewhere():
     with raises("stray is not in the scene"):
         run().section_forces(STRAY)
 
 
 @pytest.mark.serial  # PETSc reports an error of all ranks by aborting some of them
-@pytest.mark.xfail(reason="the options of a Newton that PETSc refuses stay in its database")
 def test_wrong_petsc_options_do_no_harm_to_the_next_run():
     from petsc4py import PETSc
 
