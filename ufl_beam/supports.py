@@ -120,8 +120,10 @@ class Supports:
         for axes in self._turned:
             axes.enter_matrix(data)
         if len(self.dofs):
+            # What stands on the diagonal has the right dimension and size for what is held.
+            diagonal = data[self._diagonal]
             data[self._zero] = 0.0
-            data[self._diagonal] = 1.0
+            data[self._diagonal] = diagonal
 
     def accept(self, s: Array) -> None:
         """Work of the supports that move; ``s`` in their axes."""

@@ -72,7 +72,7 @@ def reach(module):
 
 def test_the_text_is_read():
     # So that the tests below are about something
-    assert {"compat", "kinematics", "scene", "simulate"} <= set(MODULES)
+    assert {"compat", "kinematics", "scene", "simulation"} <= set(MODULES)
     assert "dolfinx" in outside("compat")
     assert "beams" in siblings("scene")
 
