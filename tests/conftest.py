@@ -6,7 +6,12 @@ from pathlib import Path
 
 import pytest
 
+from ufl_beam import simulation
+
 sys.path.insert(0, str(Path(__file__).parent))
+
+# Under mpirun the tests' small scenes, too, are shared among all processes.
+simulation.SMALLEST_SHARE = 1
 
 
 @pytest.fixture(autouse=True)

@@ -97,7 +97,7 @@ class FollowerLoads:
         ledger: Ledger,
         A: Csr,
     ) -> None:
-        mine = [load for load in loads if share.owns(share.at(load.place)).all()]
+        mine = [load for load in loads if share.computes(load.place)]
         dofs = np.array([share.local(share.at(load.place)) for load in mine], dtype=np.int64)
         self._dofs = dofs.reshape(-1, 3)
         self._forces = np.array([[*load.force, load.moment] for load in mine]).reshape(-1, 3)

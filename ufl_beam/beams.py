@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from itertools import pairwise
 
-from ufl_beam.errors import SceneError, require_number, require_vector
+from ufl_beam.errors import SceneError, require_count, require_number, require_vector
 from ufl_beam.sections import Section
 
 Point = tuple[float, float]
@@ -47,16 +47,20 @@ class Beam:
         object.__setattr__(self, "b", b)
         if not isinstance(self.section, Section):
             raise SceneError(f"{self.name}: section = {self.section!r} is not a Section")
-        require_number(self.cells, f"{self.name}: cells")
-        if self.cells != int(self.cells) or self.cells < 1:
-            raise SceneError(
-                f"{self.name}: cells = {self.cells} must be a whole number, at least 1"
-            )
+        require_count(self.cells, f"{self.name}: cells")
         object.__setattr__(self, "cells", int(self.cells))
         if self.curve is None:
             if a == b:
                 raise SceneError(f"{self.name}: zero length, both ends are at {a}")
             object.__setattr__(self, "curve", lambda s: _between(a, b, s))
+        for s, end in ((0.0, a), (1.0, b)):
+            there = require_vector(self.curve(s), f"{self.name}: curve({s:g})")
+            if math.dist(there, end) > 1e-9 * max(math.hypot(*there), math.hypot(*end)):
+                raise SceneError(f"{self.name}: curve({s:g}) = {there} is not the end {end}")
+        for s in self.corners:
+            require_number(s, f"{self.name}: corner")
+            if not 0.0 < s < 1.0:
+                raise SceneError(f"{self.name}: corner s = {s:g} must lie between 0 and 1")
         for s in (*self.corners, *(i / self.cells for i in range(self.cells + 1))):
             require_vector(self.curve(s), f"{self.name}: curve({s:g})")
 

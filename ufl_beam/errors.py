@@ -45,6 +45,13 @@ def require_number(
         raise SceneError(f"{what} = {number:g} must be at least {at_least:g}")
 
 
+def require_count(value: Any, what: str) -> None:
+    """Raise :class:`SceneError` naming ``what`` unless ``value`` is a whole number, at least 1."""
+    require_number(value, what)
+    if value != int(value) or value < 1:
+        raise SceneError(f"{what} = {value} must be a whole number, at least 1")
+
+
 def require_sequence(value: Any, what: str) -> tuple[Any, ...]:
     """``value`` as a tuple, or :class:`SceneError` naming ``what``."""
     try:

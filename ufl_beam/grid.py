@@ -108,7 +108,8 @@ class Grid:
         lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         for cell in np.flatnonzero(lengths <= 1e-12 * self.scene.size)[:1]:
             beam = self.scene.beams[self.beam_of_cell[cell]]
-            raise SceneError(f"{beam.name}: zero length of a cell at {tuple(ends[cell, 0])}")
+            x, y = ends[cell, 0]
+            raise SceneError(f"{beam.name}: zero length of a cell at ({x:g}, {y:g})")
 
     def _number(self) -> tuple[Index, int, int]:
         slots = np.arange(3 * len(self.points))
@@ -172,6 +173,15 @@ class Share:
     def at(self, place: Place) -> Index:
         """Degrees of freedom (numbers of the grid) of a place with a vertex; shape (3,)."""
         return np.asarray(self.grid.dofs[self.grid.vertex(place)])
+
+    def computes(self, place: Place) -> bool:
+        """Whether this process has the cell at a place, of two cells the first.
+
+        It then has all degrees of freedom of the place, even if others own some of them.
+        """
+        vertex = self.grid.vertex(place)
+        cell = int(np.argmax((self.grid.cells == vertex).any(axis=1)))
+        return bool(self.cells[0] <= cell <= self.cells[-1])
 
     def rotations(self) -> Index:
         """Local numbers of all rotations; int32."""

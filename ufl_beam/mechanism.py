@@ -13,7 +13,7 @@ from ufl_beam.compat import Array
 from ufl_beam.errors import SceneError
 from ufl_beam.scene import Scene
 
-DENSE = 900
+DENSE = 90
 """Up to this number of unknowns the null space comes from a dense decomposition."""
 
 
@@ -93,5 +93,8 @@ def _describe(scene: Scene, beam: int, mode: Array) -> str:
     if abs(ψ) < 1e-6:
         return f"{name} can shift along ({u:.3g}, {v:.3g})"
     cx, cy = _center(scene, beam)
-    x, y = cx - v / ψ * scene.size, cy + u / ψ * scene.size
+    x, y = (
+        scene.size * round(c / scene.size, 9)
+        for c in (cx - v / ψ * scene.size, cy + u / ψ * scene.size)
+    )
     return f"{name} can turn about ({x:.4g}, {y:.4g})"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +14,9 @@ import basix.ufl
 import numpy as np
 
 from ufl_beam.beams import Place
-from ufl_beam.compat import fem, io, line_mesh
-from ufl_beam.errors import SceneError
+from ufl_beam.compat import Array, fem, io, line_mesh
+from ufl_beam.errors import SceneError, require_count
+from ufl_beam.grid import Grid
 
 if TYPE_CHECKING:
     from ufl_beam.simulation import Simulation
@@ -26,7 +27,7 @@ class Recorder(ABC):
 
     @abstractmethod
     def require_writable(self) -> None:
-        """Raise :class:`SceneError` if the output cannot be written; before the run."""
+        """Raise :class:`SceneError` if the output cannot be written; the first process asks."""
 
     @abstractmethod
     def open(self, simulation: Simulation) -> None:
@@ -41,6 +42,20 @@ class Recorder(ABC):
         """End; also called when the run fails."""
 
 
+def on_first(comm: MPI.Intracomm, action: Callable[[], None]) -> None:
+    """Do something on the first process; what it raises there is raised on all of them."""
+    error: Exception | None = None
+    if comm.rank == 0:
+        try:
+            action()
+        except Exception as caught:
+            error = caught
+    if comm.size > 1:
+        error = comm.bcast(error)
+    if error is not None:
+        raise error
+
+
 class XDMF(Recorder):
     """Time series for ParaView: displacement and rotation at vertices, N, V, M in cells.
 
@@ -49,38 +64,41 @@ class XDMF(Recorder):
         every: Write every so many steps.
 
     Raises:
-        SceneError: ``every`` is less than 1.
+        SceneError: ``every`` is no whole number of steps, or the path does not end in ``.xdmf``.
     """
 
     def __init__(self, path: str | Path, *, every: int = 1) -> None:
-        if every < 1:
-            raise SceneError(f"XDMF {path}: every = {every} must be at least 1")
+        require_count(every, f"XDMF {path}: every")
         self._path, self._every = Path(path), every
+        if self._path.suffix != ".xdmf":
+            raise SceneError(f"XDMF {path}: the name of the file must end in .xdmf")
         self._files: list[Any] = []
 
     def require_writable(self) -> None:
-        """Raise :class:`SceneError` if the file cannot be written."""
+        """Raise :class:`SceneError` if one of both files cannot be written."""
         _require_writable(self._path)
+        _require_writable(self._path.with_suffix(".h5"))
 
     def open(self, simulation: Simulation) -> None:
         """Write the mesh and the initial state."""
         self._count = 0
-        if simulation.comm.rank == 0:
-            grid = simulation.grid
-            domain = line_mesh(grid.points, grid.cells)
-            self._order = domain.topology.original_cell_index
-            line = basix.ufl.element("Lagrange", "interval", 1)
-            vectors = basix.ufl.element("Lagrange", "interval", 1, shape=(3,))
-            constants = basix.ufl.element("DG", "interval", 0)
-            self._displacement = _named(domain, vectors, "displacement")
-            self._rotation = _named(domain, line, "rotation")
-            self._resultants = [_named(domain, constants, name) for name in "NVM"]
-            dofmap = self._rotation.function_space.dofmap.list
-            self._vertex_of_dof = np.empty(len(grid.points), dtype=np.int64)
-            self._vertex_of_dof[dofmap] = grid.cells[self._order]
-            self._files = [io.XDMFFile(MPI.COMM_SELF, self._path, "w")]
-            self._files[0].write_mesh(domain)
+        on_first(simulation.comm, lambda: self._begin(simulation.grid))
         self._put(simulation)
+
+    def _begin(self, grid: Grid) -> None:
+        domain = line_mesh(grid.points, grid.cells)
+        self._order = domain.topology.original_cell_index
+        line = basix.ufl.element("Lagrange", "interval", 1)
+        vectors = basix.ufl.element("Lagrange", "interval", 1, shape=(3,))
+        constants = basix.ufl.element("DG", "interval", 0)
+        self._displacement = _named(domain, vectors, "displacement")
+        self._rotation = _named(domain, line, "rotation")
+        self._resultants = [_named(domain, constants, name) for name in "NVM"]
+        dofmap = self._rotation.function_space.dofmap.list
+        self._vertex_of_dof = np.empty(len(grid.points), dtype=np.int64)
+        self._vertex_of_dof[dofmap] = grid.cells[self._order]
+        self._files = [io.XDMFFile(MPI.COMM_SELF, self._path, "w")]
+        self._files[0].write_mesh(domain)
 
     def write(self, simulation: Simulation) -> None:
         """Record every so many steps."""
@@ -91,14 +109,16 @@ class XDMF(Recorder):
     def _put(self, simulation: Simulation) -> None:
         q = simulation.share.gather(simulation.q)
         resultants = simulation.section_forces()
-        for file in self._files:
-            at_dofs = q[simulation.grid.dofs[self._vertex_of_dof]]
-            self._displacement.x.array.reshape(-1, 3)[:, :2] = at_dofs[:, :2]
-            self._rotation.x.array[:] = at_dofs[:, 2]
-            for component, function in enumerate(self._resultants):
-                function.x.array[:] = resultants[self._order, component]
-            for function in (self._displacement, self._rotation, *self._resultants):
-                file.write_function(function, simulation.t)
+        on_first(simulation.comm, lambda: self._write(simulation, q, resultants))
+
+    def _write(self, simulation: Simulation, q: Array, resultants: Array) -> None:
+        at_dofs = q[simulation.grid.dofs[self._vertex_of_dof]]
+        self._displacement.x.array.reshape(-1, 3)[:, :2] = at_dofs[:, :2]
+        self._rotation.x.array[:] = at_dofs[:, 2]
+        for component, function in enumerate(self._resultants):
+            function.x.array[:] = resultants[self._order, component]
+        for function in (self._displacement, self._rotation, *self._resultants):
+            self._files[0].write_function(function, simulation.t)
 
     def close(self) -> None:
         """Close the file."""
@@ -128,11 +148,14 @@ class History(Recorder):
     def open(self, simulation: Simulation) -> None:
         """Write the header and the initial state."""
         self._around = [simulation.grid.weights(place) for place in self._places]
-        if simulation.comm.rank == 0:
-            self._files = [self._path.open("w", newline="")]
         names = [f"{c} {place}" for place in self._places for c in ("u", "v", "psi")]
-        self._write_row(["t", *names, *simulation.ledger_names()])
+        header = ["t", *names, *simulation.ledger_names()]
+        on_first(simulation.comm, lambda: self._begin(header))
         self.write(simulation)
+
+    def _begin(self, header: list[str]) -> None:
+        self._files = [self._path.open("w", newline="")]
+        self._write_row(header)
 
     def write(self, simulation: Simulation) -> None:
         """Write the row of the state."""
@@ -140,14 +163,13 @@ class History(Recorder):
         dofs = simulation.grid.dofs
         motion = [w @ q[dofs[vertices]] for vertices, w in self._around]
         entries = {name: e for group in simulation.entries() for name, e in group.items()}
-        energies = [entries.get(name, 0.0) for name in simulation.ledger_names()]
-        numbers = [simulation.t, *np.ravel(motion), *energies]
-        self._write_row([repr(float(x)) for x in numbers])
+        energies = [entries[name] for name in simulation.ledger_names()]
+        row = [repr(float(x)) for x in (simulation.t, *np.ravel(motion), *energies)]
+        on_first(simulation.comm, lambda: self._write_row(row))
 
     def _write_row(self, row: list[str]) -> None:
-        for file in self._files:
-            csv.writer(file).writerow(row)
-            file.flush()
+        csv.writer(self._files[0]).writerow(row)
+        self._files[0].flush()
 
     def close(self) -> None:
         """Close the file."""

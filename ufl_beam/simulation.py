@@ -17,6 +17,7 @@ from ufl_beam.compat import Array
 from ufl_beam.errors import (
     ConvergenceError,
     SceneError,
+    require_count,
     require_kind,
     require_number,
     require_sequence,
@@ -26,7 +27,7 @@ from ufl_beam.grid import Grid, Share
 from ufl_beam.ledger import Ledger
 from ufl_beam.loads import FollowerLoad
 from ufl_beam.mechanism import require_no_mechanism
-from ufl_beam.record import Recorder
+from ufl_beam.record import Recorder, on_first
 from ufl_beam.scene import Scene
 from ufl_beam.schemes import Scheme, has_inertia
 from ufl_beam.solution import Solution
@@ -85,12 +86,11 @@ def simulate(
         ConvergenceError: A step failed; it carries the solution so far, and files are complete.
     """
     t0, t1 = _require_times(t, dt)
-    if every < 1:
-        raise SceneError(f"simulate: every = {every} must be at least 1")
+    require_count(every, "simulate: every")
     recorders = (record,) if isinstance(record, Recorder) else require_sequence(record, "record")
     for i, recorder in enumerate(recorders):
         require_kind(recorder, Recorder, f"simulate: record[{i}]")
-        recorder.require_writable()
+        on_first(comm, recorder.require_writable)
     begin = time.perf_counter()
     simulation = Simulation(scene, scheme, t0=t0, start=start, newton=newton, comm=comm)
     # A step is never longer than asked for; the slack is for the rounding of (t1 - t0) / dt.
@@ -107,6 +107,10 @@ def simulate(
                 solution.keep(simulation)
             for recorder in recorders:
                 recorder.write(simulation)
+    except BaseException as error:
+        # Whatever stops a run, an interrupt or a user's function, what was reached is not lost.
+        error.__dict__["solution"] = solution
+        raise
     finally:
         for recorder in recorders:
             recorder.close()
@@ -242,7 +246,8 @@ class Simulation:
                 vertices = self.grid.vertices_of(beam)
                 new = np.array([velocity.at(x, y) for x, y in self.grid.points[vertices]])
                 dofs = self.grid.dofs[vertices]
-                apart = np.abs(v[dofs] - new) > 1e-9 * np.abs(new).max()
+                size = np.abs(velocity.at(0, 0)[:2]).sum() + abs(velocity.angular) * self.scene.size
+                apart = np.abs(v[dofs] - new) > 1e-9 * np.array([size, size, abs(velocity.angular)])
                 if apart.any():
                     x, y = self.grid.points[vertices[np.flatnonzero(apart.any(axis=1))[0]]]
                     raise SceneError(

@@ -187,7 +187,8 @@ class Solution:
     def __str__(self) -> str:
         beams, cells = len(self.scene.beams), len(self.grid.cells)
         return (
-            f"{beams} beams, {cells} cells, {self.grid.size} degrees of freedom\n"
+            f"{beams} beam{'s' * (beams != 1)}, {cells} cell{'s' * (cells != 1)}, "
+            f"{self.grid.size} degrees of freedom\n"
             f"t = {self._times[0]:g} to {self._times[-1]:g} s in {self.parts} steps, "
             f"{self.iterations / max(self.parts, 1):.2f} Newton iterations each, "
             f"{self.seconds:.2f} s of wall time\n{self.energy}"

@@ -178,9 +178,7 @@ def test_no_supports_no_reactions():
 
 def test_reaction_drives_the_momentum():
     """In dynamics a reaction acts during the step that ends at its time."""
-    scene, _ = cantilever(
-        lambda b: ub.PointLoad(b.end, force=(2, -8), time=lambda t: math.cos(t))
-    )
+    scene, _ = cantilever(lambda b: ub.PointLoad(b.end, force=(2, -8), time=lambda t: math.cos(t)))
     solution = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05)
     t = solution.times
     forces = solution.reaction(scene.supports[0])[1:, :2] + np.outer(
