@@ -188,7 +188,8 @@ class Count(ub.Recorder):
 def test_recorders_of_users():
     count = Count()
     solution = run(scene(), count, steps=2)
-    assert count.calls == ["require_writable", "open", "write", "write", "close"]
+    asked = ["require_writable"] if MPI.COMM_WORLD.rank == 0 else []
+    assert count.calls == [*asked, "open", "write", "write", "close"]
     assert count.times == list(solution.times)
     alone = Count()
     ub.simulate(scene(), ub.Midpoint(), t=(0, 1), dt=0.5, record=alone)  # no list
