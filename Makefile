@@ -8,12 +8,14 @@ export OMPI_ALLOW_RUN_AS_ROOT = 1
 export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM = 1
 export PRTE_MCA_rmaps_default_mapping_policy = :oversubscribe
 export PRTE_MCA_mapby = :oversubscribe
+# Ranks that wait leave the core to the others: three of them share the two cores of a small machine.
+export OMPI_MCA_mpi_yield_when_idle = 1
 
-# $(call mpi,N) COMMAND...: only the first rank writes to the terminal; what another writes is shown if it fails.
-mpi = ./env mpirun -n $(1) sh -c 'rank=$${OMPI_COMM_WORLD_RANK:-$${PMI_RANK:-0}}; [ $$rank = 0 ] && exec "$$@"; \
+# $(call mpi,N) COMMAND...: a rank that fails alone leaves the others waiting, hence the limit in seconds; only the first rank writes to the terminal; what another writes is shown if it fails.
+mpi = ./env timeout 1200 mpirun -n $(1) sh -c 'rank=$${OMPI_COMM_WORLD_RANK:-$${PMI_RANK:-0}}; [ $$rank = 0 ] && exec "$$@"; \
 	log=.rank$$rank.log; "$$@" >$$log 2>&1 && exec rm $$log; status=$$?; echo "rank $$rank:"; cat $$log; exit $$status' -
 pytest_mpi = python3 -m pytest -q --color=no -p no:cacheprovider tests/unit tests/properties
-cheap_demos = demos/demo_four_beam_swing.py
+cheap_demos = demos/demo_four_beam_swing.py demos/demo_roll_up.py
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 12
