@@ -27,6 +27,7 @@ __all__ = [
     "TABULATE",
     "VERSION",
     "Array",
+    "cell_coordinates",
     "cpp",
     "csr_matrix",
     "dolfinx",
@@ -77,6 +78,13 @@ def line_mesh(points: Array, cells: npt.NDArray[np.int64]) -> mesh.Mesh:
     line = ufl.Mesh(basix.ufl.element("Lagrange", "interval", 1, shape=(2,)))
     more = {} if VERSION < (0, 10) else {"max_facet_to_cell_links": 2}
     return mesh.create_mesh(MPI.COMM_SELF, cells=cells, x=points, e=line, **more)
+
+
+def cell_coordinates(domain: mesh.Mesh) -> Array:
+    """Vertices of the cells; shape (num_cells, 2, 3); m."""
+    geometry = domain.geometry
+    dofmap = geometry.dofmap if VERSION < (0, 11) else geometry.dofmaps[0]
+    return np.ascontiguousarray(geometry.x[dofmap])
 
 
 def space_with_dofs(

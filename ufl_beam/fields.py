@@ -6,7 +6,7 @@ import basix.ufl
 import numpy as np
 import ufl
 
-from ufl_beam.compat import Array, csr_matrix, fem, line_mesh, space_with_dofs
+from ufl_beam.compat import Array, cell_coordinates, csr_matrix, fem, line_mesh, space_with_dofs
 from ufl_beam.forms import Kernel
 from ufl_beam.grid import Index, Share
 from ufl_beam.kinematics import Axis
@@ -30,8 +30,7 @@ class Fields:
         vertices, cells = np.unique(grid.cells[share.cells], return_inverse=True)
         self.mesh = line_mesh(grid.points[vertices], cells.reshape(-1, 2))
         self.order: Index = np.asarray(self.mesh.topology.original_cell_index, dtype=np.int64)
-        geometry = self.mesh.geometry
-        self._coordinates = np.ascontiguousarray(geometry.x[geometry.dofmap])
+        self._coordinates = cell_coordinates(self.mesh)
         self._require_direction(grid.points[grid.cells[share.cells[self.order]]])
         self.cell_dofs = share.cell_dofs[self.order]
         self.axis = Axis(self.mesh)
