@@ -290,7 +290,14 @@ def _add_beams(
 
 def _add_text(plotter: Any, look: _Look, text: str, position: tuple[float, float]) -> None:
     size = look.size[1] // 40
-    plotter.add_text(text, position, size, "black", name=str(position), viewport=True)
+    plotter.add_text(
+        text,
+        position=position,
+        font_size=size,
+        color="black",
+        name=str(position),
+        viewport=True,
+    )
 
 
 def _add_fittings(pyvista: Any, plotter: Any, look: _Look, n: int, points: Array) -> None:
@@ -312,9 +319,14 @@ def _add_fittings(pyvista: Any, plotter: Any, look: _Look, n: int, points: Array
         radius = max(max(map(look.depth, beams)) / 2, (0.4 if turns else 0.0) * symbol)
         height = max(map(look.width, beams)) * (1.25 if turns else 1.02)
         at = center(joint.places[0])
-        pins.append(pyvista.Cylinder(at, (0, 0, 1), radius, height, resolution=32))
+        pin = {"center": at, "direction": (0, 0, 1), "radius": radius, "height": height}
+        pins.append(pyvista.Cylinder(**pin, resolution=32))
     add(pins, "#707070", "joints")
-    add([pyvista.Sphere(1.1 * symbol, center(m.place)) for m in scene.masses], INK, "masses")
+    add(
+        [pyvista.Sphere(radius=1.1 * symbol, center=center(m.place)) for m in scene.masses],
+        INK,
+        "masses",
+    )
     supports = []
     for support in scene.supports:
         turned = solution.q[n][solution.grid.dofs[solution.grid.vertex(support.place), 2]]
