@@ -6,6 +6,7 @@ from ufl_beam.ledger import Energy
 from ufl_beam.loads import FollowerLoad, Gravity, LineLoad, PointLoad, Table, ramp
 from ufl_beam.record import XDMF, History, Recorder
 from ufl_beam.render import animate, render
+from ufl_beam.running import say, simulate
 from ufl_beam.scene import (
     Clamped,
     Joint,
@@ -21,7 +22,7 @@ from ufl_beam.scene import (
 )
 from ufl_beam.schemes import Midpoint, Static
 from ufl_beam.sections import Section
-from ufl_beam.simulation import Simulation, say, simulate
+from ufl_beam.simulation import Simulation
 from ufl_beam.solution import Solution
 from ufl_beam.solve import Newton
 from ufl_beam.view import picture, plot, plot_energy, plot_history, plot_shapes

@@ -1,0 +1,113 @@
+"""A run from beginning to end: steps, what is kept, what is written on the way."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+
+from mpi4py import MPI
+
+from tqdm import tqdm
+
+from ufl_beam.errors import (
+    SceneError,
+    require_count,
+    require_kind,
+    require_number,
+    require_sequence,
+)
+from ufl_beam.record import Recorder, on_first
+from ufl_beam.scene import Scene
+from ufl_beam.schemes import Scheme
+from ufl_beam.simulation import Simulation
+from ufl_beam.solution import Solution
+from ufl_beam.solve import Newton
+
+
+def simulate(
+    scene: Scene,
+    scheme: Scheme,
+    *,
+    t: tuple[float, float],
+    dt: float,
+    record: Sequence[Recorder] | Recorder = (),
+    every: int = 1,
+    start: Solution | None = None,
+    newton: Newton | None = None,
+    progress: bool = True,
+    comm: MPI.Intracomm = MPI.COMM_WORLD,
+) -> Solution:
+    """Simulate a scene.
+
+    Args:
+        scene: What is modelled.
+        scheme: :class:`Static` or :class:`Midpoint`.
+        t: Beginning and end; s.  In statics time is the load parameter.
+        dt: Step; s.  All steps are a little shorter if ``dt`` does not divide the time.  A step
+            without convergence is cut into parts.
+        record: Files to write on the way, such as :class:`XDMF` and :class:`History`.
+        every: Keep every so many steps in the solution; the last one always.
+        start: Solution of the same beams whose last state is the initial state.
+        newton: Tolerances and PETSc options.
+        progress: Show a progress bar if the output is a terminal.
+        comm: Processes that share the scene; a small one is computed by each of them.
+
+    Returns:
+        The motion, the forces and the ledger.
+
+    Raises:
+        SceneError: The call or the scene is wrong; nothing was computed.
+        ConvergenceError: A step failed; it carries the solution so far, and files are complete.
+    """
+    t0, t1 = _require_times(t, dt)
+    require_count(every, "simulate: every")
+    recorders = (record,) if isinstance(record, Recorder) else require_sequence(record, "record")
+    for i, recorder in enumerate(recorders):
+        require_kind(recorder, Recorder, f"simulate: record[{i}]")
+        on_first(comm, recorder.require_writable)
+    begin = time.perf_counter()
+    simulation = Simulation(scene, scheme, t0=t0, start=start, newton=newton, comm=comm)
+    # A step is never longer than asked for; the slack is for the rounding of (t1 - t0) / dt.
+    steps = max(1, math.ceil((t1 - t0) / dt * (1 - 1e-9)))
+    solution = simulation.solution
+    try:
+        for recorder in recorders:
+            recorder.open(simulation)
+        solution.keep(simulation)
+        quiet = None if progress and comm.rank == 0 else True
+        for n in tqdm(range(1, steps + 1), unit="step", disable=quiet, mininterval=0.5):
+            simulation.step_to(t0 + (t1 - t0) * n / steps)
+            if n % every == 0 or n == steps:
+                solution.keep(simulation)
+            for recorder in recorders:
+                recorder.write(simulation)
+    except BaseException as error:
+        # Whatever stops a run, an interrupt or a user's function, what was reached is not lost.
+        error.__dict__["solution"] = solution
+        raise
+    finally:
+        for recorder in recorders:
+            recorder.close()
+        simulation.close()
+        solution.seconds = time.perf_counter() - begin
+    return solution
+
+
+def _require_times(t: tuple[float, float], dt: float) -> tuple[float, float]:
+    try:
+        t0, t1 = t
+    except (TypeError, ValueError):
+        raise SceneError(f"simulate: t = {t!r} must be a pair (beginning, end)") from None
+    require_number(t0, "simulate: t[0]")
+    require_number(t1, "simulate: t[1]")
+    require_number(dt, "simulate: dt", positive=True)
+    if t1 <= t0:
+        raise SceneError(f"simulate: the end t[1] = {t1:g} must come after the beginning {t0:g}")
+    return float(t0), float(t1)
+
+
+def say(*words: object, sep: str = " ") -> None:
+    """Print from the first process only, as scripts do that may run under ``mpirun``."""
+    if MPI.COMM_WORLD.rank == 0:
+        print(*words, sep=sep, flush=True)  # noqa: T201
