@@ -13,6 +13,7 @@ import os
 import sys
 import sysconfig
 import tempfile
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -74,14 +75,11 @@ ffi: Any = _module.ffi
 lib: Any = _module.lib
 
 
-def doubles(array: Any) -> Any:
-    """Pointer to the contiguous array of float64; it keeps the array alive."""
-    return ffi.from_buffer("double[]", array)
+doubles = partial(ffi.from_buffer, ffi.typeof("double[]"))
+"""Pointer to a contiguous array of float64; it keeps the array alive."""
 
-
-def integers(array: Any) -> Any:
-    """Pointer to the contiguous array of int32; it keeps the array alive."""
-    return ffi.from_buffer("int32_t[]", array)
+integers = partial(ffi.from_buffer, ffi.typeof("int32_t[]"))
+"""Pointer to a contiguous array of int32; it keeps the array alive."""
 
 
 def kernel(pointer: Any, of: Any) -> Any:

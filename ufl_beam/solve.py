@@ -212,7 +212,7 @@ class Solver:
         scale = self._loads + self._size(self._forces())
         if residual <= self._newton.rtol * scale:
             return CONVERGED
-        if iteration > 0:
+        if iteration > 1:
             floor = self._round_off()
             # A tenth of the last digit is luck; a few of them that Newton's method no longer halves
             # are all that can be had.
