@@ -59,6 +59,9 @@ class Scheme(Protocol):
     dynamic: bool
     """Whether the scene has inertia."""
 
+    advice: str
+    """What to try where a step finds no equilibrium."""
+
     load_weight: float
     """Follower loads turn with the rotation at this part of the step."""
 
@@ -108,6 +111,10 @@ class Static:
     """
 
     dynamic = False
+    advice = (
+        "Try a smaller dt; beyond a limit load there is no equilibrium nearby, so prescribe a "
+        "displacement in the place of the load, or run dynamics"
+    )
     load_weight = 1.0
 
     def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
@@ -162,6 +169,10 @@ class Midpoint:
     beta: float = 0.0
 
     dynamic = True
+    advice = (
+        "Try a smaller dt, loads and motions without jumps, or more energy taken out of high "
+        "frequencies, such as Midpoint(alpha=0.05, beta=0.05)"
+    )
     load_weight = 0.5
 
     def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:

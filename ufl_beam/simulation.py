@@ -264,8 +264,7 @@ class Simulation:
         dt = end - self.t
         raise ConvergenceError(
             f"no equilibrium after t = {self.t:.9g} s, even with dt = {dt:.3g} s: {failure}. "
-            "Try a smaller dt, a scheme that takes energy out of high frequencies such as "
-            "Midpoint(alpha=0.05, beta=0.05), or loads that grow more slowly",
+            f"{self.scheme.advice}",
             time=self.t,
             dt=dt,
             solution=self.solution,
@@ -293,10 +292,11 @@ class Simulation:
 
     def entries(self) -> tuple[dict[str, float], ...]:
         """The ledger over all processes: state, supplied, lost; J."""
-        groups = (self.ledger.state, self.ledger.supplied, self.ledger.lost)
+        ledger = self.ledger
+        groups = (dict(ledger.state), dict(ledger.supplied), dict(ledger.lost))
         if self.share.comm.size == 1:
-            return tuple(dict(group) for group in groups)
-        everyone = self.share.comm.allgather([dict(group) for group in groups])
+            return groups
+        everyone = self.share.comm.allgather(groups)
         return tuple(
             {name: sum(one[g][name] for one in everyone) for name in group}
             for g, group in enumerate(groups)

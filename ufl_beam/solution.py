@@ -50,7 +50,8 @@ class Solution:
         share = simulation.share
         self._times.append(simulation.t)
         self._q.append(share.gather(simulation.q))
-        self._v.extend(share.gather(v) for v in simulation.velocities())
+        for v in simulation.velocities():
+            self._v.append(share.gather(v))
         self._reactions.append(simulation.reactions())
         self._entries.append(simulation.entries())
         self.parts, self.iterations = simulation.parts, simulation.iterations
