@@ -35,8 +35,8 @@ PATH = 0.1
 SMALLEST_SHARE = 100_000
 """Scenes with fewer cells per process are computed by each process.
 
-Measured on two cores: shared with MUMPS, an iteration takes five times as long at 500 to 32 000 cells
-and four times at 100 000, so that only memory speaks for sharing.
+Measured on two cores: shared with MUMPS, an iteration takes five times as long at 500 to 32 000
+cells and four times at 100 000, so that only memory speaks for sharing.
 """
 
 LARGEST_TURN = 0.75 * math.pi
