@@ -1,7 +1,10 @@
 """Planar flexible multibody dynamics with geometrically exact beams.  Units are SI."""
 
 from ufl_beam.beams import Beam, Place
+from ufl_beam.distributions import Lognormal, Normal, TruncatedNormal, Weibull
 from ufl_beam.errors import ConvergenceError, SceneError
+from ufl_beam.fibres import Fibres
+from ufl_beam.laws import DuvautLions, Hardening, LinearSoftening, Perzyna, Softening
 from ufl_beam.ledger import Energy
 from ufl_beam.loads import FollowerLoad, Gravity, LineLoad, PointLoad, Table, ramp
 from ufl_beam.record import XDMF, History, Recorder
@@ -20,7 +23,7 @@ from ufl_beam.scene import (
     Support,
     Velocity,
 )
-from ufl_beam.schemes import Midpoint, Static
+from ufl_beam.schemes import ExactStatic, Midpoint, Static
 from ufl_beam.sections import Section
 from ufl_beam.simulation import Simulation
 from ufl_beam.solution import Solution
@@ -32,14 +35,22 @@ __all__ = [
     "Beam",
     "Clamped",
     "ConvergenceError",
+    "DuvautLions",
     "Energy",
+    "ExactStatic",
+    "Fibres",
     "FollowerLoad",
     "Gravity",
+    "Hardening",
     "History",
     "Joint",
     "LineLoad",
+    "LinearSoftening",
+    "Lognormal",
     "Midpoint",
     "Newton",
+    "Normal",
+    "Perzyna",
     "Pinned",
     "Place",
     "PointLoad",
@@ -53,11 +64,14 @@ __all__ = [
     "SceneError",
     "Section",
     "Simulation",
+    "Softening",
     "Solution",
     "Static",
     "Support",
     "Table",
+    "TruncatedNormal",
     "Velocity",
+    "Weibull",
     "animate",
     "picture",
     "plot",

@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from itertools import pairwise
 
-from ufl_beam.errors import SceneError, require_count, require_number, require_vector
+from ufl_beam.errors import (
+    SceneError,
+    require_count,
+    require_kind,
+    require_number,
+    require_vector,
+)
+from ufl_beam.laws import Softening
 from ufl_beam.sections import Section
 
 Point = tuple[float, float]
@@ -27,9 +34,12 @@ class Beam:
         name: What error messages and pictures call it.
         curve: Axis from ``s = 0`` at ``a`` to ``s = 1`` at ``b``.
         corners: Parameters ``s`` that must be vertices.
+        hinges: Laws of hinges in single cells, by a parameter ``s`` in the cell; at a vertex the
+            cell before it.  They come before the law of the section.
 
     Raises:
-        SceneError: Zero length, ``cells < 1`` or coordinates that are no finite numbers.
+        SceneError: Zero length, ``cells < 1``, coordinates that are no finite numbers, or hinges in
+            a section that has none.
     """
 
     a: Point
@@ -40,6 +50,7 @@ class Beam:
     name: str = "beam"
     curve: Curve = field(default=None, repr=False)  # type: ignore[assignment]
     corners: tuple[float, ...] = ()
+    hinges: Mapping[float, Softening] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         a, b = (require_vector(x, f"{self.name}: end") for x in (self.a, self.b))
@@ -61,6 +72,16 @@ class Beam:
             require_number(s, f"{self.name}: corner")
             if not 0.0 < s < 1.0:
                 raise SceneError(f"{self.name}: corner s = {s:g} must lie between 0 and 1")
+        require_kind(self.hinges, Mapping, f"{self.name}: hinges")
+        for s, law in self.hinges.items():
+            require_number(s, f"{self.name}: hinge at")
+            if not 0.0 <= s <= 1.0:
+                raise SceneError(f"{self.name}: hinge at s = {s:g} must lie between 0 and 1")
+            require_kind(law, Softening, f"{self.name}: hinge at s = {s:g}")
+        if self.hinges and self.section.fibres is not None:
+            raise SceneError(
+                f"{self.name}: hinges are for resultants; here the fibres of the section soften"
+            )
         for s in (*self.corners, *(i / self.cells for i in range(self.cells + 1))):
             require_vector(self.curve(s), f"{self.name}: curve({s:g})")
 

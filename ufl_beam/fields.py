@@ -14,7 +14,11 @@ from ufl_beam.sparse import Csr
 
 
 class Fields:
-    """Mesh and function spaces of the cells of one process.
+    """Mesh and function spaces of the cells of one process, or of some of them.
+
+    Args:
+        share: The cells and degrees of freedom of this process.
+        part: Positions in ``share.cells`` of the cells that are meant; all by default.
 
     Attributes:
         share: The cells and degrees of freedom of this process.
@@ -24,12 +28,14 @@ class Fields:
         order: Position in ``share.cells`` of each cell of the mesh.
     """
 
-    def __init__(self, share: Share) -> None:
+    def __init__(self, share: Share, part: Index | None = None) -> None:
         self.share = share
         grid = share.grid
-        vertices, cells = np.unique(grid.cells[share.cells], return_inverse=True)
+        if part is None:
+            part = np.arange(len(share.cells))
+        vertices, cells = np.unique(grid.cells[share.cells[part]], return_inverse=True)
         self.mesh = line_mesh(grid.points[vertices], cells.reshape(-1, 2))
-        self.order: Index = np.asarray(self.mesh.topology.original_cell_index, dtype=np.int64)
+        self.order: Index = part[np.asarray(self.mesh.topology.original_cell_index)]
         self._coordinates = cell_coordinates(self.mesh)
         self._require_direction(grid.points[grid.cells[share.cells[self.order]]])
         self.cell_dofs = share.cell_dofs[self.order]
@@ -45,7 +51,7 @@ class Fields:
 
     def matrix(self) -> Csr:
         """A new matrix on the degrees of freedom of this process."""
-        return Csr(csr_matrix(self.mesh, self.cell_dofs, self.share.size))
+        return Csr(csr_matrix(self.mesh, self.share.cell_dofs, self.share.size))
 
     def _require_direction(self, ends: Array) -> None:
         """The mesh must keep the order of the vertices of a cell, which orients the beam."""
@@ -76,6 +82,11 @@ class Fields:
         cells = self.share.cells[self.order]
         function.x.array[:] = of_beam[grid.beam_of_cell[cells]].ravel()
         return function
+
+    def at_points(self, *shape: int) -> fem.Function:
+        """A new function with values of a shape in the one quadrature point of each cell."""
+        element = basix.ufl.quadrature_element("interval", value_shape=shape, degree=1)
+        return fem.Function(fem.functionspace(self.mesh, element))
 
     def constant(self, value: float) -> fem.Constant:
         """A number that forms are not compiled for anew."""

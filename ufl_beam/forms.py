@@ -86,6 +86,10 @@ class Kernel:
         if self.depends_on(function):
             self._packed[:, self._columns[function]] = q[self._dofs]
 
+    def put(self, function: fem.Function, values: Array) -> None:
+        """Give ``function`` other values in the cells; shape (num_cells, dofs per cell)."""
+        self._packed[:, self._columns[function]] = values
+
     def share(self, other: Kernel) -> None:
         """Use the packed values of ``other``, a form of the same coefficients."""
         if self._columns != other._columns:

@@ -18,6 +18,7 @@ import numpy.typing as npt
 from ufl_beam.beams import Beam, Place
 from ufl_beam.compat import Array
 from ufl_beam.errors import SceneError, require_kind
+from ufl_beam.laws import Softening
 from ufl_beam.scene import COMPONENTS, Scene
 
 Index = npt.NDArray[Any]
@@ -95,6 +96,25 @@ class Grid:
         """The vertex at a place that something is attached to."""
         vertices, weights = self.weights(place)
         return int(vertices[np.argmax(weights)])
+
+    def cell(self, place: Place) -> int:
+        """The cell at a place; at a vertex the one before it, at the start the first one."""
+        (first, _), _ = self.weights(place)
+        return int(first) - self._index(place.beam)
+
+    def hinges(self, beam: Beam) -> list[Softening | None]:
+        """Law of the hinge in each cell of a beam."""
+        cells = self.cells_of(beam)
+        laws = [beam.section.hinge] * len(cells)
+        for s, law in beam.hinges.items():
+            laws[self.cell(beam.at(s)) - cells[0]] = law
+        return laws
+
+    def keys(self, cells: Index) -> list[tuple[int, int]]:
+        """Number of the beam, and number in the beam, of some cells."""
+        beams = self.beam_of_cell[cells]
+        first = (self._first - np.arange(len(self._first)))[beams]
+        return [(int(b), int(c)) for b, c in zip(beams, cells - first, strict=True)]
 
     def describe(self, dof: int) -> str:
         """A degree of freedom in words: its component, beam and point."""
@@ -188,11 +208,15 @@ class Share:
         rotations = np.unique(self.local(self.grid.dofs[:, 2]))
         return rotations.astype(np.int32)
 
+    def cell_lengths(self) -> Array:
+        """Lengths of the cells; m."""
+        ends = self.grid.points[self.grid.cells[self.cells]]
+        return np.asarray(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
+
     def lengths(self) -> Array:
         """What a strain of one is to each local degree of freedom: a cell's length, or a radian."""
-        ends = self.grid.points[self.grid.cells[self.cells]]
         lengths = np.ones(self.size)
-        lengths[self.cell_dofs[:, :4]] = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)[:, None]
+        lengths[self.cell_dofs[:, :4]] = self.cell_lengths()[:, None]
         return lengths
 
     def local(self, dofs: Index) -> Index:

@@ -20,6 +20,7 @@ from ufl_beam.compat import Array
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.grid import Index
 from ufl_beam.kinematics import Axis
+from ufl_beam.laws import Softening, Values
 from ufl_beam.loops import doubles, integers, lib
 
 Constant = Callable[[float], Expr]
@@ -65,8 +66,20 @@ class Scheme(Protocol):
     load_weight: float
     """Follower loads turn with the rotation at this part of the step."""
 
+    theta: float
+    """Laws of inelastic material are stated at this part of the step."""
+
+    exact: bool
+    """Whether the works of a step are the exact increments of energies."""
+
+    loss: float
+    """Part of twice the energy of a change of strain that is lost numerically."""
+
     def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
         """The step from ``t0`` to ``t1``, perhaps a part of one that goes on to ``end``."""
+
+    def resistance(self, softening: Softening, opening: Array, growth: Values) -> Values:
+        """Traction of a discontinuity whose opening grows in the step."""
 
     def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
         """Variation of the strains that the resultants work on; shape (3,)."""
@@ -116,6 +129,9 @@ class Static:
         "displacement in the place of the load, or run dynamics"
     )
     load_weight = 1.0
+    theta = 1.0
+    loss = 0.0
+    exact = False
 
     def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
         """Parts of a step go in proportion to the loads and motions of its end.
@@ -123,6 +139,10 @@ class Static:
         So loads that are there at once can be reached in parts as well as those that grow.
         """
         return Step(t0, t1, q0, load_time=end, motion_time=end, toward=(t1 - t0) / (end - t0))
+
+    def resistance(self, softening: Softening, opening: Array, growth: Values) -> Values:
+        """The traction at the end of the step."""
+        return softening.traction(opening + growth)
 
     def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
         """The variation at the end of the step."""
@@ -145,45 +165,25 @@ class Static:
         return (before + now) / 2
 
 
-@dataclass(frozen=True)
-class Midpoint:
-    """Midpoint rule that conserves energy and momentum exactly, or loses energy as it is told.
+class _ExactStep:
+    """What steps have in common whose works are exact increments of energy."""
 
-    ``alpha = beta = 0`` conserves energy, linear and angular momentum to solver tolerance at any
-    step size.  Positive values take energy out of the high frequencies, never in: ``alpha`` through
-    the resultants, which keeps the momenta exact; ``beta`` through the velocities, which gives
-    up angular momentum.  What they take is the entry "numerical" of the ledger.
+    alpha: float
+    exact = True
 
-    Args:
-        alpha: Dissipation by the resultants, from 0 to 1/2.
-        beta: Dissipation by the velocities, from 0 to 1/2.
+    @property
+    def theta(self) -> float:
+        """The resultants of P(89) are those at this part of the step."""
+        return 0.5 + self.alpha
 
-    Raises:
-        SceneError: A number outside [0, 1/2].
+    @property
+    def loss(self) -> float:
+        """What ``alpha`` takes."""
+        return self.alpha
 
-    Equations:
-        P(77)-P(91); P(82) corrected, see docs/errata.md.
-    """
-
-    alpha: float = 0.0
-    beta: float = 0.0
-
-    dynamic = True
-    advice = (
-        "Try a smaller dt, loads and motions without jumps, or more energy taken out of high "
-        "frequencies, such as Midpoint(alpha=0.05, beta=0.05)"
-    )
-    load_weight = 0.5
-
-    def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
-        """Loads act in the middle of the step, motions arrive at its end."""
-        return Step(t0, t1, q0, load_time=(t0 + t1) / 2, motion_time=t1, toward=1.0)
-
-    def __post_init__(self) -> None:
-        for name, value in (("alpha", self.alpha), ("beta", self.beta)):
-            require_number(value, f"Midpoint: {name}", at_least=0.0)
-            if value > 0.5:
-                raise SceneError(f"Midpoint: {name} = {value:g} must lie between 0 and 1/2")
+    def resistance(self, softening: Softening, opening: Array, growth: Values) -> Values:
+        """The mean traction, so that the work of the step is what the opening dissipates."""
+        return softening.mean_traction(opening, growth)
 
     def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
         """The variation that turns the step into the increment of the strains."""
@@ -214,6 +214,88 @@ class Midpoint:
         """The forces in the equation of the step."""
         return now
 
+
+@dataclass(frozen=True)
+class ExactStatic(_ExactStep):
+    """Equilibrium without inertia, with an exact ledger: works are exact increments of energy.
+
+    :class:`Static` finds equilibrium at the ends of the steps and counts works by the trapezoidal
+    rule; here the equation of the step is that of :class:`Midpoint`.  Inelastic material follows
+    its laws over the step, not only at its end.
+
+    Args:
+        theta: Part of the step at which resultants and loads are in equilibrium.  1/2 loses
+            nothing, but leaves the states at the ends free to oscillate about equilibrium; 1
+            brings them there, and what that costs is the entry "numerical" of the ledger.
+
+    Raises:
+        SceneError: A number outside [1/2, 1].
+    """
+
+    theta: float = 1.0
+
+    dynamic = False
+    advice = Static.advice
+
+    def __post_init__(self) -> None:
+        _require_between("ExactStatic: theta", self.theta, 0.5, 1.0)
+
+    @property
+    def alpha(self) -> float:  # type: ignore[override]
+        """Dissipation by the resultants."""
+        return self.theta - 0.5
+
+    @property
+    def load_weight(self) -> float:
+        """Follower loads turn with the rotation where the resultants are in equilibrium."""
+        return self.theta
+
+    def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
+        """Loads act where the resultants are, motions arrive at the end."""
+        return Step(t0, t1, q0, t0 + self.theta * (t1 - t0), motion_time=t1, toward=1.0)
+
+
+@dataclass(frozen=True)
+class Midpoint(_ExactStep):
+    """Midpoint rule that conserves energy and momentum exactly, or loses energy as it is told.
+
+    ``alpha = beta = 0`` conserves energy, linear and angular momentum to solver tolerance at any
+    step size.  Positive values take energy out of the high frequencies, never in: ``alpha`` through
+    the resultants, which keeps the momenta exact; ``beta`` through the velocities, which gives
+    up angular momentum.  What they take is the entry "numerical" of the ledger.
+
+    Laws of inelastic material are stated in the middle of the step, which is of second order;
+    ``alpha = 1/2`` states them at its end: backward Euler, of first order.
+
+    Args:
+        alpha: Dissipation by the resultants, from 0 to 1/2.
+        beta: Dissipation by the velocities, from 0 to 1/2.
+
+    Raises:
+        SceneError: A number outside [0, 1/2].
+
+    Equations:
+        P(77)-P(91); P(82) corrected, see docs/errata.md.
+    """
+
+    alpha: float = 0.0
+    beta: float = 0.0
+
+    dynamic = True
+    load_weight = 0.5
+    advice = (
+        "Try a smaller dt, loads and motions without jumps, or more energy taken out of high "
+        "frequencies, such as Midpoint(alpha=0.05, beta=0.05)"
+    )
+
+    def __post_init__(self) -> None:
+        for name in ("alpha", "beta"):
+            _require_between(f"Midpoint: {name}", getattr(self, name), 0.0, 0.5)
+
+    def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
+        """Loads act in the middle of the step, motions arrive at its end."""
+        return Step(t0, t1, q0, load_time=(t0 + t1) / 2, motion_time=t1, toward=1.0)
+
     def velocity_weights(self, dt: float) -> tuple[float, float]:
         """(a, b) of the velocities v1 = a s - b v0 after the step s of the nodes."""
         keep = 0.5 + self.beta
@@ -223,3 +305,9 @@ class Midpoint:
 def _scaled(C: Expr, e: Expr) -> Expr:
     """Component by component product; shape (3,)."""
     return ufl.as_vector([C[i] * e[i] for i in range(3)])
+
+
+def _require_between(what: str, value: float, low: float, high: float) -> None:
+    require_number(value, what, at_least=low)
+    if value > high:
+        raise SceneError(f"{what} = {value:g} must lie between {low:g} and {high:g}")

@@ -13,16 +13,17 @@ from ufl_beam.applied import DeadLoads, FollowerLoads
 from ufl_beam.compat import Array
 from ufl_beam.errors import ConvergenceError, SceneError, require_kind
 from ufl_beam.fields import Fields
-from ufl_beam.grid import Grid, Share
+from ufl_beam.grid import Grid, Index, Share
+from ufl_beam.inelastic import InelasticBeams, expect_entries, inelastic_cells
 from ufl_beam.ledger import Ledger
 from ufl_beam.loads import FollowerLoad
 from ufl_beam.mechanism import require_no_mechanism
 from ufl_beam.scene import Scene
 from ufl_beam.schemes import Scheme, has_inertia
-from ufl_beam.solution import Solution
+from ufl_beam.solution import Material, Solution
 from ufl_beam.solve import Newton, Solver, StepFailed
 from ufl_beam.supports import Supports
-from ufl_beam.terms import ElasticBeams, Inertia, SectionForces, Term
+from ufl_beam.terms import Beams, ElasticBeams, Inertia, SectionForces, Term
 
 SMALLEST_PART = 2**12
 """A step is cut into at most this number of parts."""
@@ -92,23 +93,33 @@ class Simulation:
         self.ledger = Ledger()
         self.parts = 0
 
-        self.beams = ElasticBeams(self.fields, scheme, self._A, self.ledger)
+        self.elastic: list[ElasticBeams] = []
+        self.inelastic: list[InelasticBeams] = []
+        self._make_beams()
+        self.force = np.zeros(self.share.size)
         self.loads = self._make_loads()
-        self.terms: list[Term] = [self.beams, *self.loads]
+        self._beams: list[Beams] = [*self.elastic, *self.inelastic]
+        self._others: list[Term] = [*self.loads]
         if has_inertia(scheme):
             v = v[self.share.dofs]
             self.inertia = Inertia(self.fields, scheme, self._A, self.ledger, v)
-            self.terms.append(self.inertia)
+            self._others.append(self.inertia)
+        self.terms: list[Term] = [*self._beams, *self._others]
         self.supports = Supports(self.share, scheme, self.ledger, self._A)
         if start is not None:
             for load in self.loads:
                 load.carry_on(self.t, self.q)
+            for cells, rows in start.internal:
+                for inelastic in self.inelastic:
+                    inelastic.restore(cells, rows)
         self._q_before: Array = self.q
         self._dt_before = math.inf
         self._rotations = self.share.rotations()
         self._force_before: Array = np.zeros(self.share.size)
-        if not scheme.dynamic:
-            self.beams.add_residual(self.q, self._force_before)
+        self._follows = not (scheme.exact or self._has_inelastic)
+        if self._follows:
+            for beams in self._beams:
+                beams.add_residual(self.q, self._force_before)
         for term in self.terms:
             term.add_state(self.q)
         self._solver = Solver(
@@ -117,12 +128,33 @@ class Simulation:
             residual=self._residual,
             complete=self.supports.hold,
             tangent=self._tangent,
-            forces=lambda: self.beams.force,
+            forces=lambda: self.force,
             newton=newton or Newton(),
         )
         self.solution = Solution(scene, self.grid)
 
     # -- building ------------------------------------------------------------------------------
+
+    def _make_beams(self) -> None:
+        """Beams of the cells of this process: elastic ones, and those with material points."""
+        elastic = np.ones(len(self.share.cells), dtype=bool)
+        groups = inelastic_cells(self.grid)
+        self._has_inelastic = bool(groups)
+        for layout, cells in groups:
+            expect_entries(layout, self.scheme, self.ledger)
+            part = np.flatnonzero(np.isin(self.share.cells, cells))
+            if len(part):
+                elastic[part] = False
+                fields = Fields(self.share, part)
+                self.inelastic.append(
+                    InelasticBeams(fields, layout, self.scheme, self._A, self.ledger)
+                )
+        if elastic.all():
+            self._elastic_fields = [self.fields]
+        else:
+            self._elastic_fields = [Fields(self.share, np.flatnonzero(elastic))] * elastic.any()
+        for fields in self._elastic_fields:
+            self.elastic.append(ElasticBeams(fields, self.scheme, self._A, self.ledger))
 
     def _make_loads(self) -> list[DeadLoads | FollowerLoads]:
         followers = [load for load in self.scene.loads if isinstance(load, FollowerLoad)]
@@ -172,8 +204,11 @@ class Simulation:
 
     def _residual(self, x: Array, r: Array) -> None:
         q1 = self.supports.in_plane(x)
-        r.fill(0.0)
-        for term in self.terms:
+        self.force.fill(0.0)
+        for beams in self._beams:
+            beams.add_residual(q1, self.force)
+        r[:] = self.force
+        for term in self._others:
             term.add_residual(q1, r)
         self.supports.enter(r)
 
@@ -224,7 +259,7 @@ class Simulation:
         self.supports.leave(q1)
         s, turn = self.scheme.nodal_step(self.q, q1, self._rotations)
         self._require_small(turn)
-        if not self.scheme.dynamic:
+        if self._follows:
             self._require_followed(q1, s)
         for term in self.terms:
             term.accept(q1, s)
@@ -251,10 +286,12 @@ class Simulation:
 
         Otherwise Newton's method may have found another branch of equilibria than the one followed.
         """
-        force = self.beams.force
+        force = self.force
         work = self.share.total(float(self.scheme.acting(self._force_before, force) @ s))
-        change = self.share.total(self.beams.stored(q1) - self.beams.stored(self.q))
-        held = self.share.total(self.beams.stored(self.q))
+        held, stored = (
+            self.share.total(sum(beams.stored(q) for beams in self._beams)) for q in (self.q, q1)
+        )
+        change = stored - held
         if abs(work - change) > PATH * (abs(work) + abs(change)) + 1e-9 * held:
             raise StepFailed(
                 f"the step stores {change:.3e} J, but the forces along it do {work:.3e} J of work: "
@@ -312,11 +349,33 @@ class Simulation:
 
     def section_forces(self) -> Array:
         """(N, V, M) in all cells; (num_cells, 3); N, N, N m; all processes call it together."""
-        return self.share.gather_cells(self._section_forces(self.q))
+        forces = np.zeros((len(self.share.cells), 3))
+        for elastic in self._section_forces:
+            elastic.write(self.q, forces)
+        for inelastic in self.inelastic:
+            inelastic.write_section_forces(self.q, forces)
+        return self.share.gather_cells(forces)
 
     @cached_property
-    def _section_forces(self) -> SectionForces:
-        return SectionForces(self.fields)
+    def _section_forces(self) -> list[SectionForces]:
+        return [SectionForces(fields) for fields in self._elastic_fields]
+
+    def internal(self) -> list[tuple[Index, Array]]:
+        """Internal variables of all cells that have any; all processes call it together."""
+        here = [inelastic.state() for inelastic in self.inelastic]
+        if self.share.comm.size == 1:
+            return here
+        return [group for groups in self.share.comm.allgather(here) for group in groups]
+
+    def material(self) -> Material | None:
+        """State of the material of all cells; none in a scene that is elastic."""
+        if not self._has_inelastic:
+            return None
+        cells = np.zeros((len(self.share.cells), 3))
+        for inelastic in self.inelastic:
+            inelastic.write_material(cells)
+        jump, plastic, hinge = self.share.gather_cells(cells).T
+        return Material(self.section_forces(), jump, plastic, hinge)
 
     def close(self) -> None:
         """Give back what PETSc holds."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from mpi4py import MPI
 
@@ -13,7 +13,8 @@ from ufl_beam.beams import Beam, Place
 from ufl_beam.compat import Array
 from ufl_beam.errors import SceneError
 from ufl_beam.fields import Fields
-from ufl_beam.grid import Grid, Share
+from ufl_beam.grid import Grid, Index, Share
+from ufl_beam.inelastic import Strains
 from ufl_beam.ledger import Energy
 from ufl_beam.scene import Scene, Support
 from ufl_beam.sparse import Product
@@ -21,6 +22,22 @@ from ufl_beam.terms import SectionForces, mass_matrix
 
 if TYPE_CHECKING:
     from ufl_beam.simulation import Simulation
+
+
+class Material(NamedTuple):
+    """State of the material of all cells at one time.
+
+    Attributes:
+        forces: (N, V, M); (num_cells, 3); N, N, N m.
+        jump: Rotation of the hinges; (num_cells,); rad.
+        plastic: Energy dissipated by plastic strains; (num_cells,); J.
+        hinge: Energy dissipated by hinges, or by the cracks of fibres; (num_cells,); J.
+    """
+
+    forces: Array
+    jump: Array
+    plastic: Array
+    hinge: Array
 
 
 class Solution:
@@ -32,6 +49,7 @@ class Solution:
         parts: Number of steps that were taken, parts of cut steps counted each.
         iterations: Number of Newton iterations.
         seconds: Wall time of the run, building the scene included; s.
+        internal: Cells, and their internal variables in the last state that was kept.
     """
 
     def __init__(self, scene: Scene, grid: Grid) -> None:
@@ -44,6 +62,8 @@ class Solution:
         self._v: list[Array] = []
         self._reactions: list[Array] = []
         self._entries: list[tuple[dict[str, float], ...]] = []
+        self._material: list[Material] = []
+        self.internal: list[tuple[Index, Array]] = []
 
     def keep(self, simulation: Simulation) -> None:
         """Append the state of the simulation; all processes call it together."""
@@ -54,6 +74,10 @@ class Solution:
             self._v.append(share.gather(v))
         self._reactions.append(simulation.reactions())
         self._entries.append(simulation.entries())
+        material = simulation.material()
+        if material is not None:
+            self._material.append(material)
+            self.internal = simulation.internal()
         self.parts, self.iterations = simulation.parts, simulation.iterations
 
     # -- motion --------------------------------------------------------------------------------
@@ -132,21 +156,78 @@ class Solution:
     def _section_forces(self) -> SectionForces:
         return SectionForces(self._fields)
 
+    def _forces(self, n: int) -> Array:
+        """(N, V, M) of all cells: kept where history decides, else computed from the motion."""
+        if self._material:
+            return self._material[n].forces
+        forces = np.empty((len(self.grid.cells), 3))
+        self._section_forces.write(self._q[n], forces)
+        return forces
+
     def section_forces(self, beam: Beam, n: int = -1) -> Array:
         """(N, V, M) in the cells of a beam at the n-th kept time; (num_cells, 3); N, N, N m."""
         cells = self.grid.cells_of(beam)
-        return self._section_forces(self._q[n])[cells]
+        return self._forces(n)[cells]
 
     def section_forces_at(self, place: Place) -> Array:
-        """(N, V, M) in the cell around a place, at a vertex the one before it; (n+1, 3); N, N, N m.
+        """(N, V, M) in the cell at a place; (n+1, 3); N, N, N m.
+
+        At a vertex it is the cell before it, at the start of a beam the first one.
 
         Raises:
             SceneError: The beam of the place is not in the scene.
         """
-        (first, _), _ = self.grid.weights(place)
-        beam = self.grid.vertices_of(place.beam)
-        cell = self.grid.cells_of(place.beam)[first - beam[0]]
-        return np.array([self._section_forces(q)[cell] for q in self._q])
+        cell = self.grid.cell(place)
+        return np.array([self._forces(n)[cell] for n in range(len(self._q))])
+
+    # -- material ------------------------------------------------------------------------------
+
+    @cached_property
+    def _strains(self) -> Strains:
+        return Strains(self._fields)
+
+    def strains(self, beam: Beam, n: int = -1) -> Array:
+        """(Σ, Γ, K) in the cells of a beam at the n-th kept time; (num_cells, 3); 1, 1, 1/m.
+
+        The curvature includes the jump of a hinge over the length of its cell.
+        """
+        return self._all_strains(n)[self.grid.cells_of(beam)]
+
+    def strains_at(self, place: Place) -> Array:
+        """(Σ, Γ, K) in the cell at a place, as :meth:`section_forces_at`; (n+1, 3); 1, 1, 1/m."""
+        cell = self.grid.cell(place)
+        return np.array([self._all_strains(n)[cell] for n in range(len(self._q))])
+
+    def _all_strains(self, n: int) -> Array:
+        strains = np.empty((len(self.grid.cells), 3))
+        strains[self._fields.order] = self._strains(self._q[n])
+        return strains
+
+    def material(self, beam: Beam, n: int = -1) -> Material:
+        """Forces, jumps and dissipated energies in the cells of a beam at the n-th kept time.
+
+        Raises:
+            SceneError: The scene is elastic.
+        """
+        self._require_material()
+        cells = self.grid.cells_of(beam)
+        return Material(*(values[cells] for values in self._material[n]))
+
+    def material_at(self, place: Place) -> Material:
+        """The same in the cell at a place at all kept times; the arrays begin with (n+1,).
+
+        Raises:
+            SceneError: The scene is elastic, or the beam of the place is not in it.
+        """
+        self._require_material()
+        cell = self.grid.cell(place)
+        return Material(
+            *(np.array([v[cell] for v in kept]) for kept in zip(*self._material, strict=True))
+        )
+
+    def _require_material(self) -> None:
+        if not self._material:
+            raise SceneError("material: nothing in the scene yields or breaks; it is elastic")
 
     # -- balances ------------------------------------------------------------------------------
 

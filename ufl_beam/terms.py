@@ -43,12 +43,15 @@ class Term(Protocol):
         """Enter the energy that the term holds in the accepted state ``q``."""
 
 
-class ElasticBeams:
-    """Resultants of all cells working on the virtual strains, P(12).
+class Beams(Term, Protocol):
+    """The work of the resultants of cells; its part of the residual is an internal force."""
 
-    Attributes:
-        force: Internal forces at the latest residual.
-    """
+    def stored(self, q: Array) -> float:
+        """Elastic energy of the cells of this process at the accepted state ``q``; J."""
+
+
+class ElasticBeams:
+    """Resultants of elastic cells working on the virtual strains, P(12)."""
 
     def __init__(self, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger) -> None:
         q0, q1 = fields.configuration(), fields.configuration()
@@ -71,7 +74,6 @@ class ElasticBeams:
         self._A, self._ledger = A, ledger
         if losses:
             ledger.lost["numerical"] += 0.0
-        self.force = np.zeros(fields.share.size)
 
     def begin(self, step: Step) -> None:
         """Remember the configuration at the beginning."""
@@ -80,10 +82,7 @@ class ElasticBeams:
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the internal forces."""
-        force = self.force
-        force.fill(0.0)
-        self._force.add(q1, force)
-        r += force
+        self._force.add(q1, r)
 
     def add_tangent(self, q1: Array) -> None:
         """Add the stiffness, material and geometric."""
@@ -104,7 +103,7 @@ class ElasticBeams:
 
 
 class SectionForces:
-    """(N, V, M) in the cells, from the strains of a configuration, P(7)."""
+    """(N, V, M) in elastic cells, from the strains of a configuration, P(7)."""
 
     def __init__(self, fields: Fields) -> None:
         q = fields.configuration()
@@ -114,13 +113,11 @@ class SectionForces:
         self._kernel = fields.kernel(mean * fields.dx(1), q)
         self._order = fields.order
 
-    def __call__(self, q: Array) -> Array:
-        """Resultants at ``q``, in the order of the share; (num_cells, 3); N, N, N m."""
+    def write(self, q: Array, resultants: Array) -> None:
+        """Resultants at ``q`` into the rows of the cells, in the order of the share; N, N, N m."""
         values = np.zeros(3 * len(self._order))
         self._kernel.add(np.ascontiguousarray(q), values)
-        resultants = np.empty((len(self._order), 3))
         resultants[self._order] = values.reshape(-1, 3)
-        return resultants
 
 
 def mass_matrix(fields: Fields) -> Csr:

@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "ufl_beam"
 MODULES = sorted(path.stem for path in PACKAGE.glob("*.py"))
 
-RECORDS = ["beams", "errors", "loads", "scene", "sections"]
+RECORDS = ["beams", "distributions", "errors", "fibres", "laws", "loads", "scene", "sections"]
 """What users say; it must be readable and usable without any of the machinery."""
 
 MACHINERY = {"basix", "cffi", "dolfinx", "ffcx", "mpi4py", "petsc4py", "ufl"}

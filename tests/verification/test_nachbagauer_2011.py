@@ -23,7 +23,8 @@ from scipy.optimize import fsolve
 import ufl_beam as ub
 
 NU, LENGTH, FORCE = 0.3, 2.0, 5e8 * 0.5**3
-SECTION = ub.Section.rectangle(b=0.1, h=0.5, E=2.07e11, nu=NU, shear=10 * (1 + NU) / (12 + 11 * NU))
+SHEAR_FACTOR = 10 * (1 + NU) / (12 + 11 * NU)
+SECTION = ub.Section.rectangle(b=0.1, h=0.5, E=2.07e11, nu=NU, shear_factor=SHEAR_FACTOR)
 
 
 def tip(cells, force=FORCE):

@@ -1,0 +1,104 @@
+"""Distributions of yield stresses over fibres and cells; seeded, the same on every process.
+
+Each cell of each beam draws from a stream of its own, so that neither the order of computation nor
+the number of processes changes what it gets.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import KW_ONLY, dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from ufl_beam.errors import SceneError, require_number
+
+
+@dataclass(frozen=True)
+class Distribution(ABC):
+    """A random positive quantity.
+
+    Args:
+        seed: The same seed gives the same scene again.
+    """
+
+    _: KW_ONLY
+    seed: int
+
+    def __post_init__(self) -> None:
+        name = type(self).__name__
+        if not isinstance(self.seed, int) or self.seed < 0:
+            raise SceneError(f"{name}: seed = {self.seed!r} must be a whole number, 0 or more")
+        for parameter in self.__match_args__:
+            require_number(getattr(self, parameter), f"{name}: {parameter}", positive=True)
+
+    @abstractmethod
+    def law(self) -> Any:
+        """The distribution of SciPy."""
+
+    def draw(self, n: int, key: tuple[int, int]) -> npt.NDArray[np.float64]:
+        """``n`` independent values of the stream ``key``; none is negative; shape (n,)."""
+        stream = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=key))
+        return np.asarray(np.maximum(self.law().rvs(n, random_state=stream), 0.0))
+
+
+@dataclass(frozen=True)
+class Normal(Distribution):
+    """Gauss's distribution; values below zero become zero, such fibres yield at once.
+
+    Args:
+        mean: Mean; Pa for fibres, N or N m for resultants.
+        deviation: Standard deviation; same unit.
+        seed: The same seed gives the same scene again.
+
+    Raises:
+        SceneError: Mean or deviation are not positive, or the seed is no whole number.
+    """
+
+    mean: float
+    deviation: float
+
+    def law(self) -> Any:
+        """The distribution of SciPy."""
+        return stats.norm(self.mean, self.deviation)
+
+
+class TruncatedNormal(Normal):
+    """Gauss's distribution of these parameters, given that the value is positive."""
+
+    def law(self) -> Any:
+        """The distribution of SciPy."""
+        return stats.truncnorm(-self.mean / self.deviation, np.inf, self.mean, self.deviation)
+
+
+class Lognormal(Normal):
+    """The distribution of this mean and deviation whose logarithm is normal."""
+
+    def law(self) -> Any:
+        """The distribution of SciPy."""
+        spread = np.sqrt(np.log1p((self.deviation / self.mean) ** 2))
+        return stats.lognorm(spread, scale=self.mean * np.exp(-(spread**2) / 2))
+
+
+@dataclass(frozen=True)
+class Weibull(Distribution):
+    """Weibull's distribution.
+
+    Args:
+        scale: What a part exp(-1) of the values exceeds; Pa for fibres, N or N m for resultants.
+        shape: Weibull's modulus; the larger, the less scatter.
+        seed: The same seed gives the same scene again.
+
+    Raises:
+        SceneError: Scale or shape are not positive, or the seed is no whole number.
+    """
+
+    scale: float
+    shape: float
+
+    def law(self) -> Any:
+        """The distribution of SciPy."""
+        return stats.weibull_min(self.shape, scale=self.scale)
