@@ -17,6 +17,7 @@ import statistics
 import subprocess
 import sys
 import time
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -35,9 +36,9 @@ def flying_beam(cells):
     return ub.Scene([beam], loads=[load])
 
 
-def run(cells, steps, dt):
+def time_loop(scene, steps, dt):
     """Seconds of the time loop, its iterations, and the simulation at its end."""
-    simulation = ub.Simulation(flying_beam(cells), ub.Midpoint())
+    simulation = ub.Simulation(scene, ub.Midpoint())
     begin = time.perf_counter()
     for n in range(1, steps + 1):
         simulation.step_to(n * dt)
@@ -85,15 +86,13 @@ def parts(simulation):
     }
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--repeat", type=int, default=7, help="runs of each case")
-    parser.add_argument("--dt", type=float, default=0.01, help="step (s)")
-    options = parser.parse_args()
+@cache
+def machine():
+    """Commit, versions and machine of a measurement."""
     commit = subprocess.run(
         ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False
     ).stdout.strip()
-    machine = {
+    return {
         "commit": commit or "unknown",
         "python": platform.python_version(),
         "dolfinx": dolfinx.__version__,
@@ -101,7 +100,14 @@ def main():
         "processor": processor(),
         "threads": 1,
     }
-    print(f"flying beam, dt = {options.dt} s, median of {options.repeat} runs; {machine}")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--repeat", type=int, default=7, help="runs of each case")
+    parser.add_argument("--dt", type=float, default=0.01, help="step (s)")
+    options = parser.parse_args()
+    print(f"flying beam, dt = {options.dt} s, median of {options.repeat} runs; {machine()}")
     print(
         f"{'cells':>6} {'µs/step':>10} {'iterations':>10} {'µs/iter':>9} {'µs/cell/iter':>12}"
         "  parts, µs"
@@ -109,8 +115,10 @@ def main():
     RESULTS.parent.mkdir(exist_ok=True)
     with RESULTS.open("a") as file:
         for cells, steps in CASES:
-            run(cells, 2, options.dt)  # compiles
-            loops = [run(cells, steps, options.dt) for _ in range(options.repeat)]
+            time_loop(flying_beam(cells), 2, options.dt)  # compiles
+            loops = [
+                time_loop(flying_beam(cells), steps, options.dt) for _ in range(options.repeat)
+            ]
             iterations, simulation = loops[0][1:]
             seconds = sorted(loop[0] for loop in loops)
             median = 1e6 * statistics.median(seconds)
@@ -125,7 +133,7 @@ def main():
                 "case": "flying beam", "cells": cells, "steps": steps, "dt": options.dt,
                 "iterations": iterations, "us_per_iteration": median / iterations,
                 "us_min": 1e6 * seconds[0] / iterations, "us_max": 1e6 * seconds[-1] / iterations,
-                "parts_us": split, **machine,
+                "parts_us": split, **machine(),
             }  # fmt: skip
             file.write(json.dumps(case) + "\n")
 

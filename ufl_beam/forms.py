@@ -6,6 +6,8 @@ silently wrong in FFCx 0.9 to 0.11.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import ufl
 
@@ -13,6 +15,12 @@ from ufl_beam.compat import Array, fem, pack
 from ufl_beam.grid import Index
 from ufl_beam.loops import doubles, integers, kernel, lib
 from ufl_beam.sparse import Csr
+
+
+def tabulator(compiled: fem.Form) -> Any:
+    """The C function of a compiled cell form; it lives as long as the form."""
+    integral = compiled.ufcx_form.form_integrals[0]
+    return kernel(integral.tabulate_tensor_float64, compiled.module.ffi)
 
 
 class Kernel:
@@ -46,10 +54,9 @@ class Kernel:
         self._dofs = np.ascontiguousarray(cell_dofs, dtype=np.int32)
         self._coordinates = coordinates
         self._rows = self._rows_of_cells(form)
-        integral = ufcx.form_integrals[0]
         at = self._columns[unknown].start if self.depends_on(unknown) else 0
         self._head = (
-            kernel(integral.tabulate_tensor_float64, self.compiled.module.ffi),
+            tabulator(self.compiled),
             len(self._dofs),
             self._dofs.shape[1] if self.depends_on(unknown) else 0,
             integers(self._dofs),

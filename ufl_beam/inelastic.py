@@ -11,7 +11,7 @@ from ufl_beam.grid import Grid, Index
 from ufl_beam.kinematics import strain
 from ufl_beam.laws import Layout
 from ufl_beam.ledger import Ledger
-from ufl_beam.points import Discontinuities, Points
+from ufl_beam.points import INPUTS, Points
 from ufl_beam.schemes import Scheme, Step
 from ufl_beam.sparse import Csr
 
@@ -56,7 +56,7 @@ class Strains:
     def __call__(self, q: Array) -> Array:
         """Strains at ``q``, in the order of the mesh; (num_cells, 3); 1, 1, 1/m."""
         values = np.zeros(self._shape)
-        self._kernel.add(q, values.reshape(-1))
+        self._kernel.add(q, values)
         return values
 
 
@@ -75,74 +75,49 @@ class InelasticBeams:
         self._order = fields.order
         self._cells = fields.share.cells[fields.order]
         self._strains = Strains(fields)
-        n = len(layout.weights)
-        cells = len(fields.order)
-        self._variables = {"p": fields.at_points(n), "ξ": fields.at_points(n)}
-        length = fields.share.cell_lengths()[fields.order][:, None]
-        breaks = None
-        if layout.softening is not None:
-            m = len(range(n)[layout.breaking])
-            self._variables |= {"jump": fields.at_points(m), "opening": fields.at_points(m)}
-            breaks = Discontinuities(
-                layout.softening,
-                layout.breaking,
-                self._values("jump"),
-                self._values("opening"),
-                scheme.resistance,
-            )
+        cells, n = len(fields.order), len(layout.weights)
+        # Internal variables and numbers of the points: one function in their quadrature space.
+        self._variables = fields.at_points(n * len(INPUTS))
         self.points = Points(
-            layout.bulk(fields.share.grid.keys(self._cells)),
-            layout.weights,
-            length,
-            self._values("p"),
-            self._values("ξ"),
-            breaks,
-            scheme.theta,
+            layout,
+            fields.share.grid.keys(self._cells),
+            fields.share.cell_lengths()[fields.order],
+            scheme,
+            self._variables.x.array.reshape(cells, n, len(INPUTS)),
         )
-        self._length = length[:, 0]
-        self._products = np.einsum("n,ni,nj->nij", layout.weights, *[layout.strains] * 2)
-        self._products = self._products.reshape(n, 9)
-        self._sums = layout.weights[:, None] * layout.strains
-        self._rest = np.diag(layout.rest).ravel() * scheme.theta
 
         q0, q1 = fields.configuration(), fields.configuration()
         b, D = fields.at_points(3), fields.at_points(3, 3)
         w, axis = ufl.TestFunction(fields.space), fields.axis
         r = b + ufl.dot(D, strain(q1, axis))
-        work = ufl.dot(r, scheme.virtual_strain(q0, q1, w, axis)) * fields.dx(1)  # P(32)
+        work = ufl.dot(r, scheme.virtual_strain(q0, q1, w, axis)) * fields.dx(1)  # P(34)
         tangent = ufl.derivative(work, q1, ufl.TrialFunction(fields.space))
         self._q0, self._b, self._D = q0, b, D
         self._force, self._tangent = (fields.kernel(form, q1) for form in (work, tangent))
         self._tangent.share(self._force)
         self._tangent.place(A)
-        self._e0: Array = np.zeros((cells, 3))
-        self._e1 = self._e0
-        self._at: Array = np.empty(0)
-
-    def _values(self, name: str) -> Array:
-        """An internal variable; a view of shape (cells, points)."""
-        return np.asarray(self._variables[name].x.array.reshape(len(self._order), -1))
+        self._q: Array = np.empty(0)
+        self._e: Array = np.empty(0)
+        self._latest: Array = np.empty(0)
 
     # -- the step ------------------------------------------------------------------------------
 
     def begin(self, step: Step) -> None:
         """Remember the strains at the beginning."""
         self._force.set(self._q0, step.q0)
-        self._e0 = self._strains(step.q0)
-        self.points.begin(self._e0 @ self._layout.strains.T, step.dt)
-        self._at = np.empty(0)
+        if step.q0 is not self._q:
+            self._q, self._e = step.q0, self._strains(step.q0)
+        self.points.begin(self._e, step.dt)
+        self._latest = np.empty(0)
 
     def _respond(self, q1: Array) -> None:
         """Resultants at ``q1`` and their derivatives, into the form."""
-        if np.array_equal(q1, self._at):
+        if np.array_equal(q1, self._latest):
             return
-        self._at = q1.copy()
+        self._latest = q1.copy()
         self._e1 = e = self._strains(q1)
-        σ, E = self.points.respond(e @ self._layout.strains.T)
-        D = E @ self._products + self._rest
-        mean = (1 - self._scheme.theta) * self._e0 + self._scheme.theta * e
-        r = σ @ self._sums + self._layout.rest * mean
-        self._force.put(self._b, r - np.einsum("cij,cj->ci", D.reshape(-1, 3, 3), e))
+        r, D = self.points.respond(e)
+        self._force.put(self._b, r - np.matvec(D.reshape(-1, 3, 3), e))
         self._force.put(self._D, D)
 
     def add_residual(self, q1: Array, r: Array) -> None:
@@ -160,62 +135,39 @@ class InelasticBeams:
     def accept(self, q1: Array, s: Array) -> None:
         """Commit the internal variables."""
         self._respond(q1)
-        points, ledger, scheme = self.points, self._ledger, self._scheme
-        before = points.worked.sum(), points.broken.sum()
-        lost = points.accept(self._e1 @ self._layout.strains.T)
+        self.points.accept()
+        self._q, self._e = q1, self._e1
+        plastic, broken, lost, _, _ = self.points.sums.tolist()
+        entries = self._ledger.lost
         if self._layout.yields:
-            ledger.lost["plastic"] += float(points.worked.sum() - before[0])
-        if points.breaks is not None:
-            ledger.lost["hinges"] += float(points.broken.sum() - before[1])
-        if scheme.loss:
-            lost = lost + self._rest_energy(self._e1 - self._e0)
-            ledger.lost["numerical"] += 2 * scheme.loss * float(lost.sum())
-
-    def _rest_energy(self, e: Array) -> Array:
-        return np.asarray((e**2 @ self._layout.rest) / 2 * self._length)
+            entries["plastic"] += plastic
+        if self._layout.softening is not None:
+            entries["hinges"] += broken
+        if self._scheme.loss:
+            entries["numerical"] += 2 * self._scheme.loss * lost
 
     def add_state(self, q: Array) -> None:
         """Stored energy."""
-        self._ledger.state["stored"] += self.stored(q)
+        if q is not self._q:
+            self._q, self._e = q, self._strains(q)
+            self.points.refresh(self._e)
+        _, _, _, elastic, hardening = self.points.sums.tolist()
+        self._ledger.state["stored"] += elastic
         if self._layout.yields:
-            self._ledger.state["hardening"] += float(self.points.hardening_energy().sum())
-
-    def stored(self, q: Array) -> float:
-        """Elastic energy of the cells of this process; J."""
-        e = self._strains(q)
-        energy = self.points.elastic_energy(e @ self._layout.strains.T) + self._rest_energy(e)
-        return float(energy.sum())
+            self._ledger.state["hardening"] += hardening
 
     # -- what solutions keep -------------------------------------------------------------------
 
-    def write_section_forces(self, q: Array, resultants: Array) -> None:
-        """(N, V, M) in the accepted state ``q`` into the rows of the cells; N, N, N m."""
-        e = self._strains(q)
-        σ = self.points.stress(e @ self._layout.strains.T)
-        resultants[self._order] = σ @ self._sums + self._layout.rest * e
-
-    def write_material(self, cells: Array) -> None:
-        """Jump of the hinge, and energies dissipated, into the rows of the cells; rad, J, J."""
-        points = self.points
-        if points.breaks is not None and self._layout.hinges:
-            cells[self._order, 0] = points.breaks.jump[:, 0]
-        cells[self._order, 1] = points.worked
-        cells[self._order, 2] = points.broken
-
-    def _state(self) -> list[Array]:
-        """All that the accepted state consists of, by cells of the mesh; views."""
-        variables = [self._values(name) for name in self._variables]
-        return [*variables, self.points.worked[:, None], self.points.broken[:, None]]
+    def kept(self) -> tuple[Index, Array]:
+        """Cells (numbers of the grid), and :attr:`Points.kept` of them; (num_cells, 6)."""
+        return self._cells, self.points.kept.copy()
 
     def state(self) -> tuple[Index, Array]:
         """Cells (numbers of the grid), and their internal variables; (num_cells, k)."""
-        return self._cells, np.hstack(self._state())
+        return self._cells, self.points.state()
 
     def restore(self, cells: Index, rows: Array) -> None:
         """Take over internal variables, of those cells that are here too."""
         _, here, there = np.intersect1d(self._cells, cells, return_indices=True)
         if len(here):
-            state = self._state()
-            ends = np.cumsum([part.shape[1] for part in state])[:-1]
-            for part, new in zip(state, np.split(rows[there], ends, axis=1), strict=True):
-                part[here] = new
+            self.points.restore(here, rows[there])

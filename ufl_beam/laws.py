@@ -1,34 +1,54 @@
 """Laws of a material point in one dimension: what yields, hardens, flows and breaks.
 
 A point is a resultant of a cross-section (strain 1 or curvature 1/m against N or N m) or a fibre
-(strain against Pa).  The laws are plain functions of arrays; they also take complex numbers, whose
-tiny imaginary part carries a derivative, so that tangents come from the statement of the law
-itself: see :mod:`ufl_beam.points`.
+(strain against Pa).  The laws are plain functions of arrays, and of UFL expressions as well: UFL
+derives their tangents and FFCx compiles them for the time loop, see :mod:`ufl_beam.points`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import singledispatch
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from ufl_beam.errors import SceneError, require_kind, require_number
 
-Values = npt.NDArray[Any]
-"""Array of real numbers, or of complex ones that carry a derivative."""
+Values = Any
+"""Array of real or complex numbers, or a UFL expression."""
+
+
+# -- what laws are written with ----------------------------------------------------------------
+
+
+@singledispatch
+def where(condition: Values, yes: Values, no: Values) -> Values:
+    """``yes`` where the condition holds, else ``no``; both are evaluated everywhere."""
+    return np.where(condition, yes, no)
+
+
+@singledispatch
+def below(x: Values, limit: float) -> Values:
+    """Whether x is less than the limit."""
+    return x < limit
+
+
+@singledispatch
+def exp(x: Values) -> Values:
+    """Exponential function."""
+    return np.exp(x)
 
 
 def sign(x: Values) -> Values:
     """1 or -1; 1 at zero."""
-    return np.where(x.real < 0.0, -1.0, 1.0)
+    return where(below(x, 0.0), -1.0, 1.0)
 
 
 def positive(x: Values) -> Values:
     """Macaulay's bracket <x>: x where it is positive, else zero."""
-    return np.where(x.real > 0.0, x, 0.0)
+    return where(below(-x, 0.0), x, 0.0)
 
 
 def _require_from_zero_to_infinity(value: float, what: str) -> None:
@@ -139,7 +159,7 @@ class Bulk:
     B: Values
     eta: Values
 
-    def flow(self, strain: Values, p: Values, ξ: Values, θ: float, dt: float) -> Values:
+    def flow(self, strain: Values, p: Values, ξ: Values, θ: Values, dt: Values) -> Values:
         """Increment of the plastic strain over a step, in closed form.
 
         The rule is stated at t_n+θ: 1/2 is of second order, 1 is backward Euler.
@@ -158,35 +178,25 @@ class Bulk:
         direction = sign(trial)
         overstress = direction * trial - (self.limit + self.H * ξ)  # P(38)
         γ = positive(overstress) / (self.eta / dt + θ * (self.C + self.H + self.B))  # P(44)
-        return np.asarray(direction * γ)
+        return direction * γ
 
     def stress(self, strain: Values, p: Values) -> Values:
         """Stress of the elastic part of the strain."""
-        return np.asarray(self.C * (strain - p))
+        return self.C * (strain - p)
 
     def elastic_energy(self, strain: Values) -> Values:
-        """Energy per volume of the elastic strain."""
-        return np.asarray(self.C * strain**2 / 2)
+        """Energy per volume of an elastic strain."""
+        return self.C * strain**2 / 2
 
     def hardening_energy(self, p: Values, ξ: Values) -> Values:
         """Energy per volume that hardening stores."""
-        return np.asarray((self.B * p**2 + self.H * ξ**2) / 2)  # P(35)
+        return (self.B * p**2 + self.H * ξ**2) / 2  # P(35)
 
-    def dissipation(self, dp: Values, dt: float) -> Values:
+    def dissipation(self, dp: Values, dt: Values) -> Values:
         """Energy per volume that a plastic increment dissipates, by yield stress and viscosity."""
-        γ = np.abs(dp)
-        flows = γ > 0
-        resistance = np.where(flows, self.limit, 0.0) + np.where(flows, self.eta, 0.0) * γ / dt
-        return np.asarray(resistance * γ)  # P(37)
-
-    def at(self, shape: tuple[int, ...], columns: slice, mask: Values) -> Bulk:
-        """The law at some of the points of an array of ``shape``; arrays of one dimension."""
-        return Bulk(
-            *(
-                np.broadcast_to(x, shape)[:, columns][mask]
-                for x in (self.C, self.limit, self.H, self.B, self.eta)
-            )
-        )
+        γ = abs(dp)
+        flows = below(-γ, 0.0)  # a limit that is infinite must not meet an increment of zero
+        return (where(flows, self.limit, 0.0) + where(flows, self.eta, 0.0) * γ / dt) * γ  # P(37)
 
 
 # -- softening ---------------------------------------------------------------------------------
@@ -212,13 +222,20 @@ class Softening:
         _require_from_zero_to_infinity(self.limit, f"{type(self).__name__}: limit")
         require_number(self.energy, f"{type(self).__name__}: energy", positive=True)
 
+    def of(self, limit: Values, energy: Values) -> Softening:
+        """The same law with other numbers, or with symbols."""
+        law = object.__new__(type(self))
+        object.__setattr__(law, "limit", limit)
+        object.__setattr__(law, "energy", energy)
+        return law
+
     def traction(self, ξ: Values) -> Values:
         """Resistance after the accumulated opening ξ."""
-        return np.asarray(self.limit * np.exp(-self.limit / self.energy * ξ))  # P(52)!
+        return self.limit * exp(-self.limit / self.energy * ξ)  # P(52)!
 
     def mean_traction(self, ξ: Values, a: Values) -> Values:
         """Mean resistance while the opening grows from ξ by a; its product with a is dissipated."""
-        return np.asarray(self.traction(ξ) * _mean_of_decay(self.limit / self.energy * a))
+        return self.traction(ξ) * _mean_of_decay(self.limit / self.energy * a)
 
 
 @dataclass(frozen=True)
@@ -235,17 +252,19 @@ class LinearSoftening(Softening):
     def mean_traction(self, ξ: Values, a: Values) -> Values:
         """Mean resistance while the opening grows from ξ by a; its product with a is dissipated."""
         now, slope = self.traction(ξ), self.limit**2 / (2 * self.energy)
-        opens = now.real < slope * a.real
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.where(opens, now**2 / (2 * slope * a), now - slope * a / 2)
+        ends = below(now - slope * a, 0.0)
+        safe = where(ends, slope * a, 1.0)
+        return where(ends, now**2 / (2 * safe), now - slope * a / 2)
 
 
 def _mean_of_decay(x: Values) -> Values:
-    """Mean of exp(-x) from 0 to x, smooth at zero: (1 - exp(-x))/x."""
-    small = np.abs(x) < 1e-3
-    safe = np.where(small, 1.0, x)
-    series = 1 - x / 2 * (1 - x / 3 * (1 - x / 4 * (1 - x / 5 * (1 - x / 6))))
-    return np.where(small, series, -np.expm1(-safe) / safe)
+    """Mean of exp(-x) from 0 to x, smooth at zero: (1 - exp(-x))/x, its series below 0.1."""
+    small = below(x, 0.1)
+    series = 1.0
+    for k in range(12, 1, -1):
+        series = 1 - x / k * series
+    safe = where(small, 1.0, x)
+    return where(small, series, (1 - exp(-safe)) / safe)
 
 
 # -- where the points of a cross-section are ---------------------------------------------------

@@ -3,6 +3,7 @@
  * w holds the packed coefficients of a cell, `width` of them, of which those from `at` on are the
  * unknowns q of the cell; they are brought up to date on the way.
  */
+#include <float.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -80,4 +81,123 @@ double weighted_square(int rows, const double *w, const double *f)
   double sum = 0;
   for (int i = 0; i < rows; ++i) sum += w[i] * f[i] * f[i];
   return sum;
+}
+
+/* -- material points ------------------------------------------------------------------------- */
+
+/* What a point is about; the order of INPUTS in points.py. */
+enum {
+  STRAIN, GROWTH, DIRECTION, TRACTION, BEFORE, PLASTIC, ACCUMULATED, JUMP, OPENING, STIFFNESS,
+  LENGTH, THETA, WIDTH = 19
+};
+
+/* What the kernel of the end of a step says; the order in points.py. */
+enum { FLOW, WORKED, BROKEN, LOST, ELASTIC, HARDENING, STRESS, RESISTANCE, SAID };
+
+static const double unit_cell[6] = {0, 0, 0, 1, 0, 0};
+
+static void ask(kernel *tabulate, const double *w, int answers, double *e)
+{
+  memset(e, 0, answers * sizeof *e);
+  CALL(tabulate, e, w, 0, unit_cell);
+}
+
+/* Growth at which the excess of what the bulk bears over the resistance vanishes, or NAN.
+ *
+ * The excess is a concave function that is positive at zero: Newton's method comes to its root from
+ * above without fail. Above is where the bulk would be unloaded.
+ */
+static double growth(kernel *excess, double *w)
+{
+  double g[2], theta = w[THETA];
+  double strain = (1 - theta) * w[BEFORE] + theta * w[STRAIN] - w[JUMP] / w[LENGTH];
+  double bound = fabs(strain - w[PLASTIC]) * w[LENGTH] / theta + DBL_MIN;
+  w[GROWTH] = 0;
+  ask(excess, w, 2, g);
+  double a = g[1] < 0 ? fmin(bound, -g[0] / g[1]) : bound;
+  for (int i = 0; i < 100; ++i) {
+    w[GROWTH] = a;
+    ask(excess, w, 2, g);
+    /* Left of the top of the function there is no way down: go further. */
+    double step = g[0] > 0 && g[1] >= 0 ? -a : g[0] / g[1];
+    a -= step;
+    /* So small a step was the last but none: the next one would be its square. */
+    if (fabs(step) <= 1e-9 * fmax(a, 1e-9 * bound)) return a;
+  }
+  return NAN;
+}
+
+/* Resultants r of cells whose strains grow from e0 to e1, and their derivatives D. */
+void respond(kernel *bulk, kernel *opening, kernel *excess, int cells, int points,
+             const double *B, const double *weight, const double *rest, double theta,
+             const double *e0, const double *e1, double *w, double *r, double *D)
+{
+  double s[2];
+  for (int c = 0; c < cells; ++c, e0 += 3, e1 += 3, r += 3, D += 9) {
+    memset(D, 0, 9 * sizeof *D);
+    for (int k = 0; k < 3; ++k) {
+      r[k] = rest[k] * ((1 - theta) * e0[k] + theta * e1[k]);
+      D[4 * k] = rest[k] * theta;
+    }
+    for (int i = 0; i < points; ++i, w += WIDTH) {
+      const double *b = B + 3 * i;
+      w[STRAIN] = b[0] * e1[0] + b[1] * e1[1] + b[2] * e1[2];
+      w[GROWTH] = w[DIRECTION] = 0;
+      ask(bulk, w, 2, s);
+      if (fabs(s[0]) > w[TRACTION]) { /* P(51) */
+        w[DIRECTION] = s[0] < 0 ? -1 : 1;
+        w[GROWTH] = growth(excess, w);
+        ask(opening, w, 2, s);
+      }
+      for (int k = 0; k < 3; ++k) {
+        r[k] += weight[i] * s[0] * b[k];
+        for (int l = 0; l < 3; ++l) D[3 * k + l] += weight[i] * s[1] * b[k] * b[l];
+      }
+    }
+  }
+}
+
+/* Take the end of the step as the new state.
+ *
+ * Each cell keeps what it bears (3), the jump of its last point, and what it dissipated by plastic
+ * strains and by discontinuities; sum gets what all cells dissipated so in the step, what they lost
+ * numerically at theta = 1, and what they store elastically and by hardening.
+ */
+void commit(kernel *end, int cells, int points, const double *B, const double *weight,
+            const double *rest, const double *length, const double *e0, const double *e1,
+            double *w, double *kept, double *sum)
+{
+  double s[SAID];
+  memset(sum, 0, 5 * sizeof *sum);
+  for (int c = 0; c < cells; ++c, e0 += 3, e1 += 3, kept += 6) {
+    double plastic = 0, broken = 0;
+    for (int k = 0; k < 3; ++k) {
+      double change = e1[k] - e0[k];
+      kept[k] = rest[k] * e1[k];
+      sum[2] += rest[k] * change * change / 2 * length[c];
+      sum[3] += rest[k] * e1[k] * e1[k] / 2 * length[c];
+    }
+    for (int i = 0; i < points; ++i, w += WIDTH) {
+      double volume = weight[i] * length[c];
+      ask(end, w, SAID, s);
+      w[BEFORE] = w[STRAIN];
+      w[PLASTIC] += s[FLOW];
+      w[ACCUMULATED] += fabs(s[FLOW]);
+      w[JUMP] += w[DIRECTION] * w[GROWTH];
+      w[OPENING] += w[GROWTH];
+      w[GROWTH] = w[DIRECTION] = 0;
+      if (w[TRACTION] < INFINITY) w[TRACTION] = s[RESISTANCE];
+      plastic += volume * s[WORKED];
+      broken += weight[i] * s[BROKEN];
+      sum[2] += volume * s[LOST];
+      sum[3] += volume * s[ELASTIC];
+      sum[4] += volume * s[HARDENING];
+      for (int k = 0; k < 3; ++k) kept[k] += weight[i] * s[STRESS] * B[3 * i + k];
+    }
+    kept[3] = w[JUMP - WIDTH];
+    kept[4] += plastic;
+    kept[5] += broken;
+    sum[0] += plastic;
+    sum[1] += broken;
+  }
 }

@@ -1,211 +1,233 @@
-"""Material points: the return map of many at once, their state and their energies.
+"""Material points: the return map of many at once, compiled from the statement of the laws.
 
-The return map is evaluated with complex strains whose imaginary part is a tiny step.  The real part
-of the answer is the stress, the imaginary part over the step is its derivative: the consistent
-tangent, exact to round-off, from the statement of the law itself.
+The laws are traced with UFL symbols: UFL derives the consistent tangents, by the implicit function
+theorem where a discontinuity opens, FFCx compiles them, and a loop in C goes over the points.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from typing import Any
 
+import basix.ufl
 import numpy as np
+import ufl
+from ufl.conditional import Condition
+from ufl.core.expr import Expr
 
-from ufl_beam.compat import Array
-from ufl_beam.laws import Bulk, Softening, Values, sign
+from ufl_beam import laws
+from ufl_beam.compat import Array, fem, line_mesh
+from ufl_beam.forms import tabulator
+from ufl_beam.grid import Index
+from ufl_beam.laws import Bulk, Layout, Softening
+from ufl_beam.loops import doubles, ffi, lib
+from ufl_beam.schemes import Scheme
 
-STEP = 1e-30
-"""Imaginary step of derivatives; its square vanishes beside any strain."""
+laws.where.register(Condition, ufl.conditional)
+laws.below.register(Expr, ufl.lt)
+laws.exp.register(Expr, ufl.exp)
 
-CLOSE = 1e-9
-"""Relative step at which an opening is one step of Newton's method from round-off."""
+INPUTS = (
+    # what an iterate changes: strain at the end, growth of the opening and its direction
+    *("strain", "growth", "direction"),
+    # the state at t_n: resistance, strain, plastic strain and its sum, jump and its sum
+    *("traction", "before", "p", "ξ", "jump", "opening"),
+    # numbers of the point; the order of these so far is that of loops.c
+    *("C", "length", "θ", "dt", "limit", "H", "B", "eta", "softening limit", "softening energy"),
+)
+"""What the law of a point depends on, in the order of its storage."""
 
-MOST_ITERATIONS = 60
-
-Resistance = Callable[[Softening, Array, Values], Values]
-"""Traction at a discontinuity during a step: from its law, its opening before, and the growth."""
+STATE = ("p", "ξ", "jump", "opening")
+"""The internal variables."""
 
 
-@dataclass(frozen=True, eq=False)
-class Discontinuities:
-    """Jumps embedded in the cells at those points that may break, P(25)-P(34).
+class PointForms:
+    """Compiled laws: C functions from the inputs of a point to what the loops need.
 
-    A jump relaxes the strain of the bulk by jump over length; what the bulk then bears is what the
-    law of softening resists with: the second Euler equation of the Hu-Washizu functional.
+    Args:
+        softening: Law of the discontinuities, if points can break; its numbers do not matter.
+        scheme: The time scheme.
 
     Attributes:
-        softening: The law.
-        where: Columns of the points that may break.
-        jump: At t_n; shape (cells, m); rad, or m for fibres.
-        opening: Accumulated over jumps in both directions, at t_n; shape (cells, m).
-        resistance: Traction in a step.
+        bulk: Stress of a point that does not open, and its derivative.
+        opening: The same of a point that opens, its growth being known.
+        excess: What the bulk bears more than the discontinuity resists, and its derivative by the
+            growth.
+        end: What the end of the step brings; the order is that of loops.c.
     """
 
-    softening: Softening
-    where: slice
-    jump: Array
-    opening: Array
-    resistance: Resistance
+    def __init__(self, softening: Softening | None, scheme: Scheme) -> None:
+        self._cell = line_mesh(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0, 1]]))
+        self._compiled: list[fem.Form] = []
+        x = fem.Function(self._values(len(INPUTS)))
+        at = {name: x[i] for i, name in enumerate(INPUTS)}
+        strain, a = ufl.variable(at["strain"]), ufl.variable(at["growth"])
+        s, p, ξ, length, θ, dt = (at[n] for n in ("direction", "p", "ξ", "length", "θ", "dt"))
+        bulk = Bulk(at["C"], at["limit"], at["H"], at["B"], at["eta"])
+
+        # The incompatible mode: a jump relaxes the strain of the bulk by jump over length.
+        relieved = at["jump"] / length
+        e = (1 - θ) * at["before"] + θ * strain - (relieved + θ * s * a / length)  # P(30)
+        dp = bulk.flow(e, p, ξ, θ, dt)
+        σ = bulk.stress(e, p + θ * dp)
+        self.bulk = self._compile(σ, ufl.diff(σ, strain))
+
+        e0, e1 = at["before"] - relieved - p, strain - (relieved + s * a / length) - p - dp
+        broken, traction = 0 * a, 0 * a
+        self.opening = self.excess = ffi.NULL
+        if softening is not None:
+            law = softening.of(at["softening limit"], at["softening energy"])
+            resistance = scheme.resistance(law, at["opening"], a)
+            excess = s * σ - resistance  # P(32), its second equation
+            growth_by_strain = -ufl.diff(excess, strain) / ufl.diff(excess, a)
+            tangent = ufl.diff(σ, strain) + ufl.diff(σ, a) * growth_by_strain  # P(76)
+            self.opening = self._compile(σ, tangent)
+            self.excess = self._compile(excess, ufl.diff(excess, a))
+            broken = a * law.mean_traction(at["opening"], a)
+            traction = law.traction(at["opening"] + a)
+        self.end = self._compile(
+            dp,
+            bulk.dissipation(dp, dt),
+            broken,
+            bulk.elastic_energy(e1 - e0) + bulk.hardening_energy(dp, dp),
+            bulk.elastic_energy(e1),
+            bulk.hardening_energy(p + dp, ξ + abs(dp)),
+            bulk.stress(e1, 0),
+            traction,
+        )
+
+    def _values(self, n: int) -> fem.FunctionSpace:
+        element = basix.ufl.quadrature_element("interval", value_shape=(n,), degree=1)
+        return fem.functionspace(self._cell, element)
+
+    def _compile(self, *outputs: Expr) -> Any:
+        z = ufl.TestFunction(self._values(len(outputs)))
+        dx = ufl.Measure("dx", domain=self._cell, metadata={"quadrature_degree": 1})
+        form = fem.form(ufl.dot(ufl.as_vector(outputs), z) * dx)
+        self._compiled.append(form)
+        return tabulator(form)
 
 
 class Points:
     """Points of the same layout in many cells.
 
     Args:
-        bulk: Law of the bulk; arrays that broadcast to (cells, n).
-        weights: Of the points; shape (n,).
-        length: Of the cells; shape (cells, 1); m.
-        p: Plastic strains at t_n, zero; shape (cells, n).
-        ξ: Accumulated plastic strains at t_n, zero; shape (cells, n).
-        breaks: Discontinuities, if any.
-        θ: Part of a step at which the bulk follows its law.
+        layout: The points of a cell.
+        keys: For each cell two numbers that random limits depend on, besides their seed.
+        length: Of the cells; (cells,); m.
+        scheme: The time scheme.
+        storage: Zeros, for all that is known of the points; (cells, n, len(INPUTS)).
 
     Attributes:
-        worked: Energy that the plastic strains of each cell dissipated since the beginning; J.
-        broken: Energy that the discontinuities of each cell dissipated; J.
+        kept: By cell: (N, V, M) in the accepted state, the jump of the last point, and the energy
+            dissipated by plastic strains and by discontinuities; (cells, 6); N, N m, rad or m, J.
+        sums: Of all cells: dissipated in the last step by plastic strains, by discontinuities,
+            lost numerically by backward Euler (θ = 1); stored elastically, and by hardening; (5,);
+            J.
     """
 
     def __init__(
         self,
-        bulk: Bulk,
-        weights: Array,
+        layout: Layout,
+        keys: list[tuple[int, int]],
         length: Array,
-        p: Array,
-        ξ: Array,
-        breaks: Discontinuities | None,
-        θ: float,
+        scheme: Scheme,
+        storage: Array,
     ) -> None:
-        self._bulk, self._weights, self._length, self._θ = bulk, weights, length, θ
-        self.p, self.ξ, self.breaks = p, ξ, breaks
-        self._dt = 1.0
-        self._e0: Array = np.zeros_like(p)
-        self._dp: Array = np.zeros_like(p)
-        self._growth: Array = np.zeros_like(p if breaks is None else breaks.jump)
-        self.worked: Array = np.zeros(len(p))
-        self.broken: Array = np.zeros(len(p))
+        self._forms = PointForms(layout.softening, scheme)
+        self._layout, self._storage = layout, storage
+        self._at = {name: storage[:, :, i] for i, name in enumerate(INPUTS)}
+        self._bulk = bulk = layout.bulk(keys)
+        numbers = {"C": bulk.C, "limit": bulk.limit, "H": bulk.H, "B": bulk.B, "eta": bulk.eta}
+        for name, value in numbers.items():
+            self._at[name][:] = value
+        self._at["length"][:] = length[:, None]
+        self._at["θ"][:] = scheme.theta
+        self._at["dt"][:] = self._dt = 1.0
+        self._at["softening energy"][:] = 1.0
+        self._at["traction"][:] = np.inf
+        if layout.softening is not None:
+            for name in ("limit", "energy"):
+                value = getattr(layout.softening, name)
+                self._at[f"softening {name}"][:, layout.breaking] = value
+            self._resist()
+
+        cells, n, _ = storage.shape
+        self.kept, self.sums = np.zeros((cells, 6)), np.zeros(5)
+        self._r, self._D = np.zeros((cells, 3)), np.zeros((cells, 9))
+        self._e0: Array = np.zeros((cells, 3))
+        self._e1: Array = self._e0
+        B, weights, rest = (
+            np.ascontiguousarray(x, dtype=np.float64)
+            for x in (layout.strains, layout.weights, layout.rest)
+        )
+        self._section = (cells, n, doubles(B), doubles(weights), doubles(rest))
+        self._theta, self._length = scheme.theta, doubles(np.ascontiguousarray(length))
+        self._w, self._out = doubles(storage), (doubles(self._r), doubles(self._D))
+        self._kept = (doubles(self.kept), doubles(self.sums))
+
+    def __getitem__(self, name: str) -> Array:
+        """What is known of the points by the name of an input; a view; (cells, n)."""
+        return self._at[name]
+
+    def _resist(self) -> None:
+        """Resistance after the openings so far."""
+        softening, breaking = self._layout.softening, self._layout.breaking
+        if softening is not None:
+            self["traction"][:, breaking] = softening.traction(self["opening"][:, breaking])
 
     # -- the step ------------------------------------------------------------------------------
 
-    def begin(self, strain: Array, dt: float) -> None:
-        """Take note of the strains at the beginning of a step; shape (cells, n)."""
-        self._e0, self._dt = strain, dt
-        if self.breaks is not None:
-            self._traction = self.breaks.softening.traction(self.breaks.opening)
+    def begin(self, strains: Array, dt: float) -> None:
+        """Begin a step at these strains of the cells; (cells, 3); 1, 1, 1/m."""
+        if strains is not self._e1:
+            self["before"][:] = strains @ self._layout.strains.T
+        self._e0 = strains
+        if dt != self._dt:
+            self["dt"][:] = self._dt = dt
 
-    def respond(self, strain: Array) -> tuple[Array, Array]:
-        """Stresses that act in a step that ends at ``strain``, and their derivatives; (cells, n).
+    def respond(self, strains: Array) -> tuple[Array, Array]:
+        """(N, V, M) that act in a step to these strains, and derivatives; (cells, 3), (cells, 9).
 
-        They are not a number where an opening was not found.
+        They are not a number where an opening was not found.  The arrays are reused.
         """
-        mean = self._without_jumps((1 - self._θ) * self._e0 + self._θ * strain)
-        e: Values = mean + 1j * (self._θ * STEP)
-        dp = self._bulk.flow(e, self.p, self.ξ, self._θ, self._dt)
-        σ = self._bulk.stress(e, self.p + self._θ * dp)
-        if self.breaks is not None:
-            self._open(self.breaks, e, σ, dp)
-        self._dp = dp.real
-        return σ.real, σ.imag / STEP
+        forms, self._e1 = self._forms, strains
+        lib.respond(
+            *(forms.bulk, forms.opening, forms.excess, *self._section, self._theta),
+            *(doubles(self._e0), doubles(strains), self._w, *self._out),
+        )
+        return self._r, self._D
 
-    def _without_jumps(self, strain: Array) -> Array:
-        """Strain of the bulk, with the jumps of t_n."""
-        if self.breaks is None:
-            return strain
-        bulk = strain.copy()
-        bulk[:, self.breaks.where] -= self.breaks.jump / self._length
-        return bulk
-
-    def _open(self, breaks: Discontinuities, e: Values, σ: Values, dp: Values) -> None:
-        """Let those discontinuities grow that cannot bear what the bulk bears; σ, dp in place.
-
-        The trial is the response of the bulk, plastic or not, to the jumps of t_n.
-        """
-        self._growth.fill(0.0)
-        σ_b, dp_b = σ[:, breaks.where], dp[:, breaks.where]
-        over = np.abs(σ_b.real) > self._traction  # P(51)
-        if not over.any():
-            return
-        θ, dt, s = self._θ, self._dt, sign(σ_b[over])
-        bulk = self._bulk.at(self.p.shape, breaks.where, over)
-        e, p, ξ = (x[:, breaks.where][over] for x in (e, self.p, self.ξ))
-        relief = (θ * s) / np.broadcast_to(self._length, over.shape)[over]
-        opening = breaks.opening[over]
-
-        def bear(e: Values, a: Values) -> tuple[Values, Values]:
-            e = e - relief * a
-            dp = bulk.flow(e, p, ξ, θ, dt)
-            return bulk.stress(e, p + θ * dp), dp
-
-        def excess(e: Values, a: Values) -> Values:
-            return np.asarray(s * bear(e, a)[0] - breaks.resistance(breaks.softening, opening, a))
-
-        a = _root(lambda a: excess(e.real, a), (e.real - p) / relief)
-        slope = excess(e.real, a + 1j * STEP).imag / STEP
-        # One more step of Newton's method, with complex strains: the implicit function theorem.
-        a = a - excess(e, a) / slope
-        σ_b[over], dp_b[over] = bear(e, a)
-        self._growth[over] = s * a.real
+    def accept(self) -> None:
+        """Take the strains of the latest response as the new state."""
+        lib.commit(
+            *(self._forms.end, *self._section, self._length),
+            *(doubles(self._e0), doubles(self._e1), self._w, *self._kept),
+        )
 
     # -- the state -----------------------------------------------------------------------------
 
-    def accept(self, strain: Array) -> Array:
-        """Take the end of the step as the new state.
+    def state(self) -> Array:
+        """What the accepted state consists of besides the strains; (cells, k); a copy."""
+        return np.hstack([*(self[name] for name in STATE), self.kept])
 
-        The latest response must have been to ``strain``.
+    def restore(self, cells: Index, rows: Array) -> None:
+        """Take over :meth:`state` in some of the cells; call :meth:`refresh` when done."""
+        ends = np.arange(1, len(STATE) + 1) * self._storage.shape[1]
+        *variables, kept = np.split(rows, ends, axis=1)
+        for name, values in zip(STATE, variables, strict=True):
+            self[name][cells] = values
+        self.kept[cells] = kept
+        self._resist()
 
-        Returns:
-            What backward Euler (θ = 1) loses numerically in each cell; (cells,); J.
-        """
-        bulk, dp = self._bulk, self._dp
-        before = self._without_jumps(self._e0) - self.p
-        self.worked += self._sum(bulk.dissipation(dp, self._dt))
-        self.p += dp
-        self.ξ += np.abs(dp)
-        if self.breaks is not None:
-            a = np.abs(self._growth)
-            energy = a * self.breaks.softening.mean_traction(self.breaks.opening, a)
-            self.broken += energy @ self._weights[self.breaks.where]
-            self.breaks.jump[:] += self._growth
-            self.breaks.opening[:] += a
-        change = self._without_jumps(strain) - self.p - before
-        return self._sum(bulk.elastic_energy(change) + bulk.hardening_energy(dp, dp))
-
-    def stress(self, strain: Array) -> Array:
-        """Stresses in the accepted state; shape (cells, n)."""
-        return np.asarray(self._bulk.stress(self._without_jumps(strain), self.p))
-
-    def elastic_energy(self, strain: Array) -> Array:
-        """Energy that each cell stores elastically in the accepted state; (cells,); J."""
-        return self._sum(self._bulk.elastic_energy(self._without_jumps(strain) - self.p))
-
-    def hardening_energy(self) -> Array:
-        """Energy that hardening stores in each cell; (cells,); J."""
-        return self._sum(self._bulk.hardening_energy(self.p, self.ξ))
-
-    def _sum(self, density: Array) -> Array:
-        return (density @ self._weights) * self._length[:, 0]
-
-
-def _root(excess: Callable[[Values], Values], unloaded: Array) -> Array:
-    """Roots of concave functions that are positive at zero; not a number where none was found.
-
-    Newton's method comes to them from above without fail.
-
-    Args:
-        excess: The functions.
-        unloaded: Where the bulk alone would bear nothing: an upper bound, if it is positive.
-    """
-    at_zero = excess(np.zeros_like(unloaded) + 1j * STEP)
-    a = np.where(unloaded > 0, unloaded, np.abs(unloaded) + np.finfo(float).tiny)
-    falls = at_zero.imag < 0
-    newton = np.divide(-at_zero.real * STEP, at_zero.imag, where=falls, out=np.full_like(a, np.inf))
-    a = np.minimum(a, newton)
-    for _ in range(MOST_ITERATIONS):
-        g = excess(a + 1j * STEP)
-        below = (g.real > 0) & (g.imag >= 0)
-        step = np.where(below, -a, g.real * STEP / np.where(below, -STEP, g.imag))
-        a = a - step
-        found = np.abs(step) <= CLOSE * np.maximum(a, CLOSE * np.abs(unloaded))
-        if found.all():
-            return a
-    return np.where(found, a, np.nan)
+    def refresh(self, strains: Array) -> None:
+        """Make forces and stored energies those of a state that no step has led to."""
+        layout, bulk, length = self._layout, self._bulk, self["length"][:, :1]
+        e = strains @ layout.strains.T - self["jump"] / self["length"]
+        volume = layout.weights * length
+        self.kept[:, :3] = (
+            layout.rest * strains + (layout.weights * bulk.stress(e, self["p"])) @ layout.strains
+        )
+        self.sums[3] = np.sum(volume * bulk.elastic_energy(e - self["p"])) + np.sum(
+            strains**2 @ layout.rest / 2 * length[:, 0]
+        )
+        self.sums[4] = np.sum(volume * bulk.hardening_energy(self["p"], self["ξ"]))

@@ -82,6 +82,7 @@ def simulate(
                 solution.keep(simulation)
             for recorder in recorders:
                 recorder.write(simulation)
+        simulation.end()
     except BaseException as error:
         # Whatever stops a run, an interrupt or a user's function, what was reached is not lost.
         error.__dict__["solution"] = solution

@@ -20,10 +20,10 @@ from ufl_beam.loads import FollowerLoad
 from ufl_beam.mechanism import require_no_mechanism
 from ufl_beam.scene import Scene
 from ufl_beam.schemes import Scheme, has_inertia
-from ufl_beam.solution import Material, Solution
+from ufl_beam.solution import Solution
 from ufl_beam.solve import Newton, Solver, StepFailed
 from ufl_beam.supports import Supports
-from ufl_beam.terms import Beams, ElasticBeams, Inertia, SectionForces, Term
+from ufl_beam.terms import ElasticBeams, Inertia, SectionForces, Term
 
 SMALLEST_PART = 2**12
 """A step is cut into at most this number of parts."""
@@ -98,7 +98,7 @@ class Simulation:
         self._make_beams()
         self.force = np.zeros(self.share.size)
         self.loads = self._make_loads()
-        self._beams: list[Beams] = [*self.elastic, *self.inelastic]
+        self._beams: list[Term] = [*self.elastic, *self.inelastic]
         self._others: list[Term] = [*self.loads]
         if has_inertia(scheme):
             v = v[self.share.dofs]
@@ -149,11 +149,9 @@ class Simulation:
                 self.inelastic.append(
                     InelasticBeams(fields, layout, self.scheme, self._A, self.ledger)
                 )
-        if elastic.all():
-            self._elastic_fields = [self.fields]
-        else:
-            self._elastic_fields = [Fields(self.share, np.flatnonzero(elastic))] * elastic.any()
-        for fields in self._elastic_fields:
+        if elastic.any():
+            part = np.flatnonzero(elastic)
+            fields = self.fields if elastic.all() else Fields(self.share, part)
             self.elastic.append(ElasticBeams(fields, self.scheme, self._A, self.ledger))
 
     def _make_loads(self) -> list[DeadLoads | FollowerLoads]:
@@ -289,7 +287,7 @@ class Simulation:
         force = self.force
         work = self.share.total(float(self.scheme.acting(self._force_before, force) @ s))
         held, stored = (
-            self.share.total(sum(beams.stored(q) for beams in self._beams)) for q in (self.q, q1)
+            self.share.total(sum(beams.stored(q) for beams in self.elastic)) for q in (self.q, q1)
         )
         change = stored - held
         if abs(work - change) > PATH * (abs(work) + abs(change)) + 1e-9 * held:
@@ -302,6 +300,7 @@ class Simulation:
     def _give_up(self, failure: StepFailed, end: float) -> None:
         if self.t not in self.solution.times[-1:]:
             self.solution.keep(self)
+        self.end()
         dt = end - self.t
         raise ConvergenceError(
             f"no equilibrium after t = {self.t:.9g} s, even with dt = {dt:.3g} s: {failure}. "
@@ -349,33 +348,29 @@ class Simulation:
 
     def section_forces(self) -> Array:
         """(N, V, M) in all cells; (num_cells, 3); N, N, N m; all processes call it together."""
-        forces = np.zeros((len(self.share.cells), 3))
-        for elastic in self._section_forces:
-            elastic.write(self.q, forces)
-        for inelastic in self.inelastic:
-            inelastic.write_section_forces(self.q, forces)
-        return self.share.gather_cells(forces)
+        here = np.empty((len(self.share.cells), 3))
+        self._section_forces.write(self.q, here)
+        forces = self.share.gather_cells(here)
+        for cells, rows in self.material():
+            forces[cells] = rows[:, :3]
+        return forces
 
     @cached_property
-    def _section_forces(self) -> list[SectionForces]:
-        return [SectionForces(fields) for fields in self._elastic_fields]
+    def _section_forces(self) -> SectionForces:
+        return SectionForces(self.fields)
 
-    def internal(self) -> list[tuple[Index, Array]]:
-        """Internal variables of all cells that have any; all processes call it together."""
-        here = [inelastic.state() for inelastic in self.inelastic]
-        if self.share.comm.size == 1:
+    def material(self) -> list[tuple[Index, Array]]:
+        """Cells that can yield or break, and :attr:`Points.kept`; all processes call together."""
+        return self._gather([inelastic.kept() for inelastic in self.inelastic])
+
+    def _gather(self, here: list[tuple[Index, Array]]) -> list[tuple[Index, Array]]:
+        if not self._has_inelastic or self.share.comm.size == 1:
             return here
         return [group for groups in self.share.comm.allgather(here) for group in groups]
 
-    def material(self) -> Material | None:
-        """State of the material of all cells; none in a scene that is elastic."""
-        if not self._has_inelastic:
-            return None
-        cells = np.zeros((len(self.share.cells), 3))
-        for inelastic in self.inelastic:
-            inelastic.write_material(cells)
-        jump, plastic, hinge = self.share.gather_cells(cells).T
-        return Material(self.section_forces(), jump, plastic, hinge)
+    def end(self) -> None:
+        """Let the solution know the internal variables, so that another run may start with them."""
+        self.solution.internal = self._gather([inelastic.state() for inelastic in self.inelastic])
 
     def close(self) -> None:
         """Give back what PETSc holds."""

@@ -49,7 +49,7 @@ class Solution:
         parts: Number of steps that were taken, parts of cut steps counted each.
         iterations: Number of Newton iterations.
         seconds: Wall time of the run, building the scene included; s.
-        internal: Cells, and their internal variables in the last state that was kept.
+        internal: Cells, and their internal variables at the end of the run.
     """
 
     def __init__(self, scene: Scene, grid: Grid) -> None:
@@ -62,7 +62,7 @@ class Solution:
         self._v: list[Array] = []
         self._reactions: list[Array] = []
         self._entries: list[tuple[dict[str, float], ...]] = []
-        self._material: list[Material] = []
+        self._material: list[list[tuple[Index, Array]]] = []
         self.internal: list[tuple[Index, Array]] = []
 
     def keep(self, simulation: Simulation) -> None:
@@ -74,10 +74,7 @@ class Solution:
             self._v.append(share.gather(v))
         self._reactions.append(simulation.reactions())
         self._entries.append(simulation.entries())
-        material = simulation.material()
-        if material is not None:
-            self._material.append(material)
-            self.internal = simulation.internal()
+        self._material.append(simulation.material())
         self.parts, self.iterations = simulation.parts, simulation.iterations
 
     # -- motion --------------------------------------------------------------------------------
@@ -158,10 +155,10 @@ class Solution:
 
     def _forces(self, n: int) -> Array:
         """(N, V, M) of all cells: kept where history decides, else computed from the motion."""
-        if self._material:
-            return self._material[n].forces
         forces = np.empty((len(self.grid.cells), 3))
         self._section_forces.write(self._q[n], forces)
+        for cells, rows in self._material[n]:
+            forces[cells] = rows[:, :3]
         return forces
 
     def section_forces(self, beam: Beam, n: int = -1) -> Array:
@@ -209,9 +206,7 @@ class Solution:
         Raises:
             SceneError: The scene is elastic.
         """
-        self._require_material()
-        cells = self.grid.cells_of(beam)
-        return Material(*(values[cells] for values in self._material[n]))
+        return self._of_material(n, self.grid.cells_of(beam))
 
     def material_at(self, place: Place) -> Material:
         """The same in the cell at a place at all kept times; the arrays begin with (n+1,).
@@ -219,15 +214,19 @@ class Solution:
         Raises:
             SceneError: The scene is elastic, or the beam of the place is not in it.
         """
-        self._require_material()
         cell = self.grid.cell(place)
-        return Material(
-            *(np.array([v[cell] for v in kept]) for kept in zip(*self._material, strict=True))
-        )
+        kept = [self._of_material(n, cell) for n in range(len(self._times))]
+        return Material(*(np.array(field) for field in zip(*kept, strict=True)))
 
-    def _require_material(self) -> None:
-        if not self._material:
+    def _of_material(self, n: int, cells: Index | int) -> Material:
+        if not self._material[n]:
             raise SceneError("material: nothing in the scene yields or breaks; it is elastic")
+        everything = np.zeros((len(self.grid.cells), 6))
+        everything[:, :3] = self._forces(n)
+        for inelastic, rows in self._material[n]:
+            everything[inelastic, 3:] = rows[:, 3:]
+        chosen = everything[cells].T
+        return Material(chosen[:3].T, *chosen[3:])
 
     # -- balances ------------------------------------------------------------------------------
 

@@ -43,13 +43,6 @@ class Term(Protocol):
         """Enter the energy that the term holds in the accepted state ``q``."""
 
 
-class Beams(Term, Protocol):
-    """The work of the resultants of cells; its part of the residual is an internal force."""
-
-    def stored(self, q: Array) -> float:
-        """Elastic energy of the cells of this process at the accepted state ``q``; J."""
-
-
 class ElasticBeams:
     """Resultants of elastic cells working on the virtual strains, P(12)."""
 
@@ -103,7 +96,7 @@ class ElasticBeams:
 
 
 class SectionForces:
-    """(N, V, M) in elastic cells, from the strains of a configuration, P(7)."""
+    """(N, V, M) in the cells were they elastic, from the strains of a configuration, P(7)."""
 
     def __init__(self, fields: Fields) -> None:
         q = fields.configuration()
