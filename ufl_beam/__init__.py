@@ -1,6 +1,14 @@
 """Planar flexible multibody dynamics with geometrically exact beams.  Units are SI."""
 
 from ufl_beam.beams import Beam, Place
+from ufl_beam.decay import (
+    Decay,
+    damping,
+    damping_ratio,
+    fit_decay,
+    logarithmic_decrement,
+    peaks,
+)
 from ufl_beam.distributions import Lognormal, Normal, TruncatedNormal, Weibull
 from ufl_beam.errors import ConvergenceError, SceneError
 from ufl_beam.fibres import Fibres
@@ -29,12 +37,14 @@ from ufl_beam.simulation import Simulation
 from ufl_beam.solution import Solution
 from ufl_beam.solve import Newton
 from ufl_beam.view import picture, plot, plot_energy, plot_history, plot_shapes
+from ufl_beam.viscous import KelvinVoigt, Rayleigh
 
 __all__ = [
     "XDMF",
     "Beam",
     "Clamped",
     "ConvergenceError",
+    "Decay",
     "DuvautLions",
     "Energy",
     "ExactStatic",
@@ -44,6 +54,7 @@ __all__ = [
     "Hardening",
     "History",
     "Joint",
+    "KelvinVoigt",
     "LineLoad",
     "LinearSoftening",
     "Lognormal",
@@ -56,6 +67,7 @@ __all__ = [
     "PointLoad",
     "PointMass",
     "Prescribed",
+    "Rayleigh",
     "Recorder",
     "Revolute",
     "Rigid",
@@ -73,6 +85,11 @@ __all__ = [
     "Velocity",
     "Weibull",
     "animate",
+    "damping",
+    "damping_ratio",
+    "fit_decay",
+    "logarithmic_decrement",
+    "peaks",
     "picture",
     "plot",
     "plot_energy",

@@ -135,8 +135,10 @@ def peaks(
     """Times (s) and amplitudes (unit of x) of the maxima of a vibration; (m,) each.
 
     Of x and not of its magnitude: these are one period apart, wherever the equilibrium is.  Each
-    is that of the parabola through three samples; an end of the history is no maximum.  Noise raises
-    small peaks more than large ones: filter it first if it is more than 0.3 % of the amplitudes.
+    is that of the parabola through three samples; an end of the history is no maximum.
+
+    Noise raises small peaks more than large ones: filter it first if it is more than 0.3 % of the
+    amplitudes.
 
     Args:
         t: Increasing times, in any steps; (n,); s.

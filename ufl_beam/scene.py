@@ -24,6 +24,7 @@ from ufl_beam.loads import (
     TimeFunction,
     require_time_function,
 )
+from ufl_beam.viscous import Damping, KelvinVoigt, Rayleigh
 
 COMPONENTS = ("u", "v", "psi")
 Slot = tuple[Place, int]
@@ -223,6 +224,7 @@ class Scene:
         loads: :class:`PointLoad`, :class:`FollowerLoad`, :class:`LineLoad`, :class:`Gravity`.
         masses: :class:`PointMass`.
         initial: :class:`Velocity`; at rest without.
+        damping: :class:`Rayleigh`, :class:`KelvinVoigt`; besides what materials dissipate.
 
     Raises:
         SceneError: The parts do not fit together; the message names them.
@@ -234,9 +236,10 @@ class Scene:
     loads: Sequence[Load] = ()
     masses: Sequence[PointMass] = ()
     initial: Sequence[Velocity] = ()
+    damping: Sequence[Damping] = ()
 
     def __post_init__(self) -> None:
-        for part in ("beams", "joints", "supports", "loads", "masses", "initial"):
+        for part in ("beams", "joints", "supports", "loads", "masses", "initial", "damping"):
             records = require_sequence(getattr(self, part), f"Scene: {part}")
             object.__setattr__(self, part, records)
         if not self.beams:
@@ -281,6 +284,10 @@ class Scene:
         for velocity in self.initial:
             for beam in velocity.beams:
                 yield "Velocity", beam.start
+        for damping in self.damping:
+            if isinstance(damping, KelvinVoigt):
+                for beam in damping.beams or ():
+                    yield "KelvinVoigt", beam.start
 
     @cached_property
     def attached(self) -> dict[Beam, list[float]]:
@@ -348,6 +355,7 @@ def _require_kinds(scene: Scene) -> None:
         ("loads", scene.loads, (PointLoad, FollowerLoad, LineLoad, Gravity)),
         ("masses", scene.masses, (PointMass,)),
         ("initial", scene.initial, (Velocity,)),
+        ("damping", scene.damping, (Rayleigh, KelvinVoigt)),
     )
     for name, records, kind in kinds:
         for i, record in enumerate(records):

@@ -11,6 +11,7 @@ import numpy as np
 
 from ufl_beam.applied import DeadLoads, FollowerLoads
 from ufl_beam.compat import Array
+from ufl_beam.dampers import damping_forces
 from ufl_beam.errors import ConvergenceError, SceneError, require_kind
 from ufl_beam.fields import Fields
 from ufl_beam.grid import Grid, Index, Share
@@ -104,6 +105,8 @@ class Simulation:
             v = v[self.share.dofs]
             self.inertia = Inertia(self.fields, scheme, self._A, self.ledger, v)
             self._others.append(self.inertia)
+        for damping in scene.damping:
+            self._others += damping_forces(damping, self.fields, scheme, self._A, self.ledger)
         self.terms: list[Term] = [*self._beams, *self._others]
         self.supports = Supports(self.share, scheme, self.ledger, self._A)
         if start is not None:

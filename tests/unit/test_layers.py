@@ -15,7 +15,19 @@ ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "ufl_beam"
 MODULES = sorted(path.stem for path in PACKAGE.glob("*.py"))
 
-RECORDS = ["beams", "distributions", "errors", "fibres", "laws", "loads", "scene", "sections"]
+RECORDS = [
+    *("beams", "distributions", "errors", "fibres", "laws", "loads", "scene", "sections", "viscous"),
+]
+    "beams",
+    "distributions",
+    "errors",
+    "fibres",
+    "laws",
+    "loads",
+    "scene",
+    "sections",
+    "viscous",
+]
 """What users say; it must be readable and usable without any of the machinery."""
 
 MACHINERY = {"basix", "cffi", "dolfinx", "ffcx", "mpi4py", "petsc4py", "ufl"}

@@ -1,0 +1,162 @@
+"""Damping forces: what the records of viscous.py do to the equation of a step."""
+
+from __future__ import annotations
+
+from functools import singledispatch
+
+import numpy as np
+import ufl
+
+from ufl_beam.compat import Array
+from ufl_beam.errors import SceneError
+from ufl_beam.fields import Fields
+from ufl_beam.kinematics import strain, virtual_strain
+from ufl_beam.ledger import Ledger
+from ufl_beam.loops import doubles, integers, lib
+from ufl_beam.schemes import Scheme, Step
+from ufl_beam.sparse import Csr, Product
+from ufl_beam.terms import Term, mass_matrix
+from ufl_beam.viscous import KelvinVoigt, Rayleigh
+
+
+@singledispatch
+def damping_forces(
+    damping: object, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger
+) -> list[Term]:
+    """Forces of one kind of damping on the cells of a process; none if it has no such cells."""
+    raise TypeError(f"{damping!r} is not a damping")
+
+
+class KelvinVoigtForces:
+    """Resultants in proportion to the rates of the strains, P(89) with a weight of time over dt."""
+
+    def __init__(
+        self, damping: KelvinVoigt, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger
+    ) -> None:
+        q0, q1 = fields.configuration(), fields.configuration()
+        w, axis, dx = ufl.TestFunction(fields.space), fields.axis, fields.dx(1)
+        C, rate = fields.stiffness(), fields.at_points()
+        change = strain(q1, axis) - strain(q0, axis)
+        r = ufl.as_vector([rate * C[i] * change[i] for i in range(3)])
+        work = ufl.dot(r, scheme.virtual_strain(q0, q1, w, axis)) * dx
+        tangent = ufl.derivative(work, q1, ufl.TrialFunction(fields.space))
+        self._q0, self._rate, self._time = q0, rate, damping.time
+        self._force, self._tangent, self._lost = (
+            fields.kernel(form, q1) for form in (work, tangent, ufl.dot(r, change) * dx)
+        )
+        self._tangent.share(self._force)
+        self._tangent.place(A)
+        self._A, self._ledger, self._dt = A, ledger, 0.0
+
+    def begin(self, step: Step) -> None:
+        """Remember the configuration at the beginning."""
+        for kernel in (self._force, self._lost):
+            kernel.set(self._q0, step.q0)
+            if step.dt != self._dt:
+                kernel.put(self._rate, np.array([self._time / step.dt]))
+        self._dt = step.dt
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Add the damping forces."""
+        self._force.add(q1, r)
+
+    def add_tangent(self, q1: Array) -> None:
+        """Add their derivative."""
+        self._tangent.add(q1, self._A.data)
+
+    def accept(self, q1: Array, s: Array) -> None:
+        """What was damped."""
+        self._ledger.lost["damping"] += self._lost.value(q1)
+
+    def add_state(self, q: Array) -> None:
+        """Nothing is stored."""
+
+
+def reference_stiffness(fields: Fields) -> Csr:
+    """Stiffness of the undeformed scene."""
+    K = fields.matrix()
+    q, C, axis = fields.configuration(), fields.stiffness(), fields.axis
+    e, w_e = (
+        virtual_strain(q, f(fields.space), axis) for f in (ufl.TrialFunction, ufl.TestFunction)
+    )
+    work = sum(C[i] * e[i] * w_e[i] for i in range(3)) * fields.dx(1)
+    kernel = fields.kernel(work, q)
+    kernel.place(K)
+    kernel.add(np.zeros(fields.share.size), K.data)
+    return K
+
+
+class RayleighForces:
+    """A constant matrix times the mean velocity of the step, P(92)."""
+
+    def __init__(
+        self, damping: Rayleigh, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger
+    ) -> None:
+        self._C, M, K = fields.matrix(), mass_matrix(fields), reference_stiffness(fields)
+        self._C.data[:] = damping.mass * M.data + damping.stiffness * K.data  # P(92)
+        self._times = Product(self._C)
+        self._rotations = fields.share.rotations()
+        turning = np.isin(self._C.indices, self._rotations) & (self._C.data != 0)
+        self._entries = np.flatnonzero(turning).astype(np.int32)
+        self._columns = self._C.indices[self._entries]
+        self._scheme, self._A, self._ledger, self._dt = scheme, A, ledger, 0.0
+
+    def begin(self, step: Step) -> None:
+        """Prepare what stays constant in the step."""
+        self._q0 = step.q0
+        if step.dt != self._dt:
+            self._dt, self._rate = step.dt, self._C.data / step.dt
+
+    def _mean_velocity(self, q1: Array) -> Array:
+        s, _ = self._scheme.nodal_step(self._q0, q1, self._rotations)
+        s /= self._dt
+        return s
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Add the damping forces."""
+        self._times.add(self._mean_velocity(q1), r)
+
+    def add_tangent(self, q1: Array) -> None:
+        """Add their derivative."""
+        s, _ = self._scheme.nodal_step(self._q0, q1, self._rotations)
+        lib.add_inertia_tangent(
+            *(len(self._rate), doubles(self._rate)),
+            *(len(self._entries), integers(self._entries), integers(self._columns)),
+            *(doubles(s), doubles(self._A.data)),
+        )
+
+    def accept(self, q1: Array, s: Array) -> None:
+        """What was damped."""
+        self._ledger.lost["damping"] += float(s @ self._times(s)) / self._dt
+
+    def add_state(self, q: Array) -> None:
+        """Nothing is stored."""
+
+
+@damping_forces.register
+def _rayleigh(
+    damping: Rayleigh, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger
+) -> list[Term]:
+    if not scheme.dynamic:
+        raise SceneError("Rayleigh: it damps velocities, and statics has none; use KelvinVoigt")
+    ledger.lost["damping"] += 0.0
+    return [RayleighForces(damping, fields, scheme, A, ledger)]
+
+
+@damping_forces.register
+def _kelvin_voigt(
+    damping: KelvinVoigt, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger
+) -> list[Term]:
+    ledger.lost["damping"] += 0.0
+    grid = fields.share.grid
+    beams = grid.scene.beams if damping.beams is None else damping.beams
+    cells = [
+        cell
+        for beam in beams
+        for cell, hinge in zip(grid.cells_of(beam), grid.hinges(beam), strict=True)
+        if hinge is None
+    ]
+    part = np.flatnonzero(np.isin(fields.share.cells, cells))
+    if not len(part):
+        return []
+    return [KelvinVoigtForces(damping, Fields(fields.share, part), scheme, A, ledger)]
