@@ -3,6 +3,7 @@
 from ufl_beam.beams import Beam, Place
 from ufl_beam.decay import (
     Decay,
+    Envelope,
     damping,
     damping_ratio,
     fit_decay,
@@ -47,6 +48,7 @@ __all__ = [
     "Decay",
     "DuvautLions",
     "Energy",
+    "Envelope",
     "ExactStatic",
     "Fibres",
     "FollowerLoad",

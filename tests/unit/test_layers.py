@@ -16,8 +16,6 @@ PACKAGE = ROOT / "ufl_beam"
 MODULES = sorted(path.stem for path in PACKAGE.glob("*.py"))
 
 RECORDS = [
-    *("beams", "distributions", "errors", "fibres", "laws", "loads", "scene", "sections", "viscous"),
-]
     "beams",
     "distributions",
     "errors",
