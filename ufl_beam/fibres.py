@@ -113,13 +113,13 @@ class PlacedFibres:
 
     def layout(self, GA: float) -> Layout:
         """One material point for each fibre; shear stays elastic."""
-        n = len(self.y)
+        n, softening = len(self.y), self.fibres.softening
         return Layout(
             strains=np.column_stack([np.ones(n), np.zeros(n), -self.y]),
             weights=self.A,
             stiffness=np.full(n, self.E),
             laws=((self.fibres.law, n),),
             rest=np.array([0.0, GA, 0.0]),
-            softening=self.fibres.softening,
+            softening=softening if softening is not None and softening.opens else None,
             breaking=slice(None),
         )

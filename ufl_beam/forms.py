@@ -97,6 +97,10 @@ class Kernel:
         """Give ``function`` other values in the cells; shape (num_cells, dofs per cell)."""
         self._packed[:, self._columns[function]] = values
 
+    def pointer(self, function: fem.Function) -> tuple[Any, int]:
+        """Pointer to the values of ``function`` in the first cell, and the way to the next."""
+        return doubles(self._packed) + self._columns[function].start, self._packed.shape[1]
+
     def share(self, other: Kernel) -> None:
         """Use the packed values of ``other``, a form of the same coefficients."""
         if self._columns != other._columns:

@@ -11,6 +11,7 @@ from ufl_beam.grid import Grid, Index
 from ufl_beam.kinematics import strain
 from ufl_beam.laws import Layout
 from ufl_beam.ledger import Ledger
+from ufl_beam.loops import doubles, lib
 from ufl_beam.points import INPUTS, Points
 from ufl_beam.schemes import Scheme, Step
 from ufl_beam.sparse import Csr
@@ -27,7 +28,7 @@ def inelastic_cells(grid: Grid) -> list[tuple[Layout, Index]]:
             if key not in layouts:
                 layouts[key] = beam.section.layout(softening)
             layout = layouts[key]
-            if layout is not None:
+            if layout is not None and not layout.elastic:
                 groups.setdefault(layout, []).append(int(cell))
     return [(layout, np.array(cells)) for layout, cells in groups.items()]
 
@@ -53,11 +54,16 @@ class Strains:
         self._kernel = fields.kernel(mean * fields.dx(1), q)
         self._shape = (len(fields.order), 3)
 
+    def write(self, q: Array, strains: Array) -> None:
+        """Strains at ``q`` into ``strains``, in the order of the mesh; (num_cells, 3)."""
+        strains.fill(0.0)
+        self._kernel.add(q, strains)
+
     def __call__(self, q: Array) -> Array:
         """Strains at ``q``, in the order of the mesh; (num_cells, 3); 1, 1, 1/m."""
-        values = np.zeros(self._shape)
-        self._kernel.add(q, values)
-        return values
+        strains = np.empty(self._shape)
+        self.write(q, strains)
+        return strains
 
 
 class InelasticBeams:
@@ -96,9 +102,14 @@ class InelasticBeams:
         self._force, self._tangent = (fields.kernel(form, q1) for form in (work, tangent))
         self._tangent.share(self._force)
         self._tangent.place(A)
+        points, (to_b, width), (to_D, _) = self.points, *map(self._force.pointer, (b, D))
+        self._to_linearise = (
+            *(cells, doubles(points.strains), doubles(points.r), doubles(points.D)),
+            *(to_b, to_D, width),
+        )
         self._q: Array = np.empty(0)
         self._e: Array = np.empty(0)
-        self._latest: Array = np.empty(0)
+        self._latest: Array = np.full(fields.share.size, np.nan)
 
     # -- the step ------------------------------------------------------------------------------
 
@@ -108,17 +119,16 @@ class InelasticBeams:
         if step.q0 is not self._q:
             self._q, self._e = step.q0, self._strains(step.q0)
         self.points.begin(self._e, step.dt)
-        self._latest = np.empty(0)
+        self._latest.fill(np.nan)
 
     def _respond(self, q1: Array) -> None:
         """Resultants at ``q1`` and their derivatives, into the form."""
         if np.array_equal(q1, self._latest):
             return
-        self._latest = q1.copy()
-        self._e1 = e = self._strains(q1)
-        r, D = self.points.respond(e)
-        self._force.put(self._b, r - np.matvec(D.reshape(-1, 3, 3), e))
-        self._force.put(self._D, D)
+        self._latest[:] = q1
+        self._strains.write(q1, self.points.strains)
+        self.points.respond(self.points.strains)
+        lib.linearise(*self._to_linearise)
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the internal forces."""
@@ -130,13 +140,18 @@ class InelasticBeams:
         self._respond(q1)
         self._tangent.add(q1, self._A.data)
 
+    def change(self, q1: Array) -> float:
+        """Energy that cells of this process store and dissipate in the step to ``q1``; J."""
+        self._respond(q1)
+        return self.points.change()
+
     # -- the state -----------------------------------------------------------------------------
 
     def accept(self, q1: Array, s: Array) -> None:
         """Commit the internal variables."""
         self._respond(q1)
         self.points.accept()
-        self._q, self._e = q1, self._e1
+        self._q, self._e = q1, self.points.strains.copy()
         plastic, broken, lost, _, _ = self.points.sums.tolist()
         entries = self._ledger.lost
         if self._layout.yields:

@@ -222,6 +222,11 @@ class Softening:
         _require_from_zero_to_infinity(self.limit, f"{type(self).__name__}: limit")
         require_number(self.energy, f"{type(self).__name__}: energy", positive=True)
 
+    @property
+    def opens(self) -> bool:
+        """Whether it ever opens."""
+        return self.limit < np.inf
+
     def of(self, limit: Values, energy: Values) -> Softening:
         """The same law with other numbers, or with symbols."""
         law = object.__new__(type(self))
@@ -294,6 +299,11 @@ class Layout:
     softening: Softening | None
     breaking: slice
     hinges: bool = False
+
+    @property
+    def elastic(self) -> bool:
+        """Whether nothing can happen at the points."""
+        return self.softening is None and not self.yields
 
     @property
     def yields(self) -> bool:

@@ -26,6 +26,11 @@ class Ledger:
     supplied: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
     lost: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
 
+    def size(self) -> float:
+        """Sum of the sizes of all entries; J."""
+        entries = (*self.state.values(), *self.supplied.values(), *self.lost.values())
+        return sum(map(abs, entries))
+
     def begin(self) -> None:
         """Forget the state; what was supplied and lost remains."""
         for name in self.state:

@@ -157,6 +157,17 @@ void respond(kernel *bulk, kernel *opening, kernel *excess, int cells, int point
   }
 }
 
+/* Resultants as affine functions b + D e of the strains, into the packed values of cells. */
+void linearise(int cells, const double *e, const double *r, const double *D, double *b,
+               double *packed_D, int width)
+{
+  for (int c = 0; c < cells; ++c, e += 3, r += 3, D += 9, b += width, packed_D += width) {
+    for (int k = 0; k < 3; ++k)
+      b[k] = r[k] - D[3 * k] * e[0] - D[3 * k + 1] * e[1] - D[3 * k + 2] * e[2];
+    memcpy(packed_D, D, 9 * sizeof *D);
+  }
+}
+
 /* Take the end of the step as the new state.
  *
  * Each cell keeps what it bears (3), the jump of its last point, and what it dissipated by plastic
@@ -164,7 +175,7 @@ void respond(kernel *bulk, kernel *opening, kernel *excess, int cells, int point
  * numerically at theta = 1, and what they store elastically and by hardening.
  */
 void commit(kernel *end, int cells, int points, const double *B, const double *weight,
-            const double *rest, const double *length, const double *e0, const double *e1,
+            const double *rest, const double *length, double *e0, const double *e1,
             double *w, double *kept, double *sum)
 {
   double s[SAID];
@@ -176,6 +187,7 @@ void commit(kernel *end, int cells, int points, const double *B, const double *w
       kept[k] = rest[k] * e1[k];
       sum[2] += rest[k] * change * change / 2 * length[c];
       sum[3] += rest[k] * e1[k] * e1[k] / 2 * length[c];
+      e0[k] = e1[k];
     }
     for (int i = 0; i < points; ++i, w += WIDTH) {
       double volume = weight[i] * length[c];

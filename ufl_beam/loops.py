@@ -40,8 +40,10 @@ void respond(kernel *bulk, kernel *opening, kernel *excess, int cells, int point
              const double *B, const double *weight, const double *rest, double theta,
              const double *e0, const double *e1, double *w, double *r, double *D);
 void commit(kernel *end, int cells, int points, const double *B, const double *weight,
-            const double *rest, const double *length, const double *e0, const double *e1,
+            const double *rest, const double *length, double *e0, const double *e1,
             double *w, double *kept, double *sum);
+void linearise(int cells, const double *e, const double *r, const double *D, double *b,
+               double *packed_D, int width);
 """
 
 

@@ -118,6 +118,8 @@ class Points:
         storage: Zeros, for all that is known of the points; (cells, n, len(INPUTS)).
 
     Attributes:
+        strains: Of the cells at the latest response; (cells, 3); may be written to.
+        r, D: The latest response, see :meth:`respond`.
         kept: By cell: (N, V, M) in the accepted state, the jump of the last point, and the energy
             dissipated by plastic strains and by discontinuities; (cells, 6); N, N m, rad or m, J.
         sums: Of all cells: dissipated in the last step by plastic strains, by discontinuities,
@@ -153,17 +155,21 @@ class Points:
 
         cells, n, _ = storage.shape
         self.kept, self.sums = np.zeros((cells, 6)), np.zeros(5)
-        self._r, self._D = np.zeros((cells, 3)), np.zeros((cells, 9))
-        self._e0: Array = np.zeros((cells, 3))
-        self._e1: Array = self._e0
+        self.r, self.D = np.zeros((cells, 3)), np.zeros((cells, 9))
+        self._e0, self.strains = np.zeros((cells, 3)), np.zeros((cells, 3))
         B, weights, rest = (
             np.ascontiguousarray(x, dtype=np.float64)
             for x in (layout.strains, layout.weights, layout.rest)
         )
-        self._section = (cells, n, doubles(B), doubles(weights), doubles(rest))
-        self._theta, self._length = scheme.theta, doubles(np.ascontiguousarray(length))
-        self._w, self._out = doubles(storage), (doubles(self._r), doubles(self._D))
-        self._kept = (doubles(self.kept), doubles(self.sums))
+        forms, section = self._forms, (cells, n, doubles(B), doubles(weights), doubles(rest))
+        self._to_respond = (
+            *(forms.bulk, forms.opening, forms.excess, *section, scheme.theta),
+            *map(doubles, (self._e0, self.strains, storage, self.r, self.D)),
+        )
+        self._to_commit = (
+            *(forms.end, *section, doubles(np.ascontiguousarray(length))),
+            *map(doubles, (self._e0, self.strains, storage, self.kept, self.sums)),
+        )
 
     def __getitem__(self, name: str) -> Array:
         """What is known of the points by the name of an input; a view; (cells, n)."""
@@ -179,9 +185,9 @@ class Points:
 
     def begin(self, strains: Array, dt: float) -> None:
         """Begin a step at these strains of the cells; (cells, 3); 1, 1, 1/m."""
-        if strains is not self._e1:
+        if not np.array_equal(strains, self._e0):
+            self._e0[:] = strains
             self["before"][:] = strains @ self._layout.strains.T
-        self._e0 = strains
         if dt != self._dt:
             self["dt"][:] = self._dt = dt
 
@@ -190,19 +196,23 @@ class Points:
 
         They are not a number where an opening was not found.  The arrays are reused.
         """
-        forms, self._e1 = self._forms, strains
-        lib.respond(
-            *(forms.bulk, forms.opening, forms.excess, *self._section, self._theta),
-            *(doubles(self._e0), doubles(strains), self._w, *self._out),
-        )
-        return self._r, self._D
+        if strains is not self.strains:
+            self.strains[:] = strains
+        lib.respond(*self._to_respond)
+        return self.r, self.D
 
     def accept(self) -> None:
         """Take the strains of the latest response as the new state."""
-        lib.commit(
-            *(self._forms.end, *self._section, self._length),
-            *(doubles(self._e0), doubles(self._e1), self._w, *self._kept),
-        )
+        lib.commit(*self._to_commit)
+
+    def change(self) -> float:
+        """Energy that :meth:`accept` would add to what is stored and dissipated; J."""
+        state = (self._e0, self.strains, self._storage, self.kept, self.sums)
+        copies = [x.copy() for x in state]
+        lib.commit(*self._to_commit[: -len(copies)], *map(doubles, copies))
+        sums = copies[-1]
+        plastic, broken, _, elastic, hardening = (sums - [0, 0, 0, *self.sums[3:]]).tolist()
+        return float(plastic + broken + elastic + hardening)
 
     # -- the state -----------------------------------------------------------------------------
 

@@ -7,6 +7,7 @@ solver know which scheme runs; a new one (Newmark, generalised-α, ...) is one m
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, TypeGuard, runtime_checkable
@@ -69,8 +70,8 @@ class Scheme(Protocol):
     theta: float
     """Laws of inelastic material are stated at this part of the step."""
 
-    exact: bool
-    """Whether the works of a step are the exact increments of energies."""
+    slack: float
+    """A step is cut if its forces do not account for this part of what it stores and dissipates."""
 
     loss: float
     """Part of twice the energy of a change of strain that is lost numerically."""
@@ -119,19 +120,21 @@ def has_inertia(scheme: Scheme) -> TypeGuard[DynamicScheme]:
 class Static:
     """Equilibrium at the end of each step; no inertia, time is the load parameter.
 
-    The ledger counts works by the trapezoidal rule, so its imbalance is of second order in the step
-    and a measure of it; a step whose forces leave a tenth of what it stores unexplained is cut.
+    The ledger counts works by the trapezoidal rule, so its imbalance is of second order in the
+    step and a measure of it.  A step is cut whose forces leave a twentieth of what it stores and
+    dissipates unexplained, for it may have leapt to another branch of equilibria.
     """
 
     dynamic = False
     advice = (
-        "Try a smaller dt; beyond a limit load there is no equilibrium nearby, so prescribe a "
-        "displacement in the place of the load, or run dynamics"
+        "Try a smaller dt; beyond a limit load, and where softening snaps back (limit**2/energy of "
+        "a hinge above the stiffness that drives it), there is no equilibrium nearby, so prescribe "
+        "a displacement in the place of the load, or run dynamics"
     )
     load_weight = 1.0
     theta = 1.0
     loss = 0.0
-    exact = False
+    slack = 0.05
 
     def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
         """Parts of a step go in proportion to the loads and motions of its end.
@@ -169,7 +172,6 @@ class _ExactStep:
     """What steps have in common whose works are exact increments of energy."""
 
     alpha: float
-    exact = True
 
     @property
     def theta(self) -> float:
@@ -221,7 +223,8 @@ class ExactStatic(_ExactStep):
 
     :class:`Static` finds equilibrium at the ends of the steps and counts works by the trapezoidal
     rule; here the equation of the step is that of :class:`Midpoint`.  Inelastic material follows
-    its laws over the step, not only at its end.
+    its laws over the step, not only at its end.  A leap to another branch of equilibria is noticed
+    only if half of what it sets free is lost numerically; follow softening with :class:`Static`.
 
     Args:
         theta: Part of the step at which resultants and loads are in equilibrium.  1/2 loses
@@ -235,6 +238,7 @@ class ExactStatic(_ExactStep):
     theta: float = 1.0
 
     dynamic = False
+    slack = 0.5
     advice = Static.advice
 
     def __post_init__(self) -> None:
@@ -282,6 +286,7 @@ class Midpoint(_ExactStep):
     beta: float = 0.0
 
     dynamic = True
+    slack = math.inf
     load_weight = 0.5
     advice = (
         "Try a smaller dt, loads and motions without jumps, or more energy taken out of high "

@@ -81,7 +81,7 @@ class Section:
             return self.fibres.layout(self.GA)
         stiffness = np.array([self.EA, self.GA, self.EI])
         laws = [self.axial, self.shear, self.bending]
-        if hinge is not None and math.isinf(hinge.limit):
+        if hinge is not None and not hinge.opens:
             hinge = None
         if hinge is not None and self.bending is None:
             laws[2] = Hardening(limit=math.inf)

@@ -24,15 +24,12 @@ from ufl_beam.schemes import Scheme, has_inertia
 from ufl_beam.solution import Solution
 from ufl_beam.solve import Newton, Solver, StepFailed
 from ufl_beam.supports import Supports
-from ufl_beam.terms import ElasticBeams, Inertia, SectionForces, Term
+from ufl_beam.terms import Beams, ElasticBeams, Inertia, SectionForces, Term
 
 SMALLEST_PART = 2**12
 """A step is cut into at most this number of parts."""
 
 NO_REACTIONS = np.zeros((0, 3))
-
-PATH = 0.1
-"""Part of the work of a static step that may be unaccounted for before the step is cut."""
 
 SMALLEST_SHARE = 100_000
 """Scenes with fewer cells per process are computed by each process.
@@ -94,12 +91,11 @@ class Simulation:
         self.ledger = Ledger()
         self.parts = 0
 
-        self.elastic: list[ElasticBeams] = []
+        self._beams: list[Beams] = []
         self.inelastic: list[InelasticBeams] = []
         self._make_beams()
         self.force = np.zeros(self.share.size)
         self.loads = self._make_loads()
-        self._beams: list[Term] = [*self.elastic, *self.inelastic]
         self._others: list[Term] = [*self.loads]
         if has_inertia(scheme):
             v = v[self.share.dofs]
@@ -119,8 +115,7 @@ class Simulation:
         self._dt_before = math.inf
         self._rotations = self.share.rotations()
         self._force_before: Array = np.zeros(self.share.size)
-        self._follows = not (scheme.exact or self._has_inelastic)
-        if self._follows:
+        if not scheme.dynamic:
             for beams in self._beams:
                 beams.add_residual(self.q, self._force_before)
         for term in self.terms:
@@ -152,10 +147,11 @@ class Simulation:
                 self.inelastic.append(
                     InelasticBeams(fields, layout, self.scheme, self._A, self.ledger)
                 )
+        self._beams.extend(self.inelastic)
         if elastic.any():
             part = np.flatnonzero(elastic)
             fields = self.fields if elastic.all() else Fields(self.share, part)
-            self.elastic.append(ElasticBeams(fields, self.scheme, self._A, self.ledger))
+            self._beams.append(ElasticBeams(fields, self.scheme, self._A, self.ledger))
 
     def _make_loads(self) -> list[DeadLoads | FollowerLoads]:
         followers = [load for load in self.scene.loads if isinstance(load, FollowerLoad)]
@@ -260,7 +256,7 @@ class Simulation:
         self.supports.leave(q1)
         s, turn = self.scheme.nodal_step(self.q, q1, self._rotations)
         self._require_small(turn)
-        if self._follows:
+        if not self.scheme.dynamic:
             self._require_followed(q1, s)
         for term in self.terms:
             term.accept(q1, s)
@@ -283,20 +279,22 @@ class Simulation:
             )
 
     def _require_followed(self, q1: Array, s: Array) -> None:
-        """A static step must be so small that the forces on its way account for what it stores.
+        """The forces on the way of a static step must account for what it stores and dissipates.
 
-        Otherwise Newton's method may have found another branch of equilibria than the one followed.
+        Otherwise Newton's method may have found another branch of equilibria than the one followed:
+        beyond a limit load, or where softening lets go more than it dissipates.
         """
-        force = self.force
-        work = self.share.total(float(self.scheme.acting(self._force_before, force) @ s))
-        held, stored = (
-            self.share.total(sum(beams.stored(q) for beams in self.elastic)) for q in (self.q, q1)
-        )
-        change = stored - held
-        if abs(work - change) > PATH * (abs(work) + abs(change)) + 1e-9 * held:
+        force, later = self.force, self.scheme.theta - 0.5
+        middle = force - later * (force - self._force_before)
+        work = self.share.total(float(middle @ s))
+        change = self.share.total(sum(beams.change(q1) for beams in self._beams))
+        through = self.share.total(self.ledger.size())
+        slack = self.scheme.slack * (abs(work) + abs(change)) + self._solver.least_energy()
+        if abs(work - change) > slack + 1e-9 * through:
             raise StepFailed(
-                f"the step stores {change:.3e} J, but the forces along it do {work:.3e} J of work: "
-                "it leaps to another branch of equilibria, or is too long to tell"
+                f"the step stores and dissipates {change:.3e} J, but the forces along it do "
+                f"{work:.3e} J of work: it leaps to another branch of equilibria, or is too long "
+                "to tell"
             )
         self._force_before = force.copy()
 

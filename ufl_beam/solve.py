@@ -227,8 +227,15 @@ class Solver:
         A strain is the difference of two numbers near one, so stiff or finely divided beams cannot
         be solved any better, however small the forces are.
         """
-        digits = np.spacing(np.abs(self._view(self._x)) + self._lengths)
-        return self._size(self._A.data[self._diagonal] * digits)
+        return self._size(self._A.data[self._diagonal] * self._last_digits())
+
+    def _last_digits(self) -> Array:
+        return np.spacing(np.abs(self._view(self._x)) + self._lengths)
+
+    def least_energy(self) -> float:
+        """Energy that the last digit of displacements makes; less is nothing; J."""
+        energies = self._A.data[self._diagonal] * self._last_digits() ** 2
+        return self._share.total(float(energies[: len(self._weights)].sum()))
 
     # -- the call ------------------------------------------------------------------------------
 

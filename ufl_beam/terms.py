@@ -43,6 +43,13 @@ class Term(Protocol):
         """Enter the energy that the term holds in the accepted state ``q``."""
 
 
+class Beams(Term, Protocol):
+    """Resultants of cells working on the virtual strains; the residual is an internal force."""
+
+    def change(self, q1: Array) -> float:
+        """Energy that cells of this process store and dissipate in the step to ``q1``; J."""
+
+
 class ElasticBeams:
     """Resultants of elastic cells working on the virtual strains, P(12)."""
 
@@ -88,11 +95,12 @@ class ElasticBeams:
 
     def add_state(self, q: Array) -> None:
         """Stored energy."""
-        self._ledger.state["stored"] += self.stored(q)
+        self._held = self._stored.value(q)
+        self._ledger.state["stored"] += self._held
 
-    def stored(self, q: Array) -> float:
-        """Elastic energy of the cells of this process; J."""
-        return self._stored.value(q)
+    def change(self, q1: Array) -> float:
+        """Energy that cells of this process store in the step to ``q1``; J."""
+        return self._stored.value(q1) - self._held
 
 
 class SectionForces:
