@@ -13,6 +13,12 @@ from ufl_beam.decay import (
 from ufl_beam.distributions import Lognormal, Normal, TruncatedNormal, Weibull
 from ufl_beam.errors import ConvergenceError, SceneError
 from ufl_beam.fibres import Fibres
+from ufl_beam.hysteresis import (
+    plot_damage,
+    plot_dissipation,
+    plot_hinge,
+    plot_moment_curvature,
+)
 from ufl_beam.laws import DuvautLions, Hardening, LinearSoftening, Perzyna, Softening
 from ufl_beam.ledger import Energy
 from ufl_beam.loads import FollowerLoad, Gravity, LineLoad, PointLoad, Table, ramp
@@ -94,8 +100,12 @@ __all__ = [
     "peaks",
     "picture",
     "plot",
+    "plot_damage",
+    "plot_dissipation",
     "plot_energy",
+    "plot_hinge",
     "plot_history",
+    "plot_moment_curvature",
     "plot_shapes",
     "ramp",
     "render",

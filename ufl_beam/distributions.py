@@ -1,13 +1,14 @@
 """Distributions of yield stresses over fibres and cells; seeded, the same on every process.
 
-Each cell of each beam draws from a stream of its own, so that neither the order of computation nor
-the number of processes changes what it gets.
+Each cell of each beam draws from a stream of its own, known by where the beam begins and ends, so
+that neither the order of beams nor the number of processes changes what it gets.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import KW_ONLY, dataclass
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,7 @@ class Distribution(ABC):
 
     def __post_init__(self) -> None:
         name = type(self).__name__
-        if not isinstance(self.seed, int) or self.seed < 0:
+        if isinstance(self.seed, bool) or not isinstance(self.seed, Integral) or self.seed < 0:
             raise SceneError(f"{name}: seed = {self.seed!r} must be a whole number, 0 or more")
         for parameter in self.__match_args__:
             require_number(getattr(self, parameter), f"{name}: {parameter}", positive=True)
@@ -41,7 +42,7 @@ class Distribution(ABC):
 
     def draw(self, n: int, key: tuple[int, int]) -> npt.NDArray[np.float64]:
         """``n`` independent values of the stream ``key``; none is negative; shape (n,)."""
-        stream = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=key))
+        stream = np.random.default_rng(np.random.SeedSequence(int(self.seed), spawn_key=key))
         return np.asarray(np.maximum(self.law().rvs(n, random_state=stream), 0.0))
 
 

@@ -36,6 +36,7 @@ class Fibres:
     def __post_init__(self) -> None:
         require_kind(self.law, Hardening, "Fibres: law")
         require_count(self.number, "Fibres: number")
+        object.__setattr__(self, "number", int(self.number))
         if self.softening is not None:
             require_kind(self.softening, Softening, "Fibres: softening")
 
@@ -62,7 +63,10 @@ class PlacedFibres:
     @classmethod
     def at(cls, fibres: Fibres, E: float, y: Sequence[float], A: Sequence[float]) -> PlacedFibres:
         """Fibres of a user; ``y`` from any line, the axis will run through their centroid."""
-        y_, A_ = np.array(y, dtype=np.float64), np.array(A, dtype=np.float64)
+        try:
+            y_, A_ = np.array(y, dtype=np.float64), np.array(A, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise SceneError(f"Section.of_fibres: y = {y!r}, A = {A!r} are no numbers") from None
         if y_.ndim != 1 or y_.shape != A_.shape or not len(y_):
             raise SceneError(
                 f"Section.of_fibres: y and A must be lists of one length, not {y_.shape} and "
@@ -96,6 +100,8 @@ class PlacedFibres:
             first_moment: Its first moment about y = 0; m³.
             edges: Further limits between layers; m.
         """
+        if fibres.number < 2:
+            raise SceneError("Fibres: number = 1 has no bending stiffness; use 2 or more")
         cuts = np.union1d(np.linspace(-h / 2, h / 2, fibres.number + 1), np.array(edges))
         cuts = cuts[np.insert(np.diff(cuts) > 1e-9 * h, 0, True)]
         A = np.diff(area(cuts))

@@ -7,8 +7,10 @@ process.
 
 from __future__ import annotations
 
+import struct
 from functools import cached_property
 from typing import Any
+from zlib import crc32
 
 from mpi4py import MPI
 
@@ -106,15 +108,22 @@ class Grid:
         """Law of the hinge in each cell of a beam."""
         cells = self.cells_of(beam)
         laws = [beam.section.hinge] * len(cells)
+        at = {s: self.cell(beam.at(s)) - cells[0] for s in beam.hinges}
+        if len(set(at.values())) < len(at):
+            raise SceneError(
+                f"{beam.name}: two of the hinges at s = {', '.join(f'{s:g}' for s in at)} are in "
+                "one cell; take more cells, or one hinge"
+            )
         for s, law in beam.hinges.items():
-            laws[self.cell(beam.at(s)) - cells[0]] = law
+            laws[at[s]] = law
         return laws
 
     def keys(self, cells: Index) -> list[tuple[int, int]]:
-        """Number of the beam, and number in the beam, of some cells."""
+        """A number for the ends of the beam, and the number in the beam, of some cells."""
         beams = self.beam_of_cell[cells]
+        of_beam = [crc32(struct.pack("4d", *beam.a, *beam.b)) for beam in self.scene.beams]
         first = (self._first - np.arange(len(self._first)))[beams]
-        return [(int(b), int(c)) for b, c in zip(beams, cells - first, strict=True)]
+        return [(of_beam[b], int(c)) for b, c in zip(beams, cells - first, strict=True)]
 
     def describe(self, dof: int) -> str:
         """A degree of freedom in words: its component, beam and point."""

@@ -175,7 +175,10 @@ class InelasticBeams:
 
     def kept(self) -> tuple[Index, Array]:
         """Cells (numbers of the grid), and :attr:`Points.kept` of them; (num_cells, 6)."""
-        return self._cells, self.points.kept.copy()
+        rows = self.points.kept.copy()
+        if not self._layout.hinges:
+            rows[:, 3] = 0.0
+        return self._cells, rows
 
     def state(self) -> tuple[Index, Array]:
         """Cells (numbers of the grid), and their internal variables; (num_cells, k)."""

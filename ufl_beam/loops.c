@@ -104,8 +104,9 @@ static void ask(kernel *tabulate, const double *w, int answers, double *e)
 
 /* Growth at which the excess of what the bulk bears over the resistance vanishes, or NAN.
  *
- * The excess is a concave function that is positive at zero: Newton's method comes to its root from
- * above without fail. Above is where the bulk would be unloaded.
+ * The excess is positive at zero, falls, and is concave unless the bulk flows back in tension:
+ * Newton's method comes to its root from above, from where the bulk would be unloaded. Bisection
+ * stands by.
  */
 static double growth(kernel *excess, double *w)
 {
@@ -114,25 +115,34 @@ static double growth(kernel *excess, double *w)
   double bound = fabs(strain - w[PLASTIC]) * w[LENGTH] / theta + DBL_MIN;
   w[GROWTH] = 0;
   ask(excess, w, 2, g);
-  double a = g[1] < 0 ? fmin(bound, -g[0] / g[1]) : bound;
-  for (int i = 0; i < 100; ++i) {
+  if (g[0] <= 0) return 0; /* over the limit by a last digit */
+  double a = g[1] < 0 ? fmin(bound, -g[0] / g[1]) : bound, low = 0, high = INFINITY;
+  for (int i = 0; i < 200; ++i) {
     w[GROWTH] = a;
     ask(excess, w, 2, g);
-    /* Left of the top of the function there is no way down: go further. */
-    double step = g[0] > 0 && g[1] >= 0 ? -a : g[0] / g[1];
-    a -= step;
-    /* So small a step was the last but none: the next one would be its square. */
-    if (fabs(step) <= 1e-9 * fmax(a, 1e-9 * bound)) return a;
+    if (g[0] > 0) low = a;
+    else high = a;
+    double next = a - g[0] / g[1], step = fabs(next - a);
+    /* So small a relative step was the last but none: the next one would be its square. */
+    if (step <= 1e-9 * a || step <= 4 * DBL_EPSILON * bound) return next > 0 ? next : a;
+    if (!(next > low && next < high)) next = high < INFINITY ? (low + high) / 2 : 2 * a;
+    a = next;
   }
   return NAN;
 }
 
-/* Resultants r of cells whose strains grow from e0 to e1, and their derivatives D. */
-void respond(kernel *bulk, kernel *opening, kernel *excess, int cells, int points,
+/* Resultants r of cells whose strains grow from e0 to e1, and their derivatives D; how many open.
+ *
+ * If told to relieve, points that do not open answer with their elastic stiffness: where one opens,
+ * the plastic ones around it unload, which their own tangents do not tell, and Newton's method
+ * would close what it just opened, again and again.
+ */
+int respond(kernel *bulk, kernel *opening, kernel *excess, int cells, int points,
              const double *B, const double *weight, const double *rest, double theta,
-             const double *e0, const double *e1, double *w, double *r, double *D)
+             const double *e0, const double *e1, double *w, double *r, double *D, int relieve)
 {
   double s[2];
+  int open = 0;
   for (int c = 0; c < cells; ++c, e0 += 3, e1 += 3, r += 3, D += 9) {
     memset(D, 0, 9 * sizeof *D);
     for (int k = 0; k < 3; ++k) {
@@ -148,6 +158,9 @@ void respond(kernel *bulk, kernel *opening, kernel *excess, int cells, int point
         w[DIRECTION] = s[0] < 0 ? -1 : 1;
         w[GROWTH] = growth(excess, w);
         ask(opening, w, 2, s);
+        ++open;
+      } else if (relieve) {
+        s[1] = theta * w[STIFFNESS];
       }
       for (int k = 0; k < 3; ++k) {
         r[k] += weight[i] * s[0] * b[k];
@@ -155,6 +168,7 @@ void respond(kernel *bulk, kernel *opening, kernel *excess, int cells, int point
       }
     }
   }
+  return open;
 }
 
 /* Resultants as affine functions b + D e of the strains, into the packed values of cells. */

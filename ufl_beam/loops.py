@@ -36,9 +36,9 @@ void add_inertia_tangent(int entries, const double *mass, int turning_entries,
 double step_of_nodes(int size, const double *q0, const double *q1, int rotations,
                      const int32_t *rotation, double *s);
 double weighted_square(int rows, const double *w, const double *f);
-void respond(kernel *bulk, kernel *opening, kernel *excess, int cells, int points,
-             const double *B, const double *weight, const double *rest, double theta,
-             const double *e0, const double *e1, double *w, double *r, double *D);
+int respond(kernel *bulk, kernel *opening, kernel *excess, int cells, int points,
+            const double *B, const double *weight, const double *rest, double theta,
+            const double *e0, const double *e1, double *w, double *r, double *D, int relieve);
 void commit(kernel *end, int cells, int points, const double *B, const double *weight,
             const double *rest, const double *length, double *e0, const double *e1,
             double *w, double *kept, double *sum);

@@ -6,6 +6,7 @@ theorem where a discontinuity opens, FFCx compiles them, and a loop in C goes ov
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import basix.ufl
@@ -35,6 +36,9 @@ INPUTS = (
     *("C", "length", "θ", "dt", "limit", "H", "B", "eta", "softening limit", "softening energy"),
 )
 """What the law of a point depends on, in the order of its storage."""
+
+PATIENCE = 6
+"""Responses in a step after which points around one that opens are taken to unload; see loops.c."""
 
 STATE = ("p", "ξ", "jump", "opening")
 """The internal variables."""
@@ -107,6 +111,17 @@ class PointForms:
         return tabulator(form)
 
 
+@dataclass
+class Openings:
+    """What points know of each other in a step.
+
+    Attributes:
+        any: Whether a discontinuity opened in some response.
+    """
+
+    any: bool = False
+
+
 class Points:
     """Points of the same layout in many cells.
 
@@ -120,6 +135,7 @@ class Points:
     Attributes:
         strains: Of the cells at the latest response; (cells, 3); may be written to.
         r, D: The latest response, see :meth:`respond`.
+        openings: Shared by all points of a scene.
         kept: By cell: (N, V, M) in the accepted state, the jump of the last point, and the energy
             dissipated by plastic strains and by discontinuities; (cells, 6); N, N m, rad or m, J.
         sums: Of all cells: dissipated in the last step by plastic strains, by discontinuities,
@@ -154,6 +170,7 @@ class Points:
             self._resist()
 
         cells, n, _ = storage.shape
+        self._responses, self.openings = 0, Openings()
         self.kept, self.sums = np.zeros((cells, 6)), np.zeros(5)
         self.r, self.D = np.zeros((cells, 3)), np.zeros((cells, 9))
         self._e0, self.strains = np.zeros((cells, 3)), np.zeros((cells, 3))
@@ -185,6 +202,7 @@ class Points:
 
     def begin(self, strains: Array, dt: float) -> None:
         """Begin a step at these strains of the cells; (cells, 3); 1, 1, 1/m."""
+        self._responses, self.openings.any = 0, False
         if not np.array_equal(strains, self._e0):
             self._e0[:] = strains
             self["before"][:] = strains @ self._layout.strains.T
@@ -198,7 +216,9 @@ class Points:
         """
         if strains is not self.strains:
             self.strains[:] = strains
-        lib.respond(*self._to_respond)
+        self._responses += 1
+        relieve = self.openings.any and self._responses > PATIENCE
+        self.openings.any |= lib.respond(*self._to_respond, relieve) > 0
         return self.r, self.D
 
     def accept(self) -> None:

@@ -59,6 +59,9 @@ def on_first(comm: MPI.Intracomm, action: Callable[[], None]) -> None:
 class XDMF(Recorder):
     """Time series for ParaView: displacement and rotation at vertices, N, V, M in cells.
 
+    Where something yields or breaks, also the jump of the hinge (rad) and the dissipated energy (J)
+    of each cell.
+
     Args:
         path: File, ending in ``.xdmf``; the data are beside it in ``.h5``.
         every: Write every so many steps.
@@ -82,6 +85,7 @@ class XDMF(Recorder):
     def open(self, simulation: Simulation) -> None:
         """Write the mesh and the initial state."""
         self._count = 0
+        self._inelastic = len(simulation.material()) > 0
         on_first(simulation.comm, lambda: self._begin(simulation.grid))
         self._put(simulation)
 
@@ -93,7 +97,8 @@ class XDMF(Recorder):
         constants = basix.ufl.element("DG", "interval", 0)
         self._displacement = _named(domain, vectors, "displacement")
         self._rotation = _named(domain, line, "rotation")
-        self._resultants = [_named(domain, constants, name) for name in "NVM"]
+        names = ["N", "V", "M", *(["jump", "dissipated energy"] if self._inelastic else [])]
+        self._in_cells = [_named(domain, constants, name) for name in names]
         dofmap = self._rotation.function_space.dofmap.list
         self._vertex_of_dof = np.empty(len(grid.points), dtype=np.int64)
         self._vertex_of_dof[dofmap] = grid.cells[self._order]
@@ -108,16 +113,21 @@ class XDMF(Recorder):
 
     def _put(self, simulation: Simulation) -> None:
         q = simulation.share.gather(simulation.q)
-        resultants = simulation.section_forces()
-        on_first(simulation.comm, lambda: self._write(simulation, q, resultants))
+        columns = [*simulation.section_forces().T]
+        if self._inelastic:
+            jump, dissipated = np.zeros((2, len(simulation.grid.cells)))
+            for cells, rows in simulation.material():
+                jump[cells], dissipated[cells] = rows[:, 3], rows[:, 4] + rows[:, 5]
+            columns += [jump, dissipated]
+        on_first(simulation.comm, lambda: self._write(simulation, q, columns))
 
-    def _write(self, simulation: Simulation, q: Array, resultants: Array) -> None:
+    def _write(self, simulation: Simulation, q: Array, columns: list[Array]) -> None:
         at_dofs = q[simulation.grid.dofs[self._vertex_of_dof]]
         self._displacement.x.array.reshape(-1, 3)[:, :2] = at_dofs[:, :2]
         self._rotation.x.array[:] = at_dofs[:, 2]
-        for component, function in enumerate(self._resultants):
-            function.x.array[:] = resultants[self._order, component]
-        for function in (self._displacement, self._rotation, *self._resultants):
+        for values, function in zip(columns, self._in_cells, strict=True):
+            function.x.array[:] = values[self._order]
+        for function in (self._displacement, self._rotation, *self._in_cells):
             self._files[0].write_function(function, simulation.t)
 
     def close(self) -> None:

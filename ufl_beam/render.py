@@ -25,10 +25,12 @@ from ufl_beam.errors import SceneError, require_number
 from ufl_beam.solution import Solution
 from ufl_beam.view import (
     INK,
+    ORANGE,
     RESULTANTS,
     decimal_prefix,
     moved_points,
     nearest,
+    open_hinges,
     require_choice,
     support_direction,
     support_symbol,
@@ -54,7 +56,8 @@ def render(
     """Write a picture of the frame at the n-th kept time as a solid body.
 
     In the plane, beams have the depth of their section; across, they have the same depth, or a
-    visible one if they are slender.  Needs no screen, see :func:`animate`.
+    visible one if they are slender.  Orange pins are hinges that have opened.  Needs no screen, see
+    :func:`animate`.
 
     Args:
         solution: What to show.
@@ -301,7 +304,7 @@ def _add_text(plotter: Any, look: _Look, text: str, position: tuple[float, float
 
 
 def _add_fittings(pyvista: Any, plotter: Any, look: _Look, n: int, points: Array) -> None:
-    """Joints as pins across the plane, masses as balls, supports as their symbols."""
+    """Joints and open hinges as pins across the plane, masses as balls, supports as symbols."""
     solution, scene, symbol = look.solution, look.solution.scene, look.symbol
 
     def add(parts: list[Any], color: str, name: str) -> None:
@@ -322,6 +325,14 @@ def _add_fittings(pyvista: Any, plotter: Any, look: _Look, n: int, points: Array
         pin = {"center": at, "direction": (0, 0, 1), "radius": radius, "height": height}
         pins.append(pyvista.Cylinder(**pin, resolution=32))
     add(pins, "#707070", "joints")
+    hinges = []
+    for cell in open_hinges(solution, n)[0]:
+        beam = scene.beams[solution.grid.beam_of_cell[cell]]
+        at = np.append(points[solution.grid.cells[cell]].mean(axis=0), 0.0)
+        radius, height = max(look.depth(beam) / 2, 0.4 * symbol), 1.25 * look.width(beam)
+        pin = {"center": at, "direction": (0, 0, 1), "radius": radius, "height": height}
+        hinges.append(pyvista.Cylinder(**pin, resolution=32))
+    add(hinges, ORANGE, "hinges")
     add(
         [pyvista.Sphere(radius=1.1 * symbol, center=center(m.place)) for m in scene.masses],
         INK,

@@ -128,8 +128,9 @@ class Static:
     dynamic = False
     advice = (
         "Try a smaller dt; beyond a limit load, and where softening snaps back (limit**2/energy of "
-        "a hinge above the stiffness that drives it), there is no equilibrium nearby, so prescribe "
-        "a displacement in the place of the load, or run dynamics"
+        "a hinge, half of it if softening is linear, above the stiffness that drives it), there is "
+        "no equilibrium nearby, so prescribe a displacement in the place of the load, or run "
+        "dynamics"
     )
     load_weight = 1.0
     theta = 1.0
@@ -223,8 +224,8 @@ class ExactStatic(_ExactStep):
 
     :class:`Static` finds equilibrium at the ends of the steps and counts works by the trapezoidal
     rule; here the equation of the step is that of :class:`Midpoint`.  Inelastic material follows
-    its laws over the step, not only at its end.  A leap to another branch of equilibria is noticed
-    only if half of what it sets free is lost numerically; follow softening with :class:`Static`.
+    its laws over the step, not only at its end.  A leap to another branch of equilibria does not
+    stop it, but what that sets free is in the entry "numerical"; :class:`Static` stops.
 
     Args:
         theta: Part of the step at which resultants and loads are in equilibrium.  1/2 loses
@@ -238,7 +239,7 @@ class ExactStatic(_ExactStep):
     theta: float = 1.0
 
     dynamic = False
-    slack = 0.5
+    slack = math.inf
     advice = Static.advice
 
     def __post_init__(self) -> None:

@@ -31,6 +31,12 @@ SMALLEST_PART = 2**12
 
 NO_REACTIONS = np.zeros((0, 3))
 
+FAR = 1e3
+"""Sizes of the scene by which nothing moves in a static step, unless it is a mechanism."""
+
+KINK = 1e-6
+"""Part of the energy that went through at which a static step may pass a kink of a law."""
+
 SMALLEST_SHARE = 100_000
 """Scenes with fewer cells per process are computed by each process.
 
@@ -115,7 +121,7 @@ class Simulation:
         self._dt_before = math.inf
         self._rotations = self.share.rotations()
         self._force_before: Array = np.zeros(self.share.size)
-        if not scheme.dynamic:
+        if math.isfinite(scheme.slack):
             for beams in self._beams:
                 beams.add_residual(self.q, self._force_before)
         for term in self.terms:
@@ -147,6 +153,8 @@ class Simulation:
                 self.inelastic.append(
                     InelasticBeams(fields, layout, self.scheme, self._A, self.ledger)
                 )
+        for inelastic in self.inelastic[1:]:
+            inelastic.points.openings = self.inelastic[0].points.openings
         self._beams.extend(self.inelastic)
         if elastic.any():
             part = np.flatnonzero(elastic)
@@ -257,6 +265,8 @@ class Simulation:
         s, turn = self.scheme.nodal_step(self.q, q1, self._rotations)
         self._require_small(turn)
         if not self.scheme.dynamic:
+            self._require_near(s)
+        if math.isfinite(self.scheme.slack):
             self._require_followed(q1, s)
         for term in self.terms:
             term.accept(q1, s)
@@ -278,19 +288,31 @@ class Simulation:
                 f"a node turns by {turn:.3g} rad in the step, and |Δψ| must stay below π; reduce dt"
             )
 
+    def _require_near(self, s: Array) -> None:
+        """Raise if a static step goes where only a mechanism goes."""
+        moves = np.abs(s) / self.scene.size
+        moves[self._rotations] *= self.scene.size
+        far = moves.max(initial=0.0)
+        if self.share.comm.size > 1:
+            far = self.share.comm.allreduce(far, op=MPI.MAX)
+        if not far <= FAR:
+            raise StepFailed(
+                f"a node moves by {far:.1e} times the size of the scene, or turns by so many "
+                "radians, in the step: what yields and what has opened leave a mechanism"
+            )
+
     def _require_followed(self, q1: Array, s: Array) -> None:
         """The forces on the way of a static step must account for what it stores and dissipates.
 
         Otherwise Newton's method may have found another branch of equilibria than the one followed:
         beyond a limit load, or where softening lets go more than it dissipates.
         """
-        force, later = self.force, self.scheme.theta - 0.5
-        middle = force - later * (force - self._force_before)
-        work = self.share.total(float(middle @ s))
+        force = self.force
+        work = self.share.total(float(self.scheme.acting(self._force_before, force) @ s))
         change = self.share.total(sum(beams.change(q1) for beams in self._beams))
         through = self.share.total(self.ledger.size())
-        slack = self.scheme.slack * (abs(work) + abs(change)) + self._solver.least_energy()
-        if abs(work - change) > slack + 1e-9 * through:
+        slack = self.scheme.slack * (abs(work) + abs(change)) + self._solver.least_work(s)
+        if abs(work - change) > slack + KINK * through:
             raise StepFailed(
                 f"the step stores and dissipates {change:.3e} J, but the forces along it do "
                 f"{work:.3e} J of work: it leaps to another branch of equilibria, or is too long "

@@ -232,10 +232,10 @@ class Solver:
     def _last_digits(self) -> Array:
         return np.spacing(np.abs(self._view(self._x)) + self._lengths)
 
-    def least_energy(self) -> float:
-        """Energy that the last digit of displacements makes; less is nothing; J."""
-        energies = self._A.data[self._diagonal] * self._last_digits() ** 2
-        return self._share.total(float(energies[: len(self._weights)].sum()))
+    def least_work(self, s: Array) -> float:
+        """Work in a step ``s`` of what the last digit of displacements makes; less is none; J."""
+        works = self._A.data[self._diagonal] * self._last_digits() * np.abs(s)
+        return self._share.total(float(works[: len(self._weights)].sum()))
 
     # -- the call ------------------------------------------------------------------------------
 

@@ -71,6 +71,7 @@ class Supports:
         zero = np.isin(rows, self.dofs) | np.isin(columns, self.dofs)
         self._zero = np.flatnonzero(zero)
         self._diagonal = np.flatnonzero(zero & (rows == columns))
+        self._pivots = np.ones(len(self._diagonal))
         self._owned = self.dofs < share.num_owned
         self._acting, self._ledger = scheme.acting, ledger
         if any(support.moving for support in share.grid.scene.supports):
@@ -121,9 +122,11 @@ class Supports:
             axes.enter_matrix(data)
         if len(self.dofs):
             # What stands on the diagonal has the right dimension and size for what is held.
+            # Where material that flows freely leaves nothing, what stood there before does as well.
             diagonal = data[self._diagonal]
+            np.copyto(self._pivots, diagonal, where=diagonal != 0.0)
             data[self._zero] = 0.0
-            data[self._diagonal] = diagonal
+            data[self._diagonal] = self._pivots
 
     def accept(self, s: Array) -> None:
         """Work of the supports that move; ``s`` in their axes."""

@@ -19,6 +19,7 @@ import numpy as np
 from ufl_beam.beams import Place
 from ufl_beam.compat import Array
 from ufl_beam.errors import SceneError, require_number
+from ufl_beam.grid import Index
 from ufl_beam.scene import Support
 from ufl_beam.solution import Solution
 
@@ -88,14 +89,14 @@ def plot(solution: Solution, what: str = "shape", *, n: int = -1, magnify: float
     points = moved_points(solution, n, magnify)
     name = f"{RESULTANTS[what][0]} {what}" if what in RESULTANTS else "shape"
     factor = f", displacements × {magnify:g}" if magnify != 1 else ""
-    with picture(_plane_size(solution.grid.points, points)) as figure:
-        axes = _plane_axes(figure, f"{name} at t = {solution.times[n]:.4g} s{factor}")
-        _draw_axes(axes, solution, solution.grid.points, color=GREY, linewidth=1.2, zorder=1)
+    with picture(plane_size(solution.grid.points, points)) as figure:
+        axes = plane_axes(figure, f"{name} at t = {solution.times[n]:.4g} s{factor}")
+        draw_axes(axes, solution, solution.grid.points, color=GREY, linewidth=1.2, zorder=1)
         if what in RESULTANTS:
             _draw_diagram(axes, solution, what, n, points)
-        _draw_axes(axes, solution, points, color=INK, linewidth=2.6, zorder=4)
-        _draw_symbols(axes, solution, points, solution.q[n])
-        _make_room(figure, axes)
+        draw_axes(axes, solution, points, color=INK, linewidth=2.6, zorder=4)
+        draw_symbols(axes, solution, points, solution.q[n])
+        make_room(figure, axes)
     return figure
 
 
@@ -118,28 +119,21 @@ def plot_shapes(
     Raises:
         SceneError: ``count`` is less than 1, or ``magnify`` is not positive.
     """
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import ListedColormap, Normalize
-
     require_number(count, "plot_shapes: count", at_least=1)
     kept = solution.times
     chosen = nearest(kept, times if len(times) else np.linspace(kept[0], kept[-1], int(count)))
     shapes = [moved_points(solution, n, magnify) for n in chosen]
     factor = f"displacements × {magnify:g}" if magnify != 1 else ""
-    with picture(_plane_size(solution.grid.points, *shapes)) as figure:
-        # The bright end of the colour map would not be seen on white.
-        colors = ListedColormap(_colormap("viridis")(np.linspace(0.0, 0.88, 256)))
-        of_time = ScalarMappable(Normalize(kept[chosen[0]], kept[chosen[-1]]), colors)
-        axes = _plane_axes(figure, factor)
-        _draw_axes(axes, solution, solution.grid.points, color=GREY, linewidth=1.2, zorder=1)
+    with picture(plane_size(solution.grid.points, *shapes)) as figure:
+        of_time = scale("viridis", 0.0, 0.88, kept[chosen[0]], kept[chosen[-1]])
+        axes = plane_axes(figure, factor)
+        draw_axes(axes, solution, solution.grid.points, color=GREY, linewidth=1.2, zorder=1)
         for n, points in zip(chosen, shapes, strict=True):
             color = of_time.to_rgba(kept[n])
-            _draw_axes(axes, solution, points, color=color, linewidth=2.2, zorder=3)
+            draw_axes(axes, solution, points, color=color, linewidth=2.2, zorder=3)
             _draw_masses(axes, solution, points, color)
         _draw_supports(axes, solution, shapes[-1], solution.q[chosen[-1]])
-        bar = figure.colorbar(of_time, ax=axes, shrink=0.85, aspect=25, pad=0.02)
-        bar.set_label("time t (s)")
-        bar.ax.spines["outline"].set_visible(False)
+        draw_bar(figure, axes, of_time, "time t (s)")
     return figure
 
 
@@ -163,7 +157,7 @@ def plot_history(
     motion = solution.displacement if number < 3 else solution.velocity
     quantity, unit = COMPONENTS[component]
     with picture((8.0, 4.2)) as figure:
-        axes = _time_axes(figure.add_subplot(), solution)
+        axes = time_axes(figure.add_subplot(), solution)
         axes.axhline(0.0, color=GREY, linewidth=1.0, zorder=1)
         for place, color in zip(followed, _cycle(len(followed)), strict=True):
             values = motion(place)[:, number % 3]
@@ -190,7 +184,7 @@ def plot_energy(solution: Solution) -> Figure:
         ledger, check = figure.subplots(2, 1, sharex=True, height_ratios=(2.4, 1))
         for (name, values, line), color in zip(entries, _cycle(len(entries)), strict=True):
             ledger.plot(solution.times, values, line, color=color, label=name)
-        _time_axes(ledger, solution).set_ylabel("energy (J)")
+        time_axes(ledger, solution).set_ylabel("energy (J)")
         ledger.plot(solution.times, energy.total, color=INK, linewidth=1.2, label="in the scene")
         figure.legend(loc="outside upper left", ncols=5)
         part = np.abs(energy.imbalance) / (energy.throughput or 1.0)
@@ -202,7 +196,7 @@ def plot_energy(solution: Solution) -> Figure:
             xycoords=check.get_yaxis_transform(), textcoords="offset points", color="#777777",
         )  # fmt: skip
         check.set_ylim(1e-2 * precision, 10 * max(float(part.max()), 10 * precision))
-        _time_axes(check, solution).set_ylabel("imbalance\nper throughput")
+        time_axes(check, solution).set_ylabel("imbalance\nper throughput")
         check.set_xlabel("time t (s)")
     return figure
 
@@ -222,6 +216,26 @@ def moved_points(solution: Solution, n: int, magnify: float) -> Array:
     require_number(magnify, "magnify", positive=True)
     grid = solution.grid
     return np.asarray(grid.points + magnify * solution.q[n][grid.dofs[:, :2]])
+
+
+def open_hinges(solution: Solution, n: int) -> tuple[Index, Array]:
+    """Cells whose hinge has opened at the n-th kept time, and the broken part of its energy.
+
+    Returns:
+        Numbers of the cells, and parts from 0 (closed) to 1 (a joint); both (num_open,).
+    """
+    cells, parts = [], []
+    for beam in solution.scene.beams:
+        numbers, laws = solution.grid.cells_of(beam), solution.grid.hinges(beam)
+        if all(law is None or math.isinf(law.limit) for law in laws):
+            continue
+        state = solution.material(beam, n)
+        for cell, law, jump, lost in zip(numbers, laws, state.jump, state.hinge, strict=True):
+            if law is not None and (jump != 0.0 or lost > 0.0):
+                cells.append(int(cell))
+                # What never resisted is a joint from the beginning.
+                parts.append(min(lost / law.energy, 1.0) if law.limit > 0.0 else 1.0)
+    return np.array(cells, dtype=np.int64), np.array(parts)
 
 
 def nearest(kept: Array, times: Sequence[float] | Array) -> list[int]:
@@ -302,13 +316,14 @@ def picture(size: tuple[float, float]) -> Iterator[Figure]:
         yield figure
 
 
-def _plane_size(*shapes: Array) -> tuple[float, float]:
+def plane_size(*shapes: Array) -> tuple[float, float]:
     """Size of a figure for these points: 9 inches wide unless they stand upright."""
     width, height = np.ptp(np.concatenate(shapes), axis=0)
     return 9.0, float(np.clip(8.0 * height / max(width, 1e-12), 3.2, 6.8))
 
 
-def _plane_axes(figure: Figure, title: str) -> Axes:
+def plane_axes(figure: Figure, title: str) -> Axes:
+    """Axes of the plane of motion, both to one scale."""
     axes = figure.add_subplot(aspect="equal")
     axes.margins(0.06, 0.10)
     axes.set_xlabel("x (m)")
@@ -318,7 +333,8 @@ def _plane_axes(figure: Figure, title: str) -> Axes:
     return axes
 
 
-def _time_axes(axes: Axes, solution: Solution) -> Axes:
+def time_axes(axes: Axes, solution: Solution) -> Axes:
+    """Let axes show something over time."""
     axes.margins(x=0.0)
     axes.grid(axis="y", color="#E8E8E8", linewidth=0.8)
     axes.set_axisbelow(True)
@@ -330,13 +346,28 @@ def _cycle(count: int) -> list[str]:
     return list(islice(cycle((BLUE, RED, GREEN, PINK, ORANGE, SKY)), count))
 
 
-def _colormap(name: str) -> Any:
+def scale(name: str, first: float, last: float, low: float, high: float) -> Any:
+    """Colours of values from ``low`` to ``high``: a part of a colour map of Matplotlib.
+
+    The bright end of a colour map would not be seen on white.
+    """
     import matplotlib as mpl
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import ListedColormap, Normalize
 
-    return mpl.colormaps[name]
+    colors = ListedColormap(mpl.colormaps[name](np.linspace(first, last, 256)))
+    return ScalarMappable(Normalize(low, high), colors)
 
 
-def _draw_axes(axes: Axes, solution: Solution, points: Array, **line: Any) -> None:
+def draw_bar(figure: Figure, axes: Axes, colors: Any, label: str) -> None:
+    """The colour bar of a :func:`scale`."""
+    bar = figure.colorbar(colors, ax=axes, shrink=0.85, aspect=25, pad=0.02)
+    bar.set_label(label)
+    bar.ax.spines["outline"].set_visible(False)
+
+
+def draw_axes(axes: Axes, solution: Solution, points: Array, **line: Any) -> None:
+    """The axes of all beams through these points."""
     for beam in solution.scene.beams:
         axes.plot(*points[solution.grid.vertices_of(beam)].T, **line)
 
@@ -389,7 +420,7 @@ def _annotate(axes: Axes, text: str, color: str, tip: Array, outward: Array) -> 
     )  # fmt: skip
 
 
-def _make_room(figure: Figure, axes: Axes) -> None:
+def make_room(figure: Figure, axes: Axes) -> None:
     """Extend the limits such that texts stay off the edge."""
     figure.draw_without_rendering()
     for text in axes.texts:
@@ -397,7 +428,8 @@ def _make_room(figure: Figure, axes: Axes) -> None:
     axes.autoscale_view()
 
 
-def _draw_symbols(axes: Axes, solution: Solution, points: Array, q: Array) -> None:
+def draw_symbols(axes: Axes, solution: Solution, points: Array, q: Array) -> None:
+    """Symbols of supports, joints and masses."""
     _draw_supports(axes, solution, points, q)
     for joint in solution.scene.joints:
         turns = 2 not in joint.shared

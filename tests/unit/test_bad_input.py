@@ -627,6 +627,175 @@ def test_statics_has_no_velocity():
         solution.momentum()
 
 
+# -- inelastic material ----------------------------------------------------------------------------
+
+STEEL_LAW = ub.Hardening(250e6)
+BREAKS = ub.Softening(10.0, 5.0)
+INF, NAN = math.inf, math.nan
+
+
+def in_fibres(fibres=None, **more):
+    return ub.Section.rectangle(0.1, 0.2, **STEEL, fibres=fibres or ub.Fibres(STEEL_LAW), **more)
+
+
+def resultant(**laws):
+    return ub.Section(EA=1e4, GA=1e4, EI=100.0, **laws)
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        # hardening
+        (lambda: ub.Hardening(-1.0), ("Hardening: limit = -1 must be at least 0",)),
+        (lambda: ub.Hardening(NAN), ("Hardening: limit = nan is not finite",)),
+        (lambda: ub.Hardening(-INF), ("Hardening: limit = -inf is not finite",)),
+        (lambda: ub.Hardening("strong"), ("Hardening: limit = 'strong' is not a number",)),
+        (lambda: ub.Hardening(None), ("Hardening: limit = None is not a number",)),
+        (
+            lambda: ub.Hardening(1.0, modulus=-2.0),
+            ("Hardening: modulus = -2 must not be negative", "use Softening(limit, energy)"),
+        ),
+        (
+            lambda: ub.Hardening(1.0, kinematic=-2.0),
+            ("Hardening: kinematic = -2 must not be negative", "use Softening(limit, energy)"),
+        ),
+        (lambda: ub.Hardening(1.0, NAN), ("Hardening: modulus = nan is not finite",)),
+        (lambda: ub.Hardening(1.0, INF), ("Hardening: modulus = inf is not finite",)),
+        (lambda: ub.Hardening(1.0, kinematic=NAN), ("Hardening: kinematic = nan",)),
+        (
+            lambda: ub.Hardening(1.0, viscosity=5.0),
+            ("Hardening: viscosity = 5.0 is not a Perzyna or DuvautLions",),
+        ),
+        (lambda: ub.Perzyna(-1.0), ("Perzyna: eta = -1 must be at least 0",)),
+        (lambda: ub.Perzyna(NAN), ("Perzyna: eta = nan is not finite",)),
+        (lambda: ub.DuvautLions(-1.0), ("DuvautLions: tau = -1 must be at least 0",)),
+        (lambda: ub.DuvautLions("s"), ("DuvautLions: tau = 's' is not a number",)),
+        # softening
+        (lambda: ub.Softening(-1.0, 1.0), ("Softening: limit = -1 must be at least 0",)),
+        (lambda: ub.Softening(NAN, 1.0), ("Softening: limit = nan is not finite",)),
+        (lambda: ub.Softening(1.0, 0.0), ("Softening: energy = 0 must be positive",)),
+        (lambda: ub.Softening(1.0, -1.0), ("Softening: energy = -1 must be positive",)),
+        (lambda: ub.Softening(1.0, INF), ("Softening: energy = inf is not finite",)),
+        (lambda: ub.LinearSoftening(-1.0, 1.0), ("LinearSoftening: limit = -1",)),
+        (lambda: ub.LinearSoftening(1.0, 0.0), ("LinearSoftening: energy = 0 must be positive",)),
+        # distributions
+        (lambda: ub.Normal(0.0, 1.0, seed=1), ("Normal: mean = 0 must be positive",)),
+        (lambda: ub.Normal(1.0, 0.0, seed=1), ("Normal: deviation = 0 must be positive",)),
+        (lambda: ub.Lognormal(1.0, -1.0, seed=1), ("Lognormal: deviation = -1 must be positive",)),
+        (lambda: ub.TruncatedNormal(1.0, NAN, seed=1), ("TruncatedNormal: deviation = nan",)),
+        (lambda: ub.Weibull(-1.0, 2.0, seed=1), ("Weibull: scale = -1 must be positive",)),
+        (lambda: ub.Weibull(1.0, 0.0, seed=1), ("Weibull: shape = 0 must be positive",)),
+        (lambda: ub.Normal(1.0, 1.0, seed=-1), ("Normal: seed = -1 must be a whole number",)),
+        (lambda: ub.Normal(1.0, 1.0, seed=1.5), ("Normal: seed = 1.5 must be a whole number",)),
+        (lambda: ub.Weibull(1.0, 1.0, seed=None), ("Weibull: seed = None must be a whole number",)),
+        # sections
+        (lambda: resultant(bending=BREAKS), ("Section: bending", "is not a Hardening")),
+        (lambda: resultant(axial=250e6), ("Section: axial = 250000000.0 is not a Hardening",)),
+        (lambda: resultant(hinge=STEEL_LAW), ("Section: hinge", "is not a Softening")),
+        # fibres
+        (lambda: ub.Fibres(BREAKS), ("Fibres: law", "is not a Hardening")),
+        (lambda: ub.Fibres(250e6), ("Fibres: law = 250000000.0 is not a Hardening",)),
+        (lambda: ub.Fibres(STEEL_LAW, number=0), ("Fibres: number = 0", "at least 1")),
+        (lambda: ub.Fibres(STEEL_LAW, number=2.5), ("Fibres: number = 2.5", "whole number")),
+        (
+            lambda: ub.Fibres(STEEL_LAW, softening=STEEL_LAW),
+            ("Fibres: softening", "is not a Softening"),
+        ),
+        (
+            lambda: ub.Section.circle(0.1, **STEEL, fibres=STEEL_LAW),
+            ("Section: fibres", "is not a Fibres"),
+        ),
+        (lambda: in_fibres(bending=STEEL_LAW), ("Section: a law bending beside fibres",)),
+        (lambda: in_fibres(axial=STEEL_LAW), ("Section: a law axial beside fibres",)),
+        (lambda: in_fibres(shear=STEEL_LAW), ("Section: a law shear beside fibres", "elastic")),
+        (lambda: in_fibres(hinge=BREAKS), ("Section: a law hinge beside fibres",)),
+        # fibres of a user
+        (lambda: of_fibres([0.1, 0.1], [1, 1]), ("of_fibres: all fibres at one y", "spread them")),
+        (lambda: of_fibres([0.1], [1]), ("of_fibres: all fibres at one y",)),
+        (lambda: of_fibres([0, 1], [1, 1, 1]), ("y and A must be lists of one length", "(2,)")),
+        (lambda: of_fibres([], []), ("y and A must be lists of one length",)),
+        (lambda: of_fibres(0.0, 1.0), ("y and A must be lists of one length",)),
+        (lambda: of_fibres([0, 1], [1, -1]), ("y must be finite, and all A positive",)),
+        (lambda: of_fibres([0, 1], [1, 0]), ("y must be finite, and all A positive",)),
+        (lambda: of_fibres([0, NAN], [1, 1]), ("y must be finite, and all A positive",)),
+        (
+            lambda: of_fibres([0, 1], [1, 1], fibres=STEEL_LAW),
+            ("Section.of_fibres: fibres", "is not a Fibres"),
+        ),
+        # hinges of a beam
+        (lambda: beam(hinges={1.5: BREAKS}), ("girder: hinge at s = 1.5 must lie between 0 and",)),
+        (lambda: beam(hinges={-0.1: BREAKS}), ("girder: hinge at s = -0.1 must lie between",)),
+        (lambda: beam(hinges={NAN: BREAKS}), ("girder: hinge at = nan is not finite",)),
+        (lambda: beam(hinges={"end": BREAKS}), ("girder: hinge at = 'end' is not a number",)),
+        (lambda: beam(hinges={0.5: STEEL_LAW}), ("girder: hinge at s = 0.5", "not a Softening")),
+        (lambda: beam(hinges=[BREAKS]), ("girder: hinges", "is not a Mapping")),
+        (
+            lambda: ub.Beam((0, 0), (1, 0), in_fibres(), name="post", hinges={0.5: BREAKS}),
+            ("post: hinges are for resultants; here the fibres of the section soften",),
+        ),
+        # schemes
+        (lambda: ub.ExactStatic(0.4), ("ExactStatic: theta = 0.4 must be at least 0.5",)),
+        (lambda: ub.ExactStatic(1.1), ("ExactStatic: theta = 1.1 must lie between 0.5 and 1",)),
+        (lambda: ub.ExactStatic(NAN), ("ExactStatic: theta = nan is not finite",)),
+    ],
+)  # fmt: skip
+def test_inelastic_material(make, says):
+    with raises(*says):
+        make()
+
+
+def of_fibres(y, A, fibres=None):
+    return ub.Section.of_fibres(y, A, **STEEL, fibres=fibres or ub.Fibres(STEEL_LAW))
+
+
+@pytest.mark.parametrize("ask", ["material", "material_at"])
+def test_material_of_an_elastic_scene(ask):
+    one = beam()
+    solution = run(ub.Scene([one], supports=[ub.Clamped(one.start)]), ub.Static())
+    with raises("material: nothing in the scene yields or breaks; it is elastic"):
+        solution.material(one) if ask == "material" else solution.material_at(one.end)
+
+
+def test_material_of_a_beam_elsewhere():
+    one = ub.Beam((0, 0), (1, 0), resultant(bending=ub.Hardening(1.0)), cells=2)
+    solution = run(ub.Scene([one], supports=[ub.Clamped(one.start)]), ub.Static())
+    with raises("stray is not in the scene"):
+        solution.material(STRAY)
+    with raises("stray", "is not in the scene"):
+        solution.material_at(STRAY.end)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: ub.Hardening(0.0, viscosity=ub.Perzyna(INF)),
+        lambda: ub.Hardening(INF, 0.0, 0.0, ub.DuvautLions(INF)),
+        lambda: ub.Softening(INF, 1.0),
+        lambda: ub.LinearSoftening(0.0, 1.0),
+        lambda: beam(hinges={0.0: BREAKS, 1.0: ub.LinearSoftening(1.0, 1.0)}),
+        lambda: ub.ExactStatic(0.5),
+        lambda: in_fibres(ub.Fibres(STEEL_LAW, number=2, softening=BREAKS)),
+    ],
+)
+def test_ends_of_what_is_allowed(make):
+    assert make() is not None
+
+
+def test_two_hinges_in_one_cell():
+    law = ub.Softening(1.0, 1.0)
+    section = ub.Section(EA=1.0, GA=1.0, EI=1.0)
+    beam = ub.Beam((0, 0), (1, 0), section, cells=2, hinges={0.1: law, 0.2: law}, name="girder")
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)])
+    with raises("girder: two of the hinges at s = 0.1, 0.2 are in one cell"):
+        ub.Simulation(scene, ub.Static())
+
+
+def test_fibres_without_bending_stiffness():
+    """One layer, whose middle is the axis."""
+    with raises("Fibres: number = 1 has no bending stiffness; use 2 or more"):
+        in_fibres(ub.Fibres(STEEL_LAW, number=1))
+
+
 # -- no convergence: nothing is lost ---------------------------------------------------------------
 
 

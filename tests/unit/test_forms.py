@@ -1,5 +1,7 @@
 """What is compiled: one quadrature rule per form, and nothing that the scene does not need."""
 
+import math
+
 from mpi4py import MPI
 
 import numpy as np
@@ -180,6 +182,47 @@ def test_section_forces_are_compiled_when_asked_for(compiled):
     solution.section_forces(scene.beams[0])
     solution.section_forces_at(scene.beams[0].end)
     assert (before, len(compiled)) == (4, 5)
+
+
+@pytest.fixture
+def no_points(monkeypatch):
+    """Nothing of inelastic material may be made."""
+
+    def refuse(*args, **kwargs):
+        raise AssertionError("made for a scene that is elastic")
+
+    monkeypatch.setattr("ufl_beam.points.Points.__init__", refuse)
+    monkeypatch.setattr("ufl_beam.points.PointForms.__init__", refuse)
+    monkeypatch.setattr("ufl_beam.inelastic.InelasticBeams.__init__", refuse)
+    monkeypatch.setattr("ufl_beam.fields.Fields.at_points", refuse)
+    monkeypatch.setattr("ufl_beam.laws.Softening.traction", refuse)
+    monkeypatch.setattr("ufl_beam.laws.Bulk.flow", refuse)
+
+
+@pytest.mark.parametrize(
+    "scheme", [ub.Static(), ub.ExactStatic(0.5), ub.Midpoint(), ub.Midpoint(0.1, 0.1)], ids=str
+)
+def test_an_elastic_scene_has_no_points(no_points, scheme):
+    """Nor one with hinges that never open."""
+    section = ub.Section(EA=60.0, GA=40.0, EI=30.0, rhoA=2.0, hinge=ub.Softening(math.inf, 1.0))
+    beam = ub.Beam((0, 0), (1, 0), section, cells=4, hinges={0.1: ub.Softening(math.inf, 2.0)})
+    never = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.Gravity()])
+    for scene in (everything(), never):
+        solution = ub.simulate(scene, scheme, t=(0, 0.1), dt=0.1)
+        solution.section_forces(scene.beams[0])
+        assert solution.internal == []
+        assert not {"hardening", "plastic", "hinges"} & {
+            *solution.energy.state,
+            *solution.energy.lost,
+        }
+
+
+def test_no_points_can_fail(no_points):
+    """That the test above can fail."""
+    section = ub.Section(EA=60.0, GA=40.0, EI=30.0, bending=ub.Hardening(1.0))
+    beam = ub.Beam((0, 0), (1, 0), section, cells=4)
+    with pytest.raises(AssertionError, match="elastic"):
+        ub.Simulation(ub.Scene([beam], supports=[ub.Clamped(beam.start)]), ub.Static())
 
 
 def test_changing_alpha_compiles_no_other_code(compiled):

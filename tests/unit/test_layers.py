@@ -122,9 +122,11 @@ def test_only_what_solves_imports_petsc():
 @pytest.mark.parametrize("module", MODULES)
 def test_pictures_are_at_the_end(module):
     """Nothing but the package itself imports the modules of pictures."""
-    if module not in {"__init__", "view", "render"}:
-        assert not siblings(module) & {"view", "render"}
+    if module not in {"__init__", "hysteresis", "view", "render"}:
+        assert not siblings(module) & {"hysteresis", "view", "render"}
         assert not outside(module) & {"matplotlib", "pyvista", "imageio"}
+    if module != "__init__":
+        assert "hysteresis" not in siblings(module)
 
 
 def test_imports_have_no_cycles():

@@ -1,6 +1,7 @@
 """A long run needs no more memory than a short one."""
 
 import gc
+import math
 from pathlib import Path
 
 from petsc4py import PETSc
@@ -64,6 +65,32 @@ def test_memory_does_not_grow():
     assert watch.memory[10_000] - watch.memory[2_000] < 1 * MEBIBYTE
     # The probe itself is one; a step makes none
     assert watch.objects[10_000] - watch.objects[2_000] == 1
+
+
+@pytest.mark.serial
+def test_memory_does_not_grow_with_inelastic_material():
+    """A frame that yields and breaks, swayed to and fro in 2000 steps."""
+    section = ub.Section(
+        EA=1e5, GA=1e5, EI=100.0, rhoA=1.0, rhoI=0.01,
+        bending=ub.Hardening(5.0, 2.0), hinge=ub.Softening(8.0, 50.0),
+    )  # fmt: skip
+    column = ub.Beam((0, 0), (0, 1), section, cells=4, name="column")
+    girder = ub.Beam((0, 1), (1, 1), section, cells=4, name="girder")
+    sway = ub.Prescribed(girder.end, u=lambda t: 0.2 * math.sin(20 * t), v=0)
+    scene = ub.Scene(
+        [column, girder],
+        joints=[ub.Rigid(column.end, girder.start)],
+        supports=[ub.Clamped(column.start), sway],
+    )
+    watch = Watch({500, 2_000})
+    scheme = ub.Midpoint(alpha=0.05, beta=0.05)
+    solution = ub.simulate(scene, scheme, t=(0, 2), dt=1e-3, every=2_000, record=watch)
+    energy = solution.energy
+    assert energy["plastic"][-1] > 1
+    assert energy["hinges"][-1] > 1
+    # As above
+    assert watch.memory[2_000] - watch.memory[500] < 1 * MEBIBYTE
+    assert watch.objects[2_000] - watch.objects[500] == 1
 
 
 @pytest.mark.serial

@@ -57,11 +57,25 @@ class Probe:
         simulation.q = random.uniform(-0.5, 0.5, size)
         if scheme.dynamic:
             simulation.inertia.v = random.uniform(-1, 1, size)
+        for inelastic in simulation.inelastic:
+            self.at_random(inelastic, random)
         step = scheme.step(0.0, 0.3, 0.3, simulation.q)
         for term in simulation.terms:
             term.begin(step)
         self.x = simulation.supports.in_axes(simulation.q + random.uniform(-turn, turn, size))
         self.free = np.setdiff1d(np.arange(size), simulation.supports.dofs)
+
+    @staticmethod
+    def at_random(inelastic, random):
+        """Random plastic strains, jumps and their sums, the latter at least as large."""
+        cells, state = inelastic.state()
+        n = inelastic.points["p"].shape[1]
+        p, jump = random.uniform(-0.5, 0.5, (2, len(cells), n))
+        if not np.isfinite(inelastic.points["traction"]).any():
+            jump[:] = 0.0
+        more = random.uniform(0.0, 0.5, (2, len(cells), n))
+        rows = np.hstack([p, abs(p) + more[0], jump, abs(jump) + more[1], state[:, 4 * n :]])
+        inelastic.restore(cells, rows)
 
     def residual(self, x):
         r = np.empty(len(x))
@@ -131,3 +145,83 @@ def test_held_rows_and_columns_are_diagonal():
     assert (others[held] == 0).all()
     assert (others[:, held] == 0).all()
     assert (diagonal[held] > 1e-3 * diagonal.max()).all()
+
+
+# -- inelastic material --------------------------------------------------------------------------
+
+VISCOUS = ub.Hardening(2.0, 5.0, 3.0, ub.Perzyna(0.7))
+WEAK = ub.Hardening(1.0, 2.0, viscosity=ub.Perzyna(0.1))
+LAWS = {
+    "plastic": {"bending": ub.Hardening(2.0)},
+    "hardening": {"axial": ub.Hardening(3.0, 4.0), "bending": ub.Hardening(2.0, 5.0, 3.0)},
+    "viscous": {"shear": VISCOUS, "bending": ub.Hardening(1.0, viscosity=ub.DuvautLions(0.2))},
+    "softening": {"hinge": ub.Softening(4.0, 5.0)},
+    "linear softening": {"hinge": ub.LinearSoftening(4.0, 5.0)},
+    "plastic and softening": {"bending": WEAK, "hinge": ub.Softening(8.0, 40.0)},
+    "fibres": {"law": ub.Hardening(2.0, 5.0)},
+    "viscous fibres": {"law": VISCOUS},
+    "cracking fibres": {"law": WEAK, "softening": ub.Softening(8.0, 40.0)},
+}
+"""Of the numbers of SECTION, with limits that strains of order one are far beyond."""
+
+
+def inelastic_scene(kind):
+    laws = LAWS[kind]
+    if "fibres" in kind:
+        section = ub.Section.of_fibres(
+            [-1.0, -0.2, 0.3, 0.8], [0.5, 1.0, 2.0, 0.7], E=20.0, nu=0.0, rho=0.5,
+            fibres=ub.Fibres(**laws),
+        )  # fmt: skip
+    else:
+        section = ub.Section(EA=60.0, GA=40.0, EI=30.0, rhoA=2.0, rhoI=1.0, **laws)
+    a = ub.Beam((0, 0), (1, 2), section, cells=2, name="a")
+    b = ub.Beam.arc((0, 2), 1.0, (0, 2), OTHER, cells=2, name="b")
+    c = ub.Beam((1, 2), (2, 2), section, cells=3, name="c")
+    return ub.Scene(
+        [a, b, c],
+        joints=[ub.Rigid(a.end, b.start), ub.Revolute(a.end, c.start)],
+        supports=[ub.Clamped(a.start), ub.Roller(c.end, along=(2, 1))],
+        loads=[ub.PointLoad(b.end, force=(3, 4)), ub.FollowerLoad(b.end, force=(20, -30))],
+    )
+
+
+@pytest.mark.parametrize("kind", LAWS)
+@pytest.mark.parametrize(
+    "scheme",
+    [ub.Static(), ub.ExactStatic(), ub.ExactStatic(0.6), ub.Midpoint(), ub.Midpoint(0.1, 0.1)],
+    ids=str,
+)
+def test_tangent_of_inelastic_scenes(kind, scheme):
+    for seed in range(3):
+        probe = Probe(inelastic_scene(kind), scheme, turn=1.0, seed=seed)
+        tangent = probe.tangent()
+        # As above; and none of these states lies within 1e-5 of a corner of its laws
+        scale = np.abs(tangent).max()
+        assert np.abs(tangent - probe.differences(1e-5)).max() < 1e-6 * scale
+
+
+@pytest.mark.parametrize("kind", LAWS)
+def test_laws_show_in_the_tangent(kind):
+    """That the comparison above is about flow and openings, and about both at one point."""
+    flows, opens, both = False, False, False
+    for seed in range(3):
+        probe = Probe(inelastic_scene(kind), ub.Midpoint(), turn=1.0, seed=seed)
+        probe.tangent()
+        (inelastic,) = probe.simulation.inelastic
+        p, opening = (inelastic.points[name].copy() for name in ("p", "opening"))
+        inelastic.accept(probe.simulation.supports.in_plane(probe.x), None)
+        flow, growth = inelastic.points["p"] != p, inelastic.points["opening"] > opening
+        flows, opens = flows or flow.any(), opens or growth.any()
+        both = both or (flow & growth).any()
+    assert opens == ("hinge" in LAWS[kind] or "softening" in LAWS[kind])
+    assert flows == ("softening" not in kind or "plastic" in kind)
+    assert both == (flows and opens)
+
+
+@pytest.mark.parametrize("kind", ["hardening", "softening", "cracking fibres"])
+def test_static_tangent_of_associated_flow_is_symmetric(kind):
+    """Flow and openings follow from potentials, so do increments of the resultants."""
+    scene = inelastic_scene(kind)
+    dead = ub.Scene(scene.beams, joints=scene.joints, supports=scene.supports)
+    tangent = Probe(dead, ub.Static(), turn=1.0).tangent()
+    assert np.abs(tangent - tangent.T).max() < 1e-14 * np.abs(tangent).max()

@@ -1,0 +1,273 @@
+# %% [markdown]
+# # Vibrating frame: a hinge that softens is a damper
+#
+# A portal frame is struck at its top left corner and swings freely.  All of it is elastic but for
+# one hinge at the top right corner, which opens where the bending moment reaches its limit, and
+# which bears less the more it has opened.  Nothing else takes energy out, neither the material nor
+# the scheme, so that all decay comes from this hinge.
+#
+# This demo emphasises
+#
+# * a softening hinge in one cell, `Beam(..., hinges={1.0: Softening(limit, energy)})`,
+# * logarithmic decrement and damping ratio from a history, `peaks` and `fit_decay`,
+# * the ledger: what the vibration loses is what the hinge dissipates, to round-off,
+# * what "damping ratio" can mean, and what it cannot, where plasticity damps.
+#
+# It follows section 4.4 of the paper and its Table 2.  There fracture energies G_f of the hinge
+# are compared, from one to ten times a first value: the tougher the hinge, the less it damps.
+
+# %%
+from pathlib import Path
+
+import numpy as np
+
+import ufl_beam as ub
+
+output = Path("output")
+output.mkdir(exist_ok=True)
+
+# %% [markdown]
+# ## Scene
+#
+# The paper gives the section, A = 10 cm², I = 1 cm⁴, E = 1 GPa, the step of 1 ms and the 15 s.
+# Frame, mass and impulse are in a drawing without numbers, and moments of 3 kN m cannot belong to
+# EI = 10 N m²: they would bend it to a radius of 3 mm.  So these are **assumptions**:
+#
+# * a square frame of 1 m with clamped feet, of a material as light as water,
+# * the limit M_u = 315 N cm, where the paper prints 315 kN cm,
+# * G_f = 150 N cm, and a triangular impulse of 0.3 s whose elastic answer just exceeds M_u: both
+#   chosen such that the first decrement of Table 2 is about that of the paper,
+# * a hinge 2.5 cm beside the corner, in a cell of 5 cm, elastic before it opens: "linear elasticity
+#   with softening response".
+
+# %%
+E, A, I = 1e9, 10e-4, 1e-8  # Pa, m^2, m^4: the paper's
+h = np.sqrt(12 * I / A)  # the rectangle with this A and I, 91 mm by 11 mm
+section = ub.Section.rectangle(b=A / h, h=h, E=E, nu=0.3, rho=1000.0)  # kg/m^3
+
+limit, fracture = 3.15, 1.5  # N m, J
+impulse = ub.Table([0, 0.15, 0.3], [0, 1, 0])  # s
+peak = 13.8  # N
+
+
+def frame(factor):
+    """The frame with a hinge of ``factor`` times the fracture energy, and its corner."""
+    hinges = {1.0: ub.Softening(limit, factor * fracture)} if factor else {}
+    left = ub.Beam((0, 0), (0, 1), section, cells=8, name="left")  # m
+    girder = ub.Beam(
+        (0, 1), (1, 1), section, cells=8, corners=(0.95,), hinges=hinges, name="girder"
+    )
+    right = ub.Beam((1, 1), (1, 0), section, cells=8, name="right")
+    scene = ub.Scene(
+        beams=[left, girder, right],
+        joints=[ub.Rigid(left.end, girder.start), ub.Rigid(girder.end, right.start)],
+        supports=[ub.Clamped(left.start), ub.Clamped(right.end)],
+        loads=[ub.PointLoad(left.end, force=(peak, 0), time=impulse)],
+    )
+    return scene, girder.end
+
+
+def swing(factor, end, record=()):
+    """Let it swing; every fifth step is kept, 120 in a period."""
+    scene, corner = frame(factor)
+    scheme = ub.Midpoint()  # conserves energy exactly: what is lost, the hinge has
+    return ub.simulate(scene, scheme, t=(0.0, end), dt=1e-3, every=5, record=record), corner
+
+
+# %% [markdown]
+# ## Runs
+#
+# First without a hinge: the moment that the impulse would cause.  Then the fracture energies of
+# Table 2.  Decrements are taken from the first eight periods, for which 6.5 s are enough; two runs
+# go on to the paper's 15 s.
+
+# %%
+elastic, corner = swing(0, 2.0)
+demand = np.abs(elastic.section_forces_at(corner)[:, 2]).max() / limit
+ub.say(f"without a hinge the moment at the corner reaches {demand:.3f} M_u\n")
+
+factors = (1, 1.2, 1.4, 1.6, 1.8, 2, 2.2, 10)
+files = ub.XDMF(output / "vibrating_frame.xdmf", every=100)
+runs = {
+    factor: swing(factor, 15.0 if factor in (1, 10) else 6.5, files if factor == 1 else ())
+    for factor in factors
+}
+for factor in (1, 10):
+    ub.say(f"G_f × {factor}\n{runs[factor][0]}\n")
+
+# %% [markdown]
+# ## Decrement and damping ratio
+#
+# The amplitude of a swing is half the way from a maximum of u to the minimum before it: so it does
+# not matter that the open hinge shifts the middle.  The corner sinks whenever the frame sways, to
+# either side, v ≈ −0.6 u²/H: its minima come twice in a period and are as the squares of the swing.
+# Half the time, twice the logarithm: **both displacements have the same decrement**, as they have
+# in the paper's table.  Two successive minima, left and right, are averaged.
+
+# %%
+PERIODS = 8
+
+
+def decays(run):
+    """Decay of the horizontal and of the vertical displacement of the corner, after the impulse."""
+    solution, corner = run
+    free = solution.times > impulse.times[-1]
+    t, (u, v, _) = solution.times[free], solution.displacement(corner)[free].T
+    (times, highest), (_, lowest) = (ub.peaks(t, x, prominence=0.2) for x in (u, -u))
+    n = PERIODS + 1
+    horizontal = ub.fit_decay(times[:n], (highest[:n] + lowest[:n]) / 2)
+    times, sinking = ub.peaks(t, -v, prominence=0.1)
+    n = 2 * PERIODS + 1
+    vertical = ub.fit_decay(times[:n], (sinking[:n] + sinking[1 : n + 1]) / 2)
+    return horizontal, vertical
+
+
+decay = {factor: decays(run) for factor, run in runs.items()}
+lost = {
+    factor: np.interp(6.5, s.times, s.energy.lost["hinges"]) / s.energy.supplied["loads"][-1]
+    for factor, (s, _) in runs.items()
+}
+
+printed = {  # Table 2 of the paper
+    "horizontal": (
+        (0.077, 0.062, 0.038, 0.025, 0.017, 0.013, 0.006, 0.003),
+        (0.012, 0.010, 0.006, 0.004, 0.003, 0.002, 0.001, 0.001),
+    ),
+    "vertical": (
+        (0.076, 0.061, 0.038, 0.025, 0.017, 0.013, 0.006, 0.003),
+        (0.012, 0.010, 0.006, 0.004, 0.003, 0.002, 0.001, 0.000),
+    ),
+}
+
+
+def row(name, values, digits):
+    """A line of the table."""
+    ub.say(f"{name:38s}" + "".join(f"{value:>8.{digits}f}" for value in values))
+
+
+ub.say(f"{'fracture energy G_f':38s}" + "".join(f"{f'{f:g}x':>8s}" for f in factors))
+for direction, (name, (δ_paper, ζ_paper)) in enumerate(printed.items()):
+    δ, ζ = ([getattr(decay[f][direction], x) for f in factors] for x in ("decrement", "ratio"))
+    ub.say(f"{name} displacement")
+    row("  logarithmic decrement δ", δ, 4)
+    row("    printed in the paper, other frame", δ_paper, 3)
+    row("  damping ratio ζ", ζ, 4)
+    row("    printed in the paper, other frame", ζ_paper, 3)
+row("energy lost in 6.5 s, part of the work", [lost[f] for f in factors], 4)
+ub.say("\ndecrement of each of the first periods, horizontal displacement")
+for f in (1, 1.4, 10):
+    ub.say(f"  {f:3g}x  " + "".join(f"{d:8.3f}" for d in decay[f][0].decrements))
+
+# %% [markdown]
+# ## What the numbers mean
+#
+# The trend is the paper's: the damping ratio falls with every step of G_f and nearly vanishes at
+# ten times the energy.  The reason is a race.  Each opening takes energy and so lowers the moment
+# of the next swing, and it lowers the limit.  In a tough hinge the limit stays where it is, the
+# swings fall below it, and from then on the frame is elastic.  In a brittle one the limit falls as
+# fast as the swings, and the hinge opens again and again.
+#
+# So this damping **ends**.  A decrement is a mean over the periods that one counts, not a property
+# of the frame: the printout shows how it rises and falls from one period to the next.  It also
+# depends on how far the impulse exceeds the limit: weaker by a tenth, and nothing is damped at all.
+# A per cent in the peak moment, high frequencies included, decides how long the hinge keeps
+# opening, so that not even the mesh is without influence: with 16 or 32 cells in each beam, the
+# first decrement is 0.030 or 0.048 in the place of 0.081.  The numbers are those of one frame and
+# one mesh; **the trend is robust**: from 1 to 1.4 to 10 times G_f the damping falls on all three.
+# It turns where G_f is so small that the hinge opens completely in a swing or two: then it has
+# taken all it can, G_f, and what remains is a joint without damping.
+#
+# ## Pictures
+
+# %%
+shades = {1: "#0072B2", 1.4: "#D55E00", 10: "#A0A0A0"}
+
+with ub.picture((9, 5.6)) as histories:
+    axes = histories.subplots(2, 1, sharex=True)
+    for f in (10, 1):
+        solution, corner = runs[f]
+        for ax, x in zip(axes, solution.displacement(corner).T, strict=False):
+            label = f"fracture energy {100 * f * fracture:g} N cm"
+            ax.plot(solution.times, 100 * x, color=shades[f], lw=1.5, label=label)
+    axes[0].set_ylabel("horizontal (cm)")
+    axes[1].set_ylabel("vertical (cm)")
+    axes[1].set_xlabel("time (s)")
+    axes[0].set_xlim(0, 15)
+    histories.align_ylabels()
+    histories.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
+
+with ub.picture((9, 5.6)) as energies:
+    upper, lower = energies.subplots(2, 1, sharex=True)
+    for f in factors:
+        energy, t = runs[f][0].energy, runs[f][0].times
+        pale = 0.0 if f == 10 else 0.75 * (f - 1) / 1.2
+        color = shades[10] if f == 10 else (pale, 0.45 + 0.4 * pale, 0.7 + 0.2 * pale)
+        for ax, joules in ((upper, energy.total), (lower, energy.lost["hinges"])):
+            ax.plot(t[t <= 6.5], 1e3 * joules[t <= 6.5], lw=1.8, color=color)
+        if f in (1, 1.2, 1.4, 10):
+            ends = (
+                1e3 * np.array([energy.total, energy.lost["hinges"]])[:, np.flatnonzero(t <= 6.5)]
+            )
+            for ax, end in zip((upper, lower), ends[:, -1], strict=True):
+                ax.annotate(f" {f:g}×", (6.5, end), color=color, va="center")
+    upper.set_ylabel("total energy (mJ)")
+    lower.set_ylabel("dissipated by\nthe hinge (mJ)")
+    lower.set_xlabel("time (s)")
+    lower.set_xlim(0, 6.5)
+    energies.align_ylabels()
+    upper.set_title(f"fracture energy 1× to 2.2× and 10× of {100 * fracture:g} N cm", loc="left")
+
+with ub.picture((9, 4.6)) as hinge:
+    loops, ratios = hinge.subplots(1, 2)
+    for f in (1, 1.4, 10):
+        solution, corner = runs[f]
+        material = solution.material_at(corner)
+        M, jump = material.forces[:, 2], 1e3 * material.jump
+        loops.plot(jump, M, color=shades[f], lw=1.2, label=f"{f:g}×")
+    loops.set_xlabel("rotation of the hinge (mrad)")
+    loops.set_ylabel("moment (N m)")
+    loops.set_ylim(-1.1 * limit, 1.45 * limit)
+    loops.legend(loc="upper center", ncols=3)
+    ζ = [100 * decay[f][0].ratio for f in factors]
+    ζ_paper = 100 * np.array(printed["horizontal"][1])
+    ratios.plot(factors, ζ_paper, "s", color=shades[10], label="printed in Table 2, another frame")
+    ratios.plot(factors, ζ, "o-", color=shades[1], label="this frame")
+    ratios.set_xscale("log")
+    ratios.set_xticks((1, 1.4, 2, 10), ("1×", "1.4×", "2×", "10×"))
+    ratios.minorticks_off()
+    ratios.set_ylim(0, None)
+    ratios.set_xlabel(f"fracture energy, 1× is {100 * fracture:g} N cm")
+    ratios.set_ylabel("damping ratio (%)")
+    ratios.legend()
+
+pictures = {"histories": histories, "energy": energies, "hinge": hinge}
+for name, figure in pictures.items():
+    figure.savefig(output / f"vibrating_frame_{name}.png")
+shapes = ub.plot_shapes(runs[1][0], times=np.arange(0.3, 2.1, 0.31))
+shapes.savefig(output / "vibrating_frame_shapes.png")
+names = sorted(str(path) for path in output.glob("vibrating_frame*"))
+ub.say("\npictures and data:", *names, sep="\n  ")
+
+# %% [markdown]
+# ## What the agreement proves
+#
+# The trend of Table 2: each tougher hinge damps less, and the toughest next to nothing.  The
+# equal decrements of both directions.  And the ledger: the hinge is the only damper.
+
+# %%
+horizontal, vertical = (np.array([decay[f][d].ratio for f in factors]) for d in (0, 1))
+assert np.all(np.diff(horizontal) < 0)
+assert np.all(np.diff(vertical) < 0)
+assert horizontal[-1] < 0.1 * horizontal[0]
+assert np.allclose(vertical, horizontal, rtol=0.2)
+for solution, _ in runs.values():
+    assert set(solution.energy.lost) == {"hinges"}
+    assert solution.energy.worst < 1e-9
+ub.say("trend of Table 2 reproduced")
+
+# %% [markdown]
+# ## Try this
+#
+# * `fracture = 0.3`: the hinge opens completely in the first swing; how much can it damp then?
+# * `peak = 12.5`: the hinge never opens, and all decrements are zero,
+# * `ub.LinearSoftening` in the place of `ub.Softening`: the last of the resistance goes, too.

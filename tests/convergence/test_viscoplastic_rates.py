@@ -1,0 +1,62 @@
+"""Orders in time of a viscoplastic vibration, each run compared with itself.
+
+A law without a yield limit flows all the time, and with kinematic hardening it is smooth: a
+standard linear solid.  So nothing hides the order of the rule by which the law is integrated.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from convergence.study import self_convergence
+
+import ufl_beam as ub
+
+EI, LENGTH, DURATION = 25.0, 1.0, 0.2  # N m², m, s
+RELAXATION = 0.05
+"""Time of the law, s; the first period of the beam is 0.7 s with its mass."""
+
+
+def pulse(t):
+    return math.sin(math.pi * t / 0.15) ** 4 if t < 0.15 else 0.0
+
+
+def vibration(scheme, dt, viscosity):
+    """Displacement, velocity and moment of the end state."""
+    law = ub.Hardening(0.0, kinematic=EI, viscosity=viscosity)
+    section = ub.Section(EA=1e4, GA=1e4, EI=EI, rhoA=1.0, rhoI=1e-3, bending=law)
+    beam = ub.Beam((0, 0), (LENGTH, 0), section, cells=1)
+    scene = ub.Scene(
+        [beam],
+        supports=[ub.Clamped(beam.start)],
+        masses=[ub.PointMass(beam.end, 1.0)],
+        loads=[ub.PointLoad(beam.end, force=(0, 25.0), time=pulse)],
+    )
+    solution = ub.simulate(
+        scene, scheme, t=(0, DURATION), dt=dt, newton=ub.Newton(rtol=1e-13), progress=False
+    )
+    energy = solution.energy
+    assert energy.worst <= 1e-9
+    for lost in energy.lost.values():
+        assert np.diff(lost).min() >= -1e-12 * energy.throughput
+    assert energy.lost["plastic"][-1] > 0.1 * energy.throughput / 2
+    return (
+        solution.displacement(beam.end)[-1],
+        solution.velocity(beam.end)[-1],
+        solution.section_forces_at(beam.start)[-1, 2:],
+    )
+
+
+@pytest.mark.parametrize("viscosity", [ub.Perzyna(2 * EI * RELAXATION), ub.DuvautLions(RELAXATION)])
+@pytest.mark.parametrize(("alpha", "order", "dt"), [(0.0, 2, 4e-3), (0.5, 1, 1e-3)])
+def test_order_in_time(alpha, order, dt, viscosity):
+    """Midpoint() is of second order, Midpoint(alpha=0.5), backward Euler, of first.
+
+    Four step sizes; an order may differ by what the next term of the error makes, which falls with
+    the step: 0.1 in the first pair, and a quarter of it, or half, in the second.
+    """
+    runs = [vibration(ub.Midpoint(alpha=alpha), dt / 2**k, viscosity) for k in range(4)]
+    for answer in zip(*runs, strict=True):  # displacements, then velocities, then the moment
+        measured = self_convergence(answer)
+        np.testing.assert_allclose(measured, order, rtol=0, atol=0.1)
+        assert abs(measured[-1] - order) < 0.03

@@ -1,0 +1,304 @@
+"""Pictures and files of what yields and breaks: the arrays of the solution, with units."""
+
+import h5py
+import numpy as np
+import pytest
+import scenes
+
+import ufl_beam as ub
+from ufl_beam.view import decimal_prefix, open_hinges, with_unit
+
+LIMIT, FRACTURE, YIELD = 10.0, 3.0, 8.0
+"""Moments of the hinge and of yielding, N m; fracture energy of the hinge, J."""
+
+
+@pytest.fixture(scope="module")
+def bent():
+    """A cantilever with a hinge in the first of four cells, which yield; its end goes to and fro.
+
+    The moment at the clamp is the largest: it yields at 8 N m, and breaks at 10 N m.
+    """
+    section = ub.Section(EA=1e6, GA=1e6, EI=100.0, bending=ub.Hardening(YIELD, modulus=30.0))
+    law = ub.Softening(LIMIT, FRACTURE)
+    beam = ub.Beam((0, 0), (1, 0), section, cells=4, name="arm", hinges={0.0: law})
+    to_and_fro = ub.Table([0, 1, 2, 3], [0, 0.15, 0.0, 0.3])
+    held = [ub.Clamped(beam.start), ub.Prescribed(beam.end, v=to_and_fro)]
+    scene = ub.Scene([beam], supports=held)
+    return ub.simulate(scene, ub.ExactStatic(), t=(0, 3), dt=0.02)
+
+
+@pytest.fixture(scope="module")
+def elastic():
+    return ub.simulate(scenes.portal(), ub.Static(), t=(0, 1), dt=1)
+
+
+@pytest.fixture
+def arm(bent):
+    return bent.scene.beams[0]
+
+
+def path_in(axes):
+    """The points that a line coloured by time runs through."""
+    (pieces,) = [c for c in axes.collections if len(c.get_paths()) > 20]
+    segments = np.array([p.vertices for p in pieces.get_paths()])
+    np.testing.assert_array_equal(segments[1:, 0], segments[:-1, 1])
+    return np.concatenate([segments[:, 0], segments[-1:, 1]]), pieces
+
+
+def legend(figure):
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def circles(axes):
+    """Lines of one point each that are round, and not in the legend alone."""
+    return [x for x in axes.lines if x.get_marker() == "o" and len(x.get_xdata()) == 1]
+
+
+def test_the_scene_yields_breaks_and_turns_back(bent, arm):
+    # So that the tests below are about something
+    state = bent.material_at(arm.start)
+    assert state.plastic[-1] > 0
+    assert 0.1 * FRACTURE < state.hinge[-1] < 0.95 * FRACTURE
+    assert np.diff(state.jump).min() < 0 < np.diff(state.jump).max()
+
+
+# -- paths -------------------------------------------------------------------------------------
+
+
+def test_moment_curvature(bent, arm):
+    place = arm.at(0.3)
+    figure = ub.plot_moment_curvature(bent, place)
+    axes, bar = figure.axes
+    path, pieces = path_in(axes)
+    np.testing.assert_array_equal(path[:, 0], bent.strains_at(place)[:, 2])
+    np.testing.assert_array_equal(path[:, 1], bent.section_forces_at(place)[:, 2])
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("curvature K (1/m)", "bending moment M (N m)")
+    assert axes.get_title(loc="left") == f"cell at {place}"
+    assert bar.get_ylabel() == "time t (s)"
+    assert bar.get_ylim() == (0.0, 3.0)
+    # From light to dark, and marks at both ends
+    brightness = pieces.get_colors()[:, :3].mean(axis=1)
+    assert brightness[0] > brightness[-1]
+    assert legend(figure) == ["t = 0 s", "t = 3 s"]
+    for mark, end in zip(circles(axes), path[[0, -1]], strict=True):
+        np.testing.assert_array_equal(mark.get_xydata()[0], end)
+
+
+def test_units_suit_the_values_and_data_stay_in_si():
+    beam = ub.Beam((0, 0), (1, 0), ub.Section(1e9, 1e9, 1e6, bending=ub.Hardening(5e3)), cells=1)
+    scene = ub.Scene(
+        [beam],
+        supports=[ub.Clamped(beam.start)],
+        loads=[ub.PointLoad(beam.end, moment=4e3, time=ub.ramp(1.0))],
+    )
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1 / 30)
+    axes = ub.plot_moment_curvature(solution, beam.end).axes[0]
+    assert axes.get_ylabel() == "bending moment M (kN m)"
+    assert axes.yaxis.get_major_formatter()(-2500.0) == "−2.5"
+    # One cell in pure bending has the moment of the load, but for the tolerance of equilibrium
+    assert path_in(axes)[0][-1, 1] == pytest.approx(4e3, rel=1e-9)
+
+
+def test_hinge(bent, arm):
+    state = bent.material_at(arm.start)
+    figure = ub.plot_hinge(bent, arm.start)
+    axes = figure.axes[0]
+    path, _ = path_in(axes)
+    np.testing.assert_array_equal(path, np.column_stack([state.jump, state.forces[:, 2]]))
+    assert axes.get_xlabel() == "jump of rotation (mrad)"
+    assert axes.get_ylabel() == "bending moment M (N m)"
+    title = axes.get_title(loc="left")
+    assert f"hinge at {arm.start}" in title
+    spent = with_unit(state.hinge[-1], "J")
+    assert f"{spent} of 3 J dissipated, {100 * state.hinge[-1] / FRACTURE:.3g} %" in title
+
+
+def test_the_filled_area_is_the_dissipated_energy(bent, arm):
+    fills = [
+        c for c in ub.plot_hinge(bent, arm.start).axes[0].collections if len(c.get_paths()) < 9
+    ]
+    outlines = [path.vertices for fill in fills for path in fill.get_paths()]
+    x, M = zip(*(outline.T for outline in outlines), strict=True)
+    areas = [abs(np.sum(a[:-1] * b[1:] - a[1:] * b[:-1])) / 2 for a, b in zip(x, M, strict=True)]
+    lost = bent.material_at(arm.start).hinge[-1]
+    # The steps in which the hinge begins to open start below its limit: by the moment of one step,
+    # a tenth of the limit, over a jump that is a fiftieth of the whole.
+    assert sum(areas) == pytest.approx(lost, rel=0.02)
+
+
+# -- the frame ---------------------------------------------------------------------------------
+
+
+def test_damage_colours_the_cells_that_yielded(bent, arm):
+    figure = ub.plot_damage(bent, 50, magnify=2)
+    axes, bar = figure.axes
+    (zones,) = axes.collections
+    dissipated = bent.material(arm, 50).plastic
+    yielded = np.flatnonzero(dissipated)
+    assert 0 < len(yielded) < 4
+    rest = bent.grid.points
+    points = rest + 2 * (bent.shape(arm, 50) - rest)
+    drawn = np.array([path.vertices for path in zones.get_paths()])
+    np.testing.assert_allclose(drawn, np.stack([points[yielded], points[yielded + 1]], axis=1))
+    largest = dissipated.max() / 0.25  # cells of 0.25 m
+    unit, prefix = decimal_prefix(largest)
+    assert bar.get_ylabel() == f"dissipated by plastic strains ({prefix}J/m)"
+    assert bar.get_ylim()[1] == pytest.approx(largest / unit)
+    assert axes.get_title(loc="left") == "damage at t = 1 s, displacements × 2"
+
+
+def test_damage_marks_hinges_by_the_broken_part(bent, arm):
+    first = int(np.flatnonzero(bent.material_at(arm.start).hinge)[0])
+    sizes = []
+    for n in (first, -1):
+        figure = ub.plot_damage(bent, n)
+        (mark,) = circles(figure.axes[0])
+        np.testing.assert_allclose(mark.get_xydata()[0], bent.shape(arm, n)[:2].mean(axis=0))
+        assert mark.get_markerfacecolor() != "white"
+        assert legend(figure) == ["hinge, 10 % broken", "50 %", "fully open"]
+        sizes.append(mark.get_markersize())
+    assert sizes[0] < sizes[1]
+    cells, parts = open_hinges(bent, -1)
+    assert list(cells) == [0]
+    assert parts[0] == bent.material(arm).hinge[0] / FRACTURE
+
+
+def test_no_marks_before_anything_happens(bent):
+    figure = ub.plot_damage(bent, 0)
+    assert len(figure.axes) == 1  # no colour bar
+    assert not figure.axes[0].collections
+    assert not circles(figure.axes[0])
+    assert not figure.legends
+
+
+@pytest.mark.parametrize("law", [ub.Softening(0.0, 1.0), ub.LinearSoftening(1.0, 1e-2)])
+def test_what_is_fully_open_is_hollow(law):
+    """A hinge without resistance, and one of linear softening turned beyond 2 G/M = 0.02.
+
+    The end does not turn, so that what is left is no mechanism.
+    """
+    section = ub.Section(EA=1e6, GA=1e6, EI=100.0)
+    beam = ub.Beam((0, 0), (1, 0), section, cells=2, hinges={0.0: law})
+    held = [ub.Clamped(beam.start), ub.Prescribed(beam.end, v=lambda t: 0.1 * t, psi=0)]
+    scene = ub.Scene([beam], supports=held)
+    solution = ub.simulate(scene, ub.ExactStatic(), t=(0, 1), dt=0.05)
+    (mark,) = circles(ub.plot_damage(solution).axes[0])
+    assert mark.get_markerfacecolor() == "white"
+
+
+def test_cracks_of_fibres_are_damage():
+    law = ub.Fibres(ub.Hardening(np.inf), number=4, softening=ub.Softening(1e6, 100.0))
+    section = ub.Section.rectangle(b=0.1, h=0.2, E=30e9, nu=0.2, fibres=law)
+    beam = ub.Beam((0, 0), (1, 0), section, cells=1)
+    held = [ub.Clamped(beam.start), ub.Prescribed(beam.end, u=lambda t: 1e-4 * t)]
+    scene = ub.Scene([beam], supports=held)
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1)
+    axes, bar = ub.plot_damage(solution).axes
+    assert bar.get_ylabel() == "dissipated by plastic strains and cracks (J/m)"
+    # One cell of 1 m: its energy is the upper end of the bar
+    assert bar.get_ylim()[1] == pytest.approx(solution.material(beam).hinge[0])
+    assert not circles(axes)
+
+
+# -- the ledger --------------------------------------------------------------------------------
+
+
+def test_dissipation(bent):
+    figure = ub.plot_dissipation(bent)
+    (axes,) = figure.axes
+    energy = bent.energy
+    lower = np.zeros_like(bent.times)
+    assert len(axes.collections) == len(energy.lost) == 3
+    for area, (name, lost) in zip(axes.collections, energy.lost.items(), strict=True):
+        assert area.get_label() == f"lost: {name}"
+        (outline,) = [path.vertices for path in area.get_paths()]
+        for bound in (lower, lower + lost):
+            points = np.column_stack([bent.times, bound])
+            # The outline holds them to the rounding of the sum
+            apart = np.abs(outline[None] - points[:, None]).sum(axis=2).min(axis=1)
+            assert apart.max() <= 1e-14 * energy.throughput
+        lower = lower + lost
+    drawn = {line.get_label(): line.get_ydata() for line in axes.lines}
+    assert set(drawn) == {"supplied", "in the scene"}
+    np.testing.assert_array_equal(drawn["supplied"], sum(energy.supplied.values()))
+    np.testing.assert_array_equal(drawn["in the scene"], energy.total)
+    assert axes.get_ylabel() == "energy (J)"
+    title = axes.get_title(loc="left")
+    assert title.endswith(f"of {with_unit(energy.throughput, 'J')} throughput")
+    assert f"{energy.worst:.1e}".split("e")[0] in title
+    assert set(legend(figure)) == {*drawn, *(f"lost: {name}" for name in energy.lost)}
+
+
+def test_dissipation_says_what_was_there_at_the_start():
+    section = ub.Section(1e4, 1e4, 100.0, rhoA=1.0, rhoI=0.01, bending=ub.Hardening(1e3))
+    beam = ub.Beam((0, 0), (1, 0), section, cells=1)
+    thrown = ub.Scene([beam], initial=[ub.Velocity((beam,), (1.0, 0.0))])
+    solution = ub.simulate(thrown, ub.Midpoint(), t=(0, 0.1), dt=0.05)
+    lines = {x.get_label(): x.get_ydata() for x in ub.plot_dissipation(solution).axes[0].lines}
+    # 1 kg at 1 m/s, and no work
+    np.testing.assert_allclose(lines["at the start, and supplied"], 0.5, rtol=1e-12)
+
+
+# -- files -------------------------------------------------------------------------------------
+
+
+def test_xdmf_holds_jumps_and_dissipated_energies(shared_path, on_first_rank):
+    section = ub.Section(EA=1e6, GA=1e6, EI=100.0, bending=ub.Hardening(YIELD, modulus=30.0))
+    law = ub.Softening(LIMIT, FRACTURE)
+    beam = ub.Beam((0, 0), (1, 0), section, cells=4, hinges={0.0: law})
+    held = [ub.Clamped(beam.start), ub.Prescribed(beam.end, v=lambda t: 0.1 * t)]
+    scene = ub.Scene([beam], supports=held)
+    file = ub.XDMF(shared_path / "run.xdmf")
+    solution = ub.simulate(scene, ub.ExactStatic(), t=(0, 1), dt=0.1, record=file)
+
+    def read():
+        with h5py.File(shared_path / "run.h5", "r") as data:
+            middles = data["Mesh/mesh/geometry"][()][data["Mesh/mesh/topology"][()], 0].mean(axis=1)
+            names = ("M", "jump", "dissipated energy")
+            last = {name: data[f"Function/{name}/1"][:, 0] for name in names}
+            return {name: values[np.argsort(middles)] for name, values in last.items()}
+
+    written, state = on_first_rank(read), solution.material(beam)
+    # Copies, so equal to the last bit
+    np.testing.assert_array_equal(written["M"], state.forces[:, 2])
+    np.testing.assert_array_equal(written["jump"], state.jump)
+    np.testing.assert_array_equal(written["dissipated energy"], state.plastic + state.hinge)
+    assert state.jump[0] != 0
+    text = on_first_rank((shared_path / "run.xdmf").read_text)
+    assert "run.h5:/Function/dissipated energy/1" in text
+
+
+# -- what is refused ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [
+        lambda s: ub.plot_moment_curvature(s, s.scene.beams[0].end),
+        lambda s: ub.plot_hinge(s, s.scene.beams[0].end),
+        ub.plot_damage,
+        ub.plot_dissipation,
+    ],
+)
+def test_elastic_scenes_are_refused(elastic, draw):
+    with pytest.raises(ub.SceneError, match="nothing in the scene yields or breaks"):
+        draw(elastic)
+
+
+def test_elastic_scenes_have_no_open_hinges(elastic):
+    cells, parts = open_hinges(elastic, -1)
+    assert len(cells) == len(parts) == 0
+
+
+def test_a_cell_without_a_hinge_is_refused(bent, arm):
+    with pytest.raises(ub.SceneError, match=r"plot_hinge: the cell at arm.at\(0.9\).*has no hinge"):
+        ub.plot_hinge(bent, arm.at(0.9))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [({"n": 200}, "n = 200: the solution kept 151 times"), ({"magnify": 0}, "magnify = 0")],
+)
+def test_damage_refuses(bent, options, message):
+    with pytest.raises(ub.SceneError, match=message):
+        ub.plot_damage(bent, **options)

@@ -1,0 +1,157 @@
+"""Inelastic cells in a run: steps that fail leave no trace, and only cells that can yield pay."""
+
+import math
+
+import numpy as np
+import pytest
+
+import ufl_beam as ub
+
+ELASTIC = {"EA": 1e5, "GA": 1e5, "EI": 100.0, "rhoA": 1.0, "rhoI": 0.01}
+LAWS = {
+    "yielding": {"bending": ub.Hardening(5.0, 20.0)},
+    "softening": {"bending": ub.Hardening(5.0, 20.0), "hinge": ub.Softening(7.0, 8.0)},
+}
+
+
+def cantilever(kind, tip=0.4, cells=5):
+    """A cantilever whose end is lifted in one second, back and forth."""
+    section = ub.Section(**ELASTIC, **LAWS[kind])
+    beam = ub.Beam((0, 0), (1, 0), section, cells=cells)
+    lift = ub.Table([0, 0.5, 1], [0, tip, tip / 4])
+    return ub.Scene([beam], supports=[ub.Clamped(beam.start), ub.Prescribed(beam.end, v=lift)])
+
+
+class CutSteps(ub.Simulation):
+    """A simulation in which the first attempts at a step fail, after their last iteration."""
+
+    fails = 0
+
+    def _require_small(self, turn):
+        super()._require_small(turn)
+        if self.fails:
+            self.fails -= 1
+            raise ub.solve.StepFailed("on purpose")
+
+
+def state(simulation):
+    """All that a state consists of."""
+    return [
+        simulation.q,
+        *simulation.velocities(),
+        *(x.points.state() for x in simulation.inelastic),
+        *(np.array(list(group.values())) for group in simulation.entries()),
+    ]
+
+
+@pytest.mark.parametrize("kind", LAWS)
+@pytest.mark.parametrize("scheme", [ub.ExactStatic(), ub.Midpoint(0.1, 0.1)], ids=str)
+def test_a_cut_step_is_its_parts(kind, scheme):
+    """Two failures cut a step into quarters: the same, to the last digit, as quarters from there.
+
+    Steps have the same ends, 1/64 s and its parts, so that even round-off is the same.
+    """
+    scene = cantilever(kind)
+    cut, fine = CutSteps(scene, scheme), ub.Simulation(scene, scheme)
+    for n in range(32):
+        cut.fails = 2 * (n % 5 == 0)
+        parts = cut.parts
+        cut.step_to((n + 1) / 64)
+        ends = np.linspace(n, n + 1, 5)[1:] if n % 5 == 0 else [n + 1]
+        if cut.parts - parts == 3:  # the parts grow again: 1/4, 1/4, 1/2
+            ends = [n + 0.25, n + 0.5, n + 1]
+        for end in ends:
+            fine.step_to(end / 64)
+        assert cut.parts == fine.parts
+        for one, two in zip(state(cut), state(fine), strict=True):
+            assert (one == two).all()
+    _, _, lost = cut.entries()  # of all processes, each of which has some of the cells
+    assert lost["plastic"] > 0
+    assert ("hinges" in lost) == (kind == "softening")
+    assert lost.get("hinges", 1.0) > 0
+
+
+@pytest.mark.parametrize("kind", LAWS)
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.ExactStatic()], ids=str)
+def test_few_iterations_cut_steps_and_change_little(kind, scheme):
+    """Steps that are cut for want of iterations lead where small ones lead, and the ledger closes.
+
+    Half a second in four steps, which three iterations do not solve, against 200.
+    """
+    few, many = (
+        ub.simulate(cantilever(kind), scheme, t=(0, 0.5), dt=dt, newton=ub.Newton(max_iterations=n))
+        for dt, n in ((0.125, 3), (0.0025, 30))
+    )
+    assert few.parts > 4
+    coarse, fine = (s.section_forces(s.scene.beams[0])[:, 2] for s in (few, many))
+    # First order in steps of at most a quarter of the whole
+    assert np.abs(coarse - fine).max() < 0.1 * np.abs(fine).max()
+    if scheme != ub.Static():
+        assert few.energy.worst < 1e-9  # closed by design, section 9
+
+
+def test_a_failure_keeps_the_results_so_far():
+    """A force beyond the plastic limit: what was reached is there, Material included."""
+    section = ub.Section(**ELASTIC, bending=ub.Hardening(5.0), axial=ub.Hardening(10.0))
+    beam = ub.Beam((0, 0), (1, 0), section, cells=4)
+    pull = ub.PointLoad(beam.end, force=(20.0, 0.0), time=ub.ramp(1.0))
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[pull])
+    with pytest.raises(ub.ConvergenceError) as failure:
+        ub.simulate(scene, ub.ExactStatic(), t=(0, 1), dt=0.125)
+    solution = failure.value.solution
+    # [closed] N = 10 is reached at half of the load, a step's end
+    assert solution.times[-1] == failure.value.time == pytest.approx(0.5, abs=1e-3)
+    material = solution.material_at(beam.end)
+    assert len(material.forces) == len(solution.times) == len(solution.energy.total)
+    assert material.forces[-1, 0] == pytest.approx(20 * solution.times[-1], rel=1e-9)
+    for values in material:
+        assert np.isfinite(values).all()
+    assert solution.energy.worst < 1e-9
+
+
+# -- where points are ------------------------------------------------------------------------------
+
+
+def test_one_hinge_among_fifty_cells():
+    """Points in that cell only; forces are those of the whole beam."""
+    section = ub.Section(**ELASTIC)
+    law = ub.Softening(5.0, 10.0)
+    beam = ub.Beam((0, 0), (1, 0), section, cells=50, hinges={0.503: law})
+    lift = ub.Prescribed(beam.end, psi=ub.ramp(1.0))
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), lift])
+    simulation = ub.Simulation(scene, ub.ExactStatic())
+    cells = [x.points.kept.shape[0] for x in simulation.inelastic]
+    assert sum(simulation.share.comm.allgather(sum(cells))) in (1, simulation.share.comm.size)
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.05)
+    material = solution.material(beam)
+    assert np.flatnonzero(material.jump).tolist() == [25]
+    assert np.flatnonzero(material.hinge).tolist() == [25]
+    assert (material.plastic == 0).all()
+    assert "plastic" not in solution.energy.lost
+    assert "hardening" not in solution.energy.state
+    # [closed] The moment is uniform, of the hinge and of the curvature: M/EI L + jump = 1 rad
+    M, jump = material.forces[:, 2], material.jump[25]
+    on_the_curve = 5 * math.exp(-5 / 10 * jump)
+    assert np.abs(M - on_the_curve).max() < 1e-9 * on_the_curve
+    rotation = M[0] / 100 + jump
+    assert rotation == pytest.approx(1, rel=1e-9)
+    assert solution.energy["hinges"][-1] == pytest.approx(10 * (1 - M[0] / 5), rel=1e-9)
+
+
+def test_hinges_of_single_cells_come_before_that_of_the_section():
+    section = ub.Section(**ELASTIC, hinge=ub.Softening(5.0, 10.0))
+    single = {0.1: ub.Softening(math.inf, 1.0), 1.0: ub.LinearSoftening(1.0, 2.0)}
+    beam = ub.Beam((0, 0), (1, 0), section, cells=4, hinges=single)
+    laws = ub.simulation.Grid(ub.Scene([beam])).hinges(beam)
+    assert laws == [single[0.1], section.hinge, section.hinge, single[1.0]]
+
+
+def test_cracks_of_fibres_are_no_rotations():
+    fibres = ub.Fibres(ub.Hardening(math.inf), number=4, softening=ub.Softening(1e6, 1e3))
+    section = ub.Section.rectangle(0.1, 0.2, E=1e9, nu=0.3, fibres=fibres)
+    beam = ub.Beam((0, 0), (1, 0), section, cells=2)
+    turn = ub.Prescribed(beam.end, u=0, psi=ub.ramp(1.0))
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), turn])
+    solution = ub.simulate(scene, ub.ExactStatic(), t=(0, 0.1), dt=0.01)
+    assert solution.energy["hinges"][-1] > 0
+    assert (solution.material(beam).jump == 0).all()

@@ -1,0 +1,301 @@
+"""A hinge that softens, in one cell: S17 of the reference, closed forms and limits.
+
+The hinge is in the middle of its cell, and the moment of a cell stands for its middle.  So for a
+cantilever loaded at its tip, of cells h_i at x_i from the tip, with the hinge in the cell of
+length h at the clamp,
+
+    M = M(α) in that cell,  F = M/(L - h/2),  δ = F (Σ h_i x_i²/EI + L/GA) + α (L - h/2),
+
+which is what runs are compared with, on any mesh.  All is linear if it is small: moments are s
+times and energies s² times those of the reference (EI = 1000, L = 2, M_u = 10, G_f = 5), which
+makes rotations and deflections s times, and nothing else.
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+import ufl_beam as ub
+
+EI, LENGTH, M_U, G_F = 1000.0, 2.0, 10.0, 5.0  # N m², m, N m, J
+SHEAR = 1e-5
+"""EI/(GA L²): shear makes 3e-5 of the elastic deflection."""
+
+GA = EI / (SHEAR * LENGTH**2)
+LAWS = [ub.Softening, ub.LinearSoftening]
+
+
+def moment(law, opening, limit=M_U, energy=G_F):
+    """[closed] What the hinge resists with."""
+    if law is ub.LinearSoftening:
+        return np.maximum(limit - limit**2 / (2 * energy) * opening, 0.0)
+    return limit * np.exp(-limit / energy * opening)
+
+
+def section(rho=0.0):
+    return ub.Section(EA=GA, GA=GA, EI=EI, rhoA=rho, rhoI=1e-3 * rho)
+
+
+def hinged(law, *, cells=8, h=LENGTH, s=0.0, rho=0.0):
+    """Beam along x with a hinge in its first cell, of length ``h`` if that is shorter."""
+    corners = (h / LENGTH,) if h * cells < LENGTH else ()
+    return ub.Beam((0, 0), (LENGTH, 0), section(rho), cells=cells, corners=corners, hinges={s: law})
+
+
+def turned(law, motion, scheme, *, dt, cells=1, s=0.0, end=1.0, rho=0.0):
+    """Cantilever whose end is turned as given."""
+    beam = hinged(law, cells=cells, s=s, rho=rho)
+    turn = ub.Prescribed(beam.end, psi=motion)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), turn])
+    return beam, ub.simulate(scene, scheme, t=(0, end), dt=dt, progress=False)
+
+
+def assert_balanced(energy):
+    assert energy.worst <= 1e-9
+    assert_no_gain(energy)
+
+
+def assert_no_gain(energy):
+    for lost in energy.lost.values():
+        assert np.diff(lost).min() >= -1e-12 * energy.throughput
+
+
+# -- closed forms --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(("cells", "h"), [(8, 2e-6), (8, 0.1), (1, LENGTH), (64, 1.0)])
+def test_tip_load(law, cells, h):
+    """[closed] Force, moment and opening at three points; 1e-6.
+
+    Rotations are 1e-3 at most, so what is not linear is 1e-6 of them squared, 1e-6 at the
+    very most; the solver's 1e-10 and round-off of EA, ε EA = 5e-9 N of 1e-3 N, remain.
+    """
+    scale = 1e-3
+    limit, energy = scale * M_U, scale**2 * G_F
+    beam = hinged(law(limit, energy), cells=cells, h=h)
+    vertices = LENGTH * np.array(beam.vertices([]))
+    lengths, arms = np.diff(vertices), LENGTH - (vertices[1:] + vertices[:-1]) / 2
+    openings = np.array([0.1, 0.3, 0.5]) * scale
+    M = moment(law, openings, limit, energy)
+    F = M / arms[0]
+    δ = F * (np.sum(lengths * arms**2) / EI + LENGTH / GA) + openings * arms[0]
+    push = ub.Prescribed(beam.end, v=ub.Table([0, 1, 2, 3], [0.0, *δ]))
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), push])
+    solution = ub.simulate(scene, ub.Static(), t=(0, 3), dt=1 / 16, progress=False)
+    at = [16, 32, 48]
+    hinge = solution.material_at(beam.start)
+    np.testing.assert_allclose(solution.reaction(push)[at, 1], F, rtol=1e-6)
+    np.testing.assert_allclose(solution.section_forces_at(beam.start)[at, 2], M, rtol=1e-6)
+    np.testing.assert_allclose(hinge.jump[at], openings, rtol=1e-6)
+    assert_no_gain(solution.energy)
+
+
+def test_numbers_of_the_reference():
+    """[closed] (F, δ) = (5, .013333), (4.09365, .210916), (1.83940, 1.004905); half a unit.
+
+    The hinge is 1e-7 L from the clamp; 512 cells are 1e-6 off, and shear is taken out.
+    """
+    scale = 1e-3
+    beam = hinged(ub.Softening(scale * M_U, scale**2 * G_F), cells=512, h=4e-7)
+    table = np.array([(5, 0.013333), (4.09365, 0.210916), (1.83940, 1.004905)])
+    exact = [(moment(ub.Softening, a) / LENGTH, a) for a in (0.0, 0.1, 0.5)]
+    δ = [F * LENGTH**3 / (3 * EI) + a * LENGTH for F, a in exact]
+    push = ub.Prescribed(beam.end, v=ub.Table([0, 1, 2, 3], scale * np.array([0.0, *δ])))
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), push])
+    solution = ub.simulate(scene, ub.Static(), t=(0, 3), dt=1 / 4, progress=False)
+    at = [4, 8, 12]
+    F = solution.reaction(push)[at, 1] / scale
+    moved = solution.displacement(beam.end)[at, 1] / scale - F * LENGTH / GA
+    # Where the displacement is the closed one but shear takes its part, F follows 3e-5 behind.
+    assert (np.abs(F - table[:, 0]) <= [2e-4, 0.6e-5, 0.6e-5]).all()
+    np.testing.assert_allclose(moved, table[:, 1], rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_large_rotations(law):
+    """The law holds in the cell, and the reaction at the clamp agrees, with the tip a metre off."""
+    beam = hinged(law(M_U, G_F), h=1e-3)
+    push = ub.Prescribed(beam.end, v=lambda t: t)
+    clamp = ub.Clamped(beam.start)
+    scene = ub.Scene([beam], supports=[clamp, push])
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1 / 64, progress=False)
+    hinge, M = solution.material_at(beam.start), solution.section_forces_at(beam.start)[:, 2]
+    opens = hinge.jump > 0
+    assert opens.sum() > 50
+    np.testing.assert_allclose(M[opens], moment(law, hinge.jump[opens]), rtol=1e-9)
+    F = solution.reaction(push)[opens, 1]
+    x = LENGTH + solution.displacement(beam.end)[opens, 0]
+    np.testing.assert_allclose(-solution.reaction(clamp)[opens, 2], F * x, rtol=1e-7)
+    np.testing.assert_allclose(M[opens], F * x, rtol=2 * 1e-3 / LENGTH)
+
+
+# -- what a complete opening dissipates ----------------------------------------------------------
+
+BRITTLE = 0.2
+"""J; the moment falls with 500 N m at most: where the beam of 500 N m drives it, no snap-back."""
+
+COMPLETE = 30 * BRITTLE / M_U
+"""rad; exponentially, exp(-25) = 1e-11 of the energy is left."""
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("cells", [1, 4, 64])
+@pytest.mark.parametrize("steps", [10, 37])
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.ExactStatic(0.5)])
+def test_energy_of_a_complete_opening_in_statics(law, cells, steps, scheme):
+    """G_f to 1e-9, whatever the step and the mesh."""
+    energy = 1.25 * BRITTLE
+    beam, solution = turned(
+        law(M_U, energy), lambda t: COMPLETE * t, scheme, dt=1 / steps, cells=cells, s=0.5
+    )
+    assert solution.energy.lost["hinges"][-1] == pytest.approx(energy, rel=1e-9)
+    assert solution.material(beam).hinge.sum() == pytest.approx(energy, rel=1e-9)
+    assert_no_gain(solution.energy)
+    if scheme != ub.Static():
+        assert solution.energy.worst <= 1e-9
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("cells", [1, 4, 64])
+@pytest.mark.parametrize("steps", [50, 233])
+def test_energy_of_a_complete_opening_in_dynamics(law, cells, steps):
+    """G_f to 1e-9 and the ledger, with inertia, which also opens it the other way."""
+
+    def motion(t):
+        return COMPLETE * math.sin(math.pi * t / 2) ** 2
+
+    _, solution = turned(
+        law(M_U, BRITTLE), motion, ub.Midpoint(), dt=1 / steps, cells=cells, s=0.5, rho=1.0
+    )
+    assert solution.energy.lost["hinges"][-1] == pytest.approx(BRITTLE, rel=1e-9)
+    assert_balanced(solution.energy)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.Midpoint()])
+def test_cycles(law, scheme):
+    """Opened, unloaded, opened the other way and back: elastic between, never more than G_f.
+
+    What one opening takes from the limit, the other direction finds taken.
+    """
+    energy = 1.25 * BRITTLE
+    table = ub.Table([0, 1, 2, 3, 4, 5, 6], 0.02 * np.array([0, 1.5, -0.5, -2, 0.5, 2, 8]))
+    rho = 0.01 if scheme.dynamic else 0.0
+    beam, solution = turned(law(M_U, energy), table, scheme, dt=1 / 100, end=6, rho=rho)
+    hinge, M = solution.material_at(beam.start), solution.section_forces_at(beam.start)[:, 2]
+    lost = solution.energy.lost["hinges"]
+    assert lost.max() <= energy * (1 + 1e-12)
+    assert lost[-1] > 0.9 * energy
+    assert_no_gain(solution.energy)
+    growth = np.diff(hinge.jump)
+    assert (growth > 0).any()
+    assert (growth < 0).any()
+    opening = np.concatenate([[0.0], np.cumsum(np.abs(growth))])
+    if scheme.dynamic:
+        assert solution.energy.worst <= 1e-9
+        return
+    resistance = moment(law, opening, energy=energy)
+    assert (np.abs(M) <= resistance * (1 + 1e-9) + 1e-9).all()
+    moves = np.concatenate([[False], growth != 0])
+    np.testing.assert_allclose(np.abs(M[moves]), resistance[moves], rtol=1e-9, atol=1e-9)
+    still = growth == 0
+    ψ = solution.displacement(beam.end)[:, 2]
+    slope = np.diff(M)[still] / np.diff(ψ)[still]
+    np.testing.assert_allclose(slope, EI / LENGTH, rtol=1e-8)
+
+
+# -- limits --------------------------------------------------------------------------------------
+
+
+def falling(law, *, dt=0.01, scheme=None, joint=False, h=0.1, end=0.5):
+    """Two metres of beam along x, falling about a pin at the origin; a joint, or hinge, half-way.
+
+    The hinge is in the middle of a cell of length h; all other cells are the same in both.
+    """
+    stiff = ub.Section(EA=1e5, GA=1e5, EI=100.0, rhoA=1.0, rhoI=1e-3)
+    before, after = (0.25, 0.375, 0.5 - h / 4), (0.5 + h / 4, 0.625, 0.75)
+    if joint:
+        upper = ub.Beam((0, 0), (1, 0), stiff, cells=1, corners=tuple(2 * s for s in before))
+        lower = ub.Beam((1, 0), (2, 0), stiff, cells=1, corners=tuple(2 * s - 1 for s in after))
+        beams, joints = [upper, lower], [ub.Revolute(upper.end, lower.start)]
+    else:
+        hinges = {0.5: law} if law else {}
+        beams = [ub.Beam((0, 0), (2, 0), stiff, cells=1, corners=before + after, hinges=hinges)]
+        joints = []
+    scene = ub.Scene(
+        beams, joints=joints, supports=[ub.Pinned(beams[0].start)], loads=[ub.Gravity()]
+    )
+    solution = ub.simulate(scene, scheme or ub.Midpoint(), t=(0, end), dt=dt, progress=False)
+    assert_balanced(solution.energy)
+    return solution.displacement(beams[-1].end)
+
+
+def test_infinite_limit_is_elastic():
+    """Never opens: the elastic trajectory; a limit of 1e9 N m takes the way of the hinge there.
+
+    Both to round-off; the solver's tolerance of 1e-10 lets 50 steps differ by 1e-9.
+    """
+    elastic = falling(None)
+    np.testing.assert_array_equal(falling(ub.Softening(math.inf, 1.0)), elastic)
+    for law in LAWS:
+        np.testing.assert_allclose(falling(law(1e9, 1e18)), elastic, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_no_limit_is_a_revolute_joint(law):
+    """A limit of 1e-12 N m and of nothing: the same motion, and that of a revolute joint.
+
+    The cell of the hinge goes on straight where a joint would kink: its ends are nearer to each
+    other by h (1 - cos(α/2)), and it knows one mean rotation; both are of first order in h or
+    better, and vanish with it.
+    """
+    errors = []
+    for h in (0.1, 0.05, 0.025, 0.0125):
+        joint = falling(None, joint=True, h=h)
+        errors.append(np.abs(falling(law(0.0, 1.0), h=h) - joint).max())
+    np.testing.assert_allclose(falling(law(1e-12, 1.0)), falling(law(0.0, 1.0)), rtol=0, atol=1e-9)
+    order = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert errors[-1] < 0.01
+    assert (order > 0.9).all()
+
+
+# -- snap-back -----------------------------------------------------------------------------------
+
+
+def steepest(law, ratio):
+    """Energy for which the moment falls ``ratio`` times as steeply as the beam can follow."""
+    part = 2 if law is ub.LinearSoftening else 1
+    return M_U**2 / (part * ratio * EI / LENGTH)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("cells", [1, 4])
+@pytest.mark.parametrize("steps", [13, 40, 400])
+def test_snap_back_stops_statics(law, cells, steps):
+    """Steeper than EI/L: there is no equilibrium after the limit, and statics says so there."""
+    yields = M_U * LENGTH / EI
+    with pytest.raises(ub.ConvergenceError, match="snaps back") as failure:
+        turned(
+            law(M_U, steepest(law, 2.0)), lambda t: 2 * yields * t, ub.Static(),
+            dt=1 / steps, cells=cells,
+        )  # fmt: skip
+    assert 0.5 - 1 / steps <= failure.value.time <= 0.5 + 1.01 / steps
+    solution = failure.value.solution
+    assert_no_gain(solution.energy)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.ExactStatic()])
+def test_no_snap_back(law, scheme):
+    """A little less steep than EI/L, statics goes through, and with small steps with the law."""
+    yields = M_U * LENGTH / EI
+    energy = steepest(law, 0.8)
+    beam, solution = turned(law(M_U, energy), lambda t: 4 * yields * t, scheme, dt=1 / 400, cells=4)
+    hinge, M = solution.material_at(beam.start), solution.section_forces_at(beam.start)[:, 2]
+    tolerance = 1e-8 if scheme == ub.Static() else 0.05
+    np.testing.assert_allclose(
+        M[hinge.jump > 0], moment(law, hinge.jump, energy=energy)[hinge.jump > 0],
+        rtol=0, atol=tolerance * M_U,
+    )  # fmt: skip
