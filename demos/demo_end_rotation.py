@@ -222,9 +222,7 @@ def soften(others, rate, eta, steps, record=()):
     return solution.displacement(beam.end)[:, 2], solution.material_at(beam.at(0.5)), solution
 
 
-# Without viscosity all cells change at once from flow to unloading when the hinge opens, and
-# Newton's method gets over that from some steps only; hence these.
-slow = {n: soften(n, rates[0], 0.0, steps) for n, steps in ((2, 320), (4, 450), (8, 420))}
+slow = {n: soften(n, rates[0], 0.0, 500) for n in (2, 4, 8)}
 xdmf = ub.XDMF(output / "end_rotation.xdmf", every=10)
 fast = [soften(8, rate, 2e7, 400, xdmf if rate == rates[-1] else ()) for rate in rates]
 

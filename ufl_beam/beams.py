@@ -35,7 +35,9 @@ class Beam:
         curve: Axis from ``s = 0`` at ``a`` to ``s = 1`` at ``b``.
         corners: Parameters ``s`` that must be vertices.
         hinges: Laws of hinges in single cells, by a parameter ``s`` in the cell; at a vertex the
-            cell before it.  They come before the law of the section.
+            cell before it.  They come before the law of the section.  A hinge sits in the middle of
+            its cell, and where it turns far the cell keeps its length while its axis turns half as
+            far: positions are off by up to the length of the cell, so let it be short (corners).
 
     Raises:
         SceneError: Zero length, ``cells < 1``, coordinates that are no finite numbers, or hinges in

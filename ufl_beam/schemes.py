@@ -231,6 +231,7 @@ class ExactStatic(_ExactStep):
         theta: Part of the step at which resultants and loads are in equilibrium.  1/2 loses
             nothing, but leaves the states at the ends free to oscillate about equilibrium; 1
             brings them there, and what that costs is the entry "numerical" of the ledger.
+            Uniform moments differ along a beam by (Δψ/2)² of a step.
 
     Raises:
         SceneError: A number outside [1/2, 1].
@@ -270,7 +271,9 @@ class Midpoint(_ExactStep):
     up angular momentum.  What they take is the entry "numerical" of the ledger.
 
     Laws of inelastic material are stated in the middle of the step, which is of second order;
-    ``alpha = 1/2`` states them at its end: backward Euler, of first order.
+    ``alpha = 1/2`` states them at its end: backward Euler, of first order.  In the middle of the
+    step stresses lie on the yield surface, and an open hinge bears nothing; at the ends they
+    alternate about that by the order of a step, which a small ``alpha`` damps.
 
     Args:
         alpha: Dissipation by the resultants, from 0 to 1/2.
