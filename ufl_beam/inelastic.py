@@ -107,6 +107,7 @@ class InelasticBeams:
             *(cells, doubles(points.strains), doubles(points.r), doubles(points.D)),
             *(to_b, to_D, width),
         )
+        self._begins = False
         self._q: Array = np.empty(0)
         self._e: Array = np.empty(0)
         self._latest: Array = np.full(fields.share.size, np.nan)
@@ -120,6 +121,7 @@ class InelasticBeams:
             self._q, self._e = step.q0, self._strains(step.q0)
         self.points.begin(self._e, step.dt)
         self._latest.fill(np.nan)
+        self._begins = not self._scheme.dynamic
 
     def _respond(self, q1: Array) -> None:
         """Resultants at ``q1`` and their derivatives, into the form."""
@@ -136,9 +138,14 @@ class InelasticBeams:
         self._force.add(q1, r)
 
     def add_tangent(self, q1: Array) -> None:
-        """Add the stiffness, material and geometric."""
+        """Add the stiffness, material and geometric; see :class:`ElasticBeams`."""
         self._respond(q1)
+        if self._begins:
+            self.points.r[:] = self.points.kept[:, :3]
+            lib.linearise(*self._to_linearise)
+            self._latest.fill(np.nan)
         self._tangent.add(q1, self._A.data)
+        self._begins = False
 
     def change(self, q1: Array) -> float:
         """Energy that cells of this process store and dissipate in the step to ``q1``; J."""

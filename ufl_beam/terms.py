@@ -14,6 +14,7 @@ import ufl
 
 from ufl_beam.compat import Array
 from ufl_beam.fields import Fields
+from ufl_beam.forms import Kernel
 from ufl_beam.kinematics import split, strain
 from ufl_beam.ledger import Ledger
 from ufl_beam.loops import doubles, integers, lib
@@ -60,8 +61,9 @@ class ElasticBeams:
         e0, e1 = strain(q0, axis), strain(q1, axis)
 
         r = scheme.resultants(C, e0, e1, fields.constant)
-        virtual_work = ufl.dot(r, scheme.virtual_strain(q0, q1, w, axis)) * dx  # P(12)
-        tangent = ufl.derivative(virtual_work, q1, ufl.TrialFunction(fields.space))
+        w_e, dq = scheme.virtual_strain(q0, q1, w, axis), ufl.TrialFunction(fields.space)
+        virtual_work = ufl.dot(r, w_e) * dx  # P(12)
+        tangent = ufl.derivative(virtual_work, q1, dq)
         stored = sum(C[i] * e1[i] ** 2 / 2 for i in range(3)) * dx  # P(9)
         losses = [d * dx for d in scheme.losses(C, e0, e1, fields.constant)]
 
@@ -71,6 +73,14 @@ class ElasticBeams:
         )
         self._tangent.share(self._force)
         self._tangent.place(A)
+        self._first: Kernel | None = None
+        if not scheme.dynamic:
+            before = ufl.as_vector([C[i] * e0[i] for i in range(3)])
+            geometric = ufl.dot(before, ufl.derivative(w_e, q1, dq))
+            material = ufl.dot(ufl.derivative(r, q1, dq), w_e)
+            self._first = fields.kernel((geometric + material) * dx, q1)
+            self._first.place(A)
+        self._begins = False
         self._A, self._ledger = A, ledger
         if losses:
             ledger.lost["numerical"] += 0.0
@@ -79,14 +89,25 @@ class ElasticBeams:
         """Remember the configuration at the beginning."""
         for kernel in (self._force, *self._losses):
             kernel.set(self._q0, step.q0)
+        if self._first is not None:
+            self._first.set(self._q0, step.q0)
+            self._begins = True
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the internal forces."""
         self._force.add(q1, r)
 
     def add_tangent(self, q1: Array) -> None:
-        """Add the stiffness, material and geometric."""
-        self._tangent.add(q1, self._A.data)
+        """Add the stiffness, material and geometric.
+
+        Extrapolated displacements strain slender beams by nothing but error; forces from that would
+        send the first iteration of a static step astray, so it takes those before the step.
+        """
+        if self._begins and self._first is not None:
+            self._first.add(q1, self._A.data)
+        else:
+            self._tangent.add(q1, self._A.data)
+        self._begins = False
 
     def accept(self, q1: Array, s: Array) -> None:
         """What the scheme lost."""
