@@ -12,9 +12,8 @@ from ufl_beam.errors import SceneError
 from ufl_beam.fields import Fields
 from ufl_beam.kinematics import strain, virtual_strain
 from ufl_beam.ledger import Ledger
-from ufl_beam.loops import doubles, integers, lib
 from ufl_beam.schemes import Scheme, Step
-from ufl_beam.sparse import Csr, Product
+from ufl_beam.sparse import Csr, StepProduct
 from ufl_beam.terms import Term, mass_matrix
 from ufl_beam.viscous import KelvinVoigt, Rayleigh
 
@@ -89,45 +88,28 @@ def reference_stiffness(fields: Fields) -> Csr:
 class RayleighForces:
     """A constant matrix times the mean velocity of the step, P(92)."""
 
-    def __init__(
-        self, damping: Rayleigh, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger
-    ) -> None:
-        self._C, M, K = fields.matrix(), mass_matrix(fields), reference_stiffness(fields)
-        self._C.data[:] = damping.mass * M.data + damping.stiffness * K.data  # P(92)
-        self._times = Product(self._C)
-        self._rotations = fields.share.rotations()
-        turning = np.isin(self._C.indices, self._rotations) & (self._C.data != 0)
-        self._entries = np.flatnonzero(turning).astype(np.int32)
-        self._columns = self._C.indices[self._entries]
-        self._scheme, self._A, self._ledger, self._dt = scheme, A, ledger, 0.0
+    def __init__(self, damping: Rayleigh, fields: Fields, A: Csr, ledger: Ledger) -> None:
+        C, M, K = fields.matrix(), mass_matrix(fields), reference_stiffness(fields)
+        C.data[:] = damping.mass * M.data + damping.stiffness * K.data  # P(92)
+        self._times = StepProduct(C, fields.share.rotations(), A)
+        self._ledger = ledger
 
     def begin(self, step: Step) -> None:
         """Prepare what stays constant in the step."""
-        self._q0 = step.q0
-        if step.dt != self._dt:
-            self._dt, self._rate = step.dt, self._C.data / step.dt
-
-    def _mean_velocity(self, q1: Array) -> Array:
-        s, _ = self._scheme.nodal_step(self._q0, q1, self._rotations)
-        s /= self._dt
-        return s
+        self._dt = step.dt
+        self._times.begin(step.q0, 1 / step.dt, 0.0, step.q0)
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the damping forces."""
-        self._times.add(self._mean_velocity(q1), r)
+        self._times.add_force(q1, r)
 
     def add_tangent(self, q1: Array) -> None:
         """Add their derivative."""
-        s, _ = self._scheme.nodal_step(self._q0, q1, self._rotations)
-        lib.add_inertia_tangent(
-            *(len(self._rate), doubles(self._rate)),
-            *(len(self._entries), integers(self._entries), integers(self._columns)),
-            *(doubles(s), doubles(self._A.data)),
-        )
+        self._times.add_tangent(q1)
 
     def accept(self, q1: Array, s: Array) -> None:
         """What was damped."""
-        self._ledger.lost["damping"] += float(s @ self._times(s)) / self._dt
+        self._ledger.lost["damping"] += self._times.square(s) / self._dt
 
     def add_state(self, q: Array) -> None:
         """Nothing is stored."""
@@ -140,7 +122,7 @@ def _rayleigh(
     if not scheme.dynamic:
         raise SceneError("Rayleigh: it damps velocities, and statics has none; use KelvinVoigt")
     ledger.lost["damping"] += 0.0
-    return [RayleighForces(damping, fields, scheme, A, ledger)]
+    return [RayleighForces(damping, fields, A, ledger)]
 
 
 @damping_forces.register

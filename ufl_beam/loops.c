@@ -35,35 +35,19 @@ void add_product(int rows, const int32_t *indptr, const int32_t *indices, const 
   }
 }
 
-/* r += A (factor s - before) */
-void add_inertia(int rows, const int32_t *indptr, const int32_t *indices, const double *data,
-                 double factor, const double *s, const double *before, double *r)
+/* x A x */
+double quadratic_form(int rows, const int32_t *indptr, const int32_t *indices, const double *data,
+                      const double *x)
 {
-  for (int i = 0; i < rows; ++i) {
-    double sum = 0;
-    for (int k = indptr[i]; k < indptr[i + 1]; ++k) {
-      int j = indices[k];
-      sum += data[k] * (factor * s[j] - before[j]);
-    }
-    r[i] += sum;
-  }
-}
-
-/* data += mass, column by column times the derivative of the step of the nodes */
-void add_inertia_tangent(int entries, const double *mass, int turning_entries,
-                         const int32_t *entry, const int32_t *column, const double *s,
-                         double *data)
-{
-  for (int k = 0; k < entries; ++k) data[k] += mass[k];
-  for (int k = 0; k < turning_entries; ++k) {
-    double half = s[column[k]] / 2;
-    data[entry[k]] += mass[entry[k]] * half * half;
-  }
+  double sum = 0;
+  for (int i = 0; i < rows; ++i)
+    for (int k = indptr[i]; k < indptr[i + 1]; ++k) sum += x[i] * data[k] * x[indices[k]];
+  return sum;
 }
 
 /* s = q1 - q0, with 2 tan(x/2) in the place of the increments x of the rotations; the largest |x| */
-double step_of_nodes(int size, const double *q0, const double *q1, int rotations,
-                     const int32_t *rotation, double *s)
+double step_of_nodes(int size, int rotations, const int32_t *rotation, double *s,
+                     const double *q0, const double *q1)
 {
   double largest = 0;
   for (int i = 0; i < size; ++i) s[i] = q1[i] - q0[i];
@@ -73,6 +57,31 @@ double step_of_nodes(int size, const double *q0, const double *q1, int rotations
     *x = 2 * tan(*x / 2);
   }
   return largest;
+}
+
+/* r += A (factor s - back v), where s, of which only the space is given, is the step of the nodes */
+void add_step_product(int size, const int32_t *indptr, const int32_t *indices, const double *data,
+                      double factor, double back, const double *v, int rotations,
+                      const int32_t *rotation, double *s, const double *q0, const double *q1,
+                      double *r)
+{
+  step_of_nodes(size, rotations, rotation, s, q0, q1);
+  for (int i = 0; i < size; ++i) s[i] = factor * s[i] - back * v[i];
+  add_product(size, indptr, indices, data, s, r);
+}
+
+/* tangent += A, column by column times the derivative 1 + half^2 of the step of the nodes */
+void add_step_tangent(int entries, const int32_t *entry, const int32_t *column, const double *data,
+                      int size, int rotations, const int32_t *rotation, double *half,
+                      const double *q0, const double *q1, double *tangent)
+{
+  memset(half, 0, size * sizeof *half);
+  for (int k = 0; k < rotations; ++k)
+    half[rotation[k]] = tan((q1[rotation[k]] - q0[rotation[k]]) / 2);
+  for (int k = 0; k < entries; ++k) {
+    double h = half[column[k]];
+    tangent[entry[k]] = tangent[entry[k]] + data[k] + data[k] * h * h;
+  }
 }
 
 /* sum of w f^2 */

@@ -28,13 +28,17 @@ void cells_vector(kernel *tabulate, int cells, int dofs_per_cell, const int32_t 
                   const double *coordinates, int rows, const int32_t *row, double *b);
 void add_product(int rows, const int32_t *indptr, const int32_t *indices, const double *data,
                  const double *x, double *y);
-void add_inertia(int rows, const int32_t *indptr, const int32_t *indices, const double *data,
-                 double factor, const double *s, const double *before, double *r);
-void add_inertia_tangent(int entries, const double *mass, int turning_entries,
-                         const int32_t *entry, const int32_t *column, const double *s,
-                         double *data);
-double step_of_nodes(int size, const double *q0, const double *q1, int rotations,
-                     const int32_t *rotation, double *s);
+double quadratic_form(int rows, const int32_t *indptr, const int32_t *indices, const double *data,
+                      const double *x);
+double step_of_nodes(int size, int rotations, const int32_t *rotation, double *s,
+                     const double *q0, const double *q1);
+void add_step_product(int size, const int32_t *indptr, const int32_t *indices, const double *data,
+                      double factor, double back, const double *v, int rotations,
+                      const int32_t *rotation, double *s, const double *q0, const double *q1,
+                      double *r);
+void add_step_tangent(int entries, const int32_t *entry, const int32_t *column, const double *data,
+                      int size, int rotations, const int32_t *rotation, double *half,
+                      const double *q0, const double *q1, double *tangent);
 double weighted_square(int rows, const double *w, const double *f);
 int respond(kernel *bulk, kernel *opening, kernel *excess, int cells, int points,
             const double *B, const double *weight, const double *rest, double theta,

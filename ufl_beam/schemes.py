@@ -102,7 +102,7 @@ class Scheme(Protocol):
 
 
 class DynamicScheme(Scheme, Protocol):
-    """What a scheme with inertia must say besides."""
+    """What a scheme with inertia must say besides; its step of the nodes is (Δu, 2 tan(Δψ/2))."""
 
     beta: float
     """Part of the mass times the squared change of velocity that is lost numerically."""
@@ -207,9 +207,9 @@ class _ExactStep:
 
     def nodal_step(self, q0: Array, q1: Array, rotations: Index) -> tuple[Array, float]:
         """(Δu, 2 tan(Δψ/2)): with it works are exact increments; see docs/errata.md."""
-        s = np.empty_like(q1)
+        s = np.empty(len(q1))
         turn: float = lib.step_of_nodes(
-            len(s), doubles(q0), doubles(q1), len(rotations), integers(rotations), doubles(s)
+            len(s), len(rotations), integers(rotations), doubles(s), doubles(q0), doubles(q1)
         )
         return s, turn
 

@@ -63,7 +63,8 @@ class Solver:
         residual: Writes the local part of the residual at x into r: ``residual(x, r)``.
         complete: Called with the summed residual; removes what supports carry.
         tangent: Fills ``A`` at x: ``tangent(x)``.
-        forces: Internal forces in the latest residual; with the loads, the scale of convergence.
+        forces: Internal forces in the latest residual, one array during a solution; with the loads,
+            the scale of convergence.
         newton: Tolerances.
     """
 
@@ -138,6 +139,7 @@ class Solver:
         snes.setOptionsPrefix(PREFIX)
         f = self._vector()
         self._r = self._view(f, writable=True)
+        self._at_r = doubles(self._r)
         snes.setFunction(self._function, f)
         snes.setJacobian(self._jacobian, self._matrix)
         snes.setConvergenceTest(self._test)
@@ -200,16 +202,16 @@ class Solver:
         weights[self._share.rotations()] = 1 / self._share.grid.scene.size**2
         return weights[: self._share.num_owned].copy()
 
-    def _size(self, forces: Array) -> float:
-        """Euclidean norm over the scene of forces and moments over its size; N."""
-        square: float = lib.weighted_square(*self._norm, doubles(forces))
+    def _size(self, forces: Any) -> float:
+        """Euclidean norm over the scene of forces and moments over its size, at a pointer; N."""
+        square: float = lib.weighted_square(*self._norm, forces)
         return math.sqrt(self._share.total(square))
 
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, ...]) -> int:
-        residual = self._size(self._r)
+        residual = self._size(self._at_r)
         if not math.isfinite(residual):
             return DIVERGED
-        scale = self._loads + self._size(self._forces())
+        scale = self._loads + self._size(self._at_forces)
         if residual <= self._newton.rtol * scale:
             return CONVERGED
         if iteration > 1:
@@ -227,7 +229,7 @@ class Solver:
         A strain is the difference of two numbers near one, so stiff or finely divided beams cannot
         be solved any better, however small the forces are.
         """
-        return self._size(self._A.data[self._diagonal] * self._last_digits())
+        return self._size(doubles(self._A.data[self._diagonal] * self._last_digits()))
 
     def _last_digits(self) -> Array:
         return np.spacing(np.abs(self._view(self._x)) + self._lengths)
@@ -249,7 +251,8 @@ class Solver:
         Raises:
             StepFailed: No convergence.
         """
-        self._loads = sum(self._size(load) for load in loads)
+        self._loads = sum(self._size(doubles(load)) for load in loads)
+        self._at_forces = doubles(self._forces())
         x = self._view(self._x)
         x[:] = guess
         self._x.stateIncrease()
@@ -265,13 +268,13 @@ class Solver:
 
     def _explain(self, reason: int) -> str:
         names = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int)}
-        scale = self._loads + self._size(self._forces())
+        scale = self._loads + self._size(self._at_forces)
         weighted = np.zeros(self._share.size)
         weighted[: len(self._weights)] = np.abs(self._r[: len(self._weights)]) * self._weights**0.5
-        worst = int(np.argmax(self._share.gather(weighted)))
+        worst = self._share.grid.describe(int(np.argmax(self._share.gather(weighted))))
         return (
             f"SNES {names.get(reason, reason)} after {self._snes.getIterationNumber()} iterations; "
-            f"residual {self._size(self._r):.3e} N, largest in {self._share.grid.describe(worst)}, "
+            f"residual {self._size(self._at_r):.3e} N, largest in {worst}, "
             f"forces in the scene {scale:.3e} N"
         )
 

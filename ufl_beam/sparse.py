@@ -67,21 +67,56 @@ def as_slice(index: Index) -> Index | slice:
 
 
 class Product:
-    """``x -> A x`` on this process, without allocating."""
+    """``x -> A x`` on this process; what ``A`` stores of zeros is left out."""
 
     def __init__(self, A: Csr) -> None:
-        self._arrays = (A.size, integers(A.indptr), integers(A.indices), doubles(A.data))
-
-    def add(self, x: Array, y: Array) -> None:
-        """Add the product to ``y``."""
-        lib.add_product(*self._arrays, doubles(x), doubles(y))
-
-    def add_combined(self, factor: float, x: Array, less: Array, y: Array) -> None:
-        """Add the product with ``factor * x - less`` to ``y``."""
-        lib.add_inertia(*self._arrays, factor, doubles(x), doubles(less), doubles(y))
+        self._entries = np.flatnonzero(A.data).astype(np.int32)
+        self._columns = A.indices[self._entries]
+        self._data = A.data[self._entries]
+        indptr = np.searchsorted(self._entries, A.indptr).astype(np.int32)
+        pointers = (integers(indptr), integers(self._columns), doubles(self._data))
+        self._arrays = (A.size, *pointers)
 
     def __call__(self, x: Array) -> Array:
         """The product; a new array."""
-        y = np.zeros_like(x)
-        self.add(x, y)
+        y = np.zeros(len(x))
+        lib.add_product(*self._arrays, doubles(x), doubles(y))
         return y
+
+    def square(self, x: Array) -> float:
+        """``x`` times its product."""
+        square: float = lib.quadratic_form(*self._arrays, doubles(x))
+        return square
+
+
+class StepProduct(Product):
+    """Forces ``A (factor s - back v)``, s being (Δu, 2 tan(Δψ/2)), and their derivative.
+
+    Args:
+        A: Constant matrix.
+        rotations: Degrees of freedom that are rotations, as int32.
+        tangent: Matrix of the same structure that takes the derivative.
+    """
+
+    def __init__(self, A: Csr, rotations: Index, tangent: Csr) -> None:
+        super().__init__(A)
+        self._nodes = (len(rotations), integers(rotations), doubles(np.empty(A.size)))
+        self._places = (len(self._entries), integers(self._entries), integers(self._columns))
+        self._tangent = doubles(tangent.data)
+        self._factor = 0.0
+
+    def begin(self, q0: Array, factor: float, back: float, v: Array) -> None:
+        """Prepare what stays constant in the step that begins at ``q0``."""
+        if factor != self._factor:
+            self._factor, self._scaled = factor, doubles(factor * self._data)
+        nodes = (*self._nodes, doubles(q0))
+        self._to_force = (*self._arrays, factor, back, doubles(v), *nodes)
+        self._to_tangent = (*self._places, self._scaled, len(q0), *nodes)
+
+    def add_force(self, q1: Array, r: Array) -> None:
+        """Add the forces at ``q1``."""
+        lib.add_step_product(*self._to_force, doubles(q1), doubles(r))
+
+    def add_tangent(self, q1: Array) -> None:
+        """Add their derivative at ``q1``."""
+        lib.add_step_tangent(*self._to_tangent, doubles(q1), self._tangent)

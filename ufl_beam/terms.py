@@ -17,9 +17,8 @@ from ufl_beam.fields import Fields
 from ufl_beam.forms import Kernel
 from ufl_beam.kinematics import split, strain
 from ufl_beam.ledger import Ledger
-from ufl_beam.loops import doubles, integers, lib
 from ufl_beam.schemes import DynamicScheme, Scheme, Step
-from ufl_beam.sparse import Csr, Product
+from ufl_beam.sparse import Csr, StepProduct
 
 
 class Term(Protocol):
@@ -171,54 +170,37 @@ class Inertia:
     def __init__(
         self, fields: Fields, scheme: DynamicScheme, A: Csr, ledger: Ledger, v: Array
     ) -> None:
-        share = fields.share
         self.M = mass_matrix(fields)
-        self._times = Product(self.M)
-        self._rotations = share.rotations()
-        turning = np.isin(self.M.indices, self._rotations) & (self.M.data != 0)
-        self._entries = np.flatnonzero(turning).astype(np.int32)
-        self._columns = self.M.indices[self._entries]
-        self._A, self._ledger = A, ledger
+        self._times = StepProduct(self.M, fields.share.rotations(), A)
+        self._ledger = ledger
         if scheme.beta:
             ledger.lost["numerical"] += 0.0
         self._scheme = scheme
         self.v = v
-        self._dt = 0.0
 
     def begin(self, step: Step) -> None:
         """Prepare what stays constant in the step."""
-        self._q0 = step.q0
-        if step.dt != self._dt:
-            self._dt = step.dt
-            self._a, self._b = self._scheme.velocity_weights(step.dt)
-            self._mass = self.M.data * (self._a / step.dt)
-            self._tangent = (
-                *(len(self._mass), doubles(self._mass)),
-                *(len(self._entries), integers(self._entries), integers(self._columns)),
-            )
-        self._before = self.v * ((1 + self._b) / step.dt)
+        self._a, self._b = self._scheme.velocity_weights(step.dt)
+        factor, back = self._a / step.dt, (1 + self._b) / step.dt
+        self._times.begin(step.q0, factor, back, self.v)  # P(78)
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add mass times the acceleration of the step."""
-        s, _ = self._scheme.nodal_step(self._q0, q1, self._rotations)
-        self._times.add_combined(self._a / self._dt, s, self._before, r)  # P(78)
+        self._times.add_force(q1, r)
 
     def add_tangent(self, q1: Array) -> None:
         """Add mass times the derivative of the acceleration."""
-        s, _ = self._scheme.nodal_step(self._q0, q1, self._rotations)
-        lib.add_inertia_tangent(*self._tangent, doubles(s), doubles(self._A.data))
+        self._times.add_tangent(q1)
 
     def accept(self, q1: Array, s: Array) -> None:
         """New velocities, and what the scheme lost."""
         v = self._a * s
         v -= self._b * self.v
         if self._scheme.beta:
-            change = v - self.v
-            self._ledger.lost["numerical"] += self._scheme.beta * float(
-                change @ self._times(change)
-            )  # P(88)
+            lost = self._scheme.beta * self._times.square(v - self.v)  # P(88)
+            self._ledger.lost["numerical"] += lost
         self.v = v
 
     def add_state(self, q: Array) -> None:
         """Kinetic energy."""
-        self._ledger.state["kinetic"] += float(self.v @ self._times(self.v)) / 2  # P(18)
+        self._ledger.state["kinetic"] += self._times.square(self.v) / 2  # P(18)
