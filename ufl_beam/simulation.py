@@ -121,11 +121,12 @@ class Simulation:
         self._dt_before = math.inf
         self._rotations = self.share.rotations()
         self._force_before: Array = np.zeros(self.share.size)
-        if math.isfinite(scheme.slack):
-            for beams in self._beams:
-                beams.add_residual(self.q, self._force_before)
         for term in self.terms:
             term.add_state(self.q)
+        if math.isfinite(scheme.slack):
+            for beams in self._beams:
+                beams.begin(scheme.step(t0, t0 + 1.0, t0 + 1.0, self.q))
+                beams.add_residual(self.q, self._force_before)
         self._solver = Solver(
             self.share,
             self._A,
