@@ -217,8 +217,8 @@ class Solver:
         if iteration > 1:
             floor = self._round_off()
             # A tenth of the last digit is luck; a few of them that Newton's method no longer halves
-            # are all that can be had.
-            if residual <= floor / 10 or self._last / 2 < residual <= 2 * floor:
+            # are all that can be had: it may go round between two such states for ever.
+            if residual <= floor / 10 or self._last / 2 < residual <= 8 * floor:
                 return AT_ROUND_OFF
         self._last = residual
         return ITERATING
