@@ -19,6 +19,7 @@ from ufl_beam.inelastic import InelasticBeams, expect_entries, inelastic_cells
 from ufl_beam.ledger import Ledger
 from ufl_beam.loads import FollowerLoad
 from ufl_beam.mechanism import require_no_mechanism
+from ufl_beam.path import StaticPath
 from ufl_beam.scene import Scene
 from ufl_beam.schemes import Scheme, has_inertia
 from ufl_beam.solution import Solution
@@ -30,12 +31,6 @@ SMALLEST_PART = 2**12
 """A step is cut into at most this number of parts."""
 
 NO_REACTIONS = np.zeros((0, 3))
-
-FAR = 1e3
-"""Sizes of the scene by which nothing moves in a static step, unless it is a mechanism."""
-
-KINK = 1e-6
-"""Part of the energy that went through at which a static step may pass a kink of a law."""
 
 SMALLEST_SHARE = 100_000
 """Scenes with fewer cells per process are computed by each process.
@@ -120,13 +115,11 @@ class Simulation:
         self._q_before: Array = self.q
         self._dt_before = math.inf
         self._rotations = self.share.rotations()
-        self._force_before: Array = np.zeros(self.share.size)
         for term in self.terms:
             term.add_state(self.q)
-        if math.isfinite(scheme.slack):
-            for beams in self._beams:
-                beams.begin(scheme.step(t0, t0 + 1.0, t0 + 1.0, self.q))
-                beams.add_residual(self.q, self._force_before)
+        self._path: StaticPath | None = None
+        if not scheme.dynamic:
+            self._path = StaticPath(self.share, scheme, self._beams, self.ledger, self.q, t0)
         self._solver = Solver(
             self.share,
             self._A,
@@ -265,10 +258,8 @@ class Simulation:
         self.supports.leave(q1)
         s, turn = self.scheme.nodal_step(self.q, q1, self._rotations)
         self._require_small(turn)
-        if not self.scheme.dynamic:
-            self._require_near(s)
-        if math.isfinite(self.scheme.slack):
-            self._require_followed(q1, s)
+        if self._path is not None:
+            self._path.require(q1, s, self.force, self._solver.least_work(s))
         for term in self.terms:
             term.accept(q1, s)
         self.supports.enter(s)
@@ -288,38 +279,6 @@ class Simulation:
             raise StepFailed(
                 f"a node turns by {turn:.3g} rad in the step, and |Δψ| must stay below π; reduce dt"
             )
-
-    def _require_near(self, s: Array) -> None:
-        """Raise if a static step goes where only a mechanism goes."""
-        moves = np.abs(s) / self.scene.size
-        moves[self._rotations] *= self.scene.size
-        far = moves.max(initial=0.0)
-        if self.share.comm.size > 1:
-            far = self.share.comm.allreduce(far, op=MPI.MAX)
-        if not far <= FAR:
-            raise StepFailed(
-                f"a node moves by {far:.1e} times the size of the scene, or turns by so many "
-                "radians, in the step: what yields and what has opened leave a mechanism"
-            )
-
-    def _require_followed(self, q1: Array, s: Array) -> None:
-        """The forces on the way of a static step must account for what it stores and dissipates.
-
-        Otherwise Newton's method may have found another branch of equilibria than the one followed:
-        beyond a limit load, or where softening lets go more than it dissipates.
-        """
-        force = self.force
-        work = self.share.total(float(self.scheme.acting(self._force_before, force) @ s))
-        change = self.share.total(sum(beams.change(q1) for beams in self._beams))
-        through = self.share.total(self.ledger.size())
-        slack = self.scheme.slack * (abs(work) + abs(change)) + self._solver.least_work(s)
-        if abs(work - change) > slack + KINK * through:
-            raise StepFailed(
-                f"the step stores and dissipates {change:.3e} J, but the forces along it do "
-                f"{work:.3e} J of work: it leaps to another branch of equilibria, or is too long "
-                "to tell"
-            )
-        self._force_before = force.copy()
 
     def _give_up(self, failure: StepFailed, end: float) -> None:
         if self.t not in self.solution.times[-1:]:

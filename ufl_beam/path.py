@@ -1,0 +1,99 @@
+"""The path of static equilibria: whether a step followed it, or leapt somewhere else."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from mpi4py import MPI
+
+import numpy as np
+
+from ufl_beam.compat import Array
+from ufl_beam.grid import Share
+from ufl_beam.ledger import Ledger
+from ufl_beam.schemes import Scheme
+from ufl_beam.solve import StepFailed
+from ufl_beam.terms import Beams
+
+FAR = 1e3
+"""Sizes of the scene, or radians, by which nothing moves in a static step but a mechanism."""
+
+KINK = 1e-6
+"""Part of the energy that went through at which a static step may pass a kink of a law."""
+
+
+class StaticPath:
+    """What a static step must show before it is accepted.
+
+    Args:
+        share: The degrees of freedom of this process.
+        scheme: A static scheme; its ``slack`` says how much may stay unexplained.
+        beams: What stores and dissipates.
+        ledger: Energies before the step.
+        q: Configuration at the beginning.
+        t0: Time at the beginning; s.
+    """
+
+    def __init__(
+        self,
+        share: Share,
+        scheme: Scheme,
+        beams: Sequence[Beams],
+        ledger: Ledger,
+        q: Array,
+        t0: float,
+    ) -> None:
+        self._share, self._scheme, self._beams, self._ledger = share, scheme, beams, ledger
+        self._rotations = share.rotations()
+        self._before: Array = np.zeros(share.size)
+        for one in beams:
+            one.begin(scheme.step(t0, t0 + 1.0, t0 + 1.0, q))
+            one.add_residual(q, self._before)
+
+    def require(self, q1: Array, s: Array, force: Array, least_work: float) -> None:
+        """Raise unless the step was followed.
+
+        Args:
+            q1: Its end.
+            s: Its step of the nodes.
+            force: Internal forces in it.
+            least_work: Work that round-off makes; J.
+
+        Raises:
+            StepFailed: It was not.
+        """
+        self._require_near(s)
+        if math.isfinite(self._scheme.slack):
+            self._require_explained(q1, s, force, least_work)
+            self._before = force.copy()
+
+    def _require_near(self, s: Array) -> None:
+        size = self._share.grid.scene.size
+        moves = np.abs(s) / size
+        moves[self._rotations] *= size
+        far = moves.max(initial=0.0)
+        if self._share.comm.size > 1:
+            far = self._share.comm.allreduce(far, op=MPI.MAX)
+        if not far <= FAR:
+            raise StepFailed(
+                f"a node moves by {far:.1e} times the size of the scene, or turns by so many "
+                "radians, in the step: what yields and what has opened leave a mechanism"
+            )
+
+    def _require_explained(self, q1: Array, s: Array, force: Array, least_work: float) -> None:
+        """The forces on the way must account for what the step stores and dissipates.
+
+        Otherwise Newton's method may have found another branch of equilibria than the one followed:
+        beyond a limit load, or where softening lets go more than it dissipates.
+        """
+        total = self._share.total
+        work = total(float(self._scheme.acting(self._before, force) @ s))
+        change = total(sum(one.change(q1) for one in self._beams))
+        slack = self._scheme.slack * (abs(work) + abs(change)) + least_work
+        if abs(work - change) > slack + KINK * total(self._ledger.size()):
+            raise StepFailed(
+                f"the step stores and dissipates {change:.3e} J, but the forces along it do "
+                f"{work:.3e} J of work: it leaps to another branch of equilibria, or is too long "
+                "to tell"
+            )
