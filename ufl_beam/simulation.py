@@ -92,7 +92,7 @@ class Simulation:
         self.ledger = Ledger()
         self.parts = 0
 
-        self._beams: list[Beams] = []
+        self.beams: list[Beams] = []
         self.inelastic: list[InelasticBeams] = []
         self._make_beams()
         self.force = np.zeros(self.share.size)
@@ -104,7 +104,7 @@ class Simulation:
             self._others.append(self.inertia)
         for damping in scene.damping:
             self._others += damping_forces(damping, self.fields, scheme, self._A, self.ledger)
-        self.terms: list[Term] = [*self._beams, *self._others]
+        self.terms: list[Term] = [*self.beams, *self._others]
         self.supports = Supports(self.share, scheme, self.ledger, self._A)
         if start is not None:
             for load in self.loads:
@@ -119,7 +119,7 @@ class Simulation:
             term.add_state(self.q)
         self._path: StaticPath | None = None
         if not scheme.dynamic:
-            self._path = StaticPath(self.share, scheme, self._beams, self.ledger, self.q, t0)
+            self._path = StaticPath(self.share, scheme, self.beams, self.ledger, self.q, t0)
         self._solver = Solver(
             self.share,
             self._A,
@@ -149,11 +149,11 @@ class Simulation:
                 )
         for inelastic in self.inelastic[1:]:
             inelastic.points.openings = self.inelastic[0].points.openings
-        self._beams.extend(self.inelastic)
+        self.beams.extend(self.inelastic)
         if elastic.any():
             part = np.flatnonzero(elastic)
             fields = self.fields if elastic.all() else Fields(self.share, part)
-            self._beams.append(ElasticBeams(fields, self.scheme, self._A, self.ledger))
+            self.beams.append(ElasticBeams(fields, self.scheme, self._A, self.ledger))
 
     def _make_loads(self) -> list[DeadLoads | FollowerLoads]:
         followers = [load for load in self.scene.loads if isinstance(load, FollowerLoad)]
@@ -204,7 +204,7 @@ class Simulation:
     def _residual(self, x: Array, r: Array) -> None:
         q1 = self.supports.in_plane(x)
         self.force.fill(0.0)
-        for beams in self._beams:
+        for beams in self.beams:
             beams.add_residual(q1, self.force)
         r[:] = self.force
         for term in self._others:
