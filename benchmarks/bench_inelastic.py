@@ -6,8 +6,8 @@ Run on an idle machine, one core::
 
 Three pairs: the flying beam elastic and yielding in every cell (8 and 4096 cells), a frame of 50
 cells of which one can hinge, elastic and opening, and 100 cells with 200 fibres each beside
-resultants.  Each pair alternates, the figures are medians of microseconds per Newton iteration over
-the whole time loop; the ratio is that of the medians.  One JSON line per pair goes to
+resultants.  Each pair alternates, the figures are medians of microseconds per Newton iteration and
+per step over the whole time loop; ratios are those of the medians.  One JSON line per pair goes to
 ``benchmarks/results/bench_inelastic.jsonl``.
 """
 
@@ -74,7 +74,7 @@ def main():
     parser.add_argument("--repeat", type=int, default=7, help="alternations of each pair")
     options = parser.parse_args()
     print(f"Midpoint(), medians of {options.repeat} alternations; {machine()}")
-    print(f"{'':42s} {'without':>9} {'with':>9} {'ratio':>6}   µs per iteration")
+    print(f"{'':42s} {'µs per':>9} {'without':>9} {'with':>9} {'ratio':>6}")
     RESULTS.parent.mkdir(exist_ok=True)
     with RESULTS.open("a") as file:
         for name, (*scenes, steps, dt) in PAIRS.items():
@@ -83,15 +83,21 @@ def main():
             loops = [
                 [time_loop(scene, steps, dt) for scene in scenes] for _ in range(options.repeat)
             ]
-            without, with_ = (
-                statistics.median(1e6 * seconds / iterations for seconds, iterations, _ in one)
-                for one in zip(*loops, strict=True)
-            )
-            print(f"{name:42s} {without:9.1f} {with_:9.1f} {with_ / without:6.2f}", flush=True)
-            case = {
-                "case": name, "steps": steps, "dt": dt, "us_without": without, "us_with": with_,
-                "ratio": with_ / without, **machine(),
-            }  # fmt: skip
+            case = {"case": name, "steps": steps, "dt": dt, **machine()}
+            for unit in ("iteration", "step"):
+                without, with_ = (
+                    statistics.median(
+                        1e6 * seconds / (iterations if unit == "iteration" else steps)
+                        for seconds, iterations, _ in one
+                    )
+                    for one in zip(*loops, strict=True)
+                )
+                ratio = with_ / without
+                case |= {
+                    f"us_per_{unit}_without": without, f"us_per_{unit}_with": with_,
+                    f"ratio_per_{unit}": ratio,
+                }  # fmt: skip
+                print(f"{name:42s} {unit:>9} {without:9.1f} {with_:9.1f} {ratio:6.2f}", flush=True)
             file.write(json.dumps(case) + "\n")
 
 

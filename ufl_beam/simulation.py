@@ -50,7 +50,7 @@ class Simulation:
 
     Args:
         scene: What is modelled.
-        scheme: :class:`Static` or :class:`Midpoint`.
+        scheme: :class:`Static`, :class:`ExactStatic` or :class:`Midpoint`.
         t0: Time of the initial state; s.
         start: Solution of the same beams whose last state is the initial state.
         newton: Tolerances and PETSc options.
@@ -76,7 +76,7 @@ class Simulation:
     ) -> None:
         require_kind(scene, Scene, "scene")
         if not isinstance(scheme, Scheme) or isinstance(scheme, type):
-            raise SceneError(f"scheme = {scheme!r} must be Static() or Midpoint()")
+            raise SceneError(f"scheme = {scheme!r} must be Static(), ExactStatic() or Midpoint()")
         require_kind(newton or Newton(), Newton, "newton")
         if not scheme.dynamic:
             require_no_mechanism(scene)
