@@ -55,12 +55,9 @@ class Kernel:
         self._coordinates = coordinates
         self._rows = self._rows_of_cells(form)
         at = self._columns[unknown].start if self.depends_on(unknown) else 0
-        self._head = (
-            tabulator(self.compiled),
-            len(self._dofs),
-            self._dofs.shape[1] if self.depends_on(unknown) else 0,
-            integers(self._dofs),
-        )
+        self._cells = (*self._dofs.shape, integers(self._dofs))
+        unknowns = self._dofs.shape[1] if self.depends_on(unknown) else 0
+        self._head = (tabulator(self.compiled), len(self._dofs), unknowns, self._cells[2])
         self._at, self._constants = at, doubles(constants)
         self._prepare()
 
@@ -91,7 +88,8 @@ class Kernel:
     def set(self, function: fem.Function, q: Array) -> None:
         """Give ``function`` the degrees of freedom ``q``, if it appears in the form."""
         if self.depends_on(function):
-            self._packed[:, self._columns[function]] = q[self._dofs]
+            at = self._columns[function].start
+            lib.set_cells(*self._cells, doubles(q), at, *self._middle[1:3])
 
     def put(self, function: fem.Function, values: Array) -> None:
         """Give ``function`` other values in the cells; shape (num_cells, dofs per cell)."""
@@ -118,6 +116,10 @@ class Kernel:
     def add(self, q: Array, b: Array) -> None:
         """Add the form at the unknown ``q`` to a vector, or to the entries of the matrix."""
         lib.cells_vector(*self._head, doubles(q), *self._middle, doubles(b))
+
+    def arguments(self) -> tuple[Any, ...]:
+        """What the loop over the cells needs besides unknowns and result; while nothing is set."""
+        return (*self._head, *self._middle)
 
     def value(self, q: Array) -> float:
         """Value of the functional at the unknown ``q``."""

@@ -51,18 +51,13 @@ class Strains:
         q = fields.configuration()
         z = ufl.TestFunction(fields.stiffness().function_space)
         mean = ufl.dot(strain(q, fields.axis), z) / fields.axis.h
-        self._kernel = fields.kernel(mean * fields.dx(1), q)
+        self.kernel = fields.kernel(mean * fields.dx(1), q)
         self._shape = (len(fields.order), 3)
-
-    def write(self, q: Array, strains: Array) -> None:
-        """Strains at ``q`` into ``strains``, in the order of the mesh; (num_cells, 3)."""
-        strains.fill(0.0)
-        self._kernel.add(q, strains)
 
     def __call__(self, q: Array) -> Array:
         """Strains at ``q``, in the order of the mesh; (num_cells, 3); 1, 1, 1/m."""
-        strains = np.empty(self._shape)
-        self.write(q, strains)
+        strains = np.zeros(self._shape)
+        self.kernel.add(q, strains)
         return strains
 
 
@@ -107,10 +102,13 @@ class InelasticBeams:
             *(cells, doubles(points.strains), doubles(points.r), doubles(points.D)),
             *(to_b, to_D, width),
         )
+        self._latest: Array = np.full(fields.share.size, np.nan)
+        self._to_respond = (
+            *(len(self._latest), doubles(self._latest), *self._strains.kernel.arguments()),
+            *(doubles(points.strains), *points.to_respond, to_b, to_D, width),
+        )
         self._begins = False
         self._q: Array = np.empty(0)
-        self._e: Array = np.empty(0)
-        self._latest: Array = np.full(fields.share.size, np.nan)
 
     # -- the step ------------------------------------------------------------------------------
 
@@ -118,19 +116,15 @@ class InelasticBeams:
         """Remember the strains at the beginning."""
         self._force.set(self._q0, step.q0)
         if step.q0 is not self._q:
-            self._q, self._e = step.q0, self._strains(step.q0)
-        self.points.begin(self._e, step.dt)
+            self._q = step.q0
+            self.points.start(self._strains(step.q0))
+        self.points.begin(step.dt)
         self._latest.fill(np.nan)
         self._begins = not self._scheme.dynamic
 
     def _respond(self, q1: Array) -> None:
         """Resultants at ``q1`` and their derivatives, into the form."""
-        if np.array_equal(q1, self._latest):
-            return
-        self._latest[:] = q1
-        self._strains.write(q1, self.points.strains)
-        self.points.respond(self.points.strains)
-        lib.linearise(*self._to_linearise)
+        lib.respond_at(doubles(q1), *self._to_respond)
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the internal forces."""
@@ -158,7 +152,7 @@ class InelasticBeams:
         """Commit the internal variables."""
         self._respond(q1)
         self.points.accept()
-        self._q, self._e = q1, self.points.strains.copy()
+        self._q = q1
         plastic, broken, lost, _, _ = self.points.sums.tolist()
         entries = self._ledger.lost
         if self._layout.yields:
@@ -171,8 +165,10 @@ class InelasticBeams:
     def add_state(self, q: Array) -> None:
         """Stored energy."""
         if q is not self._q:
-            self._q, self._e = q, self._strains(q)
-            self.points.refresh(self._e)
+            self._q = q
+            strains = self._strains(q)
+            self.points.start(strains)
+            self.points.refresh(strains)
         _, _, _, elastic, hardening = self.points.sums.tolist()
         self._ledger.state["stored"] += elastic
         if self._layout.yields:

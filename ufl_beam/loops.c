@@ -10,6 +10,14 @@
 
 enum { MOST = 64 }; /* entries of an element vector or matrix, checked in Python */
 
+/* The values q of the cells into their packed coefficients, from `at` on. */
+void set_cells(int cells, int dofs_per_cell, const int32_t *dofs, const double *q, int at,
+               double *w, int width)
+{
+  for (int c = 0; c < cells; ++c, dofs += dofs_per_cell, w += width)
+    for (int i = 0; i < dofs_per_cell; ++i) w[at + i] = q[dofs[i]];
+}
+
 void cells_vector(kernel *tabulate, int cells, int dofs_per_cell, const int32_t *dofs,
                   const double *q, int at, double *w, int width, const double *constants,
                   const double *coordinates, int rows, const int32_t *row, double *b)
@@ -140,18 +148,12 @@ static double growth(kernel *excess, double *w)
   return NAN;
 }
 
-/* Resultants r of cells whose strains grow from e0 to e1, and their derivatives D; how many open.
- *
- * If told to relieve, points that do not open answer with their elastic stiffness: where one opens,
- * the plastic ones around it unload, which their own tangents do not tell, and Newton's method
- * would close what it just opened, again and again.
- */
-int respond(kernel *bulk, kernel *opening, kernel *excess, int cells, int points,
-             const double *B, const double *weight, const double *rest, double theta,
-             const double *e0, const double *e1, double *w, double *r, double *D, int relieve)
+/* Resultants r of cells whose strains grow from e0 to e1, and their derivatives D. */
+void respond(kernel *bulk, kernel *opening, kernel *excess, int points, const double *B,
+             const double *weight, const double *rest, double theta, const double *e0,
+             double *w, double *r, double *D, int cells, const double *e1)
 {
   double s[2];
-  int open = 0;
   for (int c = 0; c < cells; ++c, e0 += 3, e1 += 3, r += 3, D += 9) {
     memset(D, 0, 9 * sizeof *D);
     for (int k = 0; k < 3; ++k) {
@@ -167,9 +169,6 @@ int respond(kernel *bulk, kernel *opening, kernel *excess, int cells, int points
         w[DIRECTION] = s[0] < 0 ? -1 : 1;
         w[GROWTH] = growth(excess, w);
         ask(opening, w, 2, s);
-        ++open;
-      } else if (relieve) {
-        s[1] = theta * w[STIFFNESS];
       }
       for (int k = 0; k < 3; ++k) {
         r[k] += weight[i] * s[0] * b[k];
@@ -177,7 +176,6 @@ int respond(kernel *bulk, kernel *opening, kernel *excess, int cells, int points
       }
     }
   }
-  return open;
 }
 
 /* Resultants as affine functions b + D e of the strains, into the packed values of cells. */
@@ -189,6 +187,27 @@ void linearise(int cells, const double *e, const double *r, const double *D, dou
       b[k] = r[k] - D[3 * k] * e[0] - D[3 * k + 1] * e[1] - D[3 * k + 2] * e[2];
     memcpy(packed_D, D, 9 * sizeof *D);
   }
+}
+
+/* Resultants as affine functions of the strains, at q; nothing is to do if q is the latest.
+ *
+ * First what the strains at q are computed with, then what responds to them, then where it goes.
+ */
+void respond_at(const double *q, int size, double *latest,
+                kernel *strain, int cells, int dofs_per_cell, const int32_t *dofs, int at,
+                double *values, int values_width, const double *constants,
+                const double *coordinates, int rows, const int32_t *row, double *e1,
+                kernel *bulk, kernel *opening, kernel *excess, int points, const double *B,
+                const double *weight, const double *rest, double theta, const double *e0,
+                double *w, double *r, double *D, double *b, double *packed_D, int width)
+{
+  if (!memcmp(q, latest, size * sizeof *q)) return;
+  memcpy(latest, q, size * sizeof *q);
+  memset(e1, 0, 3 * cells * sizeof *e1);
+  cells_vector(strain, cells, dofs_per_cell, dofs, q, at, values, values_width, constants,
+               coordinates, rows, row, e1);
+  respond(bulk, opening, excess, points, B, weight, rest, theta, e0, w, r, D, cells, e1);
+  linearise(cells, e1, r, D, b, packed_D, width);
 }
 
 /* Take the end of the step as the new state.

@@ -6,7 +6,6 @@ theorem where a discontinuity opens, FFCx compiles them, and a loop in C goes ov
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import basix.ufl
@@ -36,9 +35,6 @@ INPUTS = (
     *("C", "length", "θ", "dt", "limit", "H", "B", "eta", "softening limit", "softening energy"),
 )
 """What the law of a point depends on, in the order of its storage."""
-
-PATIENCE = 6
-"""Responses in a step after which points around one that opens are taken to unload; see loops.c."""
 
 STATE = ("p", "ξ", "jump", "opening")
 """The internal variables."""
@@ -111,17 +107,6 @@ class PointForms:
         return tabulator(form)
 
 
-@dataclass
-class Openings:
-    """What points know of each other in a step.
-
-    Attributes:
-        any: Whether a discontinuity opened in some response.
-    """
-
-    any: bool = False
-
-
 class Points:
     """Points of the same layout in many cells.
 
@@ -135,7 +120,7 @@ class Points:
     Attributes:
         strains: Of the cells at the latest response; (cells, 3); may be written to.
         r, D: The latest response, see :meth:`respond`.
-        openings: Shared by all points of a scene.
+        to_respond: What the loop over the cells needs, besides their number and strains.
         kept: By cell: (N, V, M) in the accepted state, the jump of the last point, and the energy
             dissipated by plastic strains and by discontinuities; (cells, 6); N, N m, rad or m, J.
         sums: Of all cells: dissipated in the last step by plastic strains, by discontinuities,
@@ -170,7 +155,6 @@ class Points:
             self._resist()
 
         cells, n, _ = storage.shape
-        self._responses, self.openings = 0, Openings()
         self.kept, self.sums = np.zeros((cells, 6)), np.zeros(5)
         self.r, self.D = np.zeros((cells, 3)), np.zeros((cells, 9))
         self._e0, self.strains = np.zeros((cells, 3)), np.zeros((cells, 3))
@@ -178,13 +162,13 @@ class Points:
             np.ascontiguousarray(x, dtype=np.float64)
             for x in (layout.strains, layout.weights, layout.rest)
         )
-        forms, section = self._forms, (cells, n, doubles(B), doubles(weights), doubles(rest))
-        self._to_respond = (
+        forms, section = self._forms, (n, doubles(B), doubles(weights), doubles(rest))
+        self.to_respond = (
             *(forms.bulk, forms.opening, forms.excess, *section, scheme.theta),
-            *map(doubles, (self._e0, self.strains, storage, self.r, self.D)),
+            *map(doubles, (self._e0, storage, self.r, self.D)),
         )
         self._to_commit = (
-            *(forms.end, *section, doubles(np.ascontiguousarray(length))),
+            *(forms.end, cells, *section, doubles(np.ascontiguousarray(length))),
             *map(doubles, (self._e0, self.strains, storage, self.kept, self.sums)),
         )
 
@@ -200,12 +184,13 @@ class Points:
 
     # -- the step ------------------------------------------------------------------------------
 
-    def begin(self, strains: Array, dt: float) -> None:
-        """Begin a step at these strains of the cells; (cells, 3); 1, 1, 1/m."""
-        self._responses, self.openings.any = 0, False
-        if not np.array_equal(strains, self._e0):
-            self._e0[:] = strains
-            self["before"][:] = strains @ self._layout.strains.T
+    def start(self, strains: Array) -> None:
+        """Begin at these strains of the cells and not at those accepted; (cells, 3); 1, 1, 1/m."""
+        self._e0[:] = strains
+        self["before"][:] = strains @ self._layout.strains.T
+
+    def begin(self, dt: float) -> None:
+        """Begin a step of this length; s."""
         if dt != self._dt:
             self["dt"][:] = self._dt = dt
 
@@ -214,11 +199,8 @@ class Points:
 
         They are not a number where an opening was not found.  The arrays are reused.
         """
-        if strains is not self.strains:
-            self.strains[:] = strains
-        self._responses += 1
-        relieve = self.openings.any and self._responses > PATIENCE
-        self.openings.any |= lib.respond(*self._to_respond, relieve) > 0
+        self.strains[:] = strains
+        lib.respond(*self.to_respond, len(strains), doubles(self.strains))
         return self.r, self.D
 
     def accept(self) -> None:

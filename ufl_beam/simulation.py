@@ -147,8 +147,6 @@ class Simulation:
                 self.inelastic.append(
                     InelasticBeams(fields, layout, self.scheme, self._A, self.ledger)
                 )
-        for inelastic in self.inelastic[1:]:
-            inelastic.points.openings = self.inelastic[0].points.openings
         self.beams.extend(self.inelastic)
         if elastic.any():
             part = np.flatnonzero(elastic)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from petsc4py import PETSc
@@ -21,6 +22,26 @@ CONVERGED = int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE)
 AT_ROUND_OFF = int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS)
 ITERATING = int(PETSc.SNES.ConvergedReason.ITERATING)
 DIVERGED = int(PETSc.SNES.ConvergedReason.DIVERGED_DTOL)
+STALLED = int(PETSc.SNES.ConvergedReason.DIVERGED_LINE_SEARCH)
+
+FULL_STEPS = {"snes_linesearch_type": "basic"}
+"""A norm in a line search would add forces and moments, and each search costs a residual."""
+
+TO_NO_WORK = {
+    "snes_linesearch_type": "cp",
+    "snes_linesearch_max_it": 4,
+    "snes_linesearch_atol": 0.0,
+    "snes_linesearch_rtol": 0.5,
+    "snes_linesearch_maxstep": 1.0,
+}
+"""Steps to where the residual does no work on them: for points that flow to and fro.
+
+Forces that grow in an S, as in a point that yields one way or the other, send full steps from one
+branch to the other and back for ever.
+"""
+
+SLOW = 3
+"""Iterations in a row that do not halve the residual, after which full steps are given up."""
 
 PREFIX = "ub_"
 """Prefix of the PETSc options of the solver, as in ``-ub_snes_monitor``."""
@@ -91,9 +112,12 @@ class Solver:
         self._x = self._vector()
         self._view(self._x, writable=True)
         self._matrix = self._make_matrix()
-        self._snes = self._make_snes()
+        self._f = self._vector()
+        self._r = self._view(self._f, writable=True)
+        self._at_r = doubles(self._r)
+        self._ksp = self._make_ksp()
+        self._snes = self._make_snes(FULL_STEPS)
         self.iterations = 0
-        self._last = math.inf
 
     # -- vectors and the matrix ----------------------------------------------------------------
 
@@ -134,18 +158,9 @@ class Solver:
         matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, False)
         return matrix
 
-    def _make_snes(self) -> PETSc.SNES:
-        snes = PETSc.SNES().create(self._x.comm)
-        snes.setOptionsPrefix(PREFIX)
-        f = self._vector()
-        self._r = self._view(f, writable=True)
-        self._at_r = doubles(self._r)
-        snes.setFunction(self._function, f)
-        snes.setJacobian(self._jacobian, self._matrix)
-        snes.setConvergenceTest(self._test)
-        snes.setTolerances(max_it=self._newton.max_iterations)
-        snes.setType("newtonls")
-        ksp = snes.getKSP()
+    def _make_ksp(self) -> PETSc.KSP:
+        ksp = PETSc.KSP().create(self._x.comm)
+        ksp.setOptionsPrefix(PREFIX)
         ksp.setType("preonly")
         factors = ksp.getPC()
         factors.setType("lu")
@@ -153,10 +168,20 @@ class Solver:
         if not self._parallel:
             few_joints = self._share.grid.num_shared <= JOINTS_IN_NATURAL_ORDER
             factors.setFactorOrdering("natural" if few_joints else "nd")
-        # The norm of a line search would add forces and moments, so the full step is the default.
+        return ksp
+
+    def _make_snes(self, search: dict[str, Any]) -> PETSc.SNES:
+        snes = PETSc.SNES().create(self._x.comm)
+        snes.setOptionsPrefix(PREFIX)
+        snes.setFunction(self._function, self._f)
+        snes.setJacobian(self._jacobian, self._matrix)
+        snes.setConvergenceTest(self._test)
+        snes.setTolerances(max_it=self._newton.max_iterations)
+        snes.setType("newtonls")
+        snes.setKSP(self._ksp)
         database = PETSc.Options(PREFIX)
         before = database.getAll()
-        chosen = {"snes_linesearch_type": "basic", **before, **self._newton.petsc}
+        chosen = {**search, **before, **self._newton.petsc}
         try:
             for name, value in chosen.items():
                 database[name] = value
@@ -167,6 +192,10 @@ class Solver:
             for name, value in before.items():
                 database[name] = value
         return snes
+
+    @cached_property
+    def _careful(self) -> PETSc.SNES:
+        return self._make_snes(TO_NO_WORK)
 
     # -- what SNES calls -----------------------------------------------------------------------
 
@@ -180,6 +209,8 @@ class Solver:
         self._complete(r)
 
     def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, J: PETSc.Mat, P: PETSc.Mat) -> None:
+        if self._near:
+            return
         self._update_ghosts(x)
         self._tangent(self._view(x))
         if self._parallel:
@@ -211,17 +242,21 @@ class Solver:
         residual = self._size(self._at_r)
         if not math.isfinite(residual):
             return DIVERGED
-        scale = self._loads + self._size(self._at_forces)
-        if residual <= self._newton.rtol * scale:
+        wanted = self._newton.rtol * (self._loads + self._size(self._at_forces))
+        if residual <= wanted:
             return CONVERGED
+        self._near = False
         if iteration > 1:
-            floor = self._round_off()
-            # A tenth of the last digit is luck; a few of them that Newton's method no longer halves
-            # are all that can be had: it may go round between two such states for ever.
-            if residual <= floor / 10 or self._last / 2 < residual <= 8 * floor:
+            floor = 8 * self._round_off()
+            # A fraction of the last digit is luck; a few of them that Newton's method no longer
+            # halves are all that can be had: it may go round between two such states for ever.
+            if residual <= floor / 80 or self._last / 2 < residual <= floor:
                 return AT_ROUND_OFF
+            # With the tangent of the iterate before, the residual falls by twice the last factor.
+            self._near = residual > floor and 20 * residual**2 <= wanted * self._last
+        self._slow = self._slow + 1 if residual > self._last / 2 else 0
         self._last = residual
-        return ITERATING
+        return STALLED if self._slow == self._patience else ITERATING
 
     def _round_off(self) -> float:
         """Residual that the last digit of displacements, strains and rotations makes; N.
@@ -256,15 +291,22 @@ class Solver:
         x = self._view(self._x)
         x[:] = guess
         self._x.stateIncrease()
-        self._snes.solve(None, self._x)
-        self.iterations += self._snes.getIterationNumber()
-        reason = self._snes.getConvergedReason()
+        reason = self._iterate(self._snes, SLOW)
+        if reason == STALLED:
+            reason = self._iterate(self._careful, 2 * SLOW)
         if reason <= 0:
             # MUMPS does not get over a factorisation that failed, unless it begins anew.
-            self._snes.getKSP().getPC().reset()
+            self._ksp.getPC().reset()
             raise StepFailed(self._explain(reason))
         self._update_ghosts(self._x)
         return x.copy()
+
+    def _iterate(self, snes: PETSc.SNES, patience: int) -> int:
+        self._last, self._near, self._slow, self._patience = math.inf, False, 0, patience
+        snes.solve(None, self._x)
+        self._done = snes.getIterationNumber()
+        self.iterations += self._done
+        return int(snes.getConvergedReason())
 
     def _explain(self, reason: int) -> str:
         names = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int)}
@@ -273,7 +315,7 @@ class Solver:
         weighted[: len(self._weights)] = np.abs(self._r[: len(self._weights)]) * self._weights**0.5
         worst = self._share.grid.describe(int(np.argmax(self._share.gather(weighted))))
         return (
-            f"SNES {names.get(reason, reason)} after {self._snes.getIterationNumber()} iterations; "
+            f"SNES {names.get(reason, reason)} after {self._done} iterations; "
             f"residual {self._size(self._at_r):.3e} N, largest in {worst}, "
             f"forces in the scene {scale:.3e} N"
         )

@@ -65,7 +65,8 @@ class Bars:
 
     def respond(self, strain, dt=0.1):
         """Stresses of a step to `strain`, and their derivatives."""
-        self.points.begin(self._strains(self.strain), dt)
+        self.points.start(self._strains(self.strain))
+        self.points.begin(dt)
         r, D = self.points.respond(self._strains(np.asarray(strain)))
         return r[:, 0].copy(), D[:, 0].copy()
 
