@@ -40,9 +40,6 @@ Forces that grow in an S, as in a point that yields one way or the other, send f
 branch to the other and back for ever.
 """
 
-SLOW = 3
-"""Iterations in a row that do not halve the residual, after which full steps are given up."""
-
 PREFIX = "ub_"
 """Prefix of the PETSc options of the solver, as in ``-ub_snes_monitor``."""
 
@@ -117,7 +114,9 @@ class Solver:
         self._at_r = doubles(self._r)
         self._ksp = self._make_ksp()
         self._snes = self._make_snes(FULL_STEPS)
-        self.iterations = 0
+        self.iterations = self._done = 0
+        self._last = self._best = math.inf
+        self._near, self._slow, self._patience = False, 0, 0
 
     # -- vectors and the matrix ----------------------------------------------------------------
 
@@ -254,7 +253,9 @@ class Solver:
                 return AT_ROUND_OFF
             # With the tangent of the iterate before, the residual falls by twice the last factor.
             self._near = residual > floor and 20 * residual**2 <= wanted * self._last
-        self._slow = self._slow + 1 if residual > self._last / 2 else 0
+        self._slow += 1
+        if residual <= self._best / 2:
+            self._best, self._slow = residual, 0
         self._last = residual
         return STALLED if self._slow == self._patience else ITERATING
 
@@ -291,9 +292,9 @@ class Solver:
         x = self._view(self._x)
         x[:] = guess
         self._x.stateIncrease()
-        reason = self._iterate(self._snes, SLOW)
+        reason = self._iterate(self._snes, 2)
         if reason == STALLED:
-            reason = self._iterate(self._careful, 2 * SLOW)
+            reason = self._iterate(self._careful, 10)
         if reason <= 0:
             # MUMPS does not get over a factorisation that failed, unless it begins anew.
             self._ksp.getPC().reset()
@@ -302,7 +303,9 @@ class Solver:
         return x.copy()
 
     def _iterate(self, snes: PETSc.SNES, patience: int) -> int:
-        self._last, self._near, self._slow, self._patience = math.inf, False, 0, patience
+        """Solve; give up after so many iterations in a row without half the least residual."""
+        self._last = self._best = math.inf
+        self._near, self._slow, self._patience = False, 0, patience
         snes.solve(None, self._x)
         self._done = snes.getIterationNumber()
         self.iterations += self._done
