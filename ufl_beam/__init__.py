@@ -1,6 +1,28 @@
 """Planar flexible multibody dynamics with geometrically exact beams.  Units are SI."""
 
 from ufl_beam.beams import Beam, Place
+from ufl_beam.bodies import Body, Spot, ground
+from ufl_beam.connectors import (
+    Actuator,
+    Connector,
+    Controller,
+    Coulomb,
+    Damper,
+    Function,
+    Joint,
+    Link,
+    Motor,
+    Prismatic,
+    Release,
+    Revolute,
+    Rigid,
+    RigidLink,
+    Slide,
+    Spring,
+    Stop,
+    Stretch,
+    Turn,
+)
 from ufl_beam.decay import (
     Decay,
     Envelope,
@@ -13,6 +35,7 @@ from ufl_beam.decay import (
 from ufl_beam.distributions import Lognormal, Normal, TruncatedNormal, Weibull
 from ufl_beam.errors import ConvergenceError, SceneError
 from ufl_beam.fibres import Fibres
+from ufl_beam.gathered import Study
 from ufl_beam.hysteresis import (
     plot_damage,
     plot_dissipation,
@@ -27,12 +50,9 @@ from ufl_beam.render import animate, render
 from ufl_beam.running import say, simulate
 from ufl_beam.scene import (
     Clamped,
-    Joint,
     Pinned,
     PointMass,
     Prescribed,
-    Revolute,
-    Rigid,
     Roller,
     Scene,
     Support,
@@ -43,14 +63,21 @@ from ufl_beam.sections import Section
 from ufl_beam.simulation import Simulation
 from ufl_beam.solution import Solution
 from ufl_beam.solve import Newton
+from ufl_beam.studies import study
 from ufl_beam.view import picture, plot, plot_energy, plot_history, plot_shapes
 from ufl_beam.viscous import KelvinVoigt, Rayleigh
 
 __all__ = [
     "XDMF",
+    "Actuator",
     "Beam",
+    "Body",
     "Clamped",
+    "Connector",
+    "Controller",
     "ConvergenceError",
+    "Coulomb",
+    "Damper",
     "Decay",
     "DuvautLions",
     "Energy",
@@ -58,6 +85,7 @@ __all__ = [
     "ExactStatic",
     "Fibres",
     "FollowerLoad",
+    "Function",
     "Gravity",
     "Hardening",
     "History",
@@ -65,8 +93,10 @@ __all__ = [
     "KelvinVoigt",
     "LineLoad",
     "LinearSoftening",
+    "Link",
     "Lognormal",
     "Midpoint",
+    "Motor",
     "Newton",
     "Normal",
     "Perzyna",
@@ -75,27 +105,38 @@ __all__ = [
     "PointLoad",
     "PointMass",
     "Prescribed",
+    "Prismatic",
     "Rayleigh",
     "Recorder",
+    "Release",
     "Revolute",
     "Rigid",
+    "RigidLink",
     "Roller",
     "Scene",
     "SceneError",
     "Section",
     "Simulation",
+    "Slide",
     "Softening",
     "Solution",
+    "Spot",
+    "Spring",
     "Static",
+    "Stop",
+    "Stretch",
+    "Study",
     "Support",
     "Table",
     "TruncatedNormal",
+    "Turn",
     "Velocity",
     "Weibull",
     "animate",
     "damping",
     "damping_ratio",
     "fit_decay",
+    "ground",
     "logarithmic_decrement",
     "peaks",
     "picture",
@@ -111,4 +152,5 @@ __all__ = [
     "render",
     "say",
     "simulate",
+    "study",
 ]

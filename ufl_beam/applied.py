@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ufl_beam.bodies import carries
 from ufl_beam.compat import Array
 from ufl_beam.grid import Share
 from ufl_beam.ledger import Ledger
@@ -171,6 +172,8 @@ def _forces(load: Load, share: Share) -> Array:
 @_forces.register
 def _(load: PointLoad, share: Share) -> Array:
     forces = np.zeros(share.size)
+    if not carries(load.place):
+        return forces  # Scene.links has connectors for it
     dofs = share.at(load.place)
     mine = share.owns(dofs)
     forces[share.local(dofs[mine])] = np.array([*load.force, load.moment])[mine]
@@ -188,9 +191,11 @@ def _(load: Gravity, share: Share) -> Array:
     scene = share.grid.scene
     rhoA = [beam.section.rhoA for beam in scene.beams]
     forces = _along_beams(np.outer(rhoA, [*load.acceleration, 0.0]), share)
-    for mass in scene.masses:
+    heavy = [(one.place, one.mass) for one in scene.masses]
+    heavy += [(one.middle, one.mass) for one in scene.bodies]
+    for place, mass in heavy:
         g_x, g_y = load.acceleration
-        forces += _forces(PointLoad(mass.place, force=(mass.mass * g_x, mass.mass * g_y)), share)
+        forces += _forces(PointLoad(place, force=(mass * g_x, mass * g_y)), share)
     return forces
 
 

@@ -108,17 +108,17 @@ def space_with_dofs(
     return fem.FunctionSpace(domain, element, cpp.fem.FunctionSpace_float64(*arguments))
 
 
-def csr_matrix(domain: mesh.Mesh, cell_dofs: npt.NDArray[np.int64], size: int) -> la.MatrixCSR:
-    """Empty matrix that couples all degrees of freedom of a cell, on this process alone.
+def csr_matrix(size: int, *coupled: npt.NDArray[np.int64]) -> la.MatrixCSR:
+    """Empty matrix with a diagonal that couples what stands in a row, on this process alone.
 
     Args:
-        domain: Mesh on this process.
-        cell_dofs: Degrees of freedom of each cell; shape (num_cells, dofs per cell).
         size: Number of degrees of freedom.
+        coupled: Degrees of freedom of cells, or of what else couples some; (number, some).
     """
     index_map = cpp.common.IndexMap(MPI.COMM_SELF, size)
-    pattern = cpp.la.SparsityPattern(domain.comm, [index_map, index_map], [1, 1])
-    for dofs in cell_dofs.astype(np.int32):
+    pattern = cpp.la.SparsityPattern(MPI.COMM_SELF, [index_map, index_map], [1, 1])
+    pattern.insert_diagonal(np.arange(size, dtype=np.int32))
+    for dofs in (row.astype(np.int32) for rows in coupled for row in rows):
         pattern.insert(dofs, dofs)
     pattern.finalize()
     return la.matrix_csr(pattern)

@@ -8,7 +8,8 @@ process.
 from __future__ import annotations
 
 import struct
-from functools import cached_property
+from bisect import bisect_left
+from functools import cache, cached_property
 from typing import Any
 from zlib import crc32
 
@@ -18,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.beams import Beam, Place
+from ufl_beam.bodies import Anchor, Body, Node, Spot, node
 from ufl_beam.compat import Array
 from ufl_beam.errors import SceneError, require_kind
 from ufl_beam.laws import Softening
@@ -39,6 +41,8 @@ class Grid:
         cells: Vertices of the cells; shape (num_cells, 2).
         beam_of_cell: Number of the beam of each cell; shape (num_cells,).
         dofs: Degrees of freedom of each vertex; shape (num_vertices, 3).
+        dofs_of_bodies: Degrees of freedom of each of the scene's movers; shape (num_movers, 3).
+        multipliers: Degrees of freedom that are the forces of connectors; shape (num_links,).
         size: Number of degrees of freedom.
         num_shared: How many of them joints share.
     """
@@ -58,7 +62,7 @@ class Grid:
         self.cells = np.column_stack([begin, begin + 1])
         self.beam_of_cell = np.repeat(np.arange(len(scene.beams)), counts - 1)
         self._require_length()
-        self.dofs, self.size, self.num_shared = self._number()
+        self._number()
 
     @cached_property
     def _number_of_beam(self) -> dict[Beam, int]:
@@ -76,6 +80,13 @@ class Grid:
         i = self._index(beam)
         return np.arange(self._first[i], self._first[i + 1])
 
+    def nodes_of(self, one: Beam | Body) -> tuple[Array, Index]:
+        """Points and degrees of freedom of the nodes of a beam or body; (n, 2), (n, 3); m."""
+        if isinstance(one, Body):
+            return np.array([one.center]), self.node(one.middle).reshape(1, 3)
+        vertices = self.vertices_of(one)
+        return self.points[vertices], self.dofs[vertices]
+
     def cells_of(self, beam: Beam) -> Index:
         """Cells of a beam from start to end."""
         i = self._index(beam)
@@ -90,14 +101,35 @@ class Grid:
         require_kind(place, Place, "place")
         i = self._index(place.beam, f"{place}: ")
         s = self._parameters[i]
-        left = int(np.clip(np.searchsorted(s, place.s) - 1, 0, len(s) - 2))
+        left = min(max(bisect_left(s, place.s) - 1, 0), len(s) - 2)
         part = (place.s - s[left]) / (s[left + 1] - s[left])
         return self._first[i] + np.array([left, left + 1]), np.array([1 - part, part])
+
+    def node(self, anchor: Anchor) -> Index:
+        """Degrees of freedom of what an anchor that has a vertex, or a body, moves with; (3,).
+
+        Raises:
+            SceneError: Its beam or body is not in the scene.
+        """
+        of = node(anchor)
+        if not isinstance(of, Body):
+            return np.asarray(self.dofs[self.vertex(of)])
+        if of not in self.scene.movers:
+            raise SceneError(f"{anchor}: {of.name} is not in the scene")
+        return np.asarray(self.dofs_of_bodies[self.scene.movers.index(of)])
+
+    @cached_property
+    def dofs_of_links(self) -> Index:
+        """Of each connector: both u, both v, both ψ of its nodes, and its force; (num_links, 7)."""
+        links = self.scene.links
+        nodes = np.array([(self.node(c.a), self.node(c.b)) for c in links]).reshape(-1, 2, 3)
+        both = nodes.transpose(0, 2, 1).reshape(-1, 6)
+        return np.column_stack([both, self.multipliers]).astype(np.int64)
 
     def vertex(self, place: Place) -> int:
         """The vertex at a place that something is attached to."""
         vertices, weights = self.weights(place)
-        return int(vertices[np.argmax(weights)])
+        return int(vertices[weights.argmax()])
 
     def cell(self, place: Place) -> int:
         """The cell at a place; at a vertex the one before it, at the start the first one."""
@@ -127,6 +159,11 @@ class Grid:
 
     def describe(self, dof: int) -> str:
         """A degree of freedom in words: its component, beam and point."""
+        if dof in self.multipliers:
+            return f"what holds {self.scene.links[dof - self.multipliers[0]]}"
+        if dof not in self.dofs:
+            body, component = np.argwhere(self.dofs_of_bodies == dof)[0]
+            return f"{COMPONENTS[component]} of {self.scene.movers[body].name}"
         vertex, component = np.argwhere(self.dofs == dof)[0]
         beam = int(np.searchsorted(self._first, vertex, side="right")) - 1
         x, y = self.points[vertex]
@@ -140,18 +177,30 @@ class Grid:
             x, y = ends[cell, 0]
             raise SceneError(f"{beam.name}: zero length of a cell at ({x:g}, {y:g})")
 
-    def _number(self) -> tuple[Index, int, int]:
-        slots = np.arange(3 * len(self.points))
-        shared = np.zeros(len(slots), dtype=bool)
-        for (place, component), (other, _) in self.scene.representatives().items():
-            same = 3 * self.vertex(other) + component
-            slots[3 * self.vertex(place) + component] = same
+    def _number(self) -> None:
+        vertices, movers = len(self.points), self.scene.movers
+        row = {body: vertices + i for i, body in enumerate(movers)}
+
+        @cache
+        def at(of: Node) -> int:
+            return row[of] if isinstance(of, Body) else self.vertex(of)
+
+        slots = np.arange(3 * (vertices + len(movers)))
+        shared = slots >= 3 * vertices
+        for (one, component), (other, _) in self.scene.representatives().items():
+            same = 3 * at(other) + component
+            slots[3 * at(one) + component] = same
             shared[same] = True
         kept = slots == np.arange(len(slots))
         order = np.concatenate([np.flatnonzero(kept & ~shared), np.flatnonzero(kept & shared)])
         number = np.empty(len(slots), dtype=np.int64)
         number[order] = np.arange(len(order))
-        return number[slots].reshape(-1, 3), len(order), int(np.sum(kept & shared))
+        dofs = number[slots].reshape(-1, 3)
+        self.dofs, self.dofs_of_bodies = dofs[:vertices], dofs[vertices:]
+        # Forces come last: eliminating what they act on first leaves no zero on the diagonal.
+        self.multipliers = len(order) + np.arange(len(self.scene.links))
+        self.size = len(order) + len(self.multipliers)
+        self.num_shared = int(np.sum(kept & shared)) + len(self.multipliers)
 
 
 class Share:
@@ -167,6 +216,9 @@ class Share:
         ghosts: Global numbers of the others.
         cell_dofs: Local degrees of freedom of the cells: both u, both v, both ψ;
             shape (len(cells), 6).
+        links: Numbers of the connectors of this process.
+        link_dofs: Local degrees of freedom of the connectors: those of a cell, and their force;
+            shape (len(links), 7).
     """
 
     def __init__(self, grid: Grid, comm: MPI.Intracomm) -> None:
@@ -180,11 +232,17 @@ class Share:
         owner = np.full(grid.size, comm.size)
         rank_of_cell = np.searchsorted(limits, np.arange(num_cells), side="right") - 1
         np.minimum.at(owner, of_cell, rank_of_cell[:, None])
+        of_link = grid.dofs_of_links
+        rank_of_link = owner[of_link].min(axis=1, initial=comm.size) % comm.size
+        np.minimum.at(owner, of_link, rank_of_link[:, None])
+        owner[owner == comm.size] = 0  # bodies that nothing is attached to
+        self.links = np.flatnonzero(rank_of_link == comm.rank)
         order = np.argsort(owner, kind="stable")
         self._global = np.empty(grid.size, dtype=np.int64)
         self._global[order] = np.arange(grid.size)
 
-        touched = np.unique(of_cell[self.cells])
+        own = np.flatnonzero(owner == comm.rank)
+        touched = np.unique(np.r_[own, of_cell[self.cells].ravel(), of_link[self.links].ravel()])
         mine = owner[touched] == comm.rank
         self.dofs = np.concatenate([touched[mine], touched[~mine]])
         self.num_owned = int(mine.sum())
@@ -192,6 +250,7 @@ class Share:
         self._local = np.full(grid.size, -1)
         self._local[self.dofs] = np.arange(len(self.dofs))
         self.cell_dofs = self._local[of_cell[self.cells]]
+        self.link_dofs = self._local[of_link[self.links]]
         self._all_owned = order
 
     @property
@@ -199,23 +258,30 @@ class Share:
         """Number of local degrees of freedom, ghosts included."""
         return len(self.dofs)
 
-    def at(self, place: Place) -> Index:
-        """Degrees of freedom (numbers of the grid) of a place with a vertex; shape (3,)."""
-        return np.asarray(self.grid.dofs[self.grid.vertex(place)])
+    def at(self, anchor: Anchor) -> Index:
+        """Degrees of freedom (numbers of the grid) of what an anchor moves with; shape (3,)."""
+        return self.grid.node(anchor)
 
-    def computes(self, place: Place) -> bool:
-        """Whether this process has the cell at a place, of two cells the first.
+    def computes(self, anchor: Anchor) -> bool:
+        """Whether this process has the cell at a place, of two cells the first; or owns a body.
 
         It then has all degrees of freedom of the place, even if others own some of them.
         """
-        vertex = self.grid.vertex(place)
+        if isinstance(anchor, Spot):
+            return bool(self.owns(self.at(anchor)).all())
+        vertex = self.grid.vertex(anchor)
         cell = int(np.argmax((self.grid.cells == vertex).any(axis=1)))
         return bool(self.cells[0] <= cell <= self.cells[-1])
 
     def rotations(self) -> Index:
         """Local numbers of all rotations; int32."""
-        rotations = np.unique(self.local(self.grid.dofs[:, 2]))
-        return rotations.astype(np.int32)
+        grid = self.grid
+        turning = np.r_[grid.dofs[:, 2], grid.dofs_of_bodies[:, 2]]
+        return np.unique(self.local(turning)).astype(np.int32)
+
+    def multipliers(self) -> Index:
+        """Local numbers of the forces of connectors."""
+        return self.local(self.grid.multipliers)
 
     def cell_lengths(self) -> Array:
         """Lengths of the cells; m."""
@@ -223,9 +289,14 @@ class Share:
         return np.asarray(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
 
     def lengths(self) -> Array:
-        """What a strain of one is to each local degree of freedom: a cell's length, or a radian."""
-        lengths = np.ones(self.size)
+        """What a strain of one is to each local degree of freedom: a cell's length, or a radian.
+
+        Bodies are as large as the scene; forces of connectors have no length.
+        """
+        lengths = np.full(self.size, self.grid.scene.size)
         lengths[self.cell_dofs[:, :4]] = self.cell_lengths()[:, None]
+        lengths[self.rotations()] = 1.0
+        lengths[self.multipliers()] = 0.0
         return lengths
 
     def local(self, dofs: Index) -> Index:

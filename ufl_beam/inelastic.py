@@ -12,7 +12,7 @@ from ufl_beam.kinematics import strain
 from ufl_beam.laws import Layout
 from ufl_beam.ledger import Ledger
 from ufl_beam.loops import doubles, lib
-from ufl_beam.points import INPUTS, Points
+from ufl_beam.points import INPUTS, Course, Points
 from ufl_beam.schemes import Scheme, Step
 from ufl_beam.sparse import Csr
 
@@ -31,17 +31,6 @@ def inelastic_cells(grid: Grid) -> list[tuple[Layout, Index]]:
             if layout is not None and not layout.elastic:
                 groups.setdefault(layout, []).append(int(cell))
     return [(layout, np.array(cells)) for layout, cells in groups.items()]
-
-
-def expect_entries(layout: Layout, scheme: Scheme, ledger: Ledger) -> None:
-    """Make the entries of the ledger that cells of a layout write, on whatever process."""
-    if layout.yields:
-        ledger.state["hardening"] += 0.0
-        ledger.lost["plastic"] += 0.0
-    if layout.softening is not None:
-        ledger.lost["hinges"] += 0.0
-    if scheme.loss:
-        ledger.lost["numerical"] += 0.0
 
 
 class Strains:
@@ -70,7 +59,13 @@ class InelasticBeams:
     """
 
     def __init__(
-        self, fields: Fields, layout: Layout, scheme: Scheme, A: Csr, ledger: Ledger
+        self,
+        fields: Fields,
+        layout: Layout,
+        scheme: Scheme,
+        A: Csr,
+        ledger: Ledger,
+        course: Course,
     ) -> None:
         self._layout, self._scheme, self._A, self._ledger = layout, scheme, A, ledger
         self._order = fields.order
@@ -85,6 +80,7 @@ class InelasticBeams:
             fields.share.cell_lengths()[fields.order],
             scheme,
             self._variables.x.array.reshape(cells, n, len(INPUTS)),
+            course,
         )
 
         q0, q1 = fields.configuration(), fields.configuration()
@@ -153,14 +149,7 @@ class InelasticBeams:
         self._respond(q1)
         self.points.accept()
         self._q = q1
-        plastic, broken, lost, _, _ = self.points.sums.tolist()
-        entries = self._ledger.lost
-        if self._layout.yields:
-            entries["plastic"] += plastic
-        if self._layout.softening is not None:
-            entries["hinges"] += broken
-        if self._scheme.loss:
-            entries["numerical"] += 2 * self._scheme.loss * lost
+        self.points.enter_losses(self._ledger)
 
     def add_state(self, q: Array) -> None:
         """Stored energy."""
@@ -169,10 +158,7 @@ class InelasticBeams:
             strains = self._strains(q)
             self.points.start(strains)
             self.points.refresh(strains)
-        _, _, _, elastic, hardening = self.points.sums.tolist()
-        self._ledger.state["stored"] += elastic
-        if self._layout.yields:
-            self._ledger.state["hardening"] += hardening
+        self.points.enter_stored(self._ledger)
 
     # -- what solutions keep -------------------------------------------------------------------
 

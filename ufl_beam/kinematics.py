@@ -37,7 +37,7 @@ def _pull_back(a: Expr, ψ: Expr, axis: Axis) -> tuple[Expr, Expr]:
     )
 
 
-def _turn(a: Expr) -> Expr:
+def turn(a: Expr) -> Expr:
     """W a: the plane vector ``a`` turned by +90°."""
     return ufl.as_vector([-a[1], a[0]])
 
@@ -80,11 +80,11 @@ def virtual_strain(q: Expr, w: Expr, axis: Axis) -> Expr:
         P(21), pulled back.
     """
     (u, ψ), (w_u, w_ψ) = split(q), split(w)
-    w_Σ, w_Γ = _pull_back(axis.d(w_u) - _turn(axis.t0 + axis.d(u)) * w_ψ, ψ, axis)  # P(21)
+    w_Σ, w_Γ = _pull_back(axis.d(w_u) - turn(axis.t0 + axis.d(u)) * w_ψ, ψ, axis)  # P(21)
     return ufl.as_vector([w_Σ, w_Γ, axis.d(w_ψ)])
 
 
-def _over_tan(x: Expr) -> Expr:
+def over_tan(x: Expr) -> Expr:
     """X / tan x, smooth at zero: the series below 1e-2 has a remainder under 1e-18."""
     x2 = x**2
     series = 1 - x2 / 3 * (1 + x2 / 15 * (1 + x2 * 2 / 21 * (1 + x2 / 10)))
@@ -121,10 +121,10 @@ def virtual_strain_over_step(q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
     e = axis.h / 4 * axis.d(ψ1 - ψ0)
     tan_δ, tan_e = ufl.sin(δ) / ufl.cos(δ), ufl.sin(e) / ufl.cos(e)
     shift = -tan_δ * tan_e / 2
-    stretch = (1 - tan_δ**2 * tan_e**2) / (1 + tan_δ**2) * _over_tan(e)
+    stretch = (1 - tan_δ**2 * tan_e**2) / (1 + tan_δ**2) * over_tan(e)
 
     φ_m = axis.t0 + axis.d((u0 + u1) / 2)
-    a = axis.d(w_u) - _turn(φ_m) * (w_ψ + shift * axis.h * axis.d(w_ψ))
+    a = axis.d(w_u) - turn(φ_m) * (w_ψ + shift * axis.h * axis.d(w_ψ))
     # The mean of both frames is cos δ times the frame of the mean rotation.
     (Σ0, Γ0), (Σ1, Γ1) = _pull_back(a, ψ0, axis), _pull_back(a, ψ1, axis)
     w_Σ, w_Γ = (Σ0 + Σ1) / 2, (Γ0 + Γ1) / 2

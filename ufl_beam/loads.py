@@ -9,7 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from ufl_beam.beams import Beam, Place
+from ufl_beam.beams import Beam
+from ufl_beam.bodies import Anchor, carries, require_anchor
 from ufl_beam.errors import SceneError, require_number, require_sequence, require_vector
 
 TimeFunction = Callable[[float], float]
@@ -87,7 +88,7 @@ class PointLoad:
         time: Factor at time t.
     """
 
-    place: Place
+    place: Anchor
     force: tuple[float, float] = (0.0, 0.0)
     moment: float = 0.0
     time: TimeFunction = steady
@@ -107,18 +108,22 @@ class FollowerLoad:
         time: Factor at time t.
     """
 
-    place: Place
+    place: Anchor
     force: tuple[float, float] = (0.0, 0.0)
     moment: float = 0.0
     time: TimeFunction = steady
 
     def __post_init__(self) -> None:
         _check_point_load(self, "FollowerLoad")
+        if not carries(self.place):
+            raise SceneError(
+                f"FollowerLoad at {self.place}: not the centre of the body; act on the centre, "
+                "with the moment that this makes"
+            )
 
 
 def _check_point_load(load: PointLoad | FollowerLoad, kind: str) -> None:
-    if not isinstance(load.place, Place):
-        raise SceneError(f"{kind}: {load.place!r} is not a place; use beam.start, .end or .at(s)")
+    require_anchor(load.place, kind)
     require_vector(load.force, f"{kind} at {load.place}: force")
     require_number(load.moment, f"{kind} at {load.place}: moment")
     require_time_function(load.time, f"{kind} at {load.place}")
@@ -150,7 +155,7 @@ class LineLoad:
 
 @dataclass(frozen=True, eq=False)
 class Gravity:
-    """Weight of all beams and point masses.
+    """Weight of all beams, bodies and point masses.
 
     Args:
         acceleration: (g_x, g_y); m/s².

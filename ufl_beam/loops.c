@@ -111,6 +111,9 @@ enum {
 /* What the kernel of the end of a step says; the order in points.py. */
 enum { FLOW, WORKED, BROKEN, LOST, ELASTIC, HARDENING, STRESS, RESISTANCE, SAID };
 
+/* What points know of each other in a step; the order in points.py. */
+enum { OPENED, RELIEF };
+
 static const double unit_cell[6] = {0, 0, 0, 1, 0, 0};
 
 static void ask(kernel *tabulate, const double *w, int answers, double *e)
@@ -148,8 +151,13 @@ static double growth(kernel *excess, double *w)
   return NAN;
 }
 
-/* Resultants r of cells whose strains grow from e0 to e1, and their derivatives D. */
-void respond(kernel *bulk, kernel *opening, kernel *excess, int points, const double *B,
+/* Resultants r of cells whose strains grow from e0 to e1, and their derivatives D.
+ *
+ * `course` notes that a point opens, and may ask for relief: then points that do not open answer
+ * with their elastic stiffness. Where one opens, those around it unload, which their own tangents
+ * do not tell, and Newton's method would close what it just opened, again and again.
+ */
+void respond(int32_t *course, kernel *bulk, kernel *opening, kernel *excess, int points, const double *B,
              const double *weight, const double *rest, double theta, const double *e0,
              double *w, double *r, double *D, int cells, const double *e1)
 {
@@ -169,6 +177,9 @@ void respond(kernel *bulk, kernel *opening, kernel *excess, int points, const do
         w[DIRECTION] = s[0] < 0 ? -1 : 1;
         w[GROWTH] = growth(excess, w);
         ask(opening, w, 2, s);
+        course[OPENED] = 1;
+      } else if (course[RELIEF]) {
+        s[1] = theta * w[STIFFNESS];
       }
       for (int k = 0; k < 3; ++k) {
         r[k] += weight[i] * s[0] * b[k];
@@ -197,7 +208,7 @@ void respond_at(const double *q, int size, double *latest,
                 kernel *strain, int cells, int dofs_per_cell, const int32_t *dofs, int at,
                 double *values, int values_width, const double *constants,
                 const double *coordinates, int rows, const int32_t *row, double *e1,
-                kernel *bulk, kernel *opening, kernel *excess, int points, const double *B,
+                int32_t *course, kernel *bulk, kernel *opening, kernel *excess, int points, const double *B,
                 const double *weight, const double *rest, double theta, const double *e0,
                 double *w, double *r, double *D, double *b, double *packed_D, int width)
 {
@@ -206,7 +217,7 @@ void respond_at(const double *q, int size, double *latest,
   memset(e1, 0, 3 * cells * sizeof *e1);
   cells_vector(strain, cells, dofs_per_cell, dofs, q, at, values, values_width, constants,
                coordinates, rows, row, e1);
-  respond(bulk, opening, excess, points, B, weight, rest, theta, e0, w, r, D, cells, e1);
+  respond(course, bulk, opening, excess, points, B, weight, rest, theta, e0, w, r, D, cells, e1);
   linearise(cells, e1, r, D, b, packed_D, width);
 }
 

@@ -22,6 +22,9 @@ import cffi
 
 from ufl_beam.compat import TABULATE, jit_directory
 
+SOURCES = ("loops", "elimination")
+"""Files of C beside this one; they are one translation unit."""
+
 _DECLARATIONS = """
 void set_cells(int cells, int dofs_per_cell, const int32_t *dofs, const double *q, int at,
                double *w, int width);
@@ -42,21 +45,33 @@ void add_step_tangent(int entries, const int32_t *entry, const int32_t *column, 
                       int size, int rotations, const int32_t *rotation, double *half,
                       const double *q0, const double *q1, double *tangent);
 double weighted_square(int rows, const double *w, const double *f);
-void respond(kernel *bulk, kernel *opening, kernel *excess, int points, const double *B,
-             const double *weight, const double *rest, double theta, const double *e0,
+void respond(int32_t *course, kernel *bulk, kernel *opening, kernel *excess, int points,
+             const double *B, const double *weight, const double *rest, double theta, const double *e0,
              double *w, double *r, double *D, int cells, const double *e1);
 void respond_at(const double *q, int size, double *latest,
                 kernel *strain, int cells, int dofs_per_cell, const int32_t *dofs, int at,
                 double *values, int values_width, const double *constants,
                 const double *coordinates, int rows, const int32_t *row, double *e1,
-                kernel *bulk, kernel *opening, kernel *excess, int points, const double *B,
-                const double *weight, const double *rest, double theta, const double *e0,
+                int32_t *course, kernel *bulk, kernel *opening, kernel *excess, int points,
+                const double *B, const double *weight, const double *rest, double theta, const double *e0,
                 double *w, double *r, double *D, double *b, double *packed_D, int width);
 void commit(kernel *end, int cells, int points, const double *B, const double *weight,
             const double *rest, const double *length, double *e0, const double *e1,
             double *w, double *kept, double *sum);
 void linearise(int cells, const double *e, const double *r, const double *D, double *b,
                double *packed_D, int width);
+typedef struct {
+  int chains;
+  const int32_t *first, *row, *order, *from_ends, *indptr;
+  const double *data;
+  double *kept;
+  int32_t *swaps;
+} chains;
+void eliminate(const chains *c, const int32_t *places, double *left);
+void eliminate_from(const chains *c, const double *b, double *f, const int32_t *places,
+                    double *left);
+void substitute(const chains *c, const double *f, const int32_t *places, const double *ends,
+                double *x);
 """
 
 
@@ -68,7 +83,7 @@ def _load() -> ModuleType:
             "#include <stdint.h>",
             f"typedef void (kernel)({arguments});",
             f"#define CALL(f, e, w, c, x) f(e, w, c, x, 0, 0{extra})",
-            Path(__file__).with_name("loops.c").read_text(),
+            *(Path(__file__).with_name(f"{name}.c").read_text() for name in SOURCES),
         ]
     )
     key = hashlib.sha256((source + _DECLARATIONS + sys.version).encode()).hexdigest()[:16]

@@ -1,20 +1,86 @@
-"""Rank analysis: can the beams of a scene move without being strained?"""
+"""Rank analysis: what may move without strain, and what is held twice."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import eigsh
 
-from ufl_beam.beams import Place
+from ufl_beam.beams import Beam, Point
+from ufl_beam.bodies import GROUND, Anchor, Body, node
 from ufl_beam.compat import Array
+from ufl_beam.connectors import Connector, Function, Motor, Spring
 from ufl_beam.errors import SceneError
-from ufl_beam.scene import Scene
+from ufl_beam.scene import Scene, Slot
 
 DENSE = 90
 """Up to this number of unknowns the null space comes from a dense decomposition."""
+
+
+def require_masses(scene: Scene) -> None:
+    """Raise :class:`SceneError` if a body has no mass to move."""
+    for body in scene.bodies:
+        for name in ("mass", "inertia"):
+            if getattr(body, name) == 0.0:
+                raise SceneError(
+                    f"{body.name}: {name} = 0, but dynamics needs it to be positive; use RigidLink "
+                    "or Link for what has no mass"
+                )
+
+
+def require_independent(scene: Scene) -> None:
+    """Raise :class:`SceneError` if constraints repeat or contradict each other.
+
+    They do if their gradients in the undeformed scene, by what moves freely, are dependent.
+    """
+    held = [link for link in scene.links if isinstance(link.law, Motor)]
+    if not held:
+        return
+    gradients = _gradients(scene, held)
+    u, sizes, _ = np.linalg.svd(gradients, full_matrices=True)
+    rank = int(np.sum(sizes > 1e-9 * sizes.max(initial=0.0)))
+    if rank == len(held):
+        return
+    dependent = np.abs(u[:, rank:]).max(axis=1) > 1e-6
+    names = list(dict.fromkeys(_owner(scene, held[i]) for i in np.flatnonzero(dependent)))
+    raise SceneError(
+        f"constraints repeat or contradict each other: {len(held) - rank} of those of "
+        f"{'; '.join(names)} can be left out. Remove one, or make it elastic: a Spring, or a Beam "
+        "in the place of a rigid part"
+    )
+
+
+def _owner(scene: Scene, link: Connector) -> str:
+    for joint in scene.joints:
+        if link in joint.holders:
+            return str(joint)
+    return str(link)
+
+
+def _gradients(scene: Scene, links: list[Connector]) -> Array:
+    """Of relative motions by what moves freely, rotations times size; (num_links, free)."""
+    same = scene.representatives()
+    columns: dict[Slot, int] = {}
+    fixed: set[Slot] = {(GROUND, component) for component in range(3)}
+    fixed |= {(node(s.place), c) for s in scene.supports if not s.angle for c in s.held}
+    fixed = {same.get(slot, slot) for slot in fixed}
+    entries: list[tuple[int, int, float]] = []
+    for row, link in enumerate(links):
+        for anchor, factors in zip((link.a, link.b), link.rigidly(), strict=True):
+            for component, factor in enumerate(factors):
+                slot = (node(anchor), component)
+                slot = same.get(slot, slot)
+                if factor and slot not in fixed:
+                    column = columns.setdefault(slot, len(columns))
+                    turns = component == 2 and not link.turns
+                    entries.append((row, column, factor / scene.size if turns else factor))
+    gradients = np.zeros((len(links), max(len(columns), 1)))
+    for row, column, factor in entries:
+        gradients[row, column] += factor
+    return gradients
 
 
 def require_no_mechanism(scene: Scene) -> None:
@@ -27,7 +93,7 @@ def require_no_mechanism(scene: Scene) -> None:
     if free.shape[1] == 0:
         return
     mode = free[:, 0].reshape(-1, 3) / np.abs(free[:, 0]).max()
-    moving = [i for i in range(len(scene.beams)) if np.abs(mode[i]).max() > 1e-6]
+    moving = [i for i in range(len(mode)) if np.abs(mode[i]).max() > 1e-6]
     parts = "; ".join(_describe(scene, i, mode[i]) for i in moving[:4])
     more = f"; and {len(moving) - 4} more" if len(moving) > 4 else ""
     ways = "way" if free.shape[1] == 1 else "independent ways"
@@ -37,42 +103,62 @@ def require_no_mechanism(scene: Scene) -> None:
     )
 
 
-def _center(scene: Scene, beam: int) -> tuple[float, float]:
-    """Point about which the rigid motion of a beam is described."""
-    (xa, ya), (xb, yb) = scene.beams[beam].a, scene.beams[beam].b
+def _center(part: Beam | Body) -> Point:
+    """Point about which the rigid motion of a beam or body is described."""
+    if isinstance(part, Body):
+        return part.center
+    (xa, ya), (xb, yb) = part.a, part.b
     return (xa + xb) / 2, (ya + yb) / 2
 
 
+RESISTING = (Motor, Spring, Function)
+"""Laws of connectors that resist every motion; others bear nothing at rest, or what they are told."""
+
+
 def _constraints(scene: Scene) -> csr_array:
-    """What joints and supports demand of (u, v, size ψ) of all beams; (constraints, 3 beams)."""
-    number = {beam: i for i, beam in enumerate(scene.beams)}
+    """What joints and supports demand of (u, v, size ψ) of all parts; (constraints, 3 parts)."""
+    number = {part: i for i, part in enumerate(_parts(scene))}
     entries: list[tuple[int, int, float]] = []
     row = 0
 
-    def motion(place: Place) -> tuple[int, Array]:
-        beam = number[place.beam]
-        cx, cy = _center(scene, beam)
-        x, y = (place.point[0] - cx) / scene.size, (place.point[1] - cy) / scene.size
-        return 3 * beam, np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]])
+    def add(anchor: Anchor, factors: Sequence[float] | Array) -> None:
+        """Factors of (u, v, size ψ) of what an anchor moves with, in the present row."""
+        of = node(anchor)
+        if of is GROUND:
+            return
+        part = of if isinstance(of, Body) else of.beam
+        (cx, cy), (px, py) = _center(part), of.center if isinstance(of, Body) else of.point
+        x, y = (px - cx) / scene.size, (py - cy) / scene.size
+        motion = np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]])
+        demand = np.asarray(factors) @ motion
+        entries.extend((row, 3 * number[part] + k, float(demand[k])) for k in range(3))
 
     for joint in scene.joints:
-        first, here = motion(joint.places[0])
-        for place in joint.places[1:]:
-            column, there = motion(place)
-            for c in joint.shared:
-                entries += [(row, first + k, -here[c, k]) for k in range(3)]
-                entries += [(row, column + k, there[c, k]) for k in range(3)]
+        for component in joint.shared:
+            alike = joint.places if component == 2 else joint.carriers
+            for place in alike[1:]:
+                add(alike[0], -np.eye(3)[component])
+                add(place, np.eye(3)[component])
                 row += 1
+    for link in scene.links:
+        if isinstance(link.law, RESISTING):
+            unit = np.array([1.0, 1.0, 1.0 if link.turns else 1 / scene.size])
+            for anchor, factors in zip((link.a, link.b), link.rigidly(), strict=True):
+                add(anchor, factors * unit)
+            row += 1
     for support in scene.supports:
         cos, sin = math.cos(support.angle), math.sin(support.angle)
-        column, there = motion(support.place)
-        turned = np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]]) @ there
-        for c in support.held:
-            entries += [(row, column + k, turned[c, k]) for k in range(3)]
+        turned = np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
+        for component in support.held:
+            add(support.place, turned[component])
             row += 1
     rows, columns, values = np.array(entries).reshape(-1, 3).T
-    shape = (max(row, 1), 3 * len(scene.beams))
+    shape = (max(row, 1), 3 * len(number))
     return csr_array((values, (rows.astype(int), columns.astype(int))), shape=shape)
+
+
+def _parts(scene: Scene) -> list[Beam | Body]:
+    return [*scene.beams, *scene.bodies]
 
 
 def _null_space(constraints: csr_array) -> Array:
@@ -87,12 +173,15 @@ def _null_space(constraints: csr_array) -> Array:
     return np.asarray(vectors[:, values < 1e-13 * abs(gram).max()])
 
 
-def _describe(scene: Scene, beam: int, mode: Array) -> str:
-    name = f"{scene.beams[beam].name} (beam {beam})"
+def _describe(scene: Scene, number: int, mode: Array) -> str:
+    part = _parts(scene)[number]
+    bodies = number - len(scene.beams)
+    which = f"body {bodies}" if isinstance(part, Body) else f"beam {number}"
+    name = f"{part.name} ({which})"
     u, v, ψ = mode
     if abs(ψ) < 1e-6:
         return f"{name} can shift along ({u:.3g}, {v:.3g})"
-    cx, cy = _center(scene, beam)
+    cx, cy = _center(part)
     x, y = (
         scene.size * round(c / scene.size, 9)
         for c in (cx - v / ψ * scene.size, cy + u / ψ * scene.size)

@@ -19,7 +19,8 @@ from ufl_beam.compat import Array, fem, line_mesh
 from ufl_beam.forms import tabulator
 from ufl_beam.grid import Index
 from ufl_beam.laws import Bulk, Layout, Softening
-from ufl_beam.loops import doubles, ffi, lib
+from ufl_beam.ledger import Ledger
+from ufl_beam.loops import doubles, ffi, integers, lib
 from ufl_beam.schemes import Scheme
 
 laws.where.register(Condition, ufl.conditional)
@@ -38,6 +39,17 @@ INPUTS = (
 
 STATE = ("p", "ξ", "jump", "opening")
 """The internal variables."""
+
+
+def expect_entries(layout: Layout, scheme: Scheme, ledger: Ledger) -> None:
+    """Make the entries of the ledger that points of a layout write, on whatever process."""
+    if layout.yields:
+        ledger.state["hardening"] += 0.0
+        ledger.lost["plastic"] += 0.0
+    if layout.softening is not None:
+        ledger.lost["hinges"] += 0.0
+    if scheme.loss:
+        ledger.lost["numerical"] += 0.0
 
 
 class PointForms:
@@ -107,6 +119,22 @@ class PointForms:
         return tabulator(form)
 
 
+class Course:
+    """What points know of each other in a step.
+
+    Attributes:
+        flags: Whether one has opened, and whether the others are to relieve it; (2,), int32.
+    """
+
+    def __init__(self) -> None:
+        self.flags: Index = np.zeros(2, dtype=np.int32)
+
+    def relieve(self) -> bool:
+        """Let points around those that open answer elastically, if there are any."""
+        self.flags[1] = self.flags[0]
+        return bool(self.flags[1])
+
+
 class Points:
     """Points of the same layout in many cells.
 
@@ -116,6 +144,7 @@ class Points:
         length: Of the cells; (cells,); m.
         scheme: The time scheme.
         storage: Zeros, for all that is known of the points; (cells, n, len(INPUTS)).
+        course: Shared by all points of a scene.
 
     Attributes:
         strains: Of the cells at the latest response; (cells, 3); may be written to.
@@ -135,9 +164,11 @@ class Points:
         length: Array,
         scheme: Scheme,
         storage: Array,
+        course: Course | None = None,
     ) -> None:
+        course = course or Course()
         self._forms = PointForms(layout.softening, scheme)
-        self._layout, self._storage = layout, storage
+        self._layout, self._storage, self._loss = layout, storage, scheme.loss
         self._at = {name: storage[:, :, i] for i, name in enumerate(INPUTS)}
         self._bulk = bulk = layout.bulk(keys)
         numbers = {"C": bulk.C, "limit": bulk.limit, "H": bulk.H, "B": bulk.B, "eta": bulk.eta}
@@ -163,8 +194,16 @@ class Points:
             for x in (layout.strains, layout.weights, layout.rest)
         )
         forms, section = self._forms, (n, doubles(B), doubles(weights), doubles(rest))
+        self._course = course
         self.to_respond = (
-            *(forms.bulk, forms.opening, forms.excess, *section, scheme.theta),
+            *(
+                integers(course.flags),
+                forms.bulk,
+                forms.opening,
+                forms.excess,
+                *section,
+                scheme.theta,
+            ),
             *map(doubles, (self._e0, storage, self.r, self.D)),
         )
         self._to_commit = (
@@ -191,6 +230,7 @@ class Points:
 
     def begin(self, dt: float) -> None:
         """Begin a step of this length; s."""
+        self._course.flags[:] = 0
         if dt != self._dt:
             self["dt"][:] = self._dt = dt
 
@@ -215,6 +255,25 @@ class Points:
         sums = copies[-1]
         plastic, broken, _, elastic, hardening = (sums - [0, 0, 0, *self.sums[3:]]).tolist()
         return float(plastic + broken + elastic + hardening)
+
+    # -- the ledger ----------------------------------------------------------------------------
+
+    def enter_losses(self, ledger: Ledger) -> None:
+        """Enter what the last step dissipated."""
+        plastic, broken, lost, _, _ = self.sums.tolist()
+        if self._layout.yields:
+            ledger.lost["plastic"] += plastic
+        if self._layout.softening is not None:
+            ledger.lost["hinges"] += broken
+        if self._loss:
+            ledger.lost["numerical"] += 2 * self._loss * lost
+
+    def enter_stored(self, ledger: Ledger) -> None:
+        """Enter what the accepted state stores."""
+        _, _, _, elastic, hardening = self.sums.tolist()
+        ledger.state["stored"] += elastic
+        if self._layout.yields:
+            ledger.state["hardening"] += hardening
 
     # -- the state -----------------------------------------------------------------------------
 

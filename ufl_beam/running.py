@@ -17,6 +17,7 @@ from ufl_beam.errors import (
     require_number,
     require_sequence,
 )
+from ufl_beam.processes import in_study, ours
 from ufl_beam.record import Recorder, on_first
 from ufl_beam.scene import Scene
 from ufl_beam.schemes import Scheme
@@ -36,7 +37,7 @@ def simulate(
     start: Solution | None = None,
     newton: Newton | None = None,
     progress: bool = True,
-    comm: MPI.Intracomm = MPI.COMM_WORLD,
+    comm: MPI.Intracomm | None = None,
 ) -> Solution:
     """Simulate a scene.
 
@@ -51,7 +52,8 @@ def simulate(
         start: Solution of the same beams whose last state is the initial state.
         newton: Tolerances and PETSc options.
         progress: Show a progress bar if the output is a terminal.
-        comm: Processes that share the scene; a small one is computed by each of them.
+        comm: Processes that share the scene; all of them, or in a :func:`study` this one alone.  A
+            small scene is computed by each of them.
 
     Returns:
         The motion, the forces and the ledger.
@@ -60,6 +62,7 @@ def simulate(
         SceneError: The call or the scene is wrong; nothing was computed.
         ConvergenceError: A step failed; it carries the solution so far, and files are complete.
     """
+    comm = ours() if comm is None else comm
     t0, t1 = _require_times(t, dt)
     require_count(every, "simulate: every")
     recorders = (record,) if isinstance(record, Recorder) else require_sequence(record, "record")
@@ -75,7 +78,7 @@ def simulate(
         for recorder in recorders:
             recorder.open(simulation)
         solution.keep(simulation)
-        quiet = None if progress and comm.rank == 0 else True
+        quiet = None if progress and comm.rank == 0 and not in_study() else True
         for n in tqdm(range(1, steps + 1), unit="step", disable=quiet, mininterval=0.5):
             simulation.step_to(t0 + (t1 - t0) * n / steps)
             if n % every == 0 or n == steps:

@@ -5,9 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, singledispatch
 
 from ufl_beam.beams import Beam, Place, Point
+from ufl_beam.bodies import (
+    GROUND,
+    Anchor,
+    Body,
+    Node,
+    Spot,
+    carries,
+    ground,
+    node,
+    require_anchor,
+)
+from ufl_beam.connectors import Actuator, Connector, Joint
 from ufl_beam.errors import (
     SceneError,
     require_kind,
@@ -27,44 +39,7 @@ from ufl_beam.loads import (
 from ufl_beam.viscous import Damping, KelvinVoigt, Rayleigh
 
 COMPONENTS = ("u", "v", "psi")
-Slot = tuple[Place, int]
-
-
-# -- joints ------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, eq=False)
-class Joint:
-    """Places that share components of motion; made by :func:`Rigid` and :func:`Revolute`.
-
-    Attributes:
-        kind: Name for messages.
-        places: The places, at the same point of the undeformed scene.
-        shared: Components that are equal: 0, 1 displacement, 2 rotation.
-    """
-
-    kind: str
-    places: tuple[Place, ...]
-    shared: tuple[int, ...]
-
-    def __post_init__(self) -> None:
-        if len(self.places) < 2:
-            raise SceneError(f"{self.kind}: a joint needs at least two places")
-        for place in self.places:
-            _require_place(place, self.kind)
-
-    def __str__(self) -> str:
-        return f"{self.kind}({', '.join(map(str, self.places))})"
-
-
-def Rigid(*places: Place) -> Joint:
-    """Rigid joint: displacement and rotation are shared by all ``places``."""
-    return Joint("Rigid", places, (0, 1, 2))
-
-
-def Revolute(*places: Place) -> Joint:
-    """Revolute joint: displacement is shared by all ``places``, each turns freely."""
-    return Joint("Revolute", places, (0, 1))
+Slot = tuple[Node, int]
 
 
 # -- supports ----------------------------------------------------------------------------------
@@ -82,12 +57,12 @@ class Support:
     """
 
     kind: str
-    place: Place
+    place: Anchor
     held: dict[int, TimeFunction]
     angle: float = 0.0
 
     def __post_init__(self) -> None:
-        _require_place(self.place, self.kind)
+        _require_node(self.place, self.kind)
         if not self.held:
             raise SceneError(f"{self} holds nothing; give at least one of u, v, psi")
         for component, value in self.held.items():
@@ -107,17 +82,17 @@ def still(t: float) -> float:
     return 0.0
 
 
-def Clamped(place: Place) -> Support:
+def Clamped(place: Anchor) -> Support:
     """Holds displacement and rotation."""
     return Support("Clamped", place, {0: still, 1: still, 2: still})
 
 
-def Pinned(place: Place) -> Support:
+def Pinned(place: Anchor) -> Support:
     """Holds the displacement; the place turns freely."""
     return Support("Pinned", place, {0: still, 1: still})
 
 
-def Roller(place: Place, *, along: Point = (1.0, 0.0)) -> Support:
+def Roller(place: Anchor, *, along: Point = (1.0, 0.0)) -> Support:
     """Holds the displacement across the direction ``along``; the place rolls and turns freely."""
     x, y = require_vector(along, f"Roller at {place}: along")
     if x == y == 0.0:
@@ -130,7 +105,7 @@ def Roller(place: Place, *, along: Point = (1.0, 0.0)) -> Support:
 
 
 def Prescribed(
-    place: Place,
+    place: Anchor,
     *,
     u: float | TimeFunction | None = None,
     v: float | TimeFunction | None = None,
@@ -149,7 +124,7 @@ def Prescribed(
     return Support("Prescribed", place, held)
 
 
-def _constant(value: float, place: Place, component: int) -> TimeFunction:
+def _constant(value: float, place: Anchor, component: int) -> TimeFunction:
     require_number(value, f"Prescribed at {place}: {COMPONENTS[component]}")
     return still if value == 0 else lambda t: float(value)
 
@@ -167,28 +142,28 @@ class PointMass:
         inertia: About the place; kg m².
     """
 
-    place: Place
+    place: Anchor
     mass: float
     inertia: float = 0.0
 
     def __post_init__(self) -> None:
-        _require_place(self.place, "PointMass")
+        _require_node(self.place, "PointMass")
         require_number(self.mass, f"PointMass at {self.place}: mass", at_least=0.0)
         require_number(self.inertia, f"PointMass at {self.place}: inertia", at_least=0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Velocity:
-    """Initial motion of beams as a rigid body.
+    """Initial motion of beams and bodies as one rigid body.
 
     Args:
-        beams: The beams that move so.
+        beams: The beams and bodies that move so.
         linear: Velocity of the point ``about``; m/s.
         angular: Angular velocity; rad/s.
         about: Point of the undeformed scene; m.
     """
 
-    beams: tuple[Beam, ...]
+    beams: tuple[Beam | Body, ...]
     linear: tuple[float, float] = (0.0, 0.0)
     angular: float = 0.0
     about: Point = (0.0, 0.0)
@@ -196,7 +171,7 @@ class Velocity:
     def __post_init__(self) -> None:
         object.__setattr__(self, "beams", require_sequence(self.beams, "Velocity: beams"))
         for i, beam in enumerate(self.beams):
-            require_kind(beam, Beam, f"Velocity: beams[{i}]")
+            require_kind(beam, (Beam, Body), f"Velocity: beams[{i}]")
         require_vector(self.linear, "Velocity: linear")
         require_number(self.angular, "Velocity: angular")
         require_vector(self.about, "Velocity: about")
@@ -215,63 +190,96 @@ class Velocity:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Beams and what joins, holds, loads and moves them.
+    """Beams and bodies, and what joins, holds, loads and moves them.
 
     Args:
         beams: The beams.
-        joints: Made by :func:`Rigid` and :func:`Revolute`.
+        joints: Made by :func:`Rigid`, :func:`Revolute`, :func:`Prismatic`, :func:`RigidLink`,
+            :func:`Link` and :func:`Release`.
         supports: Made by :func:`Clamped`, :func:`Pinned`, :func:`Roller`, :func:`Prescribed`.
         loads: :class:`PointLoad`, :class:`FollowerLoad`, :class:`LineLoad`, :class:`Gravity`.
         masses: :class:`PointMass`.
         initial: :class:`Velocity`; at rest without.
         damping: :class:`Rayleigh`, :class:`KelvinVoigt`; besides what materials dissipate.
+        bodies: :class:`Body`.
+        connectors: Made by :func:`Turn`, :func:`Stretch`, :func:`Slide`: springs, dampers, stops,
+            friction, motors.
 
     Raises:
         SceneError: The parts do not fit together; the message names them.
     """
 
-    beams: Sequence[Beam]
+    beams: Sequence[Beam] = ()
     joints: Sequence[Joint] = ()
     supports: Sequence[Support] = ()
     loads: Sequence[Load] = ()
     masses: Sequence[PointMass] = ()
     initial: Sequence[Velocity] = ()
     damping: Sequence[Damping] = ()
+    bodies: Sequence[Body] = ()
+    connectors: Sequence[Connector] = ()
 
     def __post_init__(self) -> None:
-        for part in ("beams", "joints", "supports", "loads", "masses", "initial", "damping"):
+        for part in (
+            "beams", "joints", "supports", "loads", "masses", "initial", "damping", "bodies",
+            "connectors",
+        ):  # fmt: skip
             records = require_sequence(getattr(self, part), f"Scene: {part}")
             object.__setattr__(self, part, records)
-        if not self.beams:
-            raise SceneError("Scene: no beams")
-        known: dict[Beam, int] = {}
-        for i, beam in enumerate(self.beams):
-            require_kind(beam, Beam, f"Scene: beams[{i}]")
-            first = known.setdefault(beam, i)
-            if first != i:
-                raise SceneError(
-                    f"Scene: {beam.name} is in the scene twice, as beams {first} and {i}"
-                )
+        if not self.beams and not self.bodies:
+            raise SceneError("Scene: no beams and no bodies")
         _require_kinds(self)
+        known: dict[Beam | Body, str] = {GROUND: "ground"}
+        for part in ("beams", "bodies"):
+            for i, one in enumerate(getattr(self, part)):
+                first = known.setdefault(one, f"{part}[{i}]")
+                if first != f"{part}[{i}]":
+                    raise SceneError(
+                        f"Scene: {one.name} is in the scene twice, as {first} and {part}[{i}]"
+                    )
         for owner, place in self._attachments():
-            if place.beam not in known:
-                raise SceneError(f"{owner}: {place.beam.name} is not in the scene; add it to beams")
+            one = place.beam if isinstance(place, Place) else place.body
+            if one not in known:
+                part = "beams" if isinstance(one, Beam) else "bodies"
+                raise SceneError(f"{owner}: {one.name} is not in the scene; add it to {part}")
         for joint in self.joints:
             self._require_together(joint)
+        for connector in self.links:
+            if node(connector.a) == node(connector.b):
+                raise SceneError(f"{connector}: both ends are at the same body or cross-section")
         self._require_single_supports()
 
     @cached_property
     def size(self) -> float:
         """Diagonal of the box around the undeformed scene; m."""
         points = [b.curve(s) for b in self.beams for s in b.vertices(())]
+        points += [body.center for body in self.bodies]
+        points += [place.point for _, place in self._attachments() if isinstance(place, Spot)]
         xs, ys = zip(*points, strict=True)
-        return math.hypot(max(xs) - min(xs), max(ys) - min(ys))
+        return math.hypot(max(xs) - min(xs), max(ys) - min(ys)) or 1.0
 
-    def _attachments(self) -> Iterator[tuple[object, Place]]:
+    @cached_property
+    def links(self) -> tuple[Connector, ...]:
+        """All connectors: those that hold joints, those of the scene, and off-centre loads."""
+        held = [holder for joint in self.joints for holder in joint.holders]
+        loads = [push for load in self.loads for push in _off_center(load)]
+        return (*held, *self.connectors, *loads)
+
+    @cached_property
+    def movers(self) -> tuple[Body, ...]:
+        """The bodies, and the ground if something is attached to it."""
+        attached = [place for _, place in self._attachments()]
+        attached += [link.a for link in self.links]
+        return (*self.bodies, *((GROUND,) if any(node(p) is GROUND for p in attached) else ()))
+
+    def _attachments(self) -> Iterator[tuple[object, Anchor]]:
         """Everything with a place, and its place."""
         for joint in self.joints:
             for place in joint.places:
                 yield joint, place
+        for connector in self.connectors:
+            yield connector, connector.a
+            yield connector, connector.b
         for support in self.supports:
             yield support, support.place
         for mass in self.masses:
@@ -282,8 +290,8 @@ class Scene:
             elif isinstance(load, LineLoad):
                 yield "LineLoad", load.beam.start
         for velocity in self.initial:
-            for beam in velocity.beams:
-                yield "Velocity", beam.start
+            for one in velocity.beams:
+                yield "Velocity", one.start if isinstance(one, Beam) else one.middle
         for damping in self.damping:
             if isinstance(damping, KelvinVoigt):
                 for beam in damping.beams or ():
@@ -294,7 +302,8 @@ class Scene:
         """Parameters of the places of each beam that must be vertices."""
         found: dict[Beam, list[float]] = {beam: [] for beam in self.beams}
         for _, place in self._attachments():
-            found[place.beam].append(place.s)
+            if isinstance(place, Place):
+                found[place.beam].append(place.s)
         return found
 
     def _require_together(self, joint: Joint) -> None:
@@ -303,13 +312,14 @@ class Scene:
             if other in joint.places[: joint.places.index(other)] or other == here:
                 raise SceneError(f"{joint}: the same place twice")
             gap = math.dist(here.point, other.point)
-            if gap > 1e-9 * self.size:
+            if joint.meets and gap > 1e-9 * self.size:
                 raise SceneError(
-                    f"{joint.kind}: joint ends lie {gap:.6g} m apart: {here} and {other}"
+                    f"{joint.kind}: joint ends lie {gap:.6g} m apart: {here} and {other}; "
+                    "RigidLink and Link join places that are apart"
                 )
 
     def representatives(self) -> dict[Slot, Slot]:
-        """Which component of a place stands for it, for all components that joints share."""
+        """Which component of a node stands for it, for all components that joints share."""
         parent: dict[Slot, Slot] = {}
 
         def root(slot: Slot) -> Slot:
@@ -319,43 +329,80 @@ class Scene:
 
         for joint in self.joints:
             for component in joint.shared:
-                first = root((joint.places[0], component))
-                for place in joint.places[1:]:
-                    other = root((place, component))
-                    if other != first:
-                        parent[other] = first
+                alike = joint.places if component == 2 else joint.carriers
+                nodes = [node(place) for place in alike]
+                for other in nodes[1:]:
+                    first, second = root((nodes[0], component)), root((other, component))
+                    if first != second:
+                        parent[second] = first
         return {slot: root(slot) for slot in parent}
 
     def _require_single_supports(self) -> None:
         same = self.representatives()
-        holders: dict[Slot, Support] = {}
+        holders: dict[Slot, str] = {}
+        slot: Slot
+        for component in (0, 1, 2):
+            slot = (GROUND, component)
+            holders[same.get(slot, slot)] = "the ground"
         for support in self.supports:
             # A support in turned axes takes both displacements of its place.
             components = {*support.held, *((0, 1) if support.angle else ())}
             for component in sorted(components):
-                slot = (support.place, component)
+                slot = (node(support.place), component)
                 slot = same.get(slot, slot)
                 if slot in holders:
                     raise SceneError(
                         f"supports in conflict: {holders[slot]} and {support} both hold "
                         f"{COMPONENTS[component]}; remove one"
                     )
-                holders[slot] = support
+                holders[slot] = str(support)
 
 
-def _require_place(place: object, owner: str) -> None:
-    if not isinstance(place, Place):
-        raise SceneError(f"{owner}: {place!r} is not a place; use beam.start, .end or .at(s)")
+@singledispatch
+def _off_center(load: Load) -> tuple[Connector, ...]:
+    """Connectors that push like a load at a point of a body that is not its centre."""
+    return ()
+
+
+@_off_center.register
+def _(load: PointLoad) -> tuple[Connector, ...]:
+    if carries(load.place):
+        return ()
+
+    def push(motion: str, size: float, axis: Point = (1.0, 0.0)) -> Connector:
+        law = Actuator(lambda t: size * load.time(t))
+        return Connector("PointLoad", motion, ground(*load.place.point), load.place, law, axis)
+
+    (x, y), moment = load.force, load.moment
+    return (
+        push("parting", x, (1.0, 0.0)),
+        push("parting", y, (0.0, 1.0)),
+        *((push("turning", moment),) if moment else ()),
+    )
+
+
+def _require_node(place: object, owner: str) -> None:
+    require_anchor(place, owner)
+    if isinstance(place, Spot) and place.body is GROUND:
+        raise SceneError(f"{owner}: {place} does not move")
+    if not carries(place):  # type: ignore[arg-type]
+        raise SceneError(
+            f"{owner}: {place} is not the centre of the body; hold other points by joints to "
+            "ground(x, y), and give masses to the body itself"
+        )
 
 
 def _require_kinds(scene: Scene) -> None:
     kinds: tuple[tuple[str, Iterable[object], tuple[type, ...]], ...] = (
+        ("beams", scene.beams, (Beam,)),
         ("joints", scene.joints, (Joint,)),
         ("supports", scene.supports, (Support,)),
         ("loads", scene.loads, (PointLoad, FollowerLoad, LineLoad, Gravity)),
         ("masses", scene.masses, (PointMass,)),
         ("initial", scene.initial, (Velocity,)),
         ("damping", scene.damping, (Rayleigh, KelvinVoigt)),
+        ("bodies", scene.bodies, (Body,)),
+        ("connectors", scene.connectors, (Connector,)),
     )
     for name, records, kind in kinds:
         for i, record in enumerate(records):

@@ -91,6 +91,15 @@ class Scheme(Protocol):
     def losses(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> tuple[Expr, ...]:
         """Energies per length that the resultants lose numerically in the step; often none."""
 
+    def average(self, before: Expr, now: Expr) -> Expr:
+        """Of a vector or a distance between frames: the one that variations are taken with."""
+
+    def virtual_turn(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
+        """Variation of a relative rotation whose virtual motion is ``w``."""
+
+    def secant(self, force: Callable[[Array], Array], e0: Array, e1: Array) -> tuple[Array, Array]:
+        """Force of a step from e0 to e1, and its derivative, where ``force`` has slopes 0 and 1."""
+
     def nodal_step(self, q0: Array, q1: Array, rotations: Index) -> tuple[Array, float]:
         """What forces and moments work on in a step; and the largest turn of a node; rad.
 
@@ -160,6 +169,19 @@ class Static:
         """None."""
         return ()
 
+    def average(self, before: Expr, now: Expr) -> Expr:
+        """The one at the end of the step."""
+        return now
+
+    def virtual_turn(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
+        """The virtual rotation itself."""
+        return w
+
+    def secant(self, force: Callable[[Array], Array], e0: Array, e1: Array) -> tuple[Array, Array]:
+        """The force at the end of the step."""
+        f = force(e1)
+        return f, np.where(f != 0, 1.0, 0.0)
+
     def nodal_step(self, q0: Array, q1: Array, rotations: Index) -> tuple[Array, float]:
         """The increments themselves; a step may turn a node as far as it likes."""
         return q1 - q0, 0.0
@@ -204,6 +226,24 @@ class _ExactStep:
         if self.alpha == 0:
             return ()
         return (constant(self.alpha) * ufl.dot(_scaled(C, e1 - e0), e1 - e0),)  # P(90)
+
+    def average(self, before: Expr, now: Expr) -> Expr:
+        """The mean of both ends, of which increments are products."""
+        return (before + now) / 2
+
+    def virtual_turn(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
+        """The increment of the rotation, if ``w`` is 2 tan(turn_b/2) - 2 tan(turn_a/2)."""
+        tan_a, tan_b = (ufl.sin(x / 2) / ufl.cos(x / 2) for x in (turn_a, turn_b))
+        return kinematics.over_tan((turn_b - turn_a) / 2) / (1 + tan_a * tan_b) * w
+
+    def secant(self, force: Callable[[Array], Array], e0: Array, e1: Array) -> tuple[Array, Array]:
+        """The mean force over the way, so that its work is what f²/2 grows by."""
+        f0, f1, way = force(e0), force(e1), e1 - e0
+        ends = (f0 != 0) + 0.0, (f1 != 0) + 0.0
+        moves = way != 0
+        part = np.divide(f1 - f0, way, out=(ends[0] + ends[1]) / 2, where=moves)
+        f = (f0 + f1) / 2 * part
+        return f, np.divide(f1 - f, way, out=ends[1] / 2, where=moves)
 
     def nodal_step(self, q0: Array, q1: Array, rotations: Index) -> tuple[Array, float]:
         """(Δu, 2 tan(Δψ/2)): with it works are exact increments; see docs/errata.md."""

@@ -11,19 +11,26 @@ import numpy as np
 
 from ufl_beam.applied import DeadLoads, FollowerLoads
 from ufl_beam.compat import Array
+from ufl_beam.connectors import Joint
+from ufl_beam.couplings import couplings
 from ufl_beam.dampers import damping_forces
 from ufl_beam.errors import ConvergenceError, SceneError, require_kind
 from ufl_beam.fields import Fields
 from ufl_beam.grid import Grid, Index, Share
-from ufl_beam.inelastic import InelasticBeams, expect_entries, inelastic_cells
+from ufl_beam.inelastic import InelasticBeams, inelastic_cells
+from ufl_beam.joints import links_of
 from ufl_beam.ledger import Ledger
 from ufl_beam.loads import FollowerLoad
-from ufl_beam.mechanism import require_no_mechanism
+from ufl_beam.mechanism import require_independent, require_masses, require_no_mechanism
 from ufl_beam.path import StaticPath
+from ufl_beam.points import Course, expect_entries
+from ufl_beam.processes import ours
+from ufl_beam.responses import Setting
 from ufl_beam.scene import Scene
 from ufl_beam.schemes import Scheme, has_inertia
 from ufl_beam.solution import Solution
 from ufl_beam.solve import Newton, Solver, StepFailed
+from ufl_beam.sparse import as_slice
 from ufl_beam.supports import Supports
 from ufl_beam.terms import Beams, ElasticBeams, Inertia, SectionForces, Term
 
@@ -54,7 +61,7 @@ class Simulation:
         t0: Time of the initial state; s.
         start: Solution of the same beams whose last state is the initial state.
         newton: Tolerances and PETSc options.
-        comm: Processes that share the scene.
+        comm: Processes that share the scene; all of them, or in a :func:`study` this one alone.
 
     Attributes:
         t: Time; s.
@@ -72,14 +79,18 @@ class Simulation:
         t0: float = 0.0,
         start: Solution | None = None,
         newton: Newton | None = None,
-        comm: MPI.Intracomm = MPI.COMM_WORLD,
+        comm: MPI.Intracomm | None = None,
     ) -> None:
+        comm = ours() if comm is None else comm
         require_kind(scene, Scene, "scene")
         if not isinstance(scheme, Scheme) or isinstance(scheme, type):
             raise SceneError(f"scheme = {scheme!r} must be Static(), ExactStatic() or Midpoint()")
         require_kind(newton or Newton(), Newton, "newton")
-        if not scheme.dynamic:
+        if scheme.dynamic:
+            require_masses(scene)
+        else:
             require_no_mechanism(scene)
+        require_independent(scene)
         self.scene, self.scheme, self.comm = scene, scheme, comm
         self.grid = Grid(scene)
         together = len(self.grid.cells) >= comm.size * SMALLEST_SHARE
@@ -96,6 +107,7 @@ class Simulation:
         self.inelastic: list[InelasticBeams] = []
         self._make_beams()
         self.force = np.zeros(self.share.size)
+        self.couplings = couplings(self.share, Setting(self, scheme, self.ledger), self._A)
         self.loads = self._make_loads()
         self._others: list[Term] = [*self.loads]
         if has_inertia(scheme):
@@ -104,7 +116,8 @@ class Simulation:
             self._others.append(self.inertia)
         for damping in scene.damping:
             self._others += damping_forces(damping, self.fields, scheme, self._A, self.ledger)
-        self.terms: list[Term] = [*self.beams, *self._others]
+        self._inner: list[Beams] = [*self.beams, *self.couplings]
+        self.terms: list[Term] = [*self._inner, *self._others]
         self.supports = Supports(self.share, scheme, self.ledger, self._A)
         if start is not None:
             for load in self.loads:
@@ -115,11 +128,12 @@ class Simulation:
         self._q_before: Array = self.q
         self._dt_before = math.inf
         self._rotations = self.share.rotations()
+        self._multipliers = as_slice(self.share.multipliers())
         for term in self.terms:
             term.add_state(self.q)
         self._path: StaticPath | None = None
         if not scheme.dynamic:
-            self._path = StaticPath(self.share, scheme, self.beams, self.ledger, self.q, t0)
+            self._path = StaticPath(self.share, scheme, self._inner, self.ledger, self.q, t0)
         self._solver = Solver(
             self.share,
             self._A,
@@ -127,6 +141,8 @@ class Simulation:
             complete=self.supports.hold,
             tangent=self._tangent,
             forces=lambda: self.force,
+            excess=self._excess,
+            relieve=self._relieve,
             newton=newton or Newton(),
         )
         self.solution = Solution(scene, self.grid)
@@ -136,6 +152,7 @@ class Simulation:
     def _make_beams(self) -> None:
         """Beams of the cells of this process: elastic ones, and those with material points."""
         elastic = np.ones(len(self.share.cells), dtype=bool)
+        self._course = course = Course()
         groups = inelastic_cells(self.grid)
         self._has_inelastic = bool(groups)
         for layout, cells in groups:
@@ -145,7 +162,7 @@ class Simulation:
                 elastic[part] = False
                 fields = Fields(self.share, part)
                 self.inelastic.append(
-                    InelasticBeams(fields, layout, self.scheme, self._A, self.ledger)
+                    InelasticBeams(fields, layout, self.scheme, self._A, self.ledger, course)
                 )
         self.beams.extend(self.inelastic)
         if elastic.any():
@@ -183,13 +200,12 @@ class Simulation:
         v = np.full(self.grid.size, np.nan)
         for velocity in self.scene.initial:
             for beam in velocity.beams:
-                vertices = self.grid.vertices_of(beam)
-                new = np.array([velocity.at(x, y) for x, y in self.grid.points[vertices]])
-                dofs = self.grid.dofs[vertices]
+                points, dofs = self.grid.nodes_of(beam)
+                new = np.array([velocity.at(x, y) for x, y in points])
                 size = np.abs(velocity.at(0, 0)[:2]).sum() + abs(velocity.angular) * self.scene.size
                 apart = np.abs(v[dofs] - new) > 1e-9 * np.array([size, size, abs(velocity.angular)])
                 if apart.any():
-                    x, y = self.grid.points[vertices[np.flatnonzero(apart.any(axis=1))[0]]]
+                    x, y = points[np.flatnonzero(apart.any(axis=1))[0]]
                     raise SceneError(
                         f"Velocity: {beam.name} gets two different velocities at ({x:g}, {y:g}), "
                         "from itself or from a beam that it is joined to"
@@ -202,12 +218,24 @@ class Simulation:
     def _residual(self, x: Array, r: Array) -> None:
         q1 = self.supports.in_plane(x)
         self.force.fill(0.0)
-        for beams in self.beams:
-            beams.add_residual(q1, self.force)
+        for inner in self._inner:
+            inner.add_residual(q1, self.force)
         r[:] = self.force
         for term in self._others:
             term.add_residual(q1, r)
         self.supports.enter(r)
+
+    def _relieve(self) -> bool:
+        """Whether another try with relieved points makes sense."""
+        here = self._course.relieve()
+        return self.share.comm.allreduce(here, op=MPI.LOR) if self.share.comm.size > 1 else here
+
+    def _excess(self, r: Array, scale: float) -> float:
+        """How far the laws of connectors are missed."""
+        here = max((c.excess(r, scale) for c in self.couplings), default=0.0)
+        if self.share.comm.size > 1:
+            return self.share.comm.allreduce(here, op=MPI.MAX) if self.scene.links else 0.0
+        return here
 
     def _tangent(self, x: Array) -> None:
         q1 = self.supports.in_plane(x)
@@ -255,6 +283,7 @@ class Simulation:
         q1 = self._solver.solve(guess, [load.force for load in self.loads])
         self.supports.leave(q1)
         s, turn = self.scheme.nodal_step(self.q, q1, self._rotations)
+        s[self._multipliers] = 0.0
         self._require_small(turn)
         if self._path is not None:
             self._path.require(q1, s, self.force, self._solver.least_work(s))
@@ -326,6 +355,28 @@ class Simulation:
     def ledger_names(self) -> list[str]:
         """Names of the entries of the ledger."""
         return [*self.ledger.state, *self.ledger.supplied, *self.ledger.lost]
+
+    def connections(self) -> Array:
+        """Relative motion, force and work taken of all links of the scene; (num_links, 3).
+
+        All processes call it together.
+        """
+        here = np.zeros((len(self.scene.links), 3))
+        for coupling in self.couplings:
+            columns = (coupling.motion(self.q), coupling.force(self.q), coupling.work)
+            here[coupling.numbers] = np.column_stack(columns)
+        if self.share.comm.size > 1:
+            self.share.comm.Allreduce(MPI.IN_PLACE, here)
+        return here
+
+    def press(self, joint: Joint) -> float:
+        """Size of the force that connectors hold a joint with at the end of the last step; N.
+
+        Raises:
+            SceneError: The joint shares its displacement; make it with ``measured=True``.
+        """
+        forces = self.connections()[links_of(self.scene, joint), 1]
+        return float(np.linalg.norm(forces))
 
     def section_forces(self) -> Array:
         """(N, V, M) in all cells; (num_cells, 3); N, N, N m; all processes call it together."""

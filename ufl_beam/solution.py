@@ -10,11 +10,14 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.beams import Beam, Place
+from ufl_beam.bodies import GROUND, Anchor, Spot, arm, node
 from ufl_beam.compat import Array
+from ufl_beam.connectors import Connector, Joint
 from ufl_beam.errors import SceneError
 from ufl_beam.fields import Fields
 from ufl_beam.grid import Grid, Index, Share
 from ufl_beam.inelastic import Strains
+from ufl_beam.joints import Connection, JointHistory, links_of, of_joint, turned
 from ufl_beam.ledger import Energy
 from ufl_beam.scene import Scene, Support
 from ufl_beam.sparse import Product
@@ -63,6 +66,7 @@ class Solution:
         self._reactions: list[Array] = []
         self._entries: list[tuple[dict[str, float], ...]] = []
         self._material: list[list[tuple[Index, Array]]] = []
+        self._connections: list[Array] = []
         self.internal: list[tuple[Index, Array]] = []
 
     def keep(self, simulation: Simulation) -> None:
@@ -75,6 +79,8 @@ class Solution:
         self._reactions.append(simulation.reactions())
         self._entries.append(simulation.entries())
         self._material.append(simulation.material())
+        if self.scene.links:
+            self._connections.append(simulation.connections())
         self.parts, self.iterations = simulation.parts, simulation.iterations
 
     # -- motion --------------------------------------------------------------------------------
@@ -94,17 +100,21 @@ class Solution:
         """Velocities, as :attr:`q`; empty in statics."""
         return np.array(self._v)
 
-    def displacement(self, place: Place) -> Array:
+    def displacement(self, place: Anchor) -> Array:
         """Displacement and rotation (u, v, ψ) of a place; (n+1, 3); m, m, rad.
 
-        Linear between the vertices.
+        Linear between the vertices; of points of bodies exact.
 
         Raises:
             SceneError: The beam of the place is not in the scene.
         """
-        return self._at(place, self._q)
+        if not isinstance(place, Spot):
+            return self._at(place, self._q)
+        motion = self._of_body(place, self._q)
+        motion[:, :2] += turned(arm(place), motion[:, 2]) - arm(place)
+        return motion
 
-    def velocity(self, place: Place) -> Array:
+    def velocity(self, place: Anchor) -> Array:
         """Velocity (du/dt, dv/dt, dψ/dt) of a place; (n+1, 3); m/s, m/s, rad/s.
 
         Raises:
@@ -112,10 +122,17 @@ class Solution:
         """
         if not self._v:
             raise SceneError("velocity: the run was static; there is none")
-        return self._at(place, self._v)
+        if not isinstance(place, Spot):
+            return self._at(place, self._v)
+        motion = self._of_body(place, self._v)
+        x, y = turned(arm(place), self._of_body(place, self._q)[:, 2]).T
+        motion[:, :2] += motion[:, 2:] * np.column_stack([-y, x])
+        return motion
 
-    def position(self, place: Place) -> Array:
+    def position(self, place: Anchor) -> Array:
         """Coordinates of a place; (n+1, 2); m."""
+        if isinstance(place, Spot):
+            return np.asarray(place.point + self.displacement(place)[:, :2])
         vertices, weights = self.grid.weights(place)
         return np.asarray(weights @ self.grid.points[vertices] + self.displacement(place)[:, :2])
 
@@ -123,6 +140,32 @@ class Solution:
         vertices, weights = self.grid.weights(place)
         first, second = self.grid.dofs[vertices]
         return np.array([weights[0] * x[first] + weights[1] * x[second] for x in kept])
+
+    def _of_body(self, spot: Spot, kept: list[Array]) -> Array:
+        if node(spot) is GROUND:
+            return np.zeros((len(kept), 3))
+        dofs = self.grid.node(spot)
+        return np.array([x[dofs] for x in kept])
+
+    # -- joints --------------------------------------------------------------------------------
+
+    def connector(self, connector: Connector) -> Connection:
+        """Relative motion, force and work of a connector.
+
+        Raises:
+            SceneError: It is not in the scene.
+        """
+        (number,) = links_of(self.scene, connector)
+        return Connection(*np.array(self._connections)[:, number].T)
+
+    def joint(self, joint: Joint) -> JointHistory:
+        """What moves and acts between the first two places of a joint.
+
+        Raises:
+            SceneError: It is not in the scene.
+        """
+        forces = np.array(self._connections)[..., 1] if self._connections else np.zeros((0, 0))
+        return of_joint(self, joint, forces)
 
     def shape(self, beam: Beam, n: int = -1) -> Array:
         """Coordinates of the vertices of a beam at the n-th kept time; (num_vertices, 2); m."""
@@ -250,13 +293,11 @@ class Solution:
         if not self._v:
             raise SceneError("momentum: the run was static; there is none")
         times = Product(mass_matrix(self._fields))
-        _, first = np.unique(self.grid.dofs[:, 0], return_index=True)
-        u, v, ψ = (
-            self.grid.dofs[first, 0],
-            self.grid.dofs[first, 1],
-            np.unique(self.grid.dofs[:, 2]),
-        )
-        X, Y = self.grid.points[first].T
+        dofs = np.vstack([self.grid.dofs, self.grid.dofs_of_bodies])
+        centers = np.array([body.center for body in self.scene.movers]).reshape(-1, 2)
+        _, first = np.unique(dofs[:, 0], return_index=True)
+        u, v, ψ = dofs[first, 0], dofs[first, 1], np.unique(dofs[:, 2])
+        X, Y = np.vstack([self.grid.points, centers])[first].T
 
         def of(q: Array, velocity: Array) -> tuple[float, float, float]:
             p = times(velocity)
@@ -266,10 +307,17 @@ class Solution:
         return np.array([of(q, velocity) for q, velocity in zip(self._q, self._v, strict=True)])
 
     def __str__(self) -> str:
-        beams, cells = len(self.scene.beams), len(self.grid.cells)
+        scene = self.scene
+        counts = {
+            "beam": len(scene.beams), "cell": len(self.grid.cells),
+            "bod": len(scene.bodies), "link": len(scene.links),
+        }  # fmt: skip
+        endings = {"bod": ("y", "ies")}
+        parts = [
+            f"{n} {name}{endings.get(name, ('', 's'))[n != 1]}" for name, n in counts.items() if n
+        ]
         return (
-            f"{beams} beam{'s' * (beams != 1)}, {cells} cell{'s' * (cells != 1)}, "
-            f"{self.grid.size} degrees of freedom\n"
+            f"{', '.join(parts)}, {self.grid.size} degrees of freedom\n"
             f"t = {self._times[0]:g} to {self._times[-1]:g} s in {self.parts} steps, "
             f"{self.iterations / max(self.parts, 1):.2f} Newton iterations each, "
             f"{self.seconds:.2f} s of wall time\n{self.energy}"

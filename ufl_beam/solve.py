@@ -13,6 +13,7 @@ from petsc4py import PETSc
 import numpy as np
 
 from ufl_beam.compat import Array
+from ufl_beam.elimination import Elimination
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.grid import Share
 from ufl_beam.loops import doubles, lib
@@ -23,6 +24,9 @@ AT_ROUND_OFF = int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS)
 ITERATING = int(PETSc.SNES.ConvergedReason.ITERATING)
 DIVERGED = int(PETSc.SNES.ConvergedReason.DIVERGED_DTOL)
 STALLED = int(PETSc.SNES.ConvergedReason.DIVERGED_LINE_SEARCH)
+
+GOOD = int(PETSc.PC.FailedReason.NOERROR)
+BAD_PIVOT = int(PETSc.PC.FailedReason.FACTOR_NUMERIC_ZEROPIVOT)
 
 FULL_STEPS = {"snes_linesearch_type": "basic"}
 """A norm in a line search would add forces and moments, and each search costs a residual."""
@@ -45,6 +49,9 @@ PREFIX = "ub_"
 
 JOINTS_IN_NATURAL_ORDER = 60
 """Up to this number of shared degrees of freedom the order of the grid fills in least."""
+
+CELLS_IN_CACHE = 4096
+"""Up to this number of cells PETSc alone is as fast as elimination along the beams."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +79,56 @@ class StepFailed(Exception):
     """No equilibrium was found for a step; the message says why."""
 
 
+class ChainsFirst:
+    """What PETSc calls a preconditioner; an exact one: along the beams, then what that leaves.
+
+    Every process factors what is left, which is small, instead of waiting for another.
+
+    Args:
+        share: The degrees of freedom of this process.
+        A: The matrix.
+        package: What factors the matrix that is left.
+    """
+
+    def __init__(self, share: Share, A: Csr, package: str) -> None:
+        self._elimination = left = Elimination(share, A)
+        arrays = (left.indptr.astype(PETSc.IntType), left.indices.astype(PETSc.IntType), left.data)
+        self._matrix = PETSc.Mat().createAIJWithArrays(left.size, arrays, comm=PETSc.COMM_SELF)
+        self._matrix.assemble()
+        self._factors = PETSc.PC().create(PETSc.COMM_SELF)
+        self._factors.setOperators(self._matrix)
+        self._factors.setType("lu")
+        self._factors.setFactorSolverType(package)
+        if package == "petsc":
+            self._factors.setFactorOrdering("nd")
+        self._small = np.zeros(left.size)
+        self._rhs = PETSc.Vec().createWithArray(self._small, comm=PETSc.COMM_SELF)
+        self._solution = self._rhs.duplicate()
+
+    def setUp(self, pc: PETSc.PC) -> None:
+        """Factor; PETSc asks for it where the matrix has changed."""
+        pc.setFailedReason(GOOD if self._elimination.factor() and self._factor() else BAD_PIVOT)
+
+    def _factor(self) -> bool:
+        self._matrix.stateIncrease()
+        try:
+            self._factors.setUp()
+        except PETSc.Error:
+            # KLU says so of a matrix that is singular; its next factorisation does not mind.
+            return False
+        return int(self._factors.getFailedReason()) == GOOD
+
+    def _solve(self) -> None:
+        self._rhs.stateIncrease()
+        self._factors.apply(self._rhs, self._solution)
+
+    def apply(self, pc: PETSc.PC, b: PETSc.Vec, x: PETSc.Vec) -> None:
+        """Solve."""
+        self._elimination.reduce(b.array_r, self._small)
+        self._solve()
+        self._elimination.expand(self._solution.array_r, x.array_w)
+
+
 class Solver:
     """Finds the configuration in which a residual vanishes.
 
@@ -83,6 +140,9 @@ class Solver:
         tangent: Fills ``A`` at x: ``tangent(x)``.
         forces: Internal forces in the latest residual, one array during a solution; with the loads,
             the scale of convergence.
+        excess: Of a residual and the scale of forces: how far what connectors demand is missed,
+            as a number without dimension that must reach the tolerance too.
+        relieve: Makes tangents stiffer where that may help; says whether it can.
         newton: Tolerances.
     """
 
@@ -95,11 +155,13 @@ class Solver:
         complete: Callable[[Array], None],
         tangent: Callable[[Array], None],
         forces: Callable[[], Array],
+        excess: Callable[[Array, float], float],
+        relieve: Callable[[], bool],
         newton: Newton,
     ) -> None:
         self._share, self._A, self._newton = share, A, newton
         self._residual, self._complete, self._tangent = residual, complete, tangent
-        self._forces = forces
+        self._forces, self._excess, self._relieve = forces, excess, relieve
         self._parallel = share.comm.size > 1
         self._views: dict[int, Array] = {}
         self._weights = self._force_weights()
@@ -148,25 +210,31 @@ class Solver:
     def _make_matrix(self) -> PETSc.Mat:
         if not self._parallel:
             return self._A.petsc()
-        share = self._share
-        matrix = PETSc.Mat().create(share.comm)
-        matrix.setSizes([(share.num_owned, share.grid.size)] * 2)
-        matrix.setType("mpiaij")
-        matrix.setLGMap(*[self._x.getLGMap()] * 2)
+        # Nothing but the preconditioner, which has its own, asks for the matrix.
+        sizes = (self._share.num_owned, self._share.grid.size)
+        matrix = PETSc.Mat().createPython([sizes, sizes], object(), comm=self._share.comm)
         matrix.setUp()
-        matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, False)
         return matrix
 
     def _make_ksp(self) -> PETSc.KSP:
+        share = self._share
         ksp = PETSc.KSP().create(self._x.comm)
         ksp.setOptionsPrefix(PREFIX)
         ksp.setType("preonly")
         factors = ksp.getPC()
+        # Constraints make zeros on the diagonal, and PETSc does not exchange rows.
+        package = "klu" if len(getattr(share.grid, "multipliers", ())) else "petsc"
+        small = (
+            share.grid.num_shared <= JOINTS_IN_NATURAL_ORDER and len(share.cells) <= CELLS_IN_CACHE
+        )
+        if self._parallel or not small:
+            factors.setType("python")
+            factors.setPythonContext(ChainsFirst(share, self._A, package))
+            return ksp
         factors.setType("lu")
-        factors.setFactorSolverType("mumps" if self._parallel else "petsc")
-        if not self._parallel:
-            few_joints = self._share.grid.num_shared <= JOINTS_IN_NATURAL_ORDER
-            factors.setFactorOrdering("natural" if few_joints else "nd")
+        factors.setFactorSolverType(package)
+        if package == "petsc":
+            factors.setFactorOrdering("natural")
         return ksp
 
     def _make_snes(self, search: dict[str, Any]) -> PETSc.SNES:
@@ -212,17 +280,7 @@ class Solver:
             return
         self._update_ghosts(x)
         self._tangent(self._view(x))
-        if self._parallel:
-            P.zeroEntries()
-            P.setValuesLocalCSR(
-                self._A.indptr.astype(PETSc.IntType),
-                self._A.indices.astype(PETSc.IntType),
-                self._A.data,
-                addv=PETSc.InsertMode.ADD,
-            )
-            P.assemble()
-        else:
-            P.stateIncrease()
+        P.stateIncrease()
 
     # -- convergence ---------------------------------------------------------------------------
 
@@ -230,6 +288,7 @@ class Solver:
         """Of squares: one for forces, one over the squared size of the scene for moments."""
         weights = np.ones(self._share.size)
         weights[self._share.rotations()] = 1 / self._share.grid.scene.size**2
+        weights[self._share.multipliers()] = 0.0
         return weights[: self._share.num_owned].copy()
 
     def _size(self, forces: Any) -> float:
@@ -241,15 +300,18 @@ class Solver:
         residual = self._size(self._at_r)
         if not math.isfinite(residual):
             return DIVERGED
-        wanted = self._newton.rtol * (self._loads + self._size(self._at_forces))
-        if residual <= wanted:
+        scale = self._loads + self._size(self._at_forces)
+        wanted = self._newton.rtol * scale
+        excess = self._excess(self._r, scale)
+        if residual <= wanted and excess <= self._newton.rtol:
             return CONVERGED
         self._near = False
         if iteration > 1:
             floor = 8 * self._round_off()
             # A fraction of the last digit is luck; a few of them that Newton's method no longer
             # halves are all that can be had: it may go round between two such states for ever.
-            if residual <= floor / 80 or self._last / 2 < residual <= floor:
+            least = residual <= floor / 80 or self._last / 2 < residual <= floor
+            if least and excess <= self._newton.rtol:
                 return AT_ROUND_OFF
             # With the tangent of the iterate before, the residual falls by twice the last factor.
             self._near = residual > floor and 20 * residual**2 <= wanted * self._last
@@ -295,9 +357,11 @@ class Solver:
         reason = self._iterate(self._snes, 2)
         if reason == STALLED:
             reason = self._iterate(self._careful, 10)
+        if reason <= 0 and self._relieve():
+            x[:] = guess
+            self._x.stateIncrease()
+            reason = self._iterate(self._snes, self._newton.max_iterations)
         if reason <= 0:
-            # MUMPS does not get over a factorisation that failed, unless it begins anew.
-            self._ksp.getPC().reset()
             raise StepFailed(self._explain(reason))
         self._update_ghosts(self._x)
         return x.copy()

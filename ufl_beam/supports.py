@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from ufl_beam.bodies import GROUND
 from ufl_beam.compat import Array
 from ufl_beam.grid import Index, Share
 from ufl_beam.ledger import Ledger
@@ -57,6 +58,8 @@ class Supports:
         self._turned: list[TurnedAxes] = []
         held: list[int] = []
         self._motions: list[tuple[int, TimeFunction]] = []
+        if GROUND in share.grid.scene.movers:
+            held.extend(share.local(share.at(GROUND.middle)))
         for support in share.grid.scene.supports:
             dofs = share.at(support.place)
             if support.angle and len(share.local(dofs[:2])):

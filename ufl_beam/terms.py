@@ -142,7 +142,7 @@ class SectionForces:
 
 
 def mass_matrix(fields: Fields) -> Csr:
-    """Consistent mass of the beams, and the point masses."""
+    """Consistent mass of the beams, the point masses and the bodies."""
     share = fields.share
     (u, ψ), (w_u, w_ψ) = (split(f(fields.space)) for f in (ufl.TrialFunction, ufl.TestFunction))
     ρ = fields.inertia()
@@ -151,11 +151,13 @@ def mass_matrix(fields: Fields) -> Csr:
     kernel = fields.kernel(work, fields.configuration())
     kernel.place(M)
     kernel.add(np.zeros(share.size), M.data)
-    for mass in share.grid.scene.masses:
-        dofs = share.at(mass.place)
+    scene = share.grid.scene
+    lumps = [(share.at(one.place), one.mass, one.inertia) for one in scene.masses]
+    lumps += [(share.at(one.middle), one.mass, one.inertia) for one in scene.bodies]
+    for dofs, mass, inertia in lumps:
         mine = share.owns(dofs)
         here = share.local(dofs[mine])
-        M.data[M.positions(here, here)] += np.array([mass.mass, mass.mass, mass.inertia])[mine]
+        M.data[M.positions(here, here)] += np.array([mass, mass, inertia])[mine]
     return M
 
 

@@ -261,7 +261,7 @@ def test_empty_scene():
 
 def test_the_same_beam_twice():
     one, other = beam(), beam(name="other")
-    with raises("girder is in the scene twice, as beams 0 and 2"):
+    with raises("girder is in the scene twice, as beams[0] and beams[2]"):
         ub.Scene([one, other, one])
 
 

@@ -263,7 +263,7 @@ def test_kernels_give_what_dolfinx_assembles():
     kernel.add(q.x.array, matrix.data)
     value = fields.kernel(energy, q).value(q.x.array)
 
-    expected = Csr(csr_matrix(fields.mesh, fields.cell_dofs, fields.share.size))
+    expected = Csr(csr_matrix(fields.share.size, fields.cell_dofs))
     fem.assemble_matrix(expected.matrix, fem.form(tangent))
     scale = np.abs(expected.data).max()
     # The same kernels; sums over cells in another order

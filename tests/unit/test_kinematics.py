@@ -167,21 +167,21 @@ def test_short_steps_give_the_variation(cells):
 def test_over_tan(x):
     """Both branches are x / tan x to the last digits, so there is no jump between them."""
     for sign in (1, -1):
-        value = kinematics._over_tan(ufl.as_ufl(sign * x))(())
+        value = kinematics.over_tan(ufl.as_ufl(sign * x))(())
         assert value == pytest.approx(x / np.tan(x), rel=4e-16)  # two units in the last place
 
 
 def test_over_tan_at_zero_is_one_with_slope_zero():
-    assert kinematics._over_tan(ufl.as_ufl(0.0))(()) == 1.0
+    assert kinematics.over_tan(ufl.as_ufl(0.0))(()) == 1.0
     x = ufl.variable(ufl.as_ufl(0.0))
-    slope = ufl.algorithms.expand_derivatives(ufl.diff(kinematics._over_tan(x), x))
+    slope = ufl.algorithms.expand_derivatives(ufl.diff(kinematics.over_tan(x), x))
     assert slope(()) == 0.0
 
 
 def test_slope_of_over_tan_is_continuous_where_the_branches_meet():
     def slope(value):
         x = ufl.variable(ufl.as_ufl(value))
-        return ufl.algorithms.expand_derivatives(ufl.diff(kinematics._over_tan(x), x))(())
+        return ufl.algorithms.expand_derivatives(ufl.diff(kinematics.over_tan(x), x))(())
 
     # The points are 2e-11 apart and the curvature is -2/3; the closed branch, 1/tan x - x/sin² x,
     # cancels numbers of 100 and adds 1e-14

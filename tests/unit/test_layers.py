@@ -17,6 +17,8 @@ MODULES = sorted(path.stem for path in PACKAGE.glob("*.py"))
 
 RECORDS = [
     "beams",
+    "bodies",
+    "connectors",
     "distributions",
     "errors",
     "fibres",

@@ -1,0 +1,179 @@
+"""Elimination along chains of cells against direct solutions of the whole system."""
+
+from types import SimpleNamespace
+
+from mpi4py import MPI
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array
+
+import ufl_beam as ub
+from ufl_beam.elimination import Elimination
+from ufl_beam.sparse import Csr
+
+SECTION = ub.Section(EA=60.0, GA=40.0, EI=30.0, rhoA=2.0, rhoI=1.0)
+
+
+def cells_of(*beams):
+    """Degrees of freedom of cells, beam after beam: both u, both v, both ψ; from vertices."""
+    ends = np.array([pair for beam in beams for pair in zip(beam, beam[1:], strict=False)])
+    return (3 * ends[:, None, :] + np.arange(3)[:, None]).reshape(-1, 6)
+
+
+def system(cell_dofs, seed=0, more=(), held=()):
+    """A random unsymmetric matrix that couples the cells, ``more`` pairs of dofs; a share of it."""
+    random = np.random.default_rng(seed)
+    size = 1 + max(cell_dofs.max(), max((max(pair) for pair in more), default=0))
+    dense = np.zeros((size, size))
+    for dofs in [*cell_dofs, *map(list, more)]:
+        dense[np.ix_(dofs, dofs)] += random.uniform(-1, 1, (len(dofs), len(dofs)))
+    dense[np.diag_indices(size)] += random.uniform(2, 3, size) * random.choice([-1, 1], size)
+    pattern = csr_array(dense)
+    for dof in held:
+        dense[dof], dense[:, dof] = 0, 0
+        dense[dof, dof] = 5.0
+    rows = np.repeat(np.arange(size), np.diff(pattern.indptr))
+    A = Csr(
+        SimpleNamespace(
+            data=dense[rows, pattern.indices], indices=pattern.indices, indptr=pattern.indptr
+        )
+    )
+    share = SimpleNamespace(
+        comm=MPI.COMM_SELF, cell_dofs=cell_dofs, size=size, dofs=np.arange(size), num_owned=size
+    )
+    return share, A, dense
+
+
+def solve(elimination, b):
+    """The solution, by elimination and a dense solution of what is left; and what is left."""
+    assert elimination.factor()
+    arrays = elimination.data, elimination.indices, elimination.indptr
+    left = csr_array(arrays, shape=[elimination.size] * 2).toarray()
+    small, x = np.empty(elimination.size), np.empty(len(b))
+    elimination.reduce(b, small)
+    elimination.expand(np.linalg.solve(left, small), x)
+    return x
+
+
+CHAINS = {  # beams as their vertices; how many vertices are left
+    "one cell": (cells_of([0, 1]), 2),
+    "one vertex between ends": (cells_of([0, 1, 2]), 2),
+    "one beam": (cells_of(range(30)), 2),
+    "numbered backwards": (cells_of(range(30)[::-1]), 2),
+    "in any order": (cells_of([3, 7, 1, 9, 0, 4, 2, 8, 6, 5]), 2),
+    "three beams at a joint": (cells_of([0, 1, 2, 3], [3, 4, 5], [6, 7, 8, 3]), 4),
+    "one beam after the other": (cells_of([0, 1, 2], [2, 3, 4]), 2),
+    "end to end": (cells_of([0, 1, 2], [4, 3, 2]), 3),
+    "a ring": (cells_of([0, 1, 2, 3, 0]), 1),
+    "a ring with a tail": (cells_of([0, 1, 2, 3, 4, 2]), 2),
+    "no chain": (cells_of([0, 1], [0, 2], [0, 3]), 4),
+    "side by side": (cells_of([0, 1, 2], [0, 1, 2]), 2),
+    "side by side in part": (cells_of([0, 1, 2], [1, 2, 3]), 3),
+    "ends that are middles of others": (cells_of([1, 2, 3], [2, 1, 0]), 4),
+}
+
+
+@pytest.mark.parametrize("name", CHAINS)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_solutions_are_those_of_the_whole(name, seed):
+    cell_dofs, left = CHAINS[name]
+    share, A, dense = system(cell_dofs, seed)
+    elimination = Elimination(share, A)
+    assert elimination.size == 3 * left
+    for b in np.random.default_rng(seed).uniform(-1, 1, (2, share.size)):
+        # Random blocks need pivots between them, too, which elimination does not look for: some
+        # digits of sixteen are lost, here four at most.
+        assert np.allclose(solve(elimination, b), np.linalg.solve(dense, b), rtol=1e-9, atol=1e-10)
+
+
+def test_another_matrix_of_the_same_structure():
+    share, A, dense = system(cells_of(range(10)))
+    elimination, b = Elimination(share, A), np.ones(share.size)
+    solve(elimination, b)
+    A.data *= 2.0
+    assert np.allclose(solve(elimination, b), np.linalg.solve(2 * dense, b), rtol=1e-12, atol=0)
+
+
+def test_held_degrees_of_freedom():
+    """Of an end, of a joint, and some or all of a vertex within a chain."""
+    held = [0, 1, 2, 9, 16, 21, 22, 23]
+    share, A, dense = system(cells_of([0, 1, 2, 3], [3, 4, 5, 6, 7, 8, 9]), held=held)
+    elimination, b = Elimination(share, A), np.arange(1.0, share.size + 1)
+    assert elimination.size == 6  # vertex 3 ends one beam and begins the next
+    assert np.allclose(solve(elimination, b), np.linalg.solve(dense, b), rtol=1e-10, atol=1e-10)
+
+
+@pytest.mark.parametrize("pair", [(12, 60), (12, 30), (13, 17)])
+def test_what_couples_to_more_is_left(pair):
+    """A further unknown, another vertex far away, the next but one."""
+    cell_dofs = cells_of(range(20))
+    share, A, dense = system(cell_dofs, more=[pair])
+    elimination, b = Elimination(share, A), np.ones(share.size)
+    more = {60: 4, 30: 6, 17: 0}[pair[1]]  # vertex and unknown, two vertices, neighbours as ever
+    assert elimination.size == 6 + more
+    assert np.allclose(solve(elimination, b), np.linalg.solve(dense, b), rtol=1e-10, atol=1e-10)
+
+
+def test_zero_pivots_within_a_block():
+    """A block that is regular although its first pivots are zero."""
+    share, A, dense = system(cells_of(range(6)))
+    entries = A.positions(np.array([6, 7, 8, 7, 8]), np.array([6, 7, 8, 6, 6]))
+    A.data[entries] = 0, 0, 0, 3, 0
+    dense[[6, 7, 8, 7, 8], [6, 7, 8, 6, 6]] = 0, 0, 0, 3, 0
+    b = np.ones(share.size)
+    x = solve(Elimination(share, A), b)
+    assert np.allclose(x, np.linalg.solve(dense, b), rtol=1e-9, atol=1e-10)
+
+
+@pytest.mark.parametrize("held", [(), (3, 4, 5)])
+def test_a_singular_block_is_said(held):
+    """Even where nothing couples to it."""
+    share, A, _ = system(cells_of(range(6)), held=held)
+    rows = A.rows()
+    A.data[np.isin(rows, [3, 4, 5]) & np.isin(A.indices, [3, 4, 5])] = 0.0
+    assert not Elimination(share, A).factor()
+
+
+def tower():
+    """A lattice of some cells, with a revolute joint and a support within a beam."""
+    ends, beams = {}, []
+    for a, b in [
+        *(((i, j), (i, j + 1)) for i in range(3) for j in range(3)),
+        *(((i, j), (i + 1, j)) for i in range(2) for j in range(1, 4)),
+    ]:
+        beams.append(ub.Beam(a, b, SECTION, cells=4, name=f"{a}-{b}"))
+        ends.setdefault(a, []).append(beams[-1].start)
+        ends.setdefault(b, []).append(beams[-1].end)
+    joints = [
+        (ub.Revolute if at == (1, 2) else ub.Rigid)(*places)
+        for at, places in ends.items()
+        if len(places) > 1
+    ]
+    feet = [ub.Clamped(ends[i, 0][0]) for i in range(3)]
+    push = ub.PointLoad(ends[0, 3][0], force=(5.0, 1.0))
+    roller = ub.Roller(beams[9].at(0.5), along=(1, 1))
+    return ub.Scene(beams, joints=joints, supports=[*feet, roller], loads=[push])
+
+
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.Midpoint()], ids=["statics", "dynamics"])
+def test_on_several_processes_as_on_one(scheme):
+    """Under mpirun the same scene, shared, and by each process alone."""
+    alone, together = (
+        ub.simulate(tower(), scheme, t=(0, 1), dt=0.1, progress=False, comm=comm)
+        for comm in (MPI.COMM_SELF, MPI.COMM_WORLD)
+    )
+    assert alone.parts == together.parts == 10
+    # Residuals of 1e-10 of the forces, some 1e2 N, on stiffnesses of some 10 N/m.
+    assert np.abs(alone.q - together.q).max() < 1e-8
+
+
+def test_a_singular_tangent_cuts_the_step(monkeypatch):
+    """Also where elimination finds it; the message is that of any failure."""
+    monkeypatch.setattr("ufl_beam.solve.CELLS_IN_CACHE", 0)
+    simulation = ub.Simulation(tower(), ub.Midpoint())
+    data = simulation._A.data
+    monkeypatch.setattr(simulation, "_tangent", lambda x: data.fill(0.0))
+    simulation._solver._tangent = simulation._tangent
+    with pytest.raises(ub.ConvergenceError, match="DIVERGED_LINEAR_SOLVE"):
+        simulation.step_to(0.1)

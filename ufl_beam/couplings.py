@@ -1,0 +1,161 @@
+"""The virtual work of connectors: the force of a law on the variation of a relative motion."""
+
+from __future__ import annotations
+
+import basix.ufl
+import numpy as np
+import ufl
+from ufl.core.expr import Expr
+
+from ufl_beam.compat import Array, fem, line_mesh, space_with_dofs
+from ufl_beam.connectors import HELD, Connector, Law, Spring
+from ufl_beam.forms import Kernel
+from ufl_beam.grid import Index, Share
+from ufl_beam.relative import MOTIONS, Numbers, Pair
+from ufl_beam.responses import Setting, respond
+from ufl_beam.schemes import Step
+from ufl_beam.sparse import Csr
+
+
+def _alike(link: Connector) -> tuple[str, object]:
+    """What the connectors of one :class:`Couplings` have in common."""
+    law: Law = link.law
+    return link.motion, law if isinstance(law, Spring) else (type(law), law is HELD)
+
+
+class Couplings:
+    """Connectors of one relative motion whose laws are of one kind.
+
+    Each is a cell of unit length from one node to the other, with its force as a seventh unknown.
+
+    Attributes:
+        numbers: Of the connectors in the scene's links.
+        links: The connectors.
+        work: That they have taken since the beginning; (num_links,); J.
+    """
+
+    def __init__(self, share: Share, here: Index, setting: Setting, A: Csr) -> None:
+        links = [share.grid.scene.links[i] for i in share.links[here]]
+        self.numbers: Index = share.links[here]
+        dofs = share.link_dofs[here].astype(np.int32)
+        self._forces_at = dofs[:, 6]
+        n = len(links)
+        ends = np.tile([[0.0, 0.0], [1.0, 0.0]], (n, 1))
+        mesh = line_mesh(ends, np.arange(2 * n).reshape(-1, 2))
+        order = np.asarray(mesh.topology.original_cell_index)
+        self._order = order
+        coordinates = np.ascontiguousarray(np.tile([[0.0, 0, 0], [1.0, 0, 0]], (n, 1, 1)))
+        line = basix.ufl.element("Lagrange", "interval", 1)
+        point = basix.ufl.element("DG", "interval", 0)
+        element = basix.ufl.mixed_element([line, line, line, point])
+        space = space_with_dofs(mesh, element, dofs[order], share.size)
+
+        def given(*shape: int) -> fem.Function:
+            element = basix.ufl.element("DG", "interval", 0, shape=shape)
+            return fem.Function(fem.functionspace(mesh, element))
+
+        numbers, row = given(8), given(3)
+        numbers.x.array[:] = np.array(
+            [(*c.arms[0], *c.arms[1], *c.apart, *c.axis) for c in links], dtype=np.float64
+        )[order].ravel()
+        q0, q1 = fem.Function(space), fem.Function(space)
+        (before, _), (now, λ), (w, w_λ) = map(_split, (q0, q1, ufl.TestFunction(space)))
+        motion = MOTIONS[links[0].motion]
+        n_ = Numbers(*(ufl.as_vector([numbers[i], numbers[i + 1]]) for i in (0, 2, 4, 6)))
+        e = motion.value(now, n_)
+        e_w = motion.variation(before, now, w, n_, setting.scheme)
+        dx = ufl.Measure("dx", domain=mesh, metadata={"quadrature_degree": 1})
+        work = (λ * e_w + w_λ * (row[0] * e + row[1] * λ - row[2])) * dx
+        tangent = ufl.derivative(work, q1, ufl.TrialFunction(space))
+        z = ufl.TestFunction(given().function_space)
+
+        def kernel(form: ufl.Form) -> Kernel:
+            return Kernel(form, q1, dofs[order], coordinates)
+
+        self._q0, self._row = q0, row
+        self._work, self._tangent, self._value = map(kernel, (work, tangent, e * z * dx))
+        self._tangent.share(self._work)
+        self._tangent.place(A)
+        self._A = A
+        self.response = respond(links[0].law, links, setting)
+        self.links = links
+        self._e0: Array = np.zeros(n)
+        self._e: Array = np.zeros(n)
+        self.work: Array = np.zeros(n)
+        self._before: Array = np.zeros(n)
+        self._acting = setting.scheme.acting
+        self._rows = np.zeros((n, 3))
+        self._held = np.zeros(n, dtype=bool)
+        self._length = np.where([c.turns for c in links], 1.0, share.grid.scene.size)
+
+    # -- the step ------------------------------------------------------------------------------
+
+    def motion(self, q: Array) -> Array:
+        """Relative motions at ``q``; (num_links,); m or rad."""
+        e = np.zeros(len(self.links))
+        self._value.add(q, e)
+        e[self._order] = e.copy()
+        return e
+
+    def force(self, q: Array) -> Array:
+        """Forces that resist their growth; (num_links,); N or N m."""
+        return q[self._forces_at]
+
+    def begin(self, step: Step) -> None:
+        """Remember the motions at the beginning."""
+        self._work.set(self._q0, step.q0)
+        self._e0 = self.motion(step.q0)
+        self.response.begin(self._e0, step)
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Add the forces on the nodes, and the rows of the laws."""
+        self._ask(q1)
+        self._work.add(q1, r)
+
+    def _ask(self, q1: Array) -> None:
+        rows = self.response.rows(self.motion(q1), self.force(q1))
+        for column, numbers in enumerate(rows):
+            self._rows[:, column] = numbers
+        self._work.put(self._row, self._rows[self._order])
+
+    def add_tangent(self, q1: Array) -> None:
+        """Add the derivative; the rows are those of the latest residual."""
+        self._tangent.add(q1, self._A.data)
+
+    def excess(self, r: Array, force: float) -> float:
+        """Largest residual of a row: of motions as a part of 1 % of the scene, or of ``force``."""
+        sizes = np.where(self._rows[:, 0] == 1.0, self._length / 100, force * self._length)
+        return float(np.max(np.abs(r[self._forces_at]) / np.maximum(sizes, 1e-300), initial=0.0))
+
+    def change(self, q1: Array) -> float:
+        """Energy that the connectors take in the step to ``q1``; J."""
+        return self.response.change(self.motion(q1), self.force(q1))
+
+    def accept(self, q1: Array, s: Array) -> None:
+        """Enter what was supplied or lost."""
+        e1, λ = self.motion(q1), self.force(q1)
+        self.response.accept(e1, λ)
+        self.work += self._acting(self._before, λ) * (e1 - self._e0)
+        self._before = λ
+
+    def add_state(self, q: Array) -> None:
+        """Enter what is stored."""
+        self.response.add_state(self.motion(q))
+
+
+def _split(q: Expr) -> tuple[Pair, Expr]:
+    """Both configurations, which are values at the ends of a cell, and the force."""
+    *components, force = ufl.split(q)
+
+    def at(end: float) -> Expr:
+        return ufl.as_vector([x + end / 2 * ufl.grad(x)[0] for x in components])
+
+    return Pair(at(-1.0), at(1.0)), force
+
+
+def couplings(share: Share, setting: Setting, A: Csr) -> list[Couplings]:
+    """The connectors of a process, those that are alike together."""
+    groups: dict[tuple[str, object], list[int]] = {}
+    for i, number in enumerate(share.links):
+        groups.setdefault(_alike(share.grid.scene.links[number]), []).append(i)
+    return [Couplings(share, np.array(here), setting, A) for here in groups.values()]

@@ -1,0 +1,171 @@
+/* Elimination of the interior vertices of chains, by blocks of 3 x 3; see elimination.py.
+ *
+ * A chain is left end - vertices - right end. Its vertices are eliminated from left to right, so that
+ * each couples to the left end and to the next vertex when its turn comes. Row r of vertex v is
+ * data[indptr[row[3 v + r]]...], nine entries; order[9 v...] says where those of the columns of the
+ * vertex before, of v and of the vertex after are among them.
+ */
+
+/* What is kept of a vertex: its pivot block as LU, the couplings to and from the left end. */
+enum { PIVOT = 0, TO_LEFT = 9, FROM_LEFT = 18, KEPT = 27 };
+
+typedef struct {
+  int chains;
+  const int32_t *first;     /* first vertex of each chain, and their number */
+  const int32_t *row;       /* vertices x 3 */
+  const int32_t *order;     /* vertices x 9 */
+  const int32_t *from_ends; /* chains x 18: entries of the ends' rows, left and right */
+  const int32_t *indptr;
+  const double *data;
+  double *kept;             /* vertices x KEPT */
+  int32_t *swaps;           /* vertices x 3: rows in the order of the pivots */
+} chains;
+
+/* D = LU with the largest pivot of each column; the reciprocals of the pivots on the diagonal */
+static void factor_block(double *D, int32_t *swap)
+{
+  for (int k = 0; k < 3; ++k) swap[k] = k;
+  for (int k = 0; k < 3; ++k) {
+    int best = k;
+    for (int i = k + 1; i < 3; ++i)
+      if (fabs(D[3 * i + k]) > fabs(D[3 * best + k])) best = i;
+    if (best != k) {
+      int32_t s = swap[k];
+      swap[k] = swap[best], swap[best] = s;
+      for (int j = 0; j < 3; ++j) {
+        double d = D[3 * k + j];
+        D[3 * k + j] = D[3 * best + j], D[3 * best + j] = d;
+      }
+    }
+    D[4 * k] = 1 / D[4 * k]; /* of a singular block not finite, and so all that comes of it */
+    for (int i = k + 1; i < 3; ++i) {
+      D[3 * i + k] *= D[4 * k];
+      for (int j = k + 1; j < 3; ++j) D[3 * i + j] -= D[3 * i + k] * D[3 * k + j];
+    }
+  }
+}
+
+/* X = D^-1 B, of `columns` columns */
+static inline void solve_block(const double *D, const int32_t *swap, int columns, const double *B,
+                               double *X)
+{
+  const double *b0 = B + columns * swap[0], *b1 = B + columns * swap[1], *b2 = B + columns * swap[2];
+  for (int j = 0; j < columns; ++j) {
+    double x0 = b0[j], x1 = b1[j] - D[3] * x0, x2 = b2[j] - D[6] * x0 - D[7] * x1;
+    x2 *= D[8];
+    x1 = (x1 - D[5] * x2) * D[4];
+    X[j] = (x0 - D[1] * x1 - D[2] * x2) * D[0];
+    X[columns + j] = x1, X[2 * columns + j] = x2;
+  }
+}
+
+/* Y -= A X for blocks of 3 x 3, X in rows of six */
+static inline void subtract_product(const double *A, const double *X, double *Y)
+{
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      Y[3 * i + j] -= A[3 * i] * X[j] + A[3 * i + 1] * X[6 + j] + A[3 * i + 2] * X[12 + j];
+}
+
+/* y -= A x */
+static inline void subtract(const double *A, const double *x, double *y)
+{
+  for (int i = 0; i < 3; ++i) y[i] -= A[3 * i] * x[0] + A[3 * i + 1] * x[1] + A[3 * i + 2] * x[2];
+}
+
+/* The block of a vertex with the one before (0), itself (1) or the one after (2) */
+static inline void read_block(const chains *c, int vertex, int neighbour, double *block)
+{
+  const int32_t *order = c->order + 9 * vertex + 3 * neighbour;
+  for (int r = 0; r < 3; ++r) {
+    const double *row = c->data + c->indptr[c->row[3 * vertex + r]];
+    for (int k = 0; k < 3; ++k) block[3 * r + k] = row[order[k]];
+  }
+}
+
+/* The block of the one after a vertex with the vertex */
+static inline void read_below(const chains *c, int chain, int vertex, double *block)
+{
+  if (vertex + 1 < c->first[chain + 1])
+    read_block(c, vertex + 1, 0, block);
+  else
+    for (int k = 0; k < 9; ++k) block[k] = c->data[c->from_ends[18 * chain + 9 + k]];
+}
+
+/* Eliminate all vertices; what that makes of the blocks of the ends, left-left, left-right,
+ * right-left and right-right, is added to `left` at the places given for each chain. */
+void eliminate(const chains *c, const int32_t *places, double *left)
+{
+  for (int chain = 0; chain < c->chains; ++chain, places += 36) {
+    double ends[36] = {0}, pivot[9], to[9], from[9], below[9], side[18], solved[18];
+    read_block(c, c->first[chain], 1, pivot);
+    read_block(c, c->first[chain], 0, to);
+    for (int k = 0; k < 9; ++k) from[k] = c->data[c->from_ends[18 * chain + k]];
+    for (int v = c->first[chain]; v < c->first[chain + 1]; ++v) {
+      double *kept = c->kept + KEPT * v, after[9];
+      int32_t *swap = c->swaps + 3 * v;
+      factor_block(pivot, swap);
+      memcpy(kept + PIVOT, pivot, sizeof pivot);
+      memcpy(kept + TO_LEFT, to, sizeof to);
+      memcpy(kept + FROM_LEFT, from, sizeof from);
+      read_block(c, v, 2, after);
+      read_below(c, chain, v, below);
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j)
+          side[6 * i + j] = to[3 * i + j], side[6 * i + 3 + j] = after[3 * i + j];
+      solve_block(pivot, swap, 6, side, solved);
+      if (v + 1 < c->first[chain + 1]) read_block(c, v + 1, 1, pivot);
+      else memset(pivot, 0, sizeof pivot);
+      subtract_product(from, solved, ends);
+      memset(to, 0, sizeof to);
+      subtract_product(below, solved, to);
+      subtract_product(below, solved + 3, pivot);
+      double next[9] = {0};
+      subtract_product(from, solved + 3, next);
+      memcpy(from, next, sizeof from);
+    }
+    memcpy(ends + 9, from, sizeof from);
+    memcpy(ends + 18, to, sizeof to);
+    memcpy(ends + 27, pivot, sizeof pivot);
+    for (int k = 0; k < 36; ++k) left[places[k]] += ends[k];
+  }
+}
+
+/* The same for a right-hand side b: f of each vertex, and what is added at the six ends' places. */
+void eliminate_from(const chains *c, const double *b, double *f, const int32_t *places, double *left)
+{
+  for (int chain = 0; chain < c->chains; ++chain, places += 6) {
+    double ends[6] = {0}, next[3], below[9], y[3];
+    memset(next, 0, sizeof next);
+    for (int v = c->first[chain]; v < c->first[chain + 1]; ++v) {
+      const double *kept = c->kept + KEPT * v;
+      for (int r = 0; r < 3; ++r) f[3 * v + r] = b[c->row[3 * v + r]] + next[r];
+      solve_block(kept + PIVOT, c->swaps + 3 * v, 1, f + 3 * v, y);
+      read_below(c, chain, v, below);
+      memset(next, 0, sizeof next);
+      subtract(below, y, next);
+      subtract(kept + FROM_LEFT, y, ends);
+    }
+    memcpy(ends + 3, next, sizeof next);
+    for (int k = 0; k < 6; ++k) left[places[k]] += ends[k];
+  }
+}
+
+/* The unknowns of all vertices into x, from those of the ends; f as eliminate_from left it. */
+void substitute(const chains *c, const double *f, const int32_t *places, const double *ends,
+                double *x)
+{
+  for (int chain = 0; chain < c->chains; ++chain, places += 6) {
+    double left[3], after[9], y[3], next[3];
+    for (int k = 0; k < 3; ++k) left[k] = ends[places[k]], next[k] = ends[places[3 + k]];
+    for (int v = c->first[chain + 1] - 1; v >= c->first[chain]; --v) {
+      const double *kept = c->kept + KEPT * v;
+      memcpy(y, f + 3 * v, sizeof y);
+      read_block(c, v, 2, after);
+      subtract(kept + TO_LEFT, left, y);
+      subtract(after, next, y);
+      solve_block(kept + PIVOT, c->swaps + 3 * v, 1, y, next);
+      for (int r = 0; r < 3; ++r) x[c->row[3 * v + r]] = next[r];
+    }
+  }
+}

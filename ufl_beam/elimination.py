@@ -1,0 +1,185 @@
+"""Gauss elimination of what lies between the ends of chains of cells, which needs no other process.
+
+A beam of many cells is a chain of vertices that couple to their two neighbours only.  Each process
+eliminates them from its chains, by blocks, and leaves a small matrix of what remains: joints, ends,
+vertices at the border between processes, whatever else couples to more than two neighbours.  Its
+entries are summed over the processes.
+"""
+
+from __future__ import annotations
+
+from mpi4py import MPI
+
+import numpy as np
+import numpy.typing as npt
+
+from ufl_beam.compat import Array
+from ufl_beam.grid import Index, Share
+from ufl_beam.loops import doubles, ffi, integers, lib
+from ufl_beam.sparse import Csr
+
+KEPT = 27
+"""Numbers kept of each vertex that is eliminated; as in ``elimination.c``."""
+
+
+class Chains:
+    """Vertices of the cells of one process that couple to their two neighbours and to nothing else.
+
+    They are found in the structure of the matrix, so they remain right whatever comes to couple.
+
+    Args:
+        cell_dofs: Local degrees of freedom of the cells: both u, both v, both ψ; (num_cells, 6).
+        A: Matrix with the columns of each row in order.
+        alone: Which local degrees of freedom no other process has; (A.size,).
+
+    Attributes:
+        dofs: Degrees of freedom of the vertices, chain after chain; (num_vertices, 3).
+        first: First vertex of each chain, and the number of vertices.
+        ends: Degrees of freedom of the left and the right end of each chain; (num_chains, 6).
+        order: Where in the rows of a vertex the columns of the vertex before, of itself and of the
+            vertex after stand; (num_vertices, 9).
+    """
+
+    def __init__(self, cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -> None:
+        start, end = cell_dofs[:, 0::2], cell_dofs[:, 1::2]
+        # Vertex number k is the one between the cells k and k + 1.
+        around = np.hstack([start[:-1], end[:-1], end[1:]])
+        inside = (end[:-1] == start[1:]).all(axis=1) & (np.diff(np.sort(around)) > 0).all(axis=1)
+        # With nine entries in rows and columns, these nine are all.
+        plain = alone & (np.diff(A.indptr) == 9)
+        plain &= np.bincount(A.indices, minlength=A.size) == 9
+        inside &= plain[end[:-1]].all(axis=1)
+        inside &= _is_first(end[:-1, 0])
+        # Beams side by side may make an end of a chain the middle of another.
+        middle = np.zeros(A.size, dtype=bool)
+        middle[end[:-1][inside]] = True
+        chain, first, last = _runs(inside)
+        ends = np.hstack([start[:-1][first], end[1:][last]])
+        inside[inside] = ~middle[ends].any(axis=1)[chain]
+
+        _, first, last = _runs(inside)
+        self.ends = np.hstack([start[:-1][first], end[1:][last]])
+        self.dofs = end[:-1][inside]
+        self.first = np.append(0, np.cumsum(last - first + 1))
+        self.order = np.argsort(np.argsort(around[inside], axis=1), axis=1)
+
+
+def _is_first(values: Index) -> npt.NDArray[np.bool_]:
+    """Which of the values did not occur before."""
+    first = np.zeros(len(values), dtype=bool)
+    first[np.unique(values, return_index=True)[1]] = True
+    return first
+
+
+def _runs(mask: npt.NDArray[np.bool_]) -> tuple[Index, Index, Index]:
+    """Runs of true values: the run of each of them; first and last position of each run."""
+    edges = np.diff(np.concatenate([[0], mask.astype(np.int8), [0]]))
+    first, last = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+    return np.repeat(np.arange(len(first)), last - first + 1), first, last
+
+
+class Elimination:
+    """Solves with a matrix but for a small one of what cannot be eliminated in chains.
+
+    The call is :meth:`factor`, and for each right-hand side :meth:`reduce`, the solution of the
+    small system by the caller, and :meth:`expand`.  The entries of ``A`` must not change meanwhile.
+
+    Args:
+        share: Degrees of freedom of this process.
+        A: The matrix; of degrees of freedom that several processes have, a summand on each.
+
+    Attributes:
+        indptr: First entry of each row of the small matrix, which all processes have.
+        indices: Column of each entry.
+        data: Its entries; summed over the processes by :meth:`factor`.
+    """
+
+    def __init__(self, share: Share, A: Csr) -> None:
+        self._comm, self._A = share.comm, A
+        self._chains = chains = Chains(share.cell_dofs, A, self._alone(share))
+        left = np.ones(share.size, dtype=bool)
+        left[chains.dofs] = False
+        here = np.flatnonzero(left)
+        numbers = np.unique(np.concatenate(self._comm.allgather(share.dofs[here])))
+        self._number = np.full(share.size, -1)
+        self._number[here] = np.searchsorted(numbers, share.dofs[here])
+        self._owned = here[here < share.num_owned]
+        self._places_of_owned = self._number[self._owned]
+        self._make_matrix(len(numbers))
+        self._make_arguments()
+
+    @staticmethod
+    def _alone(share: Share) -> npt.NDArray[np.bool_]:
+        ghosts = np.concatenate(share.comm.allgather(share.dofs[share.num_owned :]))
+        return ~np.isin(share.dofs, ghosts)
+
+    def _make_matrix(self, size: int) -> None:
+        """Structure of the small matrix, and where its entries come from."""
+        rows, columns = (self._number[i] for i in (self._A.rows(), self._A.indices))
+        self._entries = np.flatnonzero((rows >= 0) & (columns >= 0))
+        keys = rows[self._entries] * size + columns[self._entries]
+        ends = self._number[self._chains.ends].reshape(-1, 2, 3)
+        of_blocks = ends[:, :, None, :, None] * size + ends[:, None, :, None, :]
+        of_chains = of_blocks.ravel()
+        mine = np.unique(np.concatenate([keys, of_chains]))
+        if self._comm.size > 1:
+            mine = np.unique(np.concatenate(self._comm.allgather(mine)))
+        self._places = np.searchsorted(mine, keys)
+        self._places_of_chains = np.searchsorted(mine, of_chains).astype(np.int32)
+        self.indices = (mine % size).astype(np.int32)
+        self.indptr = np.searchsorted(mine, np.arange(size + 1) * size).astype(np.int32)
+        self.data = np.zeros(len(mine))
+
+    def _make_arguments(self) -> None:
+        A, chains = self._A, self._chains
+        ends = chains.ends.reshape(-1, 2, 3, 1)
+        next_to = np.stack([chains.dofs[chains.first[:-1]], chains.dofs[chains.first[1:] - 1]], 1)
+        rows, columns = np.broadcast_arrays(ends, next_to[:, :, None, :])
+        arrays = [
+            np.ascontiguousarray(array, dtype=np.int32)
+            for array in (
+                chains.first,
+                chains.dofs,
+                chains.order,
+                A.positions(rows.ravel(), columns.ravel()),
+                A.indptr,
+            )
+        ]
+        vertices = len(chains.dofs)
+        self._f = np.zeros(3 * vertices)
+        self._at_f = doubles(self._f)
+        kept, swaps = np.empty(KEPT * vertices), np.empty(3 * vertices, dtype=np.int32)
+        self._alive = [*map(integers, arrays), doubles(A.data), doubles(kept), integers(swaps)]
+        self._c = ffi.new("chains *", (len(chains.ends), *self._alive))
+        self._at_places = integers(self._places_of_chains)
+        ends_left = np.ascontiguousarray(self._number[chains.ends], dtype=np.int32)
+        self._at_ends = integers(ends_left)
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns of the small system."""
+        return len(self.indptr) - 1
+
+    def factor(self) -> bool:
+        """Eliminate the chains and fill :attr:`data`; whether all of it is finite."""
+        self.data.fill(0.0)
+        self.data[self._places] = self._A.data[self._entries]
+        lib.eliminate(self._c, self._at_places, doubles(self.data))
+        self._sum(self.data)
+        return bool(np.isfinite(self.data).all())
+
+    def reduce(self, b: Array, small: Array) -> None:
+        """Right-hand side of the small system; ``b`` at the degrees of freedom owned here."""
+        small.fill(0.0)
+        small[self._places_of_owned] = b[self._owned]
+        lib.eliminate_from(self._c, doubles(b), self._at_f, self._at_ends, doubles(small))
+        self._sum(small)
+
+    def expand(self, small: Array, x: Array) -> None:
+        """The solution at the degrees of freedom owned here, after that of the small system."""
+        x[self._owned] = small[self._places_of_owned]
+        lib.substitute(self._c, self._at_f, self._at_ends, doubles(small), doubles(x))
+
+    def _sum(self, values: Array) -> None:
+        if self._comm.size > 1:
+            self._comm.Allreduce(MPI.IN_PLACE, values)

@@ -1,0 +1,102 @@
+"""What joints and connectors did and bore in a run."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ufl_beam.compat import Array
+from ufl_beam.connectors import Connector, Joint
+from ufl_beam.errors import SceneError
+from ufl_beam.scene import Scene
+
+if TYPE_CHECKING:
+    from ufl_beam.solution import Solution
+
+
+class Connection(NamedTuple):
+    """History of a connector.
+
+    Attributes:
+        motion: Relative motion since the undeformed scene; (n+1,); m or rad.
+        force: That resisted its growth during the step that ends there; (n+1,); N or N m.
+        work: That the connector has taken since the beginning: what springs store and dissipate,
+            what dampers and friction dissipate, and minus what motors supply; (n+1,); J.
+    """
+
+    motion: Array
+    force: Array
+    work: Array
+
+
+class JointHistory(NamedTuple):
+    """History of a joint, b being its second place and a its first.
+
+    Attributes:
+        motion: Displacement of b relative to a, in axes that turn with a, and rotation of b
+            relative to a; zero in the undeformed scene; (n+1, 3); m, m, rad.
+        force: That the joint exerts on b, in the plane; (n+1, 2); N.
+        in_a, in_b: The same in axes that turn with a and with b; (n+1, 2); N.
+        moment: That it exerts on b, about the place b; (n+1,); N m.
+    """
+
+    motion: Array
+    force: Array
+    in_a: Array
+    in_b: Array
+    moment: Array
+
+
+def links_of(scene: Scene, of: Connector | Joint) -> list[int]:
+    """Numbers of the links of a connector, or of those that hold a joint.
+
+    Raises:
+        SceneError: It is not in the scene, or it shares unknowns so that nothing holds it.
+    """
+    if isinstance(of, Connector):
+        if of not in scene.links:
+            raise SceneError(f"{of} is not in the scene")
+        return [scene.links.index(of)]
+    if of not in scene.joints:
+        raise SceneError(f"{of} is not in the scene")
+    if not of.holders:
+        raise SceneError(
+            f"{of} shares unknowns, so that its force is not known; make it with measured=True"
+        )
+    return [scene.links.index(holder) for holder in of.holders]
+
+
+def turned(x: tuple[float, float] | Array, angle: Array) -> Array:
+    """A vector, or one for each angle, turned by angles; (n, 2)."""
+    a, b = np.asarray(x, dtype=np.float64).T
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.column_stack([cos * a - sin * b, sin * a + cos * b])
+
+
+def of_joint(solution: Solution, joint: Joint, forces: Array) -> JointHistory:
+    """History of a joint, from the forces of all links of the scene; (n+1, num_links)."""
+    scene = solution.scene
+    a, b, *_ = joint.places
+    turns = [solution.displacement(place)[:, 2] for place in (a, b)]
+    apart = np.subtract(b.point, a.point)
+    between = solution.position(b) - solution.position(a)
+    motion = np.column_stack([turned(between, -turns[0]) - apart, turns[1] - turns[0]])
+    force, moment = np.zeros((len(solution.times), 2)), np.zeros(len(solution.times))
+    for number, holder in zip(links_of(scene, joint), joint.holders, strict=True):
+        if {holder.a, holder.b} != {a, b}:
+            continue
+        λ = forces[:, number]
+        if holder.turns:
+            moment -= λ
+        else:
+            force -= λ[:, None] * _direction(solution, holder, turns[0])
+    return JointHistory(motion, force, turned(force, -turns[0]), turned(force, -turns[1]), moment)
+
+
+def _direction(solution: Solution, holder: Connector, turn: Array) -> Array:
+    """Unit vectors in the plane along which a motion grows; (n+1, 2)."""
+    if holder.motion == "stretching":
+        between = solution.position(holder.b) - solution.position(holder.a)
+        return np.asarray(between / np.linalg.norm(between, axis=1)[:, None])
+    return turned(holder.axis, turn if holder.motion == "sliding" else np.zeros_like(turn))

@@ -1,0 +1,31 @@
+"""Which processes compute a scene together: all of them, or within a study one alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+from mpi4py import MPI
+
+_OURS: ContextVar[MPI.Intracomm] = ContextVar("processes of a scene", default=MPI.COMM_WORLD)
+
+
+def ours() -> MPI.Intracomm:
+    """The processes that a scene is computed by, unless a call says others."""
+    return _OURS.get()
+
+
+@contextmanager
+def alone() -> Iterator[None]:
+    """Within this context a scene is computed by this process alone."""
+    before = _OURS.set(MPI.COMM_SELF)
+    try:
+        yield
+    finally:
+        _OURS.reset(before)
+
+
+def in_study() -> bool:
+    """Whether this is a member of a study, which shows no progress of its own."""
+    return _OURS.get() != MPI.COMM_WORLD

@@ -1,0 +1,332 @@
+"""How the laws of connectors answer in a step: one row ``α e + β λ = γ`` for each of them.
+
+e is the relative motion at the end of the step and λ the force that resists its growth.  What is
+held has a row about e, all other laws have one about λ, linear in e around the latest iterate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import singledispatch
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+import numpy as np
+
+from ufl_beam.compat import Array
+from ufl_beam.connectors import (
+    HELD,
+    Actuator,
+    Connector,
+    Controller,
+    Coulomb,
+    Damper,
+    Function,
+    Motor,
+    Spring,
+    Stop,
+)
+from ufl_beam.laws import Hardening, Layout
+from ufl_beam.ledger import Ledger
+from ufl_beam.points import INPUTS, Points, expect_entries
+from ufl_beam.schemes import Scheme, Step
+
+if TYPE_CHECKING:
+    from ufl_beam.simulation import Simulation
+
+Rows = tuple[Array | float, Array | float, Array | float]
+"""α, β, γ of some connectors."""
+
+
+class Setting(NamedTuple):
+    """What responses are made with.
+
+    Attributes:
+        simulation: Whom controllers and friction ask.
+        scheme: Says what acts in a step.
+        ledger: Takes energies and works.
+    """
+
+    simulation: Simulation
+    scheme: Scheme
+    ledger: Ledger
+
+
+class Response(Protocol):
+    """Some connectors whose laws are of one kind; motions and forces are arrays of them."""
+
+    def begin(self, e0: Array, step: Step) -> None:
+        """Begin a step at the motions ``e0``."""
+
+    def rows(self, e1: Array, λ: Array) -> Rows:
+        """α, β, γ around an iterate."""
+
+    def accept(self, e1: Array, λ: Array) -> None:
+        """Take the end of the step as the new state; enter what was supplied or lost."""
+
+    def add_state(self, e: Array) -> None:
+        """Enter what is stored."""
+
+    def change(self, e1: Array, λ: Array) -> float:
+        """Energy that the step stores, dissipates or gives away; J."""
+
+
+@singledispatch
+def respond(law: Any, links: Sequence[Connector], setting: Setting) -> Response:
+    """The response of connectors whose laws are of the kind of ``law``."""
+    raise TypeError(f"{law!r} is no law of a connector")
+
+
+class _Working:
+    """What responses have in common that store nothing: the work of their forces is entered."""
+
+    _group = "lost"
+    _entry = ""
+    _sign = 1.0
+
+    def __init__(self, links: Sequence[Connector], setting: Setting) -> None:
+        self._laws: list[Any] = [link.law for link in links]
+        self._setting = setting
+        self._acting = setting.scheme.acting
+        self._entries = getattr(setting.ledger, self._group)
+        if self._entry:
+            self._entries[self._entry] += 0.0
+        self._before: Array = np.zeros(len(links))
+        self._e0: Array = np.zeros(len(links))
+
+    def begin(self, e0: Array, step: Step) -> None:
+        """Begin a step at the motions ``e0``."""
+        self._e0, self._dt = e0, step.dt
+        self._prepare(step)
+
+    def _prepare(self, step: Step) -> None:
+        """What a law notes at the beginning of a step."""
+
+    def accept(self, e1: Array, λ: Array) -> None:
+        """Enter the work."""
+        if self._entry:
+            self._entries[self._entry] += self._sign * self.change(e1, λ)
+        self._before = λ.copy()
+
+    def add_state(self, e: Array) -> None:
+        """Nothing is stored."""
+
+    def change(self, e1: Array, λ: Array) -> float:
+        """Work of the step; J."""
+        return float(self._acting(self._before, λ) @ (e1 - self._e0))
+
+    def _numbers(self, name: str) -> Array:
+        return np.array([getattr(law, name) for law in self._laws], dtype=np.float64)
+
+
+class _Held(_Working):
+    """What joints hold: the motion is zero, and there is no work."""
+
+    def rows(self, e1: Array, λ: Array) -> Rows:
+        """The motion is held."""
+        return 1.0, 0.0, 0.0
+
+
+class _Driven(_Working):
+    """Motors: the motion is given."""
+
+    _group, _entry, _sign = "supplied", "motors", -1.0
+
+    def _prepare(self, step: Step) -> None:
+        wanted = np.array([law.motion(step.motion_time) for law in self._laws])
+        self._target = self._e0 + step.toward * (wanted - self._e0)
+
+    def rows(self, e1: Array, λ: Array) -> Rows:
+        """The motion is given."""
+        return 1.0, 0.0, self._target
+
+
+@respond.register
+def _(law: Motor, links: Sequence[Connector], setting: Setting) -> Response:
+    return (_Held if law is HELD else _Driven)(links, setting)
+
+
+@respond.register(Actuator)
+class _Pushed(_Working):
+    """Actuators: the force is given."""
+
+    _group, _entry, _sign = "supplied", "loads", -1.0
+
+    def __init__(self, law: Actuator, links: Sequence[Connector], setting: Setting) -> None:
+        super().__init__(links, setting)
+
+    def _prepare(self, step: Step) -> None:
+        wanted = -np.array([self._wanted(law, step) for law in self._laws])
+        self._force = self._before + step.toward * (wanted - self._before)
+
+    def _wanted(self, law: Any, step: Step) -> float:
+        return float(law.force(step.load_time))
+
+    def rows(self, e1: Array, λ: Array) -> Rows:
+        """The force is given."""
+        return 0.0, 1.0, self._force
+
+
+@respond.register(Controller)
+class _Controlled(_Pushed):
+    """Controllers: the force is what they said at the beginning of the step."""
+
+    _entry = "controllers"
+
+    def _wanted(self, law: Any, step: Step) -> float:
+        return float(law.force(self._setting.simulation))
+
+
+@respond.register(Damper)
+class _Damped(_Working):
+    """Dampers."""
+
+    _entry = "damping"
+
+    def __init__(self, law: Damper, links: Sequence[Connector], setting: Setting) -> None:
+        super().__init__(links, setting)
+        self._viscosity = self._numbers("viscosity")
+
+    def rows(self, e1: Array, λ: Array) -> Rows:
+        """The force is viscosity times the mean rate."""
+        factor = self._viscosity / self._dt
+        return -factor, 1.0, -factor * self._e0
+
+
+@respond.register(Function)
+class _Asked(_Working):
+    """Forces that a function of motion and rate gives."""
+
+    _entry = "functions"
+
+    def __init__(self, law: Function, links: Sequence[Connector], setting: Setting) -> None:
+        super().__init__(links, setting)
+
+    def _forces(self, e1: Array) -> Array:
+        middle: Array = self._setting.scheme.average(self._e0, e1)
+        rate = (e1 - self._e0) / self._dt
+        return np.array(
+            [float(law.force(m, r)) for law, m, r in zip(self._laws, middle, rate, strict=True)]
+        )
+
+    def rows(self, e1: Array, λ: Array) -> Rows:
+        """The force around the iterate; its derivative by central differences."""
+        force = self._forces(e1)
+        ε = 6e-6 * np.maximum(np.abs(e1 - self._e0), 1e-3 * np.maximum(np.abs(e1), 1e-3))
+        slope = (self._forces(e1 + ε) - self._forces(e1 - ε)) / (2 * ε)
+        return -slope, 1.0, force - slope * e1
+
+
+@respond.register(Coulomb)
+class _Rubbing(_Working):
+    """Dry friction: each connector sticks (0), or slips one way or the other (-1, 1)."""
+
+    _entry = "friction"
+
+    def __init__(self, law: Coulomb, links: Sequence[Connector], setting: Setting) -> None:
+        super().__init__(links, setting)
+        self._slip: Array = np.zeros(len(links))
+        self._tiny = 1e-14 * np.where([c.turns for c in links], 1.0, setting.simulation.scene.size)
+
+    def _prepare(self, step: Step) -> None:
+        ask = self._setting.simulation
+        self._limit = np.array(
+            [
+                law.force + (law.coefficient and law.coefficient * ask.press(law.joint))
+                for law in self._laws
+            ]
+        )
+
+    def rows(self, e1: Array, λ: Array) -> Rows:
+        """What sticks is held until it bears too much; what slips goes on until it turns back."""
+        step = e1 - self._e0
+        stuck = self._slip == 0
+        back = ~stuck & (self._slip * step < -self._tiny)
+        over = stuck & (np.abs(λ) > self._limit * (1 + 1e-12))
+        self._slip = np.where(back, 0.0, np.where(over, np.sign(λ), self._slip))
+        sticks = self._slip == 0
+        return (
+            np.where(sticks, 1.0, 0.0),
+            np.where(sticks, 0.0, 1.0),
+            np.where(sticks, self._e0, self._slip * self._limit),
+        )
+
+
+@respond.register(Stop)
+class _Stopped(_Working):
+    """Contact outside an interval: elastic, so that what it takes it gives back."""
+
+    def __init__(self, law: Stop, links: Sequence[Connector], setting: Setting) -> None:
+        super().__init__(links, setting)
+        self._low, self._high = self._numbers("low"), self._numbers("high")
+        self._stiffness = self._numbers("stiffness")
+
+    def _beyond(self, e: Array) -> Array:
+        return np.asarray(np.maximum(e - self._high, 0.0) + np.minimum(e - self._low, 0.0))
+
+    def _energy(self, e: Array) -> float:
+        return float(self._stiffness @ self._beyond(e) ** 2) / 2
+
+    def rows(self, e1: Array, λ: Array) -> Rows:
+        """The force that makes the work of the step what the contact stores."""
+        force, slope = self._setting.scheme.secant(self._beyond, self._e0, e1)
+        force, slope = self._stiffness * force, self._stiffness * slope
+        return -slope, 1.0, force - slope * e1
+
+    def add_state(self, e: Array) -> None:
+        """Stored energy."""
+        self._setting.ledger.state["stored"] += self._energy(e)
+
+    def change(self, e1: Array, λ: Array) -> float:
+        """Energy stored in the step; J."""
+        return self._energy(e1) - self._energy(self._e0)
+
+
+@respond.register(Spring)
+class _Sprung:
+    """Springs of one law: material points whose strain is the motion."""
+
+    def __init__(self, law: Spring, links: Sequence[Connector], setting: Setting) -> None:
+        layout = Layout(
+            strains=np.array([[1.0, 0.0, 0.0]]),
+            weights=np.ones(1),
+            stiffness=np.array([law.stiffness]),
+            laws=((law.law or Hardening(limit=np.inf), 1),),
+            rest=np.zeros(3),
+            softening=law.softening,
+            breaking=slice(0, None),
+        )
+        number = len(links)
+        keys = [(0, i) for i in range(number)]
+        storage = np.zeros((number, 1, len(INPUTS)))
+        self.points = Points(layout, keys, np.ones(number), setting.scheme, storage)
+        self._ledger = setting.ledger
+        expect_entries(layout, setting.scheme, setting.ledger)
+        self._strains = np.zeros((number, 3))
+
+    def _at(self, e: Array) -> Array:
+        self._strains[:, 0] = e
+        return self._strains
+
+    def begin(self, e0: Array, step: Step) -> None:
+        """Begin a step."""
+        self.points.begin(step.dt)
+
+    def rows(self, e1: Array, λ: Array) -> Rows:
+        """The force around the iterate."""
+        r, D = self.points.respond(self._at(e1))
+        return -D[:, 0], 1.0, r[:, 0] - D[:, 0] * e1
+
+    def accept(self, e1: Array, λ: Array) -> None:
+        """Commit the internal variables."""
+        self.points.respond(self._at(e1))
+        self.points.accept()
+        self.points.enter_losses(self._ledger)
+
+    def add_state(self, e: Array) -> None:
+        """Stored energy."""
+        self.points.enter_stored(self._ledger)
+
+    def change(self, e1: Array, λ: Array) -> float:
+        """Energy stored and dissipated in the step; J."""
+        self.points.respond(self._at(e1))
+        return self.points.change()
