@@ -227,7 +227,7 @@ class Connector:
     def __post_init__(self) -> None:
         for anchor in (self.a, self.b):
             require_anchor(anchor, self.kind)
-        require_kind(self.law, Law.__args__, f"{self}: law")  # type: ignore[attr-defined]
+        require_kind(self.law, Law.__args__, f"{self}: law")
 
     def __str__(self) -> str:
         return f"{self.kind}({self.a}, {self.b})"

@@ -79,14 +79,13 @@ class Couplings:
         self._A = A
         self.response = respond(links[0].law, links, setting)
         self.links = links
-        self._e0: Array = np.zeros(n)
-        self._e: Array = np.zeros(n)
         self.work: Array = np.zeros(n)
-        self._before: Array = np.zeros(n)
         self._acting = setting.scheme.acting
+        self._before: Array = np.zeros(n)
         self._rows = np.zeros((n, 3))
-        self._held = np.zeros(n, dtype=bool)
         self._length = np.where([c.turns for c in links], 1.0, share.grid.scene.size)
+        self._q: Array = np.empty(0)
+        self._e: Array = np.zeros(n)
 
     # -- the step ------------------------------------------------------------------------------
 
@@ -104,19 +103,22 @@ class Couplings:
     def begin(self, step: Step) -> None:
         """Remember the motions at the beginning."""
         self._work.set(self._q0, step.q0)
-        self._e0 = self.motion(step.q0)
-        self.response.begin(self._e0, step)
+        if step.q0 is not self._q:
+            self._q, self._e = step.q0, self.motion(step.q0)
+        self.response.begin(self._e, step)
+        if self.response.steady:
+            self._put(*self.response.rows(self._e, self._before))
 
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Add the forces on the nodes, and the rows of the laws."""
-        self._ask(q1)
-        self._work.add(q1, r)
-
-    def _ask(self, q1: Array) -> None:
-        rows = self.response.rows(self.motion(q1), self.force(q1))
+    def _put(self, *rows: Array | float) -> None:
         for column, numbers in enumerate(rows):
             self._rows[:, column] = numbers
         self._work.put(self._row, self._rows[self._order])
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Add the forces on the nodes, and the rows of the laws."""
+        if not self.response.steady:
+            self._put(*self.response.rows(self.motion(q1), self.force(q1)))
+        self._work.add(q1, r)
 
     def add_tangent(self, q1: Array) -> None:
         """Add the derivative; the rows are those of the latest residual."""
@@ -124,23 +126,44 @@ class Couplings:
 
     def excess(self, r: Array, force: float) -> float:
         """Largest residual of a row: of motions as a part of 1 % of the scene, or of ``force``."""
-        sizes = np.where(self._rows[:, 0] == 1.0, self._length / 100, force * self._length)
-        return float(np.max(np.abs(r[self._forces_at]) / np.maximum(sizes, 1e-300), initial=0.0))
+        about_motion = self._rows[:, 1] == 0.0
+        sizes = self._length * np.where(about_motion, 0.01, force or 1.0)
+        return float((np.abs(r[self._forces_at]) / sizes).max())
+
+    def _taken(self, e1: Array, λ: Array) -> Array:
+        return self._acting(self._before, λ) * (e1 - self._e)
 
     def change(self, q1: Array) -> float:
         """Energy that the connectors take in the step to ``q1``; J."""
-        return self.response.change(self.motion(q1), self.force(q1))
+        e1 = self.motion(q1)
+        return self.response.change(e1, float(self._taken(e1, self.force(q1)).sum()))
 
     def accept(self, q1: Array, s: Array) -> None:
         """Enter what was supplied or lost."""
         e1, λ = self.motion(q1), self.force(q1)
-        self.response.accept(e1, λ)
-        self.work += self._acting(self._before, λ) * (e1 - self._e0)
-        self._before = λ
+        taken = self._taken(e1, λ)
+        self.response.accept(e1, float(taken.sum()))
+        self.work += taken
+        self._before, self._q, self._e = λ, q1, e1
+
+    # -- the state -----------------------------------------------------------------------------
 
     def add_state(self, q: Array) -> None:
         """Enter what is stored."""
-        self.response.add_state(self.motion(q))
+        self.response.add_state(self._e if q is self._q else self.motion(q))
+
+    def state(self) -> tuple[Index, Array]:
+        """Numbers of the connectors, and what their laws remember; (num_links, k)."""
+        return self.numbers, np.column_stack([self.work, self._before, self.response.state()])
+
+    def restore(self, numbers: Index, rows: Array) -> None:
+        """Take over :meth:`state`, of those connectors that are here."""
+        _, here, there = np.intersect1d(self.numbers, numbers, return_indices=True)
+        if len(here) < len(self.numbers):
+            return
+        rows = rows[there[np.argsort(here)]]
+        self.work, self._before = rows[:, 0].copy(), rows[:, 1].copy()
+        self.response.restore(self._before, rows[:, 2:])
 
 
 def _split(q: Expr) -> tuple[Pair, Expr]:
@@ -155,7 +178,11 @@ def _split(q: Expr) -> tuple[Pair, Expr]:
 
 def couplings(share: Share, setting: Setting, A: Csr) -> list[Couplings]:
     """The connectors of a process, those that are alike together."""
+    links = share.grid.scene.links
     groups: dict[tuple[str, object], list[int]] = {}
     for i, number in enumerate(share.links):
-        groups.setdefault(_alike(share.grid.scene.links[number]), []).append(i)
+        groups.setdefault(_alike(links[number]), []).append(i)
+    for link in {_alike(link): link for link in links}.values():
+        if _alike(link) not in groups:
+            respond(link.law, (), setting)  # makes the entries of the ledger that others write
     return [Couplings(share, np.array(here), setting, A) for here in groups.values()]

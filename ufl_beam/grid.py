@@ -252,6 +252,7 @@ class Share:
         self.cell_dofs = self._local[of_cell[self.cells]]
         self.link_dofs = self._local[of_link[self.links]]
         self._all_owned = order
+        self._num_owned_by = np.bincount(owner, minlength=comm.size)
 
     @property
     def size(self) -> int:
@@ -316,8 +317,9 @@ class Share:
         """
         if self.comm.size == 1:
             return values
-        parts = np.concatenate(self.comm.allgather(values[: self.num_owned]))
-        result = np.empty(self.grid.size)
+        parts, result = np.empty((2, self.grid.size))
+        owned = np.ascontiguousarray(values[: self.num_owned])
+        self.comm.Allgatherv(owned, (parts, self._num_owned_by))
         result[self._all_owned] = parts
         return result
 

@@ -54,20 +54,29 @@ class Setting(NamedTuple):
 class Response(Protocol):
     """Some connectors whose laws are of one kind; motions and forces are arrays of them."""
 
+    steady: bool
+    """Whether the rows stay the same during a step."""
+
     def begin(self, e0: Array, step: Step) -> None:
         """Begin a step at the motions ``e0``."""
 
     def rows(self, e1: Array, λ: Array) -> Rows:
         """α, β, γ around an iterate."""
 
-    def accept(self, e1: Array, λ: Array) -> None:
-        """Take the end of the step as the new state; enter what was supplied or lost."""
+    def accept(self, e1: Array, work: float) -> None:
+        """Take the end of the step as the new state; ``work`` is what the connectors have taken."""
 
     def add_state(self, e: Array) -> None:
         """Enter what is stored."""
 
-    def change(self, e1: Array, λ: Array) -> float:
+    def change(self, e1: Array, work: float) -> float:
         """Energy that the step stores, dissipates or gives away; J."""
+
+    def state(self) -> Array:
+        """What is remembered besides motions and forces; (num_links, k)."""
+
+    def restore(self, λ: Array, rows: Array) -> None:
+        """Take over forces and :meth:`state`."""
 
 
 @singledispatch
@@ -79,40 +88,49 @@ def respond(law: Any, links: Sequence[Connector], setting: Setting) -> Response:
 class _Working:
     """What responses have in common that store nothing: the work of their forces is entered."""
 
+    steady = False
     _group = "lost"
     _entry = ""
     _sign = 1.0
 
-    def __init__(self, links: Sequence[Connector], setting: Setting) -> None:
+    def __init__(self, law: Any, links: Sequence[Connector], setting: Setting) -> None:
         self._laws: list[Any] = [link.law for link in links]
-        self._setting = setting
-        self._acting = setting.scheme.acting
+        self._links, self._setting = links, setting
         self._entries = getattr(setting.ledger, self._group)
         if self._entry:
             self._entries[self._entry] += 0.0
-        self._before: Array = np.zeros(len(links))
         self._e0: Array = np.zeros(len(links))
+        self._prepare()
+
+    def _prepare(self) -> None:
+        """What a law notes once."""
 
     def begin(self, e0: Array, step: Step) -> None:
         """Begin a step at the motions ``e0``."""
         self._e0, self._dt = e0, step.dt
-        self._prepare(step)
+        self._note(step)
 
-    def _prepare(self, step: Step) -> None:
+    def _note(self, step: Step) -> None:
         """What a law notes at the beginning of a step."""
 
-    def accept(self, e1: Array, λ: Array) -> None:
+    def accept(self, e1: Array, work: float) -> None:
         """Enter the work."""
         if self._entry:
-            self._entries[self._entry] += self._sign * self.change(e1, λ)
-        self._before = λ.copy()
+            self._entries[self._entry] += self._sign * work
 
     def add_state(self, e: Array) -> None:
         """Nothing is stored."""
 
-    def change(self, e1: Array, λ: Array) -> float:
-        """Work of the step; J."""
-        return float(self._acting(self._before, λ) @ (e1 - self._e0))
+    def change(self, e1: Array, work: float) -> float:
+        """The work."""
+        return work
+
+    def state(self) -> Array:
+        """Nothing is remembered."""
+        return np.zeros((len(self._links), 0))
+
+    def restore(self, λ: Array, rows: Array) -> None:
+        """Nothing was remembered."""
 
     def _numbers(self, name: str) -> Array:
         return np.array([getattr(law, name) for law in self._laws], dtype=np.float64)
@@ -120,6 +138,8 @@ class _Working:
 
 class _Held(_Working):
     """What joints hold: the motion is zero, and there is no work."""
+
+    steady = True
 
     def rows(self, e1: Array, λ: Array) -> Rows:
         """The motion is held."""
@@ -129,9 +149,10 @@ class _Held(_Working):
 class _Driven(_Working):
     """Motors: the motion is given."""
 
+    steady = True
     _group, _entry, _sign = "supplied", "motors", -1.0
 
-    def _prepare(self, step: Step) -> None:
+    def _note(self, step: Step) -> None:
         wanted = np.array([law.motion(step.motion_time) for law in self._laws])
         self._target = self._e0 + step.toward * (wanted - self._e0)
 
@@ -142,21 +163,32 @@ class _Driven(_Working):
 
 @respond.register
 def _(law: Motor, links: Sequence[Connector], setting: Setting) -> Response:
-    return (_Held if law is HELD else _Driven)(links, setting)
+    return (_Held if law is HELD else _Driven)(law, links, setting)
 
 
 @respond.register(Actuator)
 class _Pushed(_Working):
     """Actuators: the force is given."""
 
+    steady = True
     _group, _entry, _sign = "supplied", "loads", -1.0
 
-    def __init__(self, law: Actuator, links: Sequence[Connector], setting: Setting) -> None:
-        super().__init__(links, setting)
+    def _prepare(self) -> None:
+        self._force: Array = np.zeros(len(self._links))
+        self._reached: Array = self._force
 
-    def _prepare(self, step: Step) -> None:
+    def _note(self, step: Step) -> None:
         wanted = -np.array([self._wanted(law, step) for law in self._laws])
-        self._force = self._before + step.toward * (wanted - self._before)
+        self._force = self._reached + step.toward * (wanted - self._reached)
+
+    def accept(self, e1: Array, work: float) -> None:
+        """Enter the work."""
+        super().accept(e1, work)
+        self._reached = self._force
+
+    def restore(self, λ: Array, rows: Array) -> None:
+        """Go on from these forces."""
+        self._reached = λ
 
     def _wanted(self, law: Any, step: Step) -> float:
         return float(law.force(step.load_time))
@@ -182,8 +214,7 @@ class _Damped(_Working):
 
     _entry = "damping"
 
-    def __init__(self, law: Damper, links: Sequence[Connector], setting: Setting) -> None:
-        super().__init__(links, setting)
+    def _prepare(self) -> None:
         self._viscosity = self._numbers("viscosity")
 
     def rows(self, e1: Array, λ: Array) -> Rows:
@@ -198,9 +229,6 @@ class _Asked(_Working):
 
     _entry = "functions"
 
-    def __init__(self, law: Function, links: Sequence[Connector], setting: Setting) -> None:
-        super().__init__(links, setting)
-
     def _forces(self, e1: Array) -> Array:
         middle: Array = self._setting.scheme.average(self._e0, e1)
         rate = (e1 - self._e0) / self._dt
@@ -212,7 +240,7 @@ class _Asked(_Working):
         """The force around the iterate; its derivative by central differences."""
         force = self._forces(e1)
         ε = 6e-6 * np.maximum(np.abs(e1 - self._e0), 1e-3 * np.maximum(np.abs(e1), 1e-3))
-        slope = (self._forces(e1 + ε) - self._forces(e1 - ε)) / (2 * ε)
+        slope: Array = (self._forces(e1 + ε) - self._forces(e1 - ε)) / (2 * ε)
         return -slope, 1.0, force - slope * e1
 
 
@@ -222,12 +250,20 @@ class _Rubbing(_Working):
 
     _entry = "friction"
 
-    def __init__(self, law: Coulomb, links: Sequence[Connector], setting: Setting) -> None:
-        super().__init__(links, setting)
-        self._slip: Array = np.zeros(len(links))
-        self._tiny = 1e-14 * np.where([c.turns for c in links], 1.0, setting.simulation.scene.size)
+    def _prepare(self) -> None:
+        size = self._setting.simulation.scene.size
+        self._slip: Array = np.zeros(len(self._links))
+        self._tiny = 1e-14 * np.where([c.turns for c in self._links], 1.0, size)
 
-    def _prepare(self, step: Step) -> None:
+    def state(self) -> Array:
+        """Which way each slips."""
+        return self._slip[:, None]
+
+    def restore(self, λ: Array, rows: Array) -> None:
+        """Take over :meth:`state`."""
+        self._slip = rows[:, 0].copy()
+
+    def _note(self, step: Step) -> None:
         ask = self._setting.simulation
         self._limit = np.array(
             [
@@ -255,8 +291,7 @@ class _Rubbing(_Working):
 class _Stopped(_Working):
     """Contact outside an interval: elastic, so that what it takes it gives back."""
 
-    def __init__(self, law: Stop, links: Sequence[Connector], setting: Setting) -> None:
-        super().__init__(links, setting)
+    def _prepare(self) -> None:
         self._low, self._high = self._numbers("low"), self._numbers("high")
         self._stiffness = self._numbers("stiffness")
 
@@ -276,7 +311,7 @@ class _Stopped(_Working):
         """Stored energy."""
         self._setting.ledger.state["stored"] += self._energy(e)
 
-    def change(self, e1: Array, λ: Array) -> float:
+    def change(self, e1: Array, work: float) -> float:
         """Energy stored in the step; J."""
         return self._energy(e1) - self._energy(self._e0)
 
@@ -284,6 +319,8 @@ class _Stopped(_Working):
 @respond.register(Spring)
 class _Sprung:
     """Springs of one law: material points whose strain is the motion."""
+
+    steady = False
 
     def __init__(self, law: Spring, links: Sequence[Connector], setting: Setting) -> None:
         layout = Layout(
@@ -302,6 +339,7 @@ class _Sprung:
         self._ledger = setting.ledger
         expect_entries(layout, setting.scheme, setting.ledger)
         self._strains = np.zeros((number, 3))
+        self._restored = False
 
     def _at(self, e: Array) -> Array:
         self._strains[:, 0] = e
@@ -316,7 +354,7 @@ class _Sprung:
         r, D = self.points.respond(self._at(e1))
         return -D[:, 0], 1.0, r[:, 0] - D[:, 0] * e1
 
-    def accept(self, e1: Array, λ: Array) -> None:
+    def accept(self, e1: Array, work: float) -> None:
         """Commit the internal variables."""
         self.points.respond(self._at(e1))
         self.points.accept()
@@ -324,9 +362,22 @@ class _Sprung:
 
     def add_state(self, e: Array) -> None:
         """Stored energy."""
+        if self._restored:
+            self.points.start(self._at(e))
+            self.points.refresh(self._at(e))
+            self._restored = False
         self.points.enter_stored(self._ledger)
 
-    def change(self, e1: Array, λ: Array) -> float:
+    def change(self, e1: Array, work: float) -> float:
         """Energy stored and dissipated in the step; J."""
         self.points.respond(self._at(e1))
         return self.points.change()
+
+    def state(self) -> Array:
+        """Internal variables."""
+        return self.points.state()
+
+    def restore(self, λ: Array, rows: Array) -> None:
+        """Take over :meth:`state`."""
+        self.points.restore(np.arange(len(rows)), rows)
+        self._restored = True

@@ -11,7 +11,7 @@ import numpy as np
 
 from ufl_beam.applied import DeadLoads, FollowerLoads
 from ufl_beam.compat import Array
-from ufl_beam.connectors import Joint
+from ufl_beam.connectors import HELD, Joint
 from ufl_beam.couplings import couplings
 from ufl_beam.dampers import damping_forces
 from ufl_beam.errors import ConvergenceError, SceneError, require_kind
@@ -125,6 +125,9 @@ class Simulation:
             for cells, rows in start.internal:
                 for inelastic in self.inelastic:
                     inelastic.restore(cells, rows)
+            for numbers, rows in start.internal_of_links:
+                for coupling in self.couplings:
+                    coupling.restore(numbers, rows)
         self._q_before: Array = self.q
         self._dt_before = math.inf
         self._rotations = self.share.rotations()
@@ -211,7 +214,22 @@ class Simulation:
                         "from itself or from a beam that it is joined to"
                     )
                 v[dofs] = new
-        return np.asarray(np.nan_to_num(v))
+        v = np.asarray(np.nan_to_num(v))
+        if self.scene.initial:
+            self._require_held(v)
+        return v
+
+    def _require_held(self, v: Array) -> None:
+        """Velocities must agree with what joints hold, or they would ring for ever."""
+        fastest = np.abs(v).max() * max(self.scene.size, 1.0)
+        for link, dofs in zip(self.scene.links, self.grid.dofs_of_links, strict=True):
+            a, b = v[dofs[0:6:2]], v[dofs[1:6:2]]
+            rate = float(np.dot(link.rigidly().a, a) + np.dot(link.rigidly().b, b))
+            if link.law is HELD and abs(rate) > 1e-9 * fastest:
+                raise SceneError(
+                    f"Velocity: the parts that {link} joins would move apart at {rate:.3g} m/s "
+                    "or rad/s; give all that is joined a Velocity that agrees"
+                )
 
     # -- the equation of a step ----------------------------------------------------------------
 
@@ -403,6 +421,10 @@ class Simulation:
     def end(self) -> None:
         """Let the solution know the internal variables, so that another run may start with them."""
         self.solution.internal = self._gather([inelastic.state() for inelastic in self.inelastic])
+        states = [coupling.state() for coupling in self.couplings]
+        if self.scene.links and self.share.comm.size > 1:
+            states = [state for one in self.share.comm.allgather(states) for state in one]
+        self.solution.internal_of_links = states
 
     def close(self) -> None:
         """Give back what PETSc holds."""

@@ -53,6 +53,7 @@ class Solution:
         iterations: Number of Newton iterations.
         seconds: Wall time of the run, building the scene included; s.
         internal: Cells, and their internal variables at the end of the run.
+        internal_of_links: Numbers of connectors, and what their laws remember at the end.
     """
 
     def __init__(self, scene: Scene, grid: Grid) -> None:
@@ -66,6 +67,7 @@ class Solution:
         self._reactions: list[Array] = []
         self._entries: list[tuple[dict[str, float], ...]] = []
         self._material: list[list[tuple[Index, Array]]] = []
+        self.internal_of_links: list[tuple[Index, Array]] = []
         self._connections: list[Array] = []
         self.internal: list[tuple[Index, Array]] = []
 
