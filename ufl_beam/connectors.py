@@ -7,8 +7,8 @@ from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
-from ufl_beam.beams import Place, Point
-from ufl_beam.bodies import Anchor, arm, carries, require_anchor
+from ufl_beam.beams import Curve, Place, Point
+from ufl_beam.bodies import Anchor, arm, carries, ground, require_anchor
 from ufl_beam.errors import SceneError, require_kind, require_number, require_vector
 from ufl_beam.laws import Hardening, Softening
 from ufl_beam.loads import TimeFunction, require_time_function
@@ -175,7 +175,22 @@ class Coulomb:
             raise SceneError("Coulomb: give coefficient and joint together")
 
 
-Law = Motor | Actuator | Controller | Spring | Damper | Stop | Function | Coulomb
+@dataclass(frozen=True)
+class Guide:
+    """The point stays on a curve of the plane, free along it; see :func:`Guided`.
+
+    Args:
+        curve: ``s -> (x, y)``, smooth, for all s that the motion may reach; m.
+    """
+
+    curve: Curve
+
+    def __post_init__(self) -> None:
+        if not callable(self.curve):
+            raise SceneError(f"Guide: {self.curve!r} must be a function of s, giving (x, y)")
+
+
+Law = Guide | Motor | Actuator | Controller | Spring | Damper | Stop | Function | Coulomb
 
 
 def _still(t: float) -> float:
@@ -437,6 +452,33 @@ def Link(a: Anchor, b: Anchor) -> Joint:
     rod = Connector("Link", "stretching", a, b, HELD)
     _require_apart(rod)
     return Joint("Link", (a, b), (), (rod,))
+
+
+def Guided(place: Anchor, curve: Curve) -> Joint:
+    """A point stays on a guide curve of the ground, free along it and free to turn.
+
+    Args:
+        place: What is guided; of bodies the centre, other points by a :func:`Revolute` to a beam.
+        curve: ``s -> (x, y)`` for all s that the motion may reach; ``curve(0)`` is at the place; m.
+
+    Raises:
+        SceneError: The place is not on the curve at s = 0, or the curve stands still there.
+    """
+    require_anchor(place, "Guided")
+    if not carries(place):
+        raise SceneError(f"Guided({place}): it must be the centre of the body")
+    law = Guide(curve)
+    x, y = require_vector(curve(0.0), f"Guided({place}): curve(0)")
+    if math.dist((x, y), place.point) > 1e-9 * max(math.hypot(x, y), math.hypot(*place.point)):
+        raise SceneError(f"Guided({place}): curve(0) = ({x:g}, {y:g}) must be at the place")
+    (x0, y0), (x1, y1) = curve(-1e-6), curve(1e-6)
+    length = math.hypot(x1 - x0, y1 - y0)
+    if length == 0.0:
+        raise SceneError(f"Guided({place}): the curve stands still at s = 0")
+    base, across = ground(x, y), ((y0 - y1) / length, (x1 - x0) / length)
+    return Joint(
+        "Guided", (base, place), (), (Connector("Guided", "guided", base, place, law, across),)
+    )
 
 
 def Release(a: Place, b: Anchor, *, free: str) -> Joint:

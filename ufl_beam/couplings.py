@@ -11,6 +11,8 @@ from ufl_beam.compat import Array, fem, line_mesh, space_with_dofs
 from ufl_beam.connectors import HELD, Connector, Law, Spring
 from ufl_beam.forms import Kernel
 from ufl_beam.grid import Index, Share
+from ufl_beam.guides import Guides
+from ufl_beam.links import Links
 from ufl_beam.relative import MOTIONS, Numbers, Pair
 from ufl_beam.responses import Setting, respond
 from ufl_beam.schemes import Step
@@ -23,23 +25,15 @@ def _alike(link: Connector) -> tuple[str, object]:
     return link.motion, law if isinstance(law, Spring) else (type(law), law is HELD)
 
 
-class Couplings:
+class Couplings(Links):
     """Connectors of one relative motion whose laws are of one kind.
 
     Each is a cell of unit length from one node to the other, with its force as a seventh unknown.
-
-    Attributes:
-        numbers: Of the connectors in the scene's links.
-        links: The connectors.
-        work: That they have taken since the beginning; (num_links,); J.
     """
 
     def __init__(self, share: Share, here: Index, setting: Setting, A: Csr) -> None:
-        links = [share.grid.scene.links[i] for i in share.links[here]]
-        self.numbers: Index = share.links[here]
-        dofs = share.link_dofs[here].astype(np.int32)
-        self._forces_at = dofs[:, 6]
-        n = len(links)
+        super().__init__(share, here, A)
+        links, dofs, n = self.links, self._dofs, len(here)
         ends = np.tile([[0.0, 0.0], [1.0, 0.0]], (n, 1))
         mesh = line_mesh(ends, np.arange(2 * n).reshape(-1, 2))
         order = np.asarray(mesh.topology.original_cell_index)
@@ -76,10 +70,7 @@ class Couplings:
         self._work, self._tangent, self._value = map(kernel, (work, tangent, e * z * dx))
         self._tangent.share(self._work)
         self._tangent.place(A)
-        self._A = A
         self.response = respond(links[0].law, links, setting)
-        self.links = links
-        self.work: Array = np.zeros(n)
         self._acting = setting.scheme.acting
         self._before: Array = np.zeros(n)
         self._rows = np.zeros((n, 3))
@@ -95,10 +86,6 @@ class Couplings:
         self._value.add(q, e)
         e[self._order] = e.copy()
         return e
-
-    def force(self, q: Array) -> Array:
-        """Forces that resist their growth; (num_links,); N or N m."""
-        return q[self._forces_at]
 
     def begin(self, step: Step) -> None:
         """Remember the motions at the beginning."""
@@ -176,13 +163,16 @@ def _split(q: Expr) -> tuple[Pair, Expr]:
     return Pair(at(-1.0), at(1.0)), force
 
 
-def couplings(share: Share, setting: Setting, A: Csr) -> list[Couplings]:
+def couplings(share: Share, setting: Setting, A: Csr) -> list[Couplings | Guides]:
     """The connectors of a process, those that are alike together."""
     links = share.grid.scene.links
     groups: dict[tuple[str, object], list[int]] = {}
     for i, number in enumerate(share.links):
         groups.setdefault(_alike(links[number]), []).append(i)
     for link in {_alike(link): link for link in links}.values():
-        if _alike(link) not in groups:
+        if _alike(link) not in groups and link.motion in MOTIONS:
             respond(link.law, (), setting)  # makes the entries of the ledger that others write
-    return [Couplings(share, np.array(here), setting, A) for here in groups.values()]
+    return [
+        (Couplings if motion in MOTIONS else Guides)(share, np.array(here), setting, A)
+        for (motion, _), here in groups.items()
+    ]

@@ -67,7 +67,8 @@ class Kernel:
             return np.zeros((len(self._dofs), 1), dtype=np.int32)
         dofmap = form.arguments()[0].ufl_function_space().dofmap
         blocks = np.asarray(dofmap.list)[:, :, None] * dofmap.bs + np.arange(dofmap.bs)
-        return np.ascontiguousarray(blocks.reshape(len(blocks), -1), dtype=np.int32)
+        width = blocks.shape[1] * dofmap.bs
+        return np.ascontiguousarray(blocks.reshape(len(blocks), width), dtype=np.int32)
 
     def _prepare(self) -> None:
         """Pointers to all that stays where it is."""

@@ -50,7 +50,7 @@ class Grid:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self._parameters = [np.array(b.vertices(scene.attached[b])) for b in scene.beams]
-        counts = np.array([len(p) for p in self._parameters])
+        counts = np.array([len(p) for p in self._parameters], dtype=np.int64)
         self._first = np.concatenate([[0], np.cumsum(counts)])
         self.points = np.array(
             [b.curve(s) for b, p in zip(scene.beams, self._parameters, strict=True) for s in p],
@@ -252,7 +252,7 @@ class Share:
         self.cell_dofs = self._local[of_cell[self.cells]]
         self.link_dofs = self._local[of_link[self.links]]
         self._all_owned = order
-        self._num_owned_by = np.bincount(owner, minlength=comm.size)
+        self._num_owned_by = np.bincount(owner, minlength=comm.size).tolist()
 
     @property
     def size(self) -> int:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ufl_beam.compat import Array
-from ufl_beam.connectors import Connector, Joint
+from ufl_beam.connectors import Connector, Guide, Joint
 from ufl_beam.errors import SceneError
+from ufl_beam.guides import nearest, tangent
 from ufl_beam.scene import Scene
 
 if TYPE_CHECKING:
@@ -99,4 +100,11 @@ def _direction(solution: Solution, holder: Connector, turn: Array) -> Array:
     if holder.motion == "stretching":
         between = solution.position(holder.b) - solution.position(holder.a)
         return np.asarray(between / np.linalg.norm(between, axis=1)[:, None])
+    if isinstance(holder.law, Guide):
+        s, normals = 0.0, []
+        for point in solution.position(holder.b):
+            s = nearest(holder.law.curve, point, s)
+            x, y = tangent(holder.law.curve, s)
+            normals.append((-y, x))
+        return np.asarray(normals / np.linalg.norm(normals, axis=1)[:, None])
     return turned(holder.axis, turn if holder.motion == "sliding" else np.zeros_like(turn))

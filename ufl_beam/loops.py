@@ -46,15 +46,16 @@ void add_step_tangent(int entries, const int32_t *entry, const int32_t *column, 
                       const double *q0, const double *q1, double *tangent);
 double weighted_square(int rows, const double *w, const double *f);
 void respond(int32_t *course, kernel *bulk, kernel *opening, kernel *excess, int points,
-             const double *B, const double *weight, const double *rest, double theta, const double *e0,
-             double *w, double *r, double *D, int cells, const double *e1);
+             const double *B, const double *weight, const double *rest, double theta,
+             const double *e0, double *w, double *r, double *D, int cells, const double *e1);
 void respond_at(const double *q, int size, double *latest,
                 kernel *strain, int cells, int dofs_per_cell, const int32_t *dofs, int at,
                 double *values, int values_width, const double *constants,
                 const double *coordinates, int rows, const int32_t *row, double *e1,
                 int32_t *course, kernel *bulk, kernel *opening, kernel *excess, int points,
-                const double *B, const double *weight, const double *rest, double theta, const double *e0,
-                double *w, double *r, double *D, double *b, double *packed_D, int width);
+                const double *B, const double *weight, const double *rest, double theta,
+                const double *e0, double *w, double *r, double *D, double *b,
+                double *packed_D, int width);
 void commit(kernel *end, int cells, int points, const double *B, const double *weight,
             const double *rest, const double *length, double *e0, const double *e1,
             double *w, double *kept, double *sum);

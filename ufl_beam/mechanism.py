@@ -12,7 +12,7 @@ from scipy.sparse.linalg import eigsh
 from ufl_beam.beams import Beam, Point
 from ufl_beam.bodies import GROUND, Anchor, Body, node
 from ufl_beam.compat import Array
-from ufl_beam.connectors import Connector, Function, Motor, Spring
+from ufl_beam.connectors import Connector, Function, Guide, Motor, Spring
 from ufl_beam.errors import SceneError
 from ufl_beam.scene import Scene, Slot
 
@@ -36,7 +36,7 @@ def require_independent(scene: Scene) -> None:
 
     They do if their gradients in the undeformed scene, by what moves freely, are dependent.
     """
-    held = [link for link in scene.links if isinstance(link.law, Motor)]
+    held = [link for link in scene.links if isinstance(link.law, Motor | Guide)]
     if not held:
         return
     gradients = _gradients(scene, held)
@@ -111,8 +111,8 @@ def _center(part: Beam | Body) -> Point:
     return (xa + xb) / 2, (ya + yb) / 2
 
 
-RESISTING = (Motor, Spring, Function)
-"""Laws of connectors that resist every motion; others bear nothing at rest, or what they are told."""
+RESISTING = (Motor, Guide, Spring, Function)
+"""Laws of connectors that resist every motion; others bear nothing, or what they are told."""
 
 
 def _constraints(scene: Scene) -> csr_array:

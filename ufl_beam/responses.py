@@ -33,8 +33,8 @@ from ufl_beam.schemes import Scheme, Step
 if TYPE_CHECKING:
     from ufl_beam.simulation import Simulation
 
-Rows = tuple[Array | float, Array | float, Array | float]
-"""α, β, γ of some connectors."""
+Rows = tuple[Any, Any, Any]
+"""α, β, γ of some connectors: arrays or numbers."""
 
 
 class Setting(NamedTuple):

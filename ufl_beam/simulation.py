@@ -214,10 +214,10 @@ class Simulation:
                         "from itself or from a beam that it is joined to"
                     )
                 v[dofs] = new
-        v = np.asarray(np.nan_to_num(v))
+        known: Array = np.asarray(np.nan_to_num(v))
         if self.scene.initial:
-            self._require_held(v)
-        return v
+            self._require_held(known)
+        return known
 
     def _require_held(self, v: Array) -> None:
         """Velocities must agree with what joints hold, or they would ring for ever."""

@@ -1,5 +1,6 @@
 """Elimination along chains of cells against direct solutions of the whole system."""
 
+from itertools import pairwise
 from types import SimpleNamespace
 
 from mpi4py import MPI
@@ -17,7 +18,7 @@ SECTION = ub.Section(EA=60.0, GA=40.0, EI=30.0, rhoA=2.0, rhoI=1.0)
 
 def cells_of(*beams):
     """Degrees of freedom of cells, beam after beam: both u, both v, both ψ; from vertices."""
-    ends = np.array([pair for beam in beams for pair in zip(beam, beam[1:], strict=False)])
+    ends = np.array([pair for beam in beams for pair in pairwise(beam)])
     return (3 * ends[:, None, :] + np.arange(3)[:, None]).reshape(-1, 6)
 
 

@@ -240,6 +240,7 @@ def test_a_study_goes_on(shared_path, counted):
     assert len(ub.study(counted(pushed), FORCES[1:2], path=path)) == 1
     assert counted.calls() == []
     assert len(ub.Study.load(path)) == 5
+    COMM.barrier()
 
     ub.study(counted(pushed), FORCES[1:2], path=path, anew=True)
     assert counted.calls() == FORCES[1:2]
@@ -356,6 +357,7 @@ def test_files_that_cannot_be_written(shared_path, on_first_rank, counted):
 def test_files_that_are_no_studies(shared_path, on_first_rank):
     with raises("a.h5: there is no such file"):
         ub.Study.load(shared_path / "a.h5")
+    COMM.barrier()
     on_first_rank(lambda: (shared_path / "a.h5").write_text("notes"))
     on_first_rank(lambda: h5py.File(shared_path / "b.h5", "w").close())
     ub.study(square, numbers(*range(20)), path=shared_path / "c.h5")

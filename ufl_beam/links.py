@@ -1,0 +1,37 @@
+"""What all terms of connectors have in common."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ufl_beam.compat import Array
+from ufl_beam.connectors import Connector
+from ufl_beam.grid import Index, Share
+from ufl_beam.sparse import Csr
+
+
+class Links:
+    """Connectors that are alike; each has a force among the unknowns.
+
+    Args:
+        share: The degrees of freedom of this process.
+        here: Which of its connectors.
+        A: Matrix that takes the tangent.
+
+    Attributes:
+        numbers: Of the connectors in the scene's links.
+        links: The connectors.
+        work: That they have taken since the beginning; (num_links,); J.
+    """
+
+    def __init__(self, share: Share, here: Index, A: Csr) -> None:
+        self.numbers: Index = share.links[here]
+        self.links: list[Connector] = [share.grid.scene.links[i] for i in self.numbers]
+        self._dofs = share.link_dofs[here].astype(np.int32)
+        self._forces_at = self._dofs[:, 6]
+        self._A = A
+        self.work: Array = np.zeros(len(self.links))
+
+    def force(self, q: Array) -> Array:
+        """Forces that resist the growth of the motions; (num_links,); N or N m."""
+        return q[self._forces_at]
