@@ -319,7 +319,7 @@ class Share:
             return values
         parts, result = np.empty((2, self.grid.size))
         owned = np.ascontiguousarray(values[: self.num_owned])
-        self.comm.Allgatherv(owned, (parts, self._num_owned_by))
+        self.comm.Allgatherv(owned, [parts, self._num_owned_by])
         result[self._all_owned] = parts
         return result
 

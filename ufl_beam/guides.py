@@ -70,8 +70,7 @@ class Guides(Links):
     def _nearest(self, p: Array) -> tuple[Array, Array]:
         """Points of the curves nearest to ``p``, and unit tangents there; from the latest ones."""
         curves = [law.curve for law in self._laws]
-        before = self._s.tolist()
-        self._s = np.array([nearest(c, p[k], before[k]) for k, c in enumerate(curves)])
+        self._s = np.array([nearest(c, p[k], float(self._s[k])) for k, c in enumerate(curves)])
         if not np.isfinite(self._s).all():
             raise StepFailed("no nearest point was found of the curve of a Guided joint")
         t = np.array([tangent(curve, s) for curve, s in zip(curves, self._s, strict=True)])
