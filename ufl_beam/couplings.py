@@ -92,6 +92,7 @@ class Couplings(Links):
         self._work.set(self._q0, step.q0)
         if step.q0 is not self._q:
             self._q, self._e = step.q0, self.motion(step.q0)
+        self._dt = step.dt
         self.response.begin(self._e, step)
         if self.response.steady:
             self._put(*self.response.rows(self._e, self._before))
@@ -131,6 +132,7 @@ class Couplings(Links):
         taken = self._taken(e1, λ)
         self.response.accept(e1, float(taken.sum()))
         self.work += taken
+        self.rate = np.asarray((e1 - self._e) / self._dt)
         self._before, self._q, self._e = λ, q1, e1
 
     # -- the state -----------------------------------------------------------------------------

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ufl_beam.bodies import GROUND, Anchor, Spot, arm, node
 from ufl_beam.compat import Array
 from ufl_beam.connectors import Connector, Guide, Joint
 from ufl_beam.errors import SceneError
+from ufl_beam.grid import Grid
 from ufl_beam.guides import nearest, tangent
 from ufl_beam.scene import Scene
 
@@ -24,11 +27,13 @@ class Connection(NamedTuple):
         force: That resisted its growth during the step that ends there; (n+1,); N or N m.
         work: That the connector has taken since the beginning: what springs store and dissipate,
             what dampers and friction dissipate, and minus what motors supply; (n+1,); J.
+        rate: Mean rate of the motion in the step that ends there; (n+1,); m/s or rad/s.
     """
 
-    motion: Array
-    force: Array
-    work: Array
+    motion: Any
+    force: Any
+    work: Any
+    rate: Any
 
 
 class JointHistory(NamedTuple):
@@ -73,6 +78,37 @@ def turned(x: tuple[float, float] | Array, angle: Array) -> Array:
     a, b = np.asarray(x, dtype=np.float64).T
     cos, sin = np.cos(angle), np.sin(angle)
     return np.column_stack([cos * a - sin * b, sin * a + cos * b])
+
+
+def motion_of(grid: Grid, place: Anchor, states: Sequence[Array]) -> Array:
+    """Displacement and rotation of a place in configurations of the grid; (n, 3); m, m, rad."""
+    motion = _of_node(grid, place, states)
+    if isinstance(place, Spot):
+        motion[:, :2] += turned(arm(place), motion[:, 2]) - arm(place)
+    return motion
+
+
+def velocity_of(
+    grid: Grid, place: Anchor, states: Sequence[Array], velocities: Sequence[Array]
+) -> Array:
+    """Velocity of a place; (n, 3); m/s, m/s, rad/s."""
+    motion = _of_node(grid, place, velocities)
+    if isinstance(place, Spot):
+        x, y = turned(arm(place), _of_node(grid, place, states)[:, 2]).T
+        motion[:, :2] += motion[:, 2:] * np.column_stack([-y, x])
+    return motion
+
+
+def _of_node(grid: Grid, place: Anchor, states: Sequence[Array]) -> Array:
+    """Values at what a place moves with; linear between vertices; (n, 3)."""
+    if isinstance(place, Spot):
+        if node(place) is GROUND:
+            return np.zeros((len(states), 3))
+        dofs = grid.node(place)
+        return np.array([x[dofs] for x in states])
+    vertices, weights = grid.weights(place)
+    first, second = grid.dofs[vertices]
+    return np.array([weights[0] * x[first] + weights[1] * x[second] for x in states])
 
 
 def of_joint(solution: Solution, joint: Joint, forces: Array) -> JointHistory:

@@ -22,6 +22,7 @@ class Links:
         numbers: Of the connectors in the scene's links.
         links: The connectors.
         work: That they have taken since the beginning; (num_links,); J.
+        rate: Mean rate of the motions in the last step; (num_links,); m/s or rad/s.
     """
 
     def __init__(self, share: Share, here: Index, A: Csr) -> None:
@@ -31,6 +32,7 @@ class Links:
         self._forces_at = self._dofs[:, 6]
         self._A = A
         self.work: Array = np.zeros(len(self.links))
+        self.rate: Array = np.zeros(len(self.links))
 
     def force(self, q: Array) -> Array:
         """Forces that resist the growth of the motions; (num_links,); N or N m."""

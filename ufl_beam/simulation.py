@@ -10,15 +10,16 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.applied import DeadLoads, FollowerLoads
+from ufl_beam.bodies import Anchor
 from ufl_beam.compat import Array
-from ufl_beam.connectors import HELD, Joint
+from ufl_beam.connectors import HELD, Connector, Joint
 from ufl_beam.couplings import couplings
 from ufl_beam.dampers import damping_forces
 from ufl_beam.errors import ConvergenceError, SceneError, require_kind
 from ufl_beam.fields import Fields
 from ufl_beam.grid import Grid, Index, Share
 from ufl_beam.inelastic import InelasticBeams, inelastic_cells
-from ufl_beam.joints import links_of
+from ufl_beam.joints import Connection, links_of, motion_of, velocity_of
 from ufl_beam.ledger import Ledger
 from ufl_beam.loads import FollowerLoad
 from ufl_beam.mechanism import require_independent, require_masses, require_no_mechanism
@@ -375,17 +376,36 @@ class Simulation:
         return [*self.ledger.state, *self.ledger.supplied, *self.ledger.lost]
 
     def connections(self) -> Array:
-        """Relative motion, force and work taken of all links of the scene; (num_links, 3).
+        """Motion, force, work and rate of all links of the scene, as :class:`Connection`.
 
-        All processes call it together.
+        All processes call it together; (num_links, 4).
         """
-        here = np.zeros((len(self.scene.links), 3))
+        here = np.zeros((len(self.scene.links), 4))
         for coupling in self.couplings:
-            columns = (coupling.motion(self.q), coupling.force(self.q), coupling.work)
+            q = self.q
+            columns = (coupling.motion(q), coupling.force(q), coupling.work, coupling.rate)
             here[coupling.numbers] = np.column_stack(columns)
         if self.share.comm.size > 1:
             self.share.comm.Allreduce(MPI.IN_PLACE, here)
         return here
+
+    def connector(self, connector: Connector) -> Connection:
+        """What a connector is doing: numbers, at the end of the last step.
+
+        Raises:
+            SceneError: It is not in the scene.
+        """
+        (number,) = links_of(self.scene, connector)
+        return Connection(*self.connections()[number].tolist())
+
+    def displacement(self, place: Anchor) -> Array:
+        """Displacement and rotation (u, v, ψ) of a place now; (3,); m, m, rad."""
+        return np.asarray(motion_of(self.grid, place, [self.share.gather(self.q)])[0])
+
+    def velocity(self, place: Anchor) -> Array:
+        """Velocity (du/dt, dv/dt, dψ/dt) of a place now; (3,); m/s, m/s, rad/s."""
+        q, v = self.share.gather(self.q), self.share.gather(self.velocities()[0])
+        return np.asarray(velocity_of(self.grid, place, [q], [v])[0])
 
     def press(self, joint: Joint) -> float:
         """Size of the force that connectors hold a joint with at the end of the last step; N.

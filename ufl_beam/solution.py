@@ -10,14 +10,14 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.beams import Beam, Place
-from ufl_beam.bodies import GROUND, Anchor, Spot, arm, node
+from ufl_beam.bodies import Anchor, Spot
 from ufl_beam.compat import Array
 from ufl_beam.connectors import Connector, Joint
 from ufl_beam.errors import SceneError
 from ufl_beam.fields import Fields
 from ufl_beam.grid import Grid, Index, Share
 from ufl_beam.inelastic import Strains
-from ufl_beam.joints import Connection, JointHistory, links_of, of_joint, turned
+from ufl_beam.joints import Connection, JointHistory, links_of, motion_of, of_joint, velocity_of
 from ufl_beam.ledger import Energy
 from ufl_beam.scene import Scene, Support
 from ufl_beam.sparse import Product
@@ -110,11 +110,7 @@ class Solution:
         Raises:
             SceneError: The beam of the place is not in the scene.
         """
-        if not isinstance(place, Spot):
-            return self._at(place, self._q)
-        motion = self._of_body(place, self._q)
-        motion[:, :2] += turned(arm(place), motion[:, 2]) - arm(place)
-        return motion
+        return motion_of(self.grid, place, self._q)
 
     def velocity(self, place: Anchor) -> Array:
         """Velocity (du/dt, dv/dt, dψ/dt) of a place; (n+1, 3); m/s, m/s, rad/s.
@@ -124,12 +120,7 @@ class Solution:
         """
         if not self._v:
             raise SceneError("velocity: the run was static; there is none")
-        if not isinstance(place, Spot):
-            return self._at(place, self._v)
-        motion = self._of_body(place, self._v)
-        x, y = turned(arm(place), self._of_body(place, self._q)[:, 2]).T
-        motion[:, :2] += motion[:, 2:] * np.column_stack([-y, x])
-        return motion
+        return velocity_of(self.grid, place, self._q, self._v)
 
     def position(self, place: Anchor) -> Array:
         """Coordinates of a place; (n+1, 2); m."""
@@ -137,17 +128,6 @@ class Solution:
             return np.asarray(place.point + self.displacement(place)[:, :2])
         vertices, weights = self.grid.weights(place)
         return np.asarray(weights @ self.grid.points[vertices] + self.displacement(place)[:, :2])
-
-    def _at(self, place: Place, kept: list[Array]) -> Array:
-        vertices, weights = self.grid.weights(place)
-        first, second = self.grid.dofs[vertices]
-        return np.array([weights[0] * x[first] + weights[1] * x[second] for x in kept])
-
-    def _of_body(self, spot: Spot, kept: list[Array]) -> Array:
-        if node(spot) is GROUND:
-            return np.zeros((len(kept), 3))
-        dofs = self.grid.node(spot)
-        return np.array([x[dofs] for x in kept])
 
     # -- joints --------------------------------------------------------------------------------
 
