@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import eigsh
 
 from ufl_beam.beams import Beam, Point
-from ufl_beam.bodies import GROUND, Anchor, Body, node
+from ufl_beam.bodies import GROUND, Anchor, Body, Node, node
 from ufl_beam.compat import Array
 from ufl_beam.connectors import Connector, Function, Guide, Motor, Spring
 from ufl_beam.errors import SceneError
@@ -31,26 +31,62 @@ def require_masses(scene: Scene) -> None:
                 )
 
 
+Demand = tuple[str, list[tuple[Slot, float]]]
+"""Who demands, and the factors of what moves in it; rotations times the size of the scene."""
+
+
 def require_independent(scene: Scene) -> None:
     """Raise :class:`SceneError` if constraints repeat or contradict each other.
 
     They do if their gradients in the undeformed scene, by what moves freely, are dependent.
     """
-    held = [link for link in scene.links if isinstance(link.law, Motor | Guide)]
-    if not held:
+    demands = _demands(scene)
+    if not any(isinstance(link.law, Motor | Guide) for link in scene.links):
         return
-    gradients = _gradients(scene, held)
-    u, sizes, _ = np.linalg.svd(gradients, full_matrices=True)
-    rank = int(np.sum(sizes > 1e-9 * sizes.max(initial=0.0)))
-    if rank == len(held):
+    columns = {slot: i for i, slot in enumerate({s: 0 for _, f in demands for s, _ in f})}
+    entries = [
+        (columns[slot], row, factor)
+        for row, (_, factors) in enumerate(demands)
+        for slot, factor in factors
+    ]
+    within = _null_space(_sparse(entries, (max(len(columns), 1), len(demands))))
+    if within.shape[1] == 0:
         return
-    dependent = np.abs(u[:, rank:]).max(axis=1) > 1e-6
-    names = list(dict.fromkeys(_owner(scene, held[i]) for i in np.flatnonzero(dependent)))
+    dependent = np.flatnonzero(np.abs(within).max(axis=1) > 1e-6)
+    names = list(dict.fromkeys(demands[i][0] for i in dependent))
     raise SceneError(
-        f"constraints repeat or contradict each other: {len(held) - rank} of those of "
+        f"constraints repeat or contradict each other: {within.shape[1]} of those of "
         f"{'; '.join(names)} can be left out. Remove one, or make it elastic: a Spring, or a Beam "
         "in the place of a rigid part"
     )
+
+
+def _demands(scene: Scene) -> list[Demand]:
+    """What connectors, and supports in turned axes, give of the motion of what moves freely."""
+    same = scene.representatives()
+    fixed: set[Slot] = {(GROUND, component) for component in range(3)}
+    fixed |= {(node(s.place), c) for s in scene.supports if not s.angle for c in s.held}
+    fixed = {same.get(slot, slot) for slot in fixed}
+
+    def free(factors: Iterable[tuple[Node, int, float]]) -> list[tuple[Slot, float]]:
+        slots = (((of, c), factor) for of, c, factor in factors if factor)
+        known = ((same.get(slot, slot), factor) for slot, factor in slots)
+        return [(slot, factor) for slot, factor in known if slot not in fixed]
+
+    demands: list[Demand] = []
+    for link in scene.links:
+        if isinstance(link.law, Motor | Guide):
+            unit = (1.0, 1.0, 1.0 if link.turns else 1 / scene.size)
+            pairs = zip((link.a, link.b), link.rigidly(), strict=True)
+            factors = [(node(at), c, f[c] * unit[c]) for at, f in pairs for c in range(3)]
+            demands.append((_owner(scene, link), free(factors)))
+    for support in scene.supports:
+        if support.angle:
+            of, cos, sin = node(support.place), math.cos(support.angle), math.sin(support.angle)
+            rows = {0: (cos, sin), 1: (-sin, cos)}
+            for c in support.held.keys() & rows.keys():
+                demands.append((str(support), free((of, k, rows[c][k]) for k in range(2))))
+    return demands
 
 
 def _owner(scene: Scene, link: Connector) -> str:
@@ -58,29 +94,6 @@ def _owner(scene: Scene, link: Connector) -> str:
         if link in joint.holders:
             return str(joint)
     return str(link)
-
-
-def _gradients(scene: Scene, links: list[Connector]) -> Array:
-    """Of relative motions by what moves freely, rotations times size; (num_links, free)."""
-    same = scene.representatives()
-    columns: dict[Slot, int] = {}
-    fixed: set[Slot] = {(GROUND, component) for component in range(3)}
-    fixed |= {(node(s.place), c) for s in scene.supports if not s.angle for c in s.held}
-    fixed = {same.get(slot, slot) for slot in fixed}
-    entries: list[tuple[int, int, float]] = []
-    for row, link in enumerate(links):
-        for anchor, factors in zip((link.a, link.b), link.rigidly(), strict=True):
-            for component, factor in enumerate(factors):
-                slot = (node(anchor), component)
-                slot = same.get(slot, slot)
-                if factor and slot not in fixed:
-                    column = columns.setdefault(slot, len(columns))
-                    turns = component == 2 and not link.turns
-                    entries.append((row, column, factor / scene.size if turns else factor))
-    gradients = np.zeros((len(links), max(len(columns), 1)))
-    for row, column, factor in entries:
-        gradients[row, column] += factor
-    return gradients
 
 
 def require_no_mechanism(scene: Scene) -> None:
@@ -152,8 +165,12 @@ def _constraints(scene: Scene) -> csr_array:
         for component in support.held:
             add(support.place, turned[component])
             row += 1
+    return _sparse(entries, (max(row, 1), 3 * len(number)))
+
+
+def _sparse(entries: list[tuple[int, int, float]], shape: tuple[int, int]) -> csr_array:
+    """Matrix of entries (row, column, value); those at one place are added."""
     rows, columns, values = np.array(entries).reshape(-1, 3).T
-    shape = (max(row, 1), 3 * len(number))
     return csr_array((values, (rows.astype(int), columns.astype(int))), shape=shape)
 
 
