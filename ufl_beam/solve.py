@@ -298,8 +298,7 @@ class Solver:
             return DIVERGED
         scale = self._loads + self._size(self._at_forces)
         wanted = self._newton.rtol * scale
-        excess = self._excess(self._r, scale)
-        if residual <= wanted and excess <= self._newton.rtol:
+        if residual <= wanted and self._excess(self._r, scale) <= self._newton.rtol:
             return CONVERGED
         self._near = False
         if iteration > 1:
@@ -307,7 +306,7 @@ class Solver:
             # A fraction of the last digit is luck; a few of them that Newton's method no longer
             # halves are all that can be had: it may go round between two such states for ever.
             least = residual <= floor / 80 or self._last / 2 < residual <= floor
-            if least and excess <= self._newton.rtol:
+            if least and self._excess(self._r, scale) <= self._newton.rtol:
                 return AT_ROUND_OFF
             # With the tangent of the iterate before, the residual falls by twice the last factor.
             self._near = residual > floor and 20 * residual**2 <= wanted * self._last
