@@ -43,6 +43,7 @@ check: ## lint, format and types
 bench: ## time per step
 	@./env python3 benchmarks/bench_step.py
 	@./env python3 benchmarks/bench_inelastic.py
+	@./env python3 benchmarks/bench_scaling.py
 
 # ruff, which Debian lacks: from a venv beside the root of ./env, made on first use; its version is in pyproject.toml.
 with_ruff = tools=$${XDG_CACHE_HOME:-$$HOME/.cache}/ufl_beam/tools; ruff=$$tools/bin/ruff; \

@@ -118,7 +118,8 @@ def csr_matrix(size: int, *coupled: npt.NDArray[np.int64]) -> la.MatrixCSR:
     index_map = cpp.common.IndexMap(MPI.COMM_SELF, size)
     pattern = cpp.la.SparsityPattern(MPI.COMM_SELF, [index_map, index_map], [1, 1])
     pattern.insert_diagonal(np.arange(size, dtype=np.int32))
-    for dofs in (row.astype(np.int32) for rows in coupled for row in rows):
-        pattern.insert(dofs, dofs)
+    for rows in coupled:
+        for dofs in rows.astype(np.int32):
+            pattern.insert(dofs, dofs)
     pattern.finalize()
     return la.matrix_csr(pattern)

@@ -68,11 +68,11 @@ class Grid:
     def _number_of_beam(self) -> dict[Beam, int]:
         return {beam: i for i, beam in enumerate(self.scene.beams)}
 
-    def _index(self, beam: Beam, asked: str = "") -> int:
-        """Number of a beam of the scene; ``asked`` says in messages what it is wanted for."""
+    def _index(self, beam: Beam) -> int:
+        """Number of a beam of the scene."""
         require_kind(beam, Beam, "beam")
         if beam not in self._number_of_beam:
-            raise SceneError(f"{asked}{beam.name} is not in the scene")
+            raise SceneError(f"{beam.name} is not in the scene")
         return self._number_of_beam[beam]
 
     def vertices_of(self, beam: Beam) -> Index:
@@ -99,7 +99,9 @@ class Grid:
             SceneError: The beam of the place is not in the scene.
         """
         require_kind(place, Place, "place")
-        i = self._index(place.beam, f"{place}: ")
+        if place.beam not in self._number_of_beam:
+            raise SceneError(f"{place}: {place.beam.name} is not in the scene")
+        i = self._number_of_beam[place.beam]
         s = self._parameters[i]
         left = min(max(bisect_left(s, place.s) - 1, 0), len(s) - 2)
         part = (place.s - s[left]) / (s[left + 1] - s[left])
@@ -187,7 +189,7 @@ class Grid:
 
         slots = np.arange(3 * (vertices + len(movers)))
         shared = slots >= 3 * vertices
-        for (one, component), (other, _) in self.scene.representatives().items():
+        for (one, component), (other, _) in self.scene.representatives.items():
             same = 3 * at(other) + component
             slots[3 * at(one) + component] = same
             shared[same] = True

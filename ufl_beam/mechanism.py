@@ -63,7 +63,7 @@ def require_independent(scene: Scene) -> None:
 
 def _demands(scene: Scene) -> list[Demand]:
     """What connectors, and supports in turned axes, give of the motion of what moves freely."""
-    same = scene.representatives()
+    same = scene.representatives
     fixed: set[Slot] = {(GROUND, component) for component in range(3)}
     fixed |= {(node(s.place), c) for s in scene.supports if not s.angle for c in s.held}
     fixed = {same.get(slot, slot) for slot in fixed}

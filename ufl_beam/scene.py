@@ -318,6 +318,7 @@ class Scene:
                     "RigidLink and Link join places that are apart"
                 )
 
+    @cached_property
     def representatives(self) -> dict[Slot, Slot]:
         """Which component of a node stands for it, for all components that joints share."""
         parent: dict[Slot, Slot] = {}
@@ -338,7 +339,7 @@ class Scene:
         return {slot: root(slot) for slot in parent}
 
     def _require_single_supports(self) -> None:
-        same = self.representatives()
+        same = self.representatives
         holders: dict[Slot, str] = {}
         slot: Slot
         for component in (0, 1, 2):

@@ -40,11 +40,11 @@ SMALLEST_PART = 2**12
 
 NO_REACTIONS = np.zeros((0, 3))
 
-SMALLEST_SHARE = 100_000
+SMALLEST_SHARE = 4_000
 """Scenes with fewer cells per process are computed by each process.
 
-Measured on two cores: shared with MUMPS, an iteration takes five times as long at 500 to 32 000
-cells and four times at 100 000, so that only memory speaks for sharing.
+Measured on two cores with lattices: two processes break even at some 1 000 cells each and win by
+1.4 at 4 000; see benchmarks/README.md.
 """
 
 LARGEST_TURN = 0.75 * math.pi
@@ -356,8 +356,20 @@ class Simulation:
             return NO_REACTIONS
         if self.parts == 0:
             return np.full((len(self.scene.supports), 3), np.nan)
-        everywhere = self.share.gather(self.supports.all_reactions(self.share.size))
-        return np.array([everywhere[self.share.at(s.place)] for s in self.scene.supports])
+        dofs, mine = self._support_dofs
+        here = np.where(mine, self.supports.all_reactions(self.share.size)[dofs], 0.0)
+        if self.share.comm.size > 1:
+            self.share.comm.Allreduce(MPI.IN_PLACE, here)
+        return here
+
+    @cached_property
+    def _support_dofs(self) -> tuple[Index, Index]:
+        """Local degrees of freedom of the supports, and which of them this process owns."""
+        dofs = np.array([self.share.at(support.place) for support in self.scene.supports])
+        mine = self.share.owns(dofs)
+        local = np.zeros_like(dofs)
+        local[mine] = self.share.local(dofs[mine])
+        return local, mine
 
     def entries(self) -> tuple[dict[str, float], ...]:
         """The ledger over all processes: state, supplied, lost; J."""

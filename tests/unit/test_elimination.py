@@ -171,7 +171,7 @@ def test_on_several_processes_as_on_one(scheme):
 
 def test_a_singular_tangent_cuts_the_step(monkeypatch):
     """Also where elimination finds it; the message is that of any failure."""
-    monkeypatch.setattr("ufl_beam.solve.CELLS_IN_CACHE", 0)
+    monkeypatch.setattr("ufl_beam.solve.JOINTS_IN_NATURAL_ORDER", 0)
     simulation = ub.Simulation(tower(), ub.Midpoint())
     data = simulation._A.data
     monkeypatch.setattr(simulation, "_tangent", lambda x: data.fill(0.0))
