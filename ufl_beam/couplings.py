@@ -68,7 +68,6 @@ class Couplings(Links):
 
         self._q0, self._row = q0, row
         self._work, self._tangent, self._value = map(kernel, (work, tangent, e * z * dx))
-        self._tangent.share(self._work)
         self._tangent.place(A)
         self.response = respond(links[0].law, links, setting)
         self._acting = setting.scheme.acting
@@ -90,6 +89,7 @@ class Couplings(Links):
     def begin(self, step: Step) -> None:
         """Remember the motions at the beginning."""
         self._work.set(self._q0, step.q0)
+        self._tangent.set(self._q0, step.q0)
         if step.q0 is not self._q:
             self._q, self._e = step.q0, self.motion(step.q0)
         self._dt = step.dt
@@ -110,6 +110,7 @@ class Couplings(Links):
 
     def add_tangent(self, q1: Array) -> None:
         """Add the derivative; the rows are those of the latest residual."""
+        self._tangent.put(self._row, self._rows[self._order])
         self._tangent.add(q1, self._A.data)
 
     def excess(self, r: Array, force: float) -> float:

@@ -1,0 +1,329 @@
+"""Bodies, joints and connectors: what is refused, what is shared, what solutions say."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+
+import ufl_beam as ub
+
+SECTION = ub.Section(EA=1e4, GA=1e4, EI=10.0, rhoA=1.0, rhoI=0.01)
+
+
+def body(x=0.0, y=0.0, name="body", **more):
+    return ub.Body((x, y), **({"mass": 1.0, "inertia": 0.1} | more), name=name)
+
+
+def beam(a=(0, 0), b=(1, 0), name="beam", cells=2):
+    return ub.Beam(a, b, SECTION, cells=cells, name=name)
+
+
+def raises(text):
+    return pytest.raises(ub.SceneError, match=re.escape(text))
+
+
+def run(scene, scheme=None, **more):
+    arguments = {"t": (0, 0.1), "dt": 0.01, "progress": False} | more
+    return ub.simulate(scene, scheme or ub.Midpoint(), **arguments)
+
+
+# -- bad input -----------------------------------------------------------------------------------
+
+PLACE = beam().end
+BAD = {
+    "no mass to be negative": (lambda: body(mass=-1.0), "body: mass = -1 must be at least 0"),
+    "centre": (lambda: body(x=math.nan), "body: center[0] = nan is not finite"),
+    "no place": (lambda: ub.Prismatic(3, PLACE), "Prismatic: 3 is not a place"),
+    "axis": (
+        lambda: ub.Prismatic(ub.ground(0, 0), PLACE, axis=(0, 0)),
+        "Prismatic(ground (0, 0), beam.end (1, 0)): the axis has zero length",
+    ),
+    "axis of one point": (lambda: ub.Prismatic(ub.ground(1, 0), PLACE), "the axis has zero length"),
+    "link": (lambda: ub.Link(ub.ground(1, 0), PLACE), "Link(ground (1, 0), beam.end (1, 0)): zero"),
+    "rigid link": (lambda: ub.RigidLink(PLACE, body(1.0).middle), "zero length; join them with"),
+    "stretch": (lambda: ub.Stretch(PLACE, body(1.0).middle, ub.Spring(1.0)), "zero length"),
+    "law": (lambda: ub.Turn(PLACE, body().middle, 3.0), "law = 3.0 is not a"),
+    "stiffness": (lambda: ub.Spring(-1.0), "Spring: stiffness = -1 must be positive"),
+    "hardening": (lambda: ub.Spring(1.0, law=2.0), "Spring: law = 2.0 is not a Hardening"),
+    "softening": (lambda: ub.Spring(1.0, softening=2.0), "Spring: softening = 2.0"),
+    "viscosity": (lambda: ub.Damper(0.0), "Damper: viscosity = 0 must be positive"),
+    "stop": (lambda: ub.Stop(1.0, low=0.1, high=0.2), "Stop: the interval from low = 0.1"),
+    "no stop": (lambda: ub.Stop(1.0), "have at least one end"),
+    "friction": (lambda: ub.Coulomb(), "Coulomb: force and coefficient are both zero"),
+    "friction of what": (lambda: ub.Coulomb(coefficient=0.1), "give coefficient and joint"),
+    "motor": (lambda: ub.Motor(1.0), "Motor: time = 1.0 must be a function of t"),
+    "actuator": (lambda: ub.Actuator(lambda t: math.nan), "Actuator: the time function is nan"),
+    "controller": (lambda: ub.Controller(1.0), "Controller: 1.0 must be a function"),
+    "function": (lambda: ub.Function(1.0), "Function: 1.0 must be a function"),
+    "release": (lambda: ub.Release(PLACE, body(1.0).middle, free="X"), "letters of 'NVM'"),
+    "no release": (lambda: ub.Release(PLACE, body(1.0).middle, free=""), "letters of 'NVM'"),
+    "guide": (lambda: ub.Guided(PLACE, lambda s: (s, 1.0)), "must be at the place"),
+    "guide at rest": (lambda: ub.Guided(PLACE, lambda s: (1.0, 0.0)), "the curve stands still"),
+    "guide of a rim": (lambda: ub.Guided(body().at(1, 0), lambda s: (1, s)), "the centre of the"),
+    "clamp of a rim": (lambda: ub.Clamped(body().at(1, 0)), "is not the centre of the body"),
+    "clamp of the ground": (lambda: ub.Clamped(ub.ground(1, 0)), "does not move"),
+    "follower at a rim": (
+        lambda: ub.FollowerLoad(body().at(1, 0), force=(1, 0)), "not the centre of the body"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("build", "text"), BAD.values(), ids=BAD)
+def test_records(build, text):
+    with raises(text):
+        build()
+
+
+def test_scenes():
+    one, other = body(name="one"), body(1.0, name="other")
+    with raises("Scene: no beams and no bodies"):
+        ub.Scene()
+    with raises("other is not in the scene; add it to bodies"):
+        ub.Scene(bodies=[one], joints=[ub.Link(one.middle, other.middle)])
+    with raises("one is in the scene twice, as bodies[0] and bodies[1]"):
+        ub.Scene(bodies=[one, one])
+    with raises("both ends are at the same body or cross-section"):
+        spring = ub.Stretch(one.middle, one.at(0.5, 0), ub.Spring(1.0))
+        ub.Scene(bodies=[one], connectors=[spring])
+    with raises("joint ends lie 0.5 m apart"):
+        ub.Scene(bodies=[one, other], joints=[ub.Revolute(one.at(0.5, 0), other.middle)])
+    with raises("supports in conflict: the ground and Clamped"):
+        base = ub.Rigid(one.middle, ub.ground(0, 0))
+        ub.Scene(bodies=[one], joints=[base], supports=[ub.Clamped(one.middle)])
+
+
+def test_bodies_need_mass_in_dynamics():
+    scene = ub.Scene(bodies=[ub.Body((0, 0), name="ghost")])
+    with raises("ghost: mass = 0, but dynamics needs it to be positive"):
+        run(scene)
+    with raises("ghost: inertia = 0"):
+        run(ub.Scene(bodies=[ub.Body((0, 0), mass=1.0, name="ghost")]))
+
+
+def parallelogram(cranks):
+    """A coupler on parallel cranks, all of them bodies."""
+    arms = [body(x, 0.5, name=f"crank {x}") for x in range(cranks)]
+    coupler = body(1.0, 1.0, name="coupler")
+    joints = [ub.Revolute(ub.ground(x, 0), arm.at(x, 0)) for x, arm in enumerate(arms)]
+    joints += [ub.Revolute(arm.at(x, 1), coupler.at(x, 1)) for x, arm in enumerate(arms)]
+    idle = body(9.0, 9.0, name="idle")
+    return ub.Scene(
+        bodies=[*arms, coupler, idle], joints=[*joints, ub.Revolute(idle.middle, ub.ground(9, 9))]
+    )
+
+
+def test_redundant_loops_are_refused_by_name():
+    ub.Simulation(parallelogram(2), ub.Midpoint()).close()
+    with pytest.raises(ub.SceneError) as refused:
+        ub.Simulation(parallelogram(3), ub.Midpoint())
+    message = str(refused.value)
+    assert "constraints repeat or contradict each other: 1 of those of" in message
+    for x in range(3):
+        assert f"Revolute(ground ({x}, 0), crank {x} ({x}, 0))" in message
+        assert f"Revolute(crank {x} ({x}, 1), coupler ({x}, 1))" in message
+    assert "idle" not in message
+
+
+def test_contradictions_are_refused_by_name():
+    one = beam()
+    drive = ub.Turn(ub.ground(0, 0), one.start, ub.Motor(lambda t: t))
+    clamped = ub.Scene([one], supports=[ub.Clamped(one.start)], connectors=[drive])
+    with raises("Turn(ground (0, 0), beam.start (0, 0)) can be left out"):
+        run(clamped)
+    rails = [ub.Prismatic(ub.ground(0, 0), one.end, axis=(1, 0), turning=True) for _ in range(2)]
+    with raises("Prismatic(ground (0, 0), beam.end (1, 0)) can be left out"):
+        run(ub.Scene([one], joints=rails, supports=[ub.Pinned(one.start)]))
+    slope = ub.Roller(one.end, along=(1, 1))
+    with raises("Roller at beam.end (1, 0) can be left out"):
+        rail = ub.Prismatic(ub.ground(0, -1), one.end, axis=(1, 1), turning=True)
+        run(ub.Scene([one], joints=[rail], supports=[ub.Pinned(one.start), slope]))
+
+
+def test_statics_names_what_is_free():
+    one = body(name="loose")
+    hung = ub.Scene(bodies=[one], joints=[ub.Revolute(one.at(1, 0), ub.ground(1, 0))])
+    with raises("loose (body 0) can turn about (1, 0)"):
+        run(hung, ub.Static())
+    # A spring resists, a damper does not.
+    turn = ub.Turn(ub.ground(0, 0), one.middle, ub.Spring(1.0))
+    run(ub.Scene(bodies=[one], joints=hung.joints, connectors=[turn]), ub.Static())
+    with raises("loose (body 0) can turn"):
+        turn = ub.Turn(ub.ground(0, 0), one.middle, ub.Damper(1.0))
+        run(ub.Scene(bodies=[one], joints=hung.joints, connectors=[turn]), ub.Static())
+
+
+def test_velocities_must_agree_with_joints():
+    a, b = body(name="a"), body(2.0, name="b")
+    scene = ub.Scene(
+        bodies=[a, b], joints=[ub.Link(a.middle, b.middle)],
+        initial=[ub.Velocity((b,), linear=(1.0, 0.0))],
+    )  # fmt: skip
+    with raises("the parts that Link(a (0, 0), b (2, 0)) joins would move apart at 1 m/s"):
+        run(scene)
+
+
+# -- what is an unknown --------------------------------------------------------------------------
+
+
+def unknowns(**parts):
+    return ub.Simulation(ub.Scene(**parts), ub.Midpoint()).grid.size
+
+
+def test_only_what_is_there_has_unknowns():
+    left, right = beam(), beam((1, 0), (2, 0))
+    free = unknowns(beams=[left, right])
+    assert free == 18
+    shared = unknowns(beams=[left, right], joints=[ub.Rigid(left.end, right.start)])
+    assert shared == free - 3
+    measured = [ub.Rigid(left.end, right.start, measured=True)]
+    assert unknowns(beams=[left, right], joints=measured) == free + 3
+    hub = body(1.0)
+    carried = [ub.Rigid(left.end, hub.middle, right.start)]
+    assert unknowns(beams=[left, right], bodies=[hub], joints=carried) == free - 3
+    # The rim of a body: two forces, and the rotation is shared.
+    rim = body(1.0, 1.0)
+    held = [ub.Rigid(left.end, rim.at(1.0, 0.0))]
+    assert unknowns(beams=[left], bodies=[rim], joints=held) == 9 + 3 + 2 - 1
+
+
+def test_elastic_scenes_without_links_have_no_couplings():
+    simulation = ub.Simulation(ub.Scene([beam()]), ub.Midpoint())
+    assert simulation.couplings == []
+    assert simulation.grid.multipliers.size == 0
+
+
+# -- results -------------------------------------------------------------------------------------
+
+
+def test_measured_joints_move_as_shared_ones():
+    ends = []
+    for measured in (False, True):
+        left, right = beam(), beam((1, 0), (1, 1), name="right")
+        joint = ub.Rigid(left.end, right.start, measured=measured)
+        load = ub.PointLoad(right.end, force=(2.0, -1.0))
+        scene = ub.Scene([left, right], [joint], [ub.Clamped(left.start)], [load])
+        solution = run(scene)
+        ends.append(solution.displacement(right.end))
+    # Newton's tolerance in each of ten steps, 1e-10 of forces of some newtons on 10 N/m
+    assert np.abs(ends[0] - ends[1]).max() < 1e-9
+
+
+def test_forces_of_a_joint_at_rest():
+    """A hung frame: the joint bears the weight below it, and its moment."""
+    left, right = beam((0, 0), (1, 0)), beam((1, 0), (2, 0), name="right")
+    joint = ub.Rigid(left.end, right.start, measured=True)
+    load = ub.PointLoad(right.end, force=(0.0, -0.01))
+    scene = ub.Scene([left, right], [joint], [ub.Clamped(left.start)], [load])
+    solution = run(scene, ub.Static(), t=(0, 1), dt=1.0)
+    history = solution.joint(joint)
+    turn = solution.displacement(left.end)[-1, 2]
+    arm = solution.position(right.end)[-1] - solution.position(right.start)[-1]
+    assert history.force[-1] == pytest.approx([0.0, 0.01], abs=1e-10)
+    assert history.moment[-1] == pytest.approx(0.01 * arm[0], rel=1e-8)
+    along, across = 0.01 * math.sin(turn), 0.01 * math.cos(turn)
+    assert history.in_a[-1] == pytest.approx([along, across], abs=1e-10)
+    assert history.in_b[-1] == pytest.approx(history.in_a[-1], abs=1e-12)
+    assert history.motion == pytest.approx(np.zeros((2, 3)), abs=1e-12)
+
+
+def test_questions_about_joints():
+    left, right = beam(), beam((1, 0), (2, 0))
+    joint, other = ub.Rigid(left.end, right.start), ub.Revolute(left.end, right.start)
+    solution = run(ub.Scene([left, right], [joint]))
+    with raises("Rigid(beam.end (1, 0), beam.start (1, 0)) shares unknowns"):
+        solution.joint(joint)
+    with raises("is not in the scene"):
+        solution.joint(other)
+    with raises("is not in the scene"):
+        solution.connector(ub.Turn(left.end, right.start, ub.Spring(1.0)))
+
+
+def test_points_of_bodies():
+    """A spinning disc: points, velocities and momenta of a rigid motion."""
+    disc = body(1.0, 2.0, mass=3.0, inertia=0.5)
+    scene = ub.Scene(bodies=[disc], initial=[ub.Velocity((disc,), (1.0, 0.5), 2.0, (1.0, 2.0))])
+    solution = run(scene, t=(0, 1), dt=0.01)
+    rim, t = disc.at(1.5, 2.0), solution.times
+    # 2 tan(Δψ/2) = ω Δt: the midpoint rule turns a little less, by (ω Δt)²/12
+    angle = 2 * np.arctan(0.01) * t / 0.01
+    expected = [1 + t + 0.5 * np.cos(angle), 2 + 0.5 * t + 0.5 * np.sin(angle)]
+    assert solution.position(rim) == pytest.approx(np.transpose(expected), abs=1e-11)
+    speed = [1 - np.sin(angle), 0.5 + np.cos(angle), 2 + 0 * t]
+    assert solution.velocity(rim) == pytest.approx(np.transpose(speed), abs=1e-10)
+    about_origin = 3 * (1.0 * 0.5 - 2.0 * 1.0) + 0.5 * 2.0
+    assert solution.momentum() == pytest.approx(
+        np.tile([3, 1.5, about_origin], (101, 1)), abs=1e-10
+    )
+    assert "1 body, 3 degrees of freedom" in str(solution)
+
+
+def test_live_questions_agree_with_the_solution():
+    mass = body(1.0)
+    rail = ub.Prismatic(ub.ground(0, 0), mass.middle)
+    spring = ub.Slide(ub.ground(0, 0), mass.middle, ub.Spring(4.0))
+    scene = ub.Scene(
+        bodies=[mass], joints=[rail], connectors=[spring],
+        initial=[ub.Velocity((mass,), linear=(1.0, 0.0))],
+    )  # fmt: skip
+    simulation = ub.Simulation(scene, ub.Midpoint())
+    simulation.solution.keep(simulation)
+    for n in range(1, 6):
+        simulation.step_to(0.1 * n)
+        simulation.solution.keep(simulation)
+    solution, now = simulation.solution, simulation.connector(spring)
+    then = solution.connector(spring)
+    assert now == pytest.approx([field[-1] for field in then], rel=1e-14)
+    motions = solution.displacement(mass.middle)
+    assert simulation.displacement(mass.middle) == pytest.approx(motions[-1])
+    assert simulation.velocity(mass.middle) == pytest.approx(solution.velocity(mass.middle)[-1])
+    assert then.motion == pytest.approx(motions[:, 0], abs=1e-15)
+    assert now.rate == pytest.approx(np.diff(motions[:, 0])[-1] / 0.1)
+    # The force in the step is that in the middle, and its work is what the spring stores.
+    middle = (motions[1:, 0] + motions[:-1, 0]) / 2
+    assert then.force[1:] == pytest.approx(4 * middle, rel=1e-9)
+    assert then.work == pytest.approx(2 * motions[:, 0] ** 2, abs=1e-12)
+    simulation.close()
+
+
+def test_a_run_that_goes_on_remembers_its_connectors():
+    """Two runs, one after the other, are one: yielding springs, friction, work so far."""
+
+    def scene():
+        mass = body(1.0)
+        base = ub.ground(0, 0)
+        return ub.Scene(
+            bodies=[mass], joints=[ub.Prismatic(base, mass.middle)],
+            connectors=[
+                ub.Slide(base, mass.middle, ub.Spring(40.0, ub.Hardening(1.0, kinematic=5.0))),
+                ub.Slide(base, mass.middle, ub.Coulomb(0.2)),
+            ],
+            loads=[ub.PointLoad(mass.middle, force=(3.0, 0.0), time=lambda t: math.cos(4 * t))],
+        )  # fmt: skip
+
+    one = scene()
+    whole = run(one, t=(0, 1), dt=0.01)
+    half = run(one, t=(0, 0.5), dt=0.01)
+    rest = run(one, t=(0.5, 1), dt=0.01, start=half)
+    assert whole.energy["plastic"][-1] > 0.1
+    assert np.abs(rest.q[-1][:3] - whole.q[-1][:3]).max() < 1e-9
+    for link in one.connectors:
+        ends = [solution.connector(link).work[-1] for solution in (whole, rest)]
+        assert ends[1] == pytest.approx(ends[0], abs=1e-9)
+
+
+def test_works_of_connectors_are_in_the_ledger():
+    a, b = body(name="a"), body(1.0, name="b")
+    spring = ub.Stretch(a.middle, b.middle, ub.Spring(30.0))
+    damper = ub.Stretch(a.middle, b.middle, ub.Damper(0.5))
+    motor = ub.Turn(ub.ground(0, 0), a.middle, ub.Motor(lambda t: t**2))
+    scene = ub.Scene(
+        bodies=[a, b], connectors=[spring, damper, motor],
+        joints=[ub.Revolute(a.middle, ub.ground(0, 0)), ub.Prismatic(a.middle, b.middle)],
+    )  # fmt: skip
+    solution = run(scene, t=(0, 1), dt=0.01)
+    works = [solution.connector(link).work for link in (spring, damper, motor)]
+    assert solution.energy["stored"] == pytest.approx(works[0], abs=1e-12)
+    assert solution.energy["damping"] == pytest.approx(works[1], abs=1e-12)
+    assert solution.energy["motors"] == pytest.approx(-works[2], abs=1e-12)
+    assert (np.diff(works[1]) >= 0).all()
+    assert solution.energy.worst < 1e-10
