@@ -147,6 +147,7 @@ class Simulation:
             forces=lambda: self.force,
             excess=self._excess,
             relieve=self._relieve,
+            held=self.supports.dofs,
             newton=newton or Newton(),
         )
         self.solution = Solution(scene, self.grid)

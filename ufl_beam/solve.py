@@ -15,7 +15,7 @@ import numpy as np
 from ufl_beam.compat import Array
 from ufl_beam.elimination import Elimination
 from ufl_beam.errors import SceneError, require_number
-from ufl_beam.grid import Share
+from ufl_beam.grid import Index, Share
 from ufl_beam.loops import doubles, lib
 from ufl_beam.sparse import Csr
 
@@ -141,6 +141,7 @@ class Solver:
             the scale of convergence.
         excess: Of a residual and the scale of forces: how far what connectors demand is missed,
             as a number without dimension that must reach the tolerance too.
+        held: Local degrees of freedom that supports hold; what stands for them in A means nothing.
         relieve: Makes tangents stiffer where that may help; says whether it can.
         newton: Tolerances.
     """
@@ -156,6 +157,7 @@ class Solver:
         forces: Callable[[], Array],
         excess: Callable[[Array, float], float],
         relieve: Callable[[], bool],
+        held: Index,
         newton: Newton,
     ) -> None:
         self._share, self._A, self._newton = share, A, newton
@@ -166,6 +168,8 @@ class Solver:
         self._weights = self._force_weights()
         self._norm = (len(self._weights), doubles(self._weights))
         self._lengths = share.lengths()
+        self._moves = np.ones(share.size)
+        self._moves[held] = 0.0
         self._diagonal = np.flatnonzero(A.rows() == A.indices)
         self._x = self._vector()
         self._view(self._x, writable=True)
@@ -326,7 +330,7 @@ class Solver:
         return self._size(doubles(self._A.data[self._diagonal] * self._last_digits()))
 
     def _last_digits(self) -> Array:
-        return np.spacing(np.abs(self._view(self._x)) + self._lengths)
+        return self._moves * np.spacing(np.abs(self._view(self._x)) + self._lengths)
 
     def least_work(self, s: Array) -> float:
         """Work in a step ``s`` of what the last digit of displacements makes; less is none; J."""

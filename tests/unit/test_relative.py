@@ -1,4 +1,4 @@
-"""Relative motions: values, variations that are increments, rigid motions, tangents with all laws."""
+"""Relative motions: values, variations that are increments, rigid motions; tangents of all laws."""
 
 import math
 
