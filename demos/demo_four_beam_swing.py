@@ -10,7 +10,8 @@
 # This demo emphasises
 #
 # * revolute joints, which cost nothing: they only remove unknowns,
-# * a point mass, a load in a time table, massless links as stiff beams,
+# * a point mass, a load in a time table, massless links as stiff beams and as constraints,
+# * plastic hinges in the place of the joints, as in the paper,
 # * `Midpoint()` against `Midpoint(alpha, beta)`, and the ledger that accounts for the difference,
 # * the files: XDMF for ParaView, a history table, pictures.
 #
@@ -44,12 +45,14 @@ left = ub.Beam((0, 0), (0, -0.36), rigid, cells=1, name="left link")
 right = ub.Beam((1.08, 0), (0.72, -0.36), rigid, cells=1, name="right link")
 middle = beam.at(0.5)
 
+push = ub.Table([0, 0.128, 0.256], [0, 2, 0])  # s, N
+
 swing = ub.Scene(
     beams=[beam, left, right],
     joints=[ub.Revolute(left.end, beam.start), ub.Revolute(right.end, beam.end)],
     supports=[ub.Pinned(left.start), ub.Pinned(right.start)],
     masses=[ub.PointMass(middle, 0.5)],  # kg
-    loads=[ub.PointLoad(middle, force=(1, 0), time=ub.Table([0, 0.128, 0.256], [0, 2, 0]))],  # N
+    loads=[ub.PointLoad(middle, force=(1, 0), time=push)],
 )
 
 # %% [markdown]
@@ -59,20 +62,134 @@ swing = ub.Scene(
 # vibration that the snap excites.
 
 # %%
-conserving = ub.simulate(
+conserving = ub.simulate(swing, ub.Midpoint(), t=(0.0, 2.5), dt=1e-3)
+decaying = ub.simulate(
     swing,
-    ub.Midpoint(),
+    ub.Midpoint(alpha=0.01, beta=0.01),
     t=(0.0, 2.5),
     dt=1e-3,
     record=[
-        ub.XDMF(output / "swing.xdmf", every=10),
+        ub.XDMF(output / "swing.xdmf", every=20),
         ub.History(output / "swing.csv", [beam.start, middle, beam.end]),
     ],
 )
-decaying = ub.simulate(swing, ub.Midpoint(alpha=0.01, beta=0.01), t=(0.0, 2.5), dt=1e-3)
 
 ub.say("four-beam swing, energy conserved\n" + str(conserving))
 ub.say("\nfour-beam swing, alpha = beta = 0.01\n" + str(decaying))
+
+# %% [markdown]
+# ## The links as constraints
+#
+# A massless rigid rod with a joint at both ends is a `Link`: a distance that stays, with one force.
+# What the stiff beams cost and what they change is in the table below.  With 16 cells and steps of
+# 0.2 ms the motion up to the snap is that of the converged reference.
+
+
+# %%
+def rods(cells):
+    """The swing on two links, and the places whose motion is known: mid-span, A and B."""
+    beam = ub.Beam((0, -0.36), (0.72, -0.36), flexible, cells=cells, name="beam")
+    middle = beam.at(0.5)
+    links = [ub.Link(ub.ground(0, 0), beam.start), ub.Link(ub.ground(1.08, 0), beam.end)]
+    load = ub.PointLoad(middle, force=(1, 0), time=push)
+    scene = ub.Scene([beam], joints=links, masses=[ub.PointMass(middle, 0.5)], loads=[load])
+    return scene, (middle, beam.start, beam.end)
+
+
+on_rods, places = rods(cells=4)
+exact = ub.simulate(on_rods, ub.Midpoint(), t=(0.0, 2.5), dt=1e-3, progress=False)
+fine_rods, fine_places = rods(cells=16)
+fine = ub.simulate(fine_rods, ub.Midpoint(), t=(0.0, 0.65), dt=2e-4, progress=False)
+
+# %% [markdown]
+# ## Plastic hinges that have become joints
+#
+# In the paper the joints between links and beam are hinges that have gone through their plastic
+# process.  The units of its hinge data do not fit each other, so the numbers here are free: a limit
+# of 0.5 mN m, which the push exceeds soon, and a fracture energy of 10 µJ each: together a
+# three-thousandth of what the push brings.  A hinge sits in the middle of its cell, of 1 mm here.
+
+# %%
+M_u, G_f, cell = 0.5e-3, 10e-6, 1e-3  # N m, J, m
+law = ub.Softening(M_u, G_f)
+hinged_beam = ub.Beam(
+    (0, -0.36), (0.72, -0.36), flexible, cells=4, name="beam",
+    hinges={0.0: law, 1.0: law}, corners=(cell / 0.72, 1 - cell / 0.72),
+)  # fmt: skip
+hinged_middle = hinged_beam.at(0.5)
+hinged_swing = ub.Scene(
+    beams=[hinged_beam, left, right],
+    joints=[ub.Rigid(left.end, hinged_beam.start), ub.Rigid(right.end, hinged_beam.end)],
+    supports=[ub.Pinned(left.start), ub.Pinned(right.start)],
+    masses=[ub.PointMass(hinged_middle, 0.5)],
+    loads=[ub.PointLoad(hinged_middle, force=(1, 0), time=push)],
+)
+hinged = {
+    scheme: ub.simulate(hinged_swing, scheme, t=(0.0, 2.5), dt=1e-3, progress=False)
+    for scheme in (ub.Midpoint(), ub.Midpoint(alpha=0.01, beta=0.01))
+}
+hinged_conserving, hinged_decaying = hinged.values()
+ub.say("\nfour-beam swing, plastic hinges, alpha = beta = 0.01\n" + str(hinged_decaying))
+
+# %% [markdown]
+# The reference: converged in space and time, and with the mesh and step of the paper.
+
+# %%
+converged = {  # s: displacements of mid-span, A and B; m
+    0.256: ((0.063831, -0.000786), (0.064025, 0.005739), (0.060113, -0.051422)),
+    0.5: ((0.184287, -0.010064), (0.190201, 0.054347), (0.169416, -0.112099)),
+    0.62: ((0.243479, -0.018152), (0.273893, 0.126371), (0.225279, -0.130969)),
+    0.636: ((0.251017, -0.019073), (0.298786, 0.159184), (0.232318, -0.132846)),
+    0.64: ((0.252305, -0.018983), (0.306647, 0.171407), (0.233168, -0.133065)),
+}
+of_the_paper = {
+    0.5: ((0.184135, -0.010707), (0.190133, 0.054305), (0.169473, -0.112122)),
+    0.62: ((0.243240, -0.019234),),
+    0.64: ((0.25168, -0.01990), (0.30806, 0.17372)),
+    0.7: ((0.24144, 0.00169),),
+}  # fmt: skip
+
+
+def at(solution, place, t):
+    """Displacement of a place at a time; m."""
+    n = int(np.argmin(np.abs(solution.times - t)))
+    return solution.displacement(place)[n, :2]
+
+
+def table(name, solution, where, reference):
+    """Displacements beside those of the reference; returns the largest difference in m."""
+    ub.say(f"\n{name}\n    t     place      u (m)      v (m)   reference u, v")
+    apart = []
+    for t, rows in reference.items():
+        for place, letter, known in zip(where, ("mid", "A", "B"), rows, strict=False):
+            u, v = at(solution, place, t)
+            ub.say(f"  {t:5.3f}   {letter:5s} {u:10.6f} {v:10.6f}  {known[0]:9.6f} {known[1]:9.6f}")
+            apart.append(np.abs((u, v) - np.array(known)).max())
+    return max(apart)
+
+
+def peak(solution, place):
+    """First peak of the axial force at mid-span and its time; N, s."""
+    N = solution.section_forces_at(place)[:, 0]
+    n = int(np.argmax(np.where(solution.times < 0.65, N, 0.0)))
+    return N[n], solution.times[n]
+
+
+apart_fine = table("16 cells, 0.2 ms, links: converged", fine, fine_places, converged)
+apart_paper = table("4 cells, 1 ms, links: mesh of the paper", exact, places, of_the_paper)
+
+ways = {
+    "stiff beams": (conserving, middle), "links": (exact, places[0]),
+    "plastic hinges": (hinged_conserving, hinged_middle), "links, 16 cells": (fine, fine_places[0]),
+}  # fmt: skip
+smooth = conserving.times < 0.6205
+ub.say("\n                 first peak of N      mid at 0.62 s        iterations  wall time")
+for name, (solution, place) in ways.items():
+    (N, t), (u, v) = peak(solution, place), at(solution, place, 0.62)
+    each = solution.iterations / solution.parts
+    where = f"{N:7.1f} N, {t:.4f} s  {u:9.6f} {v:9.6f} m"
+    ub.say(f"{name:15s} {where} {each:9.2f} {solution.seconds:9.2f} s")
+ub.say("reference, converged: about 151 N at 0.6406 s; mesh of the paper: 143.3 N at 0.640 s")
 
 # %% [markdown]
 # ## Pictures
@@ -99,10 +216,42 @@ with ub.picture((9, 5.5)) as forces:
     lower.set_ylabel("energy (mJ)")
     lower.set_xlabel("t (s)")
 
-pictures = {"swing_shapes": shapes, "swing_forces": forces, "swing_energy": energies}
+with ub.picture((11, 8)) as hinges:
+    (jumps, losses), (paths, totals) = hinges.subplots(2, 2)
+    at_ends = {
+        "A": hinged_decaying.material_at(hinged_beam.start),
+        "B": hinged_decaying.material_at(hinged_beam.end),
+    }
+    t = hinged_decaying.times
+    for (letter, state), color in zip(at_ends.items(), ("#0072B2", "#D55E00"), strict=True):
+        jumps.plot(t, state.jump, color=color, label=f"hinge at {letter}")
+        losses.plot(1e3 * t, 1e6 * state.hinge, color=color)
+    jumps.set_title("jump of the hinges (rad)", loc="left")
+    jumps.legend()
+    losses.axhline(1e6 * G_f, color="0.3", ls=":", lw=1.2)
+    losses.text(300, 1e6 * G_f - 0.8, "$G_f$", color="0.3")
+    losses.set(xlim=(0, 400), xlabel="t (ms)")
+    losses.set_title("dissipated by the hinges (µJ)", loc="left")
+    for solution, place, label, style in (
+        (decaying, middle, "revolute joints", {"color": "#E69F00", "lw": 5, "alpha": 0.6}),
+        (hinged_decaying, hinged_middle, "softened hinges", {"color": "#0072B2", "lw": 1.5}),
+    ):
+        paths.plot(*solution.position(place).T, label=label, **style)
+        totals.plot(solution.times, 1e3 * solution.energy.total, label=label, **style)
+    paths.set(aspect="equal", xlabel="x (m)", ylabel="y (m)")
+    paths.set_title("path of the mass", loc="left")
+    paths.legend(loc="lower left", fontsize=10.5)
+    totals.set_title("energy (mJ)", loc="left")
+    for axes in (jumps, totals):
+        axes.set_xlabel("t (s)")
+
+pictures = {
+    "swing_shapes": shapes, "swing_forces": forces, "swing_energy": energies,
+    "swing_hinges": hinges,
+}  # fmt: skip
 for name, figure in pictures.items():
     figure.savefig(output / f"{name}.png")
-ub.animate(decaying, output / "swing.gif", seconds=5, color="N", thickness=8)
+ub.animate(decaying, output / "swing.gif", seconds=3, color="N", thickness=8)
 ub.say("\npictures and data:", *sorted(str(path) for path in output.glob("swing*")), sep="\n  ")
 
 # %% [markdown]
@@ -121,6 +270,37 @@ for t, value in expected.items():
     assert abs(decaying.energy.total[i[t]] - value) < 5.1e-6, t
 assert conserving.energy.worst < 1e-9
 assert decaying.energy.worst < 1e-9
+for solution in (exact, fine, hinged_conserving, hinged_decaying):
+    assert solution.energy.worst < 1e-9
+for solution in (conserving, decaying, exact, fine, hinged_conserving, hinged_decaying):
+    assert solution.iterations <= 5 * solution.parts
+
+# %% [markdown]
+# Links and stiff beams move the same way: 10⁴ times the stiffness of the beam yields nothing that
+# forces of less than a newton, before the snap, would show.  The mesh of the paper is met to the
+# digits given, and the converged motion up to what 16 cells and 0.2 ms leave.  The hinges take
+# their fracture energy, once, and the swing differs by their cells and by what they took: by a
+# thousandth of the motion, until the snap makes it sensitive to everything.
+
+# %%
+assert apart_paper < 5.1e-6
+assert apart_fine < 3e-4
+N, t_peak = peak(exact, places[0])
+assert abs(N - 143.3) < 0.06
+N, t_peak = peak(fine, fine_places[0])
+assert abs(N - 151) < 0.5
+assert abs(t_peak - 0.6406) < 2.1e-4
+same = exact.displacement(places[0]) - conserving.displacement(middle)
+assert np.abs(same[smooth]).max() < 1e-8
+assert np.abs(exact.energy.total - conserving.energy.total).max() < 1e-8
+for solution in (hinged_conserving, hinged_decaying):
+    taken = solution.energy["hinges"]
+    assert abs(taken[-1] / (2 * G_f) - 1) < 1e-9
+    assert taken[-1] < 1e-3 * solution.energy["loads"][-1]
+    assert np.all(np.diff(taken) >= 0.0)
+apart = hinged_decaying.position(hinged_middle) - decaying.position(middle)
+ub.say(f"hinges: the mass up to {1e3 * np.abs(apart[smooth]).max():.2f} mm away before the snap")
+assert np.abs(apart[smooth]).max() < 2 * cell
 ub.say("reference values reproduced")
 
 # %% [markdown]
@@ -128,4 +308,5 @@ ub.say("reference values reproduced")
 #
 # * `alpha=beta=0.5`: how much of the swing itself is lost now?
 # * `dt=2e-4` with `Midpoint()`: does a smaller step calm the axial force?
-# * twice the push: the mass loops over the pivots.
+# * twice the push: the mass loops over the pivots,
+# * `G_f = 1e-3`: hinges that take part of the swing; are they joints in the end?

@@ -14,26 +14,21 @@ import numpy as np
 from ufl_beam.beams import Place
 from ufl_beam.compat import Array
 from ufl_beam.errors import SceneError
+from ufl_beam.glyphs import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY
 from ufl_beam.solution import Solution
 from ufl_beam.view import (
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    ORANGE,
-    PINK,
-    RED,
-    SKY,
     decimal_prefix,
     draw_axes,
     draw_bar,
     draw_symbols,
+    draw_undeformed,
     make_room,
     moved_points,
     open_hinges,
     picture,
     plane_axes,
     plane_size,
+    plane_stage,
     scale,
     time_axes,
     with_unit,
@@ -125,16 +120,18 @@ def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Fig
     points, grid = moved_points(solution, n, magnify), solution.grid
     density = _dissipated_per_length(solution, n)
     factor = f", displacements × {magnify:g}" if magnify != 1 else ""
-    room = _room(np.concatenate([grid.points, points]))
+    stage = plane_stage(solution, [n], magnify)
+    pose = stage.pose(n)
+    room = _room(np.concatenate([grid.points, points, pose.points()]))
     width, height = plane_size(room)
     # Upright frames need less; the bar and the legend have their own widths.
     across = height * float(np.divide(*np.ptp(room, axis=0)))
     with picture((min(width, max(6.0, across + 3.0)), height)) as figure:
         axes = plane_axes(figure, f"damage at t = {solution.times[n]:.4g} s{factor}")
         axes.update_datalim(room)
-        draw_axes(axes, solution, grid.points, color=GREY, linewidth=1.2, zorder=1)
+        draw_undeformed(axes, stage)
         draw_axes(axes, solution, points, color=INK, linewidth=2.0, zorder=2)
-        draw_symbols(axes, solution, points, solution.q[n])
+        draw_symbols(axes, pose)
         yielded = density > 0.0
         if yielded.any():
             unit, prefix = decimal_prefix(float(density.max()))
@@ -159,9 +156,10 @@ def plot_dissipation(solution: Solution) -> Figure:
     worst imbalance of the ledger.
 
     Raises:
-        SceneError: The scene is elastic.
+        SceneError: The scene is elastic, and has no connectors.
     """
-    solution.material(solution.scene.beams[0])  # or its error
+    if not solution.scene.connectors:
+        _require_inelastic(solution)
     energy, t = solution.energy, solution.times
     held = energy.total
     supplied = held[0] + sum(energy.supplied.values(), np.zeros_like(t))
@@ -189,6 +187,12 @@ def plot_dissipation(solution: Solution) -> Figure:
 
 
 # -- words and numbers -------------------------------------------------------------------------
+
+
+def _require_inelastic(solution: Solution) -> None:
+    if not solution.scene.beams:
+        raise SceneError("plot_dissipation: the scene has neither beams nor connectors")
+    solution.material(solution.scene.beams[0])  # or its error
 
 
 def _percent(part: float) -> str:

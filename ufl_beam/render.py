@@ -9,7 +9,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,21 +19,22 @@ from mpi4py import MPI
 
 import numpy as np
 
+from ufl_beam import symbols
 from ufl_beam.beams import Beam, Place
+from ufl_beam.bodies import Anchor
 from ufl_beam.compat import Array
 from ufl_beam.errors import SceneError, require_number
+from ufl_beam.glyphs import INK, ORANGE
 from ufl_beam.solution import Solution
+from ufl_beam.stage import Pose, Stage
+from ufl_beam.symbols import FILLED, FRONT, MIDDLE, Pin, Stroke
 from ufl_beam.view import (
-    INK,
-    ORANGE,
     RESULTANTS,
     decimal_prefix,
     moved_points,
     nearest,
     open_hinges,
     require_choice,
-    support_direction,
-    support_symbol,
 )
 
 # Where the camera looks from, and what is up in the picture; the frame is in the plane of x and y.
@@ -56,8 +57,8 @@ def render(
     """Write a picture of the frame at the n-th kept time as a solid body.
 
     In the plane, beams have the depth of their section; across, they have the same depth, or a
-    visible one if they are slender.  Orange pins are hinges that have opened.  Needs no screen, see
-    :func:`animate`.
+    visible one if they are slender.  Bodies are plates, see :func:`plot`.  Orange pins are hinges
+    that have opened.  Needs no screen, see :func:`animate`.
 
     Args:
         solution: What to show.
@@ -159,8 +160,12 @@ class _Look:
     @property
     def symbol(self) -> float:
         """Half the size of the symbols of supports and masses; m."""
-        deepest = max(self.depth(beam) for beam in self.solution.scene.beams)
+        deepest = max(map(self.depth, self.solution.scene.beams), default=0.0)
         return max(0.022 * self.solution.scene.size, 0.7 * deepest)
+
+    def stage(self, shown: list[int]) -> Stage:
+        """What is drawn besides the beams."""
+        return Stage(self.solution, self.magnify, self.symbol, sorted(set(shown)))
 
     def depth(self, beam: Beam) -> float:
         """Depth in the plane; m."""
@@ -168,7 +173,24 @@ class _Look:
 
     def width(self, beam: Beam) -> float:
         """Width across the plane; m."""
-        return max(self.depth(beam), 0.04 * self.solution.scene.size)
+        return max(self.depth(beam), self.least_width)
+
+    @property
+    def least_width(self) -> float:
+        """Width across the plane of slender beams and of bodies; m."""
+        return 0.04 * self.solution.scene.size
+
+    @property
+    def widest(self) -> float:
+        """Width across the plane of the widest beam, or of bodies; m."""
+        return max(map(self.width, self.solution.scene.beams), default=self.least_width)
+
+    def around(self, places: Iterable[Anchor]) -> tuple[float, float]:
+        """Depth and width of the thickest beam of some places; m."""
+        beams = [place.beam for place in places if isinstance(place, Place)]
+        return max(map(self.depth, beams), default=0.0), max(
+            map(self.width, beams), default=self.least_width
+        )
 
     def values(self, beam: Beam, n: int) -> Array:
         """What colours a beam: (num_cells,) or, for the rotation, (num_vertices,)."""
@@ -198,8 +220,10 @@ class _Look:
         """Lower and upper corner of the box around everything in these states; (2, 3); m."""
         grid, margin = self.solution.grid, 2.2 * self.symbol
         shapes = [grid.points, *(moved_points(self.solution, n, self.magnify) for n in set(shown))]
-        xy = np.concatenate(shapes)
-        half = max(max(self.width(b), self.depth(b)) for b in self.solution.scene.beams) / 2
+        stage = self.stage(shown)
+        poses = [stage.undeformed, *(stage.pose(n) for n in set(shown))]
+        xy = np.concatenate([*shapes, *(pose.points() for pose in poses)])
+        half = max(self.widest, *map(self.depth, self.solution.scene.beams), 0.0) / 2
         low, high = xy.min(axis=0) - margin, xy.max(axis=0) + margin
         return np.array([[*low, -half], [*high, half]])
 
@@ -219,7 +243,9 @@ class _Look:
 
     def _frames(self, pyvista: Any, plotter: Any, shown: list[int]) -> Iterator[Any]:
         beams = self.solution.scene.beams
-        largest = max(float(np.abs(self.values(b, n)).max()) for b in beams for n in set(shown))
+        sizes = (float(np.abs(self.values(b, n)).max()) for b in beams for n in set(shown))
+        largest = max(sizes, default=0.0)
+        stage = self.stage(shown)
         _set_camera(plotter, self.bounds(shown), self.size)
         plotter.set_background("white")
         plotter.enable_anti_aliasing("msaa")
@@ -227,8 +253,12 @@ class _Look:
         for n in shown:
             plotter.suppress_rendering = True
             points = moved_points(self.solution, n, self.magnify)
-            _add_beams(pyvista, plotter, self, n, points, largest)
-            _add_fittings(pyvista, plotter, self, n, points)
+            pose = stage.pose(n)
+            if beams:
+                _add_beams(pyvista, plotter, self, n, points, largest)
+            _add_strokes(pyvista, plotter, self, pose)
+            _add_fittings(pyvista, plotter, self, pose)
+            _add_hinges(pyvista, plotter, self, n, points)
             _add_text(plotter, self, f"t = {self.solution.times[n]:.3f} s{scaled}", (0.02, 0.93))
             plotter.reset_camera_clipping_range()
             plotter.suppress_rendering = False
@@ -303,51 +333,99 @@ def _add_text(plotter: Any, look: _Look, text: str, position: tuple[float, float
     )
 
 
-def _add_fittings(pyvista: Any, plotter: Any, look: _Look, n: int, points: Array) -> None:
-    """Joints and open hinges as pins across the plane, masses as balls, supports as symbols."""
-    solution, scene, symbol = look.solution, look.solution.scene, look.symbol
+def _add(pyvista: Any, plotter: Any, parts: list[Any], color: str, name: str) -> None:
+    if parts:
+        mesh = pyvista.merge(parts)
+        plotter.add_mesh(mesh, color=color, name=name, reset_camera=False, ambient=0.25)
 
-    def add(parts: list[Any], color: str, name: str) -> None:
-        if parts:
-            mesh = pyvista.merge(parts)
-            plotter.add_mesh(mesh, color=color, name=name, reset_camera=False, ambient=0.25)
 
-    def center(place: Place) -> Array:
-        return np.append(points[solution.grid.vertex(place)], 0.0)
+def _extruded(pyvista: Any, outline: Array, low: float, high: float) -> Any:
+    """A block between two planes; the outline is closed; m."""
+    flat = np.insert(outline[:-1], 2, low, axis=1)
+    face = pyvista.PolyData(flat, [len(flat), *range(len(flat))])
+    return face.triangulate().extrude((0.0, 0.0, high - low), capping=True)
 
-    pins = []
-    for joint in scene.joints:
-        beams = [place.beam for place in joint.places]
-        turns = 2 not in joint.shared
-        radius = max(max(map(look.depth, beams)) / 2, (0.4 if turns else 0.0) * symbol)
-        height = max(map(look.width, beams)) * (1.25 if turns else 1.02)
-        at = center(joint.places[0])
-        pin = {"center": at, "direction": (0, 0, 1), "radius": radius, "height": height}
-        pins.append(pyvista.Cylinder(**pin, resolution=32))
-    add(pins, "#707070", "joints")
-    hinges = []
-    for cell in open_hinges(solution, n)[0]:
-        beam = scene.beams[solution.grid.beam_of_cell[cell]]
-        at = np.append(points[solution.grid.cells[cell]].mean(axis=0), 0.0)
-        radius, height = max(look.depth(beam) / 2, 0.4 * symbol), 1.25 * look.width(beam)
-        pin = {"center": at, "direction": (0, 0, 1), "radius": radius, "height": height}
-        hinges.append(pyvista.Cylinder(**pin, resolution=32))
-    add(hinges, ORANGE, "hinges")
-    add(
-        [pyvista.Sphere(radius=1.1 * symbol, center=center(m.place)) for m in scene.masses],
-        INK,
-        "masses",
+
+def _add_strokes(pyvista: Any, plotter: Any, look: _Look, pose: Pose) -> None:
+    """Bodies as plates; lines as rods, filled areas as blocks."""
+    body, front = look.least_width, 0.7 * look.widest
+    found: dict[str, list[Any]] = {}
+    lines: dict[tuple[str, float], list[Array]] = {}
+
+    def add(strokes: Iterable[Stroke], half: float) -> None:
+        for points, color, weight, fill, layer in strokes:
+            base = front if layer == FRONT else half
+            low, high = (-half, half) if layer <= MIDDLE else (base, 1.1 * base)
+            if fill is not None:
+                found.setdefault(fill, []).append(_extruded(pyvista, points, low, high))
+            if fill != FILLED:
+                z = 0.0 if fill is None and layer <= MIDDLE else high
+                lines.setdefault((color, weight), []).append(np.insert(points, 2, z, axis=1))
+
+    add(symbols.bodies(pose), 0.4 * body)
+    add(symbols.centres(pose), 0.48 * body)
+    add(symbols.rods(pose), 0.1 * body)
+    add((*symbols.rails(pose), *symbols.connectors(pose)), 0.45 * body)
+    for (color, weight), several in lines.items():
+        tubes = _tubes(pyvista, several, weight * look.symbol / 20.0)
+        found.setdefault(color, []).append(tubes)
+    for color, parts in found.items():
+        _add(pyvista, plotter, parts, color, f"strokes {color}")
+
+
+def _tubes(pyvista: Any, lines: list[Array], radius: float) -> Any:
+    """Tubes along lines, made at once: one after the other takes long.
+
+    Each piece between two points is a tube of its own, as tubes get thin at sharp corners.
+    """
+    starts = np.cumsum([0, *map(len, lines)])
+    first = np.delete(np.arange(starts[-1]), starts[1:] - 1)  # all points but the last of each line
+    pieces = np.column_stack([np.full(len(first), 2), first, first + 1])
+    chains = pyvista.PolyData(np.concatenate(lines), lines=pieces.ravel())
+    return chains.tube(radius=radius, n_sides=12)
+
+
+def _add_fittings(pyvista: Any, plotter: Any, look: _Look, pose: Pose) -> None:
+    """Joints as pins across the plane, masses as balls, supports as symbols."""
+    solution, symbol = look.solution, look.symbol
+    pins = [_cylinder(pyvista, look, pin) for pin in symbols.pins(pose)]
+    _add(pyvista, plotter, pins, "#707070", "joints")
+    balls = [
+        pyvista.Sphere(radius=1.1 * symbol, center=(*pose.at(mass.place), 0.0))
+        for mass in solution.scene.masses
+    ]
+    _add(pyvista, plotter, balls, INK, "masses")
+    blocks: dict[str, list[Any]] = {}
+    for at, angle, outlines, color, place in symbols.footings(pose):
+        half = 0.6 * look.around([place])[1]
+        for outline in outlines:
+            block = _extruded(pyvista, symbol * np.array(outline), -half, half)
+            block = block.rotate_z(math.degrees(angle)).translate((*at, 0.0))
+            blocks.setdefault(color, []).append(block)
+    for color, parts in blocks.items():
+        _add(pyvista, plotter, parts, color, f"supports {color}")
+
+
+def _cylinder(pyvista: Any, look: _Look, pin: Pin) -> Any:
+    depth, width = look.around(pin.places)
+    radius = max(depth / 2, (0.4 if pin.turns else 0.0) * look.symbol)
+    if not depth:
+        radius = 0.4 * look.symbol
+    height = width * (1.25 if pin.turns else 1.02)
+    center = (*pin.at, 0.0)
+    return pyvista.Cylinder(
+        center=center, direction=(0, 0, 1), radius=radius, height=height, resolution=32
     )
-    supports = []
-    for support in scene.supports:
-        turned = solution.q[n][solution.grid.dofs[solution.grid.vertex(support.place), 2]]
-        angle, width = support_direction(support, turned), 1.2 * look.width(support.place.beam)
-        for outline in support_symbol(support):
-            flat = np.array([[x, y, -0.5 * width / symbol] for x, y in outline[:-1]]) * symbol
-            face = pyvista.PolyData(flat, [len(flat), *range(len(flat))])
-            block = face.triangulate().extrude((0.0, 0.0, width), capping=True)
-            supports.append(block.rotate_z(math.degrees(angle)).translate(center(support.place)))
-    add(supports, "#808080", "supports")
+
+
+def _add_hinges(pyvista: Any, plotter: Any, look: _Look, n: int, points: Array) -> None:
+    """Open hinges as orange pins."""
+    grid, hinges = look.solution.grid, []
+    for cell in open_hinges(look.solution, n)[0]:
+        beam = look.solution.scene.beams[grid.beam_of_cell[cell]]
+        pin = Pin(points[grid.cells[cell]].mean(axis=0), True, (beam.start,))
+        hinges.append(_cylinder(pyvista, look, pin))
+    _add(pyvista, plotter, hinges, ORANGE, "hinges")
 
 
 # -- files and screens -------------------------------------------------------------------------

@@ -330,7 +330,7 @@ class Solver:
         return self._size(doubles(self._A.data[self._diagonal] * self._last_digits()))
 
     def _last_digits(self) -> Array:
-        return self._moves * np.spacing(np.abs(self._view(self._x)) + self._lengths)
+        return np.asarray(self._moves * np.spacing(np.abs(self._view(self._x)) + self._lengths))
 
     def least_work(self, s: Array) -> float:
         """Work in a step ``s`` of what the last digit of displacements makes; less is none; J."""

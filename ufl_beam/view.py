@@ -7,7 +7,7 @@ works; it belongs to no window, needs no screen, and is gone when it is no longe
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import cycle, groupby, islice
 from typing import TYPE_CHECKING, Any
@@ -16,12 +16,15 @@ from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.beams import Place
+from ufl_beam import symbols
+from ufl_beam.bodies import Anchor
 from ufl_beam.compat import Array
 from ufl_beam.errors import SceneError, require_number
+from ufl_beam.glyphs import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY
 from ufl_beam.grid import Index
-from ufl_beam.scene import Support
 from ufl_beam.solution import Solution
+from ufl_beam.stage import Pose, Stage
+from ufl_beam.symbols import Stroke
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,12 +40,6 @@ COMPONENTS = {
     "dpsi/dt": ("angular velocity", "rad/s"),
 }
 
-# Okabe and Ito's palette, which the colour-blind can tell apart.
-BLUE, RED, GREEN, PINK, ORANGE, SKY = (
-    "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9",
-)  # fmt: skip
-INK, GREY = "#222222", "#B5B5B5"
-
 STYLE = {
     "font.size": 13.0,
     "axes.titlesize": 14.0,
@@ -56,15 +53,6 @@ STYLE = {
     "lines.solid_capstyle": "round",
 }
 
-# Outlines of the symbols of supports; half a symbol is 1, the place is the origin, the beam comes
-# from above.
-Outline = list[tuple[float, float]]
-_TRIANGLE = [(0.0, 0.0), (-0.6, -0.8), (0.6, -0.8), (0.0, 0.0)]
-_CLAMP = [(-1.0, 0.0), (1.0, 0.0), (1.0, -0.5), (-1.0, -0.5), (-1.0, 0.0)]
-_PLATE = [(-1.0, -0.8), (1.0, -0.8), (1.0, -0.9), (-1.0, -0.9), (-1.0, -0.8)]
-_TRACK = [(-1.0, -1.0), (1.0, -1.0), (1.0, -1.1), (-1.0, -1.1), (-1.0, -1.0)]
-_DIAMOND = [(-0.6, 0.0), (0.0, 0.6), (0.6, 0.0), (0.0, -0.6), (-0.6, 0.0)]
-
 
 # -- what users call ---------------------------------------------------------------------------
 
@@ -75,6 +63,9 @@ def plot(solution: Solution, what: str = "shape", *, n: int = -1, magnify: float
     Diagrams are constant in each cell, like the section forces, and stand on the deformed axis:
     M on the side in tension, positive N and V to the left of the way from start to end.  Positive
     values are red, negative ones blue; the extreme values are written beside them.
+
+    Bodies are outlined around their centre, a quartered circle, and all points where something is
+    attached.  What is orange drives: filled if it gives the motion, hollow if it gives the force.
 
     Args:
         solution: What to show.
@@ -87,15 +78,17 @@ def plot(solution: Solution, what: str = "shape", *, n: int = -1, magnify: float
     """
     require_choice(what, ("shape", *RESULTANTS), "plot: what")
     points = moved_points(solution, n, magnify)
+    stage = plane_stage(solution, [n], magnify)
+    pose = stage.pose(n)
     name = f"{RESULTANTS[what][0]} {what}" if what in RESULTANTS else "shape"
     factor = f", displacements × {magnify:g}" if magnify != 1 else ""
-    with picture(plane_size(solution.grid.points, points)) as figure:
+    with picture(plane_size(solution.grid.points, points, pose.points())) as figure:
         axes = plane_axes(figure, f"{name} at t = {solution.times[n]:.4g} s{factor}")
-        draw_axes(axes, solution, solution.grid.points, color=GREY, linewidth=1.2, zorder=1)
+        draw_undeformed(axes, stage)
         if what in RESULTANTS:
             _draw_diagram(axes, solution, what, n, points)
         draw_axes(axes, solution, points, color=INK, linewidth=2.6, zorder=4)
-        draw_symbols(axes, solution, points, solution.q[n])
+        draw_symbols(axes, pose)
         make_room(figure, axes)
     return figure
 
@@ -124,21 +117,25 @@ def plot_shapes(
     chosen = nearest(kept, times if len(times) else np.linspace(kept[0], kept[-1], int(count)))
     shapes = [moved_points(solution, n, magnify) for n in chosen]
     factor = f"displacements × {magnify:g}" if magnify != 1 else ""
-    with picture(plane_size(solution.grid.points, *shapes)) as figure:
+    stage = plane_stage(solution, chosen, magnify)
+    poses = [stage.pose(n) for n in chosen]
+    everything = (solution.grid.points, *shapes, *(pose.points() for pose in poses))
+    with picture(plane_size(*everything)) as figure:
         of_time = scale("viridis", 0.0, 0.88, kept[chosen[0]], kept[chosen[-1]])
         axes = plane_axes(figure, factor)
-        draw_axes(axes, solution, solution.grid.points, color=GREY, linewidth=1.2, zorder=1)
-        for n, points in zip(chosen, shapes, strict=True):
+        draw_undeformed(axes, stage)
+        for n, points, pose in zip(chosen, shapes, poses, strict=True):
             color = of_time.to_rgba(kept[n])
+            draw_strokes(axes, (*symbols.bodies(pose), *symbols.rods(pose)), color)
             draw_axes(axes, solution, points, color=color, linewidth=2.2, zorder=3)
-            _draw_masses(axes, solution, points, color)
-        _draw_supports(axes, solution, shapes[-1], solution.q[chosen[-1]])
+            _draw_masses(axes, pose, color)
+        _draw_fixings(axes, poses[-1])
         draw_bar(figure, axes, of_time, "time t (s)")
     return figure
 
 
 def plot_history(
-    solution: Solution, places: Place | Sequence[Place], *, component: str = "v"
+    solution: Solution, places: Anchor | Sequence[Anchor], *, component: str = "v"
 ) -> Figure:
     """A component of the motion of one or more places over time.
 
@@ -152,7 +149,7 @@ def plot_history(
             static run.
     """
     require_choice(component, COMPONENTS, "plot_history: component")
-    followed = (places,) if isinstance(places, Place) else tuple(places)
+    followed = (places,) if isinstance(places, Anchor) else tuple(places)
     number = list(COMPONENTS).index(component)
     motion = solution.displacement if number < 3 else solution.velocity
     quantity, unit = COMPONENTS[component]
@@ -256,37 +253,6 @@ def with_unit(value: float, unit: str) -> str:
     return f"{value / factor:.3g} {prefix}{unit}".replace("-", "−")
 
 
-def support_symbol(support: Support) -> list[Outline]:
-    """Outlines of the symbol of a support; half a symbol is 1, the place is the origin."""
-    if len(support.held) == 3:
-        return [_CLAMP]
-    return {0: [_DIAMOND], 1: [_TRIANGLE, _TRACK], 2: [_TRIANGLE, _PLATE]}[
-        len({0, 1} & set(support.held))
-    ]
-
-
-def support_direction(support: Support, turned: float) -> float:
-    """Angle by which the symbol of a support is turned, away from its beam; rad.
-
-    Args:
-        support: The support.
-        turned: Rotation ψ of its place, which a clamp follows; rad.
-    """
-    inward = _inward(support.place)
-    if len(support.held) == 3:
-        return inward + turned - math.pi / 2
-    angle = support.angle - (0.0 if 1 in support.held else math.pi / 2)
-    return angle + (math.pi if math.sin(inward - angle) < -0.5 else 0.0)
-
-
-def _inward(place: Place) -> float:
-    """Direction in which the beam leaves its end; upwards from a place in between; rad."""
-    if 0.0 < place.s < 1.0:
-        return math.pi / 2
-    (x, y), (X, Y) = place.point, place.beam.curve(1e-3 if place.s == 0.0 else 1.0 - 1e-3)
-    return math.atan2(Y - y, X - x)
-
-
 def require_choice(choice: str, choices: Sequence[str] | dict[str, Any], what: str) -> None:
     """Raise :class:`SceneError` naming ``what`` unless ``choice`` is one of ``choices``."""
     if choice not in choices:
@@ -320,6 +286,23 @@ def plane_size(*shapes: Array) -> tuple[float, float]:
     """Size of a figure for these points: 9 inches wide unless they stand upright."""
     width, height = np.ptp(np.concatenate(shapes), axis=0)
     return 9.0, float(np.clip(8.0 * height / max(width, 1e-12), 3.2, 6.8))
+
+
+def plane_stage(solution: Solution, shown: Sequence[int], magnify: float) -> Stage:
+    """A solution with symbols that are as large as those of supports in pictures of these states.
+
+    Supports are drawn in points, which do not depend on the scale; what moves and stretches in m.
+    """
+    scene = solution.scene
+    rough = Stage(solution, magnify, 0.02 * scene.size)
+    shapes = [moved_points(solution, n, magnify) for n in shown]
+    points = np.concatenate(
+        [solution.grid.points, *shapes, *(rough.pose(n).points() for n in shown)]
+    )
+    width, height = np.ptp(points, axis=0)
+    inches = plane_size(points)
+    scale = max(1.12 * width / (inches[0] - 0.9), 1.20 * height / (inches[1] - 1.1))
+    return Stage(solution, magnify, scale / 6.0, shown)  # 12 points
 
 
 def plane_axes(figure: Figure, title: str) -> Axes:
@@ -370,6 +353,14 @@ def draw_axes(axes: Axes, solution: Solution, points: Array, **line: Any) -> Non
     """The axes of all beams through these points."""
     for beam in solution.scene.beams:
         axes.plot(*points[solution.grid.vertices_of(beam)].T, **line)
+
+
+def draw_undeformed(axes: Axes, stage: Stage) -> None:
+    """Beams, bodies and rods in grey, where they were made."""
+    solution, pose = stage.solution, stage.undeformed
+    draw_axes(axes, solution, solution.grid.points, color=GREY, linewidth=1.2, zorder=1)
+    for stroke in (*symbols.bodies(pose), *symbols.rods(pose)):
+        axes.plot(*stroke.points.T, color=GREY, linewidth=1.2, zorder=1)
 
 
 def _draw_diagram(axes: Axes, solution: Solution, what: str, n: int, points: Array) -> None:
@@ -428,34 +419,47 @@ def make_room(figure: Figure, axes: Axes) -> None:
     axes.autoscale_view()
 
 
-def draw_symbols(axes: Axes, solution: Solution, points: Array, q: Array) -> None:
-    """Symbols of supports, joints and masses."""
-    _draw_supports(axes, solution, points, q)
-    for joint in solution.scene.joints:
-        turns = 2 not in joint.shared
-        marker, size, inside = ("o", 8.0, "white") if turns else ("s", 6.0, INK)
-        place = points[solution.grid.vertex(joint.places[0])]
-        axes.plot(*place, marker, ms=size, mfc=inside, mec=INK, mew=1.6, zorder=5)
-    _draw_masses(axes, solution, points, INK)
+def draw_symbols(axes: Axes, pose: Pose) -> None:
+    """Bodies, joints, connectors, supports and masses."""
+    draw_strokes(axes, (*symbols.bodies(pose), *symbols.rods(pose)))
+    _draw_fixings(axes, pose)
+    draw_strokes(axes, symbols.centres(pose))
+    for pin in symbols.pins(pose):
+        marker, size, inside = ("o", 8.0, "white") if pin.turns else ("s", 6.0, INK)
+        axes.plot(*pin.at, marker, ms=size, mfc=inside, mec=INK, mew=1.6, zorder=5)
+    _draw_masses(axes, pose, INK)
 
 
-def _draw_masses(axes: Axes, solution: Solution, points: Array, color: Any) -> None:
-    for mass in solution.scene.masses:
-        axes.plot(*points[solution.grid.vertex(mass.place)], "o", ms=10.0, color=color, zorder=5)
+def draw_strokes(axes: Axes, strokes: Iterable[Stroke], color: Any = None) -> None:
+    """Lines and areas, in their own colours or all in one."""
+    for points, own, weight, fill, layer in strokes:
+        if fill is not None:
+            inside = (color, 0.15) if color is not None else fill
+            axes.fill(
+                *points.T, facecolor=inside, edgecolor=own if color is None else color,
+                linewidth=weight, zorder=layer, joinstyle="round",
+            )  # fmt: skip
+        else:
+            axes.plot(
+                *points.T, color=own if color is None else color, linewidth=weight, zorder=layer,
+                solid_joinstyle="round",
+            )  # fmt: skip
 
 
-def _draw_supports(axes: Axes, solution: Solution, points: Array, q: Array) -> None:
-    """Symbols at the supports; orange ones move."""
+def _draw_masses(axes: Axes, pose: Pose, color: Any) -> None:
+    for mass in pose.stage.solution.scene.masses:
+        axes.plot(*pose.at(mass.place), "o", ms=10.0, color=color, zorder=5)
+
+
+def _draw_fixings(axes: Axes, pose: Pose) -> None:
+    """Rails, connectors, and symbols at the supports; orange ones move."""
     from matplotlib.markers import MarkerStyle
     from matplotlib.path import Path
 
-    for support in solution.scene.supports:
-        vertex = solution.grid.vertex(support.place)
-        outline = Path.make_compound_path(*map(Path, support_symbol(support)))
-        symbol = MarkerStyle(outline)
-        turned = support_direction(support, q[solution.grid.dofs[vertex, 2]])
-        color = ORANGE if support.moving else "#808080"
+    draw_strokes(axes, (*symbols.rails(pose), *symbols.connectors(pose)))
+    for footing in symbols.footings(pose):
+        symbol = MarkerStyle(Path.make_compound_path(*map(Path, footing.outlines)))
         axes.plot(
-            *points[vertex], marker=symbol.rotated(rad=turned), ms=24.0, mfc=color, mec=color,
-            mew=0.5, zorder=3.5,
+            *footing.at, marker=symbol.rotated(rad=footing.angle), ms=24.0, mfc=footing.color,
+            mec=footing.color, mew=0.5, zorder=3.5,
         )  # fmt: skip

@@ -1,6 +1,7 @@
 """Files of a run: their contents are the solution, on any number of ranks."""
 
 import csv
+import re
 
 from mpi4py import MPI
 
@@ -91,6 +92,105 @@ def test_xdmf_holds_the_solution(shared_path, on_first_rank):
             assert np.abs(written - forces[cells, component]).max() < 1e-16 * 1e4 * 10
 
 
+# -- bodies and joints -------------------------------------------------------------------------
+
+
+def machine(beams=True):
+    """A rocker on a bearing, a hanging weight, a wheel; with an arm clamped to the rocker."""
+    rocker = ub.Body((0.5, 0.2), mass=2.0, inertia=0.3, name="rocker")
+    weight = ub.Body((1.5, -1.0), mass=1.0, inertia=0.1, name="weight")
+    wheel = ub.Body((-1.0, 1.0), mass=1.0, inertia=0.1, name="wheel")
+    arm = ub.Beam((1.0, 0.5), (2.0, 1.5), SECTION, cells=2, name="arm")
+    joints = [
+        ub.Revolute(ub.ground(0, 0), rocker.at(0, 0)),
+        ub.Link(rocker.at(1, 0), weight.middle),
+        ub.Revolute(ub.ground(-1, 1), wheel.middle),
+        *([ub.Rigid(rocker.at(1.0, 0.5), arm.start)] if beams else []),
+    ]
+    connectors = [
+        ub.Stretch(ub.ground(-1, 0), rocker.at(0, 0.5), ub.Spring(50.0)),
+        ub.Turn(rocker.at(0, 0), ub.ground(0, 0), ub.Damper(0.5)),
+        ub.Turn(ub.ground(-1, 1), wheel.middle, ub.Motor(lambda t: t * t)),
+    ]
+    return ub.Scene(
+        [arm] if beams else [],
+        bodies=[rocker, weight, wheel],
+        joints=joints,
+        connectors=connectors,
+        loads=[ub.Gravity()],
+    )
+
+
+@pytest.mark.parametrize("beams", [True, False])
+def test_xdmf_shows_bodies_and_links(shared_path, on_first_rank, beams):
+    scene = machine(beams)
+    solution = run(scene, ub.XDMF(shared_path / "run.xdmf"), steps=4)
+    data = on_first_rank(lambda: read_h5(shared_path / "run.h5"))
+    rocker, weight, wheel = scene.bodies
+    link, spring = scene.joints[1], scene.connectors[0]
+    spots = [(0, 0), (1, 0), (0, 0.5), *([(1, 0.5)] if beams else [])]
+    rods = [(rocker.middle, rocker.at(*spot)) for spot in spots]
+    # What only turns is seen by a line of 2 % of the scene
+    rods += [(one.middle, None) for one in (weight, wheel)]
+    rods += [link.places, (spring.a, spring.b)]
+
+    topology, points = data["Mesh/mesh/topology"], data["Mesh/mesh/geometry"][:, :2]
+    parts = [values[:, 0] for values in series(data, "part")]
+    assert len(parts) == len(solution.times)
+    for values in parts:
+        assert sorted(values) == sorted([0] * 2 * beams + [1] * (len(rods) - 2) + [2, 2])
+
+    def cells_between(a, b):
+        """Cells from one point to another, and the order of their ends."""
+        found = []
+        for cell, ends in enumerate(topology):
+            for order in (ends, ends[::-1]):
+                first = (points[order[0]] == a.point).all()
+                size = np.linalg.norm(points[order[1]] - points[order[0]])
+                beside = b is None and size == pytest.approx(0.02 * scene.size)
+                if first and (beside or (b is not None and (points[order[1]] == b.point).all())):
+                    found.append((cell, order))
+        return found
+
+    for a, b in rods:
+        ((cell, order),) = cells_between(a, b)
+        assert parts[0][cell] == (2 if a in (link.places[0], spring.a) else 1)
+        other = b if b is not None else a.body.at(*points[order[1]])
+        for n in range(len(solution.times)):
+            for vertex, place in zip(order, (a, other), strict=True):
+                u = solution.displacement(place)[n]
+                # The same sums; the point of the file is rounded once
+                written = series(data, "displacement")[n][vertex, :2]
+                assert np.abs(written - u[:2]).max() < 1e-15
+                assert series(data, "rotation")[n][vertex, 0] == u[2]
+        for name in "VM":
+            assert all(values[cell, 0] == 0.0 for values in series(data, name))
+        pulls = [values[cell, 0] for values in series(data, "N")]
+        holder = {link.places[0]: link.holders[0], spring.a: spring}.get(a)
+        if holder is None:
+            assert pulls == [0.0] * len(pulls)
+        else:
+            assert pulls == list(solution.connector(holder).force)
+            assert min(pulls[1:]) != max(pulls[1:])
+
+
+@pytest.mark.parametrize("beams", [True, False])
+def test_xdmf_says_what_is_in_the_data(shared_path, on_first_rank, beams):
+    """What readers rely on: each item is there, of its size, and cells are between vertices."""
+    run(machine(beams), ub.XDMF(shared_path / "run.xdmf"), steps=2)
+    text = on_first_rank(lambda: (shared_path / "run.xdmf").read_text())
+    data = on_first_rank(lambda: read_h5(shared_path / "run.h5"))
+    items = re.findall(r'<DataItem Dimensions="([\d ]+)"[^>]*>run.h5:/([^<]+)</DataItem>', text)
+    assert {name for _, name in items} == set(data)
+    for size, name in items:
+        assert tuple(map(int, size.split())) == data[name].shape
+    assert text.count('Name="part" AttributeType="Scalar" Center="Cell"') == 3
+    topology, points = data["Mesh/mesh/topology"], data["Mesh/mesh/geometry"]
+    assert sorted(np.unique(topology)) == list(range(len(points)))
+    # 2 cells of the arm; from centres to points 4 (3), 1, 1; a link and a spring
+    assert len(topology) == (2 + 6 + 2 if beams else 5 + 2)
+
+
 def test_xdmf_names_the_times(shared_path, on_first_rank):
     run(scene(), ub.XDMF(shared_path / "run.xdmf"), steps=4)
     text = on_first_rank(lambda: (shared_path / "run.xdmf").read_text())
@@ -151,6 +251,77 @@ def test_history_without_places(shared_path, on_first_rank):
     header, rows = on_first_rank(lambda: read_csv(shared_path / "run.csv"))
     assert header == ["t", "stored", "loads"]
     assert (rows[:, 1] == solution.energy["stored"]).all()
+
+
+def test_history_of_points_of_bodies_and_of_connectors(shared_path, on_first_rank):
+    scene = machine(beams=False)
+    spring, damper, _ = scene.connectors
+    link, point = scene.joints[1], scene.bodies[0].at(1, 0)
+    record = ub.History(
+        shared_path / "run.csv", [point, ub.ground(0, 0)], connectors=[spring, damper, link]
+    )
+    solution = run(scene, record, steps=5)
+    header, rows = on_first_rank(lambda: read_csv(shared_path / "run.csv"))
+    ends = ("rocker (0, 0), ground (0, 0)", "rocker (1, 0), weight (1.5, -1)")
+    names = [
+        "Stretch(ground (-1, 0), rocker (0, 0.5)), Spring",
+        f"Turn({ends[0]}), Damper",
+        f"Link({ends[1]})",
+    ]
+    assert header[1:16] == [
+        *(f"{c} rocker (1, 0)" for c in ("u", "v", "psi")),
+        *(f"{c} ground (0, 0)" for c in ("u", "v", "psi")),
+        *(f"{c} {name}" for name in names for c in ("motion", "force", "work")),
+    ]
+    assert header[16:] == solution_entries(solution)
+    # Numbers are written to the last digit
+    assert (rows[:, 1:4] == solution.displacement(point)).all()
+    assert (rows[:, 4:7] == 0.0).all()
+    for k, connector in enumerate((spring, damper, link.holders[0])):
+        history = solution.connector(connector)
+        columns = rows[:, 7 + 3 * k : 10 + 3 * k].T
+        for column, values in zip(
+            columns, (history.motion, history.force, history.work), strict=True
+        ):
+            assert (column == values).all()
+    assert np.abs(rows[1:, 7:13]).min() > 0.0
+
+
+def solution_entries(solution):
+    """Names of the ledger in its order."""
+    energy = solution.energy
+    return [*energy.state, *energy.supplied, *energy.lost]
+
+
+def test_history_tells_the_forces_of_a_joint_apart(shared_path, on_first_rank):
+    body = ub.Body((1.0, 0.0), mass=1.0, inertia=0.1)
+    joint = ub.Rigid(ub.ground(0, 0), body.at(0, 0), measured=True)
+    scene = ub.Scene(bodies=[body], joints=[joint], loads=[ub.Gravity((3.0, -10.0))])
+    run(scene, ub.History(shared_path / "run.csv", connectors=[joint]), steps=3)
+    header, rows = on_first_rank(lambda: read_csv(shared_path / "run.csv"))
+    forces = [
+        rows[-1, header.index(f"force Rigid(ground (0, 0), body (0, 0)), {axis}")]
+        for axis in ("x", "y", "psi")
+    ]
+    # What grows with the weight is held: (3, -10) N, and -10 N at 1 m
+    assert forces == pytest.approx([3.0, -10.0, -10.0], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ({"places": [ub.Body((0, 0)).middle]}, "body is not in the scene"),
+        (
+            {"connectors": [ub.Turn(ub.ground(0, 0), ub.Body((0, 0)).middle, ub.Spring(1.0))]},
+            "is not in the scene",
+        ),
+    ],
+)
+def test_history_of_something_else_leaves_no_file(shared_path, more, message):
+    with pytest.raises(ub.SceneError, match=message):
+        run(machine(), ub.History(shared_path / "run.csv", **more), steps=1)
+    MPI.COMM_WORLD.Barrier()
+    assert not (shared_path / "run.csv").exists()
 
 
 def test_a_second_run_overwrites(shared_path, on_first_rank):

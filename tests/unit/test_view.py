@@ -1,5 +1,6 @@
 """Pictures: what is in them, that they need no screen, and what is refused."""
 
+import math
 import os
 import shutil
 import sys
@@ -11,7 +12,11 @@ import pytest
 import scenes
 
 import ufl_beam as ub
-from ufl_beam.view import support_direction, with_unit
+from ufl_beam import symbols
+from ufl_beam.glyphs import AROUND, STRAIGHT
+from ufl_beam.stage import Stage
+from ufl_beam.symbols import EDGE, FILLED, support_direction
+from ufl_beam.view import with_unit
 
 FIRST = MPI.COMM_WORLD.rank == 0
 INDEX = {"N": 0, "V": 1, "M": 2}
@@ -30,6 +35,38 @@ def swing():
 
 def forces(solution, what):
     return [solution.section_forces(b)[:, INDEX[what]] for b in solution.scene.beams]
+
+
+def crank():
+    """A crank, a rod without mass, a slider on a rail of the ground, and a spring; no beams."""
+    wheel = ub.Body((0.3, 0.2), mass=1.0, inertia=0.1, name="wheel")
+    block = ub.Body((3.0, 0.0), mass=2.0, inertia=0.2, name="block")
+    bearing = ub.Revolute(ub.ground(0, 0), wheel.at(0, 0))
+    rail = ub.Prismatic(ub.ground(2, 0), block.middle)
+    rod = ub.Link(wheel.at(0.6, 0.4), block.at(2.8, 0.1))
+    spring = ub.Stretch(block.at(3.2, 0.1), ub.ground(4.5, 0.4), ub.Spring(20.0))
+    motor = ub.Turn(ub.ground(0, 0), wheel.at(0, 0), ub.Motor(lambda t: 3.0 * t**2))
+    return ub.Scene(bodies=[wheel, block], joints=[bearing, rail, rod], connectors=[spring, motor])
+
+
+@pytest.fixture(scope="module")
+def engine():
+    return ub.simulate(crank(), ub.Midpoint(), t=(0, 0.5), dt=0.05)
+
+
+def drawn(figure, marker):
+    """Where a picture has single markers of a kind."""
+    lines = [x for x in figure.axes[0].lines if len(x.get_xdata()) == 1]
+    return [x.get_xydata()[0] for x in lines if x.get_marker() == marker]
+
+
+def has(points, point):
+    """Whether a point is among others, to round-off of coordinates of 1 m."""
+    return bool(len(points)) and float(np.min(np.linalg.norm(points - point, axis=1))) < 1e-12
+
+
+def pose(solution, n=-1, *, unit=0.05):
+    return Stage(solution, 1.0, unit).pose(n)
 
 
 def texts(figure):
@@ -196,6 +233,278 @@ def test_values_with_a_decimal_prefix(value, text):
     assert with_unit(value, "N m") == text
 
 
+# -- bodies, joints and connectors -------------------------------------------------------------
+
+
+@pytest.mark.parametrize("n", [0, 5, -1])
+def test_bodies_are_outlined_and_move_rigidly(engine, n):
+    scene = engine.scene
+    wheel, block = (s.points for s in symbols.bodies(pose(engine, n)))
+    made, _ = (s.points for s in symbols.bodies(pose(engine, 0)))
+    # Distances of all points of the outline from each other
+    apart, before = (np.linalg.norm(x[:, None] - x[None], axis=2) for x in (wheel, made))
+    np.testing.assert_allclose(apart, before, atol=1e-12)
+    for outline, spots in (
+        (wheel, [(0, 0), (0.3, 0.2), (0.6, 0.4)]),
+        (block, [(3, 0), (2.8, 0.1), (3.2, 0.1)]),
+    ):
+        body = scene.bodies[0] if outline is wheel else scene.bodies[1]
+        for spot in spots:
+            gaps = np.linalg.norm(outline - engine.position(body.at(*spot))[n], axis=1)
+            assert gaps.min() > 0.7 * 0.05  # inside, and not at the edge
+    # The wheel has turned about the bearing by what the motor gives
+    turned = 3.0 * engine.times[n] ** 2
+    np.testing.assert_allclose(
+        wheel @ [1.0, 1j], (made @ [1.0, 1j]) * np.exp(1j * turned), atol=1e-9
+    )
+
+
+@pytest.mark.parametrize("what", ["shape", "M"])
+def test_plot_without_beams(engine, what):
+    wheel, block = engine.scene.bodies
+    bearing, _, rod = engine.scene.joints
+    figure = ub.plot(engine, what)
+    at = [engine.position(p)[-1] for p in (*bearing.places[:1], *rod.places)]
+    np.testing.assert_allclose(drawn(figure, "o"), at, atol=1e-12)
+    areas = [p for p in figure.axes[0].patches if p.get_facecolor()[:3] == rgb(FILLED)]
+    assert len(areas) == 2
+    marks = [p.get_xy() for p in figure.axes[0].patches if p.get_facecolor()[:3] == rgb(EDGE)]
+    assert len(marks) == 4  # two quarters each
+    for body, (mark, _) in zip((wheel, block), (marks[:2], marks[2:]), strict=True):
+        assert has(mark, engine.position(body.middle)[-1])
+
+
+def rgb(color):
+    return tuple(int(color[i : i + 2], 16) / 255 for i in (1, 3, 5))
+
+
+def test_links_and_springs_reach_from_place_to_place(engine):
+    rod, spring = engine.scene.joints[2], engine.scene.connectors[0]
+    for n in (0, -1):
+        (line,) = symbols.rods(pose(engine, n))
+        ends = [engine.position(p)[n] for p in rod.places]
+        np.testing.assert_allclose(line.points, ends, atol=1e-12)
+        zigzag, *_ = symbols.connectors(pose(engine, n))
+        ends = [engine.position(p)[n] for p in (spring.a, spring.b)]
+        np.testing.assert_allclose(zigzag.points[[0, -1]], ends, atol=1e-12)
+        assert len(zigzag.points) > 8
+
+
+def test_rail_reaches_along_the_whole_way_and_the_block_is_at_the_slider(engine):
+    way = engine.position(engine.scene.bodies[1].middle)
+    assert np.ptp(way[:, 0]) > 0.1  # something moves
+    for n in (0, 4, -1):
+        line, *_, block = symbols.rails(pose(engine, n))
+        np.testing.assert_allclose(line.points[:, 1], 0.0, atol=1e-9)
+        first, last = sorted(line.points[:, 0])
+        assert first < way[:, 0].min() < way[:, 0].max() < last
+        np.testing.assert_allclose(block.points[:-1].mean(axis=0), way[n], atol=1e-9)
+
+
+def test_rails_are_as_long_as_what_is_shown(engine):
+    way = engine.position(engine.scene.bodies[1].middle)[:, 0]
+    rail = next(symbols.rails(Stage(engine, 1.0, 0.05, [4]).pose(4)))
+    ends = sorted(rail.points[:, 0])
+    # From where it was made to where it is, and 1.8 units more
+    np.testing.assert_allclose(ends, [way[4] - 0.09, way[0] + 0.09], atol=1e-9)
+
+
+@pytest.mark.parametrize("along", [(1.0, 0.0), (0.6, 0.8)])
+def test_a_rail_on_a_body_turns_with_it_and_is_fixed_to_it(along):
+    carrier = ub.Body((0.0, 0.0), mass=1.0, inertia=0.1)
+    block = ub.Body((1.0, 2.0), mass=1.0, inertia=0.1)
+    joints = [ub.Prismatic(carrier.at(0.5, 0), block.middle, axis=along)]
+    start = ub.Velocity([carrier, block], angular=2.0)
+    push = ub.PointLoad(block.middle, force=(0.5, 0.2))
+    scene = ub.Scene(bodies=[carrier, block], joints=joints, initial=[start], loads=[push])
+    solution = ub.simulate(scene, ub.Midpoint(), t=(0, 0.4), dt=0.05)
+    rail, arm, _ = symbols.rails(pose(solution))
+    ψ = solution.displacement(carrier.middle)[-1, 2]
+    assert ψ > 0.3
+    turned = np.array([[math.cos(ψ), -math.sin(ψ)], [math.sin(ψ), math.cos(ψ)]]) @ along
+    (x, y), length = rail.points[1] - rail.points[0], np.linalg.norm(np.diff(rail.points, axis=0))
+    np.testing.assert_allclose((x / length, y / length), turned, atol=1e-9)
+    np.testing.assert_allclose(arm.points[0], solution.position(carrier.at(0.5, 0))[-1], atol=1e-12)
+    inside = (arm.points[1] - rail.points[0]) @ turned / length
+    assert -1e-9 < inside < 1 + 1e-9  # it ends on the rail
+    across = (arm.points[1] - rail.points[0]) @ (-turned[1], turned[0])
+    assert abs(across) < 1e-9
+
+
+def test_points_of_the_ground_are_marked(engine):
+    # The bearing from beneath, the spring from its right; the rail has hatches.
+    marks = {tuple(f.at): f for f in symbols.footings(pose(engine))}
+    assert set(marks) == {(0.0, 0.0), (4.5, 0.4)}
+    assert marks[0.0, 0.0].angle == 0.0
+    toward = math.atan2(0.1 - 0.4, 3.2 - 4.5)
+    assert marks[4.5, 0.4].angle == pytest.approx(toward - math.pi / 2)
+
+
+def test_displacements_of_bodies_are_magnified(engine):
+    point = engine.scene.bodies[0].at(0.6, 0.4)
+    (line,) = symbols.rods(Stage(engine, 3.0, 0.05).pose(-1))
+    expected = point.point + 3 * (engine.position(point)[-1] - point.point)
+    np.testing.assert_allclose(line.points[0], expected, atol=1e-12)
+
+
+LAWS = [
+    ub.Motor(lambda t: 0.1 * t),
+    ub.Actuator(lambda t: t),
+    ub.Controller(lambda simulation: 1.0),
+    ub.Spring(10.0),
+    ub.Damper(1.0),
+    ub.Stop(100.0, high=0.05),
+    ub.Coulomb(0.1),
+    ub.Function(lambda x, v: 10.0 * x),
+]
+
+
+def slider(connect, *laws):
+    """A body on a rail at an angle, pushed, with connectors to the ground."""
+    body = ub.Body((1.0, 0.0), mass=1.0, inertia=0.1)
+    rail = ub.Prismatic(ub.ground(1, 0), body.middle, axis=(1, 0.5), turning=connect is ub.Turn)
+    at = ub.ground(1, 0) if connect is ub.Turn else ub.ground(0, 0)
+    return ub.Scene(
+        bodies=[body],
+        joints=[rail],
+        connectors=[connect(at, body.middle, law) for law in laws],
+        loads=[ub.PointLoad(body.middle, force=(0.0, 1.0), moment=0.2)],
+    )
+
+
+def test_each_law_has_its_symbols():
+    assert {type(law) for law in LAWS} == set(STRAIGHT) == set(AROUND)
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: type(law).__name__)
+@pytest.mark.parametrize("connect", [ub.Stretch, ub.Turn])
+def test_symbols_are_where_their_connector_is(connect, law):
+    solution = ub.simulate(slider(connect, law), ub.Midpoint(), t=(0, 0.2), dt=0.1)
+    for n in (0, -1):
+        points = np.concatenate([s.points for s in symbols.connectors(pose(solution, n))])
+        a = np.array([0.0, 0.0])
+        b = solution.position(solution.scene.bodies[0].middle)[n]
+        if connect is ub.Turn:
+            r = np.linalg.norm(points - b, axis=1)
+            assert 0.05 < r.max() < 3 * 0.05  # around the pin, in units of the symbols
+        else:
+            assert has(points, a)
+            assert has(points, b)
+            x, y = (b - a) / np.linalg.norm(b - a)
+            assert np.abs(points @ (-y, x)).max() < 1.2 * 0.05
+    assert len(ub.plot(solution).axes[0].lines) > 3
+
+
+def test_connectors_side_by_side_do_not_cover_each_other():
+    laws = [ub.Spring(10.0), ub.Damper(1.0), ub.Spring(5.0)]
+    straight = ub.simulate(slider(ub.Stretch, *laws), ub.Midpoint(), t=(0, 0.1), dt=0.1)
+    lanes = Stage(straight, 1.0, 0.05).lanes
+    assert sorted(lanes.values()) == [-1.6, 0.0, 1.6]
+    # Springs are 0.55 to each side, dampers 0.6
+    turning = ub.simulate(slider(ub.Turn, *laws), ub.Midpoint(), t=(0, 0.1), dt=0.1)
+    assert np.diff(sorted(Stage(turning, 1.0, 0.05).lanes.values())).min() > 1.0
+
+
+def test_a_slide_of_zero_length_points_along_its_axis():
+    body = ub.Body((0.0, 0.0), mass=1.0, inertia=0.1)
+    spring = ub.Slide(ub.ground(0, 0), body.middle, ub.Spring(1.0), axis=(1, 0))
+    rail = ub.Prismatic(ub.ground(0, 0), body.middle, axis=(1, 0))
+    scene = ub.Scene(bodies=[body], joints=[rail], connectors=[spring])
+    solution = ub.simulate(scene, ub.Midpoint(), t=(0, 0.1), dt=0.1)
+    *_, zigzag = (s.points for s in symbols.connectors(pose(solution, 0)))
+    assert np.ptp(zigzag[:, 0]) < 1e-12 < 0.05 < np.ptp(zigzag[:, 1])
+    assert np.isfinite(zigzag).all()
+
+
+@pytest.mark.parametrize(
+    ("free", "bars", "extent"),
+    [("N", 2, (1.8, 1.2)), ("V", 2, (1.2, 1.8)), ("NV", 4, (1.8, 1.2)), ("M", 0, None)],
+)
+def test_releases_show_what_is_free(free, bars, extent):
+    left = ub.Beam((0, 0), (1, 0), scenes.SLENDER, cells=2)
+    right = ub.Beam((1, 0), (2, 0), scenes.SLENDER, cells=2)
+    joint = ub.Release(left.end, right.start, free=free)
+    supports = [ub.Clamped(left.start), ub.Clamped(right.end)]
+    scene = ub.Scene([left, right], joints=[joint], supports=supports)
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1)
+    strokes, pins = list(symbols.rails(pose(solution))), list(symbols.pins(pose(solution)))
+    assert len(strokes) == bars
+    if extent is None:
+        assert pins[0].turns
+    else:
+        points = np.concatenate([s.points for s in strokes])
+        np.testing.assert_allclose(np.ptp(points, axis=0), 0.05 * np.array(extent), atol=1e-12)
+        np.testing.assert_allclose(points.mean(axis=0), (1, 0), atol=1e-12)
+        assert not pins
+
+
+def test_beams_and_bodies_in_one_picture():
+    beam = ub.Beam((0, 0), (1, 0), scenes.SLENDER, cells=2)
+    hub = ub.Body((1.2, 0.1), mass=1.0, inertia=0.1)
+    bead = ub.Body((2.0, 0.0), mass=1.0, inertia=0.1)
+    far = ub.Body((0.5, 0.5), mass=1.0, inertia=0.1)
+    joints = [
+        ub.Rigid(beam.end, hub.at(1, 0), measured=True),
+        ub.Guided(bead.middle, lambda s: (2.0 + s, s * s)),
+        ub.RigidLink(beam.at(0.5), far.middle),
+    ]
+    scene = ub.Scene(
+        [beam],
+        bodies=[hub, bead, far],
+        joints=joints,
+        supports=[ub.Clamped(beam.start)],
+        loads=[ub.PointLoad(bead.middle, force=(1.0, 0.3)), ub.Gravity()],
+    )
+    solution = ub.simulate(scene, ub.Midpoint(), t=(0, 0.2), dt=0.02)
+    figure = ub.plot(solution)
+    corner, at = solution.position(beam.end)[-1], solution.position(bead.middle)
+    np.testing.assert_allclose(drawn(figure, "s"), [corner], atol=1e-12)
+    np.testing.assert_allclose(drawn(figure, "o"), [at[-1]], atol=1e-12)
+    curve = next(symbols.rails(pose(solution))).points
+    np.testing.assert_allclose(curve[:, 1], (curve[:, 0] - 2.0) ** 2, atol=1e-12)
+    assert curve[:, 0].min() < at[:, 0].min() < at[:, 0].max() < curve[:, 0].max()
+    (link,) = symbols.rods(pose(solution))
+    ends = [solution.position(p)[-1] for p in joints[2].places]
+    np.testing.assert_allclose(link.points, ends, atol=1e-12)
+    assert link.weight > 4.0
+
+
+def test_shapes_of_bodies(engine):
+    figure = ub.plot_shapes(engine, count=3)
+    assert len(figure.axes[0].patches) == 3 * 2 + 2  # bodies; block and arrow of the last one
+    assert figure.axes[0].get_xlim()[1] > 4.5
+
+
+def test_damage_and_dissipation_without_beams(engine):
+    solution = ub.simulate(slider(ub.Stretch, ub.Damper(1.0)), ub.Midpoint(), t=(0, 0.2), dt=0.1)
+    drawn = {x.get_label(): x.get_ydata() for x in ub.plot_dissipation(solution).axes[0].lines}
+    assert drawn["supplied"][-1] > 0.0
+    (spot,) = symbols.footings(pose(solution))
+    assert has(np.array([spot.at]), (0.0, 0.0))
+    assert len(ub.plot_damage(solution).axes[0].patches) > 2
+    falling = ub.Scene(bodies=[ub.Body((0, 0), mass=1.0, inertia=0.1)], loads=[ub.Gravity()])
+    with pytest.raises(ub.SceneError, match="neither beams nor connectors"):
+        ub.plot_dissipation(ub.simulate(falling, ub.Midpoint(), t=(0, 0.1), dt=0.1))
+
+
+def test_one_body_alone():
+    falling = ub.Scene(bodies=[ub.Body((0, 0), mass=1.0, inertia=0.1)], loads=[ub.Gravity()])
+    solution = ub.simulate(falling, ub.Midpoint(), t=(0, 1.0), dt=0.1)
+    for n in (0, -1):  # a scene without any size; and one that has fallen 5 m
+        axes = ub.plot(solution, n=n).axes[0]
+        outline = axes.patches[0].get_xy()
+        (x, y), r = solution.position(falling.bodies[0].middle)[n], np.ptp(outline[:, 0]) / 2
+        np.testing.assert_allclose(np.linalg.norm(outline - (x, y), axis=1), r, rtol=1e-12)
+        low, high = axes.get_ylim()
+        assert low < y - r < y + r < high
+
+
+def test_history_of_a_point_of_a_body(engine):
+    point = engine.scene.bodies[0].at(0.6, 0.4)
+    (_, line) = ub.plot_history(engine, point, component="u").axes[0].lines
+    np.testing.assert_array_equal(line.get_ydata(), engine.displacement(point)[:, 0])
+
+
 def test_symbols_of_supports_stand_away_from_the_beam():
     beam = ub.Beam((0, 0), (0, 2), scenes.SLENDER)
     assert support_direction(ub.Pinned(beam.start), 0.0) == pytest.approx(0.0)  # beneath
@@ -275,6 +584,21 @@ def test_camera_sees_the_whole_motion_and_stands_still(swing, tmp_path):
         assert edge.min() > 240  # and stays within the picture
         bar = frames[:, 150:].astype(float)
         assert np.abs(bar - bar[0]).max() < 40  # one scale of colours; GIF has 256 of them
+
+
+@pytest.mark.usefixtures("no_screen")
+def test_film_without_beams(engine, tmp_path):
+    imageio = pytest.importorskip("imageio.v3")
+    path = tmp_path / "engine.gif"
+    ub.animate(engine, path, fps=10, seconds=0.4, size=(320, 160))
+    assert path.exists() == FIRST
+    if FIRST:
+        frames = imageio.imread(path).astype(float).mean(axis=-1)[:, 25:]
+        assert len(frames) == 4
+        assert np.count_nonzero(frames[0] < 200) > 500  # bodies, and all that is on them
+        assert np.count_nonzero(np.abs(frames[-1] - frames[0]) > 50) > 100  # they move
+        edge = np.concatenate([frames[:, :, :2], frames[:, :, -2:]], axis=2)
+        assert edge.min() > 240  # and stay within the picture
 
 
 @pytest.mark.skipif(not FIRST, reason="only the first process makes pictures of bodies")
