@@ -1,0 +1,209 @@
+"""Dry friction against closed forms: oscillator, incline, bearing; all [closed].
+
+Friction sticks exactly, without a stiffness, and what it takes is never negative.
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+import ufl_beam as ub
+
+MASS, STIFFNESS, LIMIT = 2.0, 50.0, 3.0  # kg, N/m, N
+OMEGA = math.sqrt(STIFFNESS / MASS)  # rad/s
+PERIOD = 2 * math.pi / OMEGA  # s
+DEAD = LIMIT / STIFFNESS  # m: half the zone in which the mass may stay
+G = 9.81  # m/s²
+
+
+def run(scene, end, dt, **more):
+    return ub.simulate(scene, ub.Midpoint(), t=(0, end), dt=dt, progress=False, **more)
+
+
+# -- a mass on a spring ------------------------------------------------------------------------
+
+
+def oscillator(v0, steps, *, periods=4.25, friction=LIMIT):
+    """A mass on a rail with a spring to the ground and friction on the rail, struck at rest."""
+    mass = ub.Body((1.0, 0.0), mass=MASS, inertia=1.0)
+    rail = ub.ground(0, 0), mass.middle
+    rub = ub.Slide(*rail, ub.Coulomb(friction))
+    scene = ub.Scene(
+        bodies=[mass],
+        joints=[ub.Prismatic(*rail)],
+        connectors=[ub.Slide(*rail, ub.Spring(STIFFNESS)), rub],
+        initial=[ub.Velocity((mass,), linear=(v0, 0.0))],
+    )
+    solution = run(scene, periods * PERIOD, PERIOD / steps)
+    return solution, solution.displacement(mass.middle)[:, 0], solution.connector(rub)
+
+
+def first_peak(v0):
+    """m v0²/2 = k x²/2 + R x."""
+    return -DEAD + math.sqrt(DEAD**2 + (v0 / OMEGA) ** 2)
+
+
+V0 = OMEGA * math.sqrt((0.63 + DEAD) ** 2 - DEAD**2)
+"""m/s, so that the first peak is 10.5 DEAD: then 8.5, 6.5, 4.5, 2.5 and 0.5, where it stays."""
+
+
+def test_amplitudes_fall_by_4R_k_each_period():
+    """Half the period apart they differ by 2 R/k, and the last one stays.
+
+    A peak between two samples is missed by up to (π/n)²/2 of the distance to the centre of its
+    half swing, 1.2e-4 with n = 200 steps a period, and by as much the turn comes late; the
+    losses add up over five half swings.
+    """
+    steps = 200
+    solution, x, _ = oscillator(V0, steps)
+    assert first_peak(V0) == pytest.approx(0.63)
+    quarter = steps // 4
+    swings = [x[quarter + i * steps // 2 - 20 : quarter + i * steps // 2 + 21] for i in range(6)]
+    peaks = np.array([np.abs(swing).max() for swing in swings])
+    expected = 0.63 - 2 * DEAD * np.arange(6)
+    np.testing.assert_allclose(peaks, expected, rtol=0, atol=12 * 1.2e-4 * 0.63)
+    assert solution.energy.worst < 1e-9
+
+
+def test_it_stays_where_it_stops():
+    """From the sixth peak on: not a digit of the position changes, and the spring is held."""
+    solution, x, rub = oscillator(V0, 200)
+    at_rest = solution.times > 3.0 * PERIOD
+    assert np.ptp(x[at_rest]) < 1e-14
+    assert x[-1] == pytest.approx(-0.03, abs=12 * 1.2e-4 * 0.63)
+    # Friction bears what the spring pulls with.  The velocity that is left when it sticks changes
+    # its sign from step to step, so that the mean of two steps is meant.
+    bears = (rub.force[at_rest][1:] + rub.force[at_rest][:-1]) / 2
+    np.testing.assert_allclose(bears, -STIFFNESS * x[-1], rtol=1e-10)
+    assert np.abs(rub.force).max() <= LIMIT * (1 + 1e-10)
+
+
+def test_work_of_friction():
+    """The limit times the way, exactly; it never falls; and it is in the ledger."""
+    solution, x, rub = oscillator(V0, 200)
+    lost = solution.energy["friction"]
+    assert np.diff(lost).min() >= 0.0
+    np.testing.assert_allclose(lost, rub.work, rtol=1e-13)
+    way = np.abs(np.diff(x)).sum()
+    # In the steps in which it stops friction bears less than the limit: at most six of them
+    longest = np.abs(np.diff(x)).max()
+    assert lost[-1] == pytest.approx(LIMIT * way, abs=6 * LIMIT * longest * math.pi / 200)
+    assert np.abs(rub.force).max() <= LIMIT * (1 + 1e-10)
+
+
+def test_second_order():
+    """The first peak, with four times the steps a sixteenth of the error.
+
+    Samples of its position differ from it by (way of the sample)² as well, so that the energy
+    at the peak is compared: R times the way to the rest is what friction took.
+    """
+    errors = []
+    for steps in (50, 200):
+        _, x, _ = oscillator(V0, steps, periods=0.4)
+        errors.append(abs(np.abs(x).max() - first_peak(V0)))
+    assert errors[0] < 5e-3 * first_peak(V0)
+    assert errors[1] < errors[0] / 8
+
+
+def test_limit_beyond_all_forces():
+    """A blow that cannot move it: it sticks in the first step and takes the energy of the blow."""
+    solution, x, _ = oscillator(1e-3, 50, periods=0.2, friction=1e3)
+    assert np.abs(x).max() < 1e-3 * PERIOD / 50
+    assert np.ptp(x[3:]) < 1e-16
+
+
+# -- a block on an incline ---------------------------------------------------------------------
+
+
+def block(angle, coefficient, *, end=1.0, dt=0.01):
+    """A block on an incline, put down at rest.
+
+    The limit of friction comes from the force of the step before, so the first step has none.
+    """
+    along = math.cos(angle), math.sin(angle)
+    mass = ub.Body(along, mass=MASS, inertia=0.3)
+    rail = ub.ground(0, 0), mass.middle
+    incline = ub.Prismatic(*rail)
+    rub = ub.Slide(*rail, ub.Coulomb(coefficient=coefficient, joint=incline))
+    scene = ub.Scene(
+        bodies=[mass],
+        joints=[incline],
+        connectors=[rub],
+        loads=[ub.Gravity((0.0, -G))],
+    )
+    return run(scene, end, dt), incline, rub
+
+
+@pytest.mark.parametrize("coefficient", [0.1, 0.5, 1.0])
+def test_friction_angle(coefficient):
+    """3 % below the friction angle it sticks, 0.5 % above it slides with the difference.
+
+    What the first step without friction gave it is gone after 1/0.03 steps and more.  The
+    acceleration is constant then, so that differences of velocity are exact.
+    """
+    angle = math.atan(coefficient)
+    below, _, rub = block(0.97 * angle, coefficient)
+    slid = below.connector(rub).motion
+    assert np.ptp(slid[below.times > 0.8]) < 1e-15
+    above, _, rub = block(1.005 * angle, coefficient)
+    rate = above.connector(rub).rate
+    expected = -G * (math.sin(1.005 * angle) - coefficient * math.cos(1.005 * angle))
+    computed = (rate[-1] - rate[5]) / (above.times[-1] - above.times[5])
+    assert computed == pytest.approx(expected, rel=1e-8)  # two digits of ten are the difference
+    assert np.diff(above.energy["friction"]).min() >= 0.0
+    assert above.energy.worst < 1e-9
+
+
+def test_force_of_the_incline():
+    """It presses with m g cos; b is the block."""
+    angle = 0.3
+    solution, incline, rub = block(angle, 0.5)
+    history = solution.joint(incline)
+    weight = MASS * G
+    np.testing.assert_allclose(
+        history.force[-1],
+        weight * math.cos(angle) * np.array([-math.sin(angle), math.cos(angle)]),
+        rtol=1e-9,
+    )
+    # It would slide down, towards the foot; the mean of two steps, as above
+    bears = solution.connector(rub).force[-2:].mean()
+    assert bears == pytest.approx(-weight * math.sin(angle), rel=1e-9)
+
+
+# -- a bearing ---------------------------------------------------------------------------------
+
+
+def test_bearing():
+    """A wheel on a pin: dω/dt = -μ r m g/J, until it stops exactly.
+
+    The limit is that of the step before: the first step runs without friction, so that rates are
+    compared from there.
+    """
+    inertia, radius, coefficient, ω0, dt = 0.4, 0.02, 0.3, 5.0, 0.02
+    wheel = ub.Body((0, 0), mass=MASS, inertia=inertia)
+    bearing = ub.Revolute(ub.ground(0, 0), wheel.middle, measured=True)
+    pin = ub.Coulomb(coefficient=coefficient * radius, joint=bearing)
+    rub = ub.Turn(ub.ground(0, 0), wheel.middle, pin)
+    scene = ub.Scene(
+        bodies=[wheel],
+        joints=[bearing],
+        connectors=[rub],
+        loads=[ub.Gravity((0.0, -G))],
+        initial=[ub.Velocity((wheel,), angular=ω0)],
+    )
+    deceleration = coefficient * radius * MASS * G / inertia
+    stop = ω0 / deceleration + dt
+    solution = run(scene, dt * round(1.1 * stop / dt), dt)
+    ω = solution.velocity(wheel.middle)[:, 2]
+    slows = (solution.times > 1.5 * dt) & (solution.times < stop - dt)
+    # Moments act through (Δψ/2)/tan(Δψ/2), so that their work is exact
+    np.testing.assert_allclose(np.diff(ω[slows]), -deceleration * dt, rtol=(ω0 * dt / 2) ** 2 / 2)
+    turned = solution.displacement(wheel.middle)[:, 2]
+    assert np.ptp(turned[solution.times > stop + 3 * dt]) < 1e-12
+    np.testing.assert_allclose(solution.joint(bearing).force[-1], (0, MASS * G), atol=1e-8)
+    energy = solution.energy
+    # ω falls to zero, but for what the step that sticks leaves to its ends
+    assert energy["friction"][-1] == pytest.approx(inertia * ω0**2 / 2, rel=1e-3)
+    assert np.diff(energy["friction"]).min() >= 0.0
+    assert energy.worst < 1e-9
