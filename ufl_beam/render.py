@@ -15,8 +15,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mpi4py import MPI
-
 import numpy as np
 
 from ufl_beam import symbols
@@ -25,6 +23,7 @@ from ufl_beam.bodies import Anchor
 from ufl_beam.compat import Array
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.glyphs import INK, ORANGE
+from ufl_beam.processes import ours
 from ufl_beam.solution import Solution
 from ufl_beam.stage import Pose, Stage
 from ufl_beam.symbols import FILLED, FRONT, MIDDLE, Pin, Stroke
@@ -79,7 +78,7 @@ def render(
     look = _Look(solution, color, thickness, magnify, size)
     path = _require_suffix(path, (".png",))
     moved_points(solution, n, magnify)
-    if MPI.COMM_WORLD.rank == 0:
+    if ours().rank == 0:
         with look.film([n]) as frames:
             for frame in frames:
                 imsave(path, frame)
@@ -123,7 +122,7 @@ def animate(
     kept = solution.times
     count = max(1, round(fps * seconds))
     shown = nearest(kept, np.linspace(kept[0], kept[-1], count))
-    if MPI.COMM_WORLD.rank == 0:
+    if ours().rank == 0:
         with look.film(shown) as frames, _writer(path, fps) as film:
             for frame in frames:
                 film.append_data(frame)

@@ -113,5 +113,5 @@ def _require_times(t: tuple[float, float], dt: float) -> tuple[float, float]:
 
 def say(*words: object, sep: str = " ") -> None:
     """Print from the first process only, as scripts do that may run under ``mpirun``."""
-    if MPI.COMM_WORLD.rank == 0:
+    if ours().rank == 0:
         print(*words, sep=sep, flush=True)  # noqa: T201

@@ -12,8 +12,6 @@ from contextlib import contextmanager
 from itertools import cycle, groupby, islice
 from typing import TYPE_CHECKING, Any
 
-from mpi4py import MPI
-
 import numpy as np
 
 from ufl_beam import symbols
@@ -22,6 +20,7 @@ from ufl_beam.compat import Array
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.glyphs import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY
 from ufl_beam.grid import Index
+from ufl_beam.processes import ours
 from ufl_beam.solution import Solution
 from ufl_beam.stage import Pose, Stage
 from ufl_beam.symbols import Stroke
@@ -277,7 +276,7 @@ def picture(size: tuple[float, float]) -> Iterator[Figure]:
 
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=size, dpi=150, layout="constrained")
-        if MPI.COMM_WORLD.rank > 0:
+        if ours().rank > 0:
             figure.savefig = lambda *args, **options: None  # type: ignore[method-assign]
         yield figure
 

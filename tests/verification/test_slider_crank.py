@@ -77,9 +77,7 @@ def rigid():
     crank = ub.Body(
         (CRANK / 2, 0), mass=DENSITY * AREA * CRANK, inertia=inertia(CRANK), name="crank"
     )
-    rod = ub.Body(
-        (CRANK + ROD / 2, 0), mass=DENSITY * AREA * ROD, inertia=inertia(ROD), name="rod"
-    )
+    rod = ub.Body((CRANK + ROD / 2, 0), mass=DENSITY * AREA * ROD, inertia=inertia(ROD), name="rod")
     end = rod.at(CRANK + ROD, 0)
     return ub.Scene(
         bodies=[crank, rod],
