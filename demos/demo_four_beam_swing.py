@@ -240,7 +240,7 @@ with ub.picture((11, 8)) as hinges:
         totals.plot(solution.times, 1e3 * solution.energy.total, label=label, **style)
     paths.set(aspect="equal", xlabel="x (m)", ylabel="y (m)")
     paths.set_title("path of the mass", loc="left")
-    paths.legend(loc="lower left", fontsize=10.5)
+    paths.legend(loc="center left", fontsize=10.5)
     totals.set_title("energy (mJ)", loc="left")
     for axes in (jumps, totals):
         axes.set_xlabel("t (s)")

@@ -35,7 +35,8 @@ output.mkdir(exist_ok=True)
 # Both arms are 5 m long.  The flexible one has 0.1 kg/m, so little that it bends by millimetres,
 # and the rigid one none.  The hinge sits in the first cell of the flexible arm, 10 mm long.  It
 # opens at 100 N m and takes 4 J to break; when the tip has turned by two radians exp(-50) of M_u
-# is left.  Then the tip turns back.
+# is left.  Then the tip turns back.  All this goes from one equilibrium to the next, so that
+# nothing is left ringing.
 #
 # The drive gets up to speed within 0.2 s.  A velocity that jumps would excite what no step of 1 ms
 # resolves.
@@ -114,12 +115,12 @@ class Manipulator:
 
 # %%
 revolute = Manipulator(hinge=0.0)
-record = ub.XDMF(output / "manipulator.xdmf", every=20)
+record = ub.XDMF(output / "manipulator.xdmf", every=40)
 by_length = {cell: Manipulator(cell) for cell in (0.04, 0.02, 0.01)}
 hinged = by_length[0.01]
 by_cells = {1: Manipulator(cells=1), 2: Manipulator(cells=2), 4: hinged}
 by_cells[8] = Manipulator(cells=8, record=record)
-by_stiffness = {r: Manipulator(stiffer=r) if r != 1e3 else hinged for r in (1e3, 1e5, 1e8)}
+by_stiffness = {r: Manipulator(stiffer=r) if r != 1e3 else hinged for r in (1e3, 1e4, 1e8)}
 body = Manipulator(stiffer=math.inf)
 
 ub.say("hinge, while it softens\n" + str(hinged.softening))
@@ -219,7 +220,7 @@ with ub.picture((13, 12)) as figure:
     dissipation.set_title("what the hinge has dissipated (J)", loc="left")
     dissipation.axhline(G_f, color="0.3", ls=":", lw=1.2)
     dissipation.text(0.55, 0.85 * G_f, "$G_f$", color="0.3")
-    dissipation.text(0.42, 0.3 * G_f, "the hinge softens", color="0.4")
+    dissipation.text(0.36, 0.3 * G_f, "the hinge softens", color="0.4")
     dissipation.text(1.55, 0.3 * G_f, "nothing more is lost", color="0.4")
     for axes in (moments, dissipation):
         axes.axvspan(0.0, t_joint, color="0.94", zorder=0)
@@ -247,7 +248,6 @@ with ub.picture((13, 12)) as figure:
     differences.set_yticks([50, 100, 200], ["50", "100", "200"])
     differences.minorticks_off()
 figure.savefig(output / "manipulator.png")
-ub.plot_energy(hinged.motion).savefig(output / "manipulator_energy.png")
 ub.say("\npictures and data:", *sorted(str(p) for p in output.glob("manipulator*")), sep="\n  ")
 
 # %% [markdown]
@@ -285,7 +285,7 @@ reach = 2 * length
 assert apart[0.01] < 1e-2 * reach
 assert max(coarse.values()) < 1e-3 * reach
 ratios = [one.away(body) for one in by_stiffness.values()]
-assert abs(ratios[0] / ratios[1] / 1e2 - 1) < 0.1
+assert abs(ratios[0] / ratios[1] / 10 - 1) < 0.1
 assert ratios[2] < 1e-2 * ratios[1]
 ub.say("a softened hinge is a revolute joint, and dissipates nothing")
 

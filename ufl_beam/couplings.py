@@ -74,6 +74,8 @@ class Couplings(Links):
         self._before: Array = np.zeros(n)
         self._rows = np.zeros((n, 3))
         self._length = np.where([c.turns for c in links], 1.0, share.grid.scene.size)
+        self._size = share.grid.scene.size
+        self._iterate: Array = np.empty(0)
         self._q: Array = np.empty(0)
         self._e: Array = np.zeros(n)
 
@@ -107,6 +109,7 @@ class Couplings(Links):
         if not self.response.steady:
             self._put(*self.response.rows(self.motion(q1), self.force(q1)))
         self._work.add(q1, r)
+        self._iterate = q1
 
     def add_tangent(self, q1: Array) -> None:
         """Add the derivative; the rows are those of the latest residual."""
@@ -117,7 +120,12 @@ class Couplings(Links):
         """Largest residual of a row: of motions as a part of 1 % of the scene, or of ``force``."""
         about_motion = self._rows[:, 1] == 0.0
         sizes = self._length * np.where(about_motion, 0.01, force or 1.0)
-        return float((np.abs(r[self._forces_at]) / sizes).max())
+        # Far from where it began, or after many turns, a part has fewer digits left.
+        moved = np.abs(self._iterate[self._dofs[:, :6]])
+        far = 1 + moved[:, :4].max(axis=1) / self._size + moved[:, 4:].max(axis=1)
+        round_off = 8 * np.abs(self._rows[:, 0]) * self._length * np.spacing(far)
+        missed = np.maximum(np.abs(r[self._forces_at]) - round_off, 0.0)
+        return float((missed / sizes).max())
 
     def _taken(self, e1: Array, λ: Array) -> Array:
         return self._acting(self._before, λ) * (e1 - self._e)

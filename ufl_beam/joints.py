@@ -44,7 +44,8 @@ class JointHistory(NamedTuple):
             relative to a; zero in the undeformed scene; (n+1, 3); m, m, rad.
         force: That the joint exerts on b, in the plane; (n+1, 2); N.
         in_a, in_b: The same in axes that turn with a and with b; (n+1, 2); N.
-        moment: That it exerts on b, about the place b; (n+1,); N m.
+        moment: That it exerts on b, about the place b; (n+1,); N m.  Not a number where the places
+            share their rotation, so that nobody knows it.
     """
 
     motion: Array
@@ -120,10 +121,18 @@ def of_joint(solution: Solution, joint: Joint, forces: Array) -> JointHistory:
     between = solution.position(b) - solution.position(a)
     motion = np.column_stack([turned(between, -turns[0]) - apart, turns[1] - turns[0]])
     force, moment = np.zeros((len(solution.times), 2)), np.zeros(len(solution.times))
-    for number, holder in zip(links_of(scene, joint), joint.holders, strict=True):
+    numbers = links_of(scene, joint)
+    if not any({holder.a, holder.b} == {a, b} for holder in joint.holders):
+        raise SceneError(
+            f"{joint}: {a} and {b} share unknowns, so that the force between them is not known; "
+            "make it with measured=True"
+        )
+    if 2 in joint.shared:
+        moment[:] = np.nan
+    for number, holder in zip(numbers, joint.holders, strict=True):
         if {holder.a, holder.b} != {a, b}:
             continue
-        λ = forces[:, number]
+        λ = forces[:, number] if holder.b == b else -forces[:, number]
         if holder.turns:
             moment -= λ
         else:

@@ -185,7 +185,6 @@ def test_large_rotation_by_an_eccentric_load():
     np.testing.assert_allclose(reaction, [150.0, 40.0, -moment], rtol=1e-8)
 
 
-@pytest.mark.xfail(raises=ub.ConvergenceError, reason="the path asks too much of off-centre loads")
 def test_eccentric_load_on_a_body():
     """The same with the arm as a part of a body, which is pushed off its centre."""
     tips = []
