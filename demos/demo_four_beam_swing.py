@@ -251,7 +251,7 @@ pictures = {
 }  # fmt: skip
 for name, figure in pictures.items():
     figure.savefig(output / f"{name}.png")
-ub.animate(decaying, output / "swing.gif", seconds=3, color="N", thickness=8)
+ub.animate(decaying, output / "swing.gif", fps=16, seconds=3, color="N", thickness=8)
 ub.say("\npictures and data:", *sorted(str(path) for path in output.glob("swing*")), sep="\n  ")
 
 # %% [markdown]

@@ -108,7 +108,7 @@ def test_second_order():
 
 def test_limit_beyond_all_forces():
     """A blow that cannot move it: it sticks in the first step and takes the energy of the blow."""
-    solution, x, _ = oscillator(1e-3, 50, periods=0.2, friction=1e3)
+    _, x, _ = oscillator(1e-3, 50, periods=0.2, friction=1e3)
     assert np.abs(x).max() < 1e-3 * PERIOD / 50
     assert np.ptp(x[3:]) < 1e-16
 
