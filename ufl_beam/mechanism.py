@@ -10,7 +10,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.linalg import eigsh
 
 from ufl_beam.beams import Beam, Point
-from ufl_beam.bodies import GROUND, Anchor, Body, Node, node
+from ufl_beam.bodies import GROUND, Anchor, Body, Node, Spot, node
 from ufl_beam.compat import Array
 from ufl_beam.connectors import Connector, Function, Guide, Motor, Spring
 from ufl_beam.errors import SceneError
@@ -21,14 +21,30 @@ DENSE = 90
 
 
 def require_masses(scene: Scene) -> None:
-    """Raise :class:`SceneError` if a body has no mass to move."""
+    """Raise :class:`SceneError` if a body that may move has no mass, unless a beam carries it."""
+    same, moved = scene.representatives, _fixed(scene)
+    for joint in scene.joints:
+        for component in joint.shared:
+            alike = joint.places if component == 2 else joint.carriers
+            slots = [(node(place), component) for place in alike if not isinstance(place, Spot)]
+            moved |= {same.get(slot, slot) for slot in slots}
     for body in scene.bodies:
-        for name in ("mass", "inertia"):
-            if getattr(body, name) == 0.0:
+        for name, components in (("mass", (0, 1)), ("inertia", (2,))):
+            slots = [(body, component) for component in components]
+            free = any(same.get(slot, slot) not in moved for slot in slots)
+            if free and getattr(body, name) == 0.0:
                 raise SceneError(
                     f"{body.name}: {name} = 0, but dynamics needs it to be positive; use RigidLink "
                     "or Link for what has no mass"
                 )
+
+
+def _fixed(scene: Scene) -> set[Slot]:
+    """What the ground and supports hold or move."""
+    same = scene.representatives
+    fixed: set[Slot] = {(GROUND, component) for component in range(3)}
+    fixed |= {(node(s.place), c) for s in scene.supports if not s.angle for c in s.held}
+    return {same.get(slot, slot) for slot in fixed}
 
 
 Demand = tuple[str, list[tuple[Slot, float]]]
@@ -63,10 +79,7 @@ def require_independent(scene: Scene) -> None:
 
 def _demands(scene: Scene) -> list[Demand]:
     """What connectors, and supports in turned axes, give of the motion of what moves freely."""
-    same = scene.representatives
-    fixed: set[Slot] = {(GROUND, component) for component in range(3)}
-    fixed |= {(node(s.place), c) for s in scene.supports if not s.angle for c in s.held}
-    fixed = {same.get(slot, slot) for slot in fixed}
+    same, fixed = scene.representatives, _fixed(scene)
 
     def free(factors: Iterable[tuple[Node, int, float]]) -> list[tuple[Slot, float]]:
         slots = (((of, c), factor) for of, c, factor in factors if factor)

@@ -100,6 +100,16 @@ def test_bodies_need_mass_in_dynamics():
         run(ub.Scene(bodies=[ub.Body((0, 0), mass=1.0, name="ghost")]))
 
 
+def test_what_is_carried_or_moved_needs_no_mass():
+    hub, one = ub.Body((0, 0), name="hub"), beam()
+    moved = ub.Prescribed(hub.middle, u=0, v=0, psi=lambda t: t)
+    scene = ub.Scene([one], [ub.Rigid(hub.middle, one.start)], [moved], bodies=[hub])
+    assert run(scene).displacement(one.start)[-1, 2] == pytest.approx(0.1)
+    run(ub.Scene([one], [ub.Rigid(hub.middle, one.start)], bodies=[hub]))
+    with raises("hub: inertia = 0"):
+        run(ub.Scene([one], [ub.Revolute(hub.middle, one.start)], bodies=[hub]))
+
+
 def parallelogram(cranks):
     """A coupler on parallel cranks, all of them bodies."""
     arms = [body(x, 0.5, name=f"crank {x}") for x in range(cranks)]

@@ -151,6 +151,39 @@ def test_measured_joint_is_the_shared_one():
         np.testing.assert_allclose(shared, held, rtol=0, atol=1e-7)
 
 
+def test_force_of_a_joint_whichever_is_first():
+    """On the ground the opposite of what acts on the body, also where the body comes first."""
+    forces = []
+    for turned_round in (False, True):
+        bob = ub.Body((1, 0), mass=1.0, inertia=0.1)
+        places = ub.ground(0, 0), bob.at(0, 0)
+        pivot = ub.Revolute(*(places[::-1] if turned_round else places))
+        spin = ub.Velocity((bob,), angular=2.0)
+        solution = run(ub.Scene(bodies=[bob], joints=[pivot], initial=[spin]), 0.05, 0.01)
+        forces.append(solution.joint(pivot).force[1:])
+    assert (forces[0][:, 0] < 0).all()  # the body is on the right
+    np.testing.assert_allclose(forces[0], -forces[1], rtol=1e-9, atol=1e-9)
+
+
+def test_what_nobody_knows_of_a_joint():
+    """Places that share a rotation are one unknown, and its moment is not known; so with forces."""
+    box = ub.Body((1, 0), mass=1.0, inertia=0.1, name="box")
+    rail = ub.Prismatic(ub.ground(0, 0), box.middle)
+    spring = ub.Slide(ub.ground(0, 0), box.middle, ub.Spring(10.0))
+    load = ub.PointLoad(box.middle, force=(0, -1), moment=3.0)
+    scene = ub.Scene(bodies=[box], joints=[rail], connectors=[spring], loads=[load])
+    history = run(scene, 1.0, 1.0, ub.Static()).joint(rail)
+    assert history.force[-1] == pytest.approx([0.0, 1.0], abs=1e-10)
+    assert np.isnan(history.moment).all()
+    section = ub.Section(EA=1e4, GA=1e4, EI=10.0, rhoA=1.0, rhoI=0.01)
+    left, right = (ub.Beam((x, 0), (x + 1, 0), section) for x in (0, 1))
+    plate = ub.Body((1, 1), mass=1.0, inertia=0.1)
+    corner = ub.Rigid(left.end, right.start, plate.at(1, 0))
+    solution = run(ub.Scene([left, right], [corner], bodies=[plate]), 0.02, 0.01)
+    with pytest.raises(ub.SceneError, match="share unknowns, so that the force between them"):
+        solution.joint(corner)
+
+
 # -- motors and given forces -------------------------------------------------------------------
 
 
