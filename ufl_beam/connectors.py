@@ -62,6 +62,10 @@ class Controller:
         if not callable(self.force):
             raise SceneError(f"Controller: {self.force!r} must be a function of the simulation")
 
+    def ask(self, simulation: Simulation) -> float:
+        """The force of the next step; all processes ask together."""
+        return float(self.force(simulation))
+
 
 @dataclass(frozen=True)
 class Spring:
@@ -150,7 +154,7 @@ class Coulomb:
     """Dry friction: no motion up to a limit, and the limit against the motion beyond it.
 
     The limit is ``force`` and ``coefficient`` times the force of a joint at the end of the step
-    before.  There is no stiffness of sticking: the motion stops exactly.
+    before.  There is no stiffness of sticking: the motion stops exactly, with its velocity.
 
     Args:
         force: Limit whatever the joint bears; N or N m.
@@ -173,6 +177,12 @@ class Coulomb:
             raise SceneError("Coulomb: force and coefficient are both zero; leave it out")
         if (self.coefficient > 0) != (self.joint is not None):
             raise SceneError("Coulomb: give coefficient and joint together")
+
+    def ask(self, simulation: Simulation) -> float:
+        """The limit of the next step; all processes ask together."""
+        if not isinstance(self.joint, Joint):
+            return self.force
+        return self.force + self.coefficient * simulation.press(self.joint)
 
 
 @dataclass(frozen=True)

@@ -132,7 +132,9 @@ class Guides(Links):
 
     def excess(self, r: Array, force: float) -> float:
         """Largest distance, as a part of 1 % of the scene."""
-        return float(np.abs(r[self._forces_at]).max() / (0.01 * self._size))
+        round_off = 8 * np.spacing(self._size + np.abs(self._points + self._on0).max(axis=1))
+        missed = np.maximum(np.abs(r[self._forces_at]) - round_off, 0.0)
+        return float(missed.max() / (0.01 * self._size))
 
     def change(self, q1: Array) -> float:
         """Guides take no energy."""

@@ -178,7 +178,7 @@ class _Pushed(_Working):
         self._reached: Array = self._force
 
     def _note(self, step: Step) -> None:
-        wanted = -np.array([self._wanted(law, step) for law in self._laws])
+        wanted = -np.array([self._wanted(link, step) for link in self._links])
         self._force = self._reached + step.toward * (wanted - self._reached)
 
     def accept(self, e1: Array, work: float) -> None:
@@ -190,8 +190,8 @@ class _Pushed(_Working):
         """Go on from these forces."""
         self._reached = λ
 
-    def _wanted(self, law: Any, step: Step) -> float:
-        return float(law.force(step.load_time))
+    def _wanted(self, link: Any, step: Step) -> float:
+        return float(link.law.force(step.load_time))
 
     def rows(self, e1: Array, λ: Array) -> Rows:
         """The force is given."""
@@ -204,8 +204,8 @@ class _Controlled(_Pushed):
 
     _entry = "controllers"
 
-    def _wanted(self, law: Any, step: Step) -> float:
-        return float(law.force(self._setting.simulation))
+    def _wanted(self, link: Any, step: Step) -> float:
+        return self._setting.simulation.asked[link]
 
 
 @respond.register(Damper)
@@ -229,6 +229,10 @@ class _Asked(_Working):
 
     _entry = "functions"
 
+    def _prepare(self) -> None:
+        size = self._setting.simulation.scene.size
+        self._small = 1e-3 * np.where([c.turns for c in self._links], 1.0, size)
+
     def _forces(self, e1: Array) -> Array:
         middle: Array = self._setting.scheme.average(self._e0, e1)
         rate = (e1 - self._e0) / self._dt
@@ -239,7 +243,7 @@ class _Asked(_Working):
     def rows(self, e1: Array, λ: Array) -> Rows:
         """The force around the iterate; its derivative by central differences."""
         force = self._forces(e1)
-        ε = 6e-6 * np.maximum(np.abs(e1 - self._e0), 1e-3 * np.maximum(np.abs(e1), 1e-3))
+        ε = 6e-6 * np.maximum(np.abs(e1 - self._e0), 1e-3 * np.maximum(np.abs(e1), self._small))
         slope: Array = (self._forces(e1 + ε) - self._forces(e1 - ε)) / (2 * ε)
         return -slope, 1.0, force - slope * e1
 
@@ -264,26 +268,27 @@ class _Rubbing(_Working):
         self._slip = rows[:, 0].copy()
 
     def _note(self, step: Step) -> None:
-        ask = self._setting.simulation
-        self._limit = np.array(
-            [
-                law.force + (law.coefficient and law.coefficient * ask.press(law.joint))
-                for law in self._laws
-            ]
-        )
+        simulation = self._setting.simulation
+        self._limit = np.array([simulation.asked[link] for link in self._links])
+        # With this way the velocity at the end is zero; with none, that before would come back.
+        self._way = self._setting.scheme.way_to_rest(step.dt) * simulation.rates(self._links)
+        self._against = np.zeros(len(self._links), dtype=bool)
 
     def rows(self, e1: Array, λ: Array) -> Rows:
-        """What sticks is held until it bears too much; what slips goes on until it turns back."""
+        """What sticks comes to rest until it bears too much; what slips goes on until it turns."""
         step = e1 - self._e0
         stuck = self._slip == 0
         back = ~stuck & (self._slip * step < -self._tiny)
         over = stuck & (np.abs(λ) > self._limit * (1 + 1e-12))
+        # Coming to rest must not give energy; if it did, the place is held at once in this step.
+        self._against |= stuck & (λ * self._way < 0)
         self._slip = np.where(back, 0.0, np.where(over, np.sign(λ), self._slip))
         sticks = self._slip == 0
+        rest = self._e0 + np.where(self._against, 0.0, self._way)
         return (
             np.where(sticks, 1.0, 0.0),
             np.where(sticks, 0.0, 1.0),
-            np.where(sticks, self._e0, self._slip * self._limit),
+            np.where(sticks, rest, self._slip * self._limit),
         )
 
 

@@ -100,6 +100,9 @@ class Scheme(Protocol):
     def secant(self, force: Callable[[Array], Array], e0: Array, e1: Array) -> tuple[Array, Array]:
         """Force of a step from e0 to e1, and its derivative, where ``force`` has slopes 0 and 1."""
 
+    def way_to_rest(self, dt: float) -> float:
+        """Way of a step at the end of which there is no velocity, over that at its beginning; s."""
+
     def nodal_step(self, q0: Array, q1: Array, rotations: Index) -> tuple[Array, float]:
         """What forces and moments work on in a step; and the largest turn of a node; rad.
 
@@ -181,6 +184,10 @@ class Static:
         """The force at the end of the step."""
         f = force(e1)
         return f, np.where(f != 0, 1.0, 0.0)
+
+    def way_to_rest(self, dt: float) -> float:
+        """None: everything is at rest."""
+        return 0.0
 
     def nodal_step(self, q0: Array, q1: Array, rotations: Index) -> tuple[Array, float]:
         """The increments themselves; a step may turn a node as far as it likes."""
@@ -296,6 +303,10 @@ class ExactStatic(_ExactStep):
         """Follower loads turn with the rotation where the resultants are in equilibrium."""
         return self.theta
 
+    def way_to_rest(self, dt: float) -> float:
+        """None: everything is at rest."""
+        return 0.0
+
     def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
         """Loads act where the resultants are, motions arrive at the end."""
         return Step(t0, t1, q0, t0 + self.theta * (t1 - t0), motion_time=t1, toward=1.0)
@@ -344,6 +355,11 @@ class Midpoint(_ExactStep):
     def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
         """Loads act in the middle of the step, motions arrive at its end."""
         return Step(t0, t1, q0, load_time=(t0 + t1) / 2, motion_time=t1, toward=1.0)
+
+    def way_to_rest(self, dt: float) -> float:
+        """From v1 = a s - b v0 = 0."""
+        a, b = self.velocity_weights(dt)
+        return b / a
 
     def velocity_weights(self, dt: float) -> tuple[float, float]:
         """(a, b) of the velocities v1 = a s - b v0 after the step s of the nodes."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import cached_property
 
 from mpi4py import MPI
@@ -12,7 +13,7 @@ import numpy as np
 from ufl_beam.applied import DeadLoads, FollowerLoads
 from ufl_beam.bodies import Anchor
 from ufl_beam.compat import Array
-from ufl_beam.connectors import HELD, Connector, Joint
+from ufl_beam.connectors import HELD, Connector, Controller, Coulomb, Joint
 from ufl_beam.couplings import couplings
 from ufl_beam.dampers import damping_forces
 from ufl_beam.errors import ConvergenceError, SceneError, require_kind
@@ -131,6 +132,10 @@ class Simulation:
                     coupling.restore(numbers, rows)
         self._q_before: Array = self.q
         self._dt_before = math.inf
+        self._asking = [
+            (link, link.law) for link in scene.links if isinstance(link.law, Controller | Coulomb)
+        ]
+        self.asked = dict.fromkeys((link for link, _ in self._asking), 0.0)
         self._rotations = self.share.rotations()
         self._multipliers = as_slice(self.share.multipliers())
         for term in self.terms:
@@ -295,6 +300,7 @@ class Simulation:
     def _advance(self, t1: float, end: float) -> None:
         """One step of the scheme, or a part of one to ``end``; the state changes if it succeeds."""
         step = self.scheme.step(self.t, t1, end, self.q)
+        self.ask()
         for term in self.terms:
             term.begin(step)
         guess = self.q + (self.q - self._q_before) * (step.dt / self._dt_before)
@@ -317,6 +323,13 @@ class Simulation:
         self.ledger.begin()
         for term in self.terms:
             term.add_state(q1)
+
+    def ask(self) -> None:
+        """Ask controllers and friction what acts in the next step.
+
+        All processes ask together, whoever computes the connector.
+        """
+        self.asked = {link: law.ask(self) for link, law in self._asking}
 
     def _require_small(self, turn: float) -> None:
         """Raise if a node of any process turns too far in the step."""
@@ -426,8 +439,21 @@ class Simulation:
         Raises:
             SceneError: The joint shares its displacement; make it with ``measured=True``.
         """
-        forces = self.connections()[links_of(self.scene, joint), 1]
-        return float(np.linalg.norm(forces))
+        links = self.scene.links
+        numbers = [n for n in links_of(self.scene, joint) if not links[n].turns]
+        return float(np.linalg.norm(self.connections()[numbers, 1]))
+
+    def rates(self, links: Sequence[Connector]) -> Array:
+        """Rates of relative motions of this process now, by a difference; m/s or rad/s."""
+        rates = np.zeros(len(links))
+        for v in self.velocities():
+            fastest = np.abs(v).max(initial=0.0) or 1.0
+            ε = 1e-5 * self.scene.size / fastest
+            for coupling in self.couplings:
+                if coupling.links == list(links):
+                    ends = (coupling.motion(self.q + sign * ε * v) for sign in (1, -1))
+                    rates += np.subtract(*ends) / (2 * ε)
+        return rates
 
     def section_forces(self) -> Array:
         """(N, V, M) in all cells; (num_cells, 3); N, N, N m; all processes call it together."""

@@ -305,16 +305,17 @@ class Solver:
         wanted = self._newton.rtol * scale
         if residual <= wanted and self._excess(self._r, scale) <= self._newton.rtol:
             return CONVERGED
-        self._near = False
+        kept, self._near = self._near, False
         if iteration > 1:
             floor = 8 * self._round_off()
             # A fraction of the last digit is luck; a few of them that Newton's method no longer
             # halves are all that can be had: it may go round between two such states for ever.
-            least = residual <= floor / 80 or self._last / 2 < residual <= floor
+            stays = not kept and self._last / 2 < residual <= floor
+            least = residual <= floor / 80 or stays
             if least and self._excess(self._r, scale) <= self._newton.rtol:
                 return AT_ROUND_OFF
             # With the tangent of the iterate before, the residual falls by twice the last factor.
-            self._near = residual > floor and 20 * residual**2 <= wanted * self._last
+            self._near = not kept and residual > floor and 20 * residual**2 <= wanted * self._last
         self._slow += 1
         if residual <= self._best / 2:
             self._best, self._slow = residual, 0

@@ -59,6 +59,7 @@ class Probe:
             simulation.inertia.v = random.uniform(-1, 1, size)
         for inelastic in simulation.inelastic:
             self.at_random(inelastic, random)
+        simulation.ask()
         step = scheme.step(0.0, 0.3, 0.3, simulation.q)
         for term in simulation.terms:
             term.begin(step)

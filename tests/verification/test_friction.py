@@ -110,7 +110,7 @@ def test_limit_beyond_all_forces():
     """A blow that cannot move it: it sticks in the first step and takes the energy of the blow."""
     _, x, _ = oscillator(1e-3, 50, periods=0.2, friction=1e3)
     assert np.abs(x).max() < 1e-3 * PERIOD / 50
-    assert np.ptp(x[3:]) < 1e-16
+    assert np.ptp(x[3:]) < 1e-15  # last digits of a scene of 1 m, in eight steps
 
 
 # -- a block on an incline ---------------------------------------------------------------------
@@ -145,7 +145,7 @@ def test_friction_angle(coefficient):
     angle = math.atan(coefficient)
     below, _, rub = block(0.97 * angle, coefficient)
     slid = below.connector(rub).motion
-    assert np.ptp(slid[below.times > 0.8]) < 1e-15
+    assert np.ptp(slid[below.times > 0.8]) < 1e-13  # last digits add up
     above, _, rub = block(1.005 * angle, coefficient)
     rate = above.connector(rub).rate
     expected = -G * (math.sin(1.005 * angle) - coefficient * math.cos(1.005 * angle))

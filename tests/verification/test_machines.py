@@ -342,6 +342,30 @@ def test_function_is_a_spring_and_a_damper():
     assert other.energy.worst < SOLVED
 
 
+def test_function_in_any_units():
+    """A stiffening spring in units of 10⁹ m to 1 nm: the same numbers from as many iterations."""
+    runs = []
+    for metre in (1.0, 1e-9, 1e9):
+        mass = ub.Body((metre, 0), mass=1.0, inertia=metre**2)
+        rail = ub.ground(0, 0), mass.middle
+
+        def force(e, rate, metre=metre):
+            x, v = e / metre, rate / metre
+            return metre * (50 * x + 5e3 * x**3 + 0.5 * v)
+
+        scene = ub.Scene(
+            bodies=[mass],
+            joints=[ub.Prismatic(*rail)],
+            connectors=[ub.Slide(*rail, ub.Function(force))],
+            initial=[ub.Velocity((mass,), linear=(metre, 0))],
+        )
+        solution = run(scene, 0.5, 0.02)
+        runs.append((solution.displacement(mass.middle)[-1, 0] / metre, solution.iterations))
+    for end, iterations in runs[1:]:
+        assert end == pytest.approx(runs[0][0], rel=1e-9)
+        assert iterations == runs[0][1]
+
+
 def test_bouncing_mass():
     """Contact lasts π √(m/k), and the mass comes back as fast as it went."""
     stiffness, way, v0, dt = 2e4, 0.05, 0.3, 1e-3
