@@ -136,6 +136,10 @@ class Couplings(Links):
         e1 = self.motion(q1)
         return self.response.change(e1, float(self._taken(e1, self.force(q1)).sum()))
 
+    def effort(self, q1: Array) -> float:
+        """Sum of the sizes of the works that the connectors take in the step to ``q1``; J."""
+        return float(np.abs(self._taken(self.motion(q1), self.force(q1))).sum())
+
     def accept(self, q1: Array, s: Array) -> None:
         """Enter what was supplied or lost."""
         e1, λ = self.motion(q1), self.force(q1)

@@ -140,6 +140,10 @@ class Guides(Links):
         """Guides take no energy."""
         return 0.0
 
+    def effort(self, q1: Array) -> float:
+        """Guides take no energy."""
+        return 0.0
+
     def accept(self, q1: Array, s: Array) -> None:
         """Remember the points on the curves."""
         self._on0, _ = self._nearest(self._at(q1))

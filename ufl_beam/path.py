@@ -10,7 +10,9 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.compat import Array
+from ufl_beam.couplings import Couplings
 from ufl_beam.grid import Share
+from ufl_beam.guides import Guides
 from ufl_beam.ledger import Ledger
 from ufl_beam.schemes import Scheme
 from ufl_beam.solve import StepFailed
@@ -30,6 +32,7 @@ class StaticPath:
         share: The degrees of freedom of this process.
         scheme: A static scheme; its ``slack`` says how much may stay unexplained.
         beams: What stores and dissipates.
+        couplings: Connectors, which may store, dissipate, supply.
         ledger: Energies before the step.
         q: Configuration at the beginning.
         t0: Time at the beginning; s.
@@ -40,14 +43,16 @@ class StaticPath:
         share: Share,
         scheme: Scheme,
         beams: Sequence[Beams],
+        couplings: Sequence[Couplings | Guides],
         ledger: Ledger,
         q: Array,
         t0: float,
     ) -> None:
-        self._share, self._scheme, self._beams, self._ledger = share, scheme, beams, ledger
+        self._share, self._scheme, self._ledger = share, scheme, ledger
+        self._beams, self._couplings = beams, couplings
         self._rotations = share.rotations()
         self._before: Array = np.zeros(share.size)
-        for one in beams:
+        for one in (*beams, *couplings):
             one.begin(scheme.step(t0, t0 + 1.0, t0 + 1.0, q))
             one.add_residual(q, self._before)
 
@@ -89,10 +94,11 @@ class StaticPath:
         """
         total = self._share.total
         work = total(float(self._scheme.acting(self._before, force) @ s))
-        changes = [one.change(q1) for one in self._beams]
-        change = total(sum(changes))
+        in_beams = total(sum(one.change(q1) for one in self._beams))
+        change = in_beams + total(sum(one.change(q1) for one in self._couplings))
         # A motor that stretches a spring gives what the spring takes; their sum measures nothing.
-        size = abs(work) + total(sum(map(abs, changes)))
+        # Connectors count one by one, so that the size is the same on any number of processes.
+        size = abs(work) + abs(in_beams) + total(sum(one.effort(q1) for one in self._couplings))
         slack = self._scheme.slack * size + least_work
         if abs(work - change) > slack + KINK * total(self._ledger.size()):
             raise StepFailed(

@@ -142,7 +142,8 @@ class Simulation:
             term.add_state(self.q)
         self._path: StaticPath | None = None
         if not scheme.dynamic:
-            self._path = StaticPath(self.share, scheme, self._inner, self.ledger, self.q, t0)
+            parts = (self.beams, self.couplings)
+            self._path = StaticPath(self.share, scheme, *parts, self.ledger, self.q, t0)
         self._solver = Solver(
             self.share,
             self._A,
