@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Sequence
 
@@ -17,6 +16,7 @@ from ufl_beam.errors import (
     require_number,
     require_sequence,
 )
+from ufl_beam.pacing import EqualSteps
 from ufl_beam.processes import in_study, ours
 from ufl_beam.record import Recorder, on_first
 from ufl_beam.scene import Scene
@@ -24,6 +24,8 @@ from ufl_beam.schemes import Scheme
 from ufl_beam.simulation import Simulation
 from ufl_beam.solution import Solution
 from ufl_beam.solve import Newton
+
+BAR = "{percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
 
 
 def simulate(
@@ -71,20 +73,21 @@ def simulate(
         on_first(comm, recorder.require_writable)
     begin = time.perf_counter()
     simulation = Simulation(scene, scheme, t0=t0, start=start, newton=newton, comm=comm)
-    # A step is never longer than asked for; the slack is for the rounding of (t1 - t0) / dt.
-    steps = max(1, math.ceil((t1 - t0) / dt * (1 - 1e-9)))
+    pace = EqualSteps(t0, t1, dt)
     solution = simulation.solution
     try:
         for recorder in recorders:
             recorder.open(simulation)
         solution.keep(simulation)
         quiet = None if progress and comm.rank == 0 and not in_study() else True
-        for n in tqdm(range(1, steps + 1), unit="step", disable=quiet, mininterval=0.5):
-            simulation.step_to(t0 + (t1 - t0) * n / steps)
-            if n % every == 0 or n == steps:
-                solution.keep(simulation)
-            for recorder in recorders:
-                recorder.write(simulation)
+        with tqdm(total=1.0, bar_format=BAR, disable=quiet, mininterval=0.5) as bar:
+            while not pace.finished:
+                pace.advance(simulation)
+                if pace.steps % every == 0 or pace.finished:
+                    solution.keep(simulation)
+                for recorder in recorders:
+                    recorder.write(simulation)
+                bar.update(pace.progress - bar.n)
         simulation.end()
     except BaseException as error:
         # Whatever stops a run, an interrupt or a user's function, what was reached is not lost.
