@@ -2,6 +2,7 @@
 
 from ufl_beam.beams import Beam, Place
 from ufl_beam.bodies import Body, Spot, ground
+from ufl_beam.checkpoint import Checkpoint
 from ufl_beam.connectors import (
     Actuator,
     Connector,
@@ -24,6 +25,10 @@ from ufl_beam.connectors import (
     Stretch,
     Turn,
 )
+from ufl_beam.cycles import Cycles, Gerber, Goodman, SNCurve, rainflow
+from ufl_beam.continuation import Path, follow
+from ufl_beam.controls import ArcLength, Displacement, Dissipation, Load
+from ufl_beam.critical import Branch, CriticalPoint
 from ufl_beam.decay import (
     Decay,
     Envelope,
@@ -34,7 +39,11 @@ from ufl_beam.decay import (
     peaks,
 )
 from ufl_beam.distributions import Lognormal, Normal, TruncatedNormal, Weibull
+from ufl_beam.envelopes import plot_cycles, plot_extremes
 from ufl_beam.errors import ConvergenceError, SceneError
+from ufl_beam.events import Event, Events
+from ufl_beam.extremes import Extent, Extremes
+from ufl_beam.fatigue import Fatigue, HotSpot
 from ufl_beam.fibres import Fibres
 from ufl_beam.gathered import Study
 from ufl_beam.hysteresis import (
@@ -45,7 +54,18 @@ from ufl_beam.hysteresis import (
 )
 from ufl_beam.laws import DuvautLions, Hardening, LinearSoftening, Perzyna, Softening
 from ufl_beam.ledger import Energy
-from ufl_beam.loads import FollowerLoad, Gravity, LineLoad, PointLoad, Table, ramp
+from ufl_beam.loads import (
+    FollowerLoad,
+    Gravity,
+    LineLoad,
+    PointLoad,
+    RotatingFrame,
+    Table,
+    ramp,
+)
+from ufl_beam.pacing import Adaptive
+from ufl_beam.mode_pictures import plot_modes
+from ufl_beam.modes import Buckling, Modes, buckling, modes
 from ufl_beam.record import XDMF, History, Recorder
 from ufl_beam.render import animate, render
 from ufl_beam.running import say, simulate
@@ -71,36 +91,56 @@ from ufl_beam.viscous import KelvinVoigt, Rayleigh
 __all__ = [
     "XDMF",
     "Actuator",
+    "Adaptive",
+    "ArcLength",
     "Beam",
     "Body",
+    "Branch",
+    "Buckling",
+    "Checkpoint",
     "Clamped",
     "Connector",
     "Controller",
     "ConvergenceError",
     "Coulomb",
+    "CriticalPoint",
+    "Cycles",
     "Damper",
     "Decay",
+    "Displacement",
+    "Dissipation",
     "DuvautLions",
     "Energy",
     "Envelope",
+    "Event",
+    "Events",
     "ExactStatic",
+    "Extent",
+    "Extremes",
+    "Fatigue",
     "Fibres",
     "FollowerLoad",
     "Function",
+    "Gerber",
+    "Goodman",
     "Gravity",
     "Guided",
     "Hardening",
     "History",
+    "HotSpot",
     "Joint",
     "KelvinVoigt",
     "LineLoad",
     "LinearSoftening",
     "Link",
+    "Load",
     "Lognormal",
     "Midpoint",
+    "Modes",
     "Motor",
     "Newton",
     "Normal",
+    "Path",
     "Perzyna",
     "Pinned",
     "Place",
@@ -115,6 +155,8 @@ __all__ = [
     "Rigid",
     "RigidLink",
     "Roller",
+    "RotatingFrame",
+    "SNCurve",
     "Scene",
     "SceneError",
     "Section",
@@ -135,21 +177,28 @@ __all__ = [
     "Velocity",
     "Weibull",
     "animate",
+    "buckling",
     "damping",
     "damping_ratio",
     "fit_decay",
+    "follow",
     "ground",
     "logarithmic_decrement",
+    "modes",
     "peaks",
     "picture",
     "plot",
+    "plot_cycles",
     "plot_damage",
     "plot_dissipation",
     "plot_energy",
+    "plot_extremes",
     "plot_hinge",
     "plot_history",
+    "plot_modes",
     "plot_moment_curvature",
     "plot_shapes",
+    "rainflow",
     "ramp",
     "render",
     "say",

@@ -14,6 +14,7 @@ from ufl_beam.compat import Array
 from ufl_beam.grid import Share
 from ufl_beam.ledger import Ledger
 from ufl_beam.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, TimeFunction
+from ufl_beam.memory import Memory
 from ufl_beam.schemes import Scheme, Step
 from ufl_beam.sparse import Csr
 
@@ -30,6 +31,8 @@ class DeadLoads:
     Attributes:
         force: The loads in the equation of the step.
     """
+
+    kind = "loads"
 
     def __init__(self, loads: Sequence[Load], share: Share, scheme: Scheme, ledger: Ledger) -> None:
         # Loads of one time function are one vector; functions need not be hashable.
@@ -75,6 +78,10 @@ class DeadLoads:
     def add_state(self, q: Array) -> None:
         """Loads hold no energy; what a potential would hold is in their work."""
 
+    def remember(self, memory: Memory, q: Array) -> None:
+        """The forces in the equation of the last step."""
+        self.force = self._before = memory.added("dead loads", self._before)
+
 
 class FollowerLoads:
     """Forces that turn with the cross-section they act on.
@@ -90,6 +97,8 @@ class FollowerLoads:
         force: The loads in the latest residual.
     """
 
+    kind = "loads"
+
     def __init__(
         self,
         loads: Sequence[FollowerLoad],
@@ -98,7 +107,8 @@ class FollowerLoads:
         ledger: Ledger,
         A: Csr,
     ) -> None:
-        mine = [load for load in loads if share.computes(load.place)]
+        here = [i for i, load in enumerate(loads) if share.computes(load.place)]
+        self._numbers, mine = np.array(here, dtype=np.int64), [loads[i] for i in here]
         dofs = np.array([share.local(share.at(load.place)) for load in mine], dtype=np.int64)
         self._dofs = dofs.reshape(-1, 3)
         self._forces = np.array([[*load.force, load.moment] for load in mine]).reshape(-1, 3)
@@ -161,6 +171,12 @@ class FollowerLoads:
 
     def add_state(self, q: Array) -> None:
         """Loads hold no energy; what a potential would hold is in their work."""
+
+    def remember(self, memory: Memory, q: Array) -> None:
+        """The forces in the equation of the last step."""
+        self.force = self._before = memory.added("follower loads", self._before)
+        sizes = memory.rows("follower loads", self._numbers, self._sizes_before)
+        self._sizes = self._sizes_before = sizes
 
 
 @singledispatch

@@ -13,6 +13,7 @@ from ufl_beam.forms import Kernel
 from ufl_beam.grid import Index, Share
 from ufl_beam.guides import Guides
 from ufl_beam.links import Links
+from ufl_beam.memory import Memory
 from ufl_beam.relative import MOTIONS, Numbers, Pair
 from ufl_beam.responses import Setting, respond
 from ufl_beam.schemes import Step
@@ -30,6 +31,8 @@ class Couplings(Links):
 
     Each is a cell of unit length from one node to the other, with its force as a seventh unknown.
     """
+
+    kind = "connectors"
 
     def __init__(self, share: Share, here: Index, setting: Setting, A: Csr) -> None:
         super().__init__(share, here, A)
@@ -149,24 +152,27 @@ class Couplings(Links):
         self.rate = np.asarray((e1 - self._e) / self._dt)
         self._before, self._q, self._e = λ, q1, e1
 
+    def freeze(self) -> None:
+        """From now on nothing yields or breaks further."""
+        self.response.freeze()
+
     # -- the state -----------------------------------------------------------------------------
 
     def add_state(self, q: Array) -> None:
         """Enter what is stored."""
-        self.response.add_state(self._e if q is self._q else self.motion(q))
+        if q is not self._q:
+            self._q, self._e = q, self.motion(q)
+            self.response.start(self._e)
+        self.response.add_state(self._e)
 
-    def state(self) -> tuple[Index, Array]:
-        """Numbers of the connectors, and what their laws remember; (num_links, k)."""
-        return self.numbers, np.column_stack([self.work, self._before, self.response.state()])
-
-    def restore(self, numbers: Index, rows: Array) -> None:
-        """Take over :meth:`state`, of those connectors that are here."""
-        _, here, there = np.intersect1d(self.numbers, numbers, return_indices=True)
-        if len(here) < len(self.numbers):
-            return
-        rows = rows[there[np.argsort(here)]]
-        self.work, self._before = rows[:, 0].copy(), rows[:, 1].copy()
-        self.response.restore(self._before, rows[:, 2:])
+    def remember(self, memory: Memory, q: Array) -> None:
+        """Motions, forces and works, and what the laws remember."""
+        response = self.response
+        rows = np.column_stack([self.work, self.rate, self._before, self._e, response.state()])
+        rows = memory.rows(type(response).__name__, self.numbers, rows)
+        self.work, self.rate, self._before, self._e = rows[:, :4].T.copy()
+        response.restore(rows[:, 4:])
+        self._q = q
 
 
 def _split(q: Expr) -> tuple[Pair, Expr]:

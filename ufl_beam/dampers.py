@@ -12,6 +12,7 @@ from ufl_beam.errors import SceneError
 from ufl_beam.fields import Fields
 from ufl_beam.kinematics import strain, virtual_strain
 from ufl_beam.ledger import Ledger
+from ufl_beam.memory import Memory
 from ufl_beam.schemes import Scheme, Step
 from ufl_beam.sparse import Csr, StepProduct
 from ufl_beam.terms import Term, mass_matrix
@@ -28,6 +29,8 @@ def damping_forces(
 
 class KelvinVoigtForces:
     """Resultants in proportion to the rates of the strains, P(89) with a weight of time over dt."""
+
+    kind = "damping"
 
     def __init__(
         self, damping: KelvinVoigt, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger
@@ -70,6 +73,9 @@ class KelvinVoigtForces:
     def add_state(self, q: Array) -> None:
         """Nothing is stored."""
 
+    def remember(self, memory: Memory, q: Array) -> None:
+        """Nothing is remembered."""
+
 
 def reference_stiffness(fields: Fields) -> Csr:
     """Stiffness of the undeformed scene."""
@@ -87,6 +93,8 @@ def reference_stiffness(fields: Fields) -> Csr:
 
 class RayleighForces:
     """A constant matrix times the mean velocity of the step, P(92)."""
+
+    kind = "damping"
 
     def __init__(self, damping: Rayleigh, fields: Fields, A: Csr, ledger: Ledger) -> None:
         C, M, K = fields.matrix(), mass_matrix(fields), reference_stiffness(fields)
@@ -113,6 +121,9 @@ class RayleighForces:
 
     def add_state(self, q: Array) -> None:
         """Nothing is stored."""
+
+    def remember(self, memory: Memory, q: Array) -> None:
+        """Nothing is remembered."""
 
 
 @damping_forces.register

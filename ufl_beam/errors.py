@@ -19,14 +19,31 @@ class ConvergenceError(RuntimeError):
     Attributes:
         time: Time of the last accepted state; s.
         dt: The smallest step that was tried; s.
-        solution: The :class:`~ufl_beam.solution.Solution` up to ``time``.
+        solution: The :class:`~ufl_beam.solution.Solution` up to ``time``; ``start=solution`` goes on
+            from there with another step or scheme.
+        residuals: What is left of the equilibrium where it is largest in each beam, body and
+            connector, the largest first; N, moments over the size of the scene.  Empty if
+            equilibria were found but refused.
+        forces: Sizes of the forces that should be in equilibrium, by kind: "beams", "connectors",
+            "loads", "inertia", "damping"; N.
     """
 
-    def __init__(self, message: str, *, time: float, dt: float, solution: Any) -> None:
+    def __init__(
+        self,
+        message: str,
+        *,
+        time: float,
+        dt: float,
+        solution: Any,
+        residuals: dict[str, float],
+        forces: dict[str, float],
+    ) -> None:
         super().__init__(message)
         self.time = time
         self.dt = dt
         self.solution = solution
+        self.residuals = residuals
+        self.forces = forces
 
 
 def require_number(

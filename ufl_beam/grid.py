@@ -138,6 +138,13 @@ class Grid:
         (first, _), _ = self.weights(place)
         return int(first) - self._index(place.beam)
 
+    def middle(self, cell: int) -> Place:
+        """The place in the middle of a cell."""
+        beam = self.beam_of_cell[cell]
+        s = self._parameters[beam]
+        i = cell - (self._first[beam] - beam)
+        return self.scene.beams[beam].at((s[i] + s[i + 1]) / 2)
+
     def hinges(self, beam: Beam) -> list[Softening | None]:
         """Law of the hinge in each cell of a beam."""
         cells = self.cells_of(beam)
@@ -170,6 +177,17 @@ class Grid:
         beam = int(np.searchsorted(self._first, vertex, side="right")) - 1
         x, y = self.points[vertex]
         return f"{COMPONENTS[component]} of {self.scene.beams[beam].name} at ({x:g}, {y:g})"
+
+    def worst(self, sizes: Array) -> dict[str, float]:
+        """The degree of freedom of each beam, body and connector with the largest size, in words.
+
+        Args:
+            sizes: One for each degree of freedom; those that are zero are left out.
+        """
+        dofs_of_beams = [self.dofs[self.vertices_of(beam)] for beam in self.scene.beams]
+        groups = [*dofs_of_beams, *self.dofs_of_bodies, *self.multipliers.reshape(-1, 1)]
+        worst = sorted({int(g.flat[np.argmax(sizes[g])]) for g in groups}, key=lambda d: -sizes[d])
+        return {self.describe(dof): float(sizes[dof]) for dof in worst if sizes[dof]}
 
     def _require_length(self) -> None:
         ends = self.points[self.cells]

@@ -11,6 +11,7 @@ from ufl_beam.compat import Array
 from ufl_beam.connectors import Guide
 from ufl_beam.grid import Index, Share
 from ufl_beam.links import Links
+from ufl_beam.memory import Memory
 from ufl_beam.responses import Setting
 from ufl_beam.schemes import Step
 from ufl_beam.solve import StepFailed
@@ -49,6 +50,8 @@ class Guides(Links):
     The motion of a guide is the distance from its curve, zero when a step is accepted.
     """
 
+    kind = "connectors"
+
     def __init__(self, share: Share, here: Index, setting: Setting, A: Csr) -> None:
         super().__init__(share, here, A)
         self._laws = [link.law for link in self.links if isinstance(link.law, Guide)]
@@ -70,9 +73,11 @@ class Guides(Links):
     def _nearest(self, p: Array) -> tuple[Array, Array]:
         """Points of the curves nearest to ``p``, and unit tangents there; from the latest ones."""
         curves = [law.curve for law in self._laws]
-        self._s = np.array([nearest(c, p[k], float(self._s[k])) for k, c in enumerate(curves)])
-        if not np.isfinite(self._s).all():
-            raise StepFailed("no nearest point was found of the curve of a Guided joint")
+        found = np.array([nearest(c, p[k], float(self._s[k])) for k, c in enumerate(curves)])
+        if not np.isfinite(found).all():
+            place = self.links[int(np.argmin(np.isfinite(found)))].b
+            raise StepFailed(f"{place} is where no nearest point of its guide curve was found")
+        self._s = found
         t = np.array([tangent(curve, s) for curve, s in zip(curves, self._s, strict=True)])
         on = np.array([curve(s) for curve, s in zip(curves, self._s, strict=True)], dtype=float)
         return on, t / np.linalg.norm(t, axis=1)[:, None]
@@ -106,6 +111,7 @@ class Guides(Links):
 
     def motion(self, q: Array) -> Array:
         """Distances from the curves; m."""
+        self._s = self._s0.copy()
         return self._frames(q)[0]
 
     def begin(self, step: Step) -> None:
@@ -149,19 +155,17 @@ class Guides(Links):
         self._on0, _ = self._nearest(self._at(q1))
         self._s0 = self._s.copy()
 
+    def freeze(self) -> None:
+        """Nothing yields."""
+
     # -- the state -----------------------------------------------------------------------------
 
     def add_state(self, q: Array) -> None:
         """Nothing is stored."""
 
-    def state(self) -> tuple[Index, Array]:
-        """Numbers of the guides, and the parameters of their points; (num_links, 1)."""
-        return self.numbers, self._s0[:, None]
-
-    def restore(self, numbers: Index, rows: Array) -> None:
-        """Take over :meth:`state`."""
-        _, here, there = np.intersect1d(self.numbers, numbers, return_indices=True)
-        if len(here) == len(self.numbers):
-            self._s0[here] = rows[there, 0]
-            pairs = zip(self._laws, self._s0, strict=True)
-            self._on0 = np.array([law.curve(s) for law, s in pairs], dtype=float)
+    def remember(self, memory: Memory, q: Array) -> None:
+        """The points on the curves, and their parameters."""
+        rows = np.column_stack([self.work, self.rate, self._s, self._s0, self._on0])
+        rows = memory.rows("guides", self.numbers, rows)
+        self.work, self.rate, self._s, self._s0 = rows[:, :4].T.copy()
+        self._on0 = rows[:, 4:].copy()

@@ -12,6 +12,7 @@ from ufl_beam.kinematics import strain
 from ufl_beam.laws import Layout
 from ufl_beam.ledger import Ledger
 from ufl_beam.loops import doubles, lib
+from ufl_beam.memory import Memory
 from ufl_beam.points import INPUTS, Course, Points
 from ufl_beam.schemes import Scheme, Step
 from ufl_beam.sparse import Csr
@@ -57,6 +58,8 @@ class InelasticBeams:
     iterates the form knows the resultants r = b + D e as linear in the strains e, so that UFL
     derives the tangent, material and geometric.
     """
+
+    kind = "beams"
 
     def __init__(
         self,
@@ -142,6 +145,15 @@ class InelasticBeams:
         self._respond(q1)
         return self.points.change()
 
+    def dissipation(self, q1: Array) -> float:
+        """Energy that cells of this process dissipate in the step to ``q1``; J."""
+        self._respond(q1)
+        return self.points.dissipation()
+
+    def freeze(self) -> None:
+        """From now on nothing yields or opens further."""
+        self.points.freeze()
+
     # -- the state -----------------------------------------------------------------------------
 
     def accept(self, q1: Array, s: Array) -> None:
@@ -159,6 +171,11 @@ class InelasticBeams:
             self.points.start(strains)
             self.points.refresh(strains)
         self.points.enter_stored(self._ledger)
+
+    def remember(self, memory: Memory, q: Array) -> None:
+        """Internal variables."""
+        self.restore(self._cells, memory.rows("cells", *self.state()))
+        self._q = q
 
     # -- what solutions keep -------------------------------------------------------------------
 

@@ -60,6 +60,11 @@ class Table:
                     f"by {after:g}"
                 )
 
+    @property
+    def kinks(self) -> Sequence[float]:
+        """Times at which adaptive steps end: the function is smooth only between them; s."""
+        return self.times
+
     def __call__(self, t: float) -> float:
         """Value at time ``t``."""
         return float(np.interp(t, self.times, self.values))
@@ -170,4 +175,29 @@ class Gravity:
         require_time_function(self.time, "Gravity")
 
 
-Load = PointLoad | FollowerLoad | LineLoad | Gravity
+@dataclass(frozen=True, eq=False)
+class RotatingFrame:
+    """Centrifugal and Coriolis forces on all that has mass: the scene turns steadily as a whole.
+
+    Motions, velocities and all other loads are those that somebody sees who turns with the frame.
+    In statics it gives the steady rotation, with all that it stretches and bends.
+
+    Args:
+        rate: Angular velocity of the frame, counter-clockwise; rad/s.
+        about: The point that stays in place; m.
+    """
+
+    rate: float
+    about: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        require_number(self.rate, "RotatingFrame: rate")
+        require_vector(self.about, "RotatingFrame: about")
+
+    @property
+    def time(self) -> TimeFunction:
+        """The rate does not change: that would make other forces."""
+        return steady
+
+
+Load = PointLoad | FollowerLoad | LineLoad | Gravity | RotatingFrame

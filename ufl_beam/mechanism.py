@@ -39,6 +39,25 @@ def require_masses(scene: Scene) -> None:
                 )
 
 
+def no_number(scene: Scene, times: Iterable[float]) -> str:
+    """What has a time function that is no finite number at one of the times; empty if nothing."""
+    named: list[tuple[object, TimeFunction]] = []
+    for load in scene.loads:
+        if not isinstance(load, RotatingFrame):
+            place = getattr(load, "place", getattr(load, "beam", None))
+            named.append((f"{type(load).__name__}{f' at {place}' if place else ''}", load.time))
+    named += [(support, motion) for support in scene.supports for motion in support.held.values()]
+    laws = ((link, link.law) for link in scene.links)
+    for link, law in laws:
+        if isinstance(law, Motor | Actuator):
+            named.append((link, law.motion if isinstance(law, Motor) else law.force))
+    for t in times:
+        for name, function in named:
+            if not math.isfinite(value := float(function(t))):
+                return f"{name}: the time function is {value} at t = {t:.9g} s"
+    return ""
+
+
 def _fixed(scene: Scene) -> set[Slot]:
     """What the ground and supports hold or move."""
     same = scene.representatives

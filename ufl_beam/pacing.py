@@ -3,10 +3,26 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
+from mpi4py import MPI
+
+import numpy as np
+
+from ufl_beam.compat import Array
+from ufl_beam.errors import SceneError, require_number, require_sequence
+from ufl_beam.solve import StepFailed
+
 if TYPE_CHECKING:
-    from ufl_beam.simulation import Simulation
+    from ufl_beam.simulation import Simulation, Trial
+
+GROWTH = 1.5
+"""A step is at most so many times as long as the one before it, whose error it may repeat."""
+
+SAMPLES = (0.01, 0.5, 0.99)
+"""Parts of a step at which loads are asked for."""
 
 
 class Pace(Protocol):
@@ -52,6 +68,11 @@ class EqualSteps:
         self.steps = 0
 
     @property
+    def dt(self) -> float:
+        """Size of the steps; s."""
+        return (self._t1 - self._t0) / self._all
+
+    @property
     def finished(self) -> bool:
         """Whether all steps are done."""
         return self.steps == self._all
@@ -74,3 +95,171 @@ class EqualSteps:
     def restore(self, state: dict[str, float]) -> None:
         """Go on after that many."""
         self.steps = int(state["steps"])
+
+
+@dataclass(frozen=True)
+class Adaptive:
+    """Steps as long as the accuracy that is asked for allows; given in the place of ``dt``.
+
+    Each step estimates its own error: what its mean velocity and acceleration miss of a motion
+    whose acceleration changes, and what the middle of the step misses of the loads.  As with other
+    integrators of differential equations the tolerance is that of a step; what the steps of a run
+    add up to is :attr:`Solution.time_error`, of which the motion may forget or magnify a part.  A
+    share of the time in the place of the step's would have every vibration of the mesh resolved,
+    however small.  All this is about the time steps, not about the cells.
+
+    Steps end at the times of every :class:`Table` in the scene, at those that other functions of
+    time name in an attribute ``kinks``, and at ``stops``.
+
+    Args:
+        tolerance: Error that a step may add; to positions as a part of the size of the scene, to
+            rotations in rad, to the impulse of a load as a part of that of its largest value.
+        first: Where the search for the first step begins; s.  By default a hundredth of the run.
+        longest: Longest step; s.
+        shortest: A run that needs shorter steps ends with an error; s.  By default 1e-12 of it.
+        stops: More times at which steps must end; s.
+
+    Raises:
+        SceneError: A number is out of range.
+    """
+
+    tolerance: float
+    first: float | None = None
+    longest: float | None = None
+    shortest: float | None = None
+    stops: Sequence[float] = ()
+
+    def __post_init__(self) -> None:
+        require_number(self.tolerance, "Adaptive: tolerance", positive=True)
+        for name in ("first", "longest", "shortest"):
+            if getattr(self, name) is not None:
+                require_number(getattr(self, name), f"Adaptive: {name}", positive=True)
+        object.__setattr__(self, "stops", require_sequence(self.stops, "Adaptive: stops"))
+        for i, stop in enumerate(self.stops):
+            require_number(stop, f"Adaptive: stops[{i}]")
+
+
+class AdaptiveSteps:
+    """Steps whose error is estimated and limited.
+
+    Args:
+        simulation: What goes through time.
+        t1: End; s.
+        choice: What the user asks for.
+
+    Attributes:
+        rejected: Steps that were solved but too long.
+        error: Sum of the errors so far.
+    """
+
+    def __init__(self, simulation: Simulation, t1: float, choice: Adaptive) -> None:
+        self._t0 = self._t = t0 = simulation.t
+        self._t1 = t1
+        self._tolerance = choice.tolerance
+        self._longest = choice.longest or t1 - t0
+        self._shortest = choice.shortest or 1e-12 * (t1 - t0)
+        self._dt = min(choice.first or (t1 - t0) / 100, self._longest)
+        self._functions = simulation.scene.time_functions()
+        self._largest = [0.0] * len(self._functions)
+        kinks = {float(t) for f in self._functions for t in getattr(f, "kinks", ())}
+        self._stops = sorted({t for t in (*kinks, *choice.stops, t1) if t0 < t <= t1})
+        self._fresh = True
+        share = simulation.share
+        self._turns = share.rotations()
+        self._sizes = np.full(share.size, 1 / share.grid.scene.size)
+        self._sizes[self._turns] = 1.0
+        self._sizes[share.multipliers()] = 0.0
+        self._sizes[simulation.supports.dofs] = 0.0
+        self.steps = self.rejected = 0
+        self.error = 0.0
+
+    @property
+    def finished(self) -> bool:
+        """Whether the end is reached."""
+        return self._t == self._t1
+
+    @property
+    def progress(self) -> float:
+        """Part of the time that is over."""
+        return (self._t - self._t0) / (self._t1 - self._t0)
+
+    def advance(self, simulation: Simulation) -> None:
+        """One step that is accurate, after as many as it takes that are not."""
+        stop = next(t for t in self._stops if t > self._t)
+        while True:
+            try:
+                trial, error = self._attempt(simulation, stop)
+                dt = trial.step.dt
+                change = 0.9 * (self._tolerance / max(error, 1e-300)) ** (1 / 3)
+                if error <= self._tolerance:
+                    break
+                self.rejected += 1
+                self._dt = dt * max(change, 0.1)
+                failure = StepFailed(
+                    f"its error {error:.1e} is above the tolerance {self._tolerance:.1e}; if a load "
+                    "or a motion jumps, name the time in `stops`"
+                )
+            except StepFailed as reason:
+                failure, self._dt = reason, self._dt / 4
+            if self._dt < self._shortest:
+                simulation.give_up(failure, self._t + self._dt)
+        simulation.accept(trial)
+        self._t = simulation.t
+        self.error = simulation.solution.time_error = self.error + error
+        self.steps += 1
+        self._dt = min(dt * min(change, GROWTH), self._longest)
+        # The acceleration may jump at a stop, so what was before tells nothing about what comes.
+        self._fresh = self._t == stop
+
+    def _attempt(self, simulation: Simulation, stop: float) -> tuple[Trial, float]:
+        """Solve the next step; also its error."""
+        left = stop - self._t
+        # Two equal steps to a stop in the place of a long and a tiny one
+        dt = left if self._dt >= left else min(self._dt, left / 2)
+        inertia = simulation.inertia
+        if self._fresh:
+            # Nothing to compare with: half of a step is compared with the whole.
+            whole = simulation.attempt(self._t + dt)
+            before, between = (inertia.velocities(whole.s) - inertia.v) / dt, -dt / 4
+            dt /= 2
+        else:
+            before = (inertia.v - inertia.v_before) / simulation.last_dt
+            between = (dt + simulation.last_dt) / 2
+        trial = simulation.attempt(stop if dt == left else self._t + dt)
+        dt = trial.step.dt
+        a = (inertia.velocities(trial.s) - inertia.v) / dt
+        jerk = (a - before) / between
+        c2, c3 = simulation.scheme.error_weights()
+        error = self._size(simulation, trial, c2 * dt**2 * a + c3 * dt**3 * jerk)
+        return trial, max(error, self._missed(dt))
+
+    def _size(self, simulation: Simulation, trial: Trial, error: Array) -> float:
+        """Largest error of a position over the size of the scene, or of a rotation."""
+        turns = self._turns
+        error[turns] += (trial.q1 - simulation.q - trial.s)[turns]
+        here = float(np.abs(simulation.supports.in_axes(error) * self._sizes).max(initial=0.0))
+        share = simulation.share
+        return share.comm.allreduce(here, op=MPI.MAX) if share.comm.size > 1 else here
+
+    def _missed(self, dt: float) -> float:
+        """What the middle of the step misses of a load, as a part of its largest impulse."""
+        missed = 0.0
+        for i, function in enumerate(self._functions):
+            # Not at the ends, where there may be jumps
+            before, middle, after = (float(function(self._t + part * dt)) for part in SAMPLES)
+            self._largest[i] = max(self._largest[i], abs(before), abs(middle), abs(after))
+            missed = max(missed, abs(before - 2 * middle + after) / (self._largest[i] or 1.0))
+        return missed / 6 * dt / (self._t1 - self._t0)  # Simpson's rule less the midpoint's
+
+    def state(self) -> dict[str, float]:
+        """What the next step depends on, and what was counted."""
+        largest = {f"largest {i}": value for i, value in enumerate(self._largest)}
+        return {**{name: float(getattr(self, name)) for name in self._STATE}, **largest}
+
+    def restore(self, state: dict[str, float]) -> None:
+        """Go on from there."""
+        for name in self._STATE:
+            setattr(self, name, type(getattr(self, name))(state[name]))
+        self._largest = [state[f"largest {i}"] for i in range(len(self._largest))]
+
+    _STATE = ("steps", "rejected", "error", "_t", "_dt", "_fresh")

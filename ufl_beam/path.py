@@ -14,6 +14,7 @@ from ufl_beam.couplings import Couplings
 from ufl_beam.grid import Share
 from ufl_beam.guides import Guides
 from ufl_beam.ledger import Ledger
+from ufl_beam.memory import Memory
 from ufl_beam.schemes import Scheme
 from ufl_beam.solve import StepFailed
 from ufl_beam.terms import Beams
@@ -56,6 +57,10 @@ class StaticPath:
             one.begin(scheme.step(t0, t0 + 1.0, t0 + 1.0, q))
             one.add_residual(q, self._before)
 
+    def remember(self, memory: Memory, q: Array) -> None:
+        """The internal forces at the end of the last step."""
+        self._before = memory.added("internal forces", self._before)
+
     def require(self, q1: Array, s: Array, force: Array, least_work: float) -> None:
         """Raise unless the step was followed.
 
@@ -71,7 +76,10 @@ class StaticPath:
         self._require_near(s)
         if math.isfinite(self._scheme.slack):
             self._require_explained(q1, s, force, least_work)
-            self._before = force.copy()
+
+    def accept(self, force: Array) -> None:
+        """Take the internal forces of a step as those before the next."""
+        self._before = force.copy()
 
     def _require_near(self, s: Array) -> None:
         size = self._share.grid.scene.size

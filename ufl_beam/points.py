@@ -37,8 +37,11 @@ INPUTS = (
 )
 """What the law of a point depends on, in the order of its storage."""
 
-STATE = ("p", "ξ", "jump", "opening")
-"""The internal variables."""
+SPENT, NOTHING = 1e-6, 1e-30
+"""Part of its limit below which an open hinge counts as a joint; factor of its stiffness then."""
+
+STATE = ("p", "ξ", "jump", "opening", "before", "traction")
+"""The internal variables, and what else of an accepted state the next step depends on."""
 
 
 def expect_entries(layout: Layout, scheme: Scheme, ledger: Ledger) -> None:
@@ -227,6 +230,7 @@ class Points:
         """Begin at these strains of the cells and not at those accepted; (cells, 3); 1, 1, 1/m."""
         self._e0[:] = strains
         self["before"][:] = strains @ self._layout.strains.T
+        self._resist()
 
     def begin(self, dt: float) -> None:
         """Begin a step of this length; s."""
@@ -249,12 +253,33 @@ class Points:
 
     def change(self) -> float:
         """Energy that :meth:`accept` would add to what is stored and dissipated; J."""
+        changes = self._sums_to_come() - [0, 0, 0, *self.sums[3:]]
+        plastic, broken, _, elastic, hardening = changes.tolist()
+        return float(plastic + broken + elastic + hardening)
+
+    def dissipation(self) -> float:
+        """Energy that :meth:`accept` would add to what is dissipated; J."""
+        plastic, broken, *_ = self._sums_to_come().tolist()
+        return float(plastic + broken)
+
+    def _sums_to_come(self) -> Array:
+        """What :meth:`accept` would make of :attr:`sums`."""
         state = (self._e0, self.strains, self._storage, self.kept, self.sums)
         copies = [x.copy() for x in state]
         lib.commit(*self._to_commit[: -len(copies)], *map(doubles, copies))
-        sums = copies[-1]
-        plastic, broken, _, elastic, hardening = (sums - [0, 0, 0, *self.sums[3:]]).tolist()
-        return float(plastic + broken + elastic + hardening)
+        return copies[-1]
+
+    def freeze(self) -> None:
+        """From now on nothing yields or opens further; hinges that bear nothing any more are free.
+
+        So points answer a vibration, however small, of what has yielded: elastic unloading.
+        """
+        breaking, softening = self._layout.breaking, self._layout.softening
+        if softening is not None:
+            borne, limit = (self[name][:, breaking] for name in ("traction", "softening limit"))
+            spent = np.isfinite(limit) & (borne <= SPENT * limit)
+            self["C"][:, breaking] *= np.where(spent, NOTHING, 1.0)
+        self["traction"][:] = self["limit"][:] = np.inf
 
     # -- the ledger ----------------------------------------------------------------------------
 
@@ -278,17 +303,22 @@ class Points:
     # -- the state -----------------------------------------------------------------------------
 
     def state(self) -> Array:
-        """What the accepted state consists of besides the strains; (cells, k); a copy."""
-        return np.hstack([*(self[name] for name in STATE), self.kept])
+        """What the accepted state consists of; (cells, k); a copy."""
+        stored = np.zeros((len(self.kept), 2))
+        stored[:1] = self.sums[3:]  # of all cells together; to whom it belongs does not matter
+        return np.hstack([*(self[name] for name in STATE), self.kept, self._e0, stored])
 
     def restore(self, cells: Index, rows: Array) -> None:
-        """Take over :meth:`state` in some of the cells; call :meth:`refresh` when done."""
+        """Take over :meth:`state` in some of the cells.
+
+        Call :meth:`start` and :meth:`refresh` where strains or laws are not those it is of.
+        """
         ends = np.arange(1, len(STATE) + 1) * self._storage.shape[1]
-        *variables, kept = np.split(rows, ends, axis=1)
+        *variables, kept, e0, stored = np.split(rows, [*ends, ends[-1] + 6, ends[-1] + 9], axis=1)
         for name, values in zip(STATE, variables, strict=True):
             self[name][cells] = values
-        self.kept[cells] = kept
-        self._resist()
+        self.kept[cells], self._e0[cells] = kept, e0
+        self.sums[3:] = stored.sum(axis=0)
 
     def refresh(self, strains: Array) -> None:
         """Make forces and stored energies those of a state that no step has led to."""

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import csv
+import os
+import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,11 +22,16 @@ from ufl_beam.connectors import Connector, Joint
 from ufl_beam.errors import SceneError, require_count
 from ufl_beam.grid import Grid
 from ufl_beam.joints import links_of, motion_of
+from ufl_beam.memory import State
 from ufl_beam.scene import Scene
 from ufl_beam.skeleton import BEAM, rods_of
 
 if TYPE_CHECKING:
     from ufl_beam.simulation import Simulation
+
+
+UNLIMITED = sys.maxsize
+"""As many as there are."""
 
 
 class Recorder(ABC):
@@ -44,6 +52,25 @@ class Recorder(ABC):
     @abstractmethod
     def close(self) -> None:
         """End; also called when the run fails."""
+
+    def state(self) -> State:
+        """What :meth:`resume` needs, arrays by name; that of the first process is kept.
+
+        Raises:
+            SceneError: The recorder has none.
+        """
+        raise SceneError(
+            f"{type(self).__name__}: this recorder cannot go on from a checkpoint; give it methods "
+            "state() and resume(simulation, state), or run without a checkpoint"
+        )
+
+    def resume(self, simulation: Simulation, state: State) -> None:
+        """Go on from a :meth:`state`, in the place of :meth:`open`; nothing is recorded yet.
+
+        Raises:
+            SceneError: What was written before is not there any more.
+        """
+        self.state()
 
 
 def on_first(comm: MPI.Intracomm, action: Callable[[], None]) -> None:
@@ -85,22 +112,30 @@ class XDMF(Recorder):
 
     def require_writable(self) -> None:
         """Raise :class:`SceneError` if one of both files cannot be written."""
-        _require_writable(self._path)
-        _require_writable(self._path.with_suffix(".h5"))
+        for path in self._paths:
+            _require_writable(path)
 
     def open(self, simulation: Simulation) -> None:
         """Write the mesh and the initial state."""
         self._count = 0
+        self._prepare(simulation)
+        on_first(simulation.comm, lambda: self._begin(simulation.grid))
+        self._put(simulation)
+
+    def _prepare(self, simulation: Simulation) -> None:
         self._inelastic = len(simulation.material()) > 0
         self._rods = rods_of(simulation.scene)
         links = simulation.scene.links
         self._pulling = [
             (k, links.index(rod.along)) for k, rod in enumerate(self._rods) if rod.along is not None
         ]
-        on_first(simulation.comm, lambda: self._begin(simulation.grid))
-        self._put(simulation)
 
     def _begin(self, grid: Grid) -> None:
+        domain = self._make_functions(grid)
+        self._files = [io.XDMFFile(MPI.COMM_SELF, self._path, "w")]
+        self._files[0].write_mesh(domain)
+
+    def _make_functions(self, grid: Grid) -> Any:
         # Rods have vertices of their own, as beams do.
         ends = [anchor.point for rod in self._rods for anchor in (rod.a, rod.b)]
         points = np.concatenate([grid.points, np.reshape(ends, (-1, 2))])
@@ -119,8 +154,36 @@ class XDMF(Recorder):
         dofmap = self._rotation.function_space.dofmap.list
         self._vertex_of_dof = np.empty(len(points), dtype=np.int64)
         self._vertex_of_dof[dofmap] = all_cells[self._order]
-        self._files = [io.XDMFFile(MPI.COMM_SELF, self._path, "w")]
-        self._files[0].write_mesh(domain)
+        return domain
+
+    def state(self) -> State:
+        """Both files: HDF5 changes them here and there, so that one that dies cannot be cut off."""
+        state = {"count": np.array([self._count], dtype=float)}
+        if self._files:
+            self.close()
+            state.update({path.suffix: _bytes_of(path) for path in self._paths})
+            self._append()
+        return state
+
+    def resume(self, simulation: Simulation, state: State) -> None:
+        """Make the files what they were, and append to them."""
+        self._count = int(state["count"][0])
+        self._prepare(simulation)
+
+        def put_back() -> None:
+            self._make_functions(simulation.grid)
+            for path in self._paths:
+                path.write_bytes(state[path.suffix].tobytes())
+            self._append()
+
+        on_first(simulation.comm, put_back)
+
+    def _append(self) -> None:
+        self._files = [io.XDMFFile(MPI.COMM_SELF, self._path, "a")]
+
+    @property
+    def _paths(self) -> tuple[Path, Path]:
+        return self._path, self._path.with_suffix(".h5")
 
     def write(self, simulation: Simulation) -> None:
         """Record every so many steps."""
@@ -179,6 +242,12 @@ class History(Recorder):
         places: Places to follow, on beams and bodies.
         connectors: Connectors to follow, see :class:`~ufl_beam.joints.Connection`; of joints, all
             the connectors that hold them.
+        every: Write every so many steps.
+        most: Rows, besides the initial one, that the file may have.  When there are more, every
+            other one goes, and only half as many steps are written from then on.
+
+    Raises:
+        SceneError: ``every`` or ``most`` is no whole number, at least 1.
     """
 
     def __init__(
@@ -186,7 +255,13 @@ class History(Recorder):
         path: str | Path,
         places: Sequence[Anchor] = (),
         connectors: Sequence[Connector | Joint] = (),
+        *,
+        every: int = 1,
+        most: int = UNLIMITED,
     ) -> None:
+        require_count(every, f"History {path}: every")
+        require_count(most, f"History {path}: most")
+        self._first_every, self._most = every, most
         self._path, self._places = Path(path), tuple(places)
         self._connectors = tuple(connectors)
         self._files: list[Any] = []
@@ -197,6 +272,13 @@ class History(Recorder):
 
     def open(self, simulation: Simulation) -> None:
         """Write the header and the initial state."""
+        header = self._prepare(simulation)
+        row = self._row(simulation)
+        self._every, self._steps, self._rows = self._first_every, 0, 0
+        on_first(simulation.comm, lambda: self._begin(header, row))
+
+    def _prepare(self, simulation: Simulation) -> list[str]:
+        """Note what is followed; the header."""
         self._links = {
             link: name
             for followed in self._connectors
@@ -204,9 +286,7 @@ class History(Recorder):
         }
         names = [f"{c} {place}" for place in self._places for c in ("u", "v", "psi")]
         names += [f"{c} {x}" for x in self._links.values() for c in ("motion", "force", "work")]
-        header = ["t", *names, *simulation.ledger_names()]
-        row = self._row(simulation)
-        on_first(simulation.comm, lambda: self._begin(header, row))
+        return ["t", *names, *simulation.ledger_names()]
 
     def _begin(self, header: list[str], row: list[str]) -> None:
         self._files = [self._path.open("w", newline="")]
@@ -214,9 +294,28 @@ class History(Recorder):
         self._write_row(row)
 
     def write(self, simulation: Simulation) -> None:
-        """Write the row of the state."""
+        """Write the row of the state, every so many steps."""
+        self._steps += 1
+        if self._steps % self._every:
+            return
+        if self._rows == self._most:
+            on_first(simulation.comm, self._thin)
+            self._rows, self._every = self._rows // 2, 2 * self._every
+            if self._steps % self._every:
+                return
         row = self._row(simulation)
+        self._rows += 1
         on_first(simulation.comm, lambda: self._write_row(row))
+
+    def _thin(self) -> None:
+        """Leave out every other row; at no time is there less than one whole file."""
+        self.close()
+        thinner = self._path.with_suffix(".thinner")
+        with self._path.open(newline="") as old, thinner.open("w", newline="") as new:
+            new.write(next(old))
+            new.writelines(islice(old, 0, None, 2))
+        thinner.replace(self._path)
+        self._files = [self._path.open("a", newline="")]
 
     def _row(self, simulation: Simulation) -> list[str]:
         q = simulation.share.gather(simulation.q)
@@ -228,6 +327,39 @@ class History(Recorder):
         numbers = (simulation.t, *np.ravel(motion), *np.ravel(connections), *energies)
         return [repr(float(x)) for x in numbers]
 
+    def state(self) -> State:
+        """The length of the file, and the whole of it where rows may go again."""
+        counts = np.array([self._every, self._steps, self._rows, 0], dtype=float)
+        state = {"counts": counts, "content": np.empty(0, dtype=np.uint8)}
+        if self._files:
+            os.fsync(self._files[0].fileno())
+            counts[3] = self._path.stat().st_size
+            if self._most < UNLIMITED:
+                state["content"] = _bytes_of(self._path)
+        return state
+
+    def resume(self, simulation: Simulation, state: State) -> None:
+        """Cut off what was written after the state, and append."""
+        header = self._prepare(simulation)
+        self._every, self._steps, self._rows, length = map(int, state["counts"])
+        on_first(simulation.comm, lambda: self._cut(header, state["content"], length))
+
+    def _cut(self, header: list[str], content: Array, length: int) -> None:
+        if len(content):
+            self._path.write_bytes(content.tobytes())
+        try:
+            with self._path.open(newline="") as file:
+                same = next(csv.reader(file)) == header and file.seek(0, os.SEEK_END) >= length
+        except (OSError, StopIteration):
+            same = False
+        if not same:
+            raise SceneError(
+                f"History {self._path}: it is not the file that was written up to the checkpoint; "
+                "bring it back, or delete the checkpoint to begin anew"
+            )
+        os.truncate(self._path, length)
+        self._files = [self._path.open("a", newline="")]
+
     def _write_row(self, row: list[str]) -> None:
         csv.writer(self._files[0]).writerow(row)
         self._files[0].flush()
@@ -237,6 +369,10 @@ class History(Recorder):
         for file in self._files:
             file.close()
         self._files = []
+
+
+def _bytes_of(path: Path) -> Array:
+    return np.fromfile(path, dtype=np.uint8)
 
 
 def _named(domain: Any, element: Any, name: str) -> fem.Function:

@@ -75,8 +75,14 @@ class Response(Protocol):
     def state(self) -> Array:
         """What is remembered besides motions and forces; (num_links, k)."""
 
-    def restore(self, λ: Array, rows: Array) -> None:
-        """Take over forces and :meth:`state`."""
+    def restore(self, rows: Array) -> None:
+        """Take over :meth:`state`."""
+
+    def start(self, e: Array) -> None:
+        """Begin at motions that no step has led to."""
+
+    def freeze(self) -> None:
+        """From now on nothing yields or breaks further."""
 
 
 @singledispatch
@@ -129,8 +135,14 @@ class _Working:
         """Nothing is remembered."""
         return np.zeros((len(self._links), 0))
 
-    def restore(self, λ: Array, rows: Array) -> None:
+    def restore(self, rows: Array) -> None:
         """Nothing was remembered."""
+
+    def start(self, e: Array) -> None:
+        """Nothing depends on them."""
+
+    def freeze(self) -> None:
+        """Nothing yields."""
 
     def _numbers(self, name: str) -> Array:
         return np.array([getattr(law, name) for law in self._laws], dtype=np.float64)
@@ -186,9 +198,13 @@ class _Pushed(_Working):
         super().accept(e1, work)
         self._reached = self._force
 
-    def restore(self, λ: Array, rows: Array) -> None:
+    def state(self) -> Array:
+        """The forces of the last step."""
+        return self._reached[:, None]
+
+    def restore(self, rows: Array) -> None:
         """Go on from these forces."""
-        self._reached = λ
+        self._reached = rows[:, 0].copy()
 
     def _wanted(self, link: Any, step: Step) -> float:
         return float(link.law.force(step.load_time))
@@ -263,7 +279,7 @@ class _Rubbing(_Working):
         """Which way each slips."""
         return self._slip[:, None]
 
-    def restore(self, λ: Array, rows: Array) -> None:
+    def restore(self, rows: Array) -> None:
         """Take over :meth:`state`."""
         self._slip = rows[:, 0].copy()
 
@@ -344,7 +360,6 @@ class _Sprung:
         self._ledger = setting.ledger
         expect_entries(layout, setting.scheme, setting.ledger)
         self._strains = np.zeros((number, 3))
-        self._restored = False
 
     def _at(self, e: Array) -> Array:
         self._strains[:, 0] = e
@@ -367,10 +382,6 @@ class _Sprung:
 
     def add_state(self, e: Array) -> None:
         """Stored energy."""
-        if self._restored:
-            self.points.start(self._at(e))
-            self.points.refresh(self._at(e))
-            self._restored = False
         self.points.enter_stored(self._ledger)
 
     def change(self, e1: Array, work: float) -> float:
@@ -382,7 +393,15 @@ class _Sprung:
         """Internal variables."""
         return self.points.state()
 
-    def restore(self, λ: Array, rows: Array) -> None:
+    def restore(self, rows: Array) -> None:
         """Take over :meth:`state`."""
         self.points.restore(np.arange(len(rows)), rows)
-        self._restored = True
+
+    def start(self, e: Array) -> None:
+        """Begin at motions that no step has led to."""
+        self.points.start(self._at(e))
+        self.points.refresh(self._at(e))
+
+    def freeze(self) -> None:
+        """From now on nothing yields or breaks further."""
+        self.points.freeze()

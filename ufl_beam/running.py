@@ -9,6 +9,7 @@ from mpi4py import MPI
 
 from tqdm import tqdm
 
+from ufl_beam.checkpoint import Checkpoint, Keeper, digest_of, kinds_of, require_continuable
 from ufl_beam.errors import (
     SceneError,
     require_count,
@@ -16,11 +17,11 @@ from ufl_beam.errors import (
     require_number,
     require_sequence,
 )
-from ufl_beam.pacing import EqualSteps
+from ufl_beam.pacing import Adaptive, AdaptiveSteps, EqualSteps, Pace
 from ufl_beam.processes import in_study, ours
-from ufl_beam.record import Recorder, on_first
+from ufl_beam.record import UNLIMITED, Recorder, on_first
 from ufl_beam.scene import Scene
-from ufl_beam.schemes import Scheme
+from ufl_beam.schemes import Scheme, has_inertia
 from ufl_beam.simulation import Simulation
 from ufl_beam.solution import Solution
 from ufl_beam.solve import Newton
@@ -33,11 +34,13 @@ def simulate(
     scheme: Scheme,
     *,
     t: tuple[float, float],
-    dt: float,
+    dt: float | Adaptive,
     record: Sequence[Recorder] | Recorder = (),
     every: int = 1,
+    most: int = UNLIMITED,
     start: Solution | None = None,
     newton: Newton | None = None,
+    checkpoint: Checkpoint | None = None,
     progress: bool = True,
     comm: MPI.Intracomm | None = None,
 ) -> Solution:
@@ -48,11 +51,15 @@ def simulate(
         scheme: :class:`Static`, :class:`ExactStatic` or :class:`Midpoint`.
         t: Beginning and end; s.  In statics time is the load parameter.
         dt: Step; s.  All steps are a little shorter if ``dt`` does not divide the time.  A step
-            without convergence is cut into parts.
+            without convergence is cut into parts.  :class:`Adaptive` steps are as long as an
+            accuracy allows.
         record: Files to write on the way, such as :class:`XDMF` and :class:`History`.
         every: Keep every so many steps in the solution; the last one always.
+        most: States, besides the initial and the last one, that the solution may have.  When there
+            are more, every other one goes, and only half as many steps are kept from then on.
         start: Solution of the same beams whose last state is the initial state.
         newton: Tolerances and PETSc options.
+        checkpoint: File from which the run goes on if it is run again after whatever stopped it.
         progress: Show a progress bar if the output is a terminal.
         comm: Processes that share the scene; all of them, or in a :func:`study` this one alone.  A
             small scene is computed by each of them.
@@ -65,28 +72,57 @@ def simulate(
         ConvergenceError: A step failed; it carries the solution so far, and files are complete.
     """
     comm = ours() if comm is None else comm
-    t0, t1 = _require_times(t, dt)
+    t0, t1 = _require_times(t)
+    _require_step(dt, scheme)
     require_count(every, "simulate: every")
+    require_count(most, "simulate: most")
     recorders = (record,) if isinstance(record, Recorder) else require_sequence(record, "record")
     for i, recorder in enumerate(recorders):
         require_kind(recorder, Recorder, f"simulate: record[{i}]")
         on_first(comm, recorder.require_writable)
     begin = time.perf_counter()
+    keeper: Keeper | None = None
+    if checkpoint is not None:
+        require_kind(checkpoint, Checkpoint, "simulate: checkpoint")
+        step = None if isinstance(dt, Adaptive) else EqualSteps(t0, t1, dt).dt
+        call = {
+            "scene": scene, "scheme": scheme, "t[0]": t0, "dt": dt, "every": every, "most": most,
+            "newton": newton or Newton(), "start": _end_of(start), "record": kinds_of(recorders),
+            "t[1]": t1 if step is None else "any",
+        }  # fmt: skip
+        for recorder in recorders:
+            require_continuable(recorder)
+        keeper = Keeper(checkpoint, call, step, comm)
     simulation = Simulation(scene, scheme, t0=t0, start=start, newton=newton, comm=comm)
-    pace = EqualSteps(t0, t1, dt)
+    pace: Pace = (
+        AdaptiveSteps(simulation, t1, dt)
+        if isinstance(dt, Adaptive)
+        else EqualSteps(simulation.t, t1, dt)
+    )
     solution = simulation.solution
     try:
-        for recorder in recorders:
-            recorder.open(simulation)
-        solution.keep(simulation)
+        solution.every = every
+        if keeper is not None and keeper.found:
+            keeper.resume(simulation, pace, recorders, t1)
+            say(f"checkpoint {keeper.path}: the run goes on from t = {simulation.t:.9g} s")
+            begin -= solution.seconds
+        else:
+            for recorder in recorders:
+                recorder.open(simulation)
+            solution.keep(simulation)
         quiet = None if progress and comm.rank == 0 and not in_study() else True
         with tqdm(total=1.0, bar_format=BAR, disable=quiet, mininterval=0.5) as bar:
             while not pace.finished:
                 pace.advance(simulation)
-                if pace.steps % every == 0 or pace.finished:
+                if pace.steps % solution.every == 0 or pace.finished:
                     solution.keep(simulation)
+                    if len(solution) > most + 1 and not pace.finished:
+                        solution.thin()
+                        solution.every *= 2
                 for recorder in recorders:
                     recorder.write(simulation)
+                if keeper is not None:
+                    keeper.note(simulation, pace, recorders)
                 bar.update(pace.progress - bar.n)
         simulation.end()
     except BaseException as error:
@@ -101,17 +137,34 @@ def simulate(
     return solution
 
 
-def _require_times(t: tuple[float, float], dt: float) -> tuple[float, float]:
+def _end_of(start: Solution | None) -> str:
+    """A checksum of what a run begins with."""
+    if start is None:
+        return "nothing"
+    require_kind(start, Solution, "start")
+    return digest_of({"q": start.q[-1:], "v": start.v[-1:], **start.internal})
+
+
+def _require_times(t: tuple[float, float]) -> tuple[float, float]:
     try:
         t0, t1 = t
     except (TypeError, ValueError):
         raise SceneError(f"simulate: t = {t!r} must be a pair (beginning, end)") from None
     require_number(t0, "simulate: t[0]")
     require_number(t1, "simulate: t[1]")
-    require_number(dt, "simulate: dt", positive=True)
     if t1 <= t0:
         raise SceneError(f"simulate: the end t[1] = {t1:g} must come after the beginning {t0:g}")
     return float(t0), float(t1)
+
+
+def _require_step(dt: float | Adaptive, scheme: Scheme) -> None:
+    if not isinstance(dt, Adaptive):
+        require_number(dt, "simulate: dt", positive=True)
+    elif not has_inertia(scheme):
+        raise SceneError(
+            "simulate: dt = Adaptive(...) estimates the error of accelerations, and a static scheme "
+            "has none; give a number"
+        )
 
 
 def say(*words: object, sep: str = " ") -> None:

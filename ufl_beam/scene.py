@@ -19,7 +19,7 @@ from ufl_beam.bodies import (
     node,
     require_anchor,
 )
-from ufl_beam.connectors import Actuator, Connector, Joint
+from ufl_beam.connectors import Actuator, Connector, Joint, Motor
 from ufl_beam.errors import (
     SceneError,
     require_kind,
@@ -33,6 +33,7 @@ from ufl_beam.loads import (
     LineLoad,
     Load,
     PointLoad,
+    RotatingFrame,
     TimeFunction,
     require_time_function,
 )
@@ -197,7 +198,8 @@ class Scene:
         joints: Made by :func:`Rigid`, :func:`Revolute`, :func:`Prismatic`, :func:`RigidLink`,
             :func:`Link` and :func:`Release`.
         supports: Made by :func:`Clamped`, :func:`Pinned`, :func:`Roller`, :func:`Prescribed`.
-        loads: :class:`PointLoad`, :class:`FollowerLoad`, :class:`LineLoad`, :class:`Gravity`.
+        loads: :class:`PointLoad`, :class:`FollowerLoad`, :class:`LineLoad`, :class:`Gravity`,
+            :class:`RotatingFrame`.
         masses: :class:`PointMass`.
         initial: :class:`Velocity`; at rest without.
         damping: :class:`Rayleigh`, :class:`KelvinVoigt`; besides what materials dissipate.
@@ -271,6 +273,17 @@ class Scene:
         attached = [place for _, place in self._attachments()]
         attached += [link.a for link in self.links]
         return (*self.bodies, *((GROUND,) if any(node(p) is GROUND for p in attached) else ()))
+
+    def time_functions(self) -> list[TimeFunction]:
+        """All functions of time, of loads, prescribed motions and drives, each once."""
+        laws = [link.law for link in self.links]
+        functions = [
+            *(load.time for load in self.loads if not isinstance(load, RotatingFrame)),
+            *(motion for support in self.supports for motion in support.held.values()),
+            *(law.motion for law in laws if isinstance(law, Motor)),
+            *(law.force for law in laws if isinstance(law, Actuator)),
+        ]
+        return list(dict.fromkeys(functions))
 
     def _attachments(self) -> Iterator[tuple[object, Anchor]]:
         """Everything with a place, and its place."""
@@ -398,7 +411,7 @@ def _require_kinds(scene: Scene) -> None:
         ("beams", scene.beams, (Beam,)),
         ("joints", scene.joints, (Joint,)),
         ("supports", scene.supports, (Support,)),
-        ("loads", scene.loads, (PointLoad, FollowerLoad, LineLoad, Gravity)),
+        ("loads", scene.loads, (PointLoad, FollowerLoad, LineLoad, Gravity, RotatingFrame)),
         ("masses", scene.masses, (PointMass,)),
         ("initial", scene.initial, (Velocity,)),
         ("damping", scene.damping, (Rayleigh, KelvinVoigt)),

@@ -122,6 +122,9 @@ class DynamicScheme(Scheme, Protocol):
     def velocity_weights(self, dt: float) -> tuple[float, float]:
         """(a, b) of the velocities v1 = a s - b v0 after the step s of the nodes."""
 
+    def error_weights(self) -> tuple[float, float]:
+        """(c2, c3) of the error c2 a dt² + c3 da/dt dt³ of a step of acceleration a."""
+
 
 def has_inertia(scheme: Scheme) -> TypeGuard[DynamicScheme]:
     """Whether the scheme is a dynamic one."""
@@ -365,6 +368,10 @@ class Midpoint(_ExactStep):
         """(a, b) of the velocities v1 = a s - b v0 after the step s of the nodes."""
         keep = 0.5 + self.beta
         return 1 / (dt * keep), (0.5 - self.beta) / keep  # P(87)
+
+    def error_weights(self) -> tuple[float, float]:
+        """The trapezoidal rule's, and what both kinds of dissipation delay."""
+        return self.beta, 1 / 12 + self.alpha
 
 
 def _scaled(C: Expr, e: Expr) -> Expr:

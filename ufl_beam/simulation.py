@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import cached_property
+from typing import NamedTuple, NoReturn
 
 from mpi4py import MPI
 
@@ -22,19 +23,21 @@ from ufl_beam.grid import Grid, Index, Share
 from ufl_beam.inelastic import InelasticBeams, inelastic_cells
 from ufl_beam.joints import Connection, links_of, motion_of, velocity_of
 from ufl_beam.ledger import Ledger
-from ufl_beam.loads import FollowerLoad
-from ufl_beam.mechanism import require_independent, require_masses, require_no_mechanism
+from ufl_beam.loads import FollowerLoad, RotatingFrame
+from ufl_beam.memory import NOWHERE, Memory, Restoring, Saving, State
+from ufl_beam.mechanism import no_number, require_independent, require_masses, require_no_mechanism
 from ufl_beam.path import StaticPath
 from ufl_beam.points import Course, expect_entries
 from ufl_beam.processes import ours
 from ufl_beam.responses import Setting
+from ufl_beam.rotating import FrameForces
 from ufl_beam.scene import Scene
-from ufl_beam.schemes import Scheme, has_inertia
+from ufl_beam.schemes import Scheme, Step, has_inertia
 from ufl_beam.solution import Solution
-from ufl_beam.solve import Newton, Solver, StepFailed
-from ufl_beam.sparse import as_slice
+from ufl_beam.solve import Border, Newton, Solver, StepFailed
+from ufl_beam.sparse import Csr, Product, as_slice
 from ufl_beam.supports import Supports
-from ufl_beam.terms import Beams, ElasticBeams, Inertia, SectionForces, Term
+from ufl_beam.terms import KINDS, Beams, ElasticBeams, Inertia, SectionForces, Term
 
 SMALLEST_PART = 2**12
 """A step is cut into at most this number of parts."""
@@ -50,6 +53,21 @@ Measured on two cores with lattices: two processes break even at some 1 000 cell
 
 LARGEST_TURN = 0.75 * math.pi
 """A step that turns a node further is cut; the algorithmic strains end at π."""
+
+
+class Trial(NamedTuple):
+    """A step that was solved but not yet accepted.
+
+    Attributes:
+        step: Its times.
+        q1: Configuration at its end, local degrees of freedom.
+        s: What forces work on, see :meth:`Scheme.nodal_step`; in dynamics the mean velocity of the
+            step times its length.
+    """
+
+    step: Step
+    q1: Array
+    s: Array
 
 
 class Simulation:
@@ -71,6 +89,7 @@ class Simulation:
         ledger: Energies of this process.
         solution: The motion so far.
         parts: Number of parts that steps were cut into, those not cut included.
+        last_dt: Length of the last accepted step; s.
     """
 
     def __init__(
@@ -124,14 +143,11 @@ class Simulation:
         if start is not None:
             for load in self.loads:
                 load.carry_on(self.t, self.q)
-            for cells, rows in start.internal:
-                for inelastic in self.inelastic:
-                    inelastic.restore(cells, rows)
-            for numbers, rows in start.internal_of_links:
-                for coupling in self.couplings:
-                    coupling.restore(numbers, rows)
+            memory = Restoring(self.share, start.internal)
+            for one in (*self.inelastic, *self.couplings):
+                one.remember(memory, NOWHERE)
         self._q_before: Array = self.q
-        self._dt_before = math.inf
+        self.last_dt = math.inf
         self._asking = [
             (link, link.law) for link in scene.links if isinstance(link.law, Controller | Coulomb)
         ]
@@ -181,10 +197,13 @@ class Simulation:
             fields = self.fields if elastic.all() else Fields(self.share, part)
             self.beams.append(ElasticBeams(fields, self.scheme, self._A, self.ledger))
 
-    def _make_loads(self) -> list[DeadLoads | FollowerLoads]:
+    def _make_loads(self) -> list[DeadLoads | FollowerLoads | FrameForces]:
         followers = [load for load in self.scene.loads if isinstance(load, FollowerLoad)]
-        dead = [load for load in self.scene.loads if not isinstance(load, FollowerLoad)]
-        loads: list[DeadLoads | FollowerLoads] = []
+        frames = [load for load in self.scene.loads if isinstance(load, RotatingFrame)]
+        dead = [load for load in self.scene.loads if load not in (*followers, *frames)]
+        loads: list[DeadLoads | FollowerLoads | FrameForces] = [
+            FrameForces(frame, self.fields, self.scheme, self.ledger, self._A) for frame in frames
+        ]
         if dead:
             loads.append(DeadLoads(dead, self.share, self.scheme, self.ledger))
         if followers:
@@ -264,11 +283,50 @@ class Simulation:
         return here
 
     def _tangent(self, x: Array) -> None:
-        q1 = self.supports.in_plane(x)
+        self._assemble(self.supports.in_plane(x))
+        self.supports.hold_matrix(self._A.data)
+
+    def tangent_at(self, x: Array, v: Array, r: Array) -> Csr:
+        """The tangent at ``x``; adds to ``r`` what it makes of a motion ``v`` of the supports.
+
+        All are in the axes of the supports, and the local part.
+        """
+        self._assemble(self.supports.in_plane(x))
+        if len(self.supports.moving):
+            forces = Product(self._A)(self.supports.in_plane(v))
+            self.supports.enter(forces)
+            r += forces
+        self.supports.hold_matrix(self._A.data)
+        return self._A
+
+    def _assemble(self, q1: Array) -> None:
         self._A.data.fill(0.0)
         for term in self.terms:
             term.add_tangent(q1)
-        self.supports.hold_matrix(self._A.data)
+
+    def linearise(self, q: Array, dt: float) -> tuple[Array, Array]:
+        """All forces but those of inertia at ``q``, as they answer the present state; derivatives.
+
+        Nothing yields or opens any further, now and later: no step may follow.
+
+        Args:
+            q: Configuration at the local degrees of freedom.
+            dt: What velocities are divided by: the derivatives are K + C / dt; s.
+
+        Returns:
+            The residual; and the entries of the matrix, in the axes of the plane, supports not held.
+        """
+        step, r = Step(0.0, dt, self.q, self.t, self.t, toward=1.0), np.zeros(self.share.size)
+        self.ask()
+        for one in (*self.inelastic, *self.couplings):
+            one.freeze()
+        self._A.data.fill(0.0)
+        for term in self.terms:
+            if not isinstance(term, Inertia):
+                term.begin(step)
+                term.add_residual(q, r)
+                term.add_tangent(q)
+        return r, self._A.data.copy()
 
     # -- stepping ------------------------------------------------------------------------------
 
@@ -287,10 +345,10 @@ class Simulation:
                 else t0 + (t1 - t0) * (done + part) / SMALLEST_PART
             )
             try:
-                self._advance(end, t1)
+                self.accept(self.attempt(end, t1))
             except StepFailed as failure:
                 if part == 1:
-                    self._give_up(failure, end)
+                    self.give_up(failure, end)
                 part //= 2
                 continue
             done += part
@@ -298,28 +356,69 @@ class Simulation:
             if done % (2 * part) == 0 and part < SMALLEST_PART:
                 part *= 2
 
-    def _advance(self, t1: float, end: float) -> None:
-        """One step of the scheme, or a part of one to ``end``; the state changes if it succeeds."""
-        step = self.scheme.step(self.t, t1, end, self.q)
+    def attempt(self, t1: float, end: float | None = None) -> Trial:
+        """Solve the next step, to ``t1``; the state changes if :meth:`accept` takes it.
+
+        Args:
+            t1: End of the step; s.
+            end: End of the whole step where this is a part of one; s.
+
+        Raises:
+            StepFailed: There is no equilibrium, or it is too far away.
+        """
+        step = self.scheme.step(self.t, t1, t1 if end is None else end, self.q)
         self.ask()
         for term in self.terms:
             term.begin(step)
-        guess = self.q + (self.q - self._q_before) * (step.dt / self._dt_before)
+        guess = self.q + (self.q - self._q_before) * (step.dt / self.last_dt)
         self.supports.enter(guess)
         self.supports.move(guess, self.supports.in_axes(self.q), step)
-        q1 = self._solver.solve(guess, [load.force for load in self.loads])
+        try:
+            q1 = self._solver.solve(guess, [load.force for load in self.loads])
+        except StepFailed:
+            if said := no_number(self.scene, (step.load_time, step.motion_time)):
+                raise StepFailed(said) from None
+            raise
+        return self._trial(step, q1)
+
+    def attempt_along(self, step: Step, guess: Array, border: Border) -> Trial:
+        """Solve the next step together with the load factor; :meth:`accept` may take it.
+
+        Args:
+            step: Where it begins; its times are those of the guess.
+            guess: Configuration, in the axes of the supports.
+            border: The equation of the factor.
+
+        Raises:
+            StepFailed: There is no equilibrium, or it is too far away.
+        """
+        self.ask()
+        for term in self.terms:
+            term.begin(step)
+        loads = [load.force for load in self.loads]
+        return self._trial(step, self._solver.solve_along(guess, loads, border))
+
+    def _trial(self, step: Step, q1: Array) -> Trial:
+        """What a step came to, ``q1`` in the axes of the supports, if it was followed."""
         self.supports.leave(q1)
         s, turn = self.scheme.nodal_step(self.q, q1, self._rotations)
         s[self._multipliers] = 0.0
         self._require_small(turn)
         if self._path is not None:
             self._path.require(q1, s, self.force, self._solver.least_work(s))
+        return Trial(step, q1, s)
+
+    def accept(self, trial: Trial) -> None:
+        """Go where the latest :meth:`attempt` went."""
+        step, q1, s = trial
+        if self._path is not None:
+            self._path.accept(self.force)
         for term in self.terms:
             term.accept(q1, s)
         self.supports.enter(s)
         self.supports.accept(s)
-        self._q_before, self._dt_before = self.q, step.dt
-        self.q, self.t = q1, t1
+        self._q_before, self.last_dt = self.q, step.dt
+        self.q, self.t = q1, step.t1
         self.parts += 1
         self.ledger.begin()
         for term in self.terms:
@@ -341,18 +440,35 @@ class Simulation:
                 f"a node turns by {turn:.3g} rad in the step, and |Δψ| must stay below π; reduce dt"
             )
 
-    def _give_up(self, failure: StepFailed, end: float) -> None:
+    def give_up(self, failure: StepFailed, end: float, advice: str = "") -> NoReturn:
+        """End the run where it is, because even the smallest step, to ``end``, failed.
+
+        Raises:
+            ConvergenceError: With the solution so far.
+        """
         if self.t not in self.solution.times[-1:]:
             self.solution.keep(self)
         self.end()
-        dt = end - self.t
+        dt, forces = end - self.t, self._forces_by_kind()
+        sizes = ", ".join(f"{kind} {size:.1e} N" for kind, size in forces.items())
         raise ConvergenceError(
-            f"no equilibrium after t = {self.t:.9g} s, even with dt = {dt:.3g} s: {failure}. "
-            f"{self.scheme.advice}",
+            f"no equilibrium after t = {self.t:.9g} s, even with dt = {dt:.3g} s: {failure} "
+            f"({sizes}). {advice or self.scheme.advice}",
             time=self.t,
             dt=dt,
             solution=self.solution,
+            residuals=failure.residuals,
+            forces=forces,
         ) from failure
+
+    def _forces_by_kind(self) -> dict[str, float]:
+        """Sizes of the forces at the latest iterate; N."""
+        q1 = self.supports.in_plane(self._solver.iterate())
+        forces = {kind: np.zeros(self.share.size) for kind in KINDS}
+        for term in self.terms:
+            term.add_residual(q1, forces[term.kind])
+        sizes = {kind: self._solver.size(force) for kind, force in forces.items()}
+        return {kind: size for kind, size in sizes.items() if size}
 
     # -- what recorders and solutions ask ------------------------------------------------------
 
@@ -480,11 +596,49 @@ class Simulation:
 
     def end(self) -> None:
         """Let the solution know the internal variables, so that another run may start with them."""
-        self.solution.internal = self._gather([inelastic.state() for inelastic in self.inelastic])
-        states = [coupling.state() for coupling in self.couplings]
-        if self.scene.links and self.share.comm.size > 1:
-            states = [state for one in self.share.comm.allgather(states) for state in one]
-        self.solution.internal_of_links = states
+        self._remember(self.solution)
+
+    def snapshot(self) -> Solution:
+        """The state now, as a solution that other runs may start with; all processes call it."""
+        now = Solution(self.scene, self.grid)
+        now.keep(self)
+        self._remember(now)
+        return now
+
+    def _remember(self, solution: Solution) -> None:
+        memory = Saving(self.share)
+        for one in (*self.inelastic, *self.couplings):
+            one.remember(memory, self.q)
+        solution.internal = memory.state()
+
+    def state(self) -> State:
+        """All that later steps depend on; all processes call it together."""
+        memory = Saving(self.share)
+        self._pass_on(memory)
+        return memory.state()
+
+    def resume(self, state: State) -> None:
+        """Go on from a :meth:`state`, perhaps of other processes."""
+        self._pass_on(Restoring(self.share, state))
+        self.ledger.begin()
+        for term in self.terms:
+            term.add_state(self.q)
+
+    def _pass_on(self, memory: Memory) -> None:
+        self.t = memory.number("t", self.t)
+        self.last_dt = memory.number("last dt", self.last_dt)
+        self.parts = int(memory.number("parts", self.parts))
+        self._solver.iterations = int(memory.number("iterations", self.iterations))
+        self.q = memory.at_dofs("q", self.q)
+        self._q_before = memory.at_dofs("q before", self._q_before)
+        for kind, entries in (("supplied", self.ledger.supplied), ("lost", self.ledger.lost)):
+            for name, value in entries.items():
+                entries[name] = memory.total(f"{kind}: {name}", value)
+        for term in self.terms:
+            term.remember(memory, self.q)
+        self.supports.remember(memory, self.q)
+        if self._path is not None:
+            self._path.remember(memory, self.q)
 
     def close(self) -> None:
         """Give back what PETSc holds."""

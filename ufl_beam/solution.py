@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -19,12 +20,17 @@ from ufl_beam.grid import Grid, Index, Share
 from ufl_beam.inelastic import Strains
 from ufl_beam.joints import Connection, JointHistory, links_of, motion_of, of_joint, velocity_of
 from ufl_beam.ledger import Energy
+from ufl_beam.memory import State
 from ufl_beam.scene import Scene, Support
 from ufl_beam.sparse import Product
 from ufl_beam.terms import SectionForces, mass_matrix
 
 if TYPE_CHECKING:
     from ufl_beam.simulation import Simulation
+
+
+LEDGER = ("state", "supplied", "lost")
+"""The parts of the ledger, see :class:`~ufl_beam.ledger.Energy`."""
 
 
 class Material(NamedTuple):
@@ -51,25 +57,28 @@ class Solution:
         grid: Its vertices, cells and numbering.
         parts: Number of steps that were taken, parts of cut steps counted each.
         iterations: Number of Newton iterations.
+        time_error: Sum of the errors of :class:`Adaptive` steps as they estimated them; of a part
+            of the size of the scene, rad; NaN if nobody did.
         seconds: Wall time of the run, building the scene included; s.
-        internal: Cells, and their internal variables at the end of the run.
-        internal_of_links: Numbers of connectors, and what their laws remember at the end.
+        every: Steps from one that was kept to the next.
+        internal: What cells and connectors remember at the end of the run.
     """
 
     def __init__(self, scene: Scene, grid: Grid) -> None:
         self.scene, self.grid = scene, grid
         self.parts = 0
         self.iterations = 0
+        self.time_error = math.nan
         self.seconds = 0.0
+        self.every = 1
         self._times: list[float] = []
         self._q: list[Array] = []
         self._v: list[Array] = []
         self._reactions: list[Array] = []
         self._entries: list[tuple[dict[str, float], ...]] = []
         self._material: list[list[tuple[Index, Array]]] = []
-        self.internal_of_links: list[tuple[Index, Array]] = []
         self._connections: list[Array] = []
-        self.internal: list[tuple[Index, Array]] = []
+        self.internal: State = {}
 
     def keep(self, simulation: Simulation) -> None:
         """Append the state of the simulation; all processes call it together."""
@@ -84,6 +93,61 @@ class Solution:
         if self.scene.links:
             self._connections.append(simulation.connections())
         self.parts, self.iterations = simulation.parts, simulation.iterations
+
+    def history(self) -> State:
+        """All that was kept, as arrays by name."""
+        history = {
+            "times": self.times,
+            "q": self.q,
+            "v": self.v,
+            "reactions": np.array(self._reactions),
+            "connections": np.array(self._connections),
+            "every": np.array([self.every]),
+        }
+        if self._material[0]:
+            # Groups are those of laws and processes.
+            tables = [np.concatenate([np.c_[group] for group in one]) for one in self._material]
+            history["material"] = np.array([table[np.argsort(table[:, 0])] for table in tables])
+        energy = self.energy
+        for kind in LEDGER:
+            for name, values in getattr(energy, kind).items():
+                history[f"{kind}: {name}"] = values
+        return history
+
+    def resume(self, history: State) -> None:
+        """Go on after what another run kept, see :meth:`history`."""
+        self._times = [float(t) for t in history["times"]]
+        self.every = int(history["every"][0])
+        self._q, self._v = list(history["q"]), list(history["v"])
+        self._reactions = list(history["reactions"])
+        self._connections = list(history["connections"])
+        self._material = [[] for _ in self._times]
+        for groups, table in zip(self._material, history.get("material", ()), strict=False):
+            groups.append((table[:, 0].astype(np.int64), table[:, 1:]))
+        entries: list[dict[str, Array]] = [
+            {
+                name.removeprefix(f"{kind}: "): values
+                for name, values in history.items()
+                if name.startswith(f"{kind}: ")
+            }
+            for kind in LEDGER
+        ]
+        self._entries = [
+            tuple({name: float(values[n]) for name, values in group.items()} for group in entries)
+            for n in range(len(self._times))
+        ]
+
+    def __len__(self) -> int:
+        """Number of kept states."""
+        return len(self._times)
+
+    def thin(self) -> None:
+        """Forget every other kept state; the first one stays."""
+        for kept in (
+            *(self._times, self._q, self._v, self._reactions),
+            *(self._entries, self._material, self._connections),
+        ):
+            del kept[1::2]
 
     # -- motion --------------------------------------------------------------------------------
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 from petsc4py import PETSc
 
@@ -24,6 +24,7 @@ AT_ROUND_OFF = int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS)
 ITERATING = int(PETSc.SNES.ConvergedReason.ITERATING)
 DIVERGED = int(PETSc.SNES.ConvergedReason.DIVERGED_DTOL)
 STALLED = int(PETSc.SNES.ConvergedReason.DIVERGED_LINE_SEARCH)
+SINGULAR = int(PETSc.SNES.ConvergedReason.DIVERGED_LINEAR_SOLVE)
 
 GOOD = int(PETSc.PC.FailedReason.NOERROR)
 BAD_PIVOT = int(PETSc.PC.FailedReason.FACTOR_NUMERIC_ZEROPIVOT)
@@ -74,7 +75,68 @@ class Newton:
 
 
 class StepFailed(Exception):
-    """No equilibrium was found for a step; the message says why."""
+    """No equilibrium was found for a step; the message says why.
+
+    Attributes:
+        residuals: What is left where it is largest in each beam, body and connector; N, moments
+            over the size of the scene.
+    """
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message)
+        self.residuals: dict[str, float] = {}
+
+
+class Border(Protocol):
+    """One more unknown on which the residual depends, and one more equation."""
+
+    def arrive(self, x: Array) -> None:
+        """Take note of an iterate; the residual that follows is at the unknown found so far."""
+
+    def tangent(self, x: Array, r: Array) -> None:
+        """Fill the matrix, and add the local part of the derivative by the unknown to ``r``."""
+
+    def correct(self, y: Array, z: Array) -> None:
+        """Change the unknown by what solves the equation, and ``y`` accordingly.
+
+        Args:
+            y: What Newton's method subtracts from the iterate if the unknown does not change.
+            z: What the inverse of the tangent makes of the rate.
+        """
+
+    def met(self) -> bool:
+        """Whether the equation is."""
+
+
+class Bordered:
+    """What PETSc calls a preconditioner: the tangent bordered by one more unknown and equation.
+
+    By elimination of the border: one factorisation and two solutions, as the tangent alone is
+    banded.  Where that is nearly singular, the next iteration makes up for the lost digits.
+
+    Args:
+        factors: An exact preconditioner of the tangent.
+        rate: The derivative by the unknown.
+        correct: See :class:`Border`; of vectors.
+    """
+
+    def __init__(
+        self, factors: PETSc.PC, rate: PETSc.Vec, correct: Callable[[PETSc.Vec, PETSc.Vec], None]
+    ) -> None:
+        self._factors, self._rate, self._correct = factors, rate, correct
+        self._z = rate.duplicate()
+
+    def setUp(self, pc: PETSc.PC) -> None:
+        """Factor; PETSc asks for it where the matrix has changed."""
+        self._factors.setOperators(*pc.getOperators())
+        self._factors.setUp()
+        pc.setFailedReason(self._factors.getFailedReason())
+
+    def apply(self, pc: PETSc.PC, b: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Solve."""
+        self._factors.apply(b, y)
+        self._factors.apply(self._rate, self._z)
+        self._correct(y, self._z)
 
 
 class ChainsFirst:
@@ -182,6 +244,7 @@ class Solver:
         self.iterations = self._done = 0
         self._last = self._best = math.inf
         self._near, self._slow, self._patience = False, 0, 0
+        self._reason = ""
 
     # -- vectors and the matrix ----------------------------------------------------------------
 
@@ -265,12 +328,76 @@ class Solver:
     def _careful(self) -> PETSc.SNES:
         return self._make_snes(TO_NO_WORK)
 
+    # -- with a border -------------------------------------------------------------------------
+
+    @cached_property
+    def _along(self) -> PETSc.SNES:
+        """SNES of the bordered equations; its steps are full ones."""
+        self._rate, self._y = self._vector(), self._vector()
+        snes = self._make_snes(FULL_STEPS)
+        snes.setFunction(self._function_along, self._f)
+        snes.setJacobian(self._jacobian_along, self._matrix)
+        snes.setConvergenceTest(self._test_along)
+        ksp = PETSc.KSP().create(self._x.comm)
+        ksp.setType("preonly")
+        ksp.getPC().setType("python")
+        ksp.getPC().setPythonContext(Bordered(self._ksp.getPC(), self._rate, self._correct))
+        snes.setKSP(ksp)
+        return snes
+
+    def _function_along(self, snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
+        self._update_ghosts(x)
+        self._border.arrive(self._view(x))
+        self._function(snes, x, f)
+
+    def _jacobian_along(self, snes: PETSc.SNES, x: PETSc.Vec, J: PETSc.Mat, P: PETSc.Mat) -> None:
+        self._update_ghosts(x)
+        rate = self._view(self._rate, writable=True)
+        rate.fill(0.0)
+        self._border.tangent(self._view(x), rate)
+        P.stateIncrease()
+        if self._parallel:
+            self._rate.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
+        rate *= self._moves
+        self._rate.stateIncrease()
+
+    def _correct(self, y: PETSc.Vec, z: PETSc.Vec) -> None:
+        y.copy(self._y)
+        self._update_ghosts(self._y)
+        self._update_ghosts(z)
+        corrected = self._view(self._y, writable=True)
+        self._border.correct(corrected, self._view(z))
+        y.array_w[:] = corrected[: len(self._weights)]
+
+    def _test_along(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, ...]) -> int:
+        reason = self._test(snes, iteration, norms)
+        return ITERATING if reason > 0 and not self._border.met() else reason
+
+    def solve_along(self, guess: Array, loads: list[Array], border: Border) -> Array:
+        """The configuration as :meth:`solve` finds it, together with the unknown of a border.
+
+        Raises:
+            StepFailed: No convergence.
+        """
+        self._border = border
+        self._start(guess, loads)
+        reason = self._iterate(self._along, 12)
+        if reason <= 0:
+            raise self._failure(reason)
+        self._update_ghosts(self._x)
+        return self._view(self._x).copy()
+
     # -- what SNES calls -----------------------------------------------------------------------
 
     def _function(self, snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
         self._update_ghosts(x)
         r = self._view(f, writable=True)
-        self._residual(self._view(x), r)
+        try:
+            self._residual(self._view(x), r)
+        except StepFailed as failure:
+            # It may have failed on this process alone; by the sum all give up together.
+            self._reason = str(failure)
+            r.fill(np.nan)
         if self._parallel:
             f.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
         f.stateIncrease()
@@ -350,11 +477,7 @@ class Solver:
         Raises:
             StepFailed: No convergence.
         """
-        self._loads = sum(self._size(doubles(load)) for load in loads)
-        self._at_forces = doubles(self._forces())
-        x = self._view(self._x)
-        x[:] = guess
-        self._x.stateIncrease()
+        x = self._start(guess, loads)
         reason = self._iterate(self._snes, 2)
         if reason == STALLED:
             reason = self._iterate(self._careful, 10)
@@ -363,30 +486,59 @@ class Solver:
             self._x.stateIncrease()
             reason = self._iterate(self._snes, self._newton.max_iterations)
         if reason <= 0:
-            raise StepFailed(self._explain(reason))
+            raise self._failure(reason)
         self._update_ghosts(self._x)
         return x.copy()
+
+    def _start(self, guess: Array, loads: list[Array]) -> Array:
+        self._loads = sum(self._size(doubles(load)) for load in loads)
+        self._at_forces = doubles(self._forces())
+        x = self._view(self._x)
+        x[:] = guess
+        self._x.stateIncrease()
+        return x
 
     def _iterate(self, snes: PETSc.SNES, patience: int) -> int:
         """Solve; give up after so many iterations in a row without half the least residual."""
         self._last = self._best = math.inf
         self._near, self._slow, self._patience = False, 0, patience
-        snes.solve(None, self._x)
+        self._reason = ""
+        try:
+            snes.solve(None, self._x)
+            reason = int(snes.getConvergedReason())
+        except PETSc.Error as error:
+            if error.__cause__ is not None:
+                raise error.__cause__ from None  # what a function of the user has raised
+            reason = SINGULAR  # KLU stops PETSc where it finds no pivot
         self._done = snes.getIterationNumber()
         self.iterations += self._done
-        return int(snes.getConvergedReason())
+        return reason
 
-    def _explain(self, reason: int) -> str:
+    def _failure(self, reason: int) -> StepFailed:
+        for said in self._share.comm.allgather(self._reason):
+            if said:
+                return StepFailed(said)
         names = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int)}
         scale = self._loads + self._size(self._at_forces)
         weighted = np.zeros(self._share.size)
         weighted[: len(self._weights)] = np.abs(self._r[: len(self._weights)]) * self._weights**0.5
-        worst = self._share.grid.describe(int(np.argmax(self._share.gather(weighted))))
-        return (
+        residuals = self._share.grid.worst(self._share.gather(weighted))
+        places = [f"{size:.1e} N in {place}" for place, size in [*residuals.items()][:3]]
+        failure = StepFailed(
             f"SNES {names.get(reason, reason)} after {self._done} iterations; "
-            f"residual {self._size(self._at_r):.3e} N, largest in {worst}, "
+            f"residual {self._size(self._at_r):.3e} N, largest: {', '.join(places) or 'nowhere'}; "
             f"forces in the scene {scale:.3e} N"
         )
+        failure.residuals = residuals
+        return failure
+
+    def iterate(self) -> Array:
+        """The latest configuration, converged or not; local values, ghosts included."""
+        return self._view(self._x).copy()
+
+    def size(self, forces: Array) -> float:
+        """Euclidean norm over the scene of forces, and moments over its size; N."""
+        return self._size(doubles(forces))
 
     def destroy(self) -> None:
         """Give back what PETSc holds."""

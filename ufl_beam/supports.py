@@ -11,6 +11,7 @@ from ufl_beam.compat import Array
 from ufl_beam.grid import Index, Share
 from ufl_beam.ledger import Ledger
 from ufl_beam.loads import TimeFunction
+from ufl_beam.memory import Memory
 from ufl_beam.schemes import Scheme, Step
 from ufl_beam.sparse import Csr, as_slice
 
@@ -52,6 +53,7 @@ class Supports:
     Attributes:
         reactions: Forces of the supports on the scene in the latest residual, at the degrees of
             freedom that are held, in turned axes.
+        moving: Local degrees of freedom whose values depend on time.
     """
 
     def __init__(self, share: Share, scheme: Scheme, ledger: Ledger, A: Csr) -> None:
@@ -69,12 +71,14 @@ class Supports:
                 if component in support.moving:
                     self._motions.extend((d, motion) for d in share.local(dofs[[component]]))
         self.dofs = np.array(sorted(held), dtype=np.int64)
+        self.moving = np.array([dof for dof, _ in self._motions], dtype=np.int64)
         self._held = as_slice(self.dofs)
         rows, columns = A.rows(), A.indices
         zero = np.isin(rows, self.dofs) | np.isin(columns, self.dofs)
         self._zero = np.flatnonzero(zero)
         self._diagonal = np.flatnonzero(zero & (rows == columns))
-        self._pivots = np.ones(len(self._diagonal))
+        self._with_pivots = rows[self._diagonal]
+        self._pivots: Array = np.ones(len(self._diagonal))
         self._owned = self.dofs < share.num_owned
         self._acting, self._ledger = scheme.acting, ledger
         if any(support.moving for support in share.grid.scene.supports):
@@ -137,6 +141,14 @@ class Supports:
             work = self._acting(self._before, self.reactions) * s[self._held]
             self._ledger.supplied["supports"] += float(np.sum(work[self._owned]))
         self._before = self.reactions
+
+    def remember(self, memory: Memory, q: Array) -> None:
+        """The reactions, and what stands for what is held in the tangent."""
+        reactions, pivots = np.zeros((2, len(q)))
+        reactions[self._held], pivots[self._with_pivots] = self._before, self._pivots
+        reactions = memory.at_dofs("reactions", reactions)
+        self.reactions = self._before = reactions[self._held].copy()
+        self._pivots = memory.at_dofs("pivots", pivots)[self._with_pivots]
 
     def all_reactions(self, size: int) -> Array:
         """The reactions as a vector of all local degrees of freedom, in the axes of the plane."""

@@ -17,12 +17,20 @@ from ufl_beam.fields import Fields
 from ufl_beam.forms import Kernel
 from ufl_beam.kinematics import split, strain
 from ufl_beam.ledger import Ledger
+from ufl_beam.memory import Memory
 from ufl_beam.schemes import DynamicScheme, Scheme, Step
 from ufl_beam.sparse import Csr, StepProduct
 
 
+KINDS = ("beams", "connectors", "loads", "inertia", "damping")
+"""Kinds of forces."""
+
+
 class Term(Protocol):
     """A virtual work."""
+
+    kind: str
+    """What it is the work of, one of :data:`KINDS`."""
 
     def begin(self, step: Step) -> None:
         """Take note of the step that is to be solved."""
@@ -42,6 +50,9 @@ class Term(Protocol):
     def add_state(self, q: Array) -> None:
         """Enter the energy that the term holds in the accepted state ``q``."""
 
+    def remember(self, memory: Memory, q: Array) -> None:
+        """State what later steps depend on; ``q`` is the configuration of the state."""
+
 
 class Beams(Term, Protocol):
     """Resultants of cells working on the virtual strains; the residual is an internal force."""
@@ -52,6 +63,8 @@ class Beams(Term, Protocol):
 
 class ElasticBeams:
     """Resultants of elastic cells working on the virtual strains, P(12)."""
+
+    kind = "beams"
 
     def __init__(self, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger) -> None:
         q0, q1 = fields.configuration(), fields.configuration()
@@ -118,6 +131,9 @@ class ElasticBeams:
         self._held = self._stored.value(q)
         self._ledger.state["stored"] += self._held
 
+    def remember(self, memory: Memory, q: Array) -> None:
+        """What is stored follows from the configuration."""
+
     def change(self, q1: Array) -> float:
         """Energy that cells of this process store in the step to ``q1``; J."""
         return self._stored.value(q1) - self._held
@@ -166,8 +182,11 @@ class Inertia:
 
     Attributes:
         v: Velocities at the end of the last accepted step.
+        v_before: Those at its beginning.
         M: The mass matrix.
     """
+
+    kind = "inertia"
 
     def __init__(
         self, fields: Fields, scheme: DynamicScheme, A: Csr, ledger: Ledger, v: Array
@@ -178,7 +197,7 @@ class Inertia:
         if scheme.beta:
             ledger.lost["numerical"] += 0.0
         self._scheme = scheme
-        self.v = v
+        self.v = self.v_before = v
 
     def begin(self, step: Step) -> None:
         """Prepare what stays constant in the step."""
@@ -194,15 +213,25 @@ class Inertia:
         """Add mass times the derivative of the acceleration."""
         self._times.add_tangent(q1)
 
-    def accept(self, q1: Array, s: Array) -> None:
-        """New velocities, and what the scheme lost."""
+    def velocities(self, s: Array) -> Array:
+        """Velocities at the end of a step ``s`` of the nodes."""
         v = self._a * s
         v -= self._b * self.v
+        return v
+
+    def accept(self, q1: Array, s: Array) -> None:
+        """New velocities, and what the scheme lost."""
+        v = self.velocities(s)
         if self._scheme.beta:
             lost = self._scheme.beta * self._times.square(v - self.v)  # P(88)
             self._ledger.lost["numerical"] += lost
-        self.v = v
+        self.v_before, self.v = self.v, v
 
     def add_state(self, q: Array) -> None:
         """Kinetic energy."""
         self._ledger.state["kinetic"] += self._times.square(self.v) / 2  # P(18)
+
+    def remember(self, memory: Memory, q: Array) -> None:
+        """The velocities."""
+        self.v = memory.at_dofs("velocity", self.v)
+        self.v_before = memory.at_dofs("velocity before", self.v_before)

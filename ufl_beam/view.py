@@ -85,7 +85,9 @@ def plot(solution: Solution, what: str = "shape", *, n: int = -1, magnify: float
         axes = plane_axes(figure, f"{name} at t = {solution.times[n]:.4g} s{factor}")
         draw_undeformed(axes, stage)
         if what in RESULTANTS:
-            _draw_diagram(axes, solution, what, n, points)
+            index = list(RESULTANTS).index(what)
+            forces = [solution.section_forces(b, n)[:, index] for b in solution.scene.beams]
+            draw_diagrams(axes, solution, what, [forces], points)
         draw_axes(axes, solution, points, color=INK, linewidth=2.6, zorder=4)
         draw_symbols(axes, pose)
         make_room(figure, axes)
@@ -362,29 +364,45 @@ def draw_undeformed(axes: Axes, stage: Stage) -> None:
         axes.plot(*stroke.points.T, color=GREY, linewidth=1.2, zorder=1)
 
 
-def _draw_diagram(axes: Axes, solution: Solution, what: str, n: int, points: Array) -> None:
+def draw_diagrams(
+    axes: Axes, solution: Solution, what: str, diagrams: Sequence[Sequence[Array]], points: Array
+) -> None:
+    """Diagrams of a section force on the frame, to one scale.
+
+    Args:
+        axes: Where to draw.
+        solution: Of the frame.
+        what: "N", "V" or "M".
+        diagrams: Each a list of the values in the cells of all beams, (num_cells,) each; N, N m.
+        points: Vertices of all beams; (num_vertices, 2); m.
+    """
     index, side = list(RESULTANTS).index(what), -1.0 if what == "M" else 1.0
     beams = solution.scene.beams
-    forces = [solution.section_forces(beam, n)[:, index] for beam in beams]
     # A strain of 1e-10 is what rounding and the tolerance of the iteration leave behind.
     limits = [(b.section.EA, b.section.GA, b.section.EI / b.section.depth)[index] for b in beams]
-    if all(np.all(np.abs(f) <= 1e-10 * limit) for f, limit in zip(forces, limits, strict=True)):
+    if all(
+        np.all(np.abs(f) <= 1e-10 * limit)
+        for forces in diagrams
+        for f, limit in zip(forces, limits, strict=True)
+    ):
         return
-    largest = max(float(np.max(np.abs(f))) for f in forces)
+    largest = max(float(np.max(np.abs(f))) for forces in diagrams for f in forces)
     scale = 0.13 * side * math.hypot(*np.ptp(points, axis=0)) / largest
-    tips, outward = [], []
-    for beam, values in zip(beams, forces, strict=True):
-        chain = points[solution.grid.vertices_of(beam)]
-        along = np.diff(chain, axis=0)
-        left = along[:, ::-1] * (-1.0, 1.0) / np.linalg.norm(along, axis=1)[:, None]
-        ordinates = scale * values[:, None] * left
-        _draw_steps(axes, chain, values, ordinates)
-        tips.append((chain[1:] + chain[:-1]) / 2 + ordinates)
-        outward.append(side * np.sign(values)[:, None] * left)
-    every = np.concatenate(forces)
-    for cell, sign, color in ((np.argmax(every), 1, RED), (np.argmin(every), -1, BLUE)):
-        if sign * every[cell] > 0:
-            text = with_unit(every[cell], RESULTANTS[what][1])
+    every, tips, outward = [], [], []
+    for forces in diagrams:
+        for beam, values in zip(beams, forces, strict=True):
+            chain = points[solution.grid.vertices_of(beam)]
+            along = np.diff(chain, axis=0)
+            left = along[:, ::-1] * (-1.0, 1.0) / np.linalg.norm(along, axis=1)[:, None]
+            ordinates = scale * values[:, None] * left
+            _draw_steps(axes, chain, values, ordinates)
+            every.append(values)
+            tips.append((chain[1:] + chain[:-1]) / 2 + ordinates)
+            outward.append(side * np.sign(values)[:, None] * left)
+    found = np.concatenate(every)
+    for cell, sign, color in ((np.argmax(found), 1, RED), (np.argmin(found), -1, BLUE)):
+        if sign * found[cell] > 0:
+            text = with_unit(found[cell], RESULTANTS[what][1])
             _annotate(axes, text, color, np.concatenate(tips)[cell], np.concatenate(outward)[cell])
 
 

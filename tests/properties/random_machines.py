@@ -1,0 +1,382 @@
+"""Random machines of everything that a scene may have, each a script that anybody can run.
+
+`script(seed)` writes Python that makes `scene`, `scheme` and `dt`.  All numbers are plain, so that
+a seed that fails can be printed, and cut down by hand.  Sizes are drawn as parts of what the first
+beam makes natural (its length, EI/L², its period) and these over many decades; kinds of laws, joints
+and schemes are drawn from short lists, for each kind compiles forms of its own.
+"""
+
+import math
+
+import numpy as np
+
+STEPS = 12
+"""Steps of a run."""
+
+SPOTS = (0.0, 0.5, 1.0)
+"""Where things are attached to beams."""
+
+
+def script(seed):
+    """Python source of a random machine."""
+    return "\n".join(_Writer(seed).lines) + "\n"
+
+
+class _Writer:
+    """Draws a machine and writes it down.
+
+    Attributes:
+        lines: The script so far.
+    """
+
+    def __init__(self, seed):
+        self._random = np.random.default_rng(seed)
+        self.lines = [f"# seed {seed}", "import math", "import ufl_beam as ub", ""]
+        self._static = self._chance(0.3)
+        self._anchors, self._beams, self._bodies, self._velocities = [], [], [], []
+        self._joints, self._supports, self._loads, self._masses = [], [], [], []
+        self._connectors, self._damping, self._initial, self._held = [], [], [], set()
+        self._scales()
+        self._free = not self._static and self._chance(0.2)
+        for i in range(self._integer(1, 4)):
+            self._beam(i)
+        for i in range(self._integer(0, 2)):
+            self._body(i)
+        self._support()
+        for _ in range(self._integer(0, 2)):
+            self._connector()
+        for _ in range(self._integer(1, 3)):
+            self._load()
+        if self._chance(0.3) and not self._static:
+            self._damp()
+        self._end()
+
+    # -- draws ---------------------------------------------------------------------------------
+
+    def _chance(self, part):
+        return self._random.random() < part
+
+    def _integer(self, low, high):
+        return int(self._random.integers(low, high + 1))
+
+    def _some(self, low, high):
+        return float(self._random.uniform(low, high))
+
+    def _size(self, low, high):
+        """A size whose decimal logarithm is uniform."""
+        return 10 ** self._some(low, high)
+
+    def _one(self, choices):
+        return choices[self._integer(0, len(choices) - 1)]
+
+    def _vector(self, size):
+        angle = self._some(-math.pi, math.pi)
+        return f"({size * math.cos(angle):.6g}, {size * math.sin(angle):.6g})"
+
+    # -- sizes ---------------------------------------------------------------------------------
+
+    def _scales(self):
+        self._L = self._size(-2, 2)
+        self._slender = self._size(0.7, 3)
+        self._EI, self._rhoA = self._size(-2, 8), self._size(-3, 3)
+        self._F, self._M = self._EI / self._L**2, self._EI / self._L
+        self._EA = self._EI * (self._slender / self._L) ** 2
+        self._T = 2 * math.pi / 3.5 * self._L**2 * math.sqrt(self._rhoA / self._EI)
+        self._dt = self._T * self._size(-3, 0)
+
+    def _time(self):
+        """A time function."""
+        t = self._dt * STEPS
+        kinds = [
+            f"ub.ramp({t * self._some(0.1, 1):.6g})",
+            f"ub.Table([0, {t / 2:.6g}, {t:.6g}], [0, {self._some(-1, 1):.3g}, 1])",
+            f"lambda t: math.sin({self._some(1, 10) / t:.6g} * t)",
+        ]
+        if not self._static:
+            kinds += ["lambda t: 1.0", f"lambda t: float(t < {t / 3:.6g})"]
+        return self._one(kinds)
+
+    # -- materials -----------------------------------------------------------------------------
+
+    def _hardening(self, stiffness, limit):
+        """A law of a resultant, a fibre or a spring; sizes of stiffness and force."""
+        more = [f"limit={limit}"]
+        if self._chance(0.5):
+            more.append(f"modulus={stiffness * self._size(-4, 0):.6g}")
+        if self._chance(0.5):
+            more.append(f"kinematic={stiffness * self._size(-4, 0):.6g}")
+        time = self._one([0.0, math.inf, self._T * self._size(-6, 6)])
+        viscous = self._one(["", "Perzyna", "DuvautLions"])
+        if viscous == "Perzyna":
+            more.append(f"viscosity=ub.Perzyna({_number(time * stiffness)})")
+        if viscous == "DuvautLions":
+            more.append(f"viscosity=ub.DuvautLions({_number(time)})")
+        return f"ub.Hardening({', '.join(more)})"
+
+    def _softening(self, limit):
+        """A law of a hinge; an energy from brittle to ductile."""
+        kind = self._one(["Softening", "LinearSoftening"])
+        energy = self._M * self._size(-4, 3)
+        limit = self._one([0.0, limit, limit, limit, math.inf])
+        return f"ub.{kind}(limit={_number(limit)}, energy={energy:.6g})"
+
+    def _section(self, i):
+        kind = self._one(["elastic", "elastic", "resultants", "hinge", "both", "fibres"])
+        stiff = self._one([1.0, 1.0, self._size(-3, 6)])
+        EA, EI, rhoA = self._EA * stiff, self._EI * stiff, self._rhoA * self._size(-1, 1)
+        limit = self._M * self._size(-3, 1) * stiff
+        if kind == "fibres":
+            h = math.sqrt(12 * EI / EA)
+            E, strength = EA / h**2, limit / h**3
+            drawn = [
+                _number(strength),
+                f"ub.Normal({strength:.6g}, {strength / 5:.6g}, seed={i})",
+                f"ub.Lognormal({strength:.6g}, {strength / 3:.6g}, seed={i})",
+                f"ub.Weibull({strength:.6g}, 3.0, seed={i})",
+            ]
+            law = self._hardening(E, self._one(drawn))
+            crack = ""
+            if self._chance(0.3):
+                energy = strength * h * self._size(-3, 2)
+                crack = f", softening=ub.Softening(limit={3 * strength:.6g}, energy={energy:.6g})"
+            shape = self._one([f"rectangle(b={h:.6g}, h={h:.6g}", f"circle(d={h:.6g}"])
+            text = (
+                f"ub.Section.{shape}, E={E:.6g}, nu=0.3, rho={rhoA / h**2:.6g}, "
+                f"fibres=ub.Fibres({law}, number={self._one([4, 8])}{crack}))"
+            )
+        else:
+            rhoI = self._one([0.0, rhoA * EI / EA, rhoA * EI / EA])
+            more = [f"EA={EA:.6g}, GA={EA * self._some(0.1, 0.5):.6g}, EI={EI:.6g}"]
+            more.append(f"rhoA={rhoA:.6g}, rhoI={rhoI:.6g}")
+            if kind in ("resultants", "both"):
+                more.append(f"bending={self._hardening(EI, _number(limit))}")
+                if self._chance(0.3):
+                    force = limit / self._L * self._slender
+                    more.append(f"axial={self._hardening(EA, _number(force))}")
+                if self._chance(0.3):
+                    more.append(f"shear={self._hardening(EA, _number(limit / self._L))}")
+            if kind in ("hinge", "both") and self._chance(0.7):
+                more.append(f"hinge={self._softening(limit * self._size(-1, 1))}")
+            text = f"ub.Section({', '.join(more)})"
+        self.lines.append(f"section{i} = {text}")
+        return kind, limit
+
+    # -- beams and bodies ----------------------------------------------------------------------
+
+    def _beam(self, i):
+        kind, limit = self._section(i)
+        name = f"beam{i}"
+        parent = self._one(self._anchors) if i else None
+        joint = self._joint_kind()
+        apart = joint in ("RigidLink", "Link")
+        start = f"{parent}.point" if i else "(0.0, 0.0)"
+        if i and apart:
+            start = f"tuple(p + d for p, d in zip({start}, {self._vector(self._L / 4)}))"
+        self.lines.append(f"x{i}, y{i} = {start}")
+        length, angle = self._L * self._some(0.5, 2), self._some(-math.pi, math.pi)
+        dx, dy = length * math.cos(angle), length * math.sin(angle)
+        cells = self._one([1, 2, 4, 8])
+        more = f"section{i}, cells={cells}, name='{name}'"
+        if kind == "hinge" and self._chance(0.5):
+            more += f", hinges={{{self._one(SPOTS)}: {self._softening(limit)}}}"
+        end = f"(x{i} + {dx:.6g}, y{i} + {dy:.6g})"
+        self.lines.append(f"{name} = ub.Beam((x{i}, y{i}), {end}, {more})")
+        if i:
+            self._join(joint, parent, f"{name}.at(0.0)", beam=name)
+        self._beams.append(name)
+        self._velocities.append(name)
+        self._anchors += [f"{name}.at({s})" for s in SPOTS]
+
+    def _body(self, i):
+        name = f"body{i}"
+        parent = self._one(self._anchors)
+        mass = self._rhoA * self._L * self._size(-3, 3)
+        self.lines.append(f"bx{i}, by{i} = {parent}.point")
+        dx, dy = (self._L * self._some(-0.3, 0.3) for _ in range(2))
+        center = f"(bx{i} + {dx:.6g}, by{i} + {dy:.6g})" if self._chance(0.7) else f"(bx{i}, by{i})"
+        inertia = mass * self._L**2 * self._size(-3, 0)
+        self.lines.append(
+            f"{name} = ub.Body({center}, mass={mass:.6g}, inertia={inertia:.6g}, name='{name}')"
+        )
+        joint = "Rigid" if self._static else self._one(["Rigid", "Rigid", "Revolute"])
+        self._join(joint, parent, f"{name}.at(bx{i}, by{i})")
+        self._bodies.append(name)
+        self._velocities.append(name)
+        self._anchors.append(f"{name}.at(bx{i} + {self._L / 5:.6g}, by{i})")
+
+    def _joint_kind(self):
+        if self._static:
+            return self._one(["Rigid", "Rigid", "Revolute", "RigidLink"])
+        return self._one(["Rigid", "Rigid", "Revolute", "Prismatic", "RigidLink", "Link", "Release"])
+
+    def _join(self, kind, a, b, beam=None):
+        """A joint; in statics, what turns is held by a connector."""
+        more = ""
+        name = f"joint{len(self._joints)}"
+        if kind in ("Rigid", "Revolute") and (self._chance(0.3) or self._static):
+            more = ", measured=True"
+        if kind == "Prismatic":
+            more = f", axis={self._vector(1.0)}"
+        if kind == "Release":
+            a, b = f"{beam}.at(0.0)", a
+            more = f", free='{self._one(['N', 'V', 'M', 'NM'])}'"
+        self.lines.append(f"{name} = ub.{kind}({a}, {b}{more})")
+        self._joints.append(name)
+        if kind == "Revolute" and (self._static or (more and self._chance(0.7))):
+            self._turn(a, b, name)
+
+    # -- connectors ----------------------------------------------------------------------------
+
+    def _turn(self, a, b, joint):
+        size = self._M * self._size(-2, 1)
+        laws = [self._spring(self._M, size), f"ub.Motor({self._swing(1.0)})"]
+        if not self._static:
+            laws += [
+                *self._resisting(self._M, 1.0, size),
+                f"ub.Coulomb({size:.6g})",
+                f"ub.Coulomb({size:.6g}, coefficient={self._L * 0.1:.6g}, joint={joint})",
+            ]
+        self._connectors.append(f"ub.Turn({a}, {b}, {self._one(laws)})")
+
+    def _connector(self):
+        a, b = self._one(self._anchors), self._one(self._anchors)
+        if self._chance(0.3) and not self._free:
+            a = f"ub.ground(*({b}.point[0] + {self._L:.6g}, {b}.point[1]))"
+        if a.split(".")[0] == b.split(".")[0]:
+            return
+        stiffness, force = self._F / self._L, self._F * self._size(-2, 1)
+        laws = [self._spring(stiffness, force), *self._resisting(stiffness, self._L, force)]
+        if not self._static:
+            laws.append(f"ub.Controller(lambda simulation: -{force:.6g} * math.sin(simulation.t))")
+        law = self._one(laws)
+        self._connectors.append(
+            self._one([
+                f"ub.Stretch({a}, {b}, {law})",
+                f"ub.Slide({a}, {b}, {law}, axis={self._vector(1.0)})",
+            ])
+        )  # fmt: skip
+
+    def _spring(self, stiffness, force):
+        k = stiffness * self._size(-3, 5)
+        more = ""
+        if self._chance(0.3):
+            more += f", law={self._hardening(k, _number(force))}"
+        elif self._chance(0.3):
+            more += f", softening=ub.Softening({force:.6g}, {force**2 / k * self._size(-1, 3):.6g})"
+        return f"ub.Spring({k:.6g}{more})"
+
+    def _resisting(self, stiffness, length, force):
+        """Laws that resist, or push, whatever the motion is."""
+        k, way, time = stiffness * self._size(-2, 3), length * self._some(0, 0.1), self._T
+        c = stiffness * time * self._size(-3, 3)
+        return [
+            f"ub.Stop({k:.6g}, low={-way:.6g}, high={way / 2:.6g})",
+            f"ub.Damper({c:.6g})",
+            f"ub.Actuator(lambda t: {force:.6g} * math.sin({1 / time:.6g} * t))",
+            f"ub.Function(lambda e, rate: {k:.6g} * e + {k / length**2:.6g} * e**3 + {c:.6g} * rate)",
+        ]
+
+    def _swing(self, size):
+        """A motion that begins at rest."""
+        ω = self._some(1, 6) / (self._dt * STEPS)
+        return f"lambda t: {size * self._size(-3, 0):.6g} * (1 - math.cos({ω:.6g} * t))"
+
+    # -- supports ------------------------------------------------------------------------------
+
+    def _support(self):
+        if self._free:
+            if self._chance(0.7):
+                self._initial.append(
+                    f"ub.Velocity([{', '.join(self._velocities)}], "
+                    f"linear={self._vector(self._L / self._T)}, "
+                    f"angular={self._some(-3, 3) / self._T:.6g})"
+                )
+            return
+        root = "beam0.at(0.0)"
+        moved = [
+            f"ub.Prescribed({root}, u={self._swing(self._L)}, v=0, psi=0)",
+            f"ub.Prescribed({root}, u=0, v=0, psi={self._swing(3.0)})",
+        ]
+        kinds = [f"ub.Clamped({root})", f"ub.Clamped({root})", *moved]
+        if not self._static:
+            kinds += [f"ub.Pinned({root})", f"ub.Roller({root}, along={self._vector(1.0)})"]
+        self._supports.append(self._one(kinds))
+        last = f"{self._beams[-1]}.at(1.0)"
+        if self._chance(0.3):
+            others = [f"ub.Roller({last}, along={self._vector(1.0)})", f"ub.Pinned({last})"]
+            self._supports.append(self._one(others))
+        elif self._chance(0.15):
+            direction = self._vector(self._L)
+            self._joints.append(
+                f"ub.Guided({last}, lambda s, p={last}.point, d={direction}: "
+                "(p[0] + s * d[0], p[1] + s * d[1] + s**2 * d[0]))"
+            )
+
+    # -- loads ---------------------------------------------------------------------------------
+
+    def _load(self):
+        size = self._F * self._size(-4, 0.5)
+        place = self._one(self._anchors)
+        force, moment, time = self._vector(size), size * self._L * self._some(-1, 1), self._time()
+        kinds = [f"ub.PointLoad({place}, force={force}, moment={moment:.6g}, time={time})"]
+        if place.startswith("beam"):
+            kinds.append(f"ub.FollowerLoad({place}, force={force}, time={time})")
+        line = self._vector(size / self._L)
+        kinds.append(f"ub.LineLoad({self._one(self._beams)}, force={line}, time={time})")
+        kinds.append(f"ub.Gravity({self._vector(size / self._rhoA / self._L)}, time={time})")
+        self._loads.append(self._one(kinds))
+        if self._chance(0.3):
+            mass = self._rhoA * self._L * self._size(-3, 3)
+            inertia = self._one([0.0, mass * self._L**2 * self._size(-3, 0)])
+            place = f"{self._one(self._beams)}.at({self._one(SPOTS)})"
+            self._masses.append(f"ub.PointMass({place}, {mass:.6g}, {inertia:.6g})")
+
+    def _damp(self):
+        if self._chance(0.5):
+            rates = f"mass={self._size(-3, 0) / self._T:.6g}, stiffness={self._size(-4, 0) * self._T:.6g}"
+            self._damping.append(f"ub.Rayleigh({rates})")
+        else:
+            self._damping.append(f"ub.KelvinVoigt({self._size(-4, 1) * self._T:.6g})")
+
+    # -- the end -------------------------------------------------------------------------------
+
+    def _end(self):
+        parts = {
+            "beams": self._beams, "bodies": self._bodies, "joints": self._joints,
+            "supports": self._supports, "connectors": self._connectors, "loads": self._loads,
+            "masses": self._masses, "damping": self._damping, "initial": self._initial,
+        }  # fmt: skip
+        self.lines.append("scene = ub.Scene(")
+        for name, records in parts.items():
+            if records:
+                self.lines.append(f"    {name}=[")
+                self.lines += [f"        {record}," for record in records]
+                self.lines.append("    ],")
+        self.lines.append(")")
+        if self._static:
+            schemes = ["Static()", "Static()", "ExactStatic()", "ExactStatic(0.5)"]
+        else:
+            a, b = self._some(0.01, 0.5), self._some(0, 0.5)
+            schemes = ["Midpoint()", "Midpoint()", f"Midpoint({a:.3g}, {b:.3g})"]
+        self.lines.append(f"scheme = ub.{self._one(schemes)}")
+        self.lines.append(f"dt = {self._dt:.6g}")
+
+
+def _number(x):
+    return "math.inf" if x == math.inf else f"{x:.6g}"
+
+
+def round_off(solution):
+    """Energy that the last digits of strains make, and its change by the strains that there are; J.
+
+    A strain is a difference of positions, which have digits of the size of the scene, over a cell.
+    """
+    scene = solution.scene
+    last = np.finfo(float).eps * scene.size
+    least = 0.0
+    for beam in scene.beams:
+        length = math.dist(beam.a, beam.b)
+        least += beam.section.EA * last**2 * beam.cells**2 / length
+    most = float(np.max(solution.energy.total))
+    # In some steps, over some nodes
+    return 50 * (least + 2 * math.sqrt(least * most))

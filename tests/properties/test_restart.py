@@ -1,0 +1,215 @@
+"""A run that is stopped, by whatever, and run again is the run, to the last bit."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from mpi4py import MPI
+
+import numpy as np
+import pytest
+from restarted import arrays_of, bend, machine, run, series
+
+import ufl_beam as ub
+
+SCRIPT = Path(__file__).with_name("restarted.py")
+
+RUNS = {
+    "midpoint": (machine, ub.Midpoint(0.05, 0.02), 0.2, 0.005),
+    "adaptive": (machine, ub.Midpoint(0.05, 0.02), 0.1, ub.Adaptive(1e-4)),
+    "static": (bend, ub.Static(), 5.0, 0.1),
+    "exact static": (bend, ub.ExactStatic(), 5.0, 0.1),
+}
+
+
+class StopAt(ub.Recorder):
+    """Stops a run after so many steps."""
+
+    def __init__(self, steps):
+        self.steps = steps
+
+    def require_writable(self):
+        pass
+
+    def open(self, simulation):
+        pass
+
+    def write(self, simulation):
+        self.steps -= 1
+        if self.steps == 0:
+            raise KeyboardInterrupt
+
+    def close(self):
+        pass
+
+    def state(self):
+        return {}
+
+    def resume(self, simulation, state):
+        pass
+
+
+def go(kind, path=None, *, steps=10**9, every=5, comm=None):
+    """A run, perhaps stopped after some steps."""
+    make, scheme, end, dt = RUNS[kind]
+    checkpoint = None if path is None else ub.Checkpoint(path, every=every)
+    return ub.simulate(
+        make(), scheme, t=(0, end), dt=dt, every=2, record=StopAt(steps), progress=False,
+        checkpoint=checkpoint, comm=comm,
+    )  # fmt: skip
+
+
+def stopped(*arguments, **keywords):
+    with pytest.raises(KeyboardInterrupt):
+        go(*arguments, **keywords)
+
+
+def assert_same_bits(one, other):
+    assert list(one) == list(other)
+    for name, values in one.items():
+        assert values.dtype == other[name].dtype, name
+        assert values.tobytes() == other[name].tobytes(), name
+
+
+def assert_same_numbers(one, other):
+    """To what Newton's method leaves, 1e-10 of the forces in each step, as any two runs differ."""
+    assert (one["times"] == other["times"]).all()
+    for name in ("q", "v", "reactions", "material", "lost: plastic", "lost: hinges"):
+        size = np.abs(np.nan_to_num(other[name])).max(initial=0.0)
+        assert np.abs(np.nan_to_num(one[name] - other[name])).max(initial=0.0) <= 1e-7 * size, name
+
+
+@pytest.mark.parametrize("kind", RUNS)
+def test_a_run_that_goes_on_is_the_run(kind, shared_path):
+    """Twice stopped; to the last bit, on several processes but for sums over them."""
+    path = shared_path / "run.checkpoint"
+    whole = go(kind)
+    stopped(kind, path, steps=12)
+    stopped(kind, path, steps=9)
+    solution = go(kind, path)
+    if MPI.COMM_WORLD.size == 1:
+        assert_same_bits(arrays_of(solution), arrays_of(whole))
+        assert str(solution).split("wall")[1:] == str(whole).split("wall")[1:]
+    assert_same_numbers(arrays_of(solution), arrays_of(whole))
+    # What must remember has something to remember
+    lost = whole.energy.lost
+    assert lost["plastic"][-1] > 0.0
+    assert lost["hinges"][-1] > 0.0 or kind == "adaptive"  # which ends before
+    if kind == "midpoint":
+        assert lost["friction"][-1] > 0.0
+        assert whole.energy.worst < 1e-9
+
+
+@pytest.mark.parametrize("kind", ["midpoint", "static"])
+@pytest.mark.parametrize("first", ["one", "all"])
+def test_a_run_goes_on_on_another_number_of_processes(kind, first, shared_path, on_first_rank):
+    path = shared_path / "run.checkpoint"
+    whole = go(kind)
+    if first == "one":
+        on_first_rank(lambda: stopped(kind, path, steps=12, comm=MPI.COMM_SELF))
+        solution = arrays_of(go(kind, path))
+    else:
+        stopped(kind, path, steps=12)
+        solution = on_first_rank(lambda: arrays_of(go(kind, path, comm=MPI.COMM_SELF)))
+    assert_same_numbers(solution, arrays_of(whole))
+
+
+def test_a_finished_run_is_there_at_once(shared_path):
+    path = shared_path / "run.checkpoint"
+    whole = go("midpoint", path)
+    again = go("midpoint", path, steps=1)  # a single step would stop it
+    assert_same_numbers(arrays_of(again), arrays_of(whole))
+    assert again.q.tobytes() == whole.q.tobytes()
+
+
+def test_a_later_end_goes_on(shared_path):
+    """The rounding of the times of steps is another; all else is the run."""
+    scene, path = machine(), shared_path / "run.checkpoint"
+
+    def until(end, **more):
+        scheme = ub.Midpoint(0.05)
+        return ub.simulate(machine(), scheme, t=(0, end), dt=0.005, progress=False, **more)
+
+    checkpoint = ub.Checkpoint(path, every=100)
+    until(0.1, checkpoint=checkpoint)
+    longer, whole = until(0.2, checkpoint=checkpoint), until(0.2)
+    assert longer.times == pytest.approx(whole.times, rel=1e-14)
+    # What a last digit of the time changes, and what Newton's method leaves
+    assert np.abs(longer.q - whole.q).max() < 1e-8 * np.abs(whole.q).max()
+    with pytest.raises(ub.SceneError, match=r"is at t = 0.2 s, beyond the end t\[1\] = 0.15"):
+        until(0.15, checkpoint=checkpoint)
+    assert scene.size > 1
+
+
+@pytest.mark.serial
+def test_files_go_on(tmp_path):
+    """Tables byte for byte; data of XDMF to the last bit, and the text that describes them."""
+    whole, parts = tmp_path / "whole", tmp_path / "parts"
+    for folder in (whole, parts):
+        folder.mkdir()
+    run(whole, steps=40, every=7, record=[StopAt(10**9)])
+    for steps in (11, 15, 8):
+        with pytest.raises(KeyboardInterrupt):
+            run(parts, steps=40, every=7, record=[StopAt(steps)])
+    run(parts, steps=40, every=7, record=[StopAt(10**9)])
+    for name in ("run.csv", "few.csv", "run.xdmf"):
+        assert (whole / name).read_bytes() == (parts / name).read_bytes(), name
+    assert_same_bits(*(series(folder / "run.xdmf") for folder in (whole, parts)))
+    assert len(series(whole / "run.xdmf")) > 6 * 5  # six times, fields and mesh
+
+
+# -- kill -9 ---------------------------------------------------------------------------------------
+
+
+def until_killed(folder, dice):
+    """Run the script and kill it some rows later, at any moment; whether it was still running."""
+    table = folder / "run.csv"
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    process = subprocess.Popen([sys.executable, str(SCRIPT), str(folder)], env=environment)
+    before = table.stat().st_size if table.exists() else 0
+    more = dice.randrange(200, 2500)  # bytes; a row has some 700
+    if dice.random() < 0.1:
+        time.sleep(dice.uniform(0, 1.5))  # while it begins
+    else:
+        while process.poll() is None and (
+            not table.exists() or table.stat().st_size in (before, 0)
+        ):
+            time.sleep(0.002)
+        begin = table.stat().st_size
+        while process.poll() is None and table.stat().st_size < begin + more:
+            time.sleep(0.0005)
+        time.sleep(dice.uniform(0, 0.02))
+    process.send_signal(signal.SIGKILL)
+    return process.wait() == -signal.SIGKILL
+
+
+def require_killed_runs_are_the_run(folder, kills):
+    whole, killed = folder / "whole", folder / "killed"
+    for one in (whole, killed):
+        one.mkdir()
+    dice = random.Random(1)
+    done = sum(until_killed(killed, dice) for _ in range(kills))
+    for one in (whole, killed):
+        subprocess.run([sys.executable, str(SCRIPT), str(one)], check=True, timeout=300)
+    assert done >= kills / 2  # the others had come to the end
+    with np.load(whole / "end.npz") as one, np.load(killed / "end.npz") as other:
+        assert_same_bits({n: one[n] for n in one}, {n: other[n] for n in other})
+    for name in ("run.csv", "few.csv", "run.xdmf"):
+        assert (whole / name).read_bytes() == (killed / name).read_bytes(), name
+    assert_same_bits(series(whole / "run.xdmf"), series(killed / "run.xdmf"))
+    assert not list(killed.glob("*.part"))
+
+
+@pytest.mark.serial
+def test_killed_three_times(tmp_path):
+    require_killed_runs_are_the_run(tmp_path, 3)
+
+
+@pytest.mark.slow
+@pytest.mark.serial
+def test_killed_twenty_times(tmp_path):
+    require_killed_runs_are_the_run(tmp_path, 20)

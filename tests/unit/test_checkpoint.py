@@ -1,0 +1,461 @@
+"""Checkpoints: what they refuse and why, what describes a run, full disks, who remembers what."""
+
+import errno
+import math
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+from mpi4py import MPI
+
+import h5py
+import numpy as np
+import pytest
+
+import ufl_beam as ub
+from ufl_beam.checkpoint import HEADER, read
+from ufl_beam.describe import Description, difference
+from ufl_beam.memory import Restoring, Saving
+
+STEEL = {"EA": 1e4, "GA": 1e4, "EI": 100.0, "rhoA": 1.0, "rhoI": 0.1}
+
+
+def scene(EI=100.0, time=lambda t: math.sin(3 * t), x=1.0, **more):
+    section = ub.Section(**{**STEEL, "EI": EI})
+    beam = ub.Beam((0, 0), (x, 0), section, cells=2, name="left")
+    load = ub.PointLoad(beam.end, force=(0, -3), time=time)
+    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load], **more)
+
+
+def run(path, frame=None, scheme=None, *, every=2, also=(), t=(0, 0.5), dt=0.1, **more):
+    return ub.simulate(
+        scene() if frame is None else frame,
+        ub.Midpoint() if scheme is None else scheme,
+        t=t,
+        dt=dt,
+        checkpoint=ub.Checkpoint(path, every=every, also=also),
+        progress=False,
+        **more,
+    )
+
+
+@pytest.fixture
+def path(shared_path):
+    return shared_path / "run.checkpoint"
+
+
+# -- what is refused -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({}, "say how often"),
+        ({"every": 0}, "every = 0 must be"),
+        ({"minutes": -1.0}, "minutes = -1 must be"),
+        ({"every": 1, "also": [3]}, r"also\[0\] = 3 has no state"),
+    ],
+)
+def test_bad_choices(arguments, message):
+    with pytest.raises(ub.SceneError, match=message):
+        ub.Checkpoint("run.checkpoint", **arguments)
+
+
+def test_a_name_is_no_checkpoint(path):
+    with pytest.raises(ub.SceneError, match="checkpoint = 'x' is not a Checkpoint"):
+        ub.simulate(scene(), ub.Midpoint(), t=(0, 1), dt=0.1, checkpoint="x")
+    with pytest.raises(ub.SceneError, match="there is no directory"):
+        run(path.parent / "nowhere" / "x")
+
+
+STEADY = ub.Table((0, 1), (0, 1))
+OTHERS = {
+    "section": ({"frame": scene(EI=200.0)}, r"'left'\.section\.EI is 200\.0, in the file 100\.0"),
+    "place": ({"frame": scene(x=2.0)}, r"scene.beams\[0\] 'left'.* is 2.0, in the file 1.0"),
+    "function": ({"frame": scene(time=lambda t: math.cos(3 * t))}, r"loads\[0\].time has changed"),
+    "table": ({"frame": scene(time=STEADY)}, r"loads\[0\].time is Table, in the file function"),
+    "mass": (
+        {"frame": scene(bodies=[ub.Body((3, 0), mass=1.0, inertia=1.0)])},
+        "scene.bodies is 1 in a row, in the file 0 in a row",
+    ),
+    "scheme": ({"scheme": ub.Midpoint(0.1)}, "scheme.alpha is 0.1, in the file 0.0"),
+    "statics": ({"scheme": ub.Static()}, "scheme is Static, in the file Midpoint"),
+    "dt": ({"dt": 0.05}, "dt is 0.05, in the file 0.1"),
+    "adaptive": ({"dt": ub.Adaptive(1e-3)}, "t.1. is 0.5, in the file any|dt is Adaptive"),
+    "beginning": ({"t": (0.1, 0.6)}, r"t\[0\] is 0.1, in the file 0.0"),
+    "step": ({"t": (0, 0.45)}, "the step is 0.09 s, in the file 0.1"),
+    "newton": ({"newton": ub.Newton(rtol=1e-8)}, "newton.rtol is 1e-08, in the file 1e-10"),
+    "random": ({"also": [np.random.default_rng(1)]}, "other objects have a state"),
+}
+
+
+@pytest.mark.parametrize("other", OTHERS)
+def test_the_file_of_another_run(other, path):
+    run(path)
+    arguments, message = OTHERS[other]
+    with pytest.raises(ub.SceneError, match=message) as refused:
+        run(path, **arguments)
+    assert "Delete the file to begin anew, or name another" in str(refused.value)
+
+
+def test_another_start(path):
+    first = ub.simulate(scene(), ub.Static(), t=(0, 1), dt=1.0, progress=False)
+    run(path)
+    frame = first.scene
+    with pytest.raises(ub.SceneError, match=r"start is .*, in the file 'nothing'"):
+        run(path, frame, start=first)
+
+
+def damages():
+    def flip(data):
+        data[int(np.random.default_rng(0).integers(len(data)))] ^= 4
+
+    yield "empty", lambda data: data.clear(), "the file is empty"
+    yield "text", lambda data: data.__setitem__(slice(None), b"hello"), "is no checkpoint"
+    yield "HDF5", lambda data: data.__delitem__(slice(HEADER)), "is no checkpoint"
+    yield "cut", lambda data: data.__delitem__(slice(-1, None)), "its checksum is not"
+    yield "cut early", lambda data: data.__delitem__(slice(100, None)), "its checksum is not"
+    yield "more", lambda data: data.append(0), "its checksum is not"
+    yield "a bit", flip, "its checksum is not"
+    version = slice(24, 25)
+    yield (
+        "format",
+        lambda data: data.__setitem__(version, b"9"),
+        "is a checkpoint of ufl_beam, 9, and this version of ufl_beam reads number 1",
+    )
+
+
+@pytest.mark.parametrize(("kind", "damage", "message"), damages(), ids=[d[0] for d in damages()])
+def test_a_damaged_file(kind, damage, message, path, on_first_rank):
+    run(path)
+
+    def do():
+        data = bytearray(path.read_bytes())
+        damage(data)
+        path.write_bytes(data)
+
+    on_first_rank(do)
+    with pytest.raises(ub.SceneError, match=message):
+        run(path)
+
+
+@pytest.mark.serial
+def test_any_flipped_bit_is_seen(path):
+    run(path)
+    good = path.read_bytes()
+    read(path)
+    for n in [*range(HEADER), *np.random.default_rng(0).integers(HEADER, len(good), 300)]:
+        bad = bytearray(good)
+        bad[n] ^= 1 << (n % 8)
+        path.write_bytes(bad)
+        with pytest.raises(ub.SceneError, match=r"damaged|this version of ufl_beam reads"):
+            read(path)
+
+
+def test_others_can_read_it(path, on_first_rank):
+    solution = run(path)
+
+    def motion():
+        with h5py.File(path) as file:
+            return file["history/q"][()]
+
+    assert (on_first_rank(motion) == solution.q).all()
+
+
+# -- full disks ------------------------------------------------------------------------------------
+
+
+@pytest.mark.serial
+def test_a_file_that_cannot_grow(path):
+    """As on a full disk: a clear error, the solution, and the checkpoint before."""
+    frame = scene()
+    run(path, frame, t=(0, 0.2))  # so that everything is compiled
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    size = path.stat().st_size
+    path.unlink()
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size + 500, limits[1]))
+    try:
+        with pytest.raises(OSError, match=r"of t = \S+ s cannot be written: .*it needs") as error:
+            run(path, t=(0, 100.0), every=2)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert error.value.errno == errno.EFBIG
+    assert "the one before is still there" in str(error.value)
+    reached = error.value.solution
+    assert [one.name for one in path.parent.iterdir()] == [path.name]
+    before = read(path)["history/q"]
+    assert 2 < len(before) < len(reached.q)
+    assert (reached.q[: len(before)] == before).all()
+    # With more space the same call goes on
+    assert run(path, t=(0, 100.0), every=10**6).times[-1] == 100.0
+
+
+FULL = """
+import ctypes, os, sys
+sys.path.insert(0, sys.argv[2])
+libc = ctypes.CDLL(None, use_errno=True)
+folder = sys.argv[1]
+if libc.mount(b"tmpfs", folder.encode(), b"tmpfs", 0, b"size=200k"):
+    sys.exit(77)
+from test_checkpoint import read, run
+from pathlib import Path
+path = Path(folder) / "run.checkpoint"
+try:
+    run(path, t=(0, 100.0), every=10)
+except OSError as error:
+    assert "No space left on device; it needs" in str(error), error
+    assert "the one before is still there" in str(error), error
+    assert len(error.solution.q) > len(read(path)["history/q"]) > 10
+    assert os.listdir(folder) == ["run.checkpoint"]
+    print("full")
+"""
+
+
+@pytest.mark.serial
+def test_a_full_disk(tmp_path):
+    here = str(Path(__file__).parent)
+    command = ["unshare", "-rm", sys.executable, "-c", FULL, str(tmp_path), here]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    except FileNotFoundError:
+        pytest.skip("there is no unshare, so no small disk can be made")
+    if done.returncode == 77 or "unshare" in done.stderr:
+        pytest.skip("no small disk can be made here")
+    assert done.stdout.endswith("full\n"), done.stdout + done.stderr
+
+
+# -- who remembers ---------------------------------------------------------------------------------
+
+
+class Counting:
+    """A load that remembers how often it was asked."""
+
+    def __init__(self):
+        self.times = 0
+
+    def __call__(self, now):
+        self.times += 1
+        return 0.1 * self.times
+
+
+class Telling(Counting):
+    def state(self):
+        return {"times": self.times}
+
+    def restore(self, state):
+        self.times = state["times"]
+
+
+def steered(force):
+    frame = scene()
+    turn = ub.Turn(ub.ground(0, 0), frame.beams[0].end, ub.Controller(force))
+    return scene_with(frame, turn)
+
+
+def scene_with(frame, *connectors):
+    return ub.Scene(frame.beams, supports=frame.supports, loads=frame.loads, connectors=connectors)
+
+
+def test_what_a_controller_remembers_goes_on(path):
+    whole = ub.simulate(steered(Telling()), ub.Midpoint(), t=(0, 1), dt=0.1, progress=False)
+    run(path, steered(Telling()), t=(0, 0.5))
+    force = Telling()
+    longer = run(path, steered(force), t=(0, 1))
+    assert force.times == 10
+    assert longer.q[-1] == pytest.approx(whole.q[-1], rel=1e-9, abs=1e-12)
+
+
+def counting_in_a_closure():
+    times = 0
+
+    def force(now):
+        nonlocal times
+        times += 1
+        return 0.1 * times
+
+    return force
+
+
+def listing(asked):
+    return lambda now: asked.append(now.t) or 0.1
+
+
+@pytest.mark.parametrize(
+    ("force", "message"),
+    [
+        (Counting(), r"law.force.times is 1.0, at the beginning 0.0"),
+        (counting_in_a_closure(), r"law.force.times is 1.0, at the beginning 0.0"),
+        (listing([]), r"law.force.asked is 1 in a row, at the beginning 0 in a row"),
+    ],
+    ids=["object", "closure", "list"],
+)
+def test_what_is_not_told_would_be_lost(force, message, path):
+    """Said after the first step and not after the first crash."""
+    with pytest.raises(ub.SceneError, match=message) as error:
+        run(path, steered(force), every=100)
+    assert "state() and restore(state)" in str(error.value)
+    assert len(error.value.solution.times) == 2
+
+
+def test_random_generators_go_on(path):
+    """Those that functions use are found; others are named."""
+
+    def noisy():
+        used = np.random.default_rng(1)
+        return used, steered(lambda now: 0.1 * used.normal())
+
+    other = np.random.Generator(np.random.MT19937(2))
+    used, frame = noisy()
+    run(path, frame, also=[other])
+    expected = used.normal(), other.normal()
+    used, frame = noisy()
+    other.normal(size=7)
+    run(path, frame, also=[other])
+    assert (used.normal(), other.normal()) == expected
+
+
+class Odd(Telling):
+    def state(self):
+        return {1j}
+
+
+def test_a_state_must_be_plain(path):
+    with pytest.raises(ub.SceneError, match="something else than numbers, texts, lists and dicts"):
+        run(path, steered(Odd()))
+
+
+class Deaf(ub.Recorder):
+    def require_writable(self):
+        pass
+
+    def open(self, simulation):
+        pass
+
+    def write(self, simulation):
+        pass
+
+    def close(self):
+        pass
+
+
+def test_recorders_that_cannot_go_on_are_refused(path):
+    with pytest.raises(ub.SceneError, match="Deaf: this recorder cannot go on"):
+        run(path, record=Deaf())
+
+
+def test_a_history_that_is_gone(path, on_first_rank):
+    table = path.with_suffix(".csv")
+    run(path, record=ub.History(table))
+    on_first_rank(lambda: table.write_text("t\n0\n"))
+    with pytest.raises(ub.SceneError, match="it is not the file that was written up to"):
+        run(path, record=ub.History(table))
+
+
+def test_by_the_clock(path, on_first_rank):
+    """Each step takes longer than no minutes."""
+    ub.simulate(
+        scene(), ub.Midpoint(), t=(0, 0.5), dt=0.1, progress=False,
+        checkpoint=ub.Checkpoint(path, minutes=0.0), record=Stop(path, 3),
+    )  # fmt: skip
+    assert on_first_rank(lambda: len(read(path)["history/q"])) == 6
+
+
+class Stop(Deaf):
+    """Sees that there is a checkpoint of each step before."""
+
+    def __init__(self, path, steps):
+        self.path, self.steps = path, 0
+
+    def write(self, simulation):
+        MPI.COMM_WORLD.Barrier()
+        if self.steps:
+            assert len(read(self.path)["history/q"]) == self.steps + 1
+        MPI.COMM_WORLD.Barrier()
+        self.steps += 1
+
+    def state(self):
+        return {}
+
+
+# -- descriptions ----------------------------------------------------------------------------------
+
+
+AMPLITUDE = 2.0
+
+
+def described(value):
+    return Description({"x": value}).texts
+
+
+def test_numbers_that_are_equal_are_described_alike():
+    assert described(2) == described(2.0) == described(np.float64(2)) == {"x": "2.0"}
+    assert described(math.inf) == {"x": "inf"}
+    assert described(0.1) != described(0.1 + 1e-17 * 10)
+    assert described(2**53) != described(2**53 + 1)
+
+
+def test_functions_are_described_by_what_they_use(monkeypatch):
+    def waves(a, b=3.0):
+        return lambda t, c=b: AMPLITUDE * a * t * c
+
+    once = described(waves(1.0))
+    assert once == described(waves(1.0))
+    assert difference(described(waves(2.0)), once) == "x.a is 2.0, in the file 1.0"
+    assert "x.defaults[0] is 4.0" in difference(described(waves(1.0, 4.0)), once)
+    monkeypatch.setitem(globals(), "AMPLITUDE", 3.0)
+    assert difference(described(waves(1.0)), once) == "x.AMPLITUDE is 3.0, in the file 2.0"
+    assert difference(described(lambda t: t), described(lambda t: t + 1)) == (
+        "the function x has changed"
+    )
+
+
+def test_things_that_contain_themselves():
+    circle = []
+    circle.append(circle)
+    assert described(circle)["x[0]"] == "the same as x"
+
+
+def test_arrays_and_dicts():
+    assert difference(described({"a": np.zeros(3)}), described({"a": np.ones(3)})).startswith(
+        "x['a'] is float64 of shape (3,)"
+    )
+    assert difference(described({"a": 1}), described({"b": 1})) == (
+        "x['a'] is 1.0, in the file there is none"
+    )
+
+
+# -- numbers of the grid ---------------------------------------------------------------------------
+
+
+def test_a_state_is_that_of_all_processes():
+    simulation = ub.Simulation(scene(), ub.Midpoint())
+    share, grid = simulation.share, simulation.grid
+    memory = Saving(share)
+    memory.at_dofs("dofs", share.dofs.astype(float))
+    memory.added("added", np.ones(share.size))
+    memory.total("total", 2.0)
+    memory.number("number", 3.0)
+    memory.rows("cells", share.cells, np.column_stack([share.cells, -share.cells]).astype(float))
+    state = memory.state()
+    assert (state["dofs"] == np.arange(grid.size)).all()
+    assert state["added"].sum() == share.total(share.size)
+    assert state["total"] == 2.0 * share.comm.size
+    assert state["number"] == 3.0
+    assert (state["cells, 2"][:, 1] == np.arange(len(grid.cells))).all()
+    back = Restoring(share, state)
+    assert (back.at_dofs("dofs", share.dofs) == share.dofs).all()
+    assert share.total(back.added("added", share.dofs).sum()) == share.total(share.size)
+    assert share.total(back.total("total", 0.0)) == 2.0 * share.comm.size
+    rows = np.full((len(share.cells), 2), np.nan)
+    assert (back.rows("cells", share.cells, rows)[:, 1] == -share.cells).all()
+    assert np.isnan(back.rows("others", share.cells, rows)).all()
+    simulation.close()
+
+
+def test_signs_of_zeros_are_kept():
+    simulation = ub.Simulation(scene(), ub.Midpoint())
+    memory = Saving(simulation.share)
+    memory.total("zero", -0.0)
+    assert math.copysign(1.0, memory.state()["zero"][0]) == -1.0
+    simulation.close()

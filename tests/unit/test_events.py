@@ -1,0 +1,90 @@
+"""What is reported to happen, and when."""
+
+import math
+
+import pytest
+
+import ufl_beam as ub
+
+ELASTIC = ub.Section(EA=1e6, GA=1e6, EI=1e3, rhoA=1.0, rhoI=1e-3)
+
+
+def cantilever(section, motion, **more):
+    """A beam of 1 m, clamped, whose end rotates as `motion` says."""
+    beam = ub.Beam((0, 0), (1, 0), section, cells=2, name="arm", **more)
+    return ub.Scene([beam], supports=[ub.Clamped(beam.start), ub.Prescribed(beam.end, psi=motion)])
+
+
+def run(scene, scheme, *, t=1.0, dt=0.05):
+    told = []
+    events = ub.Events(tell=told.append)
+    ub.simulate(scene, scheme, t=(0, t), dt=dt, record=events)
+    if ub.processes.ours().rank == 0:
+        assert told == events.found
+    return events.found
+
+
+def test_nothing_happens_in_an_elastic_scene():
+    assert run(cantilever(ELASTIC, lambda t: t), ub.Static()) == []
+
+
+def test_a_hinge_opens_and_becomes_a_joint():
+    """Uniform moment EI ψ / L until the limit, after which one cell opens, in closed form.
+
+    Then EI (ψ - jump) / L = m = limit exp(-limit jump / energy); 99.9 % of the energy are gone at
+    m = limit / 1000.
+    """
+    hinge = ub.Softening(limit=100.0, energy=50.0)
+    scene = cantilever(ELASTIC, lambda t: 5 * t, hinges={0.25: hinge})
+    first, last = run(scene, ub.Static(), dt=0.01)
+    assert (first.what, last.what) == ("opens", "is free")
+    assert first.where.beam.name == "arm"
+    assert first.where.s == 0.25
+    opens = 100.0 / 1e3 / 5
+    free = (math.log(1000) * 50.0 / 100.0 + 0.1 / 1e3 * 1e3 / 1e3) / 5
+    assert first.time == pytest.approx(opens + 0.01, abs=0.0101)
+    assert last.time == pytest.approx(free, abs=0.0101)
+    assert str(first) == f"t = {first.time:.9g} s: arm.at(0.25) (0.25, 0) opens"
+
+
+def test_yielding_is_reported_once_in_each_cell():
+    section = ub.Section(
+        EA=1e6, GA=1e6, EI=1e3, bending=ub.Hardening(limit=100.0, modulus=50.0)
+    )
+    events = run(cantilever(section, lambda t: 0.3 * math.sin(6 * t)), ub.Static())
+    assert [e.what for e in events] == ["yields", "yields"]
+    assert {e.where.s for e in events} == {0.25, 0.75}
+    # EI 0.3 sin(6 t) = 100 at t = 0.0566
+    assert [e.time for e in events] == pytest.approx([0.1, 0.1])
+
+
+def test_a_ball_bounces():
+    """Flies 0.1 m at 1 m/s to a stop; half a period of contact; back to the other one."""
+    ball = ub.Body((0, 0), mass=1.0, inertia=1.0, name="ball")
+    stop = ub.Slide(ub.ground(0, 0), ball.middle, ub.Stop(1e4, low=-0.1, high=0.1), axis=(1, 0))
+    scene = ub.Scene(
+        bodies=[ball], connectors=[stop], initial=[ub.Velocity([ball], linear=(1.0, 0.0))]
+    )
+    events = run(scene, ub.Midpoint(), t=0.5, dt=1e-3)
+    assert [e.what for e in events] == ["touches", "lets go", "touches", "lets go"]
+    contact = math.pi / 100
+    expected = [0.1, 0.1 + contact, 0.3 + contact, 0.3 + 2 * contact]
+    assert [e.time for e in events] == pytest.approx(expected, abs=2e-3)
+    assert {e.where for e in events} == {stop}
+
+
+def test_friction_slides_and_sticks():
+    """A block on a spring, let go at rest where the spring is stronger than friction."""
+    block = ub.Body((0, 0), mass=1.0, inertia=1.0, name="block")
+    friction = ub.Slide(ub.ground(0, 0), block.middle, ub.Coulomb(force=1.0), axis=(1, 0))
+    push = ub.PointLoad(block.middle, force=(1.0, 0.0), time=lambda t: 2.0 if t < 0.1 else 0.0)
+    scene = ub.Scene(
+        bodies=[block],
+        connectors=[friction],
+        supports=[ub.Roller(block.middle)],
+        loads=[push],
+    )
+    events = run(scene, ub.Midpoint(), t=0.4, dt=1e-3)
+    assert [e.what for e in events] == ["slides", "sticks"]
+    # 1 m/s² for 0.1 s, then -1 m/s² for as long
+    assert [e.time for e in events] == pytest.approx([0.0, 0.2], abs=3e-3)

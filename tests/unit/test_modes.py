@@ -1,0 +1,308 @@
+"""Modes and buckling: what is asked of them, and that it does not matter how."""
+
+import math
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import ufl_beam as ub
+
+SECTION = ub.Section(EA=1e4, GA=4e3, EI=20.0, rhoA=0.5, rhoI=1e-3)
+
+
+def cantilever(cells=6, **more):
+    beam = ub.Beam((0, 0), (2, 0), SECTION, cells=cells, name="beam")
+    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], **more)
+
+
+def mechanism(m=1.0, s=1.0, kg=1.0, angle=0.0, *, damped=True):
+    """Crank, flexible rod, slider, spring and dampers; one constraint that no joint shares."""
+    N = kg * m / s**2
+    cos, sin = math.cos(angle), math.sin(angle)
+
+    def at(x, y):
+        return (m * (cos * x - sin * y), m * (sin * x + cos * y))
+
+    section = ub.Section(
+        EA=1e4 * N, GA=4e3 * N, EI=20 * N * m**2, rhoA=0.5 * kg / m, rhoI=1e-3 * kg * m
+    )
+    crank = ub.Body(at(0.15, 0.1), mass=1.0 * kg, inertia=0.02 * kg * m**2)
+    slider = ub.Body(at(1.3, 0.0), mass=2.0 * kg, inertia=0.1 * kg * m**2)
+    rod = ub.Beam(at(0.3, 0.2), at(1.3, 0.0), section, cells=4)
+    base, far = ub.ground(*at(0, 0)), ub.ground(*at(2.0, 0.0))
+    damper = ub.Slide(far, slider.middle, ub.Damper(0.5 * N * s / m), axis=(cos, sin))
+    return ub.Scene(
+        [rod],
+        bodies=[crank, slider],
+        joints=[
+            ub.Revolute(base, crank.at(*at(0, 0))),
+            ub.Revolute(crank.at(*at(0.3, 0.2)), rod.start),
+            ub.Revolute(rod.end, slider.middle),
+            ub.Prismatic(far, slider.middle, axis=(cos, sin)),
+        ],
+        connectors=[
+            ub.Slide(far, slider.middle, ub.Spring(30 * N / m), axis=(cos, sin)),
+            *([damper] if damped else []),
+        ],
+        damping=[ub.KelvinVoigt(1e-3 * s)] if damped else [],
+    )
+
+
+# -- how a scene is stated does not matter -------------------------------------------------------
+
+
+@pytest.mark.parametrize("damped", [False, True])
+def test_units_and_axes(damped):
+    """Tolerance: that of the eigenvalue solver, 1e-12, times the condition of the lowest mode."""
+    plain = ub.modes(mechanism(damped=damped), 4)
+    for units, second in (((1e3, 1.0, 1e-3), 1.0), ((1.0, 60.0, 1.0), 60.0)):
+        other = ub.modes(mechanism(*units, angle=0.7, damped=damped), 4)
+        np.testing.assert_allclose(other.exponents * second, plain.exponents, rtol=1e-8, atol=1e-8)
+
+
+def test_a_roller_at_an_angle():
+    """The same as one along an axis, in a turned scene."""
+
+    def omega(angle):
+        end = (2 * math.cos(angle), 2 * math.sin(angle))
+        beam = ub.Beam((0, 0), end, SECTION, cells=6)
+        roller = ub.Roller(beam.end, along=end)
+        return ub.modes(ub.Scene([beam], supports=[ub.Clamped(beam.start), roller]), 4).omega
+
+    np.testing.assert_allclose(omega(0.6), omega(0.0), rtol=1e-9)
+
+
+def test_a_joint_that_is_held_and_one_that_is_shared():
+    """Multipliers of constraints bring no modes, and no others."""
+
+    def omega(**how):
+        one, two = (ub.Beam((x, 0), (x + 1, 0), SECTION, cells=4) for x in (0, 1))
+        joint = ub.Revolute(one.end, two.start, **how)
+        return ub.modes(ub.Scene([one, two], joints=[joint]), 8).omega
+
+    shared, held = omega(), omega(measured=True)
+    assert np.sum(shared == 0) == np.sum(held == 0) == 4  # three of the whole, one of the joint
+    np.testing.assert_allclose(held, shared, rtol=1e-9)
+
+
+def test_every_process_gives_the_same():
+    comm = MPI.COMM_WORLD
+    exponents = comm.allgather(ub.modes(mechanism(), 4).exponents)
+    for other in exponents:
+        np.testing.assert_array_equal(other, exponents[0])
+
+
+def test_all_modes_there_are():
+    """Of 6 cells, 18 degrees of freedom are free; more are not invented."""
+    scene = cantilever()
+    found = ub.modes(scene, 100)
+    assert len(found) == 18
+    assert (np.diff(found.omega) >= 0).all()
+    np.testing.assert_allclose(found.omega[:3], ub.modes(scene, 3).omega, rtol=1e-9)
+
+
+# -- small systems -------------------------------------------------------------------------------
+
+
+def test_a_damped_mass():
+    """[closed] ω = √(k/m), ζ = c/(2√(km)); beyond 1 two motions that do not oscillate."""
+    k, mass = 8.0, 2.0
+    body = ub.Body((1, 0), mass=mass, inertia=1.0)
+    here = ub.ground(1, 0)
+
+    def exponents(c):
+        spring, damper = ub.Spring(k), ub.Damper(c)
+        scene = ub.Scene(
+            bodies=[body],
+            joints=[ub.Prismatic(here, body.middle, axis=(1, 0))],
+            connectors=[
+                ub.Slide(here, body.middle, spring, axis=(1, 0)),
+                ub.Slide(here, body.middle, damper, axis=(1, 0)),
+            ],
+        )
+        return ub.modes(scene, 2)
+
+    ζ = 0.3
+    light = exponents(2 * ζ * math.sqrt(k * mass))
+    np.testing.assert_allclose(light.omega, [2.0], rtol=1e-10)
+    np.testing.assert_allclose(light.damping, [ζ], rtol=1e-10)
+    ζ = 2.0
+    heavy = exponents(2 * ζ * math.sqrt(k * mass))
+    np.testing.assert_allclose(
+        heavy.exponents, 2.0 * (-ζ + np.array([1, -1]) * math.sqrt(ζ**2 - 1)), rtol=1e-9
+    )
+    np.testing.assert_array_equal(heavy.damping, 1.0)
+
+
+@pytest.mark.parametrize("damping", [(), (ub.KelvinVoigt(1e-3),), (ub.Rayleigh(mass=0.1),)])
+def test_a_free_chain_has_as_many_zeros_as_it_can_move(damping):
+    """Two beams and a revolute joint: 4; mass-proportional damping slows each of them by a0."""
+    one, two = (ub.Beam((x, 0), (x + 1, 0), SECTION, cells=4) for x in (0, 1))
+    scene = ub.Scene([one, two], joints=[ub.Revolute(one.end, two.start)], damping=damping)
+    found = ub.modes(scene, 10)
+    assert np.sum(found.omega == 0) == 4
+    assert np.isnan(found.damping[:4]).all()
+    slow = [s for s in found.exponents if s.imag == 0 and s != 0]
+    np.testing.assert_allclose(slow, -0.1, rtol=1e-9)
+    assert len(slow) == (4 if damping and isinstance(damping[0], ub.Rayleigh) else 0)
+
+
+def test_friction_that_sticks_holds():
+    body = ub.Body((1, 0), mass=2.0, inertia=1.0)
+    here = ub.ground(1, 0)
+    held = ub.Slide(here, body.middle, ub.Coulomb(5.0), axis=(0, 1))
+    springs = [
+        ub.Slide(here, body.middle, ub.Spring(8.0), axis=(1, 0)),
+        ub.Turn(here, body.middle, ub.Spring(9.0)),
+    ]
+    found = ub.modes(ub.Scene(bodies=[body], connectors=[held, *springs]), 5)
+    np.testing.assert_allclose(found.omega, [2.0, 3.0], rtol=1e-10)
+
+
+# -- what has yielded and what is open -----------------------------------------------------------
+
+
+def test_what_has_yielded_answers_elastically():
+    """The frequencies of a beam that was bent beyond its limit are those of an elastic one.
+
+    Its deflection remains; the curvature shifts them by its square, 1e-3² here.
+    """
+    law = ub.Hardening(limit=1.0, modulus=2.0)
+    section = ub.Section(EA=1e4, GA=4e3, EI=20.0, rhoA=0.5, rhoI=1e-3, bending=law)
+    beam = ub.Beam((0, 0), (2, 0), section, cells=6)
+    push = ub.PointLoad(beam.end, force=(0, 0.55), time=ub.ramp(1.0))
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
+    bent = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, progress=False)
+    assert bent.energy.lost["plastic"][-1] > 0
+    elastic = ub.modes(cantilever(), 3).omega
+    np.testing.assert_allclose(ub.modes(scene, 3, at=bent).omega, elastic, rtol=5e-3)
+
+
+def test_a_hinge_that_bears_nothing_is_a_joint():
+    """In the cell of the hinge the rest is elastic: a joint between two cells is h/2 away."""
+    cells = 40
+    open_ = ub.Beam((0, 0), (2, 0), SECTION, cells=cells, hinges={0.5: ub.Softening(0.0, 1.0)})
+    scene = ub.Scene([open_], supports=[ub.Clamped(open_.start), ub.Pinned(open_.end)])
+    one = ub.Beam((0, 0), (1, 0), SECTION, cells=cells // 2)
+    two = ub.Beam((1, 0), (2, 0), SECTION, cells=cells // 2)
+    joint = ub.Revolute(one.end, two.start)
+    jointed = ub.Scene(
+        [one, two], joints=[joint], supports=[ub.Clamped(one.start), ub.Pinned(two.end)]
+    )
+    with_hinge, with_joint = (ub.modes(s, 2).omega for s in (scene, jointed))
+    np.testing.assert_allclose(with_hinge, with_joint, rtol=2 / cells)
+
+
+# -- the rotating frame --------------------------------------------------------------------------
+
+
+def test_a_rotating_frame_keeps_energy():
+    """Coriolis' force does no work and the centrifugal force has a potential: the ledger closes."""
+    frame = ub.RotatingFrame(3.0, (0.2, 0.1))
+    scene = cantilever(loads=[frame])
+    beam = scene.beams[0]
+    thrown = ub.Scene(
+        [beam],
+        supports=scene.supports,
+        loads=[frame],
+        masses=[ub.PointMass(beam.end, 0.3)],
+    )
+    solution = ub.simulate(thrown, ub.Midpoint(), t=(0, 1.0), dt=0.02, progress=False)
+    assert np.ptp(solution.displacement(beam.end)[:, 1]) > 1e-3
+    assert solution.energy.worst < 1e-9  # design.md section 9
+
+
+def test_a_thrown_body_flies_straight():
+    """[closed] Seen from the frame a free body spirals; the midpoint rule is of second order."""
+    rate, mass = 2.0, 1.5
+    body = ub.Body((1.0, 0.0), mass=mass, inertia=1.0)
+    # A spring that is next to nothing: what is attached to nothing has no matrix entries.
+    nothing = ub.Slide(ub.ground(1, 0), body.middle, ub.Spring(1e-12), axis=(1, 0))
+    at_rest = ub.Velocity((body,), linear=(0.0, -rate * 1.0))
+    scene = ub.Scene(
+        bodies=[body], connectors=[nothing], initial=[at_rest], loads=[ub.RotatingFrame(rate)]
+    )
+    errors = []
+    for steps in (50, 100):
+        solution = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=1 / steps, progress=False)
+        there = solution.position(body.middle)[-1]
+        errors.append(np.linalg.norm(there - (math.cos(rate), -math.sin(rate))))
+    assert errors[1] < 1e-3
+    assert 1.9 < math.log2(errors[0] / errors[1]) < 2.1
+
+
+# -- files and pictures --------------------------------------------------------------------------
+
+
+def test_shapes(shared_path, on_first_rank):
+    """The largest displacement is one, and the file has all modes."""
+    scene = cantilever()
+    found = ub.modes(scene, 3)
+    tip = found.shape(0, scene.beams[0].end)
+    np.testing.assert_allclose(tip[:2], [0, 1], atol=1e-9)
+    motion = found.motion(0, amplitude=0.1, count=4)
+    height = motion.displacement(scene.beams[0].end)[:, 1]
+    np.testing.assert_allclose(height, [0.2, 0, -0.2, 0, 0.2], atol=1e-9)
+    found.write(shared_path / "modes.xdmf")
+
+    def kept():
+        import h5py
+
+        with h5py.File(shared_path / "modes.h5") as file:
+            return sorted(file["Function/displacement"]), file["Function/M/0"][:, 0]
+
+    steps, moments = on_first_rank(kept)
+    assert steps == ["0", "1", "2"]
+    # A bending moment EI v'': of the clamped end of a cantilever 3.52 times v/L², less h/2.
+    np.testing.assert_allclose(np.abs(moments).max(), 20 * 3.52 * 0.2 / 4, rtol=0.15)
+    with pytest.raises(ub.SceneError, match="there is no shape 3; there are 3"):
+        found.shape(3, scene.beams[0].end)
+
+
+@pytest.mark.serial
+def test_pictures(tmp_path):
+    scene = cantilever(loads=[])
+    found = ub.modes(scene, 4)
+    ub.plot_modes(found).savefig(tmp_path / "modes.png")
+    ub.plot_modes(found, [1]).savefig(tmp_path / "one.png")
+    assert (tmp_path / "modes.png").stat().st_size > (tmp_path / "one.png").stat().st_size > 1000
+    assert "mode 0: " in str(found)
+    assert "Hz" in found.titles[0]
+
+
+# -- wrong calls ---------------------------------------------------------------------------------
+
+
+def test_wrong_calls():
+    scene = cantilever()
+    beam = scene.beams[0]
+    other = cantilever(4)
+    solution = ub.simulate(
+        cantilever(loads=[ub.Gravity()]), ub.Static(), t=(0, 1), dt=1, progress=False
+    )
+    for call, message in (
+        (lambda: ub.modes(scene, 0), "modes: n = 0 must be"),
+        (lambda: ub.modes(beam, 2), "modes: scene = .* is not a Scene"),
+        (lambda: ub.modes(other, 2, at=solution), "modes: at is a solution of other beams"),
+        (lambda: ub.modes(scene, 2, at=2.0), "modes: at = 2.0 is not a Solution"),
+        (lambda: ub.buckling(scene, 1), "nothing acts on the scene at t = 1 s"),
+        (
+            lambda: ub.buckling(ub.Scene([beam], loads=[ub.Gravity()]), 1),
+            "free to move in 3 independent ways",
+        ),
+        (
+            lambda: ub.buckling(cantilever(loads=[ub.RotatingFrame(1.0)]), 1),
+            "a RotatingFrame has a stiffness of its own",
+        ),
+        (lambda: ub.RotatingFrame(math.inf), "RotatingFrame: rate = inf is not finite"),
+    ):
+        with pytest.raises(ub.SceneError, match=message):
+            call()
+
+
+def test_no_mass():
+    section = ub.Section(EA=1e4, GA=4e3, EI=20.0)
+    beam = ub.Beam((0, 0), (2, 0), section, cells=2)
+    with pytest.raises(ub.SceneError, match="nothing that can move has mass"):
+        ub.modes(ub.Scene([beam], supports=[ub.Clamped(beam.start)]), 1)

@@ -1,0 +1,323 @@
+"""Natural frequencies, damping ratios and buckling loads against closed forms and a Ritz solution.
+
+Sources: S. P. Timoshenko, D. H. Young, W. Weaver, "Vibration Problems in Engineering", 4th ed. 1974,
+chapter 5, for beams; S. P. Timoshenko, J. M. Gere, "Theory of Elastic Stability", 2nd ed. 1961,
+chapter 2, for columns; V. V. Bolotin, "Nonconservative Problems of the Theory of Elastic Stability",
+1963, for Beck's column; A. D. Wright et al., "Vibration modes of centrifugally stiffened beams",
+J. Appl. Mech. 49 (1982), for the rotating beam.
+
+Errors of a mesh have even powers of the cell length h; two meshes extrapolated leave h⁴, which the
+tolerances are made of: for a mode with wave number β, (β h)⁴ of the finer mesh.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from convergence.study import extrapolated, romberg
+from numpy.polynomial import Legendre
+from scipy.linalg import eigh
+from scipy.optimize import brentq
+
+import ufl_beam as ub
+
+SLENDER = ub.Section(EA=1e8, GA=1e8, EI=1.0, rhoA=1.0, rhoI=1e-8)
+"""On a length of 1: shear, axial strain and rotary inertia change (βL)⁴ by (βL)²/1e8."""
+
+ENDS = {
+    "clamped-free": (lambda b: [ub.Clamped(b.start)], (1.875104, 4.694091, 7.854757)),
+    "clamped-clamped": (
+        lambda b: [ub.Clamped(b.start), ub.Clamped(b.end)],
+        (4.730041, 7.853205, 10.995608),
+    ),
+    "free-free": (lambda b: [], (0, 0, 0, 4.730041, 7.853205, 10.995608)),
+    "pinned-pinned": (
+        lambda b: [ub.Pinned(b.start), ub.Roller(b.end)],
+        (math.pi, 2 * math.pi, 3 * math.pi),
+    ),
+}
+"""Supports, and βL of the first modes: [closed] to the digits given."""
+
+
+def beam_of(cells, section=SLENDER):
+    return ub.Beam((0, 0), (1, 0), section, cells=cells)
+
+
+def omega(cells, supports, n, *, section=SLENDER, **more):
+    beam = beam_of(cells, section)
+    return ub.modes(ub.Scene([beam], supports=supports(beam), **more), n).omega
+
+
+@pytest.mark.parametrize("ends", ENDS)
+def test_slender_beams(ends):
+    """[closed] βL to half a unit of its last digit, and (βh)⁴ < 2e-4 of 80 cells by 1/100 and less.
+
+    The constant of h⁴ after one extrapolation was measured to be below 1/300.
+    """
+    supports, β = ENDS[ends]
+    runs = [omega(cells, supports, len(β)) for cells in (20, 40, 80)]
+    np.testing.assert_allclose(np.sqrt(romberg(*runs)), β, rtol=2e-6)
+    free = np.array(β) == 0
+    assert all((run[free] == 0.0).all() for run in runs)
+
+
+def test_a_stocky_beam_is_timoshenkos():
+    """[closed] Pinned at both ends v = sin kx, ψ = cos kx: two frequencies for each k = nπ/L.
+
+    Tolerance: (3π/40)⁴/100 after one extrapolation.
+    """
+    EI, GA, ρA, ρI = 1.0, 60.0, 1.0, 0.03
+    section = ub.Section(EA=1e7, GA=GA, EI=EI, rhoA=ρA, rhoI=ρI)
+    wanted = []
+    for n in (1, 2, 3):
+        k = n * math.pi
+        K = [[GA * k**2, -GA * k], [-GA * k, EI * k**2 + GA]]
+        wanted.append(math.sqrt(eigh(K, np.diag([ρA, ρI]), eigvals_only=True)[0]))
+    supports, _ = ENDS["pinned-pinned"]
+    found = extrapolated(*(omega(cells, supports, 3, section=section) for cells in (20, 40)))
+    np.testing.assert_allclose(found, wanted, rtol=3e-5)
+
+
+# -- about loaded states -------------------------------------------------------------------------
+
+
+def pulled(cells, N, *, EI=1.0, n=3):
+    """Modes of a pinned beam that bears the axial force N."""
+    section = ub.Section(EA=1e8, GA=1e8, EI=EI, rhoA=1.0, rhoI=1e-8 * EI)
+    beam = beam_of(cells, section)
+    scene = ub.Scene(
+        [beam],
+        supports=[ub.Pinned(beam.start), ub.Roller(beam.end)],
+        loads=[ub.PointLoad(beam.end, force=(N, 0))],
+    )
+    state = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1, progress=False)
+    return ub.modes(scene, n, at=state)
+
+
+@pytest.mark.parametrize("part", [-0.999, -0.5, 3.0, 100.0])
+def test_axial_force(part):
+    """[closed] ωₙ² = (nπ)⁴ + N (nπ)², N = part of π²: the first one vanishes as -N comes to π².
+
+    Tolerance: a part of the sum of both terms, 3e-6 by the mesh, and the stretch N/EA.
+    """
+    n = np.array([1, 2, 3])
+    stiffness, force = (n * math.pi) ** 4, part * math.pi**2 * (n * math.pi) ** 2
+    found = romberg(*(pulled(cells, part * math.pi**2).omega ** 2 for cells in (20, 40, 80)))
+    tolerance = 3e-6 + 2 * abs(part) * math.pi**2 / 1e8
+    assert np.all(np.abs(found - stiffness - force) < tolerance * (stiffness + np.abs(force)))
+
+
+def test_a_string():
+    """[closed] ωₙ = nπ √(N/ρA) for EI → 0; (nπ)² EI/N is 1e-8 here, and the stretch N/EA is 1e-4.
+
+    A string that stretches by e has ωₙ² = (nπ)² N/(ρA (1 + e)), with lengths of the undeformed one.
+    """
+    found = romberg(*(pulled(cells, 1e4, EI=1e-6).omega for cells in (20, 40, 80)))
+    wanted = np.arange(1, 4) * math.pi * 100 / math.sqrt(1 + 1e-4)
+    np.testing.assert_allclose(found, wanted, rtol=2e-6)
+
+
+def test_beyond_buckling_it_grows():
+    """[closed] s² = (P - π²) π² > 0: damping ratio -1, not an oscillation."""
+    grown = pulled(80, -1.01 * math.pi**2, n=1)
+    assert grown.damping[0] == -1.0
+    # P π² and π⁴ each to the mesh's (π/80)²/12 = 1.3e-4, their difference is a hundredth of them.
+    np.testing.assert_allclose(grown.omega[0] ** 2, 0.01 * math.pi**4, rtol=0.05)
+
+
+def test_becks_column():
+    """[closed] A follower load flutters from 20.0509 EI/L² on; Bolotin, section 2.2.
+
+    In between the frequencies are those of undamped vibrations.  The mesh raises the load by
+    (βh)²/12 of β = 4.7: 3e-4 at 40 cells.
+    """
+    growth = []
+    for part in (0.995, 1.005):
+        beam = beam_of(80)
+        load = ub.FollowerLoad(beam.end, force=(-20.0509 * part, 0))
+        scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+        state = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1, progress=False)
+        growth.append(-ub.modes(scene, 2, at=state).damping.min())
+    assert abs(growth[0]) < 1e-5  # both are near: to the root of round-off
+    assert growth[1] > 1e-2
+
+
+# -- buckling ------------------------------------------------------------------------------------
+
+COLUMNS = {
+    "clamped-free": (lambda b: [ub.Clamped(b.start)], 0.25),
+    "pinned-pinned": (lambda b: [ub.Pinned(b.start), ub.Roller(b.end)], 1.0),
+    "clamped-pinned": (
+        lambda b: [ub.Clamped(b.start), ub.Roller(b.end)],
+        (brentq(lambda x: math.tan(x) - x, 4.4, 4.6) / math.pi) ** 2,
+    ),
+    "clamped-clamped": (lambda b: [ub.Clamped(b.start), ub.Prescribed(b.end, v=0, psi=0)], 4.0),
+}
+"""Supports, and the load over π² EI/L²."""
+
+
+def critical(cells, supports, section=SLENDER, force=-1.0, **more):
+    beam = beam_of(cells, section)
+    load = ub.PointLoad(beam.end, force=(force, 0), time=lambda t: t)
+    return ub.buckling(ub.Scene([beam], supports=supports(beam), loads=[load]), 1, **more)
+
+
+@pytest.mark.parametrize("ends", COLUMNS)
+def test_euler_loads(ends):
+    """[closed] Tolerance: what extrapolation to h⁶ leaves of (2π/64)², and strains of 40/1e8."""
+    supports, factor = COLUMNS[ends]
+    found = romberg(*(critical(cells, supports).factors[0] for cells in (16, 32, 64)))
+    np.testing.assert_allclose(found, factor * math.pi**2, rtol=2e-6)
+
+
+def test_loads_of_another_time():
+    """The factor is one on the loads at the time: the load itself is the same."""
+    supports, _ = COLUMNS["pinned-pinned"]
+    once, thrice = (critical(10, supports, t=t).factors[0] for t in (1.0, 3.0))
+    np.testing.assert_allclose(once, 3 * thrice, rtol=1e-8)  # differences of 1e-5, to second order
+
+
+def test_a_stocky_column_is_reissners():
+    """[closed] P (1 + P/GA - P/EA) = π² EI/L²: shear and compression, from a state near the load.
+
+    E. Reissner, J. Appl. Math. Phys. 23 (1972).  From the unloaded state the factor is that of a
+    straight path: off by a part of the strain P/EA.
+    """
+    EI, EA, GA = 1.0, 100.0, 40.0
+    a = 1 / GA - 1 / EA
+    wanted = (math.sqrt(1 + 4 * a * math.pi**2) - 1) / (2 * a)
+    section = ub.Section(EA=EA, GA=GA, EI=EI, rhoA=1.0, rhoI=0.01)
+    runs = []
+    for cells in (10, 20, 40):
+        beam = beam_of(cells, section)
+        load = ub.PointLoad(beam.end, force=(-1, 0), time=lambda t: t)
+        supports = [ub.Pinned(beam.start), ub.Roller(beam.end)]
+        scene = ub.Scene([beam], supports=supports, loads=[load])
+        near = ub.simulate(scene, ub.Static(), t=(0, 0.999 * wanted), dt=wanted, progress=False)
+        more = ub.buckling(scene, 1, t=wanted, at=near).factors[0]
+        runs.append(wanted * (0.999 + 0.001 * more))
+        far = ub.buckling(scene, 1).factors[0]
+    np.testing.assert_allclose(romberg(*runs), wanted, rtol=1e-6)
+    np.testing.assert_allclose(far, wanted, rtol=wanted / EA)
+
+
+# -- damping -------------------------------------------------------------------------------------
+
+
+def test_rayleigh_and_kelvin_voigt():
+    """[closed] ζ = a0/(2ω) + a1 ω/2 of the same mesh; tolerance: that of the eigenvalue solver."""
+    supports, _ = ENDS["clamped-free"]
+    ω = omega(20, supports, 4)
+    a0, a1, time = 0.2, 1e-3, 5e-4
+    beam = beam_of(20)
+    damping = [ub.Rayleigh(mass=a0, stiffness=a1), ub.KelvinVoigt(time)]
+    damped = ub.modes(ub.Scene([beam], supports=supports(beam), damping=damping), 4)
+    np.testing.assert_allclose(damped.damping, a0 / (2 * ω) + (a1 + time) * ω / 2, rtol=1e-6)
+    np.testing.assert_allclose(damped.omega, ω, rtol=1e-7)
+
+
+def test_decrement_of_a_vibration():
+    """Peaks of a free vibration in the first mode decay with its damping ratio.
+
+    The midpoint rule damps a mode by ζ (1 + O(ω² dt²)), here ω dt = 2π/200; (ω dt)²/4 = 2.5e-4.
+    A first deflection of 1e-4 by a tip load also has 3 % of the second mode, which is damped six times
+    as much and gone after the first peaks.
+    """
+    supports, _ = ENDS["clamped-free"]
+    beam = beam_of(8)
+    push = ub.PointLoad(beam.end, force=(0, 3e-4), time=lambda t: float(t <= 0))
+    held = ub.Scene([beam], supports=supports(beam), loads=[push])
+    free = ub.Scene([beam], supports=supports(beam), damping=[ub.KelvinVoigt(0.02)])
+    bent = ub.simulate(held, ub.Static(), t=(-1, 0), dt=1, progress=False)
+    first = ub.modes(free, 1)
+    period = 1 / first.frequencies[0]
+    moving = ub.simulate(
+        free, ub.Midpoint(), t=(0, 10 * period), dt=period / 200, start=bent, progress=False
+    )
+    tip = moving.displacement(beam.end)[:, 1]
+    _, heights = ub.peaks(moving.times, tip)
+    mean, _ = ub.logarithmic_decrement(heights[3:])
+    np.testing.assert_allclose(ub.damping_ratio(mean), first.damping[0], rtol=1e-3)
+
+
+# -- rotation ------------------------------------------------------------------------------------
+
+
+def ritz(γ, n, degree=16):
+    """ω √(ρA L⁴/EI) of a beam clamped to an axis that turns with γ, in the plane of rotation.
+
+    Euler-Bernoulli: bending, the centrifugal force ρA Ω² (L² - x²)/2, and the centrifugal softening of
+    motion in the plane; x² times Legendre polynomials, integrals exact.
+    """
+    t, weights = np.polynomial.legendre.leggauss(2 * degree)
+    x, weights = (t + 1) / 2, weights / 2
+    square = Legendre.fit(x, x**2, 2, domain=[0, 1])
+    shapes = [square * Legendre.basis(k, domain=[0, 1]) for k in range(degree)]
+    W, dW, ddW = (np.array([s.deriv(d)(x) if d else s(x) for s in shapes]) for d in range(3))
+    K = (ddW * weights) @ ddW.T + γ**2 * (dW * weights * (1 - x**2) / 2) @ dW.T
+    M = (W * weights) @ W.T
+    return np.sqrt(eigh(K - γ**2 * M, M, eigvals_only=True)[:n])
+
+
+def test_the_ritz_solution_is_the_published_one():
+    """[pub] Wright et al., table 1: out of plane 3.6816 and 22.1810 at γ = 1, 11.2023 at γ = 10."""
+    np.testing.assert_allclose(np.hypot(ritz(1.0, 2), 1.0), [3.6817, 22.1810], atol=1e-4)
+    np.testing.assert_allclose(np.hypot(ritz(10.0, 1), 10.0), [11.2023], atol=1e-4)
+
+
+@pytest.mark.parametrize("rate", [1.0, 10.0, 30.0])
+def test_rotating_beam(rate):
+    """In the frame that turns: stiffer by the centrifugal force, softer by its growth outward.
+
+    Coriolis' force couples bending with stretching and is not in the reference: it and the stretch
+    are of the order γ²/EA < 1e-5.  Tolerance: those, and (βh)⁴ of 40 cells by 1/300, β = 7.9.
+    """
+    runs = []
+    for cells in (10, 20, 40):
+        beam = beam_of(cells)
+        frame = ub.RotatingFrame(rate)
+        scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[frame])
+        steady = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1, progress=False)
+        runs.append(ub.modes(scene, 3, at=steady).omega)
+    np.testing.assert_allclose(romberg(*runs), ritz(rate, 3), rtol=1e-4)
+
+
+def sprung_body(k_x, k_y, mass, *more, loads=()):
+    """A body at (1, 0) on springs along x and y."""
+    body = ub.Body((1, 0), mass=mass, inertia=1.0, name="body")
+    here = ub.ground(1, 0)
+    springs = [
+        ub.Slide(here, body.middle, ub.Spring(k_x), axis=(1, 0)),
+        ub.Slide(here, body.middle, ub.Spring(k_y), axis=(0, 1)),
+        ub.Turn(here, body.middle, ub.Spring(1e4)),
+    ]
+    return ub.Scene(bodies=[body], connectors=springs, loads=loads), body
+
+
+def test_foucaults_pendulum():
+    """[closed] Seen from a frame that turns with Ω, ω0 is ω0 - Ω and ω0 + Ω."""
+    ω, rate = 3.0, 0.5
+    scene, _ = sprung_body(2 * ω**2, 2 * ω**2, 2.0, loads=[ub.RotatingFrame(rate, (1, 0))])
+    steady = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1, progress=False)
+    found = ub.modes(scene, 2, at=steady)
+    np.testing.assert_allclose(found.omega, [ω - rate, ω + rate], rtol=1e-12)
+    np.testing.assert_allclose(found.damping, 0.0, atol=1e-12)
+
+
+def test_mass_on_a_turning_rail():
+    """[closed] Free along a rail only: ω² = k/m - Ω²."""
+    k, mass, rate = 8.0, 2.0, 1.5
+    body = ub.Body((1, 0), mass=mass, inertia=1.0)
+    here = ub.ground(1, 0)
+    scene = ub.Scene(
+        bodies=[body],
+        joints=[ub.Prismatic(here, body.middle, axis=(1, 0))],
+        connectors=[ub.Slide(here, body.middle, ub.Spring(k), axis=(1, 0))],
+        loads=[ub.RotatingFrame(rate)],
+    )
+    steady = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1, progress=False)
+    found = ub.modes(scene, 1, at=steady)
+    np.testing.assert_allclose(found.omega, [math.sqrt(k / mass - rate**2)], rtol=1e-12)
+    # k x = m Ω² (1 + x)
+    x = mass * rate**2 / (k - mass * rate**2)
+    np.testing.assert_allclose(steady.displacement(body.middle)[-1], [x, 0, 0], atol=1e-9)

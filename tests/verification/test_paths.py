@@ -1,0 +1,210 @@
+"""Static paths through limit points, bifurcations and snap-backs: S5, S7, S8, S17 of the reference.
+
+[calc] values are those of an independent converged solution, with the digits that are given.  Mesh
+errors are of second order: limits are Richardson's of two meshes, and a fifteenth of what the limit
+changed by from the mesh before is what the fourth order may leave, doubled for the orders above.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from convergence.study import extrapolated
+
+import ufl_beam as ub
+from verification.test_euler_column import TABLE, closed_form
+
+
+def growing(t):
+    return t
+
+
+def two_critical_points(now):
+    return len(now.solution.critical) == 2
+
+
+def assert_reaches(coarse, medium, fine, reference, digits):
+    """Richardson's limit is the reference to half a unit of its last digit and the fourth order."""
+    before, limit = (
+        extrapolated(*map(np.array, pair)) for pair in ((coarse, medium), (medium, fine))
+    )
+    left = 2 / 15 * np.abs(limit - before)
+    assert (np.abs(limit - reference) <= 0.51 * np.array(digits) + left).all(), (limit, left)
+
+
+# -- S5: Lee's frame ---------------------------------------------------------------------------
+
+
+def lee(cells, *, moved=False):
+    """(place, support, scene); a load of 1 kN down at 24 cm from the corner, or the place moved."""
+    A, I, E, nu = 6e-4, 2e-8, 72e9, 0.3  # m², m⁴, Pa
+    section = ub.Section(EA=E * A, GA=E * A / (2 * (1 + nu)), EI=E * I)
+    column = ub.Beam((0, 0), (0, 1.2), section, cells=cells, name="column")
+    girder = ub.Beam((0, 1.2), (1.2, 1.2), section, cells=cells, name="girder")
+    place = girder.at(0.2)
+    push = ub.Prescribed(place, v=lambda t: -t)
+    scene = ub.Scene(
+        [column, girder],
+        joints=[ub.Rigid(column.end, girder.start)],
+        supports=[ub.Pinned(column.start), ub.Pinned(girder.end), *([push] if moved else [])],
+        loads=[] if moved else [ub.PointLoad(place, force=(0, -1e3), time=growing)],
+    )
+    return place, push, scene
+
+
+def test_lee_frame_limit_points():
+    """[calc] (P in kN, v and u in cm); P is flat where it turns, so v and u have a digit less."""
+    results = []
+    for cells in (25, 50, 100):
+        place, _, scene = lee(cells)
+        path = ub.follow(scene, ub.ArcLength(0.04, factor=10), until=two_critical_points)
+        assert [point.kind for point in path.critical] == ["limit", "limit"]
+        u, v, _ = 100 * path.displacement(place)[[point.n for point in path.critical]].T
+        results.append(np.column_stack([[point.factor for point in path.critical], -v, u]))
+    reference = [[18.5466, 48.751, 26.879], [-9.3961, 58.224, 90.181]]
+    assert_reaches(*results, reference, [1e-4, 2e-3, 2e-3])
+
+
+def test_lee_frame_turning_points():
+    """[calc] Where the place turns back, v (cm) and P (kN): limit points of a motion.
+
+    v is flat there, so P has a digit less.
+    """
+    results = []
+    for cells in (25, 50, 100):
+        _, push, scene = lee(cells, moved=True)
+        path = ub.follow(scene, ub.ArcLength(0.04), until=two_critical_points)
+        P = -path.reaction(push)[[point.n for point in path.critical], 1] / 1e3
+        results.append(np.column_stack([[100 * point.factor for point in path.critical], P]))
+    assert_reaches(*results, [[61.013, 11.944], [50.737, -4.360]], [1e-3, 2e-3])
+
+
+# -- S7: deep arch -----------------------------------------------------------------------------
+
+
+def test_deep_arch():
+    """[calc] 897.287, which [pub] DaDeppo and Schmidt 1975 give as 897; the minimum after it.
+
+    The cells are chords of the arc.  v of a maximum that is flat has two digits less than P.
+    """
+    results = []
+    for cells in (40, 80, 160):
+        half = math.radians(215 / 2)
+        section = ub.Section(EA=1e8, GA=1e8, EI=1e6)
+        angles = (math.pi / 2 + half, math.pi / 2 - half)
+        arch = ub.Beam.arc((0, 0), 100.0, angles, section, cells=cells)
+        apex = arch.at(0.5)
+        scene = ub.Scene(
+            [arch],
+            supports=[ub.Clamped(arch.start), ub.Pinned(arch.end)],
+            loads=[ub.PointLoad(apex, force=(0, -1000), time=growing)],
+        )
+        path = ub.follow(scene, ub.ArcLength(0.04), until=two_critical_points)
+        assert [point.kind for point in path.critical] == ["limit", "limit"]
+        u, v, _ = path.displacement(apex)[[point.n for point in path.critical]].T
+        factors = np.array([point.factor for point in path.critical])
+        results.append(np.array([*(1000 * factors), -v[0], u[0], -v[1]]))
+    reference = [897.287, -73.05, 113.727, 61.141, 122.07]
+    assert_reaches(*results, reference, [1e-3, 1e-2, 1e-2, 2e-3, 2e-2])
+
+
+# -- S8: Euler's column ------------------------------------------------------------------------
+
+
+def column(cells, section, P):
+    """A perfect column of unit length, clamped at its foot, loaded along its axis."""
+    beam = ub.Beam((0, 0), (1, 0), section, cells=cells)
+    load = ub.PointLoad(beam.end, force=(-P, 0), time=growing)
+    return beam, ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+
+
+@pytest.mark.parametrize("cells", [4, 32])
+@pytest.mark.parametrize(("EA", "GA"), [(1e8, 1e8), (200.0, 50.0), (50.0, 1e4)])
+def test_critical_load(cells, EA, GA):
+    """[closed] P (1 - P/EA + P/GA) = 4 EI/h² tan²(π h/4L), which tends to π² EI/4L².
+
+    The straight column is shorter by P/EA; what buckles is ψ'' EI + P v' = 0, v' = (1 - P/EA +
+    P/GA) ψ.  Of nodes ψ_i and cells h: ψ' is a difference, v' a mean of both ends, and cos turns
+    to tan².  Located to 1e-7 of a step; round-off of EA and the solver's tolerance are below.
+    """
+    _, scene = column(cells, ub.Section(EA=EA, GA=GA, EI=1.0), 1.0)
+    path = ub.follow(scene, ub.ArcLength(0.2), until=lambda now: now.t > 3)
+    (point,) = path.critical
+    P = point.factor
+    assert point.kind == "bifurcation"
+    left = P * (1 - P / EA + P / GA)
+    assert left == pytest.approx(4 * cells**2 * math.tan(math.pi / 4 / cells) ** 2, rel=1e-7)
+    # The path goes on straight.
+    assert np.abs(path.q[-1][path.grid.dofs[:, 1:]]).max() < 1e-6
+
+
+def test_branch_to_the_elastica():
+    """[closed] Load and end position at the angles of the table, up to 176 degrees.
+
+    Besides the mesh: strains of axis and shear, 1e-8 P.
+    """
+    results = []
+    for cells in (32, 64, 128):
+        beam, scene = column(cells, ub.Section(EA=1e8, GA=1e8, EI=1.0), math.pi**2 / 4)
+        straight = ub.follow(scene, ub.ArcLength(0.2), until=lambda now: now.t > 1.1)
+        (point,) = straight.critical
+        turn = ub.Displacement(beam.end, "psi", math.radians(4))
+        bent = ub.follow(scene, turn, start=point.branch(), steps=44)
+        at = [row[0] // 4 for row in TABLE]
+        u, v, ψ = bent.displacement(beam.end)[at].T
+        np.testing.assert_allclose(np.degrees(ψ), [row[0] for row in TABLE], rtol=1e-8)
+        results.append(np.column_stack([bent.factor[at], 1 + u, v]))
+        assert bent.energy.lost == {}
+    exact = [closed_form(math.radians(degrees)) for degrees, *_ in TABLE]
+    # P = 22 at most: 22e-8 of 1e-6
+    assert_reaches(*results, exact, [1e-6, 1e-6, 1e-6])
+
+
+# -- S17: a hinge that snaps back ----------------------------------------------------------------
+
+EI, LENGTH, M_U = 1000.0, 2.0, 10.0  # N m², m, N m
+SCALE = 1e-3
+"""Moments are so many times, energies its square times those; rotations stay linear."""
+
+
+@pytest.mark.parametrize("steepness", [4 / 3, 4.0, 40.0])
+@pytest.mark.parametrize("law", [ub.Softening, ub.LinearSoftening])
+def test_hinge_snap_back(law, steepness):
+    """[closed] M = M_u exp(-M_u α/G_f) or linear, δ = F Σ(..) + α arm, G_f (1 - M/M_u); 1e-6.
+
+    As in ``test_hinge.py``, but softening falls ``steepness`` times as steeply as 3EI/L: beyond the
+    peak both the load and the displacement go back, and no other control finds a way.  Rotations
+    are 1e-3 of a radian, and what is not linear 1e-6 of that.
+    """
+    part = 2 if law is ub.LinearSoftening else 1
+    energy = M_U**2 / (part * steepness * 3 * EI / LENGTH)
+    h, GA = 2e-6, EI / (1e-5 * LENGTH**2)
+    beam = ub.Beam(
+        (0, 0), (LENGTH, 0), ub.Section(EA=GA, GA=GA, EI=EI), cells=8, corners=(h / LENGTH,),
+        hinges={0.0: law(SCALE * M_U, SCALE**2 * energy)},
+    )  # fmt: skip
+    load = ub.PointLoad(beam.end, force=(0, SCALE * M_U / LENGTH), time=growing)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    control = ub.Dissipation(SCALE**2 * energy / 16, ub.ArcLength(0.2))
+    spent = SCALE**2 * energy * 0.9
+    path = ub.follow(scene, control, until=lambda now: now.ledger.lost["hinges"] > spent)
+
+    vertices = LENGTH * np.array(beam.vertices([]))
+    lengths, arms = np.diff(vertices), LENGTH - (vertices[1:] + vertices[:-1]) / 2
+    F = path.factor * M_U / LENGTH
+    α = path.material_at(beam.start).jump / SCALE
+    δ = F * (np.sum(lengths * arms**2) / EI + LENGTH / GA) + α * arms[0]
+    np.testing.assert_allclose(path.displacement(beam.end)[1:, 1] / SCALE, δ[1:], rtol=1e-6)
+    opens = α > 0
+    assert opens.sum() >= 15
+    M = M_U * (np.exp(-M_U * α / energy) if part == 1 else 1 - M_U * α / (2 * energy))
+    np.testing.assert_allclose(F[opens] * arms[0], M[opens], rtol=1e-6)
+    lost = path.energy.lost["hinges"] / SCALE**2 / energy
+    # Of the exponential law 1 - M/M_u, of the linear one 1 - (M/M_u)²
+    np.testing.assert_allclose(lost[opens], 1 - (M[opens] / M_U) ** part, rtol=1e-6, atol=1e-9)
+    (peak,) = path.critical
+    assert peak.kind == "limit"
+    assert peak.factor == pytest.approx(LENGTH / arms[0], rel=1e-5)
+    after = slice(peak.n, peak.n + 3)
+    assert (np.diff(F[after]) < 0).all()
+    assert (np.diff(δ[after]) < 0).all()

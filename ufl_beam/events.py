@@ -1,0 +1,117 @@
+"""What happens in a run: what yields, opens, breaks free, touches or slides, and when."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ufl_beam.beams import Place
+from ufl_beam.connectors import Connector, Coulomb, Stop
+from ufl_beam.record import Recorder
+
+if TYPE_CHECKING:
+    from ufl_beam.simulation import Simulation
+
+Flags = npt.NDArray[np.bool_]
+
+IN_CELLS = ("yields", "opens", "is free")
+"""What can happen once in a cell: plastic flow, the opening of a hinge or crack, its end."""
+
+BETWEEN = {Stop: ("touches", "lets go"), Coulomb: ("slides", "sticks")}
+"""What can happen to connectors, and its end."""
+
+FREE = 0.999
+"""Part of the energy of a hinge after which it is called a joint."""
+
+
+class Event(NamedTuple):
+    """Something that happened in a step.
+
+    Attributes:
+        time: End of the step; s.
+        where: A place in the middle of a cell, or a connector.
+        what: "yields", "opens", "is free" in a cell; "touches", "lets go", "slides", "sticks".
+    """
+
+    time: float
+    where: Place | Connector
+    what: str
+
+    def __str__(self) -> str:
+        return f"t = {self.time:.9g} s: {self.where} {self.what}"
+
+
+class Events(Recorder):
+    """A list of what happens, for scenes with hinges, inelastic material, stops or friction.
+
+    A hinge "is free" when it has dissipated 99.9 % of its energy; stops touch and let go, friction
+    slides and sticks as often as they do, the rest happens once in a cell.
+
+    Args:
+        tell: Called on the first process with each event as it happens, such as ``print``.
+
+    Attributes:
+        found: The events in their order, the same on all processes.
+    """
+
+    def __init__(self, tell: Callable[[Event], object] | None = None) -> None:
+        self._tell = tell
+        self.found: list[Event] = []
+
+    def require_writable(self) -> None:
+        """Nothing is written."""
+
+    def open(self, simulation: Simulation) -> None:
+        """Take note of the initial state."""
+        self.found = []
+        grid = simulation.grid
+        laws = [law for beam in simulation.scene.beams for law in grid.hinges(beam)]
+        breaking = [law is not None and law.limit > 0 for law in laws]
+        energies = [law.energy if law is not None else np.inf for law in laws]
+        self._enough = np.where(breaking, FREE * np.array(energies), np.inf)
+        links = simulation.scene.links
+        self._links = [i for i, link in enumerate(links) if type(link.law) in BETWEEN]
+        self._flags = self._look(simulation)
+
+    def _look(self, simulation: Simulation) -> tuple[Flags, Flags]:
+        """What has happened in each cell; what goes on in each connector that is watched."""
+        in_cells = np.zeros((len(simulation.grid.cells), len(IN_CELLS)), dtype=bool)
+        for cells, rows in simulation.material():
+            plastic, broken = rows[:, 4], rows[:, 5]
+            happened = (plastic > 0, broken > 0, broken >= self._enough[cells])
+            in_cells[cells] = np.column_stack(happened)
+        between = np.zeros((len(self._links), 1), dtype=bool)
+        if self._links:
+            forces = simulation.connections()[self._links, 1]
+            limits = [self._limit(simulation, link) for link in self._links]
+            between[:, 0] = np.abs(forces) > limits
+        return in_cells, between
+
+    def _limit(self, simulation: Simulation, link: int) -> float:
+        """Force of a connector above which it touches, or slides; N or N m."""
+        # A force at the limit of friction is known to some digits.
+        return (1 - 1e-9) * simulation.asked.get(simulation.scene.links[link], 0.0)
+
+    def write(self, simulation: Simulation) -> None:
+        """Note what has changed in the step."""
+        flags = self._look(simulation)
+        (cells, between), (cells_before, between_before) = flags, self._flags
+        self._flags = flags
+        scene, grid = simulation.scene, simulation.grid
+        new: list[Event] = []
+        for cell, n in np.argwhere(cells & ~cells_before).tolist():
+            new.append(Event(simulation.t, grid.middle(cell), IN_CELLS[n]))
+        for i in np.flatnonzero(between != between_before).tolist():
+            link = scene.links[self._links[i]]
+            begins, ends = BETWEEN[type(link.law)]
+            new.append(Event(simulation.t, link, begins if between[i, 0] else ends))
+        self.found += new
+        if self._tell is not None and simulation.comm.rank == 0:
+            for event in new:
+                self._tell(event)
+
+    def close(self) -> None:
+        """Nothing is open."""
