@@ -1,6 +1,6 @@
 # Every target runs through ./env, which brings DOLFINx where it is missing. `make` lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-mpi verify demos check bench
+.PHONY: help demo test test-mpi verify long demos check bench extremes
 
 # Natively as root Open MPI refuses to start; with more ranks than cores, too (the last two lines: versions 5 and 6).
 # ./env sets the same in its root.
@@ -12,7 +12,7 @@ export PRTE_MCA_mapby = :oversubscribe
 export OMPI_MCA_mpi_yield_when_idle = 1
 
 # $(call mpi,N) COMMAND...: a rank that fails alone leaves the others waiting, hence the limit in seconds; only the first rank writes to the terminal; what another writes is shown if it fails.
-mpi = ./env timeout 1200 mpirun -n $(1) sh -c 'rank=$${OMPI_COMM_WORLD_RANK:-$${PMI_RANK:-0}}; [ $$rank = 0 ] && exec "$$@"; \
+mpi = ./env timeout 2400 mpirun -n $(1) sh -c 'rank=$${OMPI_COMM_WORLD_RANK:-$${PMI_RANK:-0}}; [ $$rank = 0 ] && exec "$$@"; \
 	log=.rank$$rank.log; "$$@" >$$log 2>&1 && exec rm $$log; status=$$?; echo "rank $$rank:"; cat $$log; exit $$status' -
 pytest_mpi = python3 -m pytest -q --color=no -p no:cacheprovider tests/unit tests/properties
 cheap_demos = $(addprefix demos/demo_,$(addsuffix .py,four_beam_swing roll_up emergency_stop fibre_damping monte_carlo))
@@ -33,12 +33,18 @@ test-mpi: ## unit and property tests on 2 and on 3 ranks
 verify: ## the slow verification studies
 	@./env python3 -m pytest -m slow
 
+long: ## a million steps of a softening frame: memory, files and ledger; a quarter of an hour
+	@UFL_BEAM_STEPS=1000000 ./env python3 -m pytest -m slow -s tests/verification/test_long_run.py
+
 demos: ## all demos one after the other, then the cheap ones on 2 ranks
 	@set -e; for demo in demos/demo_*.py; do echo "== $$demo"; ./env python3 $$demo; done
 	@set -e; for demo in $(cheap_demos); do echo "== $$demo, 2 ranks"; $(call mpi,2) python3 $$demo; done
 
 check: ## lint, format and types
 	@./env sh -ec '$(with_ruff); $$ruff check; $$ruff format --check; python3 -m mypy'
+
+extremes: ## what happens at the extremes, as a table in docs/extremes.md
+	@./env python3 benchmarks/extremes
 
 bench: ## time per step
 	@./env python3 benchmarks/bench_step.py

@@ -16,7 +16,7 @@ from ufl_beam.simulation import Trial
 from ufl_beam.solve import StepFailed
 
 if TYPE_CHECKING:
-    from ufl_beam.continuation import Walk
+    from ufl_beam.walk import Walk
 
 
 # -- equations of steps --------------------------------------------------------------------------
@@ -175,7 +175,7 @@ class ArcLength:
         reach = abs(self.step) * part
         size = walk.length(walk.direction, self.factor)
         unit = Direction(walk.direction.q / size, walk.direction.t / size)
-        normal = Direction(walk.weights * unit.q, unit.t / self.factor**2)
+        normal = Direction(np.asarray(walk.weights * unit.q), unit.t / self.factor**2)
         return walk.attempt(unit, reach, Plane(walk, normal, reach))
 
 

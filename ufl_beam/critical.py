@@ -11,8 +11,7 @@ from scipy.sparse.linalg import splu
 
 from ufl_beam.compat import Array
 from ufl_beam.errors import SceneError
-from ufl_beam.grid import Share
-from ufl_beam.grid import Index
+from ufl_beam.grid import Index, Share
 from ufl_beam.solution import Solution
 from ufl_beam.solve import StepFailed
 from ufl_beam.sparse import Csr

@@ -9,13 +9,12 @@ from mpi4py import MPI
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import block_array, csr_array, diags_array
-from scipy.sparse import eye_array as identity
+from scipy.sparse import block_array, csr_array, diags_array, eye_array
 from scipy.sparse.linalg import splu
 
 from ufl_beam import eigen
 from ufl_beam.compat import Array
-from ufl_beam.eigen import MORE, ROUND_OFF, SHIFT, ZERO, Complex
+from ufl_beam.eigen import ROUND_OFF, SHIFT, ZERO, Complex
 from ufl_beam.errors import SceneError
 from ufl_beam.grid import Index
 from ufl_beam.scene import Scene
@@ -23,6 +22,9 @@ from ufl_beam.schemes import Static, Step
 from ufl_beam.simulation import Simulation
 from ufl_beam.solution import Solution
 from ufl_beam.sparse import Csr
+
+APART = 1e-9
+"""Part of the largest damping below which what couples two motions does not count."""
 
 AT_REST = 1e300
 """Length of a step in which all rates vanish; s."""
@@ -94,7 +96,7 @@ class SmallMotions:
     def _axes(self) -> csr_array:
         """Columns: the components of motion, in the axes of supports."""
         turned = [support for support in self.scene.supports if support.angle]
-        Q = identity(self.grid.size, format="lil")
+        Q = eye_array(self.grid.size, format="lil")
         for support in turned:
             i, j = self.grid.node(support.place)[:2]
             c, s = math.cos(support.angle), math.sin(support.angle)
@@ -113,7 +115,7 @@ class SmallMotions:
 
     def exponents(self, n: int) -> tuple[Complex, Complex]:
         """At least n exponents, if there are so many, and motions; (m,), (unknowns, m)."""
-        K, M, n = self.K, self.M, min(n, self.most)
+        K, M = self.K, self.M
         heavy = (M.diagonal() > 0) & (K.diagonal() != 0)
         squares = np.abs(K.diagonal()[heavy]) / M.diagonal()[heavy]
         highest, low = (squares.max(), squares.min()) if heavy.any() else (1.0, 1.0)
@@ -161,7 +163,7 @@ class SmallMotions:
         N = free @ np.linalg.inv(np.linalg.cholesky(free.T @ (self.M @ free))).T
         Λ = N.T @ (C @ N)
         _, sizes, rows = np.linalg.svd(C @ N - self.M @ N @ Λ, full_matrices=False)
-        W = rows[sizes <= ROUND_OFF * abs(C).max() * np.abs(N).max(initial=0.0)].T
+        W = rows[sizes <= APART * abs(C).max() * np.abs(N).max(initial=0.0)].T
         N, Λ = N @ W, W.T @ Λ @ W
         B = csr_array(self.M @ N * (abs(self.K).max() / abs(self.M).max() ** 0.5))
         K = csr_array(block_array([[self.K, B], [B.T, csr_array((B.shape[1],) * 2)]]))
@@ -169,7 +171,7 @@ class SmallMotions:
         for A in (C, M):
             A.resize(K.shape)
         most = 2 * (self.most - B.shape[1])
-        s, x = eigen.quadratic(K, C, M, min(2 * n + MORE, most), most=most, shift=lowest)
+        s, x = eigen.quadratic(K, C, M, 2 * n, most=most, shift=lowest)
         s, x = self._with_zeros(s, x[: len(free)], free)
         decay, how = np.linalg.eig(-Λ)
         slows = np.abs(decay) > ROUND_OFF * abs(C).max() / abs(self.M).max()
@@ -197,7 +199,7 @@ class SmallMotions:
         ahead, back = (self._reduced(self._derivative(self.q + d * u, AT_REST)) for d in (ε, -ε))
         change = (back - ahead) / (2 * ε)
         size = self.K.shape[0]
-        factors, x = eigen.linear(self.K, change, min(n, size), most=size, definite=False)
+        factors, x = eigen.linear(self.K, change, n, most=size, definite=False)
         there = np.abs(factors) < 1e9 * np.abs(factors).min(initial=np.inf)
         return factors[there], x[:, there].astype(complex)
 

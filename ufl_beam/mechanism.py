@@ -12,8 +12,9 @@ from scipy.sparse.linalg import eigsh
 from ufl_beam.beams import Beam, Point
 from ufl_beam.bodies import GROUND, Anchor, Body, Node, Spot, node
 from ufl_beam.compat import Array
-from ufl_beam.connectors import Connector, Function, Guide, Motor, Spring
+from ufl_beam.connectors import Actuator, Connector, Function, Guide, Motor, Spring
 from ufl_beam.errors import SceneError
+from ufl_beam.loads import LineLoad, RotatingFrame, TimeFunction
 from ufl_beam.scene import Scene, Slot
 
 DENSE = 90
@@ -44,13 +45,14 @@ def no_number(scene: Scene, times: Iterable[float]) -> str:
     named: list[tuple[object, TimeFunction]] = []
     for load in scene.loads:
         if not isinstance(load, RotatingFrame):
-            place = getattr(load, "place", getattr(load, "beam", None))
-            named.append((f"{type(load).__name__}{f' at {place}' if place else ''}", load.time))
+            where = load.beam.start if isinstance(load, LineLoad) else getattr(load, "place", "")
+            named.append((f"{type(load).__name__} {where}", load.time))
     named += [(support, motion) for support in scene.supports for motion in support.held.values()]
-    laws = ((link, link.law) for link in scene.links)
-    for link, law in laws:
-        if isinstance(law, Motor | Actuator):
-            named.append((link, law.motion if isinstance(law, Motor) else law.force))
+    for link in scene.links:
+        if isinstance(link.law, Motor):
+            named.append((link, link.law.motion))
+        if isinstance(link.law, Actuator):
+            named.append((link, link.law.force))
     for t in times:
         for name, function in named:
             if not math.isfinite(value := float(function(t))):

@@ -254,13 +254,11 @@ class Points:
     def change(self) -> float:
         """Energy that :meth:`accept` would add to what is stored and dissipated; J."""
         changes = self._sums_to_come() - [0, 0, 0, *self.sums[3:]]
-        plastic, broken, _, elastic, hardening = changes.tolist()
-        return float(plastic + broken + elastic + hardening)
+        return float(np.sum(changes[[0, 1, 3, 4]]))
 
     def dissipation(self) -> float:
         """Energy that :meth:`accept` would add to what is dissipated; J."""
-        plastic, broken, *_ = self._sums_to_come().tolist()
-        return float(plastic + broken)
+        return float(np.sum(self._sums_to_come()[:2]))
 
     def _sums_to_come(self) -> Array:
         """What :meth:`accept` would make of :attr:`sums`."""

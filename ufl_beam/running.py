@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 
@@ -22,7 +23,7 @@ from ufl_beam.processes import in_study, ours
 from ufl_beam.record import UNLIMITED, Recorder, on_first
 from ufl_beam.scene import Scene
 from ufl_beam.schemes import Scheme, has_inertia
-from ufl_beam.simulation import Simulation
+from ufl_beam.simulation import SMALLEST_PART, Simulation
 from ufl_beam.solution import Solution
 from ufl_beam.solve import Newton
 
@@ -73,7 +74,7 @@ def simulate(
     """
     comm = ours() if comm is None else comm
     t0, t1 = _require_times(t)
-    _require_step(dt, scheme)
+    _require_step(dt, scheme, (t0, t1))
     require_count(every, "simulate: every")
     require_count(most, "simulate: most")
     recorders = (record,) if isinstance(record, Recorder) else require_sequence(record, "record")
@@ -157,9 +158,15 @@ def _require_times(t: tuple[float, float]) -> tuple[float, float]:
     return float(t0), float(t1)
 
 
-def _require_step(dt: float | Adaptive, scheme: Scheme) -> None:
+def _require_step(dt: float | Adaptive, scheme: Scheme, t: tuple[float, float]) -> None:
     if not isinstance(dt, Adaptive):
         require_number(dt, "simulate: dt", positive=True)
+        least = SMALLEST_PART * math.ulp(max(map(abs, t)))
+        if dt < least:
+            raise SceneError(
+                f"simulate: dt = {dt:g} s is too small: steps from t = {t[0]:g} to {t[1]:g} s can be "
+                f"told apart, and cut, from {least:.1e} s on; use a larger one, or let t begin at 0"
+            )
     elif not has_inertia(scheme):
         raise SceneError(
             "simulate: dt = Adaptive(...) estimates the error of accelerations, and a static scheme "

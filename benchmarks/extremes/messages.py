@@ -80,7 +80,7 @@ CASES = {
     "a load is infinite from some time on": (lambda: run(cantilever(_late(math.inf))), "PointLoad"),
     "a motion is not a number from some time on": (lambda: _motion(math.nan), "Prescribed"),
     "a time function raises": (lambda: run(cantilever(_raises)), "a user's own error"),
-    "the force of a Function is not a number": (_function_fails, "Function"),
+    "the force of a Function is not a number": (_function_fails, "Slide"),
     "a beam of zero length": (lambda: ub.Beam((1, 1), (1, 1), ub.Section(**STEEL)), "zero length"),
     "a stiffness of zero": (_section(EA=0.0), "must be positive"),
     "a stiffness that is infinite": (_section(EI=math.inf), "not finite"),

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-STEPS = 12
+STEPS = 10
 """Steps of a run."""
 
 SPOTS = (0.0, 0.5, 1.0)
@@ -315,7 +315,7 @@ class _Writer:
     # -- loads ---------------------------------------------------------------------------------
 
     def _load(self):
-        size = self._F * self._size(-4, 0.5)
+        size = self._F * self._size(-4, 0)
         place = self._one(self._anchors)
         force, moment, time = self._vector(size), size * self._L * self._some(-1, 1), self._time()
         kinds = [f"ub.PointLoad({place}, force={force}, moment={moment:.6g}, time={time})"]

@@ -147,7 +147,7 @@ def test_sway_branches_off():
 
 
 def test_a_limit_point_has_no_branch():
-    apex, scene = truss()
+    _, scene = truss()
     path = ub.follow(scene, ub.ArcLength(0.1), until=lambda now: now.solution.critical)
     with pytest.raises(ub.SceneError, match="limit point"):
         path.critical[0].branch()

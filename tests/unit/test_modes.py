@@ -144,7 +144,7 @@ def test_a_free_chain_has_as_many_zeros_as_it_can_move(damping):
     assert np.sum(found.omega == 0) == 4
     assert np.isnan(found.damping[:4]).all()
     slow = [s for s in found.exponents if s.imag == 0 and s != 0]
-    np.testing.assert_allclose(slow, -0.1, rtol=1e-9)
+    np.testing.assert_allclose(slow, -0.1, rtol=1e-7)
     assert len(slow) == (4 if damping and isinstance(damping[0], ub.Rayleigh) else 0)
 
 
@@ -166,7 +166,8 @@ def test_friction_that_sticks_holds():
 def test_what_has_yielded_answers_elastically():
     """The frequencies of a beam that was bent beyond its limit are those of an elastic one.
 
-    Its deflection remains; the curvature shifts them by its square, 1e-3² here.
+    It stays bent under its load, which shifts them by less than a hundredth; with the tangent of
+    hardening, a tenth of the elastic one at the clamp, the first would be a third lower.
     """
     law = ub.Hardening(limit=1.0, modulus=2.0)
     section = ub.Section(EA=1e4, GA=4e3, EI=20.0, rhoA=0.5, rhoI=1e-3, bending=law)
@@ -176,7 +177,7 @@ def test_what_has_yielded_answers_elastically():
     bent = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, progress=False)
     assert bent.energy.lost["plastic"][-1] > 0
     elastic = ub.modes(cantilever(), 3).omega
-    np.testing.assert_allclose(ub.modes(scene, 3, at=bent).omega, elastic, rtol=5e-3)
+    np.testing.assert_allclose(ub.modes(scene, 3, at=bent).omega, elastic, rtol=1e-2)
 
 
 def test_a_hinge_that_bears_nothing_is_a_joint():

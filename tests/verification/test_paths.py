@@ -10,9 +10,9 @@ import math
 import numpy as np
 import pytest
 from convergence.study import extrapolated
+from verification.test_euler_column import TABLE, closed_form
 
 import ufl_beam as ub
-from verification.test_euler_column import TABLE, closed_form
 
 
 def growing(t):

@@ -1,0 +1,157 @@
+# %% [markdown]
+# # Adaptive steps: short where it matters
+#
+# The four-beam swing moves slowly for 0.64 s, then it snaps taut within microseconds.  Equal steps
+# that resolve the snap are far too short for the rest.  `dt=ub.Adaptive(tolerance)` takes steps as
+# long as the accuracy allows: each step estimates its own error from how its acceleration changes.
+#
+# This demo emphasises
+#
+# * adaptive steps against equal ones: steps needed for the same error,
+# * that steps end where the table of the load has its kinks,
+# * the list of events, here of a stop that the beam hits,
+# * what the tolerance means.
+
+# %%
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+import ufl_beam as ub
+
+output = Path("output")
+output.mkdir(exist_ok=True)
+
+# %% [markdown]
+# ## Scene
+#
+# That of `demo_four_beam_swing.py`, up to the moment when the links are taut.
+
+# %%
+E, nu, rho = 73e9, 0.3, 2700.0  # Pa, -, kg/m^3
+flexible = ub.Section.rectangle(b=5e-3, h=1e-3, E=E, nu=nu, rho=rho)  # m
+rigid = ub.Section(EA=1e4 * flexible.EA, GA=1e4 * flexible.GA, EI=1e4 * flexible.EI, depth=3e-3)
+
+beam = ub.Beam((0, -0.36), (0.72, -0.36), flexible, cells=4, name="beam")  # m
+left = ub.Beam((0, 0), (0, -0.36), rigid, cells=1, name="left link")
+right = ub.Beam((1.08, 0), (0.72, -0.36), rigid, cells=1, name="right link")
+middle = beam.at(0.5)
+push = ub.Table([0, 0.128, 0.256], [0, 2, 0])  # s, N
+
+
+def swing(connectors=()):
+    """The swing, and what else acts on it."""
+    return ub.Scene(
+        beams=[beam, left, right],
+        joints=[ub.Revolute(left.end, beam.start), ub.Revolute(right.end, beam.end)],
+        supports=[ub.Pinned(left.start), ub.Pinned(right.start)],
+        masses=[ub.PointMass(middle, 0.5)],  # kg
+        loads=[ub.PointLoad(middle, force=(1, 0), time=push)],
+        connectors=connectors,
+    )
+
+
+# %% [markdown]
+# ## Errors and steps
+#
+# The error is that of the places of the beam at 0.64 s, against the run with the smallest tolerance.
+
+# %%
+END = 0.64  # s
+
+
+def places(solution):
+    """Both ends and the middle of the beam at the end of a run; m."""
+    return np.array([solution.displacement(p)[-1, :2] for p in (beam.start, middle, beam.end)])
+
+
+def run(dt):
+    """The swing until it is taut."""
+    return ub.simulate(swing(), ub.Midpoint(), t=(0.0, END), dt=dt)
+
+
+tolerances = [1e-4, 1e-5, 1e-6, 1e-7]
+adaptive = [run(ub.Adaptive(tolerance)) for tolerance in tolerances]
+equal = [run(dt) for dt in (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4)]
+exact = places(run(ub.Adaptive(1e-8)))
+
+
+def error(solution):
+    """Largest distance from the exact places; m."""
+    return float(np.linalg.norm(places(solution) - exact, axis=1).max())
+
+
+ub.say("tolerance     steps   shortest s    longest s      error m   sum of estimates m")
+for tolerance, one in zip(tolerances, adaptive, strict=True):
+    dt = np.diff(one.times)
+    sum_of_estimates = one.time_error * one.scene.size
+    numbers = f"{dt.min():12.2e} {dt.max():12.2e} {error(one):12.2e} {sum_of_estimates:20.2e}"
+    ub.say(f"{tolerance:9.0e} {one.parts:9d} {numbers}")
+for one in equal:
+    dt = END / one.parts
+    ub.say(f"    equal {one.parts:9d} {dt:12.2e} {dt:12.2e} {error(one):12.2e}")
+
+chosen = adaptive[2]
+assert error(chosen) < min(error(one) for one in equal if one.parts < 5 * chosen.parts)
+assert error(chosen) < chosen.time_error * chosen.scene.size
+for kink in push.times[1:]:
+    assert kink in chosen.times
+
+# %% [markdown]
+# Against equal steps that err as much, adaptive ones are fewer by an order of magnitude.  The sum
+# of the errors that the steps estimated is above the error that is left: here the motion forgets.
+#
+# ## Something to hit
+#
+# A stop 0.12 m to the right of the middle.  `Events` lists what happens; the steps find the
+# impacts by themselves.
+
+# %%
+stop = ub.Slide(ub.ground(0.36, -0.36), middle, ub.Stop(1e5, high=0.12), axis=(1, 0))
+events = ub.Events()
+hitting = ub.simulate(
+    swing([stop]), ub.Midpoint(), t=(0.0, 0.6), dt=ub.Adaptive(1e-6), record=events
+)
+ub.say("\na stop at 0.12 m\n" + "\n".join(map(str, events.found[:8])))
+ub.say(hitting)
+assert events.found[0].what == "touches"
+assert hitting.energy.worst < 1e-9
+
+# %% [markdown]
+# ## Pictures
+
+# %%
+figure, (top, bottom) = plt.subplots(2, 1, figsize=(8, 7), layout="constrained")
+for one, label in ((chosen, "links that snap at 0.64 s"), (hitting, "a stop at 0.12 m")):
+    top.semilogy(one.times[1:], np.diff(one.times), ".-", ms=3, lw=0.8, label=label)
+for event in events.found:
+    top.axvline(event.time, color="0.8", lw=0.5, zorder=0)
+for kink in push.times[1:]:
+    top.axvline(kink, color="C2", lw=0.8, ls="--", zorder=0)
+top.set(
+    xlabel="t  [s]",
+    ylabel="step  [s]",
+    title="The step follows the motion (dashed: kinks of the load, grey: impacts)",
+)
+top.legend(loc="lower left", frameon=False)
+
+for runs, style, label in ((equal, "s--", "equal steps"), (adaptive, "o-", "adaptive steps")):
+    bottom.loglog([one.parts for one in runs], [error(one) for one in runs], style, label=label)
+bottom.set(
+    xlabel="steps",
+    ylabel="error of position at 0.64 s  [m]",
+    title="The same accuracy with fewer steps",
+)
+bottom.legend(frameon=False)
+for axes in (top, bottom):
+    axes.grid(alpha=0.3)
+if ub.processes.ours().rank == 0:
+    figure.savefig(output / "adaptive_steps.png", dpi=150)
+
+# %% [markdown]
+# ## Try this
+#
+# * `Midpoint(0.05, 0.05)`: what the scheme loses counts as an error, so steps are shorter.
+# * A pulse that no table announces, `time=lambda t: 2.0 * (0.1 < t < 0.2)`: steps find the jumps
+#   at some cost; `ub.Adaptive(1e-6, stops=[0.1, 0.2])` saves it.
