@@ -25,9 +25,9 @@ import ufl_beam as ub
 output = Path("output")
 output.mkdir(exist_ok=True)
 
-aluminium = dict(E=70e9, nu=0.33, rho=2700.0)  # Pa, -, kg/m^3
 L = 2.0  # m
-section = ub.Section.rectangle(b=0.20, h=0.03, **aluminium)  # m
+# aluminium: m, Pa, -, kg/m^3
+section = ub.Section.rectangle(b=0.20, h=0.03, E=70e9, nu=0.33, rho=2700.0)
 blade = ub.Beam((0, 0), (L, 0), section, cells=40, name="blade")
 root = ub.Clamped(blade.start)
 inner = ub.KelvinVoigt(time=2e-5)  # s
@@ -35,9 +35,7 @@ inner = ub.KelvinVoigt(time=2e-5)  # s
 
 def spinning(rate):
     """The blade seen from the frame that turns with it; rad/s."""
-    return ub.Scene(
-        [blade], supports=[root], loads=[ub.RotatingFrame(rate)], damping=[inner]
-    )
+    return ub.Scene([blade], supports=[root], loads=[ub.RotatingFrame(rate)], damping=[inner])
 
 
 def modes_at(rate, n=3):
@@ -65,9 +63,9 @@ ub.say(f"the root bears {pull / 1e3:.1f} kN, the tip moves out by "
 # %% [markdown]
 # ## Southwell's bound
 #
-# With the shape w(x) of the blade at rest, Rayleigh's quotient gives ω² ≤ ω₀² + (k - 1) Ω²: k is the
-# work of the centrifugal force, ∫ (L² - x²)/2 w'² dx / ∫ w² dx, and -1 is what the growth of that
-# force takes away in the plane of rotation.  The shape at rest is known in closed form.
+# With the shape w(x) of the blade at rest, Rayleigh's quotient gives ω² ≤ ω₀² + (k - 1) Ω²: k is
+# the work of the centrifugal force, ∫ (L² - x²)/2 w'² dx / ∫ w² dx, and -1 is what the growth of
+# that force takes away in the plane of rotation.  The shape at rest is known in closed form.
 
 # %%
 x = np.linspace(0.0, 1.0, 4001)
@@ -130,17 +128,19 @@ ub.say("\npictures:", *sorted(str(p) for p in output.glob("rotating_beam*.png"))
 # %% [markdown]
 # ## What the agreement proves
 #
-# The computed frequencies stay below the bound, and near it: only where the speed is large, and most
-# in the first mode, does the shape change.  The damping ratios of the second and third mode fall with
-# the speed: the centrifugal force stores more and more of their energy, and only what strains store
-# is damped here.
+# The computed frequencies stay below the bound, and near it: only where the speed is large, and
+# most in the first mode, does the shape change.  The damping ratios of the second and third mode
+# fall with the speed: the centrifugal force stores more and more of their energy, and only what
+# strains store is damped here.
 
 # %%
 assert np.all(frequencies <= bounds * (1 + 1e-6))
 assert np.all(frequencies[:, 1:] >= 0.98 * bounds[:, 1:])
 assert np.allclose(ratios[0], inner.time * np.pi * frequencies[0], rtol=1e-5)  # time ω/2 at rest
 assert np.all(np.diff(ratios[:, 1:], axis=0) < 0)
-assert np.isclose(pull, section.rhoA * rates[-1] ** 2 * L**2 / 2, rtol=1e-2)  # less what it stretches
+assert np.isclose(
+    pull, section.rhoA * rates[-1] ** 2 * L**2 / 2, rtol=1e-2
+)  # less what it stretches
 
 # %% [markdown]
 # ## Try this

@@ -25,10 +25,10 @@ from ufl_beam.connectors import (
     Stretch,
     Turn,
 )
-from ufl_beam.cycles import Cycles, Gerber, Goodman, SNCurve, rainflow
 from ufl_beam.continuation import Path, follow
 from ufl_beam.controls import ArcLength, Displacement, Dissipation, Load
 from ufl_beam.critical import Branch, CriticalPoint
+from ufl_beam.cycles import Cycles, Gerber, Goodman, SNCurve, rainflow
 from ufl_beam.decay import (
     Decay,
     Envelope,
@@ -63,9 +63,9 @@ from ufl_beam.loads import (
     Table,
     ramp,
 )
-from ufl_beam.pacing import Adaptive
 from ufl_beam.mode_pictures import plot_modes
 from ufl_beam.modes import Buckling, Modes, buckling, modes
+from ufl_beam.pacing import Adaptive
 from ufl_beam.record import XDMF, History, Recorder
 from ufl_beam.render import animate, render
 from ufl_beam.running import say, simulate

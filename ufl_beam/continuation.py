@@ -59,7 +59,7 @@ AGAIN = 1e-3
 """Part of a step within which a critical point is the one that the path has just reached."""
 
 SOFT = 1e-3
-"""At a bifurcation the softest eigenvalue is at most this part of what it was before."""
+"""At a bifurcation the softest eigenvalue is at most this part of one at the ends of the step."""
 
 
 class Path(Solution):
@@ -146,7 +146,7 @@ class Route:
         Raises:
             ConvergenceError: Even the smallest part failed.
         """
-        walk, simulation = self._walk, self._walk.simulation
+        simulation = self._walk.simulation
         while True:
             iterations = simulation.iterations
             try:
@@ -170,7 +170,8 @@ class Route:
             self._landed = False
             self._take(found)
             return
-        found, reached = self._locate(before, found, part)
+        after = found
+        found, reached = self._locate(before, after, part)
         if self._landed and reached < AGAIN * part:
             # The signs of one critical point need not change in the same last digit.
             self._landed = False
@@ -182,7 +183,8 @@ class Route:
             self._pass_kink(found, reached - 2 * LOCATED * part, part, limit)
             return
         # What yields or opens may change signs without an eigenvalue of zero.
-        soft = limit or abs(self._softest(found)[0]) < SOFT * abs(self._softest(before)[0])
+        λ, *ends = (abs(self._softest(one)[0]) for one in (found, before, after))
+        soft = limit or λ < SOFT * max(ends)
         way = walk.direction
         self._take(found)
         if self._landed and soft:
@@ -279,9 +281,10 @@ class Route:
         limit = way.t * before.t < 0
         if limit:
             # At a limit point the path goes along the mode.
-            mode = way.q / walk.length(Direction(way.q, 0.0), 1.0)
+            size = walk.length(Direction(way.q, 0.0), 1.0)
+            mode = np.asarray(way.q / size, dtype=np.float64)
         else:
-            mode = self._softest(found)[1][walk.share.dofs]
+            mode = np.asarray(self._softest(found)[1][walk.share.dofs], dtype=np.float64)
             simulation.supports.leave(mode)
             # What the path goes along the mode is lost in a singular stiffness.
             strayed = Direction(way.q - before.q, 0.0)

@@ -174,8 +174,10 @@ class ArcLength:
         """On the plane across the direction."""
         reach = abs(self.step) * part
         size = walk.length(walk.direction, self.factor)
-        unit = Direction(walk.direction.q / size, walk.direction.t / size)
-        normal = Direction(np.asarray(walk.weights * unit.q), unit.t / self.factor**2)
+        unit_q: Array = np.asarray(walk.direction.q / size, dtype=np.float64)
+        unit = Direction(unit_q, walk.direction.t / size)
+        across: Array = np.asarray(walk.weights * unit.q, dtype=np.float64)
+        normal = Direction(across, unit.t / self.factor**2)
         return walk.attempt(unit, reach, Plane(walk, normal, reach))
 
 

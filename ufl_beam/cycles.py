@@ -238,7 +238,8 @@ class RainflowCounter:
     """Rainflow cycles of a series that comes in pieces, in memory that does not grow with it.
 
     Values are rounded to multiples of ``resolution``: cycles are then counts in classes, and the
-    turning points that wait for their cycle to close are no more than the classes.  Apart from the rounding the count is that of :func:`rainflow` for the whole series.
+    turning points that wait for their cycle to close are no more than the classes.  Apart
+    from the rounding the count is that of :func:`rainflow` for the whole series.
 
     Args:
         resolution: Width of the classes; Pa.

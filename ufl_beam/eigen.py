@@ -18,7 +18,7 @@ TOLERANCE = 1e-12
 """Residual of an eigenpair, as a part of its eigenvalue."""
 
 SHIFT = 1e-13
-"""Shift as a part of the squared frequencies of single nodes; smaller ones are lost in round-off."""
+"""Shift as a part of the squared frequencies of single nodes; round-off hides smaller ones."""
 
 MORE = 8
 """Eigenvalues that are sought beside those asked for, lest one of several alike be missed."""
@@ -68,9 +68,7 @@ def linear(
     """
     size, n = A.shape[0], min(n + MORE, most)
     if size <= DENSE:
-        θ, x = (_inverse_definite if definite else _inverse)(
-            (A - shift * B).toarray(), B.toarray()
-        )
+        θ, x = (_inverse_definite if definite else _inverse)((A - shift * B).toarray(), B.toarray())
         return (1 / θ[:n] + shift).real, x[:, :n].real
     slepc = _slepc()
     solver = slepc.EPS().create(PETSc.COMM_SELF)

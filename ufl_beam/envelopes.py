@@ -91,7 +91,7 @@ def plot_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:
         _draw_matrix(figure, matrix, edges, ranges, means, cycles.count)
         matrix.set(xlabel="mean stress (MPa)", ylabel="stress range (MPa)", title="cycles")
         more = np.cumsum(cycles.count[::-1])[::-1]
-        spectrum.plot(more, ranges, color=BLUE, drawstyle="steps-post", label="at least this range")
+        spectrum.plot(more, ranges, color=BLUE, drawstyle="steps-post", label="reached")
         some = np.linspace(edges[1] / 10, 1.1 * edges[-1], 1000)
         spectrum.plot(curve.endurance(1e6 * some), some, color=INK, lw=1.4, ls="--", label="borne")
         spectrum.set(xscale="log", xlabel="number of cycles", title="spectrum and S-N curve")

@@ -107,6 +107,7 @@ class Fatigue(Recorder):
         self._prepare(simulation.grid)
         self._begin = simulation.t
         self.write(simulation)
+        self._count()  # A stress that is no number is found at once.
 
     def _prepare(self, grid: Grid) -> None:
         self._cells = np.array([grid.cell(spot.place) for spot in self.spots], dtype=np.int64)
@@ -123,13 +124,13 @@ class Fatigue(Recorder):
             self._count()
 
     def _count(self) -> None:
+        filled, self._filled = self._filled, 0
         for spot, arm, forces in zip(self.spots, self._arms, list(self._block), strict=True):
-            N, V, M = (forces[i, : self._filled] for i in range(3))
+            N, V, M = (forces[i, :filled] for i in range(3))
             stress = np.asarray(spot.stress(N, V, M - arm * V), dtype=np.float64)
             if stress.shape != N.shape or not np.isfinite(stress).all():
                 raise SceneError(f"HotSpot {spot}: stress(N, V, M) must be a finite number each")
             self._counters[spot].add(stress)
-        self._filled = 0
 
     def close(self) -> None:
         """Count what is left."""

@@ -300,6 +300,14 @@ class Share:
         turning = np.r_[grid.dofs[:, 2], grid.dofs_of_bodies[:, 2]]
         return np.unique(self.local(turning)).astype(np.int32)
 
+    def translations(self) -> tuple[Index, Index]:
+        """Local numbers of both components of all displacements."""
+        grid = self.grid
+        pairs = np.unique(np.r_[grid.dofs[:, :2], grid.dofs_of_bodies[:, :2]], axis=0)
+        found = self._local[pairs]
+        x, y = found[(found >= 0).all(axis=1)].T
+        return x, y
+
     def multipliers(self) -> Index:
         """Local numbers of the forces of connectors."""
         return self.local(self.grid.multipliers)

@@ -124,7 +124,12 @@ class SmallMotions:
         nothing = ROUND_OFF * abs(K).max()
         symmetric = abs(K - K.T).max() <= nothing
         solve = partial(
-            eigen.linear, (K + K.T) / 2 if symmetric else K, M, n, most=self.most, definite=symmetric
+            eigen.linear,
+            (K + K.T) / 2 if symmetric else K,
+            M,
+            n,
+            most=self.most,
+            definite=symmetric,
         )
         values, x = solve(shift=-SHIFT * low)
         zero = self._unresisted(x)
@@ -174,6 +179,7 @@ class SmallMotions:
         s, x = eigen.quadratic(K, C, M, 2 * n, most=most, shift=lowest)
         s, x = self._with_zeros(s, x[: len(free)], free)
         decay, how = np.linalg.eig(-Λ)
+        decay = np.where(np.abs(decay.imag) <= APART * np.abs(decay), decay.real, decay)
         slows = np.abs(decay) > ROUND_OFF * abs(C).max() / abs(self.M).max()
         return np.concatenate([s, decay[slows]]), np.hstack([x, N @ how[:, slows]])
 

@@ -43,7 +43,9 @@ def plot_modes(
     stages = [plane_stage(swing, [0, 1], 1.0) for swing in swings]
     ends = [(moved_points(s, 0, 1.0), moved_points(s, 1, 1.0)) for s in swings]
     bodies = [stage.pose(n).points() for stage in stages for n in (0, 1)]
-    box = np.concatenate([shapes.grid.points, *bodies, *(points for pair in ends for points in pair)])
+    box = np.concatenate(
+        [shapes.grid.points, *bodies, *(points for pair in ends for points in pair)]
+    )
     low, high = box.min(axis=0), box.max(axis=0)
     # Room for the symbols of supports.
     room = 0.08 * np.hypot(*(high - low))

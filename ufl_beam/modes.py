@@ -123,7 +123,7 @@ class Shapes(ABC):
             recorder.close()
 
     def _scaled(self, k: int, amplitude: float) -> Array | Complex:
-        """The k-th shape, its largest motion a part of the scene's size; if a rotation, of 1 rad."""
+        """The k-th shape, its largest motion a part of the size; if a rotation, of 1 rad."""
         shape = self.shapes[:, k]
         lengths = np.r_[self.grid.dofs, self.grid.dofs_of_bodies][:, :2]
         size = self.scene.size if np.abs(shape[lengths]).max() > 0.5 else 1.0
@@ -181,7 +181,7 @@ class Modes(Shapes):
     @property
     def frequencies(self) -> Array:
         """Natural frequencies, ascending; (n,); Hz."""
-        return self.omega / (2 * math.pi)
+        return np.asarray(self.omega / (2 * math.pi))
 
     @property
     def damping(self) -> Array:
@@ -233,8 +233,9 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None) -> Modes:
     What friction holds is held, what slides slides freely; controllers do not answer.
 
     Without damping they are eigenvalues of K x = ω² M x.  Damping, Coriolis and follower forces
-    make it (K + s C + s² M) x = 0, solved as it is: no modal damping is assumed, what decays without
-    oscillating counts as a mode, and a negative damping ratio is flutter, or buckling if it is -1.
+    make it (K + s C + s² M) x = 0, solved as it is: no modal damping is assumed, what decays
+    without oscillating counts as a mode, and a negative damping ratio is flutter, or buckling if
+    it is -1.
 
     Args:
         scene: What is modelled.
@@ -283,9 +284,9 @@ def buckling(scene: Scene, n: int, *, t: float = 1.0, at: Solution | None = None
     for load in scene.loads:
         if isinstance(load, FollowerLoad | RotatingFrame):
             raise SceneError(
-                f"buckling: a {type(load).__name__} has a stiffness of its own; use modes(..., at=) "
-                "about states with more and more of it, and see where a frequency vanishes or a "
-                "damping ratio becomes negative"
+                f"buckling: a {type(load).__name__} has a stiffness of its own; use "
+                "modes(..., at=) about states with more and more of it, and see where a frequency "
+                "vanishes or a damping ratio becomes negative"
             )
     if at is None:
         require_no_mechanism(scene)

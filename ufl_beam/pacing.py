@@ -165,11 +165,7 @@ class AdaptiveSteps:
         self._stops = sorted({t for t in (*kinks, *choice.stops, t1) if t0 < t <= t1})
         self._fresh = True
         share = simulation.share
-        self._turns = share.rotations()
-        self._sizes = np.full(share.size, 1 / share.grid.scene.size)
-        self._sizes[self._turns] = 1.0
-        self._sizes[share.multipliers()] = 0.0
-        self._sizes[simulation.supports.dofs] = 0.0
+        self._turns, (self._x, self._y) = share.rotations(), share.translations()
         self.steps = self.rejected = 0
         self.error = 0.0
 
@@ -235,9 +231,14 @@ class AdaptiveSteps:
 
     def _size(self, simulation: Simulation, trial: Trial, error: Array) -> float:
         """Largest error of a position over the size of the scene, or of a rotation."""
-        turns = self._turns
-        error[turns] += (trial.q1 - simulation.q - trial.s)[turns]
-        here = float(np.abs(simulation.supports.in_axes(error) * self._sizes).max(initial=0.0))
+        error[self._turns] += (trial.q1 - simulation.q - trial.s)[self._turns]
+        supports = simulation.supports
+        supports.enter(error)
+        error[supports.dofs] = 0.0
+        supports.leave(error)
+        moves = np.hypot(error[self._x], error[self._y]).max(initial=0.0)
+        turns = np.abs(error[self._turns]).max(initial=0.0)
+        here = float(max(moves / simulation.scene.size, turns))
         share = simulation.share
         return share.comm.allreduce(here, op=MPI.MAX) if share.comm.size > 1 else here
 

@@ -164,13 +164,13 @@ def _require_step(dt: float | Adaptive, scheme: Scheme, t: tuple[float, float]) 
         least = SMALLEST_PART * math.ulp(max(map(abs, t)))
         if dt < least:
             raise SceneError(
-                f"simulate: dt = {dt:g} s is too small: steps from t = {t[0]:g} to {t[1]:g} s can be "
-                f"told apart, and cut, from {least:.1e} s on; use a larger one, or let t begin at 0"
+                f"simulate: dt = {dt:g} s is too small: steps from t = {t[0]:g} to {t[1]:g} s can "
+                f"be told apart, and cut, from {least:.1e} s on; use a larger one, or begin at 0"
             )
     elif not has_inertia(scheme):
         raise SceneError(
-            "simulate: dt = Adaptive(...) estimates the error of accelerations, and a static scheme "
-            "has none; give a number"
+            "simulate: dt = Adaptive(...) estimates the error of accelerations, and a static "
+            "scheme has none; give a number"
         )
 
 

@@ -24,8 +24,8 @@ from ufl_beam.inelastic import InelasticBeams, inelastic_cells
 from ufl_beam.joints import Connection, links_of, motion_of, velocity_of
 from ufl_beam.ledger import Ledger
 from ufl_beam.loads import FollowerLoad, RotatingFrame
-from ufl_beam.memory import NOWHERE, Memory, Restoring, Saving, State
 from ufl_beam.mechanism import no_number, require_independent, require_masses, require_no_mechanism
+from ufl_beam.memory import NOWHERE, Memory, Restoring, Saving, State
 from ufl_beam.path import StaticPath
 from ufl_beam.points import Course, expect_entries
 from ufl_beam.processes import ours
@@ -466,7 +466,10 @@ class Simulation:
         q1 = self.supports.in_plane(self._solver.iterate())
         forces = {kind: np.zeros(self.share.size) for kind in KINDS}
         for term in self.terms:
-            term.add_residual(q1, forces[term.kind])
+            try:
+                term.add_residual(q1, forces[term.kind])
+            except StepFailed:
+                forces[term.kind].fill(np.nan)  # it is why the step has failed
         sizes = {kind: self._solver.size(force) for kind, force in forces.items()}
         return {kind: size for kind, size in sizes.items() if size}
 

@@ -122,8 +122,9 @@ class Solution:
         self._reactions = list(history["reactions"])
         self._connections = list(history["connections"])
         self._material = [[] for _ in self._times]
-        for groups, table in zip(self._material, history.get("material", ()), strict=False):
-            groups.append((table[:, 0].astype(np.int64), table[:, 1:]))
+        if "material" in history:
+            for n, table in enumerate([*history["material"]]):
+                self._material[n] = [(table[:, 0].astype(np.int64), table[:, 1:])]
         entries: list[dict[str, Array]] = [
             {
                 name.removeprefix(f"{kind}: "): values

@@ -149,7 +149,8 @@ class Walk:
         for term in self._driven:
             term.add_residual(q, np.zeros(self.share.size))
         simulation.supports.enter(r)
-        self._rates: Array = (self._moved(self.t + ε) - self._moved(self.t - ε)) / (2 * ε)
+        rates = (self._moved(self.t + ε) - self._moved(self.t - ε)) / (2 * ε)
+        self._rates = np.asarray(rates, dtype=np.float64)
         self._A = simulation.tangent_at(x, self._rates, r)
 
     def correct(self, y: Array, z: Array) -> None:

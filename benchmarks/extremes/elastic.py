@@ -5,6 +5,7 @@ number allows is written as ``EPS`` times how much it is magnified.
 """
 
 import math
+from itertools import pairwise
 
 import numpy as np
 from rows import EPS, LEDGER, outcome, row
@@ -20,7 +21,7 @@ def rolled(sections, lengths, cells, moment):
     for i, (section, length, n) in enumerate(zip(sections, lengths, cells, strict=True)):
         beams.append(ub.Beam((x, 0), (x + length, 0), section, cells=n, name=f"beam{i}"))
         x += length
-    joints = [ub.Rigid(a.end, b.start) for a, b in zip(beams, beams[1:], strict=False)]
+    joints = [ub.Rigid(a.end, b.start) for a, b in pairwise(beams)]
     scene = ub.Scene(
         beams,
         joints=joints,
@@ -58,7 +59,9 @@ def rigid_part(ratio):
     second = polygon(two, 0.5, 8)
     # The second chain goes on where the first ends, turned by its angle.
     x, y = second[0] + 0.5, second[1]
-    turned = np.array([math.cos(one) * x - math.sin(one) * y, math.sin(one) * x + math.cos(one) * y])
+    turned = np.array(
+        [math.cos(one) * x - math.sin(one) * y, math.sin(one) * x + math.cos(one) * y]
+    )
     expected = np.array([first[0] + turned[0] - 0.5, first[1] + turned[1], one + two])
     error = missed(solution, solution.scene.beams[-1].end, expected)
     # Forces are met to 1e-10 of those in the scene (10 N, EI/L² is 1 N), or to the last digits of
@@ -153,7 +156,7 @@ def cells_in_flight(cells):
 
 
 def drift(solution, spin=3.0):
-    """What a tolerance of 1e-10 lets energy drift: forces of the spin along the way of all steps."""
+    """What a tolerance of 1e-10 lets energy drift: forces of the spin along the way of all."""
     t = solution.times[-1] - solution.times[0]
     force = spin**2 / 4
     # Far away from where it began positions, and so strains, have fewer digits.
@@ -177,7 +180,7 @@ def flight(cells, *, steps, dt, spin=3.0, linear=(1.0, 2.0), every=1):
     tuple(10.0**k for k in range(-3, 4)),
 )
 def oscillator(ratio):
-    """A mass on a massless bar that a force begins to pull; u = F/k (1 - cos nθ), tan θ/2 = ω Δt/2."""
+    """A mass on a massless bar that a force begins to pull; 1 - cos nθ, tan θ/2 = ω Δt/2."""
     section = ub.Section(EA=100.0, GA=100.0, EI=1.0)
     bar = ub.Beam((0, 0), (1, 0), section, cells=1)
     scene = ub.Scene(
@@ -260,7 +263,7 @@ def beam_turns(turns):
 @row(
     "revolutions that a motor imposes",
     "turns",
-    "place of the end of a beam that turns steadily: radius of the stretched beam, angle of the motor",
+    "place of the end of a beam that turns steadily, at the angle of the motor",
     (1, 10, 100, 1000),
 )
 def motor_turns(turns):
@@ -389,7 +392,7 @@ def toggle(angle):
 @row(
     "nearly singular: close to buckling",
     "1 - P/P_cr",
-    "linear amplification of a small lateral load, P_cr of the same cells from that at P = 0.5",
+    "linear amplification of a small lateral load, by algebra of the same cells",
     (0.5, 0.1, 1e-2, 1e-3, 1e-4),
 )
 def buckling(distance):
@@ -466,9 +469,7 @@ def released(turns):
         loads=[ub.PointLoad(beam.end, moment=θ, time=lambda t: t if t <= 1 else 0.0)],
     )
     rolled_up = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1 / 32)
-    solution = ub.simulate(
-        scene, ub.Midpoint(), t=(1, 1.4), dt=0.002, start=rolled_up
-    )
+    solution = ub.simulate(scene, ub.Midpoint(), t=(1, 1.4), dt=0.002, start=rolled_up)
     energy = solution.energy
     error = float(np.abs(energy.total - θ**2 / 2).max() / (θ**2 / 2))
     # The roll is in equilibrium to 1e-10.
@@ -549,4 +550,3 @@ def units(unit):
         parts.append(np.abs(values - other.energy[name] / joule).max() / si.energy.throughput)
     # Both are solved to 1e-10 of the forces, and errors grow with the motion.
     return outcome(other, float(max(parts)), 1e-7)
-

@@ -54,7 +54,11 @@ def perzyna(η):
     error = float(np.abs(got - drawn(η, solution.times[1:])).max())
     # First order: in one step the overstress changes by at most C Δε; exact at both ends.
     exact = η < 1e-10 or η > 1e10
-    return outcome(solution, error, 1e-9 + (2 * min(η, 1 / η) if exact and 0 < η else 0) + (0 if exact else 0.5 / STEPS))
+    return outcome(
+        solution,
+        error,
+        1e-9 + (2 * min(η, 1 / η) if exact and η > 0 else 0) + (0 if exact else 0.5 / STEPS),
+    )
 
 
 @row(
@@ -69,11 +73,15 @@ def duvaut_lions(τ):
     η = τ * 1.25 if τ < 1e299 else math.inf
     error = float(np.abs(got - drawn(η, solution.times[1:])).max())
     exact = τ < 1e-10 or τ > 1e10
-    return outcome(solution, error, 1e-9 + (2 * min(τ, 1 / τ) if exact and 0 < τ else 0) + (0 if exact else 0.5 / STEPS))
+    return outcome(
+        solution,
+        error,
+        1e-9 + (2 * min(τ, 1 / τ) if exact and τ > 0 else 0) + (0 if exact else 0.5 / STEPS),
+    )
 
 
 def bent(hinge, scheme=None, cells=1):
-    """A cantilever, EI/L = 1 N m, a hinge in its first cell, its end turned by 1 rad; its moment."""
+    """A cantilever, EI/L = 1 N m, a hinge in its first cell, its end turned by 1 rad."""
     section = ub.Section(EA=1e4, GA=1e4, EI=1.0)
     beam = ub.Beam((0, 0), (1, 0), section, cells=cells, hinges={0.0: hinge})
     turn = ub.Prescribed(beam.end, psi=lambda t: t)

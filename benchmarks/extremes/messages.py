@@ -76,7 +76,10 @@ def _section(**numbers):
 
 
 CASES = {
-    "a load is not a number from some time on": (lambda: run(cantilever(_late(math.nan))), "PointLoad"),
+    "a load is not a number from some time on": (
+        lambda: run(cantilever(_late(math.nan))),
+        "PointLoad",
+    ),
     "a load is infinite from some time on": (lambda: run(cantilever(_late(math.inf))), "PointLoad"),
     "a motion is not a number from some time on": (lambda: _motion(math.nan), "Prescribed"),
     "a time function raises": (lambda: run(cantilever(_raises)), "a user's own error"),

@@ -28,13 +28,14 @@ def save(results: Results) -> None:
     lines = [
         "# The extremes: what was tried and what happened",
         "",
-        "Written by `make extremes`; do not edit. Each value is a simulation of its own; its error is",
-        "the difference from an independent answer, and what is allowed is argued in",
-        "[benchmarks/extremes](../benchmarks/extremes): the tolerance of Newton's method, the order of",
-        "the scheme, and last digits times what magnifies them.",
+        "Written by `make extremes`; do not edit. Each value is a simulation of its own; its",
+        "error is the difference from an independent answer, and what is allowed is argued in",
+        "[benchmarks/extremes](../benchmarks/extremes): the tolerance of Newton's method, the",
+        "order of the scheme, and last digits times what magnifies them.",
         "",
-        f"Of {sum(counts.values())} runs {counts['works']} work, {counts['stops']} stop with a message "
-        f"that names what is wrong, {counts['WRONG']} are wrong in silence, {counts['HANG']} hang.",
+        f"Of {sum(counts.values())} runs {counts['works']} work, {counts['stops']} stop with a "
+        f"message that names what is wrong, {counts['WRONG']} are wrong "
+        f"in silence, {counts['HANG']} hang.",
         "",
         "![Errors over what was varied](pictures/extremes.png)",
         "",
@@ -47,7 +48,10 @@ def save(results: Results) -> None:
     lines += ["", "## Each value", ""]
     for row, one in results:
         lines += [f"### {row.name}", "", f"Varied: {row.varied}. Compared with: {row.against}.", ""]
-        lines += ["| value | error | allowed | iterations per step | verdict |", "|---|---|---|---|---|"]
+        lines += [
+            "| value | error | allowed | iterations per step | verdict |",
+            "|---|---|---|---|---|",
+        ]
         lines += [_detail(r) for r in one] + [""]
     (DOCS / "extremes.md").write_text("\n".join(lines).rstrip() + "\n")
 
@@ -68,7 +72,8 @@ def _line(row: Row, one: list[dict[str, Any]]) -> str:
     if works:
         worst = max(works, key=lambda r: r["error"])
         most = max(r["iterations"] for r in works)
-        said = f"{worst['error']:.1e} of {worst['allowed']:.1e} at {_text(worst['value'])}; ≤ {most:.1f}"
+        at = _text(worst["value"])
+        said = f"{worst['error']:.1e} of {worst['allowed']:.1e} at {at}; ≤ {most:.1f}"
     stops = f"{len(others)}: {_cut(others[0]['message'], 60)}" if others else "—"
     return f"| {row.name} | {row.varied}: {span} | {said} | {stops} |"
 

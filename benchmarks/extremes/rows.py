@@ -93,7 +93,7 @@ def run(name: str) -> None:
         begin = time.perf_counter()
         result = _judge(one, value)
         result |= {"value": value, "seconds": time.perf_counter() - begin}
-        print(json.dumps(result), file=sys.stdout, flush=True)  # noqa: T201
+        print(json.dumps(result), file=sys.stdout, flush=True)
 
 
 def _judge(one: Row, value: Any) -> dict[str, Any]:

@@ -2,8 +2,8 @@
 
 `script(seed)` writes Python that makes `scene`, `scheme` and `dt`.  All numbers are plain, so that
 a seed that fails can be printed, and cut down by hand.  Sizes are drawn as parts of what the first
-beam makes natural (its length, EI/L², its period) and these over many decades; kinds of laws, joints
-and schemes are drawn from short lists, for each kind compiles forms of its own.
+beam makes natural (its length, EI/L², its period) and these over many decades; kinds of laws,
+joints and schemes are drawn from short lists, for each kind compiles forms of its own.
 """
 
 import math
@@ -207,7 +207,9 @@ class _Writer:
     def _joint_kind(self):
         if self._static:
             return self._one(["Rigid", "Rigid", "Revolute", "RigidLink"])
-        return self._one(["Rigid", "Rigid", "Revolute", "Prismatic", "RigidLink", "Link", "Release"])
+        return self._one(
+            ["Rigid", "Rigid", "Revolute", "Prismatic", "RigidLink", "Link", "Release"]
+        )
 
     def _join(self, kind, a, b, beam=None):
         """A joint; in statics, what turns is held by a connector."""
@@ -273,7 +275,8 @@ class _Writer:
             f"ub.Stop({k:.6g}, low={-way:.6g}, high={way / 2:.6g})",
             f"ub.Damper({c:.6g})",
             f"ub.Actuator(lambda t: {force:.6g} * math.sin({1 / time:.6g} * t))",
-            f"ub.Function(lambda e, rate: {k:.6g} * e + {k / length**2:.6g} * e**3 + {c:.6g} * rate)",
+            f"ub.Function(lambda e, rate: {k:.6g} * (e + {1 / length**2:.6g} * e**3) + "
+            f"{c:.6g} * rate)",
         ]
 
     def _swing(self, size):
@@ -333,8 +336,8 @@ class _Writer:
 
     def _damp(self):
         if self._chance(0.5):
-            rates = f"mass={self._size(-3, 0) / self._T:.6g}, stiffness={self._size(-4, 0) * self._T:.6g}"
-            self._damping.append(f"ub.Rayleigh({rates})")
+            mass, stiffness = self._size(-3, 0) / self._T, self._size(-4, 0) * self._T
+            self._damping.append(f"ub.Rayleigh(mass={mass:.6g}, stiffness={stiffness:.6g})")
         else:
             self._damping.append(f"ub.KelvinVoigt({self._size(-4, 1) * self._T:.6g})")
 

@@ -111,3 +111,29 @@ def test_something_happens(seed):
     """The scenes are no trivial ones: they move by a good part of their size, and turn."""
     motion = Built(draw(seed)).run(ub.Midpoint()).motion()
     assert np.abs(motion).max() > 1e-3
+
+
+def run_adaptive(built, **more):
+    built.solution = ub.simulate(
+        built.scene, SCHEME, t=(0.0, 0.3 * built.units.second), dt=ub.Adaptive(1e-4), **more
+    )
+    return built
+
+
+def test_adaptive_steps(seed):
+    """The steps themselves, in other units, turned, on other numbers of processes.
+
+    Their lengths come from differences of accelerations, which have a few digits less.
+    """
+    numbers = draw(seed)
+    random = np.random.default_rng(6000 + seed)
+    units = Units(*(float(x) for x in 10 ** random.uniform(-4, 4, 3)))
+    one = run_adaptive(Built(numbers))
+    for other in (
+        run_adaptive(Built(numbers, units=units)),
+        run_adaptive(Built(numbers, angle=1.0)),
+        run_adaptive(Built(numbers), comm=MPI.COMM_SELF),
+    ):
+        times = other.solution.times / other.units.second
+        np.testing.assert_allclose(times, one.solution.times, rtol=1e-6)
+        assert difference(one, other) < 1e-6

@@ -9,8 +9,8 @@ from random_machines import STEPS, round_off, script
 
 import ufl_beam as ub
 
-SAMPLE = range(25)
-"""Seeds of the default run; the slow one takes all."""
+SAMPLE = [seed for seed in range(27) if seed not in (2, 13)]
+"""Seeds of the default run without two of thousands of iterations; the slow one takes all."""
 
 ALL = range(500)
 
@@ -37,19 +37,19 @@ CLEAR = ("no equilibrium after t", "zero length", "constraints repeat", "free to
 
 
 def run(seed):
-    """The imbalance of a machine as a part of what is allowed, or none where it ends in an error."""
+    """The imbalance of a machine, round-off apart, as a part of the energy that went through."""
     names = {}
-    exec(script(seed), names)  # noqa: S102
+    exec(script(seed), names)
+    said = CLEAR[0]
     faulthandler.dump_traceback_later(HANG, exit=True, file=sys.__stderr__)
     try:
         times = (0.0, STEPS * names["dt"])
         solution = ub.simulate(names["scene"], names["scheme"], t=times, dt=names["dt"])
     except ub.ConvergenceError as error:
-        assert any(words in str(error) for words in CLEAR), error
-        assert np.isfinite(error.solution.q).all()
-        solution = error.solution
+        solution, said = error.solution, str(error)
     finally:
         faulthandler.cancel_dump_traceback_later()
+    assert any(words in said for words in CLEAR), said
     assert np.isfinite(solution.q).all()
     assert all((np.diff(lost) >= -1e-12 * abs(lost).max()).all() for lost in _sinks(solution))
     imbalance = max(float(np.abs(solution.energy.imbalance).max()) - round_off(solution), 0.0)
@@ -66,10 +66,9 @@ def check(seed):
     """Whether a machine ends as it must; its imbalance, none for an error of the scene."""
     try:
         imbalance = run(seed)
-    except ub.SceneError as error:
-        assert any(words in str(error) for words in CLEAR), f"{error}\n{script(seed)}"
-        return None
-    except BaseException as error:
+    except Exception as error:
+        if isinstance(error, ub.SceneError) and any(words in str(error) for words in CLEAR):
+            return None
         raise AssertionError(f"{type(error).__name__}: {error}\n{script(seed)}") from error
     bound = BY_TRAPEZES if "scheme = ub.Static(" in script(seed) else CLOSED
     assert imbalance <= bound, f"imbalance {imbalance:.1e} of throughput\n{script(seed)}"

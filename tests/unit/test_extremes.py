@@ -10,7 +10,10 @@ import ufl_beam as ub
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=1.0, rhoA=1.0, rhoI=1e-3)
 
 
-def cantilever(*, time=ub.ramp(0.1), connect=lambda beam: (), hold=ub.Clamped):
+GROWING = ub.ramp(0.1)
+
+
+def cantilever(*, time=GROWING, connect=lambda beam: (), hold=ub.Clamped):
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
     load = ub.PointLoad(beam.end, force=(0.0, 0.1), time=time)
     return ub.Scene([beam], supports=[hold(beam.start)], connectors=connect(beam), loads=[load])
@@ -26,7 +29,9 @@ def late(value):
 
 
 def test_load_that_is_no_number_is_named():
-    with pytest.raises(ub.ConvergenceError, match=r"PointLoad beam.end.*nan at t = 0\.0(5|49)") as error:
+    with pytest.raises(
+        ub.ConvergenceError, match=r"PointLoad beam.end.*nan at t = 0\.0(5|49)"
+    ) as error:
         run(cantilever(time=late(math.nan)))
     solution = error.value.solution
     assert solution.times[-1] == pytest.approx(0.05, rel=3e-3)  # 1/4096 of a step before it
@@ -37,7 +42,9 @@ def test_motion_that_is_no_number_is_named():
     def hold(place):
         return ub.Prescribed(place, u=0, v=0, psi=late(math.inf))
 
-    with pytest.raises(ub.ConvergenceError, match=r"Prescribed at beam.start.*inf at t = 0\.0(5|49)"):
+    with pytest.raises(
+        ub.ConvergenceError, match=r"Prescribed at beam.start.*inf at t = 0\.0(5|49)"
+    ):
         run(cantilever(hold=hold))
 
 

@@ -361,7 +361,7 @@ def test_bad_input_of_a_run(library):
     elsewhere = ub.Fatigue(ub.HotSpot(PLACE, stress=lambda N, V, M: M), CURVE)
     with pytest.raises(ub.SceneError, match="arm is not in the scene"):
         ub.simulate(scene, ub.Midpoint(), record=elsewhere, **run)
-    spot = ub.HotSpot(beam.start, stress=lambda N, V, M: M[0])
+    spot = ub.HotSpot(beam.start, stress=lambda N, V, M: M[0])  # one number
     single = ub.Fatigue(spot, CURVE)
     with pytest.raises(ub.SceneError, match=r"mast\.start .* a finite number each"):
         ub.simulate(scene, ub.Midpoint(), record=single, **run)

@@ -1,10 +1,10 @@
 """Natural frequencies, damping ratios and buckling loads against closed forms and a Ritz solution.
 
-Sources: S. P. Timoshenko, D. H. Young, W. Weaver, "Vibration Problems in Engineering", 4th ed. 1974,
-chapter 5, for beams; S. P. Timoshenko, J. M. Gere, "Theory of Elastic Stability", 2nd ed. 1961,
-chapter 2, for columns; V. V. Bolotin, "Nonconservative Problems of the Theory of Elastic Stability",
-1963, for Beck's column; A. D. Wright et al., "Vibration modes of centrifugally stiffened beams",
-J. Appl. Mech. 49 (1982), for the rotating beam.
+Sources: S. P. Timoshenko, D. H. Young, W. Weaver, "Vibration Problems in Engineering", 4th ed.
+1974, chapter 5, for beams; S. P. Timoshenko, J. M. Gere, "Theory of Elastic Stability", 2nd ed.
+1961, chapter 2, for columns; V. V. Bolotin, "Nonconservative Problems of the Theory of Elastic
+Stability", 1963, for Beck's column; A. D. Wright et al., "Vibration modes of centrifugally
+stiffened beams", J. Appl. Mech. 49 (1982), for the rotating beam.
 
 Errors of a mesh have even powers of the cell length h; two meshes extrapolated leave h⁴, which the
 tolerances are made of: for a mode with wave number β, (β h)⁴ of the finer mesh.
@@ -205,23 +205,26 @@ def test_a_stocky_column_is_reissners():
 
 
 def test_rayleigh_and_kelvin_voigt():
-    """[closed] ζ = a0/(2ω) + a1 ω/2 of the same mesh; tolerance: that of the eigenvalue solver."""
+    """[closed] ζ = a0/(2ω) + a1 ω/2 of the same mesh.
+
+    Tolerance: round-off 1e-16 of the highest squared frequency, 5e11, over the lowest, 12.
+    """
     supports, _ = ENDS["clamped-free"]
     ω = omega(20, supports, 4)
     a0, a1, time = 0.2, 1e-3, 5e-4
     beam = beam_of(20)
     damping = [ub.Rayleigh(mass=a0, stiffness=a1), ub.KelvinVoigt(time)]
     damped = ub.modes(ub.Scene([beam], supports=supports(beam), damping=damping), 4)
-    np.testing.assert_allclose(damped.damping, a0 / (2 * ω) + (a1 + time) * ω / 2, rtol=1e-6)
-    np.testing.assert_allclose(damped.omega, ω, rtol=1e-7)
+    np.testing.assert_allclose(damped.damping, a0 / (2 * ω) + (a1 + time) * ω / 2, rtol=4e-6)
+    np.testing.assert_allclose(damped.omega, ω, rtol=4e-6)
 
 
 def test_decrement_of_a_vibration():
     """Peaks of a free vibration in the first mode decay with its damping ratio.
 
     The midpoint rule damps a mode by ζ (1 + O(ω² dt²)), here ω dt = 2π/200; (ω dt)²/4 = 2.5e-4.
-    A first deflection of 1e-4 by a tip load also has 3 % of the second mode, which is damped six times
-    as much and gone after the first peaks.
+    A first deflection of 1e-4 by a tip load also has 3 % of the second mode, which is damped six
+    times as much and gone after the first peaks.
     """
     supports, _ = ENDS["clamped-free"]
     beam = beam_of(8)
@@ -246,8 +249,8 @@ def test_decrement_of_a_vibration():
 def ritz(γ, n, degree=16):
     """ω √(ρA L⁴/EI) of a beam clamped to an axis that turns with γ, in the plane of rotation.
 
-    Euler-Bernoulli: bending, the centrifugal force ρA Ω² (L² - x²)/2, and the centrifugal softening of
-    motion in the plane; x² times Legendre polynomials, integrals exact.
+    Euler-Bernoulli: bending, the centrifugal force ρA Ω² (L² - x²)/2, and the centrifugal softening
+    of motion in the plane; x² times Legendre polynomials, integrals exact.
     """
     t, weights = np.polynomial.legendre.leggauss(2 * degree)
     x, weights = (t + 1) / 2, weights / 2
