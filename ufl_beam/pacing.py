@@ -30,13 +30,17 @@ class Pace(Protocol):
 
     Attributes:
         steps: Steps done.
-        finished: Whether the end is reached.
-        progress: Part of the way that is done, from 0 to 1.
     """
 
     steps: int
-    finished: bool
-    progress: float
+
+    @property
+    def finished(self) -> bool:
+        """Whether the end is reached."""
+
+    @property
+    def progress(self) -> float:
+        """Part of the way that is done, from 0 to 1."""
 
     def advance(self, simulation: Simulation) -> None:
         """One step.
