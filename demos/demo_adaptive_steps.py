@@ -55,7 +55,7 @@ def swing(connectors=()):
 # %% [markdown]
 # ## Errors and steps
 #
-# The error is that of the places of the beam at 0.64 s, against the run with the smallest tolerance.
+# The error is that of the places of the beam at 0.64 s, against a run with a smaller tolerance.
 
 # %%
 END = 0.64  # s

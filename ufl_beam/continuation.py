@@ -371,6 +371,8 @@ def follow(
                 break
         simulation.end()
     except BaseException as error:
+        if simulation.comm.size == 1:
+            simulation.end()  # several processes may not all be here
         error.__dict__["solution"] = path
         raise
     finally:

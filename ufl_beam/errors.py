@@ -19,8 +19,8 @@ class ConvergenceError(RuntimeError):
     Attributes:
         time: Time of the last accepted state; s.
         dt: The smallest step that was tried; s.
-        solution: The :class:`~ufl_beam.solution.Solution` up to ``time``; ``start=solution`` goes on
-            from there with another step or scheme.
+        solution: The :class:`~ufl_beam.solution.Solution` up to ``time``; ``start=solution`` goes
+            on from there with another step or scheme.
         residuals: What is left of the equilibrium where it is largest in each beam, body and
             connector, the largest first; N, moments over the size of the scene.  Empty if
             equilibria were found but refused.

@@ -76,19 +76,18 @@ class Events(Recorder):
         self._links = [i for i, link in enumerate(links) if type(link.law) in BETWEEN]
         self._flags = self._look(simulation)
 
-    def _look(self, simulation: Simulation) -> tuple[Flags, Flags]:
+    def _look(self, simulation: Simulation) -> tuple[Flags, list[bool]]:
         """What has happened in each cell; what goes on in each connector that is watched."""
         in_cells = np.zeros((len(simulation.grid.cells), len(IN_CELLS)), dtype=bool)
         for cells, rows in simulation.material():
             plastic, broken = rows[:, 4], rows[:, 5]
             happened = (plastic > 0, broken > 0, broken >= self._enough[cells])
             in_cells[cells] = np.column_stack(happened)
-        between = np.zeros((len(self._links), 1), dtype=bool)
-        if self._links:
-            forces = simulation.connections()[self._links, 1]
-            limits = [self._limit(simulation, link) for link in self._links]
-            between[:, 0] = np.abs(forces) > limits
-        return in_cells, between
+        if not self._links:
+            return in_cells, []
+        forces = np.abs(simulation.connections()[self._links, 1])
+        limits = [self._limit(simulation, link) for link in self._links]
+        return in_cells, [bool(goes_on) for goes_on in forces > limits]
 
     def _limit(self, simulation: Simulation, link: int) -> float:
         """Force of a connector above which it touches, or slides; N or N m."""
@@ -98,16 +97,17 @@ class Events(Recorder):
     def write(self, simulation: Simulation) -> None:
         """Note what has changed in the step."""
         flags = self._look(simulation)
-        (cells, between), (cells_before, between_before) = flags, self._flags
+        (cells, goes_on), (cells_before, went_on) = flags, self._flags
         self._flags = flags
         scene, grid = simulation.scene, simulation.grid
         new: list[Event] = []
-        for cell, n in np.argwhere(cells & ~cells_before).tolist():
-            new.append(Event(simulation.t, grid.middle(cell), IN_CELLS[n]))
-        for i in np.flatnonzero(between != between_before).tolist():
-            link = scene.links[self._links[i]]
-            begins, ends = BETWEEN[type(link.law)]
-            new.append(Event(simulation.t, link, begins if between[i, 0] else ends))
+        for cell, n in np.argwhere(cells & ~cells_before):
+            new.append(Event(simulation.t, grid.middle(int(cell)), IN_CELLS[n]))
+        for link, now, before in zip(self._links, goes_on, went_on, strict=True):
+            if now != before:
+                connector = scene.links[link]
+                begins, ends = BETWEEN[type(connector.law)]
+                new.append(Event(simulation.t, connector, begins if now else ends))
         self.found += new
         if self._tell is not None and simulation.comm.rank == 0:
             for event in new:

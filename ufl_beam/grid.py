@@ -140,10 +140,10 @@ class Grid:
 
     def middle(self, cell: int) -> Place:
         """The place in the middle of a cell."""
-        beam = self.beam_of_cell[cell]
-        s = self._parameters[beam]
-        i = cell - (self._first[beam] - beam)
-        return self.scene.beams[beam].at((s[i] + s[i + 1]) / 2)
+        number = int(self.beam_of_cell[cell])
+        s, i = self._parameters[number], cell - int(self._first[number] - number)
+        beam: Beam = self.scene.beams[number]
+        return beam.at((s[i] + s[i + 1]) / 2)
 
     def hinges(self, beam: Beam) -> list[Softening | None]:
         """Law of the hinge in each cell of a beam."""

@@ -101,6 +101,9 @@ class PointLoad:
     def __post_init__(self) -> None:
         _check_point_load(self, "PointLoad")
 
+    def __str__(self) -> str:
+        return f"PointLoad at {self.place}"
+
 
 @dataclass(frozen=True, eq=False)
 class FollowerLoad:
@@ -125,6 +128,9 @@ class FollowerLoad:
                 f"FollowerLoad at {self.place}: not the centre of the body; act on the centre, "
                 "with the moment that this makes"
             )
+
+    def __str__(self) -> str:
+        return f"FollowerLoad at {self.place}"
 
 
 def _check_point_load(load: PointLoad | FollowerLoad, kind: str) -> None:
@@ -157,6 +163,9 @@ class LineLoad:
         require_number(self.moment, f"LineLoad on {self.beam.name}: moment")
         require_time_function(self.time, f"LineLoad on {self.beam.name}")
 
+    def __str__(self) -> str:
+        return f"LineLoad on {self.beam.name}"
+
 
 @dataclass(frozen=True, eq=False)
 class Gravity:
@@ -173,6 +182,9 @@ class Gravity:
     def __post_init__(self) -> None:
         require_vector(self.acceleration, "Gravity: acceleration")
         require_time_function(self.time, "Gravity")
+
+    def __str__(self) -> str:
+        return "Gravity"
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,9 +12,8 @@ from scipy.sparse.linalg import eigsh
 from ufl_beam.beams import Beam, Point
 from ufl_beam.bodies import GROUND, Anchor, Body, Node, Spot, node
 from ufl_beam.compat import Array
-from ufl_beam.connectors import Actuator, Connector, Function, Guide, Motor, Spring
+from ufl_beam.connectors import Connector, Function, Guide, Motor, Spring
 from ufl_beam.errors import SceneError
-from ufl_beam.loads import LineLoad, RotatingFrame, TimeFunction
 from ufl_beam.scene import Scene, Slot
 
 DENSE = 90
@@ -42,21 +41,10 @@ def require_masses(scene: Scene) -> None:
 
 def no_number(scene: Scene, times: Iterable[float]) -> str:
     """What has a time function that is no finite number at one of the times; empty if nothing."""
-    named: list[tuple[object, TimeFunction]] = []
-    for load in scene.loads:
-        if not isinstance(load, RotatingFrame):
-            where = load.beam.start if isinstance(load, LineLoad) else getattr(load, "place", "")
-            named.append((f"{type(load).__name__} {where}", load.time))
-    named += [(support, motion) for support in scene.supports for motion in support.held.values()]
-    for link in scene.links:
-        if isinstance(link.law, Motor):
-            named.append((link, link.law.motion))
-        if isinstance(link.law, Actuator):
-            named.append((link, link.law.force))
     for t in times:
-        for name, function in named:
+        for owner, function in scene.time_functions():
             if not math.isfinite(value := float(function(t))):
-                return f"{name}: the time function is {value} at t = {t:.9g} s"
+                return f"{owner}: the time function is {value} at t = {t:.9g} s"
     return ""
 
 

@@ -12,7 +12,7 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.compat import Array
-from ufl_beam.errors import SceneError, require_number, require_sequence
+from ufl_beam.errors import require_number, require_sequence
 from ufl_beam.solve import StepFailed
 
 if TYPE_CHECKING:
@@ -163,7 +163,8 @@ class AdaptiveSteps:
         self._longest = choice.longest or t1 - t0
         self._shortest = choice.shortest or 1e-12 * (t1 - t0)
         self._dt = min(choice.first or (t1 - t0) / 100, self._longest)
-        self._functions = simulation.scene.time_functions()
+        functions = (function for _, function in simulation.scene.time_functions())
+        self._functions = list(dict.fromkeys(functions))
         self._largest = [0.0] * len(self._functions)
         kinks = {float(t) for f in self._functions for t in getattr(f, "kinks", ())}
         self._stops = sorted({t for t in (*kinks, *choice.stops, t1) if t0 < t <= t1})
@@ -196,8 +197,8 @@ class AdaptiveSteps:
                 self.rejected += 1
                 self._dt = dt * max(change, 0.1)
                 failure = StepFailed(
-                    f"its error {error:.1e} is above the tolerance {self._tolerance:.1e}; if a load "
-                    "or a motion jumps, name the time in `stops`"
+                    f"its error {error:.1e} is above the tolerance {self._tolerance:.1e}; if a "
+                    "load or a motion jumps, name the time in `stops`"
                 )
             except StepFailed as reason:
                 failure, self._dt = reason, self._dt / 4
@@ -229,7 +230,7 @@ class AdaptiveSteps:
         dt = trial.step.dt
         a = (inertia.velocities(trial.s) - inertia.v) / dt
         jerk = (a - before) / between
-        c2, c3 = simulation.scheme.error_weights()
+        c2, c3 = inertia.scheme.error_weights()
         error = self._size(simulation, trial, c2 * dt**2 * a + c3 * dt**3 * jerk)
         return trial, max(error, self._missed(dt))
 

@@ -128,6 +128,8 @@ def simulate(
         simulation.end()
     except BaseException as error:
         # Whatever stops a run, an interrupt or a user's function, what was reached is not lost.
+        if simulation.comm.size == 1:
+            simulation.end()  # several processes may not all be here
         error.__dict__["solution"] = solution
         raise
     finally:

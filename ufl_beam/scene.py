@@ -274,16 +274,19 @@ class Scene:
         attached += [link.a for link in self.links]
         return (*self.bodies, *((GROUND,) if any(node(p) is GROUND for p in attached) else ()))
 
-    def time_functions(self) -> list[TimeFunction]:
-        """All functions of time, of loads, prescribed motions and drives, each once."""
-        laws = [link.law for link in self.links]
-        functions = [
-            *(load.time for load in self.loads if not isinstance(load, RotatingFrame)),
-            *(motion for support in self.supports for motion in support.held.values()),
-            *(law.motion for law in laws if isinstance(law, Motor)),
-            *(law.force for law in laws if isinstance(law, Actuator)),
-        ]
-        return list(dict.fromkeys(functions))
+    def time_functions(self) -> Iterator[tuple[object, TimeFunction]]:
+        """All functions of time, of loads, prescribed motions and drives, and whose they are."""
+        for load in self.loads:
+            if not isinstance(load, RotatingFrame):
+                yield load, load.time
+        for support in self.supports:
+            for motion in support.held.values():
+                yield support, motion
+        for link in self.links:
+            if isinstance(link.law, Motor):
+                yield link, link.law.motion
+            if isinstance(link.law, Actuator):
+                yield link, link.law.force
 
     def _attachments(self) -> Iterator[tuple[object, Anchor]]:
         """Everything with a place, and its place."""

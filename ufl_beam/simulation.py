@@ -314,7 +314,7 @@ class Simulation:
             dt: What velocities are divided by: the derivatives are K + C / dt; s.
 
         Returns:
-            The residual; and the entries of the matrix, in the axes of the plane, supports not held.
+            The residual; and the entries of the matrix; in the axes of the plane, nothing held.
         """
         step, r = Step(0.0, dt, self.q, self.t, self.t, toward=1.0), np.zeros(self.share.size)
         self.ask()
@@ -446,8 +446,6 @@ class Simulation:
         Raises:
             ConvergenceError: With the solution so far.
         """
-        if self.t not in self.solution.times[-1:]:
-            self.solution.keep(self)
         self.end()
         dt, forces = end - self.t, self._forces_by_kind()
         sizes = ", ".join(f"{kind} {size:.1e} N" for kind, size in forces.items())
@@ -598,7 +596,9 @@ class Simulation:
         return [group for groups in self.share.comm.allgather(here) for group in groups]
 
     def end(self) -> None:
-        """Let the solution know the internal variables, so that another run may start with them."""
+        """Let the solution have the last state, and what another run that starts there needs."""
+        if self.t not in self.solution.times[-1:]:
+            self.solution.keep(self)
         self._remember(self.solution)
 
     def snapshot(self) -> Solution:

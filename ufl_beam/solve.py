@@ -244,7 +244,7 @@ class Solver:
         self.iterations = self._done = 0
         self._last = self._best = math.inf
         self._near, self._slow, self._patience = False, 0, 0
-        self._reason = ""
+        self._error: Exception | None = None
 
     # -- vectors and the matrix ----------------------------------------------------------------
 
@@ -394,9 +394,9 @@ class Solver:
         r = self._view(f, writable=True)
         try:
             self._residual(self._view(x), r)
-        except StepFailed as failure:
+        except Exception as error:
             # It may have failed on this process alone; by the sum all give up together.
-            self._reason = str(failure)
+            self._error = error
             r.fill(np.nan)
         if self._parallel:
             f.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
@@ -502,22 +502,24 @@ class Solver:
         """Solve; give up after so many iterations in a row without half the least residual."""
         self._last = self._best = math.inf
         self._near, self._slow, self._patience = False, 0, patience
-        self._reason = ""
+        self._error = None
         try:
             snes.solve(None, self._x)
             reason = int(snes.getConvergedReason())
         except PETSc.Error as error:
             if error.__cause__ is not None:
-                raise error.__cause__ from None  # what a function of the user has raised
+                raise error.__cause__ from None
             reason = SINGULAR  # KLU stops PETSc where it finds no pivot
         self._done = snes.getIterationNumber()
         self.iterations += self._done
         return reason
 
     def _failure(self, reason: int) -> StepFailed:
-        for said in self._share.comm.allgather(self._reason):
-            if said:
-                return StepFailed(said)
+        errors = [e for e in self._share.comm.allgather(self._error) if e is not None]
+        if errors and not isinstance(errors[0], StepFailed):
+            raise errors[0]  # what a function of the user has raised
+        if errors:
+            return StepFailed(str(errors[0]))
         names = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int)}
         scale = self._loads + self._size(self._at_forces)
         weighted = np.zeros(self._share.size)

@@ -21,7 +21,6 @@ from ufl_beam.memory import Memory
 from ufl_beam.schemes import DynamicScheme, Scheme, Step
 from ufl_beam.sparse import Csr, StepProduct
 
-
 KINDS = ("beams", "connectors", "loads", "inertia", "damping")
 """Kinds of forces."""
 
@@ -123,6 +122,7 @@ class ElasticBeams:
 
     def accept(self, q1: Array, s: Array) -> None:
         """What the scheme lost."""
+        self._begins = False
         for loss in self._losses:
             self._ledger.lost["numerical"] += loss.value(q1)
 
@@ -183,6 +183,7 @@ class Inertia:
     Attributes:
         v: Velocities at the end of the last accepted step.
         v_before: Those at its beginning.
+        scheme: The time scheme.
         M: The mass matrix.
     """
 
@@ -196,12 +197,12 @@ class Inertia:
         self._ledger = ledger
         if scheme.beta:
             ledger.lost["numerical"] += 0.0
-        self._scheme = scheme
+        self.scheme = scheme
         self.v = self.v_before = v
 
     def begin(self, step: Step) -> None:
         """Prepare what stays constant in the step."""
-        self._a, self._b = self._scheme.velocity_weights(step.dt)
+        self._a, self._b = self.scheme.velocity_weights(step.dt)
         factor, back = self._a / step.dt, (1 + self._b) / step.dt
         self._times.begin(step.q0, factor, back, self.v)  # P(78)
 
@@ -222,8 +223,8 @@ class Inertia:
     def accept(self, q1: Array, s: Array) -> None:
         """New velocities, and what the scheme lost."""
         v = self.velocities(s)
-        if self._scheme.beta:
-            lost = self._scheme.beta * self._times.square(v - self.v)  # P(88)
+        if self.scheme.beta:
+            lost = self.scheme.beta * self._times.square(v - self.v)  # P(88)
             self._ledger.lost["numerical"] += lost
         self.v_before, self.v = self.v, v
 

@@ -198,7 +198,7 @@ def perfect_joint(cells):
         ends.append(solution.displacement(beam.end)[:, :2])
     error = float(np.abs(ends[0] - ends[1]).max())
     # First order in the cell: half of it moves otherwise.
-    return outcome(solution, error, 20 / cells**1)
+    return outcome(solution, error, 2 / cells)
 
 
 @row(

@@ -48,9 +48,7 @@ def test_a_hinge_opens_and_becomes_a_joint():
 
 
 def test_yielding_is_reported_once_in_each_cell():
-    section = ub.Section(
-        EA=1e6, GA=1e6, EI=1e3, bending=ub.Hardening(limit=100.0, modulus=50.0)
-    )
+    section = ub.Section(EA=1e6, GA=1e6, EI=1e3, bending=ub.Hardening(limit=100.0, modulus=50.0))
     events = run(cantilever(section, lambda t: 0.3 * math.sin(6 * t)), ub.Static())
     assert [e.what for e in events] == ["yields", "yields"]
     assert {e.where.s for e in events} == {0.25, 0.75}

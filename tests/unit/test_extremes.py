@@ -30,7 +30,7 @@ def late(value):
 
 def test_load_that_is_no_number_is_named():
     with pytest.raises(
-        ub.ConvergenceError, match=r"PointLoad beam.end.*nan at t = 0\.0(5|49)"
+        ub.ConvergenceError, match=r"PointLoad at beam.end.*nan at t = 0\.0(5|49)"
     ) as error:
         run(cantilever(time=late(math.nan)))
     solution = error.value.solution

@@ -149,7 +149,9 @@ def test_a_study_in_a_member_is_its_own():
 
 def fragile(x):
     if x == 2:
-        raise ub.ConvergenceError("no equilibrium", time=0.0, dt=1.0, solution=None, residuals={}, forces={})
+        raise ub.ConvergenceError(
+            "no equilibrium", time=0.0, dt=1.0, solution=None, residuals={}, forces={}
+        )
     if x == 3:
         raise ub.SceneError("x = 3 is no scene")
     return square(x)

@@ -121,7 +121,7 @@ def test_functions_of_time_are_those_of_the_scene():
         ],
         connectors=[ub.Turn(ub.ground(0, 1), body.middle, ub.Actuator(ub.ramp(5.0)))],
     )
-    kinks = {t for f in scene.time_functions() for t in getattr(f, "kinks", ())}
+    kinks = {t for _, f in scene.time_functions() for t in getattr(f, "kinks", ())}
     assert kinks == {0.0, 1.0, 2.0, 3.0, 4.0, 5.0}
 
 
