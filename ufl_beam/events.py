@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from ufl_beam.beams import Place
 from ufl_beam.connectors import Connector, Coulomb, Stop
+from ufl_beam.memory import State
 from ufl_beam.record import Recorder
 
 if TYPE_CHECKING:
@@ -22,6 +23,12 @@ IN_CELLS = ("yields", "opens", "is free")
 
 BETWEEN = {Stop: ("touches", "lets go"), Coulomb: ("slides", "sticks")}
 """What can happen to connectors, and its end."""
+
+ALL = (*IN_CELLS, *(what for pair in BETWEEN.values() for what in pair))
+"""All that can happen."""
+
+Row = tuple[float, int, str]
+"""Time, number of the cell or connector, what."""
 
 FREE = 0.999
 """Part of the energy of a hinge after which it is called a joint."""
@@ -60,13 +67,18 @@ class Events(Recorder):
     def __init__(self, tell: Callable[[Event], object] | None = None) -> None:
         self._tell = tell
         self.found: list[Event] = []
+        self._rows: list[Row] = []
 
     def require_writable(self) -> None:
         """Nothing is written."""
 
     def open(self, simulation: Simulation) -> None:
         """Take note of the initial state."""
-        self.found = []
+        self.found, self._rows = [], []
+        self._watch(simulation)
+
+    def _watch(self, simulation: Simulation) -> None:
+        """What may happen in a scene, and what has."""
         grid = simulation.grid
         laws = [law for beam in simulation.scene.beams for law in grid.hinges(beam)]
         breaking = [law is not None and law.limit > 0 for law in laws]
@@ -99,19 +111,37 @@ class Events(Recorder):
         flags = self._look(simulation)
         (cells, goes_on), (cells_before, went_on) = flags, self._flags
         self._flags = flags
-        scene, grid = simulation.scene, simulation.grid
-        new: list[Event] = []
+        new: list[Row] = []
         for cell, n in np.argwhere(cells & ~cells_before):
-            new.append(Event(simulation.t, grid.middle(int(cell)), IN_CELLS[n]))
+            new.append((simulation.t, int(cell), IN_CELLS[n]))
         for link, now, before in zip(self._links, goes_on, went_on, strict=True):
             if now != before:
-                connector = scene.links[link]
-                begins, ends = BETWEEN[type(connector.law)]
-                new.append(Event(simulation.t, connector, begins if now else ends))
-        self.found += new
+                begins, ends = BETWEEN[type(simulation.scene.links[link].law)]
+                new.append((simulation.t, link, begins if now else ends))
+        events = self._add(simulation, new)
         if self._tell is not None and simulation.comm.rank == 0:
-            for event in new:
+            for event in events:
                 self._tell(event)
+
+    def _add(self, simulation: Simulation, rows: list[Row]) -> list[Event]:
+        links, grid = simulation.scene.links, simulation.grid
+        events = [
+            Event(t, grid.middle(number) if what in IN_CELLS else links[number], what)
+            for t, number, what in rows
+        ]
+        self._rows += rows
+        self.found += events
+        return events
 
     def close(self) -> None:
         """Nothing is open."""
+
+    def state(self) -> State:
+        """The events so far: time, number of the cell or connector, and what."""
+        return {"events": np.array([(t, n, ALL.index(what)) for t, n, what in self._rows])}
+
+    def resume(self, simulation: Simulation, state: State) -> None:
+        """Go on after those events."""
+        self.found, self._rows = [], []
+        self._add(simulation, [(t, int(n), ALL[int(k)]) for t, n, k in state["events"].tolist()])
+        self._watch(simulation)

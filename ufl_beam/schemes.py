@@ -144,8 +144,8 @@ class Static:
     advice = (
         "Try a smaller dt; beyond a limit load, and where softening snaps back (limit**2/energy of "
         "a hinge, half of it if softening is linear, above the stiffness that drives it), there is "
-        "no equilibrium nearby, so prescribe a displacement in the place of the load, or run "
-        "dynamics"
+        "no equilibrium nearby: follow the path with ub.follow(scene, ub.ArcLength(...)) or "
+        "ub.Dissipation(...), prescribe a displacement in the place of the load, or run dynamics"
     )
     load_weight = 1.0
     theta = 1.0

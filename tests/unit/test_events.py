@@ -86,3 +86,24 @@ def test_friction_slides_and_sticks():
     assert [e.what for e in events] == ["slides", "sticks"]
     # 1 m/s² for 0.1 s, then -1 m/s² for as long
     assert [e.time for e in events] == pytest.approx([0.0, 0.2], abs=3e-3)
+
+
+def test_events_go_on_from_a_checkpoint(shared_path):
+    """A run in two parts lists what a run in one does."""
+    section = ub.Section(EA=1e6, GA=1e6, EI=1e3, bending=ub.Hardening(limit=100.0, modulus=200.0))
+    scene = cantilever(section, lambda t: 0.3 * t, hinges={0.25: ub.Softening(120.0, 50.0)})
+    whole = run(scene, ub.Static())
+    events = ub.Events()
+    for end in (0.5, 1.0):
+        ub.simulate(
+            scene,
+            ub.Static(),
+            t=(0, end),
+            dt=0.05,
+            record=events,
+            checkpoint=ub.Checkpoint(shared_path / "run.h5", every=100),
+        )
+        events = ub.Events() if end < 1 else events
+    assert events.found == whole
+    assert {event.what for event in whole} == {"yields", "opens"}
+    assert min(event.time for event in whole) < 0.5 < max(event.time for event in whole)
