@@ -143,5 +143,5 @@ class Events(Recorder):
     def resume(self, simulation: Simulation, state: State) -> None:
         """Go on after those events."""
         self.found, self._rows = [], []
-        self._add(simulation, [(t, int(n), ALL[int(k)]) for t, n, k in state["events"].tolist()])
+        self._add(simulation, [(float(t), int(n), ALL[int(k)]) for t, n, k in state["events"]])
         self._watch(simulation)

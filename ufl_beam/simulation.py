@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from functools import cached_property
 from typing import NamedTuple, NoReturn
 
 from mpi4py import MPI
@@ -12,17 +10,17 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.applied import DeadLoads, FollowerLoads
-from ufl_beam.bodies import Anchor
 from ufl_beam.compat import Array
-from ufl_beam.connectors import HELD, Connector, Controller, Coulomb, Joint
+from ufl_beam.connectors import Controller, Coulomb
 from ufl_beam.couplings import couplings
 from ufl_beam.dampers import damping_forces
 from ufl_beam.errors import ConvergenceError, SceneError, require_kind
 from ufl_beam.fields import Fields
-from ufl_beam.grid import Grid, Index, Share
+from ufl_beam.grid import Grid, Share
 from ufl_beam.inelastic import InelasticBeams, inelastic_cells
-from ufl_beam.joints import Connection, links_of, motion_of, velocity_of
+from ufl_beam.initial import initial_state
 from ufl_beam.ledger import Ledger
+from ufl_beam.live import Live
 from ufl_beam.loads import FollowerLoad, RotatingFrame
 from ufl_beam.mechanism import no_number, require_independent, require_masses, require_no_mechanism
 from ufl_beam.memory import NOWHERE, Memory, Restoring, Saving, State
@@ -37,12 +35,10 @@ from ufl_beam.solution import Solution
 from ufl_beam.solve import Border, Newton, Solver, StepFailed
 from ufl_beam.sparse import Csr, Product, as_slice
 from ufl_beam.supports import Supports
-from ufl_beam.terms import KINDS, Beams, ElasticBeams, Inertia, SectionForces, Term
+from ufl_beam.terms import KINDS, Beams, ElasticBeams, Inertia, Term
 
 SMALLEST_PART = 2**12
 """A step is cut into at most this number of parts."""
-
-NO_REACTIONS = np.zeros((0, 3))
 
 SMALLEST_SHARE = 4_000
 """Scenes with fewer cells per process are computed by each process.
@@ -70,7 +66,7 @@ class Trial(NamedTuple):
     s: Array
 
 
-class Simulation:
+class Simulation(Live):
     """A scene in motion: one state, and the step to the next.
 
     :func:`simulate` is a loop over :meth:`step_to`; use this class for loops of your own.
@@ -116,7 +112,7 @@ class Simulation:
         self.grid = Grid(scene)
         together = len(self.grid.cells) >= comm.size * SMALLEST_SHARE
         self.share = Share(self.grid, comm if together else MPI.COMM_SELF)
-        q, v = self._initial_state(start)
+        q, v = initial_state(self.grid, start)
         self.fields = Fields(self.share)
         self._A = self.fields.matrix()
         self.t = t0
@@ -209,54 +205,6 @@ class Simulation:
         if followers:
             loads.append(FollowerLoads(followers, self.share, self.scheme, self.ledger, self._A))
         return loads
-
-    def _initial_state(self, start: Solution | None) -> tuple[Array, Array]:
-        """Configuration and velocities at all degrees of freedom, before anything is built."""
-        q, v = np.zeros(self.grid.size), self._initial_velocity()
-        if start is None:
-            return q, v
-        require_kind(start, Solution, "start")
-        if start.scene.beams != self.scene.beams or not np.array_equal(
-            start.grid.dofs, self.grid.dofs
-        ):
-            raise SceneError(
-                "start: the solution is of other beams or joints; use the same Beam objects, "
-                "joined alike"
-            )
-        return start.q[-1], start.v[-1] if len(start.v) else v
-
-    def _initial_velocity(self) -> Array:
-        """Velocities of :class:`Velocity`; zero elsewhere."""
-        v = np.full(self.grid.size, np.nan)
-        for velocity in self.scene.initial:
-            for beam in velocity.beams:
-                points, dofs = self.grid.nodes_of(beam)
-                new = np.array([velocity.at(x, y) for x, y in points])
-                size = np.abs(velocity.at(0, 0)[:2]).sum() + abs(velocity.angular) * self.scene.size
-                apart = np.abs(v[dofs] - new) > 1e-9 * np.array([size, size, abs(velocity.angular)])
-                if apart.any():
-                    x, y = points[np.flatnonzero(apart.any(axis=1))[0]]
-                    raise SceneError(
-                        f"Velocity: {beam.name} gets two different velocities at ({x:g}, {y:g}), "
-                        "from itself or from a beam that it is joined to"
-                    )
-                v[dofs] = new
-        known: Array = np.asarray(np.nan_to_num(v))
-        if self.scene.initial:
-            self._require_held(known)
-        return known
-
-    def _require_held(self, v: Array) -> None:
-        """Velocities must agree with what joints hold, or they would ring for ever."""
-        fastest = np.abs(v).max() * max(self.scene.size, 1.0)
-        for link, dofs in zip(self.scene.links, self.grid.dofs_of_links, strict=True):
-            a, b = v[dofs[0:6:2]], v[dofs[1:6:2]]
-            rate = float(np.dot(link.rigidly().a, a) + np.dot(link.rigidly().b, b))
-            if link.law is HELD and abs(rate) > 1e-9 * fastest:
-                raise SceneError(
-                    f"Velocity: the parts that {link} joins would move apart at {rate:.3g} m/s "
-                    "or rad/s; give all that is joined a Velocity that agrees"
-                )
 
     # -- the equation of a step ----------------------------------------------------------------
 
@@ -471,129 +419,12 @@ class Simulation:
         sizes = {kind: self._solver.size(force) for kind, force in forces.items()}
         return {kind: size for kind, size in sizes.items() if size}
 
-    # -- what recorders and solutions ask ------------------------------------------------------
+    # -- the end, and going on -----------------------------------------------------------------
 
     @property
     def iterations(self) -> int:
         """Newton iterations so far."""
         return self._solver.iterations
-
-    def velocities(self) -> list[Array]:
-        """Velocities at the local degrees of freedom; none in statics."""
-        return [self.inertia.v] if self.scheme.dynamic else []
-
-    def reactions(self) -> Array:
-        """Forces of all supports on the scene; (num_supports, 3); N, N, N m."""
-        if not self.scene.supports:
-            return NO_REACTIONS
-        if self.parts == 0:
-            return np.full((len(self.scene.supports), 3), np.nan)
-        dofs, mine = self._support_dofs
-        here = np.where(mine, self.supports.all_reactions(self.share.size)[dofs], 0.0)
-        if self.share.comm.size > 1:
-            self.share.comm.Allreduce(MPI.IN_PLACE, here)
-        return here
-
-    @cached_property
-    def _support_dofs(self) -> tuple[Index, Index]:
-        """Local degrees of freedom of the supports, and which of them this process owns."""
-        dofs = np.array([self.share.at(support.place) for support in self.scene.supports])
-        mine = self.share.owns(dofs)
-        local = np.zeros_like(dofs)
-        local[mine] = self.share.local(dofs[mine])
-        return local, mine
-
-    def entries(self) -> tuple[dict[str, float], ...]:
-        """The ledger over all processes: state, supplied, lost; J."""
-        ledger = self.ledger
-        groups = (dict(ledger.state), dict(ledger.supplied), dict(ledger.lost))
-        if self.share.comm.size == 1:
-            return groups
-        everyone = self.share.comm.allgather(groups)
-        return tuple(
-            {name: sum(one[g][name] for one in everyone) for name in group}
-            for g, group in enumerate(groups)
-        )
-
-    def ledger_names(self) -> list[str]:
-        """Names of the entries of the ledger."""
-        return [*self.ledger.state, *self.ledger.supplied, *self.ledger.lost]
-
-    def connections(self) -> Array:
-        """Motion, force, work and rate of all links of the scene, as :class:`Connection`.
-
-        All processes call it together; (num_links, 4).
-        """
-        here = np.zeros((len(self.scene.links), 4))
-        for coupling in self.couplings:
-            q = self.q
-            columns = (coupling.motion(q), coupling.force(q), coupling.work, coupling.rate)
-            here[coupling.numbers] = np.column_stack(columns)
-        if self.share.comm.size > 1:
-            self.share.comm.Allreduce(MPI.IN_PLACE, here)
-        return here
-
-    def connector(self, connector: Connector) -> Connection:
-        """What a connector is doing: numbers, at the end of the last step.
-
-        Raises:
-            SceneError: It is not in the scene.
-        """
-        (number,) = links_of(self.scene, connector)
-        return Connection(*self.connections()[number].tolist())
-
-    def displacement(self, place: Anchor) -> Array:
-        """Displacement and rotation (u, v, ψ) of a place now; (3,); m, m, rad."""
-        return np.asarray(motion_of(self.grid, place, [self.share.gather(self.q)])[0])
-
-    def velocity(self, place: Anchor) -> Array:
-        """Velocity (du/dt, dv/dt, dψ/dt) of a place now; (3,); m/s, m/s, rad/s."""
-        q, v = self.share.gather(self.q), self.share.gather(self.velocities()[0])
-        return np.asarray(velocity_of(self.grid, place, [q], [v])[0])
-
-    def press(self, joint: Joint) -> float:
-        """Size of the force that connectors hold a joint with at the end of the last step; N.
-
-        Raises:
-            SceneError: The joint shares its displacement; make it with ``measured=True``.
-        """
-        links = self.scene.links
-        numbers = [n for n in links_of(self.scene, joint) if not links[n].turns]
-        return float(np.linalg.norm(self.connections()[numbers, 1]))
-
-    def rates(self, links: Sequence[Connector]) -> Array:
-        """Rates of relative motions of this process now, by a difference; m/s or rad/s."""
-        rates = np.zeros(len(links))
-        for v in self.velocities():
-            fastest = np.abs(v).max(initial=0.0) or 1.0
-            ε = 1e-5 * self.scene.size / fastest
-            for coupling in self.couplings:
-                if coupling.links == list(links):
-                    ends = (coupling.motion(self.q + sign * ε * v) for sign in (1, -1))
-                    rates += np.subtract(*ends) / (2 * ε)
-        return rates
-
-    def section_forces(self) -> Array:
-        """(N, V, M) in all cells; (num_cells, 3); N, N, N m; all processes call it together."""
-        here = np.empty((len(self.share.cells), 3))
-        self._section_forces.write(self.q, here)
-        forces = self.share.gather_cells(here)
-        for cells, rows in self.material():
-            forces[cells] = rows[:, :3]
-        return forces
-
-    @cached_property
-    def _section_forces(self) -> SectionForces:
-        return SectionForces(self.fields)
-
-    def material(self) -> list[tuple[Index, Array]]:
-        """Cells that can yield or break, and :attr:`Points.kept`; all processes call together."""
-        return self._gather([inelastic.kept() for inelastic in self.inelastic])
-
-    def _gather(self, here: list[tuple[Index, Array]]) -> list[tuple[Index, Array]]:
-        if not self._has_inelastic or self.share.comm.size == 1:
-            return here
-        return [group for groups in self.share.comm.allgather(here) for group in groups]
 
     def end(self) -> None:
         """Let the solution have the last state, and what another run that starts there needs."""

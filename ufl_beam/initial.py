@@ -1,0 +1,60 @@
+"""The state that a run begins with."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ufl_beam.compat import Array
+from ufl_beam.connectors import HELD
+from ufl_beam.errors import SceneError, require_kind
+from ufl_beam.grid import Grid
+from ufl_beam.solution import Solution
+
+
+def initial_state(grid: Grid, start: Solution | None) -> tuple[Array, Array]:
+    """Configuration and velocities at all degrees of freedom, before anything is built."""
+    q, v = np.zeros(grid.size), _initial_velocity(grid)
+    if start is None:
+        return q, v
+    require_kind(start, Solution, "start")
+    if start.scene.beams != grid.scene.beams or not np.array_equal(start.grid.dofs, grid.dofs):
+        raise SceneError(
+            "start: the solution is of other beams or joints; use the same Beam objects, "
+            "joined alike"
+        )
+    return start.q[-1], start.v[-1] if len(start.v) else v
+
+
+def _initial_velocity(grid: Grid) -> Array:
+    """Velocities of :class:`Velocity`; zero elsewhere."""
+    v = np.full(grid.size, np.nan)
+    for velocity in grid.scene.initial:
+        for beam in velocity.beams:
+            points, dofs = grid.nodes_of(beam)
+            new = np.array([velocity.at(x, y) for x, y in points])
+            size = np.abs(velocity.at(0, 0)[:2]).sum() + abs(velocity.angular) * grid.scene.size
+            apart = np.abs(v[dofs] - new) > 1e-9 * np.array([size, size, abs(velocity.angular)])
+            if apart.any():
+                x, y = points[np.flatnonzero(apart.any(axis=1))[0]]
+                raise SceneError(
+                    f"Velocity: {beam.name} gets two different velocities at ({x:g}, {y:g}), "
+                    "from itself or from a beam that it is joined to"
+                )
+            v[dofs] = new
+    known: Array = np.asarray(np.nan_to_num(v))
+    if grid.scene.initial:
+        _require_held(grid, known)
+    return known
+
+
+def _require_held(grid: Grid, v: Array) -> None:
+    """Velocities must agree with what joints hold, or they would ring for ever."""
+    fastest = np.abs(v).max() * max(grid.scene.size, 1.0)
+    for link, dofs in zip(grid.scene.links, grid.dofs_of_links, strict=True):
+        a, b = v[dofs[0:6:2]], v[dofs[1:6:2]]
+        rate = float(np.dot(link.rigidly().a, a) + np.dot(link.rigidly().b, b))
+        if link.law is HELD and abs(rate) > 1e-9 * fastest:
+            raise SceneError(
+                f"Velocity: the parts that {link} joins would move apart at {rate:.3g} m/s "
+                "or rad/s; give all that is joined a Velocity that agrees"
+            )

@@ -1,0 +1,174 @@
+"""What recorders, controllers and solutions may ask of a simulation between its steps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+from mpi4py import MPI
+
+import numpy as np
+
+from ufl_beam.bodies import Anchor
+from ufl_beam.compat import Array
+from ufl_beam.connectors import Connector, Joint
+from ufl_beam.couplings import Couplings
+from ufl_beam.fields import Fields
+from ufl_beam.grid import Grid, Index, Share
+from ufl_beam.guides import Guides
+from ufl_beam.inelastic import InelasticBeams
+from ufl_beam.joints import Connection, links_of, motion_of, velocity_of
+from ufl_beam.ledger import Ledger
+from ufl_beam.scene import Scene
+from ufl_beam.schemes import Scheme
+from ufl_beam.supports import Supports
+from ufl_beam.terms import Inertia, SectionForces
+
+NO_REACTIONS = np.zeros((0, 3))
+
+
+class Live:
+    """The state of a scene in words of the scene.
+
+    Unless they say otherwise all processes call these together.
+
+    Attributes:
+        scene: What is modelled.
+        grid: Its vertices, cells and numbering.
+        share: The degrees of freedom of this process.
+        t: Time; s.
+        q: Configuration at the local degrees of freedom.
+        parts: Number of steps so far, parts of cut steps counted each.
+    """
+
+    scene: Scene
+    scheme: Scheme
+    grid: Grid
+    share: Share
+    fields: Fields
+    t: float
+    q: Array
+    parts: int
+    ledger: Ledger
+    supports: Supports
+    inertia: Inertia
+    couplings: list[Couplings | Guides]
+    inelastic: list[InelasticBeams]
+    _has_inelastic: bool
+
+    def velocities(self) -> list[Array]:
+        """Velocities at the local degrees of freedom; none in statics."""
+        return [self.inertia.v] if self.scheme.dynamic else []
+
+    def reactions(self) -> Array:
+        """Forces of all supports on the scene; (num_supports, 3); N, N, N m."""
+        if not self.scene.supports:
+            return NO_REACTIONS
+        if self.parts == 0:
+            return np.full((len(self.scene.supports), 3), np.nan)
+        dofs, mine = self._support_dofs
+        here = np.where(mine, self.supports.all_reactions(self.share.size)[dofs], 0.0)
+        if self.share.comm.size > 1:
+            self.share.comm.Allreduce(MPI.IN_PLACE, here)
+        return here
+
+    @cached_property
+    def _support_dofs(self) -> tuple[Index, Index]:
+        """Local degrees of freedom of the supports, and which of them this process owns."""
+        dofs = np.array([self.share.at(support.place) for support in self.scene.supports])
+        mine = self.share.owns(dofs)
+        local = np.zeros_like(dofs)
+        local[mine] = self.share.local(dofs[mine])
+        return local, mine
+
+    def entries(self) -> tuple[dict[str, float], ...]:
+        """The ledger over all processes: state, supplied, lost; J."""
+        ledger = self.ledger
+        groups = (dict(ledger.state), dict(ledger.supplied), dict(ledger.lost))
+        if self.share.comm.size == 1:
+            return groups
+        everyone = self.share.comm.allgather(groups)
+        return tuple(
+            {name: sum(one[g][name] for one in everyone) for name in group}
+            for g, group in enumerate(groups)
+        )
+
+    def ledger_names(self) -> list[str]:
+        """Names of the entries of the ledger."""
+        return [*self.ledger.state, *self.ledger.supplied, *self.ledger.lost]
+
+    def connections(self) -> Array:
+        """Motion, force, work and rate of all links of the scene, as :class:`Connection`.
+
+        All processes call it together; (num_links, 4).
+        """
+        here = np.zeros((len(self.scene.links), 4))
+        for coupling in self.couplings:
+            q = self.q
+            columns = (coupling.motion(q), coupling.force(q), coupling.work, coupling.rate)
+            here[coupling.numbers] = np.column_stack(columns)
+        if self.share.comm.size > 1:
+            self.share.comm.Allreduce(MPI.IN_PLACE, here)
+        return here
+
+    def connector(self, connector: Connector) -> Connection:
+        """What a connector is doing: numbers, at the end of the last step.
+
+        Raises:
+            SceneError: It is not in the scene.
+        """
+        (number,) = links_of(self.scene, connector)
+        return Connection(*self.connections()[number].tolist())
+
+    def displacement(self, place: Anchor) -> Array:
+        """Displacement and rotation (u, v, ψ) of a place now; (3,); m, m, rad."""
+        return np.asarray(motion_of(self.grid, place, [self.share.gather(self.q)])[0])
+
+    def velocity(self, place: Anchor) -> Array:
+        """Velocity (du/dt, dv/dt, dψ/dt) of a place now; (3,); m/s, m/s, rad/s."""
+        q, v = self.share.gather(self.q), self.share.gather(self.velocities()[0])
+        return np.asarray(velocity_of(self.grid, place, [q], [v])[0])
+
+    def press(self, joint: Joint) -> float:
+        """Size of the force that connectors hold a joint with at the end of the last step; N.
+
+        Raises:
+            SceneError: The joint shares its displacement; make it with ``measured=True``.
+        """
+        links = self.scene.links
+        numbers = [n for n in links_of(self.scene, joint) if not links[n].turns]
+        return float(np.linalg.norm(self.connections()[numbers, 1]))
+
+    def rates(self, links: Sequence[Connector]) -> Array:
+        """Rates of relative motions of this process now, by a difference; m/s or rad/s."""
+        rates = np.zeros(len(links))
+        for v in self.velocities():
+            fastest = np.abs(v).max(initial=0.0) or 1.0
+            ε = 1e-5 * self.scene.size / fastest
+            for coupling in self.couplings:
+                if coupling.links == list(links):
+                    ends = (coupling.motion(self.q + sign * ε * v) for sign in (1, -1))
+                    rates += np.subtract(*ends) / (2 * ε)
+        return rates
+
+    def section_forces(self) -> Array:
+        """(N, V, M) in all cells; (num_cells, 3); N, N, N m; all processes call it together."""
+        here = np.empty((len(self.share.cells), 3))
+        self._section_forces.write(self.q, here)
+        forces = self.share.gather_cells(here)
+        for cells, rows in self.material():
+            forces[cells] = rows[:, :3]
+        return forces
+
+    @cached_property
+    def _section_forces(self) -> SectionForces:
+        return SectionForces(self.fields)
+
+    def material(self) -> list[tuple[Index, Array]]:
+        """Cells that can yield or break, and :attr:`Points.kept`; all processes call together."""
+        return self._gather([inelastic.kept() for inelastic in self.inelastic])
+
+    def _gather(self, here: list[tuple[Index, Array]]) -> list[tuple[Index, Array]]:
+        if not self._has_inelastic or self.share.comm.size == 1:
+            return here
+        return [group for groups in self.share.comm.allgather(here) for group in groups]
