@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Protocol
 
+from mpi4py import MPI
 from petsc4py import PETSc
 
 import numpy as np
@@ -16,7 +17,7 @@ from ufl_beam.compat import Array
 from ufl_beam.elimination import Elimination
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.grid import Index, Share
-from ufl_beam.loops import doubles, lib
+from ufl_beam.loops import doubles, ffi, lib
 from ufl_beam.sparse import Csr
 
 CONVERGED = int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE)
@@ -44,6 +45,9 @@ TO_NO_WORK = {
 Forces that grow in an S, as in a point that yields one way or the other, send full steps from one
 branch to the other and back for ever.
 """
+
+SMALL, LARGE = 1e-250, 1e250
+"""Between them sums of squares have all their digits."""
 
 PREFIX = "ub_"
 """Prefix of the PETSc options of the solver, as in ``-ub_snes_monitor``."""
@@ -421,8 +425,18 @@ class Solver:
 
     def _size(self, forces: Any) -> float:
         """Euclidean norm over the scene of forces and moments over its size, at a pointer; N."""
-        square: float = lib.weighted_square(*self._norm, forces)
-        return math.sqrt(self._share.total(square))
+        square = self._share.total(lib.weighted_square(*self._norm, forces))
+        return math.sqrt(square) if SMALL < square < LARGE else self._scaled_size(forces)
+
+    def _scaled_size(self, forces: Any) -> float:
+        """The same of forces whose squares are no numbers any more."""
+        here = np.frombuffer(ffi.buffer(forces, self._weights.nbytes)) * np.sqrt(self._weights)
+        largest = float(np.abs(here).max(initial=0.0))
+        if self._parallel:
+            largest = self._share.comm.allreduce(largest, op=MPI.MAX)
+        if largest == 0.0 or not math.isfinite(largest):
+            return largest
+        return largest * math.sqrt(self._share.total(float(np.sum((here / largest) ** 2))))
 
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, ...]) -> int:
         residual = self._size(self._at_r)
@@ -442,7 +456,7 @@ class Solver:
             if least and self._excess(self._r, scale) <= self._newton.rtol:
                 return AT_ROUND_OFF
             # With the tangent of the iterate before, the residual falls by twice the last factor.
-            self._near = not kept and residual > floor and 20 * residual**2 <= wanted * self._last
+            self._near = not kept and residual > floor and 20 * residual * (residual / self._last) <= wanted
         self._slow += 1
         if residual <= self._best / 2:
             self._best, self._slow = residual, 0
