@@ -158,7 +158,7 @@ class AdaptiveSteps:
 
     def __init__(self, simulation: Simulation, t1: float, choice: Adaptive) -> None:
         self._t0 = self._t = t0 = simulation.t
-        self._t1 = t1
+        self._t1, self._solution = t1, simulation.solution
         self._tolerance = choice.tolerance
         self._longest = choice.longest or t1 - t0
         self._shortest = choice.shortest or 1e-12 * (t1 - t0)
@@ -206,7 +206,7 @@ class AdaptiveSteps:
                 simulation.give_up(failure, self._t + self._dt)
         simulation.accept(trial)
         self._t = simulation.t
-        self.error = simulation.solution.time_error = self.error + error
+        self.error = self._solution.time_error = self.error + error
         self.steps += 1
         self._dt = min(dt * min(change, GROWTH), self._longest)
         # The acceleration may jump at a stop, so what was before tells nothing about what comes.
@@ -267,5 +267,6 @@ class AdaptiveSteps:
         for name in self._STATE:
             setattr(self, name, type(getattr(self, name))(state[name]))
         self._largest = [state[f"largest {i}"] for i in range(len(self._largest))]
+        self._solution.time_error = self.error
 
     _STATE = ("steps", "rejected", "error", "_t", "_dt", "_fresh")
