@@ -121,7 +121,7 @@ class Couplings(Links):
 
     def excess(self, r: Array, force: float) -> float:
         """Largest residual of a row: of motions as a part of 1 % of the scene, or of ``force``."""
-        about_motion = self._rows[:, 1] == 0.0
+        about_motion = np.abs(self._rows[:, 1]) < 1.0
         forces = (force or 1.0) * self._size / self._length  # moments for what turns
         sizes = np.where(about_motion, 0.01 * self._length, forces)
         # Far from where it began, or after many turns, a part has fewer digits left.

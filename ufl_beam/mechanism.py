@@ -12,7 +12,7 @@ from scipy.sparse.linalg import eigsh
 from ufl_beam.beams import Beam, Point
 from ufl_beam.bodies import GROUND, Anchor, Body, Node, Spot, node
 from ufl_beam.compat import Array
-from ufl_beam.connectors import Connector, Function, Guide, Motor, Spring
+from ufl_beam.connectors import Connector, Coulomb, Function, Guide, Motor, Spring
 from ufl_beam.errors import SceneError
 from ufl_beam.scene import Scene, Slot
 
@@ -56,6 +56,9 @@ def _fixed(scene: Scene) -> set[Slot]:
     return {same.get(slot, slot) for slot in fixed}
 
 
+HOLDING = (Motor, Guide)
+"""Laws of connectors that give the motion."""
+
 Demand = tuple[str, list[tuple[Slot, float]]]
 """Who demands, and the factors of what moves in it; rotations times the size of the scene."""
 
@@ -65,16 +68,10 @@ def require_independent(scene: Scene) -> None:
 
     They do if their gradients in the undeformed scene, by what moves freely, are dependent.
     """
-    demands = _demands(scene)
-    if not any(isinstance(link.law, Motor | Guide) for link in scene.links):
+    if not any(isinstance(link.law, HOLDING) for link in scene.links):
         return
-    columns = {slot: i for i, slot in enumerate({s: 0 for _, f in demands for s, _ in f})}
-    entries = [
-        (columns[slot], row, factor)
-        for row, (_, factors) in enumerate(demands)
-        for slot, factor in factors
-    ]
-    within = _null_space(_sparse(entries, (max(len(columns), 1), len(demands))))
+    demands = _demands(scene, HOLDING)
+    within = _dependences(demands)
     if within.shape[1] == 0:
         return
     dependent = np.flatnonzero(np.abs(within).max(axis=1) > 1e-6)
@@ -86,8 +83,26 @@ def require_independent(scene: Scene) -> None:
     )
 
 
-def _demands(scene: Scene) -> list[Demand]:
-    """What connectors, and supports in turned axes, give of the motion of what moves freely."""
+def friction_repeats(scene: Scene) -> bool:
+    """Whether places that stick hold what is held already, by joints or by each other."""
+    if not any(isinstance(link.law, Coulomb) for link in scene.links):
+        return False
+    return _dependences(_demands(scene, (*HOLDING, Coulomb))).shape[1] > 0
+
+
+def _dependences(demands: list[Demand]) -> Array:
+    """Combinations of demands that demand nothing; (num_demands, k)."""
+    columns = {slot: i for i, slot in enumerate({s: 0 for _, f in demands for s, _ in f})}
+    entries = [
+        (columns[slot], row, factor)
+        for row, (_, factors) in enumerate(demands)
+        for slot, factor in factors
+    ]
+    return _null_space(_sparse(entries, (max(len(columns), 1), len(demands))))
+
+
+def _demands(scene: Scene, laws: tuple[type, ...]) -> list[Demand]:
+    """What connectors of some laws, and supports in turned axes, give of what moves freely."""
     same, fixed = scene.representatives, _fixed(scene)
 
     def free(factors: Iterable[tuple[Node, int, float]]) -> list[tuple[Slot, float]]:
@@ -97,7 +112,7 @@ def _demands(scene: Scene) -> list[Demand]:
 
     demands: list[Demand] = []
     for link in scene.links:
-        if isinstance(link.law, Motor | Guide):
+        if isinstance(link.law, laws):
             unit = (1.0, 1.0, 1.0 if link.turns else 1 / scene.size)
             pairs = zip((link.a, link.b), link.rigidly(), strict=True)
             factors = [(node(at), c, f[c] * unit[c]) for at, f in pairs for c in range(3)]

@@ -33,6 +33,12 @@ from ufl_beam.schemes import Scheme, Step
 if TYPE_CHECKING:
     from ufl_beam.simulation import Simulation
 
+CREEP = 1e-12
+"""Part of the size of the scene, or rad, by which what sticks creeps in a step under its limit.
+
+Only where several places that stick hold the same motion: so they share the force.
+"""
+
 Rows = tuple[Any, Any, Any]
 """α, β, γ of some connectors: arrays or numbers."""
 
@@ -44,11 +50,13 @@ class Setting(NamedTuple):
         simulation: Whom controllers and friction ask.
         scheme: Says what acts in a step.
         ledger: Takes energies and works.
+        friction_repeats: Whether places that stick may hold what is held already.
     """
 
     simulation: Simulation
     scheme: Scheme
     ledger: Ledger
+    friction_repeats: bool
 
 
 class Response(Protocol):
@@ -273,7 +281,9 @@ class _Rubbing(_Working):
     def _prepare(self) -> None:
         size = self._setting.simulation.scene.size
         self._slip: Array = np.zeros(len(self._links))
-        self._tiny = 1e-14 * np.where([c.turns for c in self._links], 1.0, size)
+        lengths = np.where([c.turns for c in self._links], 1.0, size)
+        self._tiny = 1e-14 * lengths
+        self._softness = (CREEP if self._setting.friction_repeats else 0.0) * lengths
 
     def state(self) -> Array:
         """Which way each slips."""
@@ -285,7 +295,8 @@ class _Rubbing(_Working):
 
     def _note(self, step: Step) -> None:
         simulation = self._setting.simulation
-        self._limit = np.array([simulation.asked[link] for link in self._links])
+        self._limit = limit = np.array([simulation.asked[link] for link in self._links])
+        self._creep = self._softness / np.where(limit > 0, limit, np.inf)
         # With this way the velocity at the end is zero; with none, that before would come back.
         self._way = self._setting.scheme.way_to_rest(step.dt) * simulation.rates(self._links)
         self._against = np.zeros(len(self._links), dtype=bool)
@@ -299,11 +310,11 @@ class _Rubbing(_Working):
         # Coming to rest must not give energy; if it did, the place is held at once in this step.
         self._against |= stuck & (λ * self._way < 0)
         self._slip = np.where(back, 0.0, np.where(over, np.sign(λ), self._slip))
-        sticks = self._slip == 0
+        sticks = (self._slip == 0) & (self._limit > 0)
         rest = self._e0 + np.where(self._against, 0.0, self._way)
         return (
             np.where(sticks, 1.0, 0.0),
-            np.where(sticks, 0.0, 1.0),
+            np.where(sticks, -self._creep, 1.0),
             np.where(sticks, rest, self._slip * self._limit),
         )
 

@@ -22,7 +22,13 @@ from ufl_beam.initial import initial_state
 from ufl_beam.ledger import Ledger
 from ufl_beam.live import Live
 from ufl_beam.loads import FollowerLoad, RotatingFrame
-from ufl_beam.mechanism import no_number, require_independent, require_masses, require_no_mechanism
+from ufl_beam.mechanism import (
+    friction_repeats,
+    no_number,
+    require_independent,
+    require_masses,
+    require_no_mechanism,
+)
 from ufl_beam.memory import NOWHERE, Memory, Restoring, Saving, State
 from ufl_beam.path import StaticPath
 from ufl_beam.points import Course, expect_entries
@@ -124,7 +130,8 @@ class Simulation(Live):
         self.inelastic: list[InelasticBeams] = []
         self._make_beams()
         self.force = np.zeros(self.share.size)
-        self.couplings = couplings(self.share, Setting(self, scheme, self.ledger), self._A)
+        setting = Setting(self, scheme, self.ledger, friction_repeats(scene))
+        self.couplings = couplings(self.share, setting, self._A)
         self.loads = self._make_loads()
         self._others: list[Term] = [*self.loads]
         if has_inertia(scheme):

@@ -456,7 +456,9 @@ class Solver:
             if least and self._excess(self._r, scale) <= self._newton.rtol:
                 return AT_ROUND_OFF
             # With the tangent of the iterate before, the residual falls by twice the last factor.
-            self._near = not kept and residual > floor and 20 * residual * (residual / self._last) <= wanted
+            self._near = (
+                not kept and residual > floor and 20 * residual * (residual / self._last) <= wanted
+            )
         self._slow += 1
         if residual <= self._best / 2:
             self._best, self._slow = residual, 0

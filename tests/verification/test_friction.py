@@ -207,3 +207,51 @@ def test_bearing():
     assert energy["friction"][-1] == pytest.approx(inertia * ω0**2 / 2, rel=1e-3)
     assert np.diff(energy["friction"]).min() >= 0.0
     assert energy.worst < 1e-9
+
+
+# -- friction that holds what is held already ----------------------------------------------------
+
+
+def test_friction_at_all_pins_of_a_closed_loop():
+    """Four places stick where one would do; then virtual work says when all slide at once.
+
+    A push F on the coupler of a four-bar linkage, cranks of 1 m and 1.2 m upright: with a unit
+    angular velocity of the first crank the second turns with 1/1.2 and the coupler not at all,
+    so F · 1 m = (M_A + M_B) + (M_C + M_D) / 1.2.
+    """
+    A, B, C, D = (0, 0), (0, 1), (1.5, 1.2), (1.5, 0)
+    crank, coupler, rocker = (
+        ub.Body(((p[0] + q[0]) / 2, (p[1] + q[1]) / 2), mass=1.0, inertia=0.1, name=name)
+        for name, p, q in (("crank", A, B), ("coupler", B, C), ("rocker", C, D))
+    )
+    pins = [
+        (ub.ground(*A), crank.at(*A)),
+        (crank.at(*B), coupler.at(*B)),
+        (coupler.at(*C), rocker.at(*C)),
+        (rocker.at(*D), ub.ground(*D)),
+    ]
+    moments = 3.0, 0.5, 0.7, 2.0
+    frictions = [
+        ub.Turn(*pin, ub.Coulomb(force=moment)) for pin, moment in zip(pins, moments, strict=True)
+    ]
+    push = ub.PointLoad(coupler.middle, force=(1, 0), time=lambda t: 60 * t)
+    scene = ub.Scene(
+        bodies=[crank, coupler, rocker],
+        joints=[ub.Revolute(*pin) for pin in pins],
+        connectors=frictions,
+        loads=[push],
+    )
+    events = ub.Events()
+    solution = ub.simulate(scene, ub.Midpoint(), t=(0, 0.2), dt=1e-3, record=events)
+    slides = {}
+    for event in events.found:
+        if event.what == "slides":
+            slides.setdefault(event.where, event.time)
+    assert set(slides) == set(frictions)
+    limit = (3.0 + 0.5 + (0.7 + 2.0) / 1.2) / 60
+    assert max(slides.values()) == pytest.approx(limit, abs=2e-3)
+    before = solution.times < limit - 1e-3
+    assert np.abs(solution.displacement(coupler.middle)[before]).max() < 1e-9
+    assert np.abs(solution.displacement(coupler.middle)[-1]).max() > 1e-3
+    assert solution.energy.worst < 1e-9
+    assert (np.diff(solution.energy.lost["friction"]) >= 0).all()
