@@ -97,6 +97,9 @@ double weighted_square(int rows, const double *w, const double *f)
 {
   double sum = 0;
   for (int i = 0; i < rows; ++i) sum += w[i] * f[i] * f[i];
+  if (sum == 0)
+    for (int i = 0; i < rows; ++i)
+      if (w[i] * f[i] != 0) return 5e-324; /* the squares are too small for a number */
   return sum;
 }
 

@@ -426,7 +426,9 @@ class Solver:
     def _size(self, forces: Any) -> float:
         """Euclidean norm over the scene of forces and moments over its size, at a pointer; N."""
         square = self._share.total(lib.weighted_square(*self._norm, forces))
-        return math.sqrt(square) if SMALL < square < LARGE else self._scaled_size(forces)
+        if SMALL < square < LARGE or square == 0.0:
+            return math.sqrt(square)
+        return self._scaled_size(forces)
 
     def _scaled_size(self, forces: Any) -> float:
         """The same of forces whose squares are no numbers any more."""
