@@ -126,7 +126,10 @@ def damages():
     )
 
 
-@pytest.mark.parametrize(("kind", "damage", "message"), damages(), ids=[d[0] for d in damages()])
+DAMAGES = list(damages())
+
+
+@pytest.mark.parametrize(("kind", "damage", "message"), DAMAGES, ids=[d[0] for d in DAMAGES])
 def test_a_damaged_file(kind, damage, message, path, on_first_rank):
     run(path)
 
