@@ -52,7 +52,7 @@ class Fields:
     def matrix(self) -> Csr:
         """A new matrix on the degrees of freedom of this process."""
         share = self.share
-        return Csr(csr_matrix(share.size, share.cell_dofs, share.link_dofs))
+        return Csr(csr_matrix(share.size, share.cell_dofs, share.link_dofs, share.body_dofs))
 
     def _require_direction(self, ends: Array) -> None:
         """The mesh must keep the order of the vertices of a cell, which orients the beam."""

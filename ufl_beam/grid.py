@@ -237,6 +237,7 @@ class Share:
         cell_dofs: Local degrees of freedom of the cells: both u, both v, both ψ;
             shape (len(cells), 6).
         links: Numbers of the connectors of this process.
+        body_dofs: Local degrees of freedom of the bodies that are here; (num, 3).
         link_dofs: Local degrees of freedom of the connectors: those of a cell, and their force;
             shape (len(links), 7).
     """
@@ -271,6 +272,8 @@ class Share:
         self._local[self.dofs] = np.arange(len(self.dofs))
         self.cell_dofs = self._local[of_cell[self.cells]]
         self.link_dofs = self._local[of_link[self.links]]
+        of_body = self._local[grid.dofs_of_bodies]
+        self.body_dofs = of_body[(of_body >= 0).all(axis=1)]
         self._all_owned = order
         self._num_owned_by = np.bincount(owner, minlength=comm.size).tolist()
 

@@ -308,3 +308,19 @@ def test_no_mass():
     beam = ub.Beam((0, 0), (2, 0), section, cells=2)
     with pytest.raises(ub.SceneError, match="nothing that can move has mass"):
         ub.modes(ub.Scene([beam], supports=[ub.Clamped(beam.start)]), 1)
+
+
+def test_a_lone_body_seen_from_a_rotating_frame():
+    """It flies straight; the error of dt = 0.01 s is (ω dt)²/12 of a radian's way."""
+    rate, body = 2.0, ub.Body((1, 0), mass=2.0, inertia=1.0)
+    scene = ub.Scene(
+        bodies=[body],
+        loads=[ub.RotatingFrame(rate)],
+        initial=[ub.Velocity([body], linear=(0.0, 1.0))],
+    )
+    solution = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.01)
+    straight = np.array([1.0, 3.0])  # at 1 s, with the velocity of the frame, ω r = 2 m/s
+    c, s = np.cos(rate), np.sin(rate)
+    seen = np.array([[c, s], [-s, c]]) @ straight
+    np.testing.assert_allclose(solution.position(body.middle)[-1], seen, atol=4 * 0.02**2 / 12)
+    assert solution.energy.worst < 1e-12
