@@ -871,8 +871,46 @@ def test_too_few_iterations():
     one = beam()
     push = ub.PointLoad(one.end, force=(0, 500), time=lambda t: 1.0 * (t > 0.25))
     scene = ub.Scene([one], supports=[ub.Clamped(one.start)], loads=[push])
-    with pytest.raises(ub.ConvergenceError, match="DIVERGED_MAX_IT after 1 iterations; residual"):
+    message = "DIVERGED_MAX_IT after 1 iterations; residual"
+    with pytest.raises(ub.ConvergenceError, match=message) as failure:
         run(scene, ub.Static(), dt=0.5, newton=ub.Newton(rtol=1e-14, max_iterations=1))
+    # Where the equilibrium is missed, and by which forces
+    (place, residual), *_ = failure.value.residuals.items()
+    assert f"{residual:.1e} N in {place}" in str(failure.value)
+    assert f"of {one.name} at (" in place
+    assert list(failure.value.residuals.values()) == sorted(
+        failure.value.residuals.values(), reverse=True
+    )
+    assert set(failure.value.forces) == {"beams", "loads"}
+    assert min(failure.value.forces.values()) > residual > 0
+
+
+def test_the_solution_of_an_interrupted_run_goes_on():
+    """What stops it is the user's own; internal variables are those of the last state."""
+    section = ub.Section(EA=1e4, GA=1e4, EI=100.0, bending=ub.Hardening(limit=10.0, modulus=10.0))
+    one = ub.Beam((0, 0), (1, 0), section, cells=2)
+
+    class Interrupted:
+        until = 0.55
+
+        def __call__(self, t):
+            if t > self.until:
+                raise KeyboardInterrupt
+            return 0.4 * t
+
+    motion = Interrupted()
+    scene = ub.Scene([one], supports=[ub.Clamped(one.start), ub.Prescribed(one.end, psi=motion)])
+    with pytest.raises(KeyboardInterrupt) as failure:
+        ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1, every=4, comm=MPI.COMM_SELF)
+    reached = failure.value.solution
+    assert reached.times[-1] == pytest.approx(0.5)
+    motion.until = 2.0
+    rest = ub.simulate(
+        scene, ub.Static(), t=(reached.times[-1], 1), dt=0.1, start=reached, comm=MPI.COMM_SELF
+    )
+    whole = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1, comm=MPI.COMM_SELF)
+    assert whole.energy.lost["plastic"][-1] > 0
+    np.testing.assert_allclose(rest.section_forces(one), whole.section_forces(one), atol=1e-9)
 
 
 def test_a_simulation_after_a_failure_is_as_good_as_any():

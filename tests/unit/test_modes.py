@@ -322,5 +322,7 @@ def test_a_lone_body_seen_from_a_rotating_frame():
     straight = np.array([1.0, 3.0])  # at 1 s, with the velocity of the frame, ω r = 2 m/s
     c, s = np.cos(rate), np.sin(rate)
     seen = np.array([[c, s], [-s, c]]) @ straight
-    np.testing.assert_allclose(solution.position(body.middle)[-1], seen, atol=3.2 * 2 * 2.0 * 0.02**2 / 12)
+    np.testing.assert_allclose(
+        solution.position(body.middle)[-1], seen, atol=3.2 * 2 * 2.0 * 0.02**2 / 12
+    )
     assert solution.energy.worst < 1e-12
