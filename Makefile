@@ -15,7 +15,7 @@ export OMPI_MCA_mpi_yield_when_idle = 1
 mpi = ./env timeout 2400 mpirun -n $(1) sh -c 'rank=$${OMPI_COMM_WORLD_RANK:-$${PMI_RANK:-0}}; [ $$rank = 0 ] && exec "$$@"; \
 	log=.rank$$rank.log; "$$@" >$$log 2>&1 && exec rm $$log; status=$$?; echo "rank $$rank:"; cat $$log; exit $$status' -
 pytest_mpi = python3 -m pytest -q --color=no -p no:cacheprovider tests/unit tests/properties
-cheap_demos = $(addprefix demos/demo_,$(addsuffix .py,four_beam_swing roll_up emergency_stop fibre_damping monte_carlo))
+cheap_demos = $(addprefix demos/demo_,$(addsuffix .py,four_beam_swing roll_up emergency_stop fibre_damping monte_carlo adaptive_steps lee_frame hinge_snapback rotating_beam))
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 12
