@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Protocol
 
 from mpi4py import MPI
@@ -161,13 +162,18 @@ class AdaptiveSteps:
         self._t1, self._solution = t1, simulation.solution
         self._tolerance = choice.tolerance
         self._longest = choice.longest or t1 - t0
-        self._shortest = choice.shortest or 1e-12 * (t1 - t0)
+        last_digit = math.ulp(max(abs(t0), abs(t1)))
+        self._shortest = max(choice.shortest or 1e-12 * (t1 - t0), 16 * last_digit)
         self._dt = min(choice.first or (t1 - t0) / 100, self._longest)
         functions = (function for _, function in simulation.scene.time_functions())
         self._functions = list(dict.fromkeys(functions))
         self._largest = [0.0] * len(self._functions)
         kinks = {float(t) for f in self._functions for t in getattr(f, "kinks", ())}
-        self._stops = sorted({t for t in (*kinks, *choice.stops, t1) if t0 < t <= t1})
+        # Times that differ by rounding alone are one.
+        same = max(1e-9 * (t1 - t0), self._shortest)
+        inside = sorted(t for t in (*kinks, *choice.stops) if t0 + same < t < t1 - same)
+        apart = [t for before, t in pairwise([t0, *inside]) if t - before > same]
+        self._stops = [*apart, t1]
         self._fresh = True
         share = simulation.share
         self._turns, (self._x, self._y) = share.rotations(), share.translations()

@@ -103,6 +103,19 @@ def test_steps_end_at_kinks_and_stops():
     assert (np.diff(solution.times) > 0).all()
 
 
+def test_stops_that_differ_by_rounding_are_one():
+    """And a run that begins late, where times have few digits, is the same run."""
+    early = run(oscillator(), ub.Adaptive(1e-4, stops=[0.3, 0.1 + 0.2, 1 - 1e-15]), end=1.0)
+    assert 0.3 in early.times
+    assert np.diff(early.times).min() > 1e-3
+    late = ub.simulate(
+        oscillator(), ub.Midpoint(), t=(2.0**20, 2.0**20 + 1), dt=ub.Adaptive(1e-4, stops=[0.3])
+    )
+    assert late.parts > 1
+    x = [at_end(s, s.scene.bodies[0].middle) for s in (early, late)]
+    assert x[0] == pytest.approx(x[1], abs=1e-3)
+
+
 def test_functions_of_time_are_those_of_the_scene():
     beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1, GA=1, EI=1, rhoA=1, rhoI=1))
     body = ub.Body((0, 1), mass=1.0, inertia=1.0)
