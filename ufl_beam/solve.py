@@ -322,7 +322,8 @@ class Solver:
                 database[name] = value
             snes.setFromOptions()
         finally:
-            for name in chosen:
+            # PETSc may have given those of before 3.24 their new names.
+            for name in {**chosen, **database.getAll()}:
                 del database[name]
             for name, value in before.items():
                 database[name] = value
