@@ -126,7 +126,6 @@ with ub.picture((12, 5)) as figure:
     right.set_xlabel("dissipated part of the fracture energy")
     right.set_ylabel("load (kN)")
     right.set_ylim(0, 5.6)
-    figure.tight_layout()
 figure.savefig(output / "hinge_snapback.png")
 ub.say("\npicture:", output / "hinge_snapback.png")
 

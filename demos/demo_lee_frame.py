@@ -121,7 +121,6 @@ with ub.picture((12, 5.2)) as figure:
         right.plot(*(100 * path.position(place)[n]), "o", color=color, ms=7)
     right.plot([0, 100 * L], [0, 100 * L], "^", color=INK, ms=11, zorder=0)
     right.legend(loc="lower right")
-    figure.tight_layout()
 figure.savefig(output / "lee_frame.png")
 ub.say("\npicture:", output / "lee_frame.png")
 
