@@ -9,18 +9,6 @@
 /* What is kept of a vertex: its pivot block as LU, the couplings to and from the left end. */
 enum { PIVOT = 0, TO_LEFT = 9, FROM_LEFT = 18, KEPT = 27 };
 
-typedef struct {
-  int chains;
-  const int32_t *first;     /* first vertex of each chain, and their number */
-  const int32_t *row;       /* vertices x 3 */
-  const int32_t *order;     /* vertices x 9 */
-  const int32_t *from_ends; /* chains x 18: entries of the ends' rows, left and right */
-  const int32_t *indptr;
-  const double *data;
-  double *kept;             /* vertices x KEPT */
-  int32_t *swaps;           /* vertices x 3: rows in the order of the pivots */
-} chains;
-
 /* D = LU with the largest pivot of each column; the reciprocals of the pivots on the diagonal */
 static void factor_block(double *D, int32_t *swap)
 {

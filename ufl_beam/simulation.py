@@ -14,7 +14,8 @@ from ufl_beam.compat import Array
 from ufl_beam.connectors import Controller, Coulomb
 from ufl_beam.couplings import couplings
 from ufl_beam.dampers import damping_forces
-from ufl_beam.errors import ConvergenceError, SceneError, require_kind
+from ufl_beam.equation import Equation
+from ufl_beam.errors import ConvergenceError, SceneError, StepFailed, require_kind
 from ufl_beam.fields import Fields
 from ufl_beam.grid import Grid, Share
 from ufl_beam.inelastic import InelasticBeams, inelastic_cells
@@ -38,7 +39,7 @@ from ufl_beam.rotating import FrameForces
 from ufl_beam.scene import Scene
 from ufl_beam.schemes import Scheme, Step, has_inertia
 from ufl_beam.solution import Solution
-from ufl_beam.solve import Border, Newton, Solver, StepFailed
+from ufl_beam.solve import Border, Newton, Solver
 from ufl_beam.sparse import Csr, Product, as_slice
 from ufl_beam.supports import Supports
 from ufl_beam.terms import KINDS, Beams, ElasticBeams, Inertia, Term
@@ -163,9 +164,14 @@ class Simulation(Live):
         if not scheme.dynamic:
             parts = (self.beams, self.couplings)
             self._path = StaticPath(self.share, scheme, *parts, self.ledger, self.q, t0)
+        equation = None
+        if self.share.comm.size == 1 and not self.supports.turned:
+            terms = (self.beams, self.couplings, self._others)
+            equation = Equation(self._A, *terms, self.supports, self.force)
         self._solver = Solver(
             self.share,
             self._A,
+            equation=equation,
             residual=self._residual,
             complete=self.supports.hold,
             tangent=self._tangent,
@@ -230,9 +236,10 @@ class Simulation(Live):
         here = self._course.relieve()
         return self.share.comm.allreduce(here, op=MPI.LOR) if self.share.comm.size > 1 else here
 
-    def _excess(self, r: Array, scale: float) -> float:
+    def _excess(self, x: Array, r: Array, scale: float) -> float:
         """How far the laws of connectors are missed."""
-        here = max((c.excess(r, scale) for c in self.couplings), default=0.0)
+        q1 = self.supports.in_plane(x)
+        here = max((c.excess(q1, r, scale) for c in self.couplings), default=0.0)
         if self.share.comm.size > 1:
             return self.share.comm.allreduce(here, op=MPI.MAX) if self.scene.links else 0.0
         return here
