@@ -169,7 +169,8 @@ typedef struct {
   int demands;
   const demand *demand; /* of connectors */
   double last, best;
-  int near, slow, patience;
+  int near, slow, patience, modified; /* near: the tangent is kept in the next iteration */
+  double rate;                        /* of a modified Newton's method, by which residuals fall */
 } equation;
 
 /* Values of SNESConvergedReason. */

@@ -32,6 +32,9 @@ void assemble(equation *e, const double *q)
 /* Between them sums of squares have all their digits. */
 static const double SMALL = 1e-250, LARGE = 1e250;
 
+/* Iterations that a tangent may still cost if it is kept: making one costs as much as two. */
+enum { MORE = 3 };
+
 static int demands_met(const equation *e, const double *q, double scale)
 {
   for (int k = 0; k < e->demands; ++k)
@@ -56,6 +59,11 @@ int judge(equation *e, const double *q, int iteration, double residual, double s
     if ((stays || residual <= floor / 80) && demands_met(e, q, scale)) return AT_ROUND_OFF;
     /* With the tangent of the iterate before, the residual falls by twice the last factor. */
     e->near = !kept && residual > floor && 20 * residual * (residual / e->last) <= wanted;
+  }
+  if (e->modified) {
+    /* The residual goes on to fall as it did, if the tangent is kept; from step to step too. */
+    if (iteration > 0) e->rate = residual / e->last;
+    e->near |= residual * pow(e->rate, MORE) <= wanted;
   }
   e->slow += 1;
   if (residual <= e->best / 2) e->best = residual, e->slow = 0;

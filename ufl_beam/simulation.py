@@ -336,7 +336,8 @@ class Simulation(Live):
         self.supports.enter(guess)
         self.supports.move(guess, self.supports.in_axes(self.q), step)
         try:
-            q1 = self._solver.solve(guess, [load.force for load in self.loads])
+            like_last = self.scheme.dynamic and math.isclose(step.dt, self.last_dt, rel_tol=1e-6)
+            q1 = self._solver.solve(guess, [load.force for load in self.loads], like_last)
         except StepFailed:
             if said := no_number(self.scene, (step.load_time, step.motion_time)):
                 raise StepFailed(said) from None

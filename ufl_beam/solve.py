@@ -58,12 +58,15 @@ class Newton:
     Args:
         rtol: Residual to be reached, as a part of the forces in the scene.
         max_iterations: Iterations before a step is cut.
+        modified: Keep the tangent, also from step to step, while residuals fall fast enough.  What
+            is saved grows with the number of cells; solutions end closer to ``rtol``.
         petsc: PETSc options without their prefix, such as ``{"snes_monitor": None}``; in
             ``PETSC_OPTIONS`` they have the prefix ``ub_``.
     """
 
     rtol: float = 1e-10
     max_iterations: int = 30
+    modified: bool = False
     petsc: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -231,12 +234,13 @@ class Solver:
         self._course = self._make_course()
         self._snes = self._make_snes(FULL_STEPS)
         self.iterations = self._done = 0
+        self._keeps = False
         self._error: BaseException | None = None
 
     def _make_course(self) -> Any:
         """How far a solution is, for :func:`judge` in C; and what the test in C needs."""
         c = ffi.new("equation *") if self._equation is None else self._equation.c
-        c.rtol = self._newton.rtol
+        c.rtol, c.modified, c.rate = self._newton.rtol, self._newton.modified, math.inf
         self._at_diagonal = integers(self._diagonal.astype(np.int32))
         self._at_sizes = [*map(doubles, (self._lengths, self._moves, np.empty(self._share.size)))]
         c.weight, c.residual, c.diagonal = self._norm[1], self._at_r, self._at_diagonal
@@ -472,18 +476,21 @@ class Solver:
 
     # -- the call ------------------------------------------------------------------------------
 
-    def solve(self, guess: Array, loads: list[Array]) -> Array:
+    def solve(self, guess: Array, loads: list[Array], like_last: bool = False) -> Array:
         """The configuration, found from ``guess``; local values, ghosts included; a new array.
 
         Args:
             guess: Where to begin.
             loads: Vectors of the loads, for the scale of convergence.
+            like_last: Whether the tangent of the last solution may do for this one.
 
         Raises:
             StepFailed: No convergence.
         """
         x = self._start(guess, loads)
+        self._keeps = like_last
         reason = self._iterate(self._snes, 2)
+        self._keeps = False
         if reason == lib.STALLED:
             reason = self._iterate(self._careful, 10)
         if reason <= 0 and self._relieve():
@@ -508,6 +515,8 @@ class Solver:
         course = self._course
         course.last = course.best = math.inf
         course.near, course.slow, course.patience = 0, 0, patience
+        if snes is not self._snes or not self._keeps:
+            course.rate = math.inf
         self._error = None
         try:
             snes.solve(None, self._x)
