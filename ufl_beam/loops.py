@@ -52,14 +52,14 @@ def _load() -> ModuleType:
             *(Path(__file__).with_name(f"{name}.c").read_text() for name in SOURCES),
         ]
     )
-    key = hashlib.sha256((source + _CALLBACKS + sys.version + "O3n").encode()).hexdigest()[:16]
+    key = hashlib.sha256((source + _CALLBACKS + sys.version).encode()).hexdigest()[:16]
     name = f"ufl_beam_loops_{key}"
     directory = jit_directory()
     library = directory / (name + str(sysconfig.get_config_var("EXT_SUFFIX")))
     if not library.exists():
         builder = cffi.FFI()
         builder.cdef(declarations + _CALLBACKS)
-        builder.set_source(name, source, extra_compile_args=["-O3", "-march=native"], libraries=["m"])
+        builder.set_source(name, source, extra_compile_args=["-O3"], libraries=["m"])
         directory.mkdir(parents=True, exist_ok=True)
         # Other processes may compile the same at the same time; the last one wins.
         with tempfile.TemporaryDirectory(dir=directory) as scratch:

@@ -47,8 +47,9 @@ PREFIX = "ub_"
 """Prefix of the PETSc options of the solver, as in ``-ub_snes_monitor``."""
 
 JOINTS_IN_NATURAL_ORDER = 60
-"""Up to this number of shared degrees of freedom PETSc alone is as fast as elimination along the
-beams, for 64 as for 32 768 cells: the order of the grid fills in next to nothing."""
+CELLS_IN_NATURAL_ORDER = 2000
+"""Up to these numbers of shared degrees of freedom and of cells PETSc alone is as fast as
+elimination along the beams, which Python calls: the order of the grid fills in next to nothing."""
 
 
 @dataclass(frozen=True)
@@ -299,8 +300,8 @@ class Solver:
         factors = ksp.getPC()
         # Constraints make zeros on the diagonal, and PETSc does not exchange rows.
         package = "klu" if len(share.grid.multipliers) else "petsc"
-        many_joints = share.grid.num_shared > JOINTS_IN_NATURAL_ORDER
-        if self._parallel or many_joints:
+        long = len(share.cells) > CELLS_IN_NATURAL_ORDER
+        if self._parallel or long or share.grid.num_shared > JOINTS_IN_NATURAL_ORDER:
             factors.setType("python")
             factors.setPythonContext(ChainsFirst(share, self._A, package))
             return ksp
