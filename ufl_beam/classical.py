@@ -153,11 +153,11 @@ class _Accelerated(_AtEnd):
         if 2 * β > γ > 0.5:
             return
         given = [str(c) for c in scene.links if isinstance(c.law, Motor | Guide)]
-        given += [f"the moving support at {s.place}" for s in scene.supports if s.moving]
+        given += [f"the support of {s.place}" for s in scene.supports if s.moving]
         if given:
             raise SceneError(
-                f"{name}: {given[0]} gives a motion, and accelerations of what is given ring for "
-                "ever without numerical damping; use GeneralizedAlpha(0.8), or Midpoint()"
+                f"{name}: {given[0]} prescribes a motion, whose accelerations ring for ever without "
+                "numerical damping; use GeneralizedAlpha(0.8), or Midpoint()"
             )
 
     def _beginning(self, dt: float, rates: Rates) -> tuple[Weights, Array | float, Array | float]:

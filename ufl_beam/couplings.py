@@ -74,7 +74,6 @@ class Couplings(Links):
         self._tangent.place(A)
         self.response = respond(links[0].law, links, setting)
         self._acting = setting.scheme.acting
-        self._before: Array = np.zeros(n)
         self._rows = np.zeros((n, 3))
         self._length = np.where([c.turns for c in links], 1.0, share.grid.scene.size)
         self._size = share.grid.scene.size

@@ -162,8 +162,12 @@ class Simulation(Live):
             memory = Restoring(self.share, start.internal)
             for one in (*self.inelastic, *self.couplings):
                 one.remember(memory, NOWHERE)
-            if has_inertia(scheme) and self._goes_on(start):
-                self.inertia.remember(memory, self.q)
+            if "reactions" in start.internal:
+                self.supports.carry_on(memory, self.q)
+            if has_inertia(scheme) and start.scene is scene and start.times[-1] == t0:
+                # No force has changed since: accelerations are still what they were.
+                known = sum(name in start.internal for name in scheme.kept)
+                self.inertia.carry_on(memory, known)
         self._q_before: Array = self.q
         self.last_dt = math.inf
         self._asking = [
@@ -191,11 +195,6 @@ class Simulation(Live):
             newton=newton or Newton(),
         )
         self.solution = Solution(scene, self.grid)
-
-    def _goes_on(self, start: Solution) -> bool:
-        """Whether forces have not changed since, so that what a scheme keeps still holds."""
-        known = "further rates" in start.internal
-        return known and start.scene is self.scene and float(start.times[-1]) == self.t
 
     # -- building ------------------------------------------------------------------------------
 
@@ -343,7 +342,11 @@ class Simulation(Live):
             StepFailed: There is no equilibrium, or it is too far away.
         """
         if self._path is None and not self.inertia.ready:
-            self.inertia.prepare(self._attempt(self.t + FIRST * (t1 - self.t), t1).s)
+            first = self._attempt(self.t + FIRST * (t1 - self.t), t1)
+            self.inertia.prepare(first.s)
+            self.supports.take()
+            for coupling in self.couplings:
+                coupling.take(first.q1)
         return self._attempt(t1, end)
 
     def _attempt(self, t1: float, end: float | None) -> Trial:
@@ -477,6 +480,10 @@ class Simulation(Live):
         memory = Saving(self.share)
         for one in (*self.inelastic, *self.couplings):
             one.remember(memory, self.q)
+        if self.supports.work:
+            self.supports.carry_on(memory, self.q)
+        if self._path is None:
+            self.inertia.carry_on(memory, len(self.inertia.more))
         solution.internal = memory.state()
 
     def state(self) -> State:

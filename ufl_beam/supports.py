@@ -54,6 +54,7 @@ class Supports:
         reactions: Forces of the supports on the scene in the latest residual, at the degrees of
             freedom that are held, in turned axes.
         moving: Local degrees of freedom whose values depend on time.
+        work: Whether there are such anywhere in the scene.
     """
 
     def __init__(self, share: Share, scheme: Scheme, ledger: Ledger, A: Csr) -> None:
@@ -81,7 +82,8 @@ class Supports:
         self._pivots: Array = np.ones(len(self._diagonal))
         self._owned = self.dofs < share.num_owned
         self._acting, self._ledger = scheme.acting, ledger
-        if any(support.moving for support in share.grid.scene.supports):
+        self.work = any(support.moving for support in share.grid.scene.supports)
+        if self.work:
             ledger.supplied["supports"] += 0.0
         self.reactions: Array = np.zeros(len(self.dofs))
         self._before: Array = self.reactions
@@ -142,12 +144,22 @@ class Supports:
             self._ledger.supplied["supports"] += float(np.sum(work[self._owned]))
         self._before = self.reactions
 
-    def remember(self, memory: Memory, q: Array) -> None:
-        """The reactions, and what stands for what is held in the tangent."""
-        reactions, pivots = np.zeros((2, len(q)))
-        reactions[self._held], pivots[self._with_pivots] = self._before, self._pivots
+    def take(self) -> None:
+        """Take the latest reactions as those before the next step."""
+        self._before = self.reactions
+
+    def carry_on(self, memory: Memory, q: Array) -> None:
+        """The reactions."""
+        reactions = np.zeros(len(q))
+        reactions[self._held] = self._before
         reactions = memory.at_dofs("reactions", reactions)
         self.reactions = self._before = reactions[self._held].copy()
+
+    def remember(self, memory: Memory, q: Array) -> None:
+        """The reactions, and what stands for what is held in the tangent."""
+        self.carry_on(memory, q)
+        pivots = np.zeros(len(q))
+        pivots[self._with_pivots] = self._pivots
         self._pivots = memory.at_dofs("pivots", pivots)[self._with_pivots]
 
     def all_reactions(self, size: int) -> Array:

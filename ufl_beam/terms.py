@@ -219,6 +219,11 @@ class Inertia:
         """Add mass times the derivative of the acceleration."""
         self._times.add_tangent(q1)
 
+    def carry_on(self, memory: Memory, known: int) -> None:
+        """State what the scheme keeps besides the velocities, as much as is ``known`` of it."""
+        more = self.more or (self.v,) * known
+        self.more = tuple(map(memory.at_dofs, self.scheme.kept[:known], more))
+
     def velocities(self, s: Array) -> Array:
         """Velocities at the end of a step ``s`` of the nodes."""
         return self.scheme.rates(self._dt, s, self)[0]
@@ -252,7 +257,4 @@ class Inertia:
         self.v = memory.at_dofs("velocity", self.v)
         self.v_before = memory.at_dofs("velocity before", self.v_before)
         self.last_dt = memory.number("step of velocity", self.last_dt)
-        known = int(memory.number("further rates", len(self.more)))
-        more = self.more or (self.v,) * known
-        names = self.scheme.kept[:known]
-        self.more = tuple(memory.at_dofs(*one) for one in zip(names, more, strict=True))
+        self.carry_on(memory, int(memory.number("further rates", len(self.more))))
