@@ -296,7 +296,7 @@ class DecayingMidpoint(_ExactStep, _Midway):
     Δe (Δe - r Δe') = (Δe² - r² Δe'² + (Δe - r Δe')²)/2: the motion never has more energy than it
     began with and was given.  The entry "numerical" of the ledger has the sum of both, exactly; in
     a single step it may give back a part of what it took.  Linear momentum is kept; angular momentum
-    is lost at third order by the velocities.  Cells that may yield or break are not damped, so that
+    is lost at second order by the velocities.  Cells that may yield or break are not damped, so that
     open hinges turn freely, nor are connectors.
 
     Args:

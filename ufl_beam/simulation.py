@@ -155,6 +155,8 @@ class Simulation(Live):
         self._inner: list[Beams] = [*self.beams, *self.couplings]
         self.terms: list[Term] = [*self._inner, *self._others]
         self.supports = Supports(self.share, scheme, self.ledger, self._A)
+        if has_inertia(scheme):
+            self.supports.stop(self.inertia.v)
         if start is not None or (has_inertia(scheme) and scheme.kept):
             for load in self.loads:
                 load.carry_on(self.t, self.q)

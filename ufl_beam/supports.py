@@ -144,6 +144,12 @@ class Supports:
             self._ledger.supplied["supports"] += float(np.sum(work[self._owned]))
         self._before = self.reactions
 
+    def stop(self, v: Array) -> None:
+        """Set velocities of what does not move to zero, in place; else they would ring."""
+        self.enter(v)
+        v[np.setdiff1d(self.dofs, self.moving)] = 0.0
+        self.leave(v)
+
     def take(self) -> None:
         """Take the latest reactions as those before the next step."""
         self._before = self.reactions
