@@ -157,9 +157,9 @@ def test_period_of_average_acceleration():
     )
     solution = go(bar(), ub.Newmark(), 400 * Ω / OMEGA, 400)
     energy = solution.energy.total
-    # Linear: energy is kept from the first step on, whose acceleration is not quite the right one.
+    # Linear: energy is kept but for the first step, whose acceleration is that a 16th later.
     assert np.ptp(energy[1:]) < 1e-10 * energy[0]
-    assert np.ptp(energy) < 0.05 * Ω**2 * energy[0]
+    assert np.ptp(energy) < 0.07 * Ω**2 * energy[0]
 
 
 @pytest.mark.parametrize("rho_inf", [0.0, 0.4, 0.8, 1.0])
@@ -295,12 +295,13 @@ def test_moving_supports_and_joints_of_multipliers_with_generalised_alpha():
             bodies=[body],
             joints=[ub.Revolute(ub.ground(0, 0), body.at(0, 0)), hinge],
             supports=[ub.Prescribed(beam.end, v=lambda t: 0.3 * math.sin(3 * t) ** 4)],
+            damping=[ub.Rayleigh(stiffness=0.02)],
         )
 
-    finest = go(scene(), ub.Midpoint(), 0.5, 1600)
-    runs = [go(scene(), ub.GeneralizedAlpha(0.6), 0.5, n) for n in (100, 200)]
+    finest = go(scene(), ub.Midpoint(), 0.5, 1000)
+    runs = [go(scene(), ub.GeneralizedAlpha(0.6), 0.5, n) for n in (50, 100)]
     coarse, fine = (np.abs(run.v[-1] - finest.v[-1]).max() for run in runs)
-    assert math.log2(coarse / fine) == pytest.approx(2, abs=0.3)
+    assert math.log2(coarse / fine) == pytest.approx(2, abs=0.05)
     assert runs[-1].energy.worst < 1e-4
     joint = runs[-1].scene.joints[1]
     body, beam = runs[-1].scene.bodies[0], runs[-1].scene.beams[0]
