@@ -15,13 +15,13 @@ from ufl_beam.inelastic import Strains
 from ufl_beam.kinematics import strain
 from ufl_beam.ledger import Ledger
 from ufl_beam.memory import Memory
-from ufl_beam.schemes import Scheme, Step
+from ufl_beam.schemes import Step
 from ufl_beam.sparse import Csr
 from ufl_beam.terms import Term
 
 
 @singledispatch
-def numerical_forces(scheme: Scheme, fields: Fields, A: Csr, ledger: Ledger) -> list[Term]:
+def numerical_forces(scheme: object, fields: Fields, A: Csr, ledger: Ledger) -> list[Term]:
     """Forces of elastic cells that only the scheme asks for; for most schemes none."""
     return []
 

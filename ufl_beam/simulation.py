@@ -115,7 +115,9 @@ class Simulation(Live):
         comm = ours() if comm is None else comm
         require_kind(scene, Scene, "scene")
         if not isinstance(scheme, Scheme) or isinstance(scheme, type):
-            raise SceneError(f"scheme = {scheme!r} must be a scheme, such as Static() or Midpoint()")
+            raise SceneError(
+                f"scheme = {scheme!r} must be a scheme, such as Static() or Midpoint()"
+            )
         require_kind(newton or Newton(), Newton, "newton")
         if has_inertia(scheme):
             require_masses(scene)

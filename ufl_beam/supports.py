@@ -156,7 +156,7 @@ class Supports:
 
     def carry_on(self, memory: Memory, q: Array) -> None:
         """The reactions."""
-        reactions = np.zeros(len(q))
+        reactions: Array = np.zeros(len(q))
         reactions[self._held] = self._before
         reactions = memory.at_dofs("reactions", reactions)
         self.reactions = self._before = reactions[self._held].copy()

@@ -1,8 +1,8 @@
 """Time schemes against closed forms: order, amplification of one mode, energy, momenta, refusals.
 
-Sources: N. M. Newmark, J. Eng. Mech. Div. 85 (1959) 67-94; J. Chung, G. M. Hulbert, J. Appl. Mech. 60
-(1993) 371-375; M. Arnold, O. Brüls, Multibody Syst. Dyn. 18 (2007) 185-202.  The polynomials of the
-decaying midpoint rule are derived in docs/schemes.md.
+Sources: N. M. Newmark, J. Eng. Mech. Div. 85 (1959) 67-94; J. Chung, G. M. Hulbert, J. Appl. Mech.
+60 (1993) 371-375; M. Arnold, O. Brüls, Multibody Syst. Dyn. 18 (2007) 185-202.  The polynomials of
+the decaying midpoint rule are derived in docs/schemes.md.
 """
 
 import math
@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from scenes import flying_beam, swing
+from scenes import flying_beam
 
 import ufl_beam as ub
 
@@ -187,7 +187,7 @@ def test_decaying_midpoint_never_amplifies(rho_inf, Ω):
 
 
 def test_energy_of_decaying_midpoint_with_its_memory_never_grows():
-    """[closed] Whatever the steps: E + c/2 (k Δu² + m Δv²), and its loss is what the ledger says."""
+    """[closed] E + c/2 (k Δu² + m Δv²), whatever the steps; E loses what the ledger says."""
     scheme, random = ub.DecayingMidpoint(0.5), np.random.default_rng(4)
     simulation = ub.Simulation(bar(), scheme)
     place = simulation.scene.beams[0].end
