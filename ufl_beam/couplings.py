@@ -75,7 +75,7 @@ class Couplings(Links):
         self._tangent.place(A)
         self.response = respond(links[0].law, links, setting)
         self._length = np.where([c.turns for c in links], 1.0, share.grid.scene.size)
-        self._before, self._e, self._now = np.zeros((3, n))
+        self._e, self._now = np.zeros((2, n))
         self._rows = np.zeros((n, 3))
         self._q: Array = np.empty(0)
         self._in_c = c = ffi.new("couplings *")

@@ -14,6 +14,7 @@ from ufl_beam.compat import Array
 from ufl_beam.connectors import Controller, Coulomb
 from ufl_beam.couplings import couplings
 from ufl_beam.dampers import damping_forces
+from ufl_beam.differences import numerical_forces
 from ufl_beam.equation import Equation
 from ufl_beam.errors import ConvergenceError, SceneError, StepFailed, require_kind
 from ufl_beam.fields import Fields
@@ -58,6 +59,13 @@ LARGEST_TURN = 0.75 * math.pi
 """A step that turns a node further is cut; the algorithmic strains end at π."""
 
 
+FIRST = 1 / 16
+"""Part of the first step after which accelerations are taken for those at the beginning.
+
+Shorter ones are nearer to it, but magnify the velocities of supports that do not begin with theirs.
+"""
+
+
 class Trial(NamedTuple):
     """A step that was solved but not yet accepted.
 
@@ -80,7 +88,7 @@ class Simulation(Live):
 
     Args:
         scene: What is modelled.
-        scheme: :class:`Static`, :class:`ExactStatic` or :class:`Midpoint`.
+        scheme: :class:`Static`, :class:`Midpoint` or another one, see docs/schemes.md.
         t0: Time of the initial state; s.
         start: Solution of the same beams whose last state is the initial state.
         newton: Tolerances and PETSc options.
@@ -108,10 +116,13 @@ class Simulation(Live):
         comm = ours() if comm is None else comm
         require_kind(scene, Scene, "scene")
         if not isinstance(scheme, Scheme) or isinstance(scheme, type):
-            raise SceneError(f"scheme = {scheme!r} must be Static(), ExactStatic() or Midpoint()")
+            raise SceneError(
+                f"scheme = {scheme!r} must be a scheme, such as Static() or Midpoint()"
+            )
         require_kind(newton or Newton(), Newton, "newton")
-        if scheme.dynamic:
+        if has_inertia(scheme):
             require_masses(scene)
+            scheme.require(scene)
         else:
             require_no_mechanism(scene)
         require_independent(scene)
@@ -129,27 +140,39 @@ class Simulation(Live):
 
         self.beams: list[Beams] = []
         self.inelastic: list[InelasticBeams] = []
+        self._numerical: list[Term] = []
         self._make_beams()
         self.force = np.zeros(self.share.size)
         setting = Setting(self, scheme, self.ledger, friction_repeats(scene))
         self.couplings = couplings(self.share, setting, self._A)
         self.loads = self._make_loads()
-        self._others: list[Term] = [*self.loads]
+        self._others: list[Term] = [*self.loads, *self._numerical]
         if has_inertia(scheme):
             v = v[self.share.dofs]
             self.inertia = Inertia(self.fields, scheme, self._A, self.ledger, v)
             self._others.append(self.inertia)
         for damping in scene.damping:
-            self._others += damping_forces(damping, self.fields, scheme, self._A, self.ledger)
+            inertia = self.inertia if scheme.dynamic else None
+            setting_of = (self.fields, scheme, self._A, self.ledger, inertia)
+            self._others += damping_forces(damping, *setting_of)
         self._inner: list[Beams] = [*self.beams, *self.couplings]
         self.terms: list[Term] = [*self._inner, *self._others]
         self.supports = Supports(self.share, scheme, self.ledger, self._A)
-        if start is not None:
+        if has_inertia(scheme):
+            self.supports.stop(self.inertia.v)
+        if start is not None or (has_inertia(scheme) and scheme.kept):
             for load in self.loads:
                 load.carry_on(self.t, self.q)
+        if start is not None:
             memory = Restoring(self.share, start.internal)
             for one in (*self.inelastic, *self.couplings):
                 one.remember(memory, NOWHERE)
+            if "reactions" in start.internal:
+                self.supports.carry_on(memory, self.q)
+            if has_inertia(scheme) and start.scene is scene and start.times[-1] == t0:
+                # No force has changed since: accelerations are still what they were.
+                known = sum(name in start.internal for name in scheme.kept)
+                self.inertia.carry_on(memory, known)
         self._q_before: Array = self.q
         self.last_dt = math.inf
         self._asking = [
@@ -205,6 +228,7 @@ class Simulation(Live):
             part = np.flatnonzero(elastic)
             fields = self.fields if elastic.all() else Fields(self.share, part)
             self.beams.append(ElasticBeams(fields, self.scheme, self._A, self.ledger))
+            self._numerical = numerical_forces(self.scheme, fields, self._A, self.ledger)
 
     def _make_loads(self) -> list[DeadLoads | FollowerLoads | FrameForces]:
         followers = [load for load in self.scene.loads if isinstance(load, FollowerLoad)]
@@ -328,6 +352,16 @@ class Simulation(Live):
         Raises:
             StepFailed: There is no equilibrium, or it is too far away.
         """
+        if self._path is None and not self.inertia.ready:
+            first = self._attempt(self.t + FIRST * (t1 - self.t), t1)
+            self.inertia.prepare(first.s)
+            self.supports.take()
+            for coupling in self.couplings:
+                coupling.take(first.q1)
+        return self._attempt(t1, end)
+
+    def _attempt(self, t1: float, end: float | None) -> Trial:
+        """See :meth:`attempt`."""
         step = self.scheme.step(self.t, t1, t1 if end is None else end, self.q)
         self.ask()
         for term in self.terms:
@@ -458,6 +492,10 @@ class Simulation(Live):
         memory = Saving(self.share)
         for one in (*self.inelastic, *self.couplings):
             one.remember(memory, self.q)
+        if self.supports.work:
+            self.supports.carry_on(memory, self.q)
+        if self._path is None:
+            self.inertia.carry_on(memory, len(self.inertia.more))
         solution.internal = memory.state()
 
     def state(self) -> State:

@@ -56,6 +56,7 @@ class Supports:
         entries: Entries of the matrix that hold them, and those of them on the diagonal.
         pivots: What stands on the diagonal.
         moving: Local degrees of freedom whose values depend on time.
+        work: Whether there are such anywhere in the scene.
     """
 
     def __init__(self, share: Share, scheme: Scheme, ledger: Ledger, A: Csr) -> None:
@@ -83,7 +84,8 @@ class Supports:
         self.pivots: Array = np.ones(len(self.dofs))
         self._owned = self.dofs < share.num_owned
         self._acting, self._ledger = scheme.acting, ledger
-        if any(support.moving for support in share.grid.scene.supports):
+        self.work = any(support.moving for support in share.grid.scene.supports)
+        if self.work:
             ledger.supplied["supports"] += 0.0
         self.reactions: Array = np.zeros(len(self.dofs))
         self._before: Array = self.reactions.copy()
@@ -149,12 +151,28 @@ class Supports:
             self._ledger.supplied["supports"] += float(np.sum(work[self._owned]))
             self._before = self.reactions.copy()
 
-    def remember(self, memory: Memory, q: Array) -> None:
-        """The reactions, and what stands for what is held in the tangent."""
-        reactions, pivots = np.zeros((2, len(q)))
-        reactions[self._held], pivots[self._held] = self.reactions, self.pivots
+    def stop(self, v: Array) -> None:
+        """Set velocities of what does not move to zero, in place; else they would ring."""
+        self.enter(v)
+        v[np.setdiff1d(self.dofs, self.moving)] = 0.0
+        self.leave(v)
+
+    def take(self) -> None:
+        """Take the latest reactions as those before the next step."""
+        self._before = self.reactions.copy()
+
+    def carry_on(self, memory: Memory, q: Array) -> None:
+        """The reactions."""
+        reactions: Array = np.zeros(len(q))
+        reactions[self._held] = self._before if self._motions else self.reactions
         self.reactions[:] = memory.at_dofs("reactions", reactions)[self._held]
         self._before = self.reactions.copy()
+
+    def remember(self, memory: Memory, q: Array) -> None:
+        """The reactions, and what stands for what is held in the tangent."""
+        self.carry_on(memory, q)
+        pivots = np.zeros(len(q))
+        pivots[self._held] = self.pivots
         self.pivots[:] = memory.at_dofs("pivots", pivots)[self._held]
 
     def all_reactions(self, size: int) -> Array:
