@@ -21,6 +21,7 @@ import numpy.typing as npt
 from ufl_beam.beams import Beam, Place
 from ufl_beam.bodies import Anchor, Body, Node, Spot, node
 from ufl_beam.compat import Array
+from ufl_beam.discretisation import Mesh
 from ufl_beam.errors import SceneError, require_kind
 from ufl_beam.laws import Softening
 from ufl_beam.scene import COMPONENTS, Scene
@@ -36,6 +37,10 @@ class Grid:
     numbered along the beams, the shared ones last: eliminating them in this order fills in nothing
     but the coupling of the joints.
 
+    Args:
+        scene: What is modelled.
+        mesh: How finely; with the cells of its beams by default.
+
     Attributes:
         points: Vertices of all beams, beam after beam; shape (num_vertices, 2); m.
         cells: Vertices of the cells; shape (num_cells, 2).
@@ -47,9 +52,10 @@ class Grid:
         num_shared: How many of them joints share.
     """
 
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
-        self._parameters = [np.array(b.vertices(scene.attached[b])) for b in scene.beams]
+    def __init__(self, scene: Scene, mesh: Mesh | None = None) -> None:
+        require_kind(mesh or Mesh(), Mesh, "mesh")
+        self.scene, self.mesh = scene, mesh or Mesh()
+        self._parameters = [np.array(self.mesh.vertices(b, scene.attached[b])) for b in scene.beams]
         counts = np.array([len(p) for p in self._parameters], dtype=np.int64)
         self._first = np.concatenate([[0], np.cumsum(counts)])
         self.points = np.array(
@@ -63,6 +69,14 @@ class Grid:
         self.beam_of_cell = np.repeat(np.arange(len(scene.beams)), counts - 1)
         self._require_length()
         self._number()
+
+    def agrees(self, other: Grid) -> bool:
+        """Whether what belongs to the degrees of freedom of another grid belongs to these."""
+        return (
+            self.scene.beams == other.scene.beams
+            and np.array_equal(self.points, other.points)
+            and np.array_equal(self.dofs, other.dofs)
+        )
 
     @cached_property
     def _number_of_beam(self) -> dict[Beam, int]:

@@ -19,6 +19,7 @@ RECORDS = [
     "beams",
     "bodies",
     "connectors",
+    "discretisation",
     "distributions",
     "errors",
     "fibres",
