@@ -109,6 +109,13 @@ class Grid:
         nodes = self.nodes_along(one)
         return self.points[nodes], self.dofs[nodes]
 
+    @property
+    def pieces(self) -> Index:
+        """Neighbouring nodes, one pair after the other along each cell; (degree num_cells, 2)."""
+        start, end, *between = self.nodes_of_cells.T
+        along = np.column_stack([start, *between, end])
+        return np.stack([along[:, :-1], along[:, 1:]], axis=2).reshape(-1, 2)
+
     def nodes_along(self, beam: Beam) -> Index:
         """Vertices of a beam and nodes between them, from start to end."""
         start, _, *between = self.nodes_of_cells[self.cells_of(beam)].T
