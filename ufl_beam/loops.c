@@ -1,6 +1,6 @@
 /* The loops over cells and rows that a Newton iteration consists of; see loops.h. */
 
-enum { MOST = 64 }; /* entries of an element vector or matrix, checked in Python */
+enum { MOST = 144 }; /* entries of an element vector or matrix: 12 unknowns of degree 3 */
 
 /* The values q of the cells into their packed coefficients, from `at` on. */
 void set_cells(const cells *c, const double *q, int at)

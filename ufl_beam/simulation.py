@@ -15,12 +15,13 @@ from ufl_beam.connectors import Controller, Coulomb
 from ufl_beam.couplings import couplings
 from ufl_beam.dampers import damping_forces
 from ufl_beam.differences import numerical_forces
+from ufl_beam.discretisation import Mesh
 from ufl_beam.equation import Equation
 from ufl_beam.errors import ConvergenceError, SceneError, StepFailed, require_kind
 from ufl_beam.fields import Fields
 from ufl_beam.grid import Grid, Share
 from ufl_beam.inelastic import InelasticBeams, inelastic_cells
-from ufl_beam.initial import initial_state
+from ufl_beam.initial import initial_state, mesh_of
 from ufl_beam.ledger import Ledger
 from ufl_beam.live import Live
 from ufl_beam.loads import FollowerLoad, RotatingFrame
@@ -92,6 +93,7 @@ class Simulation(Live):
         t0: Time of the initial state; s.
         start: Solution of the same beams whose last state is the initial state.
         newton: Tolerances and PETSc options.
+        mesh: How finely it is discretised; as ``start``, or with the cells of the beams.
         comm: Processes that share the scene; all of them, or in a :func:`study` this one alone.
 
     Attributes:
@@ -111,6 +113,7 @@ class Simulation(Live):
         t0: float = 0.0,
         start: Solution | None = None,
         newton: Newton | None = None,
+        mesh: Mesh | None = None,
         comm: MPI.Intracomm | None = None,
     ) -> None:
         comm = ours() if comm is None else comm
@@ -127,7 +130,7 @@ class Simulation(Live):
             require_no_mechanism(scene)
         require_independent(scene)
         self.scene, self.scheme, self.comm = scene, scheme, comm
-        self.grid = Grid(scene)
+        self.grid = Grid(scene, mesh_of(start, mesh))
         together = len(self.grid.cells) >= comm.size * SMALLEST_SHARE
         self.share = Share(self.grid, comm if together else MPI.COMM_SELF)
         q, v = initial_state(self.grid, start)
