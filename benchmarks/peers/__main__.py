@@ -14,14 +14,24 @@ from itertools import groupby
 from pathlib import Path
 
 import cases
+import report
 from install import installed
 from problems import PROBLEMS
 
 HERE = Path(__file__).parent
+RESULTS = HERE.parent / "results" / "bench_peers.jsonl"
 LIMIT = 600  # s for one run
 ALONE = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
 )
+
+
+def machine():
+    """Commit, versions and machine, asked in a process of its own: this one stays small."""
+    code = "import json, bench_step; print(json.dumps(bench_step.machine()))"
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, cwd=HERE.parent, capture_output=True, text=True, check=True)
+    return json.loads(done.stdout)
 
 
 def run(case, peers):
@@ -45,13 +55,13 @@ def record(case, runs):
     """What is kept of the runs of a case: medians, and each wall time in the order of the rounds."""
     first = runs[0]
     kept = {"program": case.program, "problem": case.problem, "label": case.label}
-    kept |= {"settings": case.settings}
+    kept |= {"settings": case.settings, "part": case.part}
     for name in ("version", "steps", "newton", "jacobians", "failed"):
         if name in first:
             kept[name] = first[name]
-    if "wall" in first:
-        kept["walls"] = walls = [r["wall"] for r in runs]
-        kept["us_per_step"] = 1e6 * statistics.median(walls) / first["steps"]
+    if all("wall" in r for r in runs) and "failed" not in kept:
+        for clock in ("wall", "cpu"):
+            kept[clock] = [r[clock] for r in runs]
         for name in ("memory", "memory_before"):
             kept[name] = statistics.median(r[name] for r in runs)
     if "values" in first and "failed" not in first and "steps" not in case.settings:
@@ -64,8 +74,9 @@ def show(kept):
     settings = kept["settings"]
     name = f"{kept['program']} {kept['label']}"
     line = f"{kept['problem']} {settings['cells']:6d} {settings.get('dt', '')!s:>6} {name:30s}"
-    if "us_per_step" in kept:
-        line += f" {kept['us_per_step']:11.1f} µs/step"
+    if "wall" in kept:
+        for clock in ("wall", "cpu"):
+            line += f" {1e6 * statistics.median(kept[clock]) / kept['steps']:10.1f}"
         line += f" {kept['newton'] / kept['steps']:6.2f} it" if "newton" in kept else " " * 10
         line += f" {kept['memory']:6.0f} MB"
     for what, value in kept.get("measures", {}).items():
@@ -89,13 +100,14 @@ def measure(chosen, repeat, peers):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="small cases, few rounds: 5 minutes")
     parser.add_argument("--only", nargs="*", metavar="P", help="problems, such as P2 P4")
     parser.add_argument("--cells", nargs="*", type=int)
     parser.add_argument("--dt", nargs="*", type=float, help="steps (s)")
     parser.add_argument("--programs", nargs="*", help="ufl_beam exudyn opensees c")
-    parser.add_argument("--repeat", type=int, default=5, help="rounds")
+    parser.add_argument("--part", choices=("tables", "figure"))
+    parser.add_argument("--repeat", type=int, help="rounds; 5, of the figure 2")
     options = parser.parse_args()
-    peers = installed()
 
     def wanted(case):
         asked = (
@@ -103,12 +115,24 @@ def main():
             (options.cells, case.settings["cells"]),
             (options.dt, case.settings.get("dt")),
             (options.programs, case.program),
+            (options.part, case.part),
         )
-        return all(not values or value in values for values, value in asked)
+        return all(not values or value in values for values, value in asked) and not (
+            options.quick and case.long
+        )
 
-    chosen = [case for case in cases.timed() if wanted(case)]
-    for _ in measure(chosen, options.repeat, peers):
-        pass
+    parts = ((cases.tables(), 5, 2), (cases.ladders(), 2, 1))  # rounds, and in a quick run
+    peers, where, records = installed(), machine(), []
+    print(where)
+    print(f"{'problem, cells, step (s), program':56s} {'µs/step':>10} {'cpu':>10}  iterations/step")
+    for some, rounds, fewer in parts:
+        repeat = options.repeat or (fewer if options.quick else rounds)
+        records += measure([case for case in some if wanted(case)], repeat, peers)
+    if any((options.only, options.cells, options.dt, options.programs, options.part)):
+        return
+    RESULTS.parent.mkdir(exist_ok=True)
+    RESULTS.write_text("".join(json.dumps(one | where) + "\n" for one in records))
+    report.save(records)
 
 
 if __name__ == "__main__":

@@ -1,15 +1,14 @@
 """The problems in Exudyn: planar geometrically exact beams, no output, the fastest settings.
 
-Loads are symbolic functions, which Exudyn evaluates without Python.  Initial accelerations are not
-computed: those of a force on the node of a fine mesh would spoil the predictor.
+Loads are symbolic functions, which Exudyn evaluates without Python.
 """
 
 import sys
-import time
 import warnings
 
 import numpy as np
 from problems import PROBLEMS
+from stopwatch import Stopwatch
 
 sys.exudynFast = True  # the module without range checks
 warnings.filterwarnings("ignore")
@@ -83,8 +82,8 @@ class Model:
             kind(**of, outputVariableType=what, storeInternal=True, writeToFile=False)
         )
 
-    def motion(self, node):
-        return np.array(self.system.GetNodeOutput(node, COORDINATES))
+    def where(self, node):
+        return self.system.GetNodeOutput(node, exu.OutputVariableType.Position)[:2].tolist()
 
     def history(self, sensor, column):
         """All but the initial value, one a period."""
@@ -106,11 +105,10 @@ def settings(newton, solver, rtol=1e-8, atol=1e-8, sampled=None):
         part.adaptiveStep = False
         part.newton.relativeTolerance, part.newton.absoluteTolerance = rtol, atol
     s.timeIntegration.newton.useModifiedNewton = newton == "modified"
-    s.timeIntegration.generalizedAlpha.computeInitialAccelerations = False
     return s
 
 
-def damped(s, rho):
+def integrator(s, rho):
     """The integrator: generalised-α with its spectral radius, or the trapezoidal rule."""
     α = s.timeIntegration.generalizedAlpha
     if rho == "trapezoidal":
@@ -119,29 +117,44 @@ def damped(s, rho):
         α.spectralRadius = rho
 
 
-def run(model, s, end, steps):
-    s.timeIntegration.endTime, s.timeIntegration.numberOfSteps = end, steps
-    solver = exu.MainSolverImplicitSecondOrder()
-    return _solve(solver, model, s, steps)
-
-
-def _solve(solver, model, s, steps):
+def solve(solver, model, s):
+    """Only the steps are timed."""
     if not solver.InitializeSolver(model.system, s):
         raise RuntimeError("InitializeSolver failed")
-    begin = time.perf_counter()
-    done = solver.SolveSteps(model.system, s)
-    wall = time.perf_counter() - begin
+    stopwatch = Stopwatch()
+    with stopwatch:
+        done = solver.SolveSteps(model.system, s)
     counts = {"newton": solver.it.newtonStepsCount, "jacobians": solver.it.newtonJacobiCount}
     if not done:
-        counts["failed"] = f"stopped at t = {solver.it.currentTime:.4g} s"
+        counts["failed"] = f"stopped at t = {solver.it.currentTime:.4g}"
     solver.FinalizeSolver(model.system, s)
-    return {"wall": wall, "steps": steps, **counts}
+    return counts | stopwatch.read()
+
+
+def run(model, s, end, steps):
+    s.timeIntegration.endTime, s.timeIntegration.numberOfSteps = end, steps
+    return {"steps": steps, **solve(exu.MainSolverImplicitSecondOrder(), model, s)}
+
+
+def roll_up(cells, turns, newton, solver):
+    p = PROBLEMS["P1"]
+    model = Model(p.chains(cells))
+    (nodes,) = model.nodes
+    model.tie(nodes[0], None, (0, 1, 2))
+    end = model.system.AddMarker(item.MarkerNodeRigid(nodeNumber=nodes[-1]))
+    torque = [0, 0, p.moment(turns)]
+    model.system.AddLoad(item.LoadTorqueVector(markerNumber=end, loadVector=torque))
+    model.system.Assemble()
+    s = settings(newton, solver)
+    s.staticSolver.numberOfLoadSteps = p.steps
+    s.staticSolver.newton.maxIterations = 60
+    result = solve(exu.MainSolverStatic(), model, s)
+    return {"steps": p.steps} | result | {"values": {"tip": model.where(nodes[-1])}}
 
 
 def flying_beam(cells, dt, newton, solver, steps=None, rho=1.0):
     p = PROBLEMS["P2"]
-    (chain,) = p.chains(cells)
-    model = Model([chain])
+    model = Model(p.chains(cells))
     (nodes,) = model.nodes
 
     def factor(t):
@@ -153,11 +166,37 @@ def flying_beam(cells, dt, newton, solver, steps=None, rho=1.0):
     model.load(nodes[0], lambda t: [p.force * factor(t), real(0.0)], lambda t: p.moment * factor(t))
     model.system.Assemble()
     s = settings(newton, solver)
-    damped(s, rho)
+    integrator(s, rho)
+    # that of a force on the node of a fine mesh would spoil the predictor
+    s.timeIntegration.generalizedAlpha.computeInitialAccelerations = False
     n = steps or round(p.end / dt)
     result = run(model, s, n * dt, n)
-    ends = [chain.points[i] + model.motion(nodes[i])[:2] for i in (0, -1)]
-    return result | {"values": {"ends": [e.tolist() for e in ends]}}
+    return result | {"values": {"ends": [model.where(nodes[i]) for i in (0, -1)]}}
+
+
+def swing(cells, dt, newton, solver, rho=0.9, end=None):
+    p = PROBLEMS["P3"]
+    model = Model(p.chains(cells))
+    beam, left, right = model.nodes
+    for link, node in ((left, beam[0]), (right, beam[-1])):
+        model.tie(link[-1], None, (0, 1))
+        pair = [
+            model.system.AddMarker(item.MarkerNodePosition(nodeNumber=n)) for n in (link[0], node)
+        ]
+        model.system.AddObject(item.ObjectJointRevolute2D(markerNumbers=pair))
+    middle = beam[len(beam) // 2]
+    mass = item.ObjectRigidBody2D(physicsMass=p.mass, physicsInertia=0.0, nodeNumber=middle)
+    model.system.AddObject(mass)
+    slope = 2 * p.peak / p.until
+    model.load(middle, lambda t: [most(real(0.0), least(t, p.until - t)) * slope, real(0.0)])
+    sensor = model.sense(item.SensorNode, DISPLACEMENT, nodeNumber=middle)
+    model.system.Assemble()
+    s = settings(newton, solver, atol=1e-6, sampled=p.sampled)
+    integrator(s, rho)
+    n = round((end or p.end) / dt)
+    result = run(model, s, n * dt, n)
+    u, v = (model.history(sensor, column) for column in (1, 2))
+    return result | {"values": {"middle": list(zip(u, v, strict=True))}}
 
 
 def portal(cells, dt, newton, solver, rho="trapezoidal"):
@@ -180,7 +219,7 @@ def portal(cells, dt, newton, solver, rho="trapezoidal"):
     )
     model.system.Assemble()
     s = settings(newton, solver, atol=1e-6, sampled=p.sampled)
-    damped(s, rho)
+    integrator(s, rho)
     result = run(model, s, p.end, round(p.end / dt))
     u, turned = (model.history(sensor, 1) for sensor in senses)
     return result | {"values": {"u": u, "turn": turned}}
@@ -214,4 +253,16 @@ def hinge(model, turn, p):
     return number
 
 
-RUNS = {"P2": flying_beam, "P4": portal}
+def cantilever(cells, dt, newton, solver):
+    p = PROBLEMS["P5"]
+    model = Model(p.chains(cells))
+    (nodes,) = model.nodes
+    model.tie(nodes[0], None, (0, 1, 2))
+    model.load(nodes[-1], lambda t: [real(0.0), t * (p.force / p.end)])
+    model.system.Assemble()
+    s = settings(newton, solver, rtol=1e-6, atol=1e-3)  # it does not reach less on fine meshes
+    result = run(model, s, p.end, round(p.end / dt))
+    return result | {"values": {"tip": model.where(nodes[-1])}}
+
+
+RUNS = {"P1": roll_up, "P2": flying_beam, "P3": swing, "P4": portal, "P5": cantilever}

@@ -5,11 +5,11 @@ spatial model has its motion out of the plane fixed.
 """
 
 import math
-import time
 
 import numpy as np
 import openseespy.opensees as ops
 from problems import PROBLEMS
+from stopwatch import Stopwatch
 
 VERSION = f"OpenSees {ops.version()}"
 
@@ -71,8 +71,8 @@ class Model:
         ops.pattern("Plain", 1, 1)
         ops.load(tag, fx, fy, *((0.0, 0.0, 0.0) if self.spatial else ()), moment)
 
-    def motion(self, tag):
-        return np.array([ops.nodeDisp(tag, c) for c in (1, 2, self.turn)])
+    def where(self, tag):
+        return np.add(ops.nodeCoord(tag)[:2], [ops.nodeDisp(tag, c) for c in (1, 2)]).tolist()
 
 
 def analyse(system, newton, integrator, constraints="Plain", numberer="Plain", tolerance=1e-8):
@@ -89,19 +89,32 @@ INTEGRATORS = {"newmark": ("Newmark", 0.5, 0.25), "trbdf2": ("TRBDF2",)}
 
 
 def run(steps, dt=None, sample=None, every=None):
-    """The time loop; reading samples is not timed."""
-    samples, wall, every = [], 0.0, every or steps
+    """The loop over steps; what is read after every so many of them is not timed."""
+    samples, stopwatch, every, said = [], Stopwatch(), every or steps, {}
     for first in range(0, steps, every):
         n = min(every, steps - first)
-        begin = time.perf_counter()
-        failed = ops.analyze(n, *([] if dt is None else [dt]))
-        wall += time.perf_counter() - begin
+        with stopwatch:
+            failed = ops.analyze(n, *([] if dt is None else [dt]))
         if failed:
-            said = f"stopped at t = {ops.getTime():.4g} s"
-            return samples, {"wall": wall, "steps": steps, "failed": said}
+            said = {"failed": f"stopped at t = {ops.getTime():.4g}"}
+            break
         if sample:
             samples.append(sample())
-    return samples, {"wall": wall, "steps": steps}
+    return samples, {"steps": steps, **said, **stopwatch.read()}
+
+
+def roll_up(cells, turns, element="euler"):
+    p = PROBLEMS["P1"]
+    (chain,) = p.chains(cells)
+    model = Model(element)
+    tags = model.add(chain)
+    model.fix(tags[0], 1, 1, 1)
+    model.finish()
+    model.load(tags[-1], ("Linear", 1), moment=p.moment(turns))
+    analyse("BandGeneral", "full", ("LoadControl", 1 / p.steps))
+    iterations, result = run(p.steps, sample=ops.testIter, every=1)
+    tip = model.where(tags[-1])
+    return result | {"newton": sum(iterations), "values": {"tip": tip}}
 
 
 def flying_beam(cells, dt, newton="full", element="euler", integrator="newmark", steps=None):
@@ -119,8 +132,30 @@ def flying_beam(cells, dt, newton="full", element="euler", integrator="newmark",
         ops.setNodeAccel(tags[0], c, acceleration, "-commit")
     analyse("BandGeneral", newton, INTEGRATORS[integrator])
     _, result = run(steps or round(p.end / dt), dt)
-    ends = [chain.points[i] + model.motion(tags[i])[:2] for i in (0, -1)]
-    return result | {"values": {"ends": [x.tolist() for x in ends]}}
+    return result | {"values": {"ends": [model.where(tags[i]) for i in (0, -1)]}}
+
+
+def swing(cells, dt, newton="full", element="euler", integrator="trbdf2", end=None):
+    p = PROBLEMS["P3"]
+    model = Model(element)
+    beam, left, right = (model.add(chain) for chain in p.chains(cells))
+    middle = beam[len(beam) // 2]
+    m, J = model.masses[middle]
+    model.masses[middle] = m + p.mass, J
+    for link in (left, right):
+        model.fix(link[-1], 1, 1, 0)
+    model.finish()
+    for link, tag in ((left, beam[0]), (right, beam[-1])):
+        ops.equalDOF(tag, link[0], 1, 2)
+    times, values = (-1.0, 0.0, p.until / 2, p.until, 1e3), (0.0, 0.0, p.peak, 0.0, 0.0)
+    model.load(middle, ("Path", 1, "-time", *times, "-values", *values), fx=1.0)
+    analyse("BandGeneral", newton, INTEGRATORS[integrator], "Transformation", "RCM")
+
+    def sample():
+        return ops.nodeDisp(middle, 1), ops.nodeDisp(middle, 2)
+
+    samples, result = run(round((end or p.end) / dt), dt, sample, round(p.sampled / dt))
+    return result | {"values": {"middle": samples}}
 
 
 def portal(cells, dt, newton="full", element="euler", integrator="newmark"):
@@ -146,4 +181,18 @@ def portal(cells, dt, newton="full", element="euler", integrator="newmark"):
     return result | {"values": {"u": u, "turn": turn}}
 
 
-RUNS = {"P2": flying_beam, "P4": portal}
+def cantilever(cells, dt, newton="full", element="euler"):
+    p = PROBLEMS["P5"]
+    (chain,) = p.chains(cells)
+    model = Model(element)
+    tags = model.add(chain)
+    model.fix(tags[0], 1, 1, 1)
+    model.finish()
+    model.load(tags[-1], ("Linear", 1, "-factor", 1 / p.end), fy=p.force)
+    analyse("ProfileSPD", newton, INTEGRATORS["newmark"])
+    iterations, result = run(round(p.end / dt), dt, ops.testIter, every=1)
+    tip = model.where(tags[-1])
+    return result | {"newton": sum(iterations), "values": {"tip": tip}}
+
+
+RUNS = {"P1": roll_up, "P2": flying_beam, "P3": swing, "P4": portal, "P5": cantilever}

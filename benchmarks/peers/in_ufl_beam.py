@@ -1,9 +1,8 @@
 """The problems in ufl_beam, as a user states them; the time loop is timed."""
 
-import time
-
 import numpy as np
 from problems import PROBLEMS
+from stopwatch import Stopwatch
 
 import ufl_beam as ub
 from ufl_beam.compat import dolfinx
@@ -11,7 +10,7 @@ from ufl_beam.compat import dolfinx
 VERSION = f"DOLFINx {dolfinx.__version__}"
 
 
-def scheme_of(alpha):
+def decaying(alpha):
     return ub.Midpoint(alpha=alpha, beta=alpha)
 
 
@@ -21,33 +20,73 @@ def beams_of(chains):
     ]
 
 
-def run(scene, scheme, end, steps, newton=None, sample=None, every=None):
-    """Step to the end; only the steps are timed, not what is read every so many of them."""
-    simulation = ub.Simulation(scene, scheme, newton=newton)
+def run(scene, scheme, end, steps, sample=None, every=None):
+    """Step to the end; only the steps are timed, not what is read after every so many of them.
+
+    Returns:
+        The simulation at its end, the samples, and what the loop took.
+    """
+    simulation = ub.Simulation(scene, scheme)
     every = every or steps
-    samples, wall = [], 0.0
+    samples, stopwatch = [], Stopwatch()
     for first in range(1, steps + 1, every):
         last = min(first + every, steps + 1)
-        begin = time.perf_counter()
-        for n in range(first, last):
-            simulation.step_to(end * n / steps)
-        wall += time.perf_counter() - begin
+        with stopwatch:
+            for n in range(first, last):
+                simulation.step_to(end * n / steps)
         if sample:
             samples.append(sample(simulation))
-    result = {"wall": wall, "steps": steps, "newton": simulation.iterations}
+    result = {"steps": steps, "newton": simulation.iterations, **stopwatch.read()}
     return simulation, samples, result
 
 
-def flying_beam(cells, dt, steps=None, alpha=0.0):
+def energy(simulation):
+    """Kinetic and stored; J."""
+    return sum(simulation.ledger.state.values())
+
+
+def roll_up(cells, turns):
+    p = PROBLEMS["P1"]
+    (beam,) = beams_of(p.chains(cells))
+    bend = ub.PointLoad(beam.end, moment=p.moment(turns), time=lambda t: t)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[bend])
+    now, _, result = run(scene, ub.Static(), 1.0, p.steps)
+    return result | {"values": {"tip": where(now, beam.end)}}
+
+
+def where(now, place):
+    return np.add(place.point, now.displacement(place)[:2]).tolist()
+
+
+def flying_beam(cells, dt, alpha=0.0, steps=None):
     p = PROBLEMS["P2"]
     (beam,) = beams_of(p.chains(cells))
     push = ub.PointLoad(
         beam.start, force=(p.force, 0), moment=p.moment, time=lambda t: float(t < p.until)
     )
     n = steps or round(p.end / dt)
-    now, _, result = run(ub.Scene([beam], loads=[push]), scheme_of(alpha), n * dt, n)
-    ends = [np.add(place.point, now.displacement(place)[:2]) for place in (beam.start, beam.end)]
-    return result | {"values": {"ends": [e.tolist() for e in ends]}}
+    now, _, result = run(ub.Scene([beam], loads=[push]), decaying(alpha), n * dt, n)
+    return result | {"values": {"ends": [where(now, at) for at in (beam.start, beam.end)]}}
+
+
+def swing(cells, dt, alpha=0.0, end=None):
+    p = PROBLEMS["P3"]
+    beam, left, right = beams_of(p.chains(cells))
+    middle = beam.at(0.5)
+    scene = ub.Scene(
+        [beam, left, right],
+        joints=[ub.Revolute(left.start, beam.start), ub.Revolute(right.start, beam.end)],
+        supports=[ub.Pinned(left.end), ub.Pinned(right.end)],
+        masses=[ub.PointMass(middle, p.mass)],
+        loads=[ub.PointLoad(middle, force=(1, 0), time=p.push)],
+    )
+
+    def sample(now):
+        return *now.displacement(middle)[:2].tolist(), energy(now)
+
+    n, every = round((end or p.end) / dt), round(p.sampled / dt)
+    _, samples, result = run(scene, decaying(alpha), n * dt, n, sample, every)
+    return result | {"values": {"middle": [s[:2] for s in samples], "energy": [s[2] for s in samples]}}
 
 
 def portal(cells, dt, alpha=0.0):
@@ -65,12 +104,21 @@ def portal(cells, dt, alpha=0.0):
     )
 
     def sample(now):
-        return now.displacement(left.end)[0], now.connector(hinge).motion
+        return float(now.displacement(left.end)[0]), now.connector(hinge).motion
 
-    every, n = round(p.sampled / dt), round(p.end / dt)
-    _, samples, result = run(scene, scheme_of(alpha), p.end, n, sample=sample, every=every)
+    n, every = round(p.end / dt), round(p.sampled / dt)
+    _, samples, result = run(scene, decaying(alpha), p.end, n, sample, every)
     u, turn = zip(*samples, strict=True)
-    return result | {"values": {"u": [float(x) for x in u], "turn": [float(x) for x in turn]}}
+    return result | {"values": {"u": u, "turn": turn}}
 
 
-RUNS = {"P2": flying_beam, "P4": portal}
+def cantilever(cells, dt):
+    p = PROBLEMS["P5"]
+    (beam,) = beams_of(p.chains(cells))
+    load = ub.PointLoad(beam.end, force=(0, 1), time=p.push)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    now, _, result = run(scene, ub.Midpoint(), p.end, round(p.end / dt))
+    return result | {"values": {"tip": where(now, beam.end)}}
+
+
+RUNS = {"P1": roll_up, "P2": flying_beam, "P3": swing, "P4": portal, "P5": cantilever}
