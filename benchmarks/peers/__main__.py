@@ -52,7 +52,7 @@ def run(case, peers):
 
 
 def record(case, runs):
-    """What is kept of the runs of a case: medians, and each wall time in the order of the rounds."""
+    """What is kept of the runs of a case: each time in the order of the rounds, medians of others."""
     first = runs[0]
     kept = {"program": case.program, "problem": case.problem, "label": case.label}
     kept |= {"settings": case.settings, "part": case.part}

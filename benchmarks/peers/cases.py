@@ -48,7 +48,8 @@ def ours(*variants):
 def exudyn(cells, newton=NEWTON, said="", **more):
     for solver in ("sparse", "dense") if cells <= DENSE else ("sparse",):
         for one in newton:
-            yield "exudyn", f"{one} Newton, {solver}{said}", {"newton": one, "solver": solver, **more}
+            how = {"newton": one, "solver": solver}
+            yield "exudyn", f"{one} Newton, {solver}{said}", how | more
 
 
 def opensees(*variants):
@@ -64,7 +65,7 @@ def floor():
 def roll_up(cells, turns):
     yield from ours(("", {}))
     yield from exudyn(cells, newton=("full",))
-    more = ("64 load steps", {"steps": 64}) if cells > DENSE else ("", {})  # it fails with 8
+    more = ("64 load steps", {"load_steps": 64}) if cells > DENSE else ("", {})  # it fails with 8
     yield from opensees(more)
     yield from floor()
 
@@ -131,7 +132,6 @@ def portal_ladder(cells, dt):
     yield from opensees(
         ("with shear", {"element": "shear"}), ("without shear", {"element": "euler"})
     )
-
 
 
 LADDERS = (

@@ -14,9 +14,7 @@ def run(elimination, *words):
     with tempfile.TemporaryDirectory() as directory:
         program = os.path.join(directory, "floor")
         source = str(Path(__file__).with_name("floor.c"))
-        subprocess.run(
-            [compiler, "-O3", "-march=native", "-o", program, source, "-lm"], check=True
-        )
+        subprocess.run([compiler, "-O3", "-march=native", "-o", program, source, "-lm"], check=True)
         command = [program, elimination, *map(str, words)]
         return json.loads(subprocess.run(command, capture_output=True, check=True).stdout)
 

@@ -5,6 +5,7 @@ Loads are symbolic functions, which Exudyn evaluates without Python.
 
 import sys
 import warnings
+from itertools import pairwise
 
 import numpy as np
 from problems import PROBLEMS
@@ -42,7 +43,7 @@ class Model:
             add.AddNode(item.NodeRigidBody2D(referenceCoordinates=[x, y, chain.angle]))
             for x, y in chain.points
         ]
-        for pair in zip(nodes[:-1], nodes[1:], strict=True):
+        for pair in pairwise(nodes):
             beam = item.ObjectBeamGeometricallyExact2D(
                 nodeNumbers=list(pair), length=chain.h, massPerLength=s.rhoA,
                 crossSectionInertia=s.rhoI, bendingStiffness=s.EI, axialStiffness=s.EA,
@@ -209,10 +210,11 @@ def portal(cells, dt, newton, solver, rho="trapezoidal"):
     model.tie(girder[-1], right[0], (0, 1))
     turn = [model.coordinate(node, 2) for node in (girder[-1], right[0])]
     connect = hinge(model, turn, p)
-    model.load(
-        left[-1],
-        lambda t: [p.force * exu.symbolic.sin(least(t, real(p.until)) * (np.pi / p.until)), real(0)],
-    )
+
+    def push(t):
+        return [p.force * exu.symbolic.sin(least(t, real(p.until)) * (np.pi / p.until)), real(0.0)]
+
+    model.load(left[-1], push)
     senses = (
         model.sense(item.SensorNode, DISPLACEMENT, nodeNumber=left[-1]),
         model.sense(item.SensorObject, DISPLACEMENT, objectNumber=connect),

@@ -5,6 +5,7 @@ spatial model has its motion out of the plane fixed.
 """
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import openseespy.opensees as ops
@@ -34,7 +35,7 @@ class Model:
         self.elements += 1  # a transformation for each chain
         transformation = self.elements
         ops.geomTransf("Corotational", transformation, *([0.0, 0.0, 1.0] if self.spatial else []))
-        for a, b in zip(tags[:-1], tags[1:], strict=True):
+        for a, b in pairwise(tags):
             self.elements += 1
             ops.element(*self._element(a, b, s, transformation))
             for tag in (a, b):
@@ -104,7 +105,7 @@ def run(steps, dt=None, sample=None, every=None):
     return samples, {"steps": steps, **said, **stopwatch.read()}
 
 
-def roll_up(cells, turns, element="euler"):
+def roll_up(cells, turns, load_steps=PROBLEMS["P1"].steps):
     p = PROBLEMS["P1"]
     (chain,) = p.chains(cells)
     model = Model("euler")
@@ -112,8 +113,8 @@ def roll_up(cells, turns, element="euler"):
     model.fix(tags[0], 1, 1, 1)
     model.finish()
     model.load(tags[-1], ("Linear", 1), moment=p.moment(turns))
-    analyse("full", ("LoadControl", 1 / steps), system="BandGeneral")  # it is indefinite
-    iterations, result = run(steps, sample=ops.testIter, every=1)
+    analyse("full", ("LoadControl", 1 / load_steps), system="BandGeneral")  # it is indefinite
+    iterations, result = run(load_steps, sample=ops.testIter, every=1)
     tip = model.where(tags[-1])
     return result | {"newton": sum(iterations), "values": {"tip": tip}}
 

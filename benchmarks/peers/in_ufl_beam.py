@@ -86,7 +86,8 @@ def swing(cells, dt, alpha=0.0, end=None):
 
     n, every = round((end or p.end) / dt), round(p.sampled / dt)
     _, samples, result = run(scene, decaying(alpha), n * dt, n, sample, every)
-    return result | {"values": {"middle": [s[:2] for s in samples], "energy": [s[2] for s in samples]}}
+    middle, told = [s[:2] for s in samples], [s[2] for s in samples]
+    return result | {"values": {"middle": middle, "energy": told}}
 
 
 def portal(cells, dt, alpha=0.0):

@@ -48,8 +48,8 @@ class Chain(NamedTuple):
 
 
 def steel_like(width, thickness, E, nu, rho):
-    area, inertia = width * thickness, width * thickness**3 / 12
-    return Section(E * area, 5 / 6 * E / (2 * (1 + nu)) * area, E * inertia, rho * area, rho * inertia)
+    A, I = width * thickness, width * thickness**3 / 12
+    return Section(E * A, 5 / 6 * E / (2 * (1 + nu)) * A, E * I, rho * A, rho * I)
 
 
 E_MODULUS, AREA, INERTIA = 73e9, 2e-4, 0.1667e-8  # Pa, m^2, m^4
