@@ -52,7 +52,7 @@ def run(case, peers):
 
 
 def record(case, runs):
-    """What is kept of the runs of a case: each time in the order of the rounds, medians of others."""
+    """What is kept of the runs of a case: times in the order of the rounds, medians of memory."""
     first = runs[0]
     kept = {"program": case.program, "problem": case.problem, "label": case.label}
     kept |= {"settings": case.settings, "part": case.part}
@@ -125,14 +125,19 @@ def main():
     peers, where, records = installed(), machine(), []
     print(where)
     print(f"{'problem, cells, step (s), program':56s} {'µs/step':>10} {'cpu':>10}  iterations/step")
-    for some, rounds, fewer in parts:
-        repeat = options.repeat or (fewer if options.quick else rounds)
-        records += measure([case for case in some if wanted(case)], repeat, peers)
-    if any((options.only, options.cells, options.dt, options.programs, options.part)):
-        return
+    some = (options.only, options.cells, options.dt, options.programs, options.part)
     RESULTS.parent.mkdir(exist_ok=True)
-    RESULTS.write_text("".join(json.dumps(one | where) + "\n" for one in records))
-    report.save(records)
+    with open(os.devnull if any(some) else RESULTS, "w") as file:
+        for part, rounds, fewer in parts:
+            repeat = options.repeat or (fewer if options.quick else rounds)
+            for kept in measure([case for case in part if wanted(case)], repeat, peers):
+                records.append(kept | where)
+                file.write(json.dumps(records[-1]) + "\n")
+                file.flush()
+    if any(some):
+        print("\n".join(report.of_claims(records)))
+    else:
+        report.save(records)
 
 
 if __name__ == "__main__":

@@ -38,7 +38,7 @@ def words_of(claim):
 
 
 def of_claims(records):
-    head = ("line", "ufl_beam", "the other", "times as fast", "met")
+    head = ("line", "ufl_beam", "the other", "ratio", "met")
     return table(head, [words_of(claim) for claim in claims(records)])
 
 
