@@ -258,6 +258,11 @@ class Connector:
         return f"{self.kind}({self.a}, {self.b})"
 
     @property
+    def holds(self) -> bool:
+        """Whether the law may demand a motion, whatever force that takes."""
+        return isinstance(self.law, Motor | Coulomb | Guide)
+
+    @property
     def arms(self) -> tuple[Point, Point]:
         """From both nodes to the points that are meant; m."""
         return arm(self.a, self.corner), arm(self.b)

@@ -298,8 +298,9 @@ class Solver:
         ksp.setOptionsPrefix(PREFIX)
         ksp.setType("preonly")
         factors = ksp.getPC()
-        # Constraints make zeros on the diagonal, and PETSc does not exchange rows.
-        package = "klu" if len(share.grid.multipliers) else "petsc"
+        # What is held makes zeros on the diagonal, and PETSc does not exchange rows.
+        holds = any(link.holds for link in share.grid.scene.links)
+        package = "klu" if holds else "petsc"
         long = len(share.cells) > CELLS_IN_NATURAL_ORDER
         if self._parallel or long or share.grid.num_shared > JOINTS_IN_NATURAL_ORDER:
             factors.setType("python")
