@@ -39,6 +39,7 @@ from ufl_beam.decay import (
     logarithmic_decrement,
     peaks,
 )
+from ufl_beam.discretisation import Mesh
 from ufl_beam.distributions import Lognormal, Normal, TruncatedNormal, Weibull
 from ufl_beam.envelopes import plot_cycles, plot_extremes
 from ufl_beam.errors import ConvergenceError, SceneError
@@ -138,6 +139,7 @@ __all__ = [
     "Link",
     "Load",
     "Lognormal",
+    "Mesh",
     "Midpoint",
     "Modes",
     "Motor",

@@ -16,14 +16,15 @@ from ufl_beam.compat import Array
 from ufl_beam.connectors import Actuator, Controller, Motor
 from ufl_beam.controls import Control, Given
 from ufl_beam.critical import Branch, CriticalPoint, Direction, Stiffness
-from ufl_beam.errors import SceneError, require_count, require_kind, require_sequence
+from ufl_beam.discretisation import Mesh
+from ufl_beam.errors import SceneError, StepFailed, require_count, require_kind, require_sequence
 from ufl_beam.loads import TimeFunction
 from ufl_beam.processes import ours
 from ufl_beam.record import Recorder, on_first
 from ufl_beam.scene import Scene
 from ufl_beam.simulation import Simulation, Trial
 from ufl_beam.solution import Solution
-from ufl_beam.solve import Newton, StepFailed
+from ufl_beam.solve import Newton
 from ufl_beam.walk import Walk
 
 ADVICE = (
@@ -308,6 +309,7 @@ def follow(
     start: Solution | Branch | None = None,
     record: Sequence[Recorder] | Recorder = (),
     newton: Newton | None = None,
+    mesh: Mesh | None = None,
     comm: MPI.Intracomm | None = None,
 ) -> Path:
     """Follow a path of static equilibria through limit points and snap-backs.
@@ -328,6 +330,7 @@ def follow(
         start: Branch of a :class:`CriticalPoint`, or a solution whose last state is the beginning.
         record: Files to write on the way.
         newton: Tolerances and PETSc options; line searches and Krylov methods are not used.
+        mesh: How finely it is discretised; as ``start``, or with the cells of the beams.
         comm: Processes that share the scene.
 
     Raises:
@@ -353,7 +356,9 @@ def follow(
     t0 = 0.0 if state is None else float(state.times[-1])
     _require_driven(scene, t0)
     began = time.perf_counter()
-    simulation = Simulation(scene, Static(), t0=t0, start=state, newton=newton, comm=comm)
+    simulation = Simulation(
+        scene, Static(), t0=t0, start=state, newton=newton, mesh=mesh, comm=comm
+    )
     simulation.solution = path = Path(scene, simulation.grid)
     route = Route(simulation, control)
     path.critical = route.critical

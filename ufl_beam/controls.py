@@ -10,10 +10,9 @@ import numpy as np
 from ufl_beam.beams import Place
 from ufl_beam.compat import Array
 from ufl_beam.critical import Direction
-from ufl_beam.errors import SceneError, require_kind, require_number
+from ufl_beam.errors import SceneError, StepFailed, require_kind, require_number
 from ufl_beam.scene import COMPONENTS, Scene
 from ufl_beam.simulation import Trial
-from ufl_beam.solve import StepFailed
 
 if TYPE_CHECKING:
     from ufl_beam.walk import Walk
@@ -247,8 +246,8 @@ class Displacement:
 
     def _normal(self, walk: Walk) -> Direction:
         share, normal = walk.share, np.zeros(walk.share.grid.size)
-        vertices, weights = share.grid.weights(self.place)
-        normal[share.grid.dofs[vertices, COMPONENTS.index(self.component)]] += weights
+        nodes, weights = share.grid.weights(self.place)
+        normal[share.grid.dofs[nodes, COMPONENTS.index(self.component)]] += weights
         local = normal[share.dofs]
         local[share.num_owned :] = 0.0
         return Direction(local, 0.0)

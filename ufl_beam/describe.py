@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
 from functools import partial
 from types import CodeType, FunctionType, MethodType, ModuleType
 from typing import Any
@@ -39,7 +40,7 @@ class Description:
             self._put(name, value)
 
     def _put(self, name: str, value: Any) -> None:
-        if value is None or isinstance(value, bool | str | bytes | ModuleType | type):
+        if value is None or isinstance(value, bool | str | bytes | Fraction | ModuleType | type):
             self.texts[name] = getattr(value, "__qualname__", repr(value))
             return
         if isinstance(value, int | float | np.integer | np.floating):

@@ -6,9 +6,18 @@ import numpy as np
 
 from ufl_beam.compat import Array
 from ufl_beam.connectors import HELD
+from ufl_beam.discretisation import Mesh
 from ufl_beam.errors import SceneError, require_kind
 from ufl_beam.grid import Grid
 from ufl_beam.solution import Solution
+
+
+def mesh_of(start: Solution | None, mesh: Mesh | None) -> Mesh:
+    """The mesh of a call: the one it says, that of the solution it starts with, or that given."""
+    if start is None:
+        return mesh or Mesh()
+    require_kind(start, Solution, "start")
+    return mesh or start.grid.mesh
 
 
 def initial_state(grid: Grid, start: Solution | None) -> tuple[Array, Array]:
@@ -16,11 +25,10 @@ def initial_state(grid: Grid, start: Solution | None) -> tuple[Array, Array]:
     q, v = np.zeros(grid.size), _initial_velocity(grid)
     if start is None:
         return q, v
-    require_kind(start, Solution, "start")
-    if start.scene.beams != grid.scene.beams or not np.array_equal(start.grid.dofs, grid.dofs):
+    if not grid.agrees(start.grid):
         raise SceneError(
-            "start: the solution is of other beams or joints; use the same Beam objects, "
-            "joined alike"
+            "start: the solution is of other beams, joints or cells; use the same Beam objects, "
+            "joined alike, and the same Mesh"
         )
     return start.q[-1], start.v[-1] if len(start.v) else v
 

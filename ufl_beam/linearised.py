@@ -15,6 +15,7 @@ from scipy.sparse.linalg import splu
 from ufl_beam import eigen
 from ufl_beam.classical import Static
 from ufl_beam.compat import Array
+from ufl_beam.discretisation import Mesh
 from ufl_beam.eigen import ROUND_OFF, SHIFT, ZERO, Complex
 from ufl_beam.errors import SceneError
 from ufl_beam.grid import Index
@@ -79,12 +80,21 @@ class SmallMotions:
         scene: What is modelled.
         at: Solution whose last state is meant; the undeformed scene by default.
         t: Time of loads; that of the state by default; s.
+        mesh: How finely it is discretised; as ``at``, or with the cells of the beams.
     """
 
-    def __init__(self, scene: Scene, at: Solution | None, t: float | None = None) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        at: Solution | None,
+        t: float | None = None,
+        mesh: Mesh | None = None,
+    ) -> None:
         time = 0.0 if at is None else float(at.times[-1])
         # Each process does the same: no answer depends on their number.
-        simulation = Simulation(scene, _Standstill(), t0=time, start=at, comm=MPI.COMM_SELF)
+        simulation = Simulation(
+            scene, _Standstill(), t0=time, start=at, mesh=mesh, comm=MPI.COMM_SELF
+        )
         if t is not None:
             simulation.t = t
         self.scene, self._simulation = scene, simulation

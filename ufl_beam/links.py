@@ -41,4 +41,4 @@ class Links:
 
     def take(self, q: Array) -> None:
         """Take the forces in ``q`` as those before the next step."""
-        self._before = self.force(q)
+        self._before[:] = self.force(q)

@@ -14,10 +14,12 @@ import numpy as np
 
 from ufl_beam.bodies import Anchor
 from ufl_beam.compat import Array
+from ufl_beam.discretisation import Mesh
 from ufl_beam.eigen import Complex
 from ufl_beam.errors import SceneError, require_count, require_kind, require_number
 from ufl_beam.fields import Fields
 from ufl_beam.grid import Grid, Share
+from ufl_beam.initial import mesh_of
 from ufl_beam.joints import velocity_of
 from ufl_beam.linearised import SmallMotions
 from ufl_beam.loads import FollowerLoad, RotatingFrame
@@ -224,7 +226,7 @@ class Buckling(Shapes):
         return "\n".join(f"shape {k}: {title}" for k, title in enumerate(self.titles))
 
 
-def modes(scene: Scene, n: int, *, at: Solution | None = None) -> Modes:
+def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None = None) -> Modes:
     """Natural frequencies, damping ratios and shapes of small motions.
 
     About the undeformed, unloaded scene; or about the last state of a solution, with its section
@@ -241,6 +243,7 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None) -> Modes:
         scene: What is modelled.
         n: How many, from the lowest; fewer are given if the scene has fewer.
         at: Solution whose last state is meant, of the same beams joined alike.
+        mesh: How finely it is discretised; as ``at``, or with the cells of the beams.
 
     Raises:
         SceneError: The call or the scene is wrong, or nothing that moves has mass.
@@ -251,8 +254,8 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None) -> Modes:
         # Loads that the state does not balance have no part in its stiffness.
         scene = replace(scene, loads=())
     else:
-        _require_of(at, scene, "modes")
-    small = SmallMotions(scene, at)
+        _require_of(at, scene, mesh, "modes")
+    small = SmallMotions(scene, at, mesh=mesh)
     if not small.M.data.any():
         raise SceneError("modes: nothing that can move has mass; give sections rho or rhoA")
     exponents, x = small.exponents(int(n))
@@ -260,7 +263,14 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None) -> Modes:
     return Modes(small.scene, small.grid, small.q, small.shapes(x[:, order]), exponents[order])
 
 
-def buckling(scene: Scene, n: int, *, t: float = 1.0, at: Solution | None = None) -> Buckling:
+def buckling(
+    scene: Scene,
+    n: int,
+    *,
+    t: float = 1.0,
+    at: Solution | None = None,
+    mesh: Mesh | None = None,
+) -> Buckling:
     """Factors on the loads at which the scene buckles, (K + λ K') x = 0.
 
     Loads and prescribed motions grow in proportion, from those of the state ``at`` (λ = 0; nothing
@@ -273,6 +283,7 @@ def buckling(scene: Scene, n: int, *, t: float = 1.0, at: Solution | None = None
         n: How many, from the smallest |λ|.
         t: Time at which loads are taken; s.
         at: Solution whose last state the loads grow from, of the same beams joined alike.
+        mesh: How finely it is discretised; as ``at``, or with the cells of the beams.
 
     Raises:
         SceneError: The call is wrong, the scene is free to move, nothing acts on it, or what acts
@@ -291,17 +302,17 @@ def buckling(scene: Scene, n: int, *, t: float = 1.0, at: Solution | None = None
     if at is None:
         require_no_mechanism(scene)
     else:
-        _require_of(at, scene, "buckling")
-    small = SmallMotions(scene, at, t)
+        _require_of(at, scene, mesh, "buckling")
+    small = SmallMotions(scene, at, t, mesh)
     factors, x = small.buckling(int(n))
     order = np.argsort(np.abs(factors), kind="stable")[: int(n)]
     return Buckling(small.scene, small.grid, small.q, small.shapes(x[:, order]), factors[order])
 
 
-def _require_of(at: Solution, scene: Scene, what: str) -> None:
+def _require_of(at: Solution, scene: Scene, mesh: Mesh | None, what: str) -> None:
     require_kind(at, Solution, f"{what}: at")
-    if at.scene.beams != scene.beams or not np.array_equal(at.grid.dofs, Grid(scene).dofs):
+    if not Grid(scene, mesh_of(at, mesh)).agrees(at.grid):
         raise SceneError(
-            f"{what}: at is a solution of other beams or joints; use the same Beam objects, "
-            "joined alike"
+            f"{what}: at is a solution of other beams, joints or cells; use the same Beam "
+            "objects, joined alike, and the same Mesh"
         )

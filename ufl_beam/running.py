@@ -11,6 +11,7 @@ from mpi4py import MPI
 from tqdm import tqdm
 
 from ufl_beam.checkpoint import Checkpoint, Keeper, digest_of, kinds_of, require_continuable
+from ufl_beam.discretisation import Mesh
 from ufl_beam.errors import (
     SceneError,
     require_count,
@@ -18,6 +19,7 @@ from ufl_beam.errors import (
     require_number,
     require_sequence,
 )
+from ufl_beam.initial import mesh_of
 from ufl_beam.pacing import Adaptive, AdaptiveSteps, EqualSteps, Pace
 from ufl_beam.processes import in_study, ours
 from ufl_beam.record import UNLIMITED, Recorder, on_first
@@ -41,6 +43,7 @@ def simulate(
     most: int = UNLIMITED,
     start: Solution | None = None,
     newton: Newton | None = None,
+    mesh: Mesh | None = None,
     checkpoint: Checkpoint | None = None,
     progress: bool = True,
     comm: MPI.Intracomm | None = None,
@@ -60,6 +63,7 @@ def simulate(
             are more, every other one goes, and only half as many steps are kept from then on.
         start: Solution of the same beams whose last state is the initial state.
         newton: Tolerances and PETSc options.
+        mesh: How finely it is discretised; as ``start``, or with the cells of the beams.
         checkpoint: File from which the run goes on if it is run again after whatever stopped it.
         progress: Show a progress bar if the output is a terminal.
         comm: Processes that share the scene; all of them, or in a :func:`study` this one alone.  A
@@ -89,12 +93,12 @@ def simulate(
         call = {
             "scene": scene, "scheme": scheme, "t[0]": t0, "dt": dt, "every": every, "most": most,
             "newton": newton or Newton(), "start": _end_of(start), "record": kinds_of(recorders),
-            "t[1]": t1 if step is None else "any",
+            "t[1]": t1 if step is None else "any", "mesh": mesh_of(start, mesh),
         }  # fmt: skip
         for recorder in recorders:
             require_continuable(recorder)
         keeper = Keeper(checkpoint, call, step, comm)
-    simulation = Simulation(scene, scheme, t0=t0, start=start, newton=newton, comm=comm)
+    simulation = Simulation(scene, scheme, t0=t0, start=start, newton=newton, mesh=mesh, comm=comm)
     pace: Pace = (
         AdaptiveSteps(simulation, t1, dt)
         if isinstance(dt, Adaptive)

@@ -15,14 +15,17 @@ from ufl_beam.connectors import Controller, Coulomb
 from ufl_beam.couplings import couplings
 from ufl_beam.dampers import damping_forces
 from ufl_beam.differences import numerical_forces
-from ufl_beam.errors import ConvergenceError, SceneError, require_kind
+from ufl_beam.discretisation import Mesh
+from ufl_beam.equation import Equation
+from ufl_beam.errors import ConvergenceError, SceneError, StepFailed, require_kind
 from ufl_beam.fields import Fields
 from ufl_beam.grid import Grid, Share
 from ufl_beam.inelastic import InelasticBeams, inelastic_cells
-from ufl_beam.initial import initial_state
+from ufl_beam.initial import initial_state, mesh_of
 from ufl_beam.ledger import Ledger
 from ufl_beam.live import Live
 from ufl_beam.loads import FollowerLoad, RotatingFrame
+from ufl_beam.loops import extrapolated
 from ufl_beam.mechanism import (
     friction_repeats,
     no_number,
@@ -39,7 +42,7 @@ from ufl_beam.rotating import FrameForces
 from ufl_beam.scene import Scene
 from ufl_beam.schemes import Scheme, Step, has_inertia
 from ufl_beam.solution import Solution
-from ufl_beam.solve import Border, Newton, Solver, StepFailed
+from ufl_beam.solve import Border, Newton, Solver
 from ufl_beam.sparse import Csr, Product, as_slice
 from ufl_beam.supports import Supports
 from ufl_beam.terms import KINDS, Beams, ElasticBeams, Inertia, Term
@@ -91,6 +94,7 @@ class Simulation(Live):
         t0: Time of the initial state; s.
         start: Solution of the same beams whose last state is the initial state.
         newton: Tolerances and PETSc options.
+        mesh: How finely it is discretised; as ``start``, or with the cells of the beams.
         comm: Processes that share the scene; all of them, or in a :func:`study` this one alone.
 
     Attributes:
@@ -110,6 +114,7 @@ class Simulation(Live):
         t0: float = 0.0,
         start: Solution | None = None,
         newton: Newton | None = None,
+        mesh: Mesh | None = None,
         comm: MPI.Intracomm | None = None,
     ) -> None:
         comm = ours() if comm is None else comm
@@ -126,7 +131,7 @@ class Simulation(Live):
             require_no_mechanism(scene)
         require_independent(scene)
         self.scene, self.scheme, self.comm = scene, scheme, comm
-        self.grid = Grid(scene)
+        self.grid = Grid(scene, mesh_of(start, mesh))
         together = len(self.grid.cells) >= comm.size * SMALLEST_SHARE
         self.share = Share(self.grid, comm if together else MPI.COMM_SELF)
         q, v = initial_state(self.grid, start)
@@ -186,9 +191,14 @@ class Simulation(Live):
         if not scheme.dynamic:
             parts = (self.beams, self.couplings)
             self._path = StaticPath(self.share, scheme, *parts, self.ledger, self.q, t0)
+        equation = None
+        if self.share.comm.size == 1 and not self.supports.turned:
+            terms = (self.beams, self.couplings, self._others)
+            equation = Equation(self._A, *terms, self.supports, self.force)
         self._solver = Solver(
             self.share,
             self._A,
+            equation=equation,
             residual=self._residual,
             complete=self.supports.hold,
             tangent=self._tangent,
@@ -254,9 +264,10 @@ class Simulation(Live):
         here = self._course.relieve()
         return self.share.comm.allreduce(here, op=MPI.LOR) if self.share.comm.size > 1 else here
 
-    def _excess(self, r: Array, scale: float) -> float:
+    def _excess(self, x: Array, r: Array, scale: float) -> float:
         """How far the laws of connectors are missed."""
-        here = max((c.excess(r, scale) for c in self.couplings), default=0.0)
+        q1 = self.supports.in_plane(x)
+        here = max((c.excess(q1, r, scale) for c in self.couplings), default=0.0)
         if self.share.comm.size > 1:
             return self.share.comm.allreduce(here, op=MPI.MAX) if self.scene.links else 0.0
         return here
@@ -359,11 +370,12 @@ class Simulation(Live):
         self.ask()
         for term in self.terms:
             term.begin(step)
-        guess = self.q + (self.q - self._q_before) * (step.dt / self.last_dt)
+        guess = extrapolated(self.q, self._q_before, step.dt / self.last_dt)
         self.supports.enter(guess)
         self.supports.move(guess, self.supports.in_axes(self.q), step)
         try:
-            q1 = self._solver.solve(guess, [load.force for load in self.loads])
+            like_last = self.scheme.dynamic and math.isclose(step.dt, self.last_dt, rel_tol=1e-6)
+            q1 = self._solver.solve(guess, [load.force for load in self.loads], like_last)
         except StepFailed:
             if said := no_number(self.scene, (step.load_time, step.motion_time)):
                 raise StepFailed(said) from None
@@ -391,7 +403,8 @@ class Simulation(Live):
         """What a step came to, ``q1`` in the axes of the supports, if it was followed."""
         self.supports.leave(q1)
         s, turn = self.scheme.nodal_step(self.q, q1, self._rotations)
-        s[self._multipliers] = 0.0
+        if self.scene.links:
+            s[self._multipliers] = 0.0
         self._require_small(turn)
         if self._path is not None:
             self._path.require(q1, s, self.force, self._solver.least_work(s))

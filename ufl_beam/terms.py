@@ -18,6 +18,7 @@ from ufl_beam.fields import Fields
 from ufl_beam.forms import Kernel
 from ufl_beam.kinematics import split, strain
 from ufl_beam.ledger import Ledger
+from ufl_beam.loops import Loop, doubles, ffi, lib, loop
 from ufl_beam.memory import Memory
 from ufl_beam.schemes import DynamicScheme, Scheme, Step
 from ufl_beam.sparse import Csr, StepProduct
@@ -31,6 +32,9 @@ class Term(Protocol):
 
     kind: str
     """What it is the work of, one of :data:`KINDS`."""
+
+    def loops(self) -> tuple[Loop, Loop | None] | None:
+        """What :meth:`add_residual` and :meth:`add_tangent` are in C, if there is one; or None."""
 
     def begin(self, step: Step) -> None:
         """Take note of the step that is to be solved."""
@@ -86,13 +90,14 @@ class ElasticBeams:
         self._tangent.share(self._force)
         self._tangent.place(A)
         self._first: Kernel | None = None
+        self._tangents = ffi.new("first_cells *", {"then": self._tangent.cells})
         if not scheme.dynamic:
             before = ufl.as_vector([C[i] * e0[i] for i in range(3)])
             geometric = ufl.dot(before, ufl.derivative(w_e, q1, dq))
             material = ufl.dot(ufl.derivative(r, q1, dq), w_e)
             self._first = fields.kernel((geometric + material) * dx, q1)
             self._first.place(A)
-        self._begins = False
+            self._tangents.first = self._first.cells
         self._A, self._ledger = A, ledger
         if losses:
             ledger.lost["numerical"] += 0.0
@@ -103,7 +108,11 @@ class ElasticBeams:
             kernel.set(self._q0, step.q0)
         if self._first is not None:
             self._first.set(self._q0, step.q0)
-            self._begins = True
+            self._tangents.begins = 1
+
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """Two forms."""
+        return loop("add_cells", self._force.cells), loop("add_first_cells", self._tangents)
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the internal forces."""
@@ -115,15 +124,11 @@ class ElasticBeams:
         Extrapolated displacements strain slender beams by nothing but error; forces from that would
         send the first iteration of a static step astray, so it takes those before the step.
         """
-        if self._begins and self._first is not None:
-            self._first.add(q1, self._A.data)
-        else:
-            self._tangent.add(q1, self._A.data)
-        self._begins = False
+        lib.add_first_cells(self._tangents, doubles(q1), doubles(self._A.data))
 
     def accept(self, q1: Array, s: Array) -> None:
         """What the scheme lost."""
-        self._begins = False
+        self._tangents.begins = 0
         for loss in self._losses:
             self._ledger.lost["numerical"] += loss.value(q1)
 
@@ -159,12 +164,12 @@ class SectionForces:
 
 
 def mass_matrix(fields: Fields) -> Csr:
-    """Consistent mass of the beams, the point masses and the bodies."""
+    """Mass of the beams, the point masses and the bodies."""
     share = fields.share
     (u, ψ), (w_u, w_ψ) = (split(f(fields.space)) for f in (ufl.TrialFunction, ufl.TestFunction))
     ρ = fields.inertia()
     M = fields.matrix()
-    work = (ρ[0] * ufl.dot(u, w_u) + ρ[1] * ψ * w_ψ) * fields.dx(2)  # P(67)
+    work = (ρ[0] * ufl.dot(u, w_u) + ρ[1] * ψ * w_ψ) * fields.dx_of_mass()  # P(67)
     kernel = fields.kernel(work, fields.configuration())
     kernel.place(M)
     kernel.add(np.zeros(share.size), M.data)
@@ -210,6 +215,10 @@ class Inertia:
         """Prepare what stays constant in the step."""
         self._dt = step.dt
         self._times.begin(step.q0, *self.scheme.inertia(step.dt, self))
+
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """A matrix times the step of the nodes."""
+        return self._times.loops()
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add mass times the acceleration of the step."""

@@ -561,14 +561,16 @@ def test_histories_of_places_elsewhere(shared_path):
 
 def test_start_from_another_scene():
     other = run()
-    with raises("start: the solution is of other beams or joints; use the same Beam objects"):
+    with raises(
+        "start: the solution is of other beams, joints or cells; use the same Beam objects"
+    ):
         run(start=other)
 
 
 def test_start_from_other_joints():
     a, b = beam(name="a"), ub.Beam((1, 0), (2, 0), SECTION, name="b")
     hinged = run(ub.Scene([a, b], joints=[ub.Revolute(a.end, b.start)]))
-    with raises("start: the solution is of other beams or joints"):
+    with raises("start: the solution is of other beams, joints or cells"):
         run(ub.Scene([a, b], joints=[ub.Rigid(a.end, b.start)]), start=hinged)
 
 
