@@ -11,7 +11,6 @@ import ufl
 from ufl_beam.compat import Array
 from ufl_beam.exact_schemes import DecayingMidpoint
 from ufl_beam.fields import Fields
-from ufl_beam.inelastic import Strains
 from ufl_beam.kinematics import strain
 from ufl_beam.ledger import Ledger
 from ufl_beam.loops import Loop, loop
@@ -46,14 +45,23 @@ class SecondDifferences:
         )
         self._tangent.share(self._force)
         self._tangent.place(A)
-        self._strains = Strains(fields)
+        z = ufl.TestFunction(before.function_space)
+        self._values = fields.kernel(ufl.dot(strain(q1, axis), z) * dx, q1)
         self._cells = fields.share.cells[fields.order]
         self._q: Array = np.empty(0)
-        self._e: Array = np.zeros((len(self._cells), 3))
-        self._change = np.zeros_like(self._e)
+        self._change: Array = np.zeros(before.x.array.size).reshape(len(self._cells), -1)
+        self._e: Array = self._change
+        self._volumes = np.zeros(before.x.array.size)
+        fields.kernel(sum(z) * dx, q1).add(np.zeros(fields.share.size), self._volumes)
         self._dt = self._last_dt = math.inf
         self._A, self._ledger = A, ledger
         ledger.lost["numerical"] += 0.0
+
+    def _strains(self, q: Array) -> Array:
+        """Strains at ``q`` in the points of the cells; (num_cells, 3 points)."""
+        values = np.zeros(len(self._volumes))
+        self._values.add(q, values)
+        return np.asarray(values / self._volumes).reshape(self._change.shape)
 
     def begin(self, step: Step) -> None:
         """Remember the configuration at the beginning, and the changes in the step before."""

@@ -6,6 +6,7 @@ import re
 import sys
 import tokenize
 from collections import Counter
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -41,6 +42,7 @@ def is_type_checking(node):
     return isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING")
 
 
+@cache
 def imports(module):
     """Names of the modules that a module of the package imports, anywhere but for type checkers."""
     found = set()
@@ -74,6 +76,7 @@ def outside(module):
     return {name.split(".")[0] for name in imports(module)} - {"ufl_beam"}
 
 
+@cache
 def reach(module):
     """The module, and all modules of the package that come with it."""
     found, todo = set(), {module}

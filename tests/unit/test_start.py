@@ -68,6 +68,34 @@ def test_a_run_in_two_parts_is_the_run():
     assert second.times == pytest.approx(whole.times[10:])
 
 
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.GeneralizedAlpha(0.6)], ids=str)
+def test_forces_of_moving_supports_carry_on(scheme):
+    """The work of the first step takes the mean of the force before and after it."""
+    beam = ub.Beam((0, 0), (2, 0), SECTION, cells=2)
+    moved = ub.Prescribed(beam.end, v=lambda t: 0.1 * t**2)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), moved])
+    whole = ub.simulate(scene, scheme, t=(0, 1), dt=0.05)
+    first = ub.simulate(scene, scheme, t=(0, 0.5), dt=0.05)
+    second = ub.simulate(scene, scheme, t=(0.5, 1), dt=0.05, start=first)
+    work = whole.energy["supports"][10:] - whole.energy["supports"][10]
+    # What Newton's method leaves
+    assert second.energy["supports"] == pytest.approx(work, rel=1e-7)
+
+
+@pytest.mark.parametrize("scheme", [ub.Midpoint(), ub.Newmark()], ids=str)
+def test_what_is_held_does_not_move(scheme):
+    """Velocities that would contradict a support are zero from the beginning."""
+    beam = ub.Beam((0, 0), (2, 0), SECTION, cells=2)
+    throw = ub.Velocity([beam], linear=(1, 2))
+    supports = [ub.Pinned(beam.start), ub.Roller(beam.end, along=(1, 1))]
+    scene = ub.Scene([beam], supports=supports, initial=[throw])
+    solution = ub.simulate(scene, scheme, t=(0, 0.1), dt=0.05)
+    assert np.abs(solution.velocity(beam.start)[:, :2]).max() == 0
+    # On the roller the part along it stays: (1, 2) on (1, 1)/√2 is (1.5, 1.5)
+    assert solution.velocity(beam.end)[0] == pytest.approx([1.5, 1.5, 0], rel=1e-14, abs=1e-14)
+    assert solution.velocity(beam.at(0.5))[0] == pytest.approx([1, 2, 0])
+
+
 def test_other_supports_and_loads_may_follow():
     """A rope is cut: the static state of one scene, let go in another of the same beams."""
     scene = bent()
