@@ -53,7 +53,7 @@ class Mesh:
     def nodes(self) -> npt.NDArray[np.float64]:
         """Where in a cell, from 0 to 1, its nodes are; ascending: Gauss-Lobatto points."""
         inner = np.polynomial.legendre.Legendre.basis(self.degree).deriv().roots()
-        return np.array([0.0, *(1 + inner) / 2, 1.0])
+        return np.array([0.0, *((1 + x) / 2 for x in inner.tolist()), 1.0])
 
     @cached_property
     def parts(self) -> npt.NDArray[np.float64]:

@@ -5,7 +5,7 @@ but the one that the arguments live on.  The letters are the paper's; P(n) is it
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import accumulate, pairwise
 
 import ufl
@@ -18,7 +18,7 @@ class Axis:
     Args:
         mesh: Their mesh.
         nodes: Where in a cell, from 0 to 1, the nodes of configurations are; ascending.
-        X: From 0 to 1 along each cell; only more than two nodes need it.
+        X: From 0 to 1 along each cell; by default the point is in the middle.
 
     Attributes:
         nodes: As given.
@@ -28,9 +28,7 @@ class Axis:
         h: Length of the cell; m.
     """
 
-    def __init__(
-        self, mesh: ufl.Mesh, nodes: Sequence[float] = (0.0, 1.0), X: Expr | None = None
-    ) -> None:
+    def __init__(self, mesh: ufl.Mesh, nodes: Iterable[float] = (0.0, 1.0), X: Expr = 0.5) -> None:
         self.nodes, self.X = [float(a) for a in nodes], X
         J = ufl.Jacobian(mesh)
         self.h = ufl.sqrt(J[0, 0] ** 2 + J[1, 0] ** 2)
