@@ -64,10 +64,12 @@ class Mesh:
 
     def weights(self, part: float) -> npt.NDArray[np.float64]:
         """Weights of the nodes of a cell in the value at a part of it, by Lagrange."""
-        weights = [
-            np.prod([(part - b) / (a - b) for b in self.nodes if b != a]) for a in self.nodes
-        ]
-        return np.array(weights)
+        return np.asarray(part ** np.arange(self.degree + 1) @ self._polynomials)
+
+    @cached_property
+    def _polynomials(self) -> npt.NDArray[np.float64]:
+        """Coefficients of the polynomials that are one in one node, in columns."""
+        return np.asarray(np.linalg.inv(np.vander(self.nodes, increasing=True)))
 
     def vertices(self, beam: Beam, attached: Sequence[float]) -> list[float]:
         """Parameters of the vertices of a beam: ends, corners and what is ``attached`` among them.
