@@ -12,16 +12,22 @@ from ufl_beam.errors import SceneError
 from ufl_beam.fields import Fields
 from ufl_beam.kinematics import strain, virtual_strain
 from ufl_beam.ledger import Ledger
+from ufl_beam.loops import Loop, loop
 from ufl_beam.memory import Memory
 from ufl_beam.schemes import Scheme, Step
 from ufl_beam.sparse import Csr, StepProduct
-from ufl_beam.terms import Term, mass_matrix
+from ufl_beam.terms import Inertia, Term, mass_matrix
 from ufl_beam.viscous import KelvinVoigt, Rayleigh
 
 
 @singledispatch
 def damping_forces(
-    damping: object, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger
+    damping: object,
+    fields: Fields,
+    scheme: Scheme,
+    A: Csr,
+    ledger: Ledger,
+    inertia: Inertia | None,
 ) -> list[Term]:
     """Forces of one kind of damping on the cells of a process; none if it has no such cells."""
     raise TypeError(f"{damping!r} is not a damping")
@@ -58,6 +64,10 @@ class KelvinVoigtForces:
                 kernel.put(self._rate, np.array([self._time / step.dt]))
         self._dt = step.dt
 
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """Two forms."""
+        return loop("add_cells", self._force.cells), loop("add_cells", self._tangent.cells)
+
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the damping forces."""
         self._force.add(q1, r)
@@ -92,20 +102,27 @@ def reference_stiffness(fields: Fields) -> Csr:
 
 
 class RayleighForces:
-    """A constant matrix times the mean velocity of the step, P(92)."""
+    """A constant matrix times the velocity of the step, P(92)."""
 
     kind = "damping"
 
-    def __init__(self, damping: Rayleigh, fields: Fields, A: Csr, ledger: Ledger) -> None:
+    def __init__(
+        self, damping: Rayleigh, fields: Fields, A: Csr, ledger: Ledger, inertia: Inertia
+    ) -> None:
         C, M, K = fields.matrix(), mass_matrix(fields), reference_stiffness(fields)
         C.data[:] = damping.mass * M.data + damping.stiffness * K.data  # P(92)
-        self._times = StepProduct(C, fields.share.rotations(), A)
-        self._ledger = ledger
+        rotations = inertia.scheme.half_tangents(fields.share.rotations())
+        self._times = StepProduct(C, rotations, A)
+        self._ledger, self._inertia = ledger, inertia
 
     def begin(self, step: Step) -> None:
         """Prepare what stays constant in the step."""
         self._dt = step.dt
-        self._times.begin(step.q0, 1 / step.dt, 0.0, step.q0)
+        self._times.begin(step.q0, *self._inertia.scheme.velocity(step.dt, self._inertia))
+
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """A matrix times the step of the nodes."""
+        return self._times.loops()
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the damping forces."""
@@ -128,17 +145,27 @@ class RayleighForces:
 
 @damping_forces.register
 def _rayleigh(
-    damping: Rayleigh, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger
+    damping: Rayleigh,
+    fields: Fields,
+    scheme: Scheme,
+    A: Csr,
+    ledger: Ledger,
+    inertia: Inertia | None,
 ) -> list[Term]:
-    if not scheme.dynamic:
+    if inertia is None:
         raise SceneError("Rayleigh: it damps velocities, and statics has none; use KelvinVoigt")
     ledger.lost["damping"] += 0.0
-    return [RayleighForces(damping, fields, A, ledger)]
+    return [RayleighForces(damping, fields, A, ledger, inertia)]
 
 
 @damping_forces.register
 def _kelvin_voigt(
-    damping: KelvinVoigt, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger
+    damping: KelvinVoigt,
+    fields: Fields,
+    scheme: Scheme,
+    A: Csr,
+    ledger: Ledger,
+    inertia: Inertia | None,
 ) -> list[Term]:
     ledger.lost["damping"] += 0.0
     grid = fields.share.grid

@@ -7,6 +7,7 @@ what several processes add to one degree of freedom is summed by the solver.
 
 from __future__ import annotations
 
+import math
 from typing import Protocol
 
 import numpy as np
@@ -17,6 +18,7 @@ from ufl_beam.fields import Fields
 from ufl_beam.forms import Kernel
 from ufl_beam.kinematics import split, strain
 from ufl_beam.ledger import Ledger
+from ufl_beam.loops import Loop, doubles, ffi, lib, loop
 from ufl_beam.memory import Memory
 from ufl_beam.schemes import DynamicScheme, Scheme, Step
 from ufl_beam.sparse import Csr, StepProduct
@@ -30,6 +32,9 @@ class Term(Protocol):
 
     kind: str
     """What it is the work of, one of :data:`KINDS`."""
+
+    def loops(self) -> tuple[Loop, Loop | None] | None:
+        """What :meth:`add_residual` and :meth:`add_tangent` are in C, if there is one; or None."""
 
     def begin(self, step: Step) -> None:
         """Take note of the step that is to be solved."""
@@ -85,13 +90,14 @@ class ElasticBeams:
         self._tangent.share(self._force)
         self._tangent.place(A)
         self._first: Kernel | None = None
+        self._tangents = ffi.new("first_cells *", {"then": self._tangent.cells})
         if not scheme.dynamic:
             before = ufl.as_vector([C[i] * e0[i] for i in range(3)])
             geometric = ufl.dot(before, ufl.derivative(w_e, q1, dq))
             material = ufl.dot(ufl.derivative(r, q1, dq), w_e)
             self._first = fields.kernel((geometric + material) * dx, q1)
             self._first.place(A)
-        self._begins = False
+            self._tangents.first = self._first.cells
         self._A, self._ledger = A, ledger
         if losses:
             ledger.lost["numerical"] += 0.0
@@ -102,7 +108,11 @@ class ElasticBeams:
             kernel.set(self._q0, step.q0)
         if self._first is not None:
             self._first.set(self._q0, step.q0)
-            self._begins = True
+            self._tangents.begins = 1
+
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """Two forms."""
+        return loop("add_cells", self._force.cells), loop("add_first_cells", self._tangents)
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the internal forces."""
@@ -114,15 +124,11 @@ class ElasticBeams:
         Extrapolated displacements strain slender beams by nothing but error; forces from that would
         send the first iteration of a static step astray, so it takes those before the step.
         """
-        if self._begins and self._first is not None:
-            self._first.add(q1, self._A.data)
-        else:
-            self._tangent.add(q1, self._A.data)
-        self._begins = False
+        lib.add_first_cells(self._tangents, doubles(q1), doubles(self._A.data))
 
     def accept(self, q1: Array, s: Array) -> None:
         """What the scheme lost."""
-        self._begins = False
+        self._tangents.begins = 0
         for loss in self._losses:
             self._ledger.lost["numerical"] += loss.value(q1)
 
@@ -183,6 +189,8 @@ class Inertia:
     Attributes:
         v: Velocities at the end of the last accepted step.
         v_before: Those at its beginning.
+        more: What the scheme keeps besides; empty before the first step.
+        last_dt: Length of the last accepted step; s.
         scheme: The time scheme.
         M: The mass matrix.
     """
@@ -193,18 +201,24 @@ class Inertia:
         self, fields: Fields, scheme: DynamicScheme, A: Csr, ledger: Ledger, v: Array
     ) -> None:
         self.M = mass_matrix(fields)
-        self._times = StepProduct(self.M, fields.share.rotations(), A)
+        rotations = scheme.half_tangents(fields.share.rotations())
+        self._times = StepProduct(self.M, rotations, A)
         self._ledger = ledger
-        if scheme.beta:
+        if scheme.slips:
             ledger.lost["numerical"] += 0.0
         self.scheme = scheme
         self.v = self.v_before = v
+        self.more: tuple[Array, ...] = ()
+        self._dt = self.last_dt = math.inf
 
     def begin(self, step: Step) -> None:
         """Prepare what stays constant in the step."""
-        self._a, self._b = self.scheme.velocity_weights(step.dt)
-        factor, back = self._a / step.dt, (1 + self._b) / step.dt
-        self._times.begin(step.q0, factor, back, self.v)  # P(78)
+        self._dt = step.dt
+        self._times.begin(step.q0, *self.scheme.inertia(step.dt, self))
+
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """A matrix times the step of the nodes."""
+        return self._times.loops()
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add mass times the acceleration of the step."""
@@ -214,19 +228,34 @@ class Inertia:
         """Add mass times the derivative of the acceleration."""
         self._times.add_tangent(q1)
 
+    def carry_on(self, memory: Memory, known: int) -> None:
+        """State what the scheme keeps besides the velocities, as much as is ``known`` of it."""
+        more = self.more or (self.v,) * known
+        self.more = tuple(map(memory.at_dofs, self.scheme.kept[:known], more))
+
     def velocities(self, s: Array) -> Array:
         """Velocities at the end of a step ``s`` of the nodes."""
-        v = self._a * s
-        v -= self._b * self.v
-        return v
+        return self.scheme.rates(self._dt, s, self)[0]
+
+    @property
+    def ready(self) -> bool:
+        """Whether a step can begin: of what the scheme keeps something is known."""
+        return not self.scheme.kept or bool(self.more)
+
+    def prepare(self, s: Array) -> None:
+        """Take from a trial step ``s`` what the scheme keeps besides the velocities."""
+        _, *more = self.scheme.rates(self._dt, s, self)
+        self.more = tuple(more)
 
     def accept(self, q1: Array, s: Array) -> None:
         """New velocities, and what the scheme lost."""
-        v = self.velocities(s)
-        if self.scheme.beta:
-            lost = self.scheme.beta * self._times.square(v - self.v)  # P(88)
-            self._ledger.lost["numerical"] += lost
-        self.v_before, self.v = self.v, v
+        v, *more = self.scheme.rates(self._dt, s, self)
+        if self.scheme.slips:
+            change = v - self.v
+            momentum = self._times(change)
+            lost = self.scheme.slip(self._dt, change, self) @ momentum
+            self._ledger.lost["numerical"] += float(lost)
+        self.v_before, self.v, self.more, self.last_dt = self.v, v, tuple(more), self._dt
 
     def add_state(self, q: Array) -> None:
         """Kinetic energy."""
@@ -236,3 +265,5 @@ class Inertia:
         """The velocities."""
         self.v = memory.at_dofs("velocity", self.v)
         self.v_before = memory.at_dofs("velocity before", self.v_before)
+        self.last_dt = memory.number("step of velocity", self.last_dt)
+        self.carry_on(memory, int(memory.number("further rates", len(self.more))))
