@@ -192,15 +192,10 @@ def _turn_of_nodes(ψ0: Expr, ψ1: Expr, w: Expr, axis: Axis) -> tuple[Expr, Exp
     nodes, virtual = axis.at_nodes(δ), axis.at_nodes(w)
     # Differences of 2 tan δ between neighbours are made differences of 2 δ.
     steps = [
-        _over_sin(b - a) * ufl.cos(a) * ufl.cos(b) * (w_b - w_a)
+        ufl.cos(a) * ufl.cos(b) / _sinc(b - a) * (w_b - w_a)
         for (a, b), (w_a, w_b) in zip(pairwise(nodes), pairwise(virtual), strict=True)
     ]
     y, w_K = axis.interpolate([0, *accumulate(steps)])
     ends = ((nodes[0], virtual[0], y), (nodes[-1], virtual[-1], y - sum(steps, 0)))
-    turns = [w_a + y_a / (_over_sin(δ - a) * ufl.cos(a) * ufl.cos(δ)) for a, w_a, y_a in ends]
+    turns = [w_a + y_a * _sinc(δ - a) / (ufl.cos(a) * ufl.cos(δ)) for a, w_a, y_a in ends]
     return sum(turns, 0) / 2, w_K
-
-
-def _over_sin(x: Expr) -> Expr:
-    """X / sin x, smooth at zero."""
-    return over_tan(x / 2) / ufl.cos(x / 2) ** 2
