@@ -49,7 +49,7 @@ class SecondDifferences:
         self._strains = Strains(fields)
         self._cells = fields.share.cells[fields.order]
         self._q: Array = np.empty(0)
-        self._e: Array = np.zeros((len(self._cells), 3))
+        self._e: Array = np.zeros(self._strains.shape)
         self._change = np.zeros_like(self._e)
         self._dt = self._last_dt = math.inf
         self._A, self._ledger = A, ledger

@@ -56,6 +56,11 @@ class Mesh:
         return np.array([0.0, *((1 + x) / 2 for x in inner.tolist()), 1.0])
 
     @cached_property
+    def point_weights(self) -> npt.NDArray[np.float64]:
+        """Parts of a cell that its Gauss points stand for."""
+        return np.polynomial.legendre.leggauss(self.degree)[1] / 2
+
+    @cached_property
     def parts(self) -> npt.NDArray[np.float64]:
         """Part of a uniform load on a cell, or of its mass, that each node bears."""
         p = self.degree

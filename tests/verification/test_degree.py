@@ -193,3 +193,14 @@ def test_orders_of_motions(degree, cells, lumped):
         for n in (cells, 2 * cells)
     ]
     np.testing.assert_allclose(orders(errors), 2 * degree, atol=0.6)
+
+
+@pytest.mark.parametrize("degree", [2, 3])
+def test_a_decaying_scheme_knows_what_it_takes(degree):
+    """Also where it remembers strains in the points of the cells."""
+    scene, mesh = flying_beam(cells=4), ub.Mesh(degree=degree)
+    more = {"dt": 0.1, "newton": TIGHT, "progress": False}
+    first = ub.simulate(scene, ub.DecayingMidpoint(), t=(0, 4), mesh=mesh, **more)
+    lost = first.energy.lost["numerical"]
+    assert first.energy.worst <= 1e-10
+    assert 0 < lost[-1] < 0.1 * first.energy.total[-1]
