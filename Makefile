@@ -1,6 +1,6 @@
 # Every target runs through ./env, which brings DOLFINx where it is missing. `make` lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-mpi verify long demos check bench extremes
+.PHONY: help demo test test-mpi verify long demos check bench bench-peers extremes
 
 # Natively as root Open MPI refuses to start; with more ranks than cores, too (the last two lines: versions 5 and 6).
 # ./env sets the same in its root.
@@ -50,6 +50,9 @@ bench: ## time per step
 	@./env python3 benchmarks/bench_step.py
 	@./env python3 benchmarks/bench_inelastic.py
 	@./env python3 benchmarks/bench_scaling.py
+
+bench-peers: ## beside Exudyn, OpenSees and a C loop: time, memory, error
+	@./env python3 benchmarks/peers
 
 # ruff, which Debian lacks: from a venv beside the root of ./env, made on first use; its version is in pyproject.toml.
 with_ruff = tools=$${XDG_CACHE_HOME:-$$HOME/.cache}/ufl_beam/tools; ruff=$$tools/bin/ruff; \

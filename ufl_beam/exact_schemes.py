@@ -16,7 +16,7 @@ from ufl_beam.compat import Array
 from ufl_beam.grid import Index
 from ufl_beam.kinematics import Axis
 from ufl_beam.laws import Softening, Values
-from ufl_beam.loops import doubles, integers, lib
+from ufl_beam.loops import combined, doubles, integers, lib
 from ufl_beam.scene import Scene
 from ufl_beam.schemes import Constant, Rates, Step, require_between, scaled
 
@@ -195,9 +195,7 @@ class _Velocities(_Midway):
     def rates(self, dt: float, s: Array, rates: Rates) -> tuple[Array, ...]:
         """The velocities."""
         a, b = self._weights(dt)
-        v = a * s
-        v -= b * rates.v
-        return (v,)
+        return (combined(a, s, -b, rates.v),)
 
     def slip(self, dt: float, change: Array, rates: Rates) -> Array:
         """In proportion to the change; what it loses is D_K of the paper."""

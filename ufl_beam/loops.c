@@ -27,6 +27,26 @@ void add_cells(void *self, const double *q, double *b)
   }
 }
 
+/* Value of a functional at the unknowns q. */
+double value_of_cells(const cells *c, const double *q)
+{
+  double value = 0;
+  add_cells((void *)c, q, &value);
+  return value;
+}
+
+/* out = a x + b y */
+void combine(int size, double a, const double *x, double b, const double *y, double *out)
+{
+  for (int i = 0; i < size; ++i) out[i] = a * x[i] + b * y[i];
+}
+
+/* out = x + ratio (x - y) */
+void extrapolate(int size, const double *x, const double *y, double ratio, double *out)
+{
+  for (int i = 0; i < size; ++i) out[i] = x[i] + ratio * (x[i] - y[i]);
+}
+
 /* The same of one form at the first call of a step, and of another one then. */
 void add_first_cells(void *self, const double *q, double *b)
 {

@@ -47,6 +47,9 @@ typedef struct {
 
 void set_cells(const cells *c, const double *q, int at);
 void add_cells(void *self, const double *q, double *b);
+double value_of_cells(const cells *c, const double *q);
+void combine(int size, double a, const double *x, double b, const double *y, double *out);
+void extrapolate(int size, const double *x, const double *y, double ratio, double *out);
 void add_first_cells(void *self, const double *q, double *b);
 void subtract_vector(void *self, const double *q, double *b);
 void add_step_force(void *self, const double *q, double *r);

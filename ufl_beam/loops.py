@@ -23,7 +23,7 @@ from petsc4py import PETSc
 import cffi
 import numpy as np
 
-from ufl_beam.compat import TABULATE, jit_directory
+from ufl_beam.compat import TABULATE, Array, jit_directory
 
 SOURCES = ("loops", "elimination", "newton")
 """Files of C beside this one; they are one translation unit."""
@@ -91,6 +91,20 @@ doubles = partial(ffi.from_buffer, ffi.typeof("double[]"))
 
 integers = partial(ffi.from_buffer, ffi.typeof("int32_t[]"))
 """Pointer to a contiguous array of int32; it keeps the array alive."""
+
+
+def extrapolated(x: Array, y: Array, ratio: float) -> Array:
+    """``x + ratio (x - y)``; of short arrays in half the time that NumPy takes."""
+    out: Array = np.empty(len(x))
+    lib.extrapolate(len(x), doubles(x), doubles(y), ratio, doubles(out))
+    return out
+
+
+def combined(a: float, x: Array, b: float, y: Array) -> Array:
+    """``a x + b y``, likewise."""
+    out: Array = np.empty(len(x))
+    lib.combine(len(x), a, doubles(x), b, doubles(y), doubles(out))
+    return out
 
 
 def kernel(pointer: Any, of: Any) -> Any:

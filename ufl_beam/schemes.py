@@ -9,8 +9,7 @@ the step are in exact.py and decaying.py, those whose forces act at its end in c
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Protocol, TypeGuard, runtime_checkable
+from typing import NamedTuple, Protocol, TypeGuard, runtime_checkable
 
 import ufl
 from ufl.core.expr import Expr
@@ -26,8 +25,7 @@ Constant = Callable[[float], Expr]
 """Makes a number of the scheme a constant of the form, so that changing it compiles nothing."""
 
 
-@dataclass(frozen=True)
-class Step:
+class Step(NamedTuple):
     """A step in time.
 
     Attributes:

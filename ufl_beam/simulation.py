@@ -25,6 +25,7 @@ from ufl_beam.initial import initial_state, mesh_of
 from ufl_beam.ledger import Ledger
 from ufl_beam.live import Live
 from ufl_beam.loads import FollowerLoad, RotatingFrame
+from ufl_beam.loops import extrapolated
 from ufl_beam.mechanism import (
     friction_repeats,
     no_number,
@@ -369,7 +370,7 @@ class Simulation(Live):
         self.ask()
         for term in self.terms:
             term.begin(step)
-        guess = self.q + (self.q - self._q_before) * (step.dt / self.last_dt)
+        guess = extrapolated(self.q, self._q_before, step.dt / self.last_dt)
         self.supports.enter(guess)
         self.supports.move(guess, self.supports.in_axes(self.q), step)
         try:
@@ -402,7 +403,8 @@ class Simulation(Live):
         """What a step came to, ``q1`` in the axes of the supports, if it was followed."""
         self.supports.leave(q1)
         s, turn = self.scheme.nodal_step(self.q, q1, self._rotations)
-        s[self._multipliers] = 0.0
+        if self.scene.links:
+            s[self._multipliers] = 0.0
         self._require_small(turn)
         if self._path is not None:
             self._path.require(q1, s, self.force, self._solver.least_work(s))

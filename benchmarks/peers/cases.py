@@ -1,0 +1,166 @@
+"""What is run: each program with its settings on each problem, and the ladders of the figure."""
+
+from typing import NamedTuple
+
+
+class Case(NamedTuple):
+    """One program at one setting on one problem.
+
+    Attributes:
+        label: The setting, for tables and legends; "" for the only one.
+        settings: Arguments of the program's function.
+        part: "tables" or "figure".
+        long: Left out by ``--quick``.
+    """
+
+    program: str
+    problem: str
+    label: str
+    settings: dict
+    part: str
+    long: bool
+
+    @property
+    def group(self):
+        """Cases of one group run in turn, and are compared."""
+        names = ("cells", "dt", "turns", "end")
+        return self.part, self.problem, *(self.settings.get(name) for name in names)
+
+
+NEWTON = ("full", "modified")
+DENSE = 64
+"""Exudyn's dense solver is tried up to this number of cells."""
+FEW = {512: 50, 4096: 5}
+"""Steps of OpenSees in the flying beam, which would take minutes."""
+SWING = {"end": 1.2}
+"""How far the ladders of the swing go: all programs get there, with every scheme."""
+
+CONSERVING = ("conserving", {})
+DECAYING = ("decaying", {"alpha": 0.01})
+TRAPEZOIDAL = {"rho": "trapezoidal"}
+
+
+def ours(*variants):
+    for label, more in variants:
+        yield "ufl_beam", label, more
+
+
+def exudyn(cells, newton=NEWTON, said="", **more):
+    for solver in ("sparse", "dense") if cells <= DENSE else ("sparse",):
+        for one in newton:
+            how = {"newton": one, "solver": solver}
+            yield "exudyn", f"{one} Newton, {solver}{said}", how | more
+
+
+def opensees(*variants):
+    for label, more in variants:
+        yield "opensees", label, more
+
+
+def floor():
+    for elimination in ("banded", "fused"):
+        yield "c", elimination, {"elimination": elimination}
+
+
+def roll_up(cells, turns):
+    yield from ours(("", {}))
+    yield from exudyn(cells, newton=("full",))
+    more = ("64 load steps", {"load_steps": 64}) if cells > DENSE else ("", {})  # it fails with 8
+    yield from opensees(more)
+    yield from floor()
+
+
+def flying_beam(cells, dt):
+    yield from ours(CONSERVING)
+    yield from exudyn(cells)
+    fewer = {"steps": FEW[cells]} if cells in FEW else {}
+    yield from opensees(("Newmark", fewer))
+    yield from floor()
+
+
+def swing(cells, dt):
+    yield from ours(CONSERVING, DECAYING)
+    yield from exudyn(cells, said=", ρ∞ 0.6", rho=0.6)
+    yield from opensees(("TRBDF2", {}))
+
+
+def portal(cells, dt):
+    yield from ours(CONSERVING)
+    yield from exudyn(cells)
+    yield from opensees(
+        ("with shear", {"element": "shear"}), ("without shear", {"element": "euler"})
+    )
+
+
+def cantilever(cells, dt):
+    yield from ours(("", {}))
+    yield from exudyn(cells)
+    yield from opensees(("", {}))
+    yield from floor()
+
+
+TABLES = (  # problem, variants, arguments, and which of them --quick leaves out
+    ("P1", roll_up, [{"cells": n, "turns": 0.5} for n in (8, 64, 512)], (512,)),
+    ("P1", roll_up, [{"cells": 64, "turns": 1.0}], (64,)),
+    ("P2", flying_beam, [{"cells": n, "dt": 0.01} for n in (8, 64, 512, 4096)], (4096,)),
+    ("P2", flying_beam, [{"cells": n, "dt": 0.1} for n in (8, 64, 512, 4096)], (512, 4096)),
+    ("P3", swing, [{"cells": n, "dt": 1e-3} for n in (8, 32, 128)], (32, 128)),
+    ("P4", portal, [{"cells": n, "dt": 1e-3} for n in (12, 48)], ()),
+    ("P5", cantilever, [{"cells": n, "dt": 1e-3} for n in (10_000, 100_000)], (100_000,)),
+)
+
+
+def flying_ladder(cells, dt):
+    yield from ours(CONSERVING)
+    for newton in NEWTON:
+        yield "exudyn", f"{newton} Newton", {"newton": newton, "solver": "sparse"}
+    if cells <= 64 and dt >= 0.02:
+        yield from opensees(("Newmark", {}))
+
+
+def swing_ladder(cells, dt):
+    yield from ours(CONSERVING)
+    for label, rho in (("trapezoidal", "trapezoidal"), ("ρ∞ 0.9", 0.9)):
+        yield "exudyn", label, {"newton": "modified", "solver": "sparse", "rho": rho}
+    yield from opensees(("Newmark", {"integrator": "newmark"}), ("TRBDF2", {}))
+
+
+def portal_ladder(cells, dt):
+    yield from ours(CONSERVING)
+    for newton in NEWTON:
+        yield "exudyn", f"{newton} Newton", {"newton": newton, "solver": "sparse"}
+    yield from opensees(
+        ("with shear", {"element": "shear"}), ("without shear", {"element": "euler"})
+    )
+
+
+LADDERS = (
+    ("P2", flying_ladder, {}, {
+        0.1: (8, 16, 32), 0.05: (16, 32, 64), 0.02: (32, 64, 128), 0.01: (64, 128, 256),
+        0.005: (128, 256),
+    }),
+    ("P3", swing_ladder, SWING, {
+        5e-3: (8, 16, 32), 2.5e-3: (16, 32, 64), 1e-3: (32, 64, 128), 5e-4: (128,),
+    }),
+    ("P4", portal_ladder, {}, {
+        4e-3: (12, 24), 2e-3: (12, 24, 48), 1e-3: (24, 48, 96), 5e-4: (96,),
+    }),
+)  # fmt: skip
+
+
+def tables():
+    """The cases of the tables."""
+    for problem, variants, arguments, long in TABLES:
+        for one in arguments:
+            for program, label, more in variants(**one):
+                yield Case(program, problem, label, one | more, "tables", one["cells"] in long)
+
+
+def ladders():
+    """The cases of the figure: cells and step refined together."""
+    for problem, variants, more, steps in LADDERS:
+        for dt, cells in steps.items():
+            for n in cells:
+                for program, label, how in variants(n, dt):
+                    settings = {"cells": n, "dt": dt, **more, **how}
+                    yield Case(program, problem, label, settings, "figure", n != cells[0])
