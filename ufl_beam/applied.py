@@ -226,7 +226,7 @@ def _(load: Gravity, share: Share) -> Array:
 
 
 def _along_beams(per_beam: npt.NDArray[Any], share: Share) -> Array:
-    """Nodal forces of line loads (num_beams, 3): of two nodes of a cell, each bears a half of it."""
+    """Nodal forces of line loads (num_beams, 3): two nodes of a cell bear a half of it each."""
     grid = share.grid
     loads = per_beam[grid.beam_of_cell[share.cells]] * share.cell_lengths()[:, None]
     first, *between, last = grid.mesh.parts

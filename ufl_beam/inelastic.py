@@ -45,18 +45,32 @@ def inelastic_cells(grid: Grid) -> list[tuple[Layout, Index]]:
 
 
 class Strains:
-    """(Σ, Γ, K) of the cells of some fields."""
+    """(Σ, Γ, K) in the points of the cells of some fields.
+
+    Attributes:
+        kernel: Strains times the weights of the points.
+        shape: Cells, and three times the points in each.
+    """
 
     def __init__(self, fields: Fields) -> None:
         q = fields.configuration()
-        z = ufl.TestFunction(fields.stiffness().function_space)
-        mean = ufl.dot(strain(q, fields.axis), z) / fields.axis.h
-        self.kernel = fields.kernel(mean * fields.dx(1), q)
-        self._shape = (len(fields.order), 3)
+        z = ufl.TestFunction(fields.at_points(3).function_space)
+        weighted = ufl.dot(strain(q, fields.axis), z) / fields.axis.h
+        self.kernel = fields.kernel(weighted * fields.dx(1), q)
+        self._weights = np.repeat(fields.share.grid.mesh.point_weights, 3)
+        self.shape = (len(fields.order), len(self._weights))
 
     def __call__(self, q: Array) -> Array:
-        """Strains at ``q``, in the order of the mesh; (num_cells, 3); 1, 1, 1/m."""
-        strains = np.zeros(self._shape)
+        """Strains at ``q``, in the order of the mesh, point after point; 1, 1, 1/m."""
+        return self._weighted(q) / self._weights
+
+    def mean(self, q: Array) -> Array:
+        """Means of the cells at ``q``, in the order of the mesh; (num_cells, 3); 1, 1, 1/m."""
+        in_points = self._weighted(q).reshape(self.shape[0], self.shape[1] // 3, 3)
+        return np.asarray(in_points.sum(axis=1))
+
+    def _weighted(self, q: Array) -> Array:
+        strains = np.zeros(self.shape)
         self.kernel.add(q, strains)
         return strains
 

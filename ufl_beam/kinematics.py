@@ -5,7 +5,7 @@ but the one that the arguments live on.  The letters are the paper's; P(n) is it
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import accumulate, pairwise
 
 import ufl
@@ -18,7 +18,7 @@ class Axis:
     Args:
         mesh: Their mesh.
         nodes: Where in a cell, from 0 to 1, the nodes of configurations are; ascending.
-        X: From 0 to 1 along each cell; only more than two nodes need it.
+        X: From 0 to 1 along each cell; by default the point is in the middle.
 
     Attributes:
         nodes: As given.
@@ -28,9 +28,7 @@ class Axis:
         h: Length of the cell; m.
     """
 
-    def __init__(
-        self, mesh: ufl.Mesh, nodes: Sequence[float] = (0.0, 1.0), X: Expr | None = None
-    ) -> None:
+    def __init__(self, mesh: ufl.Mesh, nodes: Iterable[float] = (0.0, 1.0), X: Expr = 0.5) -> None:
         self.nodes, self.X = [float(a) for a in nodes], X
         J = ufl.Jacobian(mesh)
         self.h = ufl.sqrt(J[0, 0] ** 2 + J[1, 0] ** 2)
@@ -194,15 +192,10 @@ def _turn_of_nodes(ψ0: Expr, ψ1: Expr, w: Expr, axis: Axis) -> tuple[Expr, Exp
     nodes, virtual = axis.at_nodes(δ), axis.at_nodes(w)
     # Differences of 2 tan δ between neighbours are made differences of 2 δ.
     steps = [
-        _over_sin(b - a) * ufl.cos(a) * ufl.cos(b) * (w_b - w_a)
+        ufl.cos(a) * ufl.cos(b) / _sinc(b - a) * (w_b - w_a)
         for (a, b), (w_a, w_b) in zip(pairwise(nodes), pairwise(virtual), strict=True)
     ]
     y, w_K = axis.interpolate([0, *accumulate(steps)])
     ends = ((nodes[0], virtual[0], y), (nodes[-1], virtual[-1], y - sum(steps, 0)))
-    turns = [w_a + y_a / (_over_sin(δ - a) * ufl.cos(a) * ufl.cos(δ)) for a, w_a, y_a in ends]
+    turns = [w_a + y_a * _sinc(δ - a) / (ufl.cos(a) * ufl.cos(δ)) for a, w_a, y_a in ends]
     return sum(turns, 0) / 2, w_K
-
-
-def _over_sin(x: Expr) -> Expr:
-    """X / sin x, smooth at zero."""
-    return over_tan(x / 2) / ufl.cos(x / 2) ** 2

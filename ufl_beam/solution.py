@@ -287,7 +287,7 @@ class Solution:
 
     def _all_strains(self, n: int) -> Array:
         strains = np.empty((len(self.grid.cells), 3))
-        strains[self._fields.order] = self._strains(self._q[n])
+        strains[self._fields.order] = self._strains.mean(self._q[n])
         return strains
 
     def material(self, beam: Beam, n: int = -1) -> Material:

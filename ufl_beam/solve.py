@@ -301,7 +301,8 @@ class Solver:
         # What is held makes zeros on the diagonal, and PETSc does not exchange rows.
         holds = any(link.holds for link in share.grid.scene.links)
         package = "klu" if holds else "petsc"
-        long = len(share.cells) > CELLS_IN_NATURAL_ORDER
+        # Cells with inner nodes have no chains to eliminate.
+        long = len(share.cells) > CELLS_IN_NATURAL_ORDER and share.grid.mesh.degree == 1
         if self._parallel or long or share.grid.num_shared > JOINTS_IN_NATURAL_ORDER:
             factors.setType("python")
             factors.setPythonContext(ChainsFirst(share, self._A, package))
