@@ -78,7 +78,8 @@ class Climb:
                 return min(tried, key=self._goal.rank)
             self._slower *= found.run.seconds / choice.seconds
             if found.ratio > choice.ratio:
-                base = base[0] + 1, base[1] + 1
+                more = outlook.coarser(choice)
+                base = base[0] + more[0], base[1] + more[1]
 
     def _look(self, base: Level) -> tuple[Outlook | None, str, Level]:
         """What runs around a base show; or else why nothing is seen, and where to look next."""

@@ -27,6 +27,9 @@ SLACK = 0.2
 ROUGH = 0.3
 """Errors of this part of a quantity are none to recommend."""
 
+NEARLY = 2.0
+"""Where nothing is accurate enough, the cheapest with so many times the least error is next."""
+
 NEGLIGIBLE = 0.1
 """Changes up to this part of a tolerance need not converge."""
 
@@ -77,6 +80,13 @@ class Outlook:
         """Largest error, in its unit."""
         i = math.log2(refine)
         return max(cross.error(i, level) / self.units[name] for name, cross in self.crosses.items())
+
+    def coarser(self, choice: Choice) -> tuple[int, int]:
+        """A level more of the dial, cells or steps, that has the larger part of the error."""
+        i = math.log2(choice.refine)
+        worst = max(self.crosses, key=lambda name: self.crosses[name].error(i, choice.level) / self.units[name])
+        cells, steps = self.crosses[worst].cells.at(i), self.crosses[worst].steps.at(choice.level)
+        return (1, 0) if cells > steps else (0, 1)
 
     def largest(self, differences: Mapping[str, Array]) -> float:
         """Largest of differences of the quantities, in its unit."""
@@ -179,11 +189,11 @@ class Tolerance:
         return {n: self.absolute.get(n, self.relative * scale) for n, scale in scales.items()}
 
     def choose(self, outlook: Outlook) -> Choice:
-        """The cheapest that is accurate enough, or the most accurate."""
+        """The cheapest that is accurate enough, or else nearly as accurate as any."""
         settings, seconds, ratios = outlook.settings()
-        good = ratios <= 1.0
-        k = int(np.argmin(np.where(good, seconds, np.inf) if good.any() else ratios))
-        return Choice(*settings[k], float(seconds[k]), float(ratios[k]), bool(good[k]))
+        good = ratios <= max(1.0, NEARLY * ratios.min())
+        k = int(np.argmin(np.where(good, seconds, np.inf)))
+        return Choice(*settings[k], float(seconds[k]), float(ratios[k]), bool(ratios[k] <= 1.0))
 
     def hopeless(self, choice: Choice, best: Choice) -> bool:
         """Whether it would take much longer."""

@@ -27,7 +27,7 @@ from ufl_beam.studies import study
 
 Quantity = Callable[[Solution], npt.ArrayLike]
 
-SHORT = 0.3
+SHORT = 0.1
 """Runs below are done three times, and the median counts; s."""
 
 

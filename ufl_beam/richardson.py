@@ -49,6 +49,7 @@ class Convergence:
         order: Observed; 0 where changes are negligible.
         aligned: Whether both changes are of one direction; if not, nothing is extrapolated.
         used: Order that errors are predicted with, not above that of the method.
+        method: Order of the method; with it errors grow towards levels coarser than the three.
         error: Of the finest level; where changes are negligible, of every level.
         rest: What the finest level lacks of the limit, with its sign.
         safety: Factor by which ``error`` may be wrong.
@@ -59,6 +60,7 @@ class Convergence:
     order: float
     aligned: bool
     used: float
+    method: float
     error: float
     rest: Array
     safety: float
@@ -78,7 +80,7 @@ class Convergence:
         first, second = values[1] - values[0], values[2] - values[1]
         a, b = size(first), size(second)
         if max(a, b) <= floor:
-            return cls(finest, (a, b), 0.0, False, 0.0, max(a, b), 0 * second, UNSURE)
+            return cls(finest, (a, b), 0.0, False, 0.0, method, max(a, b), 0 * second, UNSURE)
         order = math.log2(a / b) if min(a, b) > 0 else math.copysign(math.inf, a - b)
         lengths = np.linalg.norm(first) * np.linalg.norm(second)
         aligned = bool(np.vdot(first, second) >= ALIGNED * lengths)
@@ -88,7 +90,7 @@ class Convergence:
         whole = any(abs(order - k) <= NEAR for k in range(1, round(method) + 1))
         safety = SURE if aligned and whole else UNSURE
         rest = aligned * second / (2**used - 1)
-        return cls(finest, (a, b), order, aligned, used, error, rest, safety)
+        return cls(finest, (a, b), order, aligned, used, method, error, rest, safety)
 
     @property
     def seen(self) -> bool:
@@ -97,7 +99,9 @@ class Convergence:
 
     def at(self, level: float) -> float:
         """Error at a level, which need not be whole, with its safety factor; unit of quantity."""
-        return self.safety * self.error * 2 ** (self.used * (self.finest - level))
+        coarser = max(0.0, self.finest - 2 - level)
+        growth = self.used * (self.finest - level - coarser) + self.method * coarser
+        return self.safety * self.error * 2**growth
 
     def __str__(self) -> str:
         a, b = self.differences
