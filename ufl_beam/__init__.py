@@ -3,6 +3,7 @@
 from ufl_beam.beams import Beam, Place
 from ufl_beam.bodies import Body, Spot, ground
 from ufl_beam.checkpoint import Checkpoint
+from ufl_beam.classical import GeneralizedAlpha, Newmark, Static
 from ufl_beam.connectors import (
     Actuator,
     Connector,
@@ -43,6 +44,7 @@ from ufl_beam.distributions import Lognormal, Normal, TruncatedNormal, Weibull
 from ufl_beam.envelopes import plot_cycles, plot_extremes
 from ufl_beam.errors import ConvergenceError, SceneError, TradeoffError
 from ufl_beam.events import Event, Events
+from ufl_beam.exact_schemes import DecayingMidpoint, ExactStatic, Midpoint, PrintedMidpoint
 from ufl_beam.extremes import Extent, Extremes
 from ufl_beam.fatigue import Fatigue, HotSpot
 from ufl_beam.fibres import Fibres
@@ -81,7 +83,6 @@ from ufl_beam.scene import (
     Support,
     Velocity,
 )
-from ufl_beam.schemes import ExactStatic, Midpoint, Static
 from ufl_beam.sections import Section
 from ufl_beam.simulation import Simulation
 from ufl_beam.solution import Solution
@@ -111,6 +112,7 @@ __all__ = [
     "Cycles",
     "Damper",
     "Decay",
+    "DecayingMidpoint",
     "Displacement",
     "Dissipation",
     "DuvautLions",
@@ -125,6 +127,7 @@ __all__ = [
     "Fibres",
     "FollowerLoad",
     "Function",
+    "GeneralizedAlpha",
     "Gerber",
     "Goodman",
     "Gravity",
@@ -143,6 +146,7 @@ __all__ = [
     "Midpoint",
     "Modes",
     "Motor",
+    "Newmark",
     "Newton",
     "Normal",
     "Path",
@@ -152,6 +156,7 @@ __all__ = [
     "PointLoad",
     "PointMass",
     "Prescribed",
+    "PrintedMidpoint",
     "Prismatic",
     "Rayleigh",
     "Recorder",

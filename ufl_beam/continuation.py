@@ -21,7 +21,7 @@ from ufl_beam.loads import TimeFunction
 from ufl_beam.processes import ours
 from ufl_beam.record import Recorder, on_first
 from ufl_beam.scene import Scene
-from ufl_beam.schemes import Static
+from ufl_beam.classical import Static
 from ufl_beam.simulation import Simulation, Trial
 from ufl_beam.solution import Solution
 from ufl_beam.solve import Newton, StepFailed

@@ -15,13 +15,18 @@ from ufl_beam.ledger import Ledger
 from ufl_beam.memory import Memory
 from ufl_beam.schemes import Scheme, Step
 from ufl_beam.sparse import Csr, StepProduct
-from ufl_beam.terms import Term, mass_matrix
+from ufl_beam.terms import Inertia, Term, mass_matrix
 from ufl_beam.viscous import KelvinVoigt, Rayleigh
 
 
 @singledispatch
 def damping_forces(
-    damping: object, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger
+    damping: object,
+    fields: Fields,
+    scheme: Scheme,
+    A: Csr,
+    ledger: Ledger,
+    inertia: Inertia | None,
 ) -> list[Term]:
     """Forces of one kind of damping on the cells of a process; none if it has no such cells."""
     raise TypeError(f"{damping!r} is not a damping")
@@ -92,20 +97,23 @@ def reference_stiffness(fields: Fields) -> Csr:
 
 
 class RayleighForces:
-    """A constant matrix times the mean velocity of the step, P(92)."""
+    """A constant matrix times the velocity of the step, P(92)."""
 
     kind = "damping"
 
-    def __init__(self, damping: Rayleigh, fields: Fields, A: Csr, ledger: Ledger) -> None:
+    def __init__(
+        self, damping: Rayleigh, fields: Fields, A: Csr, ledger: Ledger, inertia: Inertia
+    ) -> None:
         C, M, K = fields.matrix(), mass_matrix(fields), reference_stiffness(fields)
         C.data[:] = damping.mass * M.data + damping.stiffness * K.data  # P(92)
-        self._times = StepProduct(C, fields.share.rotations(), A)
-        self._ledger = ledger
+        rotations = inertia.scheme.half_tangents(fields.share.rotations())
+        self._times = StepProduct(C, rotations, A)
+        self._ledger, self._inertia = ledger, inertia
 
     def begin(self, step: Step) -> None:
         """Prepare what stays constant in the step."""
         self._dt = step.dt
-        self._times.begin(step.q0, 1 / step.dt, 0.0, step.q0)
+        self._times.begin(step.q0, *self._inertia.scheme.velocity(step.dt, self._inertia))
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the damping forces."""
@@ -128,17 +136,27 @@ class RayleighForces:
 
 @damping_forces.register
 def _rayleigh(
-    damping: Rayleigh, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger
+    damping: Rayleigh,
+    fields: Fields,
+    scheme: Scheme,
+    A: Csr,
+    ledger: Ledger,
+    inertia: Inertia | None,
 ) -> list[Term]:
-    if not scheme.dynamic:
+    if inertia is None:
         raise SceneError("Rayleigh: it damps velocities, and statics has none; use KelvinVoigt")
     ledger.lost["damping"] += 0.0
-    return [RayleighForces(damping, fields, A, ledger)]
+    return [RayleighForces(damping, fields, A, ledger, inertia)]
 
 
 @damping_forces.register
 def _kelvin_voigt(
-    damping: KelvinVoigt, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger
+    damping: KelvinVoigt,
+    fields: Fields,
+    scheme: Scheme,
+    A: Csr,
+    ledger: Ledger,
+    inertia: Inertia | None,
 ) -> list[Term]:
     ledger.lost["damping"] += 0.0
     grid = fields.share.grid

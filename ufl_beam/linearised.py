@@ -13,13 +13,14 @@ from scipy.sparse import block_array, csr_array, diags_array, eye_array
 from scipy.sparse.linalg import splu
 
 from ufl_beam import eigen
+from ufl_beam.classical import Static
 from ufl_beam.compat import Array
 from ufl_beam.discretisation import Mesh
 from ufl_beam.eigen import ROUND_OFF, SHIFT, ZERO, Complex
 from ufl_beam.errors import SceneError
 from ufl_beam.grid import Index
 from ufl_beam.scene import Scene
-from ufl_beam.schemes import Static, Step
+from ufl_beam.schemes import Rates, Step
 from ufl_beam.simulation import Simulation
 from ufl_beam.solution import Solution
 from ufl_beam.sparse import Csr
@@ -35,17 +36,40 @@ SMALL = 1e-5
 
 
 class _Standstill(Static):
-    """Everything is taken where it is, and there is inertia: what small motions begin with."""
+    """Everything is taken where it is, and there is inertia: what small motions begin with.
+
+    Nothing steps with this scheme.
+    """
 
     dynamic = True
-    beta = 0.0
+    slips = False
+    kept: tuple[str, ...] = ()
 
-    def velocity_weights(self, dt: float) -> tuple[float, float]:
+    def require(self, scene: Scene) -> None:
+        """It can do all scenes."""
+
+    def half_tangents(self, rotations: Index) -> Index:
+        """None."""
+        return rotations[:0]
+
+    def inertia(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
+        """Nothing accelerates."""
+        return 1 / dt**2, 0.0, rates.v
+
+    def velocity(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
         """Velocities are differences over ``dt``."""
-        return 1 / dt, 0.0
+        return 1 / dt, 0.0, rates.v
+
+    def rates(self, dt: float, s: Array, rates: Rates) -> tuple[Array, ...]:
+        """Velocities are differences over ``dt``."""
+        return (s / dt,)
+
+    def slip(self, dt: float, change: Array, rates: Rates) -> Array:
+        """None."""
+        return 0 * change
 
     def error_weights(self) -> tuple[float, float]:
-        """Nothing steps with this scheme."""
+        """None are known."""
         return 0.5, 0.0
 
 

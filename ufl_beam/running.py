@@ -52,7 +52,7 @@ def simulate(
 
     Args:
         scene: What is modelled.
-        scheme: :class:`Static`, :class:`ExactStatic` or :class:`Midpoint`.
+        scheme: :class:`Static`, :class:`Midpoint` or another one, see docs/schemes.md.
         t: Beginning and end; s.  In statics time is the load parameter.
         dt: Step; s.  All steps are a little shorter if ``dt`` does not divide the time.  A step
             without convergence is cut into parts.  :class:`Adaptive` steps are as long as an

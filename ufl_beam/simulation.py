@@ -14,6 +14,7 @@ from ufl_beam.compat import Array
 from ufl_beam.connectors import Controller, Coulomb
 from ufl_beam.couplings import couplings
 from ufl_beam.dampers import damping_forces
+from ufl_beam.differences import numerical_forces
 from ufl_beam.discretisation import Mesh
 from ufl_beam.errors import ConvergenceError, SceneError, require_kind
 from ufl_beam.fields import Fields
@@ -58,6 +59,13 @@ LARGEST_TURN = 0.75 * math.pi
 """A step that turns a node further is cut; the algorithmic strains end at π."""
 
 
+FIRST = 1 / 16
+"""Part of the first step after which accelerations are taken for those at the beginning.
+
+Shorter ones are nearer to it, but magnify the velocities of supports that do not begin with theirs.
+"""
+
+
 class Trial(NamedTuple):
     """A step that was solved but not yet accepted.
 
@@ -80,7 +88,7 @@ class Simulation(Live):
 
     Args:
         scene: What is modelled.
-        scheme: :class:`Static`, :class:`ExactStatic` or :class:`Midpoint`.
+        scheme: :class:`Static`, :class:`Midpoint` or another one, see docs/schemes.md.
         t0: Time of the initial state; s.
         start: Solution of the same beams whose last state is the initial state.
         newton: Tolerances and PETSc options.
@@ -110,10 +118,11 @@ class Simulation(Live):
         comm = ours() if comm is None else comm
         require_kind(scene, Scene, "scene")
         if not isinstance(scheme, Scheme) or isinstance(scheme, type):
-            raise SceneError(f"scheme = {scheme!r} must be Static(), ExactStatic() or Midpoint()")
+            raise SceneError(f"scheme = {scheme!r} must be a scheme, such as Static() or Midpoint()")
         require_kind(newton or Newton(), Newton, "newton")
-        if scheme.dynamic:
+        if has_inertia(scheme):
             require_masses(scene)
+            scheme.require(scene)
         else:
             require_no_mechanism(scene)
         require_independent(scene)
@@ -131,27 +140,33 @@ class Simulation(Live):
 
         self.beams: list[Beams] = []
         self.inelastic: list[InelasticBeams] = []
+        self._numerical: list[Term] = []
         self._make_beams()
         self.force = np.zeros(self.share.size)
         setting = Setting(self, scheme, self.ledger, friction_repeats(scene))
         self.couplings = couplings(self.share, setting, self._A)
         self.loads = self._make_loads()
-        self._others: list[Term] = [*self.loads]
+        self._others: list[Term] = [*self.loads, *self._numerical]
         if has_inertia(scheme):
             v = v[self.share.dofs]
             self.inertia = Inertia(self.fields, scheme, self._A, self.ledger, v)
             self._others.append(self.inertia)
         for damping in scene.damping:
-            self._others += damping_forces(damping, self.fields, scheme, self._A, self.ledger)
+            inertia = self.inertia if scheme.dynamic else None
+            setting_of = (self.fields, scheme, self._A, self.ledger, inertia)
+            self._others += damping_forces(damping, *setting_of)
         self._inner: list[Beams] = [*self.beams, *self.couplings]
         self.terms: list[Term] = [*self._inner, *self._others]
         self.supports = Supports(self.share, scheme, self.ledger, self._A)
-        if start is not None:
+        if start is not None or (has_inertia(scheme) and scheme.kept):
             for load in self.loads:
                 load.carry_on(self.t, self.q)
+        if start is not None:
             memory = Restoring(self.share, start.internal)
             for one in (*self.inelastic, *self.couplings):
                 one.remember(memory, NOWHERE)
+            if has_inertia(scheme) and self._goes_on(start):
+                self.inertia.remember(memory, self.q)
         self._q_before: Array = self.q
         self.last_dt = math.inf
         self._asking = [
@@ -180,6 +195,11 @@ class Simulation(Live):
         )
         self.solution = Solution(scene, self.grid)
 
+    def _goes_on(self, start: Solution) -> bool:
+        """Whether forces have not changed since, so that what a scheme keeps still holds."""
+        known = "further rates" in start.internal
+        return known and start.scene is self.scene and float(start.times[-1]) == self.t
+
     # -- building ------------------------------------------------------------------------------
 
     def _make_beams(self) -> None:
@@ -202,6 +222,7 @@ class Simulation(Live):
             part = np.flatnonzero(elastic)
             fields = self.fields if elastic.all() else Fields(self.share, part)
             self.beams.append(ElasticBeams(fields, self.scheme, self._A, self.ledger))
+            self._numerical = numerical_forces(self.scheme, fields, self._A, self.ledger)
 
     def _make_loads(self) -> list[DeadLoads | FollowerLoads | FrameForces]:
         followers = [load for load in self.scene.loads if isinstance(load, FollowerLoad)]
@@ -324,6 +345,12 @@ class Simulation(Live):
         Raises:
             StepFailed: There is no equilibrium, or it is too far away.
         """
+        if self._path is None and not self.inertia.ready:
+            self.inertia.prepare(self._attempt(self.t + FIRST * (t1 - self.t), t1).s)
+        return self._attempt(t1, end)
+
+    def _attempt(self, t1: float, end: float | None) -> Trial:
+        """See :meth:`attempt`."""
         step = self.scheme.step(self.t, t1, t1 if end is None else end, self.q)
         self.ask()
         for term in self.terms:

@@ -7,6 +7,7 @@ what several processes add to one degree of freedom is summed by the solver.
 
 from __future__ import annotations
 
+import math
 from typing import Protocol
 
 import numpy as np
@@ -183,6 +184,8 @@ class Inertia:
     Attributes:
         v: Velocities at the end of the last accepted step.
         v_before: Those at its beginning.
+        more: What the scheme keeps besides; empty before the first step.
+        last_dt: Length of the last accepted step; s.
         scheme: The time scheme.
         M: The mass matrix.
     """
@@ -193,18 +196,20 @@ class Inertia:
         self, fields: Fields, scheme: DynamicScheme, A: Csr, ledger: Ledger, v: Array
     ) -> None:
         self.M = mass_matrix(fields)
-        self._times = StepProduct(self.M, fields.share.rotations(), A)
+        rotations = scheme.half_tangents(fields.share.rotations())
+        self._times = StepProduct(self.M, rotations, A)
         self._ledger = ledger
-        if scheme.beta:
+        if scheme.slips:
             ledger.lost["numerical"] += 0.0
         self.scheme = scheme
         self.v = self.v_before = v
+        self.more: tuple[Array, ...] = ()
+        self._dt = self.last_dt = math.inf
 
     def begin(self, step: Step) -> None:
         """Prepare what stays constant in the step."""
-        self._a, self._b = self.scheme.velocity_weights(step.dt)
-        factor, back = self._a / step.dt, (1 + self._b) / step.dt
-        self._times.begin(step.q0, factor, back, self.v)  # P(78)
+        self._dt = step.dt
+        self._times.begin(step.q0, *self.scheme.inertia(step.dt, self))
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add mass times the acceleration of the step."""
@@ -216,17 +221,27 @@ class Inertia:
 
     def velocities(self, s: Array) -> Array:
         """Velocities at the end of a step ``s`` of the nodes."""
-        v = self._a * s
-        v -= self._b * self.v
-        return v
+        return self.scheme.rates(self._dt, s, self)[0]
+
+    @property
+    def ready(self) -> bool:
+        """Whether a step can begin: of what the scheme keeps something is known."""
+        return not self.scheme.kept or bool(self.more)
+
+    def prepare(self, s: Array) -> None:
+        """Take from a trial step ``s`` what the scheme keeps besides the velocities."""
+        _, *more = self.scheme.rates(self._dt, s, self)
+        self.more = tuple(more)
 
     def accept(self, q1: Array, s: Array) -> None:
         """New velocities, and what the scheme lost."""
-        v = self.velocities(s)
-        if self.scheme.beta:
-            lost = self.scheme.beta * self._times.square(v - self.v)  # P(88)
-            self._ledger.lost["numerical"] += lost
-        self.v_before, self.v = self.v, v
+        v, *more = self.scheme.rates(self._dt, s, self)
+        if self.scheme.slips:
+            change = v - self.v
+            momentum = self._times(change)
+            lost = self.scheme.slip(self._dt, change, self) @ momentum
+            self._ledger.lost["numerical"] += float(lost)
+        self.v_before, self.v, self.more, self.last_dt = self.v, v, tuple(more), self._dt
 
     def add_state(self, q: Array) -> None:
         """Kinetic energy."""
@@ -236,3 +251,8 @@ class Inertia:
         """The velocities."""
         self.v = memory.at_dofs("velocity", self.v)
         self.v_before = memory.at_dofs("velocity before", self.v_before)
+        self.last_dt = memory.number("step of velocity", self.last_dt)
+        known = int(memory.number("further rates", len(self.more)))
+        more = self.more or (self.v,) * known
+        names = self.scheme.kept[:known]
+        self.more = tuple(memory.at_dofs(*one) for one in zip(names, more, strict=True))

@@ -50,5 +50,5 @@ def plot_tradeoff(tradeoff: Tradeoff) -> Figure:
         for draw, bound in ((axes.axvline, time), (axes.axhline, ratio)):
             if np.isfinite(bound):
                 draw(bound, color=GREY, ls="--", lw=1.2, zorder=1)
-        axes.legend()
+        axes.legend(loc="lower left", fontsize=11, title="size: cells", title_fontsize=10)
     return figure
