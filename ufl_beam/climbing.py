@@ -78,14 +78,14 @@ class Climb:
                 return min(tried, key=self._goal.rank)
             self._slower *= found.run.seconds / choice.seconds
             if found.ratio > choice.ratio:
-                more = outlook.coarser(choice)
+                more = outlook.bottleneck(choice)
                 base = base[0] + more[0], base[1] + more[1]
 
     def _look(self, base: Level) -> tuple[Outlook | None, str, Level]:
         """What runs around a base show; or else why nothing is seen, and where to look next."""
         i, j = base
         ladder, levels = self._ladder, Cross.levels(base)
-        rungs = [Rung(self._family, 2**level[0], level[1]) for level in levels]
+        rungs = [Rung(self._family, 2 ** level[0], level[1]) for level in levels]
         ladder.climb(rungs[:1])  # tells how long the others take
         ladder.climb(rungs)
         failed = [f"\n  {ladder.dials(r)}: {ladder.failed[r]}" for r in rungs if r in ladder.failed]

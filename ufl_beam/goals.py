@@ -81,11 +81,12 @@ class Outlook:
         i = math.log2(refine)
         return max(cross.error(i, level) / self.units[name] for name, cross in self.crosses.items())
 
-    def coarser(self, choice: Choice) -> tuple[int, int]:
+    def bottleneck(self, choice: Choice) -> tuple[int, int]:
         """A level more of the dial, cells or steps, that has the larger part of the error."""
         i = math.log2(choice.refine)
-        worst = max(self.crosses, key=lambda name: self.crosses[name].error(i, choice.level) / self.units[name])
-        cells, steps = self.crosses[worst].cells.at(i), self.crosses[worst].steps.at(choice.level)
+        errors = {n: c.error(i, choice.level) / self.units[n] for n, c in self.crosses.items()}
+        worst = self.crosses[max(errors, key=errors.__getitem__)]
+        cells, steps = worst.cells.at(i), worst.steps.at(choice.level)
         return (1, 0) if cells > steps else (0, 1)
 
     def largest(self, differences: Mapping[str, Array]) -> float:
@@ -234,11 +235,12 @@ class Budget:
         return dict(scales)
 
     def choose(self, outlook: Outlook) -> Choice:
-        """The most accurate that is fast enough, or the least inaccurate."""
+        """The most accurate that is fast enough, or the fastest."""
         settings, seconds, ratios = outlook.settings()
-        good = (seconds <= FILL * self.seconds) & (ratios <= ROUGH)
-        k = int(np.argmin(np.where(good, ratios, np.inf) if good.any() else ratios))
-        return Choice(*settings[k], float(seconds[k]), float(ratios[k]), bool(good[k]))
+        fast = seconds <= FILL * self.seconds
+        k = int(np.argmin(np.where(fast, ratios, np.inf) if fast.any() else seconds))
+        serves = bool(fast[k] and ratios[k] <= ROUGH)
+        return Choice(*settings[k], float(seconds[k]), float(ratios[k]), serves)
 
     def hopeless(self, choice: Choice, best: Choice) -> bool:
         """Whether it would be much less accurate."""

@@ -124,7 +124,7 @@ class Ladder:
     Attributes:
         runs: What is done.
         failed: Why runs failed.
-        spent: Wall time of all runs; s.
+        spent: Wall time of all runs, and of compiling; s.
     """
 
     def __init__(
@@ -152,6 +152,7 @@ class Ladder:
             SceneError: The scene or a quantity is wrong.
         """
         shapes: dict[str, tuple[int, ...]] = {}
+        seconds = 0.0
         with alone():
             for family in range(len(self.families)):
                 for level in (0.0, 1.0):
@@ -159,6 +160,7 @@ class Ladder:
                         solution = self._simulate(Rung(family, 1, level))
                     except ConvergenceError:
                         continue  # finer steps may do
+                    seconds += solution.seconds
                     for name, value in self._ask(solution):
                         if shapes.setdefault(name, value.shape) != value.shape:
                             raise SceneError(
@@ -166,6 +168,8 @@ class Ladder:
                                 f"and {value.shape} in another with other steps or cells; give a "
                                 "number, or an array at times and places of your own (np.interp)"
                             )
+
+        self.spent = float(self._comm.bcast(seconds))
 
     def climb(self, rungs: Sequence[Rung]) -> None:
         """Run what is missing, several at a time where there are processes.
@@ -180,7 +184,8 @@ class Ladder:
         if self.spent + needed > self._most:
             raise TradeoffError(
                 f"the next {len(missing)} runs would take about {needed:.3g} s after "
-                f"{self.spent:.3g} s of runs, more than most = {self._most:g} s; {missing[-1]}",
+                f"{self.spent:.3g} s of runs, more than most = {self._most:g} s; the finest of them: "
+                f"{self.dials(missing[-1])}",
                 tuple(self.runs.values()),
             )
         cases = [rung._asdict() for rung in missing]
@@ -260,6 +265,11 @@ def _spelled(value: Any) -> str:
     """A number, or what of a record is not as by default."""
     if isinstance(value, float | int):
         return f"dt={value:.4g}"
-    named = {f.name: getattr(value, f.name) for f in fields(value) if getattr(value, f.name) != f.default}
-    shown = (f"{k}={v:.4g}" if isinstance(v, float) else f"{k}={v}" for k, v in named.items() if v)
+    values = {field.name: getattr(value, field.name) for field in fields(value)}
+    defaults = {field.name: field.default for field in fields(value)}
+    shown = (
+        f"{name}={one:.4g}" if isinstance(one, float) else f"{name}={one}"
+        for name, one in values.items()
+        if one and one != defaults[name]
+    )  # fmt: skip
     return f"{type(value).__name__}({', '.join(shown)})"

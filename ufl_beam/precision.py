@@ -27,7 +27,7 @@ class Tradeoff:
         goal: What was asked.
         families: The kinds of dials, in words.
         notes: What else should be known.
-        spent: Wall time of all runs; s.
+        spent: Wall time of all runs, repetitions and compiling included; s.
     """
 
     runs: tuple[Run, ...]

@@ -46,9 +46,10 @@ class Convergence:
     Attributes:
         finest: The finest of the three levels.
         differences: Size of the change from the first level to the second, and to the third.
-        order: Observed; 0 where changes are negligible.
+        order: Observed.
         aligned: Whether both changes are of one direction; if not, nothing is extrapolated.
-        used: Order that errors are predicted with, not above that of the method.
+        used: Order that errors are predicted with, not above that of the method; 0 where changes
+            are negligible.
         method: Order of the method; with it errors grow towards levels coarser than the three.
         error: Of the finest level; where changes are negligible, of every level.
         rest: What the finest level lacks of the limit, with its sign.
@@ -80,7 +81,7 @@ class Convergence:
         first, second = values[1] - values[0], values[2] - values[1]
         a, b = size(first), size(second)
         if max(a, b) <= floor:
-            return cls(finest, (a, b), 0.0, False, 0.0, method, max(a, b), 0 * second, UNSURE)
+            return cls(finest, (a, b), 0.0, False, 0.0, method, max(a, b), np.asarray(0 * second), UNSURE)
         order = math.log2(a / b) if min(a, b) > 0 else math.copysign(math.inf, a - b)
         lengths = np.linalg.norm(first) * np.linalg.norm(second)
         aligned = bool(np.vdot(first, second) >= ALIGNED * lengths)
@@ -89,13 +90,13 @@ class Convergence:
         error = max(b, a / 2**method) / (2**used - 1)
         whole = any(abs(order - k) <= NEAR for k in range(1, round(method) + 1))
         safety = SURE if aligned and whole else UNSURE
-        rest = aligned * second / (2**used - 1)
+        rest = np.asarray(aligned * second / (2**used - 1))
         return cls(finest, (a, b), order, aligned, used, method, error, rest, safety)
 
     @property
     def seen(self) -> bool:
         """Whether changes fall, or are negligible."""
-        return self.order == 0 or self.order >= LEAST_ORDER
+        return self.used == 0 or self.order >= LEAST_ORDER
 
     def at(self, level: float) -> float:
         """Error at a level, which need not be whole, with its safety factor; unit of quantity."""
@@ -105,7 +106,7 @@ class Convergence:
 
     def __str__(self) -> str:
         a, b = self.differences
-        if self.order == 0:
+        if self.used == 0:
             return f"changes by {max(a, b):.1e} at most: negligible"
         turns = "" if self.aligned else ", to and fro"
         return f"changes by {a:.1e}, then {b:.1e}: order {self.order:.2f}{turns}"
@@ -144,7 +145,7 @@ class Cross:
         steps = Convergence.of((q, values[i, j + 1], values[i, j + 2]), j + 2, methods[1], floor)
         mixed = values[i + 1, j + 1] - values[i + 1, j] - values[i, j + 1] + q
         parts = [1 - 2**-dial.used for dial in (cells, steps)]
-        mixed = mixed / math.prod(parts) if all(parts) else 0 * q
+        mixed = np.asarray(mixed / math.prod(parts) if all(parts) else 0 * q)
         limit = values[i + 2, j] + cells.rest + values[i, j + 2] + steps.rest - q + mixed
         return cls(cells, steps, limit, size(mixed))
 

@@ -78,9 +78,9 @@ def tradeoff(
     goal = _goal(quantities, tolerance, budget)
     require_number(most, "tradeoff: most", positive=True)
     meshes, newtons = _several(mesh or Mesh(), "mesh"), _several(newton or Newton(), "newton")
+    steps: tuple[float | Adaptive, ...] = _several(dt, "dt")
     families = [
-        Dials(*one, newtons[0])
-        for one in product(_several(scheme, "scheme"), _several(dt, "dt"), meshes)
+        Dials(*one, newtons[0]) for one in product(_several(scheme, "scheme"), steps, meshes)
     ]
     ladder = Ladder(
         scene, quantities, t=t, families=families, newtons=newtons, most=most,
