@@ -181,7 +181,7 @@ class FollowerLoads:
 
 @singledispatch
 def _forces(load: Load, share: Share) -> Array:
-    """Nodal forces of a dead load with factor one, consistent with linear displacements."""
+    """Nodal forces of a dead load with factor one, consistent with the displacements of cells."""
     raise TypeError(f"{type(load).__name__} is not a dead load")
 
 
@@ -216,11 +216,10 @@ def _(load: Gravity, share: Share) -> Array:
 
 
 def _along_beams(per_beam: npt.NDArray[Any], share: Share) -> Array:
-    """Nodal forces of line loads (num_beams, 3): each end of a cell carries a half of it."""
+    """Nodal forces of line loads (num_beams, 3): of two nodes of a cell, each bears a half of it."""
     grid = share.grid
-    ends = grid.points[grid.cells[share.cells]]
-    half = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)[:, None] / 2
+    loads = per_beam[grid.beam_of_cell[share.cells]] * share.cell_lengths()[:, None]
+    first, *between, last = grid.mesh.parts
     forces = np.zeros(share.size)
-    of_ends = np.repeat(per_beam[grid.beam_of_cell[share.cells]] * half, 2, axis=1)
-    np.add.at(forces, share.cell_dofs, of_ends)
+    np.add.at(forces, share.cell_dofs, np.kron(loads, [first, last, *between]))
     return forces

@@ -247,8 +247,8 @@ class Displacement:
 
     def _normal(self, walk: Walk) -> Direction:
         share, normal = walk.share, np.zeros(walk.share.grid.size)
-        vertices, weights = share.grid.weights(self.place)
-        normal[share.grid.dofs[vertices, COMPONENTS.index(self.component)]] += weights
+        nodes, weights = share.grid.weights(self.place)
+        normal[share.grid.dofs[nodes, COMPONENTS.index(self.component)]] += weights
         local = normal[share.dofs]
         local[share.num_owned :] = 0.0
         return Direction(local, 0.0)

@@ -7,11 +7,15 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from itertools import pairwise
 from numbers import Rational
 
+import numpy as np
+import numpy.typing as npt
+
 from ufl_beam.beams import Beam
-from ufl_beam.errors import SceneError
+from ufl_beam.errors import SceneError, require_kind
 
 
 @dataclass(frozen=True)
@@ -21,12 +25,18 @@ class Mesh:
     Args:
         refine: Factor on the number of cells between any two places of a beam; a whole number
             divides each cell, ``Fraction(1, 2)`` joins two and two.
+        degree: Polynomial degree of displacements and rotations in a cell, 1, 2 or 3, integrated
+            with as many points; more than 1 for elastic beams only.
+        lumped: Whether the mass of the beams is that of their nodes: a diagonal matrix, the row
+            sums of the consistent one.
 
     Raises:
         SceneError: A number that makes no mesh.
     """
 
     refine: int | Fraction = 1
+    degree: int = 1
+    lumped: bool = False
 
     def __post_init__(self) -> None:
         if not isinstance(self.refine, Rational) or self.refine <= 0:
@@ -34,6 +44,30 @@ class Mesh:
                 f"Mesh: refine = {self.refine!r} must be a positive whole number or Fraction(p, q)"
             )
         object.__setattr__(self, "refine", Fraction(self.refine))
+        if self.degree not in (1, 2, 3):
+            raise SceneError(f"Mesh: degree = {self.degree!r} must be 1, 2 or 3")
+        object.__setattr__(self, "degree", int(self.degree))
+        require_kind(self.lumped, bool, "Mesh: lumped")
+
+    @cached_property
+    def nodes(self) -> npt.NDArray[np.float64]:
+        """Where in a cell, from 0 to 1, its nodes are; ascending: Gauss-Lobatto points."""
+        inner = np.polynomial.legendre.Legendre.basis(self.degree).deriv().roots()
+        return np.array([0.0, *(1 + inner) / 2, 1.0])
+
+    @cached_property
+    def parts(self) -> npt.NDArray[np.float64]:
+        """Part of a uniform load on a cell, or of its mass, that each node bears."""
+        p = self.degree
+        at = np.polynomial.legendre.Legendre.basis(p)(2 * self.nodes - 1)
+        return np.asarray(1 / (p * (p + 1) * at**2))
+
+    def weights(self, part: float) -> npt.NDArray[np.float64]:
+        """Weights of the nodes of a cell in the value at a part of it, by Lagrange."""
+        weights = [
+            np.prod([(part - b) / (a - b) for b in self.nodes if b != a]) for a in self.nodes
+        ]
+        return np.array(weights)
 
     def vertices(self, beam: Beam, attached: Sequence[float]) -> list[float]:
         """Parameters of the vertices of a beam: ends, corners and what is ``attached`` among them.

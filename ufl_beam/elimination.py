@@ -28,7 +28,7 @@ class Chains:
     They are found in the structure of the matrix, so they remain right whatever comes to couple.
 
     Args:
-        cell_dofs: Local degrees of freedom of the cells: both u, both v, both ψ; (num_cells, 6).
+        cell_dofs: Local degrees of freedom of the cells, see :class:`Share`.
         A: Matrix with the columns of each row in order.
         alone: Which local degrees of freedom no other process has; (A.size,).
 
@@ -41,7 +41,8 @@ class Chains:
     """
 
     def __init__(self, cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -> None:
-        start, end = cell_dofs[:, 0::2], cell_dofs[:, 1::2]
+        nodes = cell_dofs.shape[1] // 3
+        start, end = cell_dofs[:, 0::nodes], cell_dofs[:, 1::nodes]
         # Vertex number k is the one between the cells k and k + 1.
         around = np.hstack([start[:-1], end[:-1], end[1:]])
         inside = (end[:-1] == start[1:]).all(axis=1) & (np.diff(np.sort(around)) > 0).all(axis=1)

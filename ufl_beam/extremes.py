@@ -112,7 +112,7 @@ class Extremes(Recorder):
         return self._forces.of(cells)
 
     def displacement(self, one: Beam | Body) -> Extent:
-        """Extremes of (u, v, ψ) at the vertices of a beam, or of a body; (n, 3); m, m, rad.
+        """Extremes of (u, v, ψ) at the nodes of a beam, or of a body; (n, 3); m, m, rad.
 
         Raises:
             SceneError: It is not in the scene, or nothing was run.

@@ -192,6 +192,7 @@ class Fatigue(Recorder):
 
 def _arm(grid: Grid, place: Place) -> float:
     """Distance of a place from the middle of its cell, positive towards the end; m."""
-    vertices, weights = grid.weights(place)
-    length = float(np.linalg.norm(np.subtract(*grid.points[vertices])))
-    return (float(weights[1]) - 0.5) * length
+    nodes, weights = grid.weights(place)
+    start, end = grid.points[nodes[:2]]
+    axis = (end - start) / np.linalg.norm(end - start)
+    return float((weights @ grid.points[nodes] - (start + end) / 2) @ axis)

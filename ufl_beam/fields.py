@@ -24,7 +24,8 @@ class Fields:
         share: The cells and degrees of freedom of this process.
         axis: Undeformed axis, in UFL.
         space: Configurations (u_x, u_y, ψ), with the degrees of freedom that joints share.
-        cell_dofs: Local degrees of freedom in the order of the cells of the mesh; (num_cells, 6).
+        cell_dofs: Local degrees of freedom in the order of the cells of the mesh;
+            (num_cells, 3 (degree + 1)).
         order: Position in ``share.cells`` of each cell of the mesh.
     """
 
@@ -39,8 +40,10 @@ class Fields:
         self._coordinates = cell_coordinates(self.mesh)
         self._require_direction(grid.points[grid.cells[share.cells[self.order]]])
         self.cell_dofs = share.cell_dofs[self.order]
-        self.axis = Axis(self.mesh)
-        line = basix.ufl.element("Lagrange", "interval", 1)
+        self._degree = grid.mesh.degree
+        X = self._along() if self._degree > 1 else None
+        self.axis = Axis(self.mesh, grid.mesh.nodes, X)
+        line = basix.ufl.element("Lagrange", "interval", self._degree)
         self.space = space_with_dofs(
             self.mesh, basix.ufl.mixed_element([line, line, line]), self.cell_dofs, share.size
         )
@@ -60,8 +63,28 @@ class Fields:
             raise RuntimeError("this version of DOLFINx turns cells around; please report it")
 
     def dx(self, degree: int) -> ufl.Measure:
-        """Integration over the cells; one degree per form, see :mod:`ufl_beam.forms`."""
-        return ufl.Measure("dx", domain=self.mesh, metadata={"quadrature_degree": degree})
+        """Integration over the cells; one degree per form, see :mod:`ufl_beam.forms`.
+
+        Args:
+            degree: Of the rule on cells of degree 1; each degree that they have more adds two.
+        """
+        return ufl.Measure("dx", domain=self.mesh, metadata={"quadrature_degree": self._rule(degree)})
+
+    def dx_of_mass(self) -> ufl.Measure:
+        """Integration of inertia: exact, or with the nodes as points, which lumps it."""
+        if not self.share.grid.mesh.lumped:
+            return self.dx(2)
+        rule = {"quadrature_rule": "GLL", "quadrature_degree": self._rule(1)}
+        return ufl.Measure("dx", domain=self.mesh, metadata=rule)
+
+    def _rule(self, degree: int) -> int:
+        return degree + 2 * (self._degree - 1)
+
+    def _along(self) -> fem.Function:
+        """From 0 to 1 along each cell."""
+        function = fem.Function(fem.functionspace(self.mesh, ("DG", 1)))
+        function.x.array[:] = np.tile([0.0, 1.0], len(self.order))
+        return function
 
     def configuration(self) -> fem.Function:
         """A new configuration (u_x, u_y, ψ)."""
@@ -85,8 +108,9 @@ class Fields:
         return function
 
     def at_points(self, *shape: int) -> fem.Function:
-        """A new function with values of a shape in the one quadrature point of each cell."""
-        element = basix.ufl.quadrature_element("interval", value_shape=shape, degree=1)
+        """A new function with values of a shape in the points of ``dx(1)``."""
+        rule = self._rule(1)
+        element = basix.ufl.quadrature_element("interval", value_shape=shape, degree=rule)
         return fem.Function(fem.functionspace(self.mesh, element))
 
     def constant(self, value: float) -> fem.Constant:

@@ -33,19 +33,22 @@ Index = npt.NDArray[Any]
 class Grid:
     """Vertices, cells and degrees of freedom of a scene.
 
-    A vertex has three degrees of freedom (u, v, ψ); those that joints share are one.  They are
-    numbered along the beams, the shared ones last: eliminating them in this order fills in nothing
-    but the coupling of the joints.
+    Cells of a higher degree have nodes between their vertices, too.  A node has three degrees of
+    freedom (u, v, ψ); those that joints share are one.  They are numbered along the beams, the
+    shared ones last: eliminating them in this order fills in nothing but the coupling of the
+    joints.
 
     Args:
         scene: What is modelled.
         mesh: How finely; with the cells of its beams by default.
 
     Attributes:
-        points: Vertices of all beams, beam after beam; shape (num_vertices, 2); m.
+        points: Nodes of all beams: the vertices, beam after beam, then those inside of cells;
+            shape (num_nodes, 2); m.
         cells: Vertices of the cells; shape (num_cells, 2).
+        nodes_of_cells: Both vertices of the cells and the nodes between; (num_cells, degree + 1).
         beam_of_cell: Number of the beam of each cell; shape (num_cells,).
-        dofs: Degrees of freedom of each vertex; shape (num_vertices, 3).
+        dofs: Degrees of freedom of each node; shape (num_nodes, 3).
         dofs_of_bodies: Degrees of freedom of each of the scene's movers; shape (num_movers, 3).
         multipliers: Degrees of freedom that are the forces of connectors; shape (num_links,).
         size: Number of degrees of freedom.
@@ -58,15 +61,20 @@ class Grid:
         self._parameters = [np.array(self.mesh.vertices(b, scene.attached[b])) for b in scene.beams]
         counts = np.array([len(p) for p in self._parameters], dtype=np.int64)
         self._first = np.concatenate([[0], np.cumsum(counts)])
-        self.points = np.array(
+        vertices = np.array(
             [b.curve(s) for b, p in zip(scene.beams, self._parameters, strict=True) for s in p],
             dtype=np.float64,
         ).reshape(-1, 2)
-        last = np.zeros(len(self.points), dtype=bool)
+        last = np.zeros(len(vertices), dtype=bool)
         last[self._first[1:] - 1] = True
         begin = np.flatnonzero(~last)
         self.cells = np.column_stack([begin, begin + 1])
         self.beam_of_cell = np.repeat(np.arange(len(scene.beams)), counts - 1)
+        inner, begins, ends = self.mesh.nodes[1:-1], vertices[self.cells[:, 0]], vertices[begin + 1]
+        between = begins[:, None] + inner[:, None] * (ends - begins)[:, None]
+        self.points = np.concatenate([vertices, between.reshape(-1, 2)])
+        numbers = len(vertices) + np.arange(between[..., 0].size).reshape(between.shape[:2])
+        self.nodes_of_cells = np.hstack([self.cells, numbers])
         self._require_length()
         self._number()
 
@@ -98,8 +106,20 @@ class Grid:
         """Points and degrees of freedom of the nodes of a beam or body; (n, 2), (n, 3); m."""
         if isinstance(one, Body):
             return np.array([one.center]), self.node(one.middle).reshape(1, 3)
-        vertices = self.vertices_of(one)
-        return self.points[vertices], self.dofs[vertices]
+        nodes = self.nodes_along(one)
+        return self.points[nodes], self.dofs[nodes]
+
+    @property
+    def pieces(self) -> Index:
+        """Neighbouring nodes, one pair after the other along each cell; (degree num_cells, 2)."""
+        start, end, *between = self.nodes_of_cells.T
+        along = np.column_stack([start, *between, end])
+        return np.stack([along[:, :-1], along[:, 1:]], axis=2).reshape(-1, 2)
+
+    def nodes_along(self, beam: Beam) -> Index:
+        """Vertices of a beam and nodes between them, from start to end."""
+        start, _, *between = self.nodes_of_cells[self.cells_of(beam)].T
+        return np.append(np.column_stack([start, *between]), self.vertices_of(beam)[-1])
 
     def cells_of(self, beam: Beam) -> Index:
         """Cells of a beam from start to end."""
@@ -107,7 +127,7 @@ class Grid:
         return np.arange(self._first[i] - i, self._first[i + 1] - i - 1)
 
     def weights(self, place: Place) -> tuple[Index, Array]:
-        """Vertices around a place and their weights of linear interpolation; both (2,).
+        """Nodes of the cell at a place, the vertices first, and their weights there; (degree + 1,).
 
         Raises:
             SceneError: The beam of the place is not in the scene.
@@ -119,7 +139,8 @@ class Grid:
         s = self._parameters[i]
         left = min(max(bisect_left(s, place.s) - 1, 0), len(s) - 2)
         part = (place.s - s[left]) / (s[left + 1] - s[left])
-        return self._first[i] + np.array([left, left + 1]), np.array([1 - part, part])
+        first, *between, last = self.mesh.weights(part)
+        return self.nodes_of_cells[self._first[i] - i + left], np.array([first, last, *between])
 
     def node(self, anchor: Anchor) -> Index:
         """Degrees of freedom of what an anchor that has a vertex, or a body, moves with; (3,).
@@ -144,12 +165,12 @@ class Grid:
 
     def vertex(self, place: Place) -> int:
         """The vertex at a place that something is attached to."""
-        vertices, weights = self.weights(place)
-        return int(vertices[weights.argmax()])
+        nodes, weights = self.weights(place)
+        return int(nodes[weights.argmax()])
 
     def cell(self, place: Place) -> int:
         """The cell at a place; at a vertex the one before it, at the start the first one."""
-        (first, _), _ = self.weights(place)
+        (first, *_), _ = self.weights(place)
         return int(first) - self._index(place.beam)
 
     def middle(self, cell: int) -> Place:
@@ -187,10 +208,11 @@ class Grid:
         if dof not in self.dofs:
             body, component = np.argwhere(self.dofs_of_bodies == dof)[0]
             return f"{COMPONENTS[component]} of {self.scene.movers[body].name}"
-        vertex, component = np.argwhere(self.dofs == dof)[0]
-        beam = int(np.searchsorted(self._first, vertex, side="right")) - 1
-        x, y = self.points[vertex]
-        return f"{COMPONENTS[component]} of {self.scene.beams[beam].name} at ({x:g}, {y:g})"
+        node, component = np.argwhere(self.dofs == dof)[0]
+        cell = int(np.argmax((self.nodes_of_cells == node).any(axis=1)))
+        x, y = self.points[node]
+        beam: Beam = self.scene.beams[self.beam_of_cell[cell]]
+        return f"{COMPONENTS[component]} of {beam.name} at ({x:g}, {y:g})"
 
     def worst(self, sizes: Array) -> dict[str, float]:
         """The degree of freedom of each beam, body and connector with the largest size, in words.
@@ -198,7 +220,7 @@ class Grid:
         Args:
             sizes: One for each degree of freedom; those that are zero are left out.
         """
-        dofs_of_beams = [self.dofs[self.vertices_of(beam)] for beam in self.scene.beams]
+        dofs_of_beams = [self.nodes_of(beam)[1] for beam in self.scene.beams]
         groups = [*dofs_of_beams, *self.dofs_of_bodies, *self.multipliers.reshape(-1, 1)]
         worst = sorted({int(g.flat[np.argmax(sizes[g])]) for g in groups}, key=lambda d: -sizes[d])
         return {self.describe(dof): float(sizes[dof]) for dof in worst if sizes[dof]}
@@ -212,25 +234,28 @@ class Grid:
             raise SceneError(f"{beam.name}: zero length of a cell at ({x:g}, {y:g})")
 
     def _number(self) -> None:
-        vertices, movers = len(self.points), self.scene.movers
-        row = {body: vertices + i for i, body in enumerate(movers)}
+        nodes, movers = len(self.points), self.scene.movers
+        row = {body: nodes + i for i, body in enumerate(movers)}
 
         @cache
         def at(of: Node) -> int:
             return row[of] if isinstance(of, Body) else self.vertex(of)
 
-        slots = np.arange(3 * (vertices + len(movers)))
-        shared = slots >= 3 * vertices
+        slots = np.arange(3 * (nodes + len(movers)))
+        shared = slots >= 3 * nodes
         for (one, component), (other, _) in self.scene.representatives.items():
             same = 3 * at(other) + component
             slots[3 * at(one) + component] = same
             shared[same] = True
         kept = slots == np.arange(len(slots))
-        order = np.concatenate([np.flatnonzero(kept & ~shared), np.flatnonzero(kept & shared)])
+        along = [self.nodes_along(beam) for beam in self.scene.beams]
+        rows = np.concatenate([*along, np.arange(nodes, nodes + len(movers))]).astype(np.int64)
+        ordered = (3 * rows[:, None] + np.arange(3)).ravel()
+        order = np.concatenate([ordered[(kept & of)[ordered]] for of in (~shared, shared)])
         number = np.empty(len(slots), dtype=np.int64)
         number[order] = np.arange(len(order))
         dofs = number[slots].reshape(-1, 3)
-        self.dofs, self.dofs_of_bodies = dofs[:vertices], dofs[vertices:]
+        self.dofs, self.dofs_of_bodies = dofs[:nodes], dofs[nodes:]
         # Forces come last: eliminating what they act on first leaves no zero on the diagonal.
         self.multipliers = len(order) + np.arange(len(self.scene.links))
         self.size = len(order) + len(self.multipliers)
@@ -248,8 +273,8 @@ class Share:
         dofs: Degrees of freedom, in numbers of the grid, by local number.
         num_owned: How many of them this process owns.
         ghosts: Global numbers of the others.
-        cell_dofs: Local degrees of freedom of the cells: both u, both v, both ψ;
-            shape (len(cells), 6).
+        cell_dofs: Local degrees of freedom of the cells: all u, all v, all ψ of their nodes;
+            shape (len(cells), 3 (degree + 1)).
         links: Numbers of the connectors of this process.
         body_dofs: Local degrees of freedom of the bodies that are here; (num, 3).
         link_dofs: Local degrees of freedom of the connectors: those of a cell, and their force;
@@ -263,7 +288,8 @@ class Share:
         limits = np.arange(comm.size + 1) * num_cells // comm.size
         self.cells = np.arange(limits[comm.rank], limits[comm.rank + 1])
 
-        of_cell = grid.dofs[grid.cells].transpose(0, 2, 1).reshape(num_cells, 6)
+        of_cell = grid.dofs[grid.nodes_of_cells].transpose(0, 2, 1)
+        of_cell = of_cell.reshape(num_cells, 3 * (grid.mesh.degree + 1))
         owner = np.full(grid.size, comm.size)
         rank_of_cell = np.searchsorted(limits, np.arange(num_cells), side="right") - 1
         np.minimum.at(owner, of_cell, rank_of_cell[:, None])
@@ -340,7 +366,8 @@ class Share:
         Bodies are as large as the scene; forces of connectors have no length.
         """
         lengths = np.full(self.size, self.grid.scene.size)
-        lengths[self.cell_dofs[:, :4]] = self.cell_lengths()[:, None]
+        displacements = self.cell_dofs[:, : 2 * (self.grid.mesh.degree + 1)]
+        lengths[displacements] = self.cell_lengths()[:, None]
         lengths[self.rotations()] = 1.0
         lengths[self.multipliers()] = 0.0
         return lengths

@@ -6,6 +6,7 @@ import numpy as np
 import ufl
 
 from ufl_beam.compat import Array
+from ufl_beam.errors import SceneError
 from ufl_beam.fields import Fields
 from ufl_beam.grid import Grid, Index
 from ufl_beam.kinematics import strain
@@ -19,7 +20,11 @@ from ufl_beam.sparse import Csr
 
 
 def inelastic_cells(grid: Grid) -> list[tuple[Layout, Index]]:
-    """Layouts of material points, and the cells (numbers of the grid) that have them."""
+    """Layouts of material points, and the cells (numbers of the grid) that have them.
+
+    Raises:
+        SceneError: There are some, and cells have a higher degree than 1.
+    """
     groups: dict[Layout, list[int]] = {}
     layouts: dict[object, Layout | None] = {}
     for beam in grid.scene.beams:
@@ -30,6 +35,11 @@ def inelastic_cells(grid: Grid) -> list[tuple[Layout, Index]]:
                 layouts[key] = beam.section.layout(softening)
             layout = layouts[key]
             if layout is not None and not layout.elastic:
+                if grid.mesh.degree > 1:
+                    raise SceneError(
+                        f"Mesh: degree = {grid.mesh.degree} is for elastic beams, and {beam.name} "
+                        "may yield or break; use degree=1 with more cells, or an elastic section"
+                    )
                 groups.setdefault(layout, []).append(int(cell))
     return [(layout, np.array(cells)) for layout, cells in groups.items()]
 

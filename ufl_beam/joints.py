@@ -101,15 +101,15 @@ def velocity_of(
 
 
 def _of_node(grid: Grid, place: Anchor, states: Sequence[Array]) -> Array:
-    """Values at what a place moves with; linear between vertices; (n, 3)."""
+    """Values at what a place moves with; interpolated in cells; (n, 3)."""
     if isinstance(place, Spot):
         if node(place) is GROUND:
             return np.zeros((len(states), 3))
         dofs = grid.node(place)
         return np.array([x[dofs] for x in states])
-    vertices, weights = grid.weights(place)
-    first, second = grid.dofs[vertices]
-    return np.array([weights[0] * x[first] + weights[1] * x[second] for x in states])
+    nodes, weights = grid.weights(place)
+    dofs = grid.dofs[nodes]
+    return np.array([weights @ x[dofs] for x in states])
 
 
 def of_joint(solution: Solution, joint: Joint, forces: Array) -> JointHistory:

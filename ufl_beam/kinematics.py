@@ -4,6 +4,10 @@ Pure functions: configurations ``(u_x, u_y, ψ)`` in, strains ``(Σ, Γ, K)`` ou
 but the one that the arguments live on.  The letters are the paper's; P(n) is its equation n.
 """
 
+import math
+from collections.abc import Sequence
+from itertools import accumulate, pairwise
+
 import ufl
 from ufl.core.expr import Expr
 
@@ -11,13 +15,23 @@ from ufl.core.expr import Expr
 class Axis:
     """Undeformed axis of the beams on a mesh of straight cells.
 
+    Args:
+        mesh: Their mesh.
+        nodes: Where in a cell, from 0 to 1, the nodes of configurations are; ascending.
+        X: From 0 to 1 along each cell; only more than two nodes need it.
+
     Attributes:
+        nodes: As given.
+        X: As given.
         t0: Unit tangent of the cell, from its first to its last vertex; shape (2,).
         n0: Unit normal, ``t0`` turned by +90°; shape (2,).
         h: Length of the cell; m.
     """
 
-    def __init__(self, mesh: ufl.Mesh) -> None:
+    def __init__(
+        self, mesh: ufl.Mesh, nodes: Sequence[float] = (0.0, 1.0), X: Expr | None = None
+    ) -> None:
+        self.nodes, self.X = [float(a) for a in nodes], X
         J = ufl.Jacobian(mesh)
         self.h = ufl.sqrt(J[0, 0] ** 2 + J[1, 0] ** 2)
         self.t0 = ufl.as_vector([J[0, 0] / self.h, J[1, 0] / self.h])
@@ -26,6 +40,25 @@ class Axis:
     def d(self, f: Expr) -> Expr:
         """Derivative along the axis, ``f' = grad(f)·t0``."""
         return ufl.dot(ufl.grad(f), self.t0)
+
+    def at_nodes(self, f: Expr) -> list[Expr]:
+        """Values of a scalar function in the nodes of the cell, by its derivatives at the point."""
+        terms = [f]
+        for _ in self.nodes[1:]:
+            terms.append(self.h * self.d(terms[-1]))
+        return [
+            sum(((a - self.X) ** k / math.factorial(k) * t for k, t in enumerate(terms)), 0)
+            for a in self.nodes
+        ]
+
+    def interpolate(self, values: Sequence[Expr]) -> tuple[Expr, Expr]:
+        """Of values in the nodes of the cell: value and derivative at the point, by Lagrange."""
+        X = ufl.variable(self.X)
+        f = 0
+        for a, value in zip(self.nodes, values, strict=True):
+            weight = math.prod((X - b) / (a - b) for b in self.nodes if b != a)
+            f += weight * value
+        return f, ufl.diff(f, X) / self.h
 
 
 def _pull_back(a: Expr, ψ: Expr, axis: Axis) -> tuple[Expr, Expr]:
@@ -101,7 +134,7 @@ def virtual_strain_over_step(q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
     vanishes for rigid rotations about any point, which makes angular momentum exact.  P(82) as
     printed has neither property beyond O(Δψ²); docs/errata.md derives this form.
 
-    Valid on two-node cells with a one-point rule, for ``|Δψ| < π``.
+    Valid for ``|Δψ| < π``; on two-node cells with a one-point rule, on others with any.
 
     Args:
         q0: Configuration at t_n; shape (3,).
@@ -116,16 +149,48 @@ def virtual_strain_over_step(q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
         P(82) in its corrected form.
     """
     (u0, ψ0), (u1, ψ1), (w_u, w_ψ) = split(q0), split(q1), split(w)
-    # Half the increments of rotation at both nodes of the cell are δ - e and δ + e.
-    δ = (ψ1 - ψ0) / 2
-    e = axis.h / 4 * axis.d(ψ1 - ψ0)
-    tan_δ, tan_e = ufl.sin(δ) / ufl.cos(δ), ufl.sin(e) / ufl.cos(e)
-    shift = -tan_δ * tan_e / 2
-    stretch = (1 - tan_δ**2 * tan_e**2) / (1 + tan_δ**2) * over_tan(e)
-
+    turn_over_step = _turn_of_two_nodes if len(axis.nodes) == 2 else _turn_of_nodes
+    w_turn, w_K = turn_over_step((ψ1 - ψ0) / 2, w_ψ, axis)
     φ_m = axis.t0 + axis.d((u0 + u1) / 2)
-    a = axis.d(w_u) - turn(φ_m) * (w_ψ + shift * axis.h * axis.d(w_ψ))
+    a = axis.d(w_u) - turn(φ_m) * w_turn
     # The mean of both frames is cos δ times the frame of the mean rotation.
     (Σ0, Γ0), (Σ1, Γ1) = _pull_back(a, ψ0, axis), _pull_back(a, ψ1, axis)
     w_Σ, w_Γ = (Σ0 + Σ1) / 2, (Γ0 + Γ1) / 2
-    return ufl.as_vector([w_Σ, w_Γ, stretch * axis.d(w_ψ)])  # P(82)!
+    return ufl.as_vector([w_Σ, w_Γ, w_K])  # P(82)!
+
+
+def _turn_of_two_nodes(δ: Expr, w: Expr, axis: Axis) -> tuple[Expr, Expr]:
+    """:func:`_turn_of_nodes` in the middle of a cell with two nodes, where it is short."""
+    # Half the increments of rotation at both nodes of the cell are δ - e and δ + e.
+    e = axis.h / 2 * axis.d(δ)
+    tan_δ, tan_e = ufl.sin(δ) / ufl.cos(δ), ufl.sin(e) / ufl.cos(e)
+    shift = -tan_δ * tan_e / 2
+    stretch = (1 - tan_δ**2 * tan_e**2) / (1 + tan_δ**2) * over_tan(e)
+    return w + shift * axis.h * axis.d(w), stretch * axis.d(w)
+
+
+def _turn_of_nodes(δ: Expr, w: Expr, axis: Axis) -> tuple[Expr, Expr]:
+    """Virtual rotation and curvature at a point: 2 tan δ and 2 δ' if w is 2 tan δ at the nodes.
+
+    Both are linear in w, and a uniform w is that rotation, and no curvature; docs/errata.md.
+
+    Args:
+        δ: Half the increment of the rotation.
+        w: Virtual rotation.
+        axis: Undeformed axis.
+    """
+    nodes, virtual = axis.at_nodes(δ), axis.at_nodes(w)
+    # Differences of 2 tan δ between neighbours are made differences of 2 δ.
+    steps = [
+        _over_sin(b - a) * ufl.cos(a) * ufl.cos(b) * (w_b - w_a)
+        for (a, b), (w_a, w_b) in zip(pairwise(nodes), pairwise(virtual), strict=True)
+    ]
+    y, w_K = axis.interpolate([0, *accumulate(steps)])
+    ends = ((nodes[0], virtual[0], y), (nodes[-1], virtual[-1], y - sum(steps, 0)))
+    turns = [w_a + y_a / (_over_sin(δ - a) * ufl.cos(a) * ufl.cos(δ)) for a, w_a, y_a in ends]
+    return sum(turns, 0) / 2, w_K
+
+
+def _over_sin(x: Expr) -> Expr:
+    """X / sin x, smooth at zero."""
+    return over_tan(x / 2) / ufl.cos(x / 2) ** 2

@@ -8,7 +8,7 @@
 #include <stdint.h>
 #include <string.h>
 
-enum { MOST = 64 }; /* entries of an element vector or matrix, checked in Python */
+enum { MOST = 144 }; /* entries of an element vector or matrix: 12 unknowns of degree 3 */
 
 /* The values q of the cells into their packed coefficients, from `at` on. */
 void set_cells(int cells, int dofs_per_cell, const int32_t *dofs, const double *q, int at,

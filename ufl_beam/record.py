@@ -140,7 +140,7 @@ class XDMF(Recorder):
         ends = [anchor.point for rod in self._rods for anchor in (rod.a, rod.b)]
         points = np.concatenate([grid.points, np.reshape(ends, (-1, 2))])
         more = len(grid.points) + np.arange(len(ends)).reshape(-1, 2)
-        all_cells = np.concatenate([grid.cells, more])
+        all_cells = np.concatenate([grid.pieces, more])
         domain = line_mesh(points, all_cells)
         self._order = domain.topology.original_cell_index
         line = basix.ufl.element("Lagrange", "interval", 1)
@@ -199,6 +199,7 @@ class XDMF(Recorder):
             for cells, rows in simulation.material():
                 jump[cells], dissipated[cells] = rows[:, 3], rows[:, 4] + rows[:, 5]
             columns += [jump, dissipated]
+        columns = [np.repeat(column, simulation.grid.mesh.degree) for column in columns]
         if self._rods:
             columns = self._with_rods(columns, simulation.connections())
         on_first(simulation.comm, lambda: self._write(simulation, q, columns))

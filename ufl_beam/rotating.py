@@ -21,7 +21,7 @@ def turned_mass_matrix(fields: Fields) -> Csr:
     share = fields.share
     (u, _), (w_u, _) = (split(f(fields.space)) for f in (ufl.TrialFunction, ufl.TestFunction))
     G = fields.matrix()
-    work = fields.inertia()[0] * ufl.dot(turn(u), w_u) * fields.dx(2)
+    work = fields.inertia()[0] * ufl.dot(turn(u), w_u) * fields.dx_of_mass()
     kernel = fields.kernel(work, fields.configuration())
     kernel.place(G)
     kernel.add(np.zeros(share.size), G.data)

@@ -170,7 +170,7 @@ class Solution:
     def displacement(self, place: Anchor) -> Array:
         """Displacement and rotation (u, v, ψ) of a place; (n+1, 3); m, m, rad.
 
-        Linear between the vertices; of points of bodies exact.
+        Interpolated in cells with their degree; of points of bodies exact.
 
         Raises:
             SceneError: The beam of the place is not in the scene.
@@ -191,8 +191,8 @@ class Solution:
         """Coordinates of a place; (n+1, 2); m."""
         if isinstance(place, Spot):
             return np.asarray(place.point + self.displacement(place)[:, :2])
-        vertices, weights = self.grid.weights(place)
-        return np.asarray(weights @ self.grid.points[vertices] + self.displacement(place)[:, :2])
+        nodes, weights = self.grid.weights(place)
+        return np.asarray(weights @ self.grid.points[nodes] + self.displacement(place)[:, :2])
 
     # -- joints --------------------------------------------------------------------------------
 

@@ -159,12 +159,12 @@ class SectionForces:
 
 
 def mass_matrix(fields: Fields) -> Csr:
-    """Consistent mass of the beams, the point masses and the bodies."""
+    """Mass of the beams, the point masses and the bodies."""
     share = fields.share
     (u, ψ), (w_u, w_ψ) = (split(f(fields.space)) for f in (ufl.TrialFunction, ufl.TestFunction))
     ρ = fields.inertia()
     M = fields.matrix()
-    work = (ρ[0] * ufl.dot(u, w_u) + ρ[1] * ψ * w_ψ) * fields.dx(2)  # P(67)
+    work = (ρ[0] * ufl.dot(u, w_u) + ρ[1] * ψ * w_ψ) * fields.dx_of_mass()  # P(67)
     kernel = fields.kernel(work, fields.configuration())
     kernel.place(M)
     kernel.add(np.zeros(share.size), M.data)

@@ -353,7 +353,7 @@ def draw_bar(figure: Figure, axes: Axes, colors: Any, label: str) -> None:
 def draw_axes(axes: Axes, solution: Solution, points: Array, **line: Any) -> None:
     """The axes of all beams through these points."""
     for beam in solution.scene.beams:
-        axes.plot(*points[solution.grid.vertices_of(beam)].T, **line)
+        axes.plot(*points[solution.grid.nodes_along(beam)].T, **line)
 
 
 def draw_undeformed(axes: Axes, stage: Stage) -> None:
@@ -374,7 +374,7 @@ def draw_diagrams(
         solution: Of the frame.
         what: "N", "V" or "M".
         diagrams: Each a list of the values in the cells of all beams, (num_cells,) each; N, N m.
-        points: Vertices of all beams; (num_vertices, 2); m.
+        points: Nodes of all beams; (num_nodes, 2); m.
     """
     index, side = list(RESULTANTS).index(what), -1.0 if what == "M" else 1.0
     beams = solution.scene.beams

@@ -1,13 +1,19 @@
 """The dials of a mesh: places remain vertices, and what asks a solution takes any mesh."""
 
 import math
+import re
 from fractions import Fraction
 
+import basix.ufl
 import numpy as np
 import pytest
+from mpi4py import MPI
+from scipy.sparse import csr_array
 
 import ufl_beam as ub
-from ufl_beam.grid import Grid
+from ufl_beam.fields import Fields
+from ufl_beam.grid import Grid, Share
+from ufl_beam.terms import mass_matrix
 
 STEEL = ub.Section(EA=1e6, GA=4e5, EI=1e3, rhoA=2.0, rhoI=1e-3)  # N, N, N m2, kg/m, kg m
 
@@ -189,3 +195,134 @@ def test_the_mesh_belongs_to_a_checkpoint(shared_path):
     with pytest.raises(ub.SceneError, match=r"mesh.refine is Fraction\(3, 1\), in the file Frac"):
         run(8e-3, 3)
     assert run(8e-3, 2).times[-1] == 8e-3
+
+
+# -- degree and lumped mass ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_nodes_are_those_of_the_element(degree):
+    mesh = ub.Mesh(degree=degree)
+    element = basix.ufl.element("Lagrange", "interval", degree).basix_element
+    first, last, *between = element.points[:, 0]
+    assert mesh.nodes == pytest.approx([first, *between, last], abs=1e-15)
+    values = element.tabulate(0, np.array([[0.3]]))[0, 0, :, 0]
+    first, *between, last = mesh.weights(0.3)
+    assert values == pytest.approx([first, last, *between], abs=1e-14)
+    # The nodes are the points of a rule that is exact up to degree 2p - 1
+    for k in range(2 * degree):
+        assert mesh.parts @ mesh.nodes**k == pytest.approx(1 / (k + 1), rel=1e-14)
+
+
+@pytest.mark.parametrize("degree", [0, 4, 1.5, "2"])
+def test_no_such_degree(degree):
+    with pytest.raises(ub.SceneError, match="Mesh: degree = .* must be 1, 2 or 3"):
+        ub.Mesh(degree=degree)
+
+
+def test_lumped_is_yes_or_no():
+    with pytest.raises(ub.SceneError, match="Mesh: lumped = 1 is not a bool"):
+        ub.Mesh(lumped=1)
+
+
+LAW = ub.Hardening(1.0)
+INELASTIC = {
+    "yields": {"section": ub.Section(EA=1, GA=1, EI=1, bending=LAW)},
+    "softens": {"section": ub.Section(EA=1, GA=1, EI=1, hinge=ub.Softening(1.0, 1.0))},
+    "hinge": {"section": STEEL, "hinges": {0.5: ub.Softening(1.0, 1.0)}},
+    "fibres": {
+        "section": ub.Section.rectangle(b=1, h=1, E=1, nu=0, rho=1, fibres=ub.Fibres(LAW, number=4))
+    },
+}
+
+
+@pytest.mark.parametrize("kind", INELASTIC)
+def test_higher_degrees_are_for_elastic_beams(kind):
+    beam = ub.Beam((0, 0), (1, 0), cells=4, name="girder", **INELASTIC[kind])
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)])
+    with pytest.raises(ub.SceneError, match="degree = 2 is for elastic beams, and girder may yield"):
+        ub.Simulation(scene, ub.Static(), mesh=ub.Mesh(degree=2))
+    ub.Simulation(scene, ub.Static()).close()
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_lumped_mass_is_the_row_sum(degree):
+    scene = portal(masses=[])
+
+    def mass(lumped):
+        grid = Grid(scene, ub.Mesh(degree=degree, lumped=lumped))
+        M = mass_matrix(Fields(Share(grid, MPI.COMM_SELF)))
+        return csr_array((M.data, M.indices, M.indptr)).toarray()
+
+    full, lumped = mass(False), mass(True)
+    assert (lumped == np.diag(np.diag(lumped))).all()
+    # Rows of displacements and rotations alike: no couplings between them
+    assert np.diag(lumped) == pytest.approx(full.sum(axis=1), rel=1e-13)
+    # 5 m of 2 kg/m and 1e-3 kg m
+    assert np.trace(lumped) == pytest.approx(2 * 5 * 2.0 + 5 * 1e-3, rel=1e-13)
+
+
+@pytest.mark.parametrize("degree", [2, 3])
+def test_values_between_nodes(degree):
+    """Under its own weight a cell of degree 2 is a parabola of u, and u is exact everywhere."""
+    beam = ub.Beam((0, 0), (0, 1), STEEL, cells=1)
+    load = ub.LineLoad(beam, force=(0.0, -100.0))  # N/m
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    solution = bend(scene, mesh=ub.Mesh(degree=degree))
+    for s in (0.1, 0.5, 0.77, 1.0):
+        exact = -100.0 / 1e6 * (s - s**2 / 2)
+        assert solution.displacement(beam.at(s))[-1, 1] == pytest.approx(exact, rel=1e-9)
+        assert solution.position(beam.at(s))[-1] == pytest.approx([0, s + exact], rel=1e-12)
+    assert len(solution.grid.nodes_along(beam)) == degree + 1
+
+
+@pytest.mark.parametrize("degree", [2, 3])
+def test_numbering_of_higher_degrees(degree):
+    """Along the beams, so that Gauss elimination fills in next to nothing; joints come last."""
+    scene = portal()
+    post, arm = scene.beams
+    grid = Grid(scene, ub.Mesh(degree=degree))
+    assert grid.dofs[grid.nodes_along(post)[:-1]].ravel() == pytest.approx(np.arange(12 * degree))
+    assert (grid.dofs[grid.vertex(post.end)] == grid.dofs[grid.vertex(arm.start)]).all()
+    assert (grid.dofs[grid.vertex(post.end)] == grid.size - 3 + np.arange(3)).all()
+    inside = int(grid.dofs[grid.nodes_along(arm)[1], 1])
+    x = grid.points[grid.nodes_along(arm)[1], 0]
+    assert grid.describe(inside) == f"v of arm at ({x:g}, 2)"
+
+
+@pytest.mark.parametrize("mesh", [ub.Mesh(degree=2), ub.Mesh(2, degree=3, lumped=True)], ids=str)
+def test_everything_takes_a_higher_degree(mesh, shared_path, on_first_rank):
+    """Joints of all kinds, dampings, recorders, pictures; the ledger closes."""
+    base = portal()
+    post, arm = base.beams
+    body = ub.Body((3, 1), mass=1.0, inertia=0.1)
+    scene = ub.Scene(
+        base.beams,
+        joints=[*base.joints, ub.RigidLink(arm.end, body.at(0, 0.5))],
+        supports=base.supports,
+        loads=[*base.loads, ub.FollowerLoad(arm.end, force=(0.0, 10.0)), ub.Gravity()],
+        bodies=[body],
+        damping=[ub.Rayleigh(mass=0.1, stiffness=1e-4), ub.KelvinVoigt(1e-3)],
+        connectors=[ub.Stretch(post.at(0.5), arm.at(0.5), ub.Spring(100.0))],
+    )
+    records = [
+        ub.XDMF(shared_path / "b.xdmf"), ub.History(shared_path / "b.csv", [arm.at(0.3)]),
+        ub.Extremes(), ub.Fatigue(ub.HotSpot.fibre(arm.at(0.3), y=0.1, E=1e9), ub.SNCurve(range=1e8)),
+    ]  # fmt: skip
+    solution = ub.simulate(
+        scene, ub.Midpoint(0.05), t=(0, 0.1), dt=0.01, mesh=mesh, record=records, progress=False
+    )
+    assert solution.energy.worst < 1e-9
+    written = on_first_rank(lambda: (shared_path / "b.xdmf").read_text())
+    (lines, *_) = re.findall(r'NumberOfElements="(\d+)"', written)
+    # Degree pieces a cell; and the body, the link and the spring
+    assert int(lines) == mesh.degree * int(mesh.refine) * (4 + 7) + 3
+    ub.plot(solution, "M")
+    ub.plot_shapes(solution)
+    modes = ub.modes(scene, 3, at=solution)
+    ub.plot_modes(modes)
+    assert modes.grid.mesh == mesh
+    again = ub.simulate(
+        scene, ub.Midpoint(0.05), t=(0.1, 0.12), dt=0.01, start=solution, progress=False
+    )
+    assert again.energy.worst < 1e-9

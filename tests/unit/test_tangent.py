@@ -49,10 +49,10 @@ SCHEMES = [
 class Probe:
     """Residual and tangent of a step between random states, without what supports hold."""
 
-    def __init__(self, scene, scheme, turn, seed=0):
+    def __init__(self, scene, scheme, turn, seed=0, mesh=None):
         random = np.random.default_rng(seed)
         # Every process computes the whole scene.
-        self.simulation = simulation = ub.Simulation(scene, scheme, comm=MPI.COMM_SELF)
+        self.simulation = simulation = ub.Simulation(scene, scheme, mesh=mesh, comm=MPI.COMM_SELF)
         size = simulation.share.size
         simulation.q = random.uniform(-0.5, 0.5, size)
         if scheme.dynamic:
@@ -108,6 +108,14 @@ def test_tangent(kind, scheme):
     # and less of the largest entry at these states
     scale = np.abs(tangent).max()
     assert np.abs(tangent - probe.differences(1e-5)).max() < 1e-7 * scale
+
+
+@pytest.mark.parametrize("mesh", [ub.Mesh(degree=2), ub.Mesh(degree=3, lumped=True)], ids=str)
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.Midpoint(0.1, 0.1)], ids=str)
+def test_tangent_of_higher_degrees(mesh, scheme):
+    probe = Probe(scene("follower roller masses"), scheme, turn=1.5, mesh=mesh)
+    tangent = probe.tangent()
+    assert np.abs(tangent - probe.differences(1e-5)).max() < 1e-7 * np.abs(tangent).max()  # ditto
 
 
 @pytest.mark.parametrize("turn", [1e-2, 2.5])
