@@ -21,8 +21,8 @@ TRIES = 5
 LAST_DIGITS = 1e-9
 """Changes up to this part of a quantity are rounding, or the tolerance of Newton's method."""
 
-CELL_ORDER, STEP_ORDER = 2.0, 2.0
-"""Orders of cells and of schemes, at most."""
+STEP_ORDER = 2.0
+"""Order of the schemes, at most; that of cells is twice their degree."""
 
 
 class Climb:
@@ -94,6 +94,7 @@ class Climb:
         runs = {level: ladder.runs[rung] for level, rung in zip(levels, rungs, strict=True)}
         finest = runs[i, j + 2]
         units = self._goal.units({name: size(value) for name, value in finest.values.items()})
+        orders = (2.0 * finest.dials.mesh.degree, STEP_ORDER)
         crosses = {}
         for name, unit in units.items():
             if unit == 0:
@@ -103,7 +104,7 @@ class Climb:
                 )
             values = {level: run.values[name] for level, run in runs.items()}
             floor = max(self._goal.negligible * unit, LAST_DIGITS * size(finest.values[name]))
-            crosses[name] = Cross.of(values, base, (CELL_ORDER, STEP_ORDER), floor)
+            crosses[name] = Cross.of(values, base, orders, floor)
         doubts = [f"\n  {name}{cross}" for name, cross in crosses.items() if not cross.seen]
         if doubts:
             unseen = [cross for cross in crosses.values() if not cross.seen]

@@ -184,7 +184,7 @@ class Ladder:
         if self.spent + needed > self._most:
             raise TradeoffError(
                 f"the next {len(missing)} runs would take about {needed:.3g} s after "
-                f"{self.spent:.3g} s of runs, more than most = {self._most:g} s; the finest of them: "
+                f"{self.spent:.3g} s of runs, more than most = {self._most:g} s; the finest is "
                 f"{self.dials(missing[-1])}",
                 tuple(self.runs.values()),
             )
