@@ -18,6 +18,9 @@ PATIENCE = 4
 TRIES = 5
 """Settings that are tried."""
 
+CAREFUL = 2.0
+"""Of settings that are tried, runs below are done three times; s."""
+
 LAST_DIGITS = 1e-9
 """Changes up to this part of a quantity are rounding, or the tolerance of Newton's method."""
 
@@ -59,15 +62,20 @@ class Climb:
             if any(self._goal.hopeless(choice, one.choice) for one in others):
                 return None
             i, j = outlook.finest
-            beyond = math.ceil(math.log2(choice.refine) - i), math.ceil(choice.level - j)
-            if max(beyond) > 0:
-                base = base[0] + max(0, beyond[0]), base[1] + max(0, beyond[1])
+            more = (
+                max(0, math.ceil(math.log2(choice.refine) - i)),
+                max(0, math.ceil(choice.level - j)),
+            )
+            if choice.further and more == (0, 0):
+                more = outlook.bottleneck(choice)
+            if more != (0, 0):
+                base = base[0] + more[0], base[1] + more[1]
                 continue
             if not choice.serves:
                 raise self._refusal(
                     f"no setting serves; the nearest takes {choice.seconds:.3g} s and has errors "
-                    f"{choice.ratio:.2g} times what they are measured by; steps and cells given "
-                    "are the coarsest, and no error is known below the last digits"
+                    f"of {choice.ratio:.2g} {self._goal.measure}; steps and cells as they are "
+                    "given are the coarsest, and the last digits of a quantity are not known"
                 )
             found = self._attempt(choice, outlook)
             again = any(one.run is found.run for one in tried)
@@ -121,7 +129,7 @@ class Climb:
     def _attempt(self, choice: Choice, outlook: Outlook) -> Found:
         """Run a choice and compare it with the limits."""
         rung = Rung(self._family, choice.refine, choice.level)
-        self._ladder.climb([rung])
+        self._ladder.climb([rung], short=CAREFUL)
         if rung in self._ladder.failed:
             raise self._refusal(f"the chosen setting failed: {self._ladder.failed[rung]}")
         return Found(self._ladder.runs[rung], choice, outlook)

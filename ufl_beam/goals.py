@@ -43,6 +43,7 @@ class Choice(NamedTuple):
         seconds: Wall time; s.
         ratio: Largest error, as a part of what is allowed, or of the quantity.
         serves: Whether it does what is asked.
+        further: If not, whether one may that is finer than those that were run.
     """
 
     refine: int
@@ -50,6 +51,7 @@ class Choice(NamedTuple):
     seconds: float
     ratio: float
     serves: bool
+    further: bool
 
 
 @dataclass(frozen=True)
@@ -82,12 +84,16 @@ class Outlook:
         return max(cross.error(i, level) / self.units[name] for name, cross in self.crosses.items())
 
     def bottleneck(self, choice: Choice) -> tuple[int, int]:
-        """A level more of the dial, cells or steps, that has the larger part of the error."""
+        """A level more of the dial, cells or steps, that has the larger part of the error.
+
+        None if that is negligible already.
+        """
         i = math.log2(choice.refine)
         errors = {n: c.error(i, choice.level) / self.units[n] for n, c in self.crosses.items()}
         worst = self.crosses[max(errors, key=errors.__getitem__)]
-        cells, steps = worst.cells.at(i), worst.steps.at(choice.level)
-        return (1, 0) if cells > steps else (0, 1)
+        if worst.cells.at(i) > worst.steps.at(choice.level):
+            return int(worst.cells.used > 0), 0
+        return 0, int(worst.steps.used > 0)
 
     def largest(self, differences: Mapping[str, Array]) -> float:
         """Largest of differences of the quantities, in its unit."""
@@ -173,7 +179,7 @@ class Tolerance:
     absolute: Mapping[str, float]
     relative: float
     negligible = NEGLIGIBLE
-    measure = "tolerance"
+    measure = "tolerances"
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -194,7 +200,8 @@ class Tolerance:
         settings, seconds, ratios = outlook.settings()
         good = ratios <= max(1.0, NEARLY * ratios.min())
         k = int(np.argmin(np.where(good, seconds, np.inf)))
-        return Choice(*settings[k], float(seconds[k]), float(ratios[k]), bool(ratios[k] <= 1.0))
+        serves = bool(ratios[k] <= 1.0)
+        return Choice(*settings[k], float(seconds[k]), float(ratios[k]), serves, not serves)
 
     def hopeless(self, choice: Choice, best: Choice) -> bool:
         """Whether it would take much longer."""
@@ -220,7 +227,7 @@ class Budget:
 
     seconds: float
     negligible = 0.0
-    measure = "largest value"
+    measure = "largest values"
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -239,8 +246,9 @@ class Budget:
         settings, seconds, ratios = outlook.settings()
         fast = seconds <= FILL * self.seconds
         k = int(np.argmin(np.where(fast, ratios, np.inf) if fast.any() else seconds))
-        serves = bool(fast[k] and ratios[k] <= ROUGH)
-        return Choice(*settings[k], float(seconds[k]), float(ratios[k]), serves)
+        good = bool(ratios[k] <= ROUGH)
+        numbers = float(seconds[k]), float(ratios[k])
+        return Choice(*settings[k], *numbers, bool(fast[k]) and good, bool(fast[k]) and not good)
 
     def hopeless(self, choice: Choice, best: Choice) -> bool:
         """Whether it would be much less accurate."""

@@ -28,7 +28,7 @@ from ufl_beam.studies import study
 Quantity = Callable[[Solution], npt.ArrayLike]
 
 SHORT = 0.1
-"""Runs below are done three times, and the median counts; s."""
+"""Runs below are done three times, and the median counts, unless others are asked for; s."""
 
 
 @dataclass(frozen=True)
@@ -171,8 +171,12 @@ class Ladder:
 
         self.spent = float(self._comm.bcast(seconds))
 
-    def climb(self, rungs: Sequence[Rung]) -> None:
+    def climb(self, rungs: Sequence[Rung], *, short: float = SHORT) -> None:
         """Run what is missing, several at a time where there are processes.
+
+        Args:
+            rungs: Where on the ladder.
+            short: Runs below are done three times; s.
 
         Raises:
             TradeoffError: It would take more time than all runs may.
@@ -188,7 +192,7 @@ class Ladder:
                 f"{self.dials(missing[-1])}",
                 tuple(self.runs.values()),
             )
-        cases = [rung._asdict() for rung in missing]
+        cases = [rung._asdict() | {"short": short} for rung in missing]
         try:
             done = study(self._member, cases, progress=False, comm=self._comm)
         except RuntimeError as error:  # all of them failed
@@ -239,12 +243,12 @@ class Ladder:
                 raise SceneError(f"tradeoff: quantity {name!r} is not finite")
             yield name, value
 
-    def _member(self, **case: Any) -> dict[str, Any]:
+    def _member(self, short: float, **case: Any) -> dict[str, Any]:
         """One run of a study."""
         rung = Rung(**case)
         solution = self._simulate(rung)
         seconds = [solution.seconds]
-        if solution.seconds < SHORT:
+        if solution.seconds < short:
             seconds += [self._simulate(rung).seconds for _ in range(2)]
         values = {f"quantity {n}": v for n, (_, v) in enumerate(self._ask(solution))}
         return values | {

@@ -74,8 +74,8 @@ class Tradeoff:
         names = list(self.limit)
         front = self.front
         rows = [["", "seconds", "steps", "cells", "iterations", *names, "dials"]]
-        for run in sorted(self.runs, key=lambda run: run.seconds):
-            mark = "=>" if run is self.best else "*" if run in front else ""
+        for run in sorted({*front, self.best}, key=lambda run: run.seconds):
+            mark = "=>" if run is self.best else ""
             errors = self.errors(run)
             rows.append([
                 mark, f"{run.seconds:.3g}", f"{run.steps:.0f}", f"{run.cells:.0f}",
@@ -87,8 +87,9 @@ class Tradeoff:
             "  ".join([*(c.rjust(w) for c, w in zip(row[:-1], widths, strict=False)), row[-1]])
             for row in rows
         ]
+        lines.append(f"and {len(self.runs) - len(lines) + 1} runs that others beat in both")
         for name, cross in self.crosses.items():
-            value = f"{float(cross.limit):.9g}" if cross.limit.ndim == 0 else "an array"
+            value = np.array2string(cross.limit, precision=9, threshold=6, edgeitems=2)
             lines.append(f"{name}: limit {value} ± {cross.uncertainty:.1g}{cross}")
         lines.append(
             f"{len(self.runs)} runs took {self.spent:.3g} s, "

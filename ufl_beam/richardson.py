@@ -81,7 +81,9 @@ class Convergence:
         first, second = values[1] - values[0], values[2] - values[1]
         a, b = size(first), size(second)
         if max(a, b) <= floor:
-            return cls(finest, (a, b), 0.0, False, 0.0, method, max(a, b), np.asarray(0 * second), UNSURE)
+            return cls(
+                finest, (a, b), 0.0, False, 0.0, method, max(a, b), np.asarray(0 * second), UNSURE
+            )
         order = math.log2(a / b) if min(a, b) > 0 else math.copysign(math.inf, a - b)
         lengths = np.linalg.norm(first) * np.linalg.norm(second)
         aligned = bool(np.vdot(first, second) >= ALIGNED * lengths)

@@ -9,7 +9,7 @@ from typing import TypeVar, cast
 
 from mpi4py import MPI
 
-from ufl_beam.climbing import Climb
+from ufl_beam.climbing import CAREFUL, Climb
 from ufl_beam.discretisation import Mesh
 from ufl_beam.errors import SceneError, TradeoffError, require_kind, require_number
 from ufl_beam.goals import Budget, Found, Goal, Tolerance
@@ -129,7 +129,7 @@ def _other_newton(ladder: Ladder, best: Found) -> Run:
     chosen = best.run
     for number in range(1, len(ladder.newtons)):
         rung = best.run.rung._replace(newton=number)
-        ladder.climb([rung])
+        ladder.climb([rung], short=CAREFUL)
         if rung in ladder.runs:
             run = ladder.runs[rung]
             changed = best.outlook.largest(

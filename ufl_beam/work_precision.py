@@ -44,7 +44,7 @@ def plot_tradeoff(tradeoff: Tradeoff) -> Figure:
         best = (tradeoff.best.seconds, max(tradeoff.ratio(tradeoff.best), FAINTEST))
         axes.plot(*best, "o", ms=18, mfc="none", mec=INK, mew=1.8, zorder=4)
         axes.set(xscale="log", yscale="log", xlabel="wall time of a run (s)")
-        axes.set_ylabel(f"error (parts of the {tradeoff.goal.measure})")
+        axes.set_ylabel(f"error ({tradeoff.goal.measure})")
         axes.set_title(f"recommended: {tradeoff.best.dials}", loc="left", fontsize=11)
         time, ratio = tradeoff.goal.bounds
         for draw, bound in ((axes.axvline, time), (axes.axhline, ratio)):

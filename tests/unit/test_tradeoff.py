@@ -102,7 +102,7 @@ def test_the_recommendation_are_arguments_of_simulate(law):
     assert "errors of 0.0001 of each quantity" in said
     assert f"{len(found.runs)} runs took" in said
     assert f"recommended: {found.best.dials}" in said
-    assert all(str(run.dials) in said for run in found.runs)
+    assert all(str(run.dials) in said for run in found.front)
 
 
 def test_a_dial_that_does_nothing_stays_as_it_is(law):
