@@ -82,9 +82,9 @@ quantities = {"place": place, "lag": lag}
 accurate = ub.tradeoff(
     scene,
     quantities,
-    scheme=[ub.Midpoint(), ub.Midpoint(alpha=0.05, beta=0.05)],
+    scheme=[ub.Midpoint(), ub.GeneralizedAlpha()],
     t=(0.0, end),
-    dt=0.04,
+    dt=0.02,
     mesh=[ub.Mesh(), ub.Mesh(degree=2)],
     newton=[ub.Newton(), ub.Newton(rtol=1e-6)],
     tolerance={"place": 2e-4, "lag": 1e-3},  # m, rad
@@ -103,7 +103,7 @@ fast = ub.tradeoff(
     quantities,
     scheme=winner["scheme"],
     t=(0.0, end),
-    dt=0.04,
+    dt=0.02,
     mesh=ub.Mesh(degree=winner["mesh"].degree),
     budget=0.5,  # s
 )
@@ -147,9 +147,7 @@ ub.say(f"the search took {accurate.spent / accurate.best.seconds:.0f} times its 
 
 # %%
 try:
-    ub.tradeoff(
-        scene, {"steps": len}, scheme=ub.Midpoint(), t=(0.0, end), dt=0.04, tolerance=0.01
-    )
+    ub.tradeoff(scene, {"steps": len}, scheme=ub.Midpoint(), t=(0.0, end), dt=0.04, tolerance=0.01)
 except ub.TradeoffError as error:
     ub.say("\nrefused:", error)
 else:

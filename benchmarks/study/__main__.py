@@ -29,18 +29,26 @@ def main() -> int:
     parser.add_argument("--report", action="store_true", help="from results that are there")
     options = parser.parse_args()
     whole = not (options.quick or options.names)
-    results = (ROOT / "benchmarks" / "results" if whole else ROOT / "output" / "study") / "study.json"
+    results = (
+        ROOT / "benchmarks" / "results" if whole else ROOT / "output" / "study"
+    ) / "study.json"
     docs = ROOT / "docs" if whole else results.parent
     results.parent.mkdir(parents=True, exist_ok=True)
     if not options.report:
         chosen = [c for c in CASES if not options.names or any(n in c.name for n in options.names)]
-        measured, begin = [], time.perf_counter()
+        measured, failed, begin = [], {}, time.perf_counter()
         for case in chosen:
             since = time.perf_counter()
-            measured.append(Bench(case, options.quick).results())
+            try:
+                measured.append(Bench(case, options.quick).results())
+            except Exception as error:  # the other scenes are still worth it
+                failed[case.name] = f"{type(error).__name__}: {error}"
+                print(f"{case.name:25s} {failed[case.name]}", flush=True)
+                continue
             took = time.perf_counter() - since
             print(f"{case.name:25s} {len(measured[-1]['runs']):4d} runs {took:6.1f} s", flush=True)
-        study = {"quick": options.quick, "seconds": time.perf_counter() - begin, **machine()}
+        took = time.perf_counter() - begin
+        study = {"quick": options.quick, "seconds": took, "failed": failed, **machine()}
         results.write_text(json.dumps({**study, "cases": measured}, indent=1) + "\n")
     save(json.loads(results.read_text()), docs)
     print(f"written: {results}, {docs / 'study.md'}")

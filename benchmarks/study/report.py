@@ -13,12 +13,13 @@ Case = dict[str, Any]
 INTRODUCTION = """\
 # Speed and accuracy: the study
 
-Written by `make study`; do not edit. What each dial costs and what it errs, over scenes that are smooth, stiff,
-impulsive, plastic, softening and static. Times are the wall time of a run, building the scene included,
-compiling not. Errors are the largest distance of a place at ten instants from a reference that is finer than all that is compared, as
-a part of the size of the scene; what is below twice the error of the reference itself is not counted.
-The scenes are small and the numbers those of one machine: take ratios from here, and settings for your own scene
-from [`ub.tradeoff`](tradeoff.md).
+Written by `make study`; do not edit. What each dial costs and what it errs, over scenes that are
+smooth, stiff, impulsive, plastic, softening and static. Times are the wall time of a run, building
+the scene included, compiling not. Errors are the largest distance of a place at ten instants from a
+reference that is finer than all that is compared, as a part of the size of the scene; what is below
+twice the error of the reference itself is not counted. The scenes are small and the numbers those
+of one machine: take ratios from here, and settings for your own scene from
+[`ub.tradeoff`](tradeoff.md).
 """
 
 
@@ -34,6 +35,7 @@ def save(study: dict[str, Any], docs: Path) -> None:
         f"Commit {study['commit']}, Python {study['python']}, DOLFINx {study['dolfinx']}, "
         f"{study['processor']}, one thread; {study['seconds'] / 60:.0f} minutes.",
         "",
+        *(f"Without {name}: {_cut(why)}\n" for name, why in study["failed"].items()),
         "## What to choose when",
         "",
         *advice(cases),
@@ -45,8 +47,9 @@ def save(study: dict[str, Any], docs: Path) -> None:
         "",
         "## Each dial by itself",
         "",
-        "One dial is turned at a time, from the setting that the tables of the scenes name. Time and error "
-        "are ratios to that setting; the change is what the dial alone does to the result.",
+        "One dial is turned at a time, from the setting that the tables of the scenes name. Time "
+        "and error are ratios to that setting; the change is what the dial alone does to the "
+        "result.",
         "",
         "![Time and error as each dial is turned](pictures/study_dials.png)",
         "",
