@@ -77,7 +77,8 @@ def tradeoff(
     """
     goal = _goal(quantities, tolerance, budget)
     require_number(most, "tradeoff: most", positive=True)
-    meshes, newtons = _several(mesh or Mesh(), "mesh"), _several(newton or Newton(), "newton")
+    meshes = _several(Mesh() if mesh is None else mesh, "mesh")
+    newtons = _several(Newton() if newton is None else newton, "newton")
     steps: tuple[float | Adaptive, ...] = _several(dt, "dt")
     families = [
         Dials(*one, newtons[0]) for one in product(_several(scheme, "scheme"), steps, meshes)
