@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import cycle
+from itertools import cycle, product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,14 +29,15 @@ def plot_tradeoff(tradeoff: Tradeoff) -> Figure:
     """
     with picture((9.0, 6.0)) as figure:
         axes = figure.subplots()
-        colors = cycle((BLUE, RED, GREEN, ORANGE, PINK, SKY))
-        for family, (name, color) in enumerate(zip(tradeoff.families, colors, strict=False)):
+        styles = cycle(product("os^", (BLUE, RED, GREEN, ORANGE, PINK, SKY)))
+        for family, (name, style) in enumerate(zip(tradeoff.families, styles, strict=False)):
+            marker, color = style
             runs = [run for run in tradeoff.runs if run.rung.family == family]
             axes.scatter(
                 [run.seconds for run in runs],
                 [max(tradeoff.ratio(run), FAINTEST) for run in runs],
                 s=[30 + 12 * np.log2(run.cells) for run in runs],
-                color=color, alpha=0.75, lw=0, label=f"from {name}", zorder=3,
+                marker=marker, color=color, alpha=0.75, lw=0, label=f"from {name}", zorder=3,
             )  # fmt: skip
         front = tradeoff.front
         seconds, errors = [r.seconds for r in front], [tradeoff.ratio(r) for r in front]
@@ -50,5 +51,7 @@ def plot_tradeoff(tradeoff: Tradeoff) -> Figure:
         for draw, bound in ((axes.axvline, time), (axes.axhline, ratio)):
             if np.isfinite(bound):
                 draw(bound, color=GREY, ls="--", lw=1.2, zorder=1)
-        axes.legend(loc="lower left", fontsize=11, title="size: cells", title_fontsize=10)
+        figure.legend(
+            loc="outside lower center", ncols=2, fontsize=9, title="size: cells", title_fontsize=9
+        )
     return figure
