@@ -14,6 +14,7 @@ from ufl_beam.compat import Array
 from ufl_beam.grid import Share
 from ufl_beam.ledger import Ledger
 from ufl_beam.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, TimeFunction
+from ufl_beam.loops import Loop, doubles, ffi, loop
 from ufl_beam.memory import Memory
 from ufl_beam.schemes import Scheme, Step
 from ufl_beam.sparse import Csr
@@ -45,12 +46,18 @@ class DeadLoads:
         ledger.supplied["loads"] += 0.0
         self.force: Array = np.zeros(share.size)
         self._before: Array = self.force
+        self._in_c = ffi.new("vector *", {"size": share.size})
 
     def begin(self, step: Step) -> None:
         """The loads of the step."""
         self.force = self._at(step.load_time)
         if step.toward < 1:
             self.force = self._before + step.toward * (self.force - self._before)
+        self._values = self._in_c.values = doubles(self.force)
+
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """A vector."""
+        return loop("subtract_vector", self._in_c), None
 
     def carry_on(self, t: float, q: Array) -> None:
         """Take the state ``q`` at time ``t`` as one that is in equilibrium with the loads."""
@@ -153,6 +160,9 @@ class FollowerLoads:
         x, y = self._sizes[:, 0], self._sizes[:, 1]
         return cos * x - sin * y, sin * x + cos * y
 
+    def loops(self) -> None:
+        """None."""
+
     def add_residual(self, q1: Array, r: Array) -> None:
         """Subtract the loads."""
         self.force = self._in_plane(q1)
@@ -216,7 +226,7 @@ def _(load: Gravity, share: Share) -> Array:
 
 
 def _along_beams(per_beam: npt.NDArray[Any], share: Share) -> Array:
-    """Nodal forces of line loads (num_beams, 3): of two nodes of a cell, each bears a half of it."""
+    """Nodal forces of line loads (num_beams, 3): two nodes of a cell bear a half of it each."""
     grid = share.grid
     loads = per_beam[grid.beam_of_cell[share.cells]] * share.cell_lengths()[:, None]
     first, *between, last = grid.mesh.parts

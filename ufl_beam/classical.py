@@ -153,11 +153,11 @@ class _Accelerated(_AtEnd):
         if 2 * β > γ > 0.5:
             return
         given = [str(c) for c in scene.links if isinstance(c.law, Motor | Guide)]
-        given += [f"the moving support at {s.place}" for s in scene.supports if s.moving]
+        given += [f"the support of {s.place}" for s in scene.supports if s.moving]
         if given:
             raise SceneError(
-                f"{name}: {given[0]} gives a motion, and accelerations of what is given ring for "
-                "ever without numerical damping; use GeneralizedAlpha(0.8), or Midpoint()"
+                f"{name}: {given[0]} prescribes a motion, whose accelerations ring for ever "
+                "without numerical damping; use GeneralizedAlpha(0.8), or Midpoint()"
             )
 
     def _beginning(self, dt: float, rates: Rates) -> tuple[Weights, Array | float, Array | float]:
@@ -183,9 +183,10 @@ class _Accelerated(_AtEnd):
     def _end(self, dt: float, s: Array, rates: Rates) -> tuple[Array, Array, Array]:
         """v, a and ü at the end."""
         (α_m, α_f, γ, β), a0, acceleration = self._beginning(dt, rates)
-        a = (s - dt * rates.v - dt**2 * (0.5 - β) * a0) / (β * dt**2)
-        v = rates.v + dt * ((1 - γ) * a0 + γ * a)
-        return v, a, ((1 - α_m) * a + α_m * a0 - α_f * acceleration) / (1 - α_f)
+        a: Array = (s - dt * rates.v - dt**2 * (0.5 - β) * a0) * (1 / (β * dt**2))
+        v: Array = rates.v + dt * ((1 - γ) * a0 + γ * a)
+        forced: Array = ((1 - α_m) * a + α_m * a0 - α_f * acceleration) * (1 / (1 - α_f))
+        return v, a, forced
 
     def rates(self, dt: float, s: Array, rates: Rates) -> tuple[Array, ...]:
         """Velocities and accelerations."""
@@ -283,7 +284,7 @@ class GeneralizedAlpha(_Accelerated):
         return Weights(α_m, α_f, 0.5 - α_m + α_f, (1 - α_m + α_f) ** 2 / 4)
 
     def _beginning(self, dt: float, rates: Rates) -> tuple[Weights, Array | float, Array | float]:
-        """a leads by (α_m - α_f) dt; where that is not known yet, the step does without."""
+        """Where it is not known yet by how much a leads, the step does without."""
         if not rates.more:
             return CONSTANT, 0.0, 0.0
         acceleration, *lead = rates.more
@@ -294,9 +295,12 @@ class GeneralizedAlpha(_Accelerated):
     def rates(self, dt: float, s: Array, rates: Rates) -> tuple[Array, ...]:
         """Velocities, accelerations and what a differs from them by, over the time."""
         v, a, acceleration = self._end(dt, s, rates)
+        lead: Array
         if not rates.more:
             return v, acceleration
         if len(rates.more) == len(self.kept):
-            return v, acceleration, (a - acceleration) / dt
-        α_m, α_f, _, _ = self.weights
-        return v, acceleration, (α_m - α_f) / dt * (acceleration - rates.more[0])
+            lead = 1 / dt * (a - acceleration)
+        else:
+            α_m, α_f, _, _ = self.weights
+            lead = (α_m - α_f) / dt * (acceleration - rates.more[0])
+        return v, acceleration, lead

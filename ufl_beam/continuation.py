@@ -11,20 +11,20 @@ from mpi4py import MPI
 
 import numpy as np
 
+from ufl_beam.classical import Static
 from ufl_beam.compat import Array
 from ufl_beam.connectors import Actuator, Controller, Motor
 from ufl_beam.controls import Control, Given
 from ufl_beam.critical import Branch, CriticalPoint, Direction, Stiffness
 from ufl_beam.discretisation import Mesh
-from ufl_beam.errors import SceneError, require_count, require_kind, require_sequence
+from ufl_beam.errors import SceneError, StepFailed, require_count, require_kind, require_sequence
 from ufl_beam.loads import TimeFunction
 from ufl_beam.processes import ours
 from ufl_beam.record import Recorder, on_first
 from ufl_beam.scene import Scene
-from ufl_beam.classical import Static
 from ufl_beam.simulation import Simulation, Trial
 from ufl_beam.solution import Solution
-from ufl_beam.solve import Newton, StepFailed
+from ufl_beam.solve import Newton
 from ufl_beam.walk import Walk
 
 ADVICE = (

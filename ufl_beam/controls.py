@@ -10,10 +10,9 @@ import numpy as np
 from ufl_beam.beams import Place
 from ufl_beam.compat import Array
 from ufl_beam.critical import Direction
-from ufl_beam.errors import SceneError, require_kind, require_number
+from ufl_beam.errors import SceneError, StepFailed, require_kind, require_number
 from ufl_beam.scene import COMPONENTS, Scene
 from ufl_beam.simulation import Trial
-from ufl_beam.solve import StepFailed
 
 if TYPE_CHECKING:
     from ufl_beam.walk import Walk

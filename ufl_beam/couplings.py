@@ -13,6 +13,7 @@ from ufl_beam.forms import Kernel
 from ufl_beam.grid import Index, Share
 from ufl_beam.guides import Guides
 from ufl_beam.links import Links
+from ufl_beam.loops import Loop, doubles, ffi, integers, lib, loop
 from ufl_beam.memory import Memory
 from ufl_beam.relative import MOTIONS, Numbers, Pair
 from ufl_beam.responses import Setting, respond
@@ -73,30 +74,39 @@ class Couplings(Links):
         self._work, self._tangent, self._value = map(kernel, (work, tangent, e * z * dx))
         self._tangent.place(A)
         self.response = respond(links[0].law, links, setting)
-        self._acting = setting.scheme.acting
-        self._before: Array = np.zeros(n)
-        self._rows = np.zeros((n, 3))
         self._length = np.where([c.turns for c in links], 1.0, share.grid.scene.size)
-        self._size = share.grid.scene.size
-        self._iterate: Array = np.empty(0)
+        self._e, self._now = np.zeros((2, n))
+        self._rows = np.zeros((n, 3))
         self._q: Array = np.empty(0)
-        self._e: Array = np.zeros(n)
+        self._in_c = c = ffi.new("couplings *")
+        c.work, c.tangent, c.motion = self._work.cells, self._tangent.cells, self._value.cells
+        self._alive = [
+            *(integers(x.astype(np.int32)) for x in (order, self._forces_at, self._dofs)),
+            *map(doubles, (np.zeros(n), self._now, self._e, self._before, self.work, self.rate)),
+            doubles(self._length),
+        ]
+        c.link, c.force, c.dofs = self._alive[:3]
+        c.by_cell, c.e1, c.e0, c.before, c.taken, c.rate, c.length = self._alive[3:]
+        c.number, c.size = n, share.grid.scene.size
+        c.row, c.width = self._work.pointer(row)
+        c.row_of_tangent, c.width_of_tangent = self._tangent.pointer(row)
+        c.weight_of_before = setting.scheme.acting(np.ones(1), np.zeros(1))[0]
+        if self.response.points is not None:
+            c.points = self.response.points.points
 
     # -- the step ------------------------------------------------------------------------------
 
     def motion(self, q: Array) -> Array:
         """Relative motions at ``q``; (num_links,); m or rad."""
-        e = np.zeros(len(self.links))
-        self._value.add(q, e)
-        e[self._order] = e.copy()
-        return e
+        lib.find_motions(self._in_c, doubles(q))
+        return self._now.copy()
 
     def begin(self, step: Step) -> None:
         """Remember the motions at the beginning."""
         self._work.set(self._q0, step.q0)
         self._tangent.set(self._q0, step.q0)
         if step.q0 is not self._q:
-            self._q, self._e = step.q0, self.motion(step.q0)
+            self._q, self._e[:] = step.q0, self.motion(step.q0)
         self._dt = step.dt
         self.response.begin(self._e, step)
         if self.response.steady:
@@ -105,52 +115,52 @@ class Couplings(Links):
     def _put(self, *rows: Array | float) -> None:
         for column, numbers in enumerate(rows):
             self._rows[:, column] = numbers
-        self._work.put(self._row, self._rows[self._order])
+        for kernel in (self._work, self._tangent):
+            kernel.put(self._row, self._rows[self._order])
+
+    def loops(self) -> tuple[Loop, Loop | None] | None:
+        """Those of laws that are steady or of material points."""
+        if not self.response.steady and self.response.points is None:
+            return None
+        return loop("add_couplings_force", self._in_c), loop("add_cells", self._tangent.cells)
+
+    def demand(self) -> Loop:
+        """The loop of :meth:`excess`."""
+        return loop("missed_by_couplings", self._in_c)
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the forces on the nodes, and the rows of the laws."""
-        if not self.response.steady:
+        if not self.response.steady and self.response.points is None:
             self._put(*self.response.rows(self.motion(q1), self.force(q1)))
-        self._work.add(q1, r)
-        self._iterate = q1
+        lib.add_couplings_force(self._in_c, doubles(q1), doubles(r))
 
     def add_tangent(self, q1: Array) -> None:
         """Add the derivative; the rows are those of the latest residual."""
-        self._tangent.put(self._row, self._rows[self._order])
         self._tangent.add(q1, self._A.data)
 
-    def excess(self, r: Array, force: float) -> float:
+    def excess(self, q: Array, r: Array, force: float) -> float:
         """Largest residual of a row: of motions as a part of 1 % of the scene, or of ``force``."""
-        about_motion = np.abs(self._rows[:, 1]) < 1.0
-        forces = (force or 1.0) * self._size / self._length  # moments for what turns
-        sizes = np.where(about_motion, 0.01 * self._length, forces)
-        # Far from where it began, or after many turns, a part has fewer digits left.
-        moved = np.abs(self._iterate[self._dofs[:, :6]])
-        far = 1 + moved[:, :4].max(axis=1) / self._size + moved[:, 4:].max(axis=1)
-        round_off = 8 * np.abs(self._rows[:, 0]) * self._length * np.spacing(far)
-        missed = np.maximum(np.abs(r[self._forces_at]) - round_off, 0.0)
-        return float((missed / sizes).max())
+        missed: float = lib.missed_by_couplings(self._in_c, doubles(q), doubles(r), force)
+        return missed
 
-    def _taken(self, e1: Array, λ: Array) -> Array:
-        return self._acting(self._before, λ) * (e1 - self._e)
+    def _taken(self, q1: Array) -> Array:
+        weight = self._in_c.weight_of_before
+        force = weight * self._before + (1 - weight) * self.force(q1)
+        return np.asarray(force * (self.motion(q1) - self._e))
 
     def change(self, q1: Array) -> float:
         """Energy that the connectors take in the step to ``q1``; J."""
-        e1 = self.motion(q1)
-        return self.response.change(e1, float(self._taken(e1, self.force(q1)).sum()))
+        return self.response.change(self.motion(q1), float(self._taken(q1).sum()))
 
     def effort(self, q1: Array) -> float:
         """Sum of the sizes of the works that the connectors take in the step to ``q1``; J."""
-        return float(np.abs(self._taken(self.motion(q1), self.force(q1))).sum())
+        return float(np.abs(self._taken(q1)).sum())
 
     def accept(self, q1: Array, s: Array) -> None:
         """Enter what was supplied or lost."""
-        e1, λ = self.motion(q1), self.force(q1)
-        taken = self._taken(e1, λ)
-        self.response.accept(e1, float(taken.sum()))
-        self.work += taken
-        self.rate = np.asarray((e1 - self._e) / self._dt)
-        self._before, self._q, self._e = λ, q1, e1
+        taken: float = lib.commit_couplings(self._in_c, doubles(q1), self._dt)
+        self._q = q1
+        self.response.accept(self._e, taken)
 
     def freeze(self) -> None:
         """From now on nothing yields or breaks further."""
@@ -161,7 +171,7 @@ class Couplings(Links):
     def add_state(self, q: Array) -> None:
         """Enter what is stored."""
         if q is not self._q:
-            self._q, self._e = q, self.motion(q)
+            self._q, self._e[:] = q, self.motion(q)
             self.response.start(self._e)
         self.response.add_state(self._e)
 
@@ -170,7 +180,10 @@ class Couplings(Links):
         response = self.response
         rows = np.column_stack([self.work, self.rate, self._before, self._e, response.state()])
         rows = memory.rows(type(response).__name__, self.numbers, rows)
-        self.work, self.rate, self._before, self._e = rows[:, :4].T.copy()
+        for mine, column in zip(
+            (self.work, self.rate, self._before, self._e), rows.T, strict=False
+        ):
+            mine[:] = column
         response.restore(rows[:, 4:])
         self._q = q
 

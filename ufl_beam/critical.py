@@ -10,10 +10,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.linalg import splu
 
 from ufl_beam.compat import Array
-from ufl_beam.errors import SceneError
+from ufl_beam.errors import SceneError, StepFailed
 from ufl_beam.grid import Index, Share
 from ufl_beam.solution import Solution
-from ufl_beam.solve import StepFailed
 from ufl_beam.sparse import Csr
 
 ITERATIONS = 50

@@ -12,6 +12,7 @@ from ufl_beam.errors import SceneError
 from ufl_beam.fields import Fields
 from ufl_beam.kinematics import strain, virtual_strain
 from ufl_beam.ledger import Ledger
+from ufl_beam.loops import Loop, loop
 from ufl_beam.memory import Memory
 from ufl_beam.schemes import Scheme, Step
 from ufl_beam.sparse import Csr, StepProduct
@@ -62,6 +63,10 @@ class KelvinVoigtForces:
             if step.dt != self._dt:
                 kernel.put(self._rate, np.array([self._time / step.dt]))
         self._dt = step.dt
+
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """Two forms."""
+        return loop("add_cells", self._force.cells), loop("add_cells", self._tangent.cells)
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the damping forces."""
@@ -114,6 +119,10 @@ class RayleighForces:
         """Prepare what stays constant in the step."""
         self._dt = step.dt
         self._times.begin(step.q0, *self._inertia.scheme.velocity(step.dt, self._inertia))
+
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """A matrix times the step of the nodes."""
+        return self._times.loops()
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the damping forces."""

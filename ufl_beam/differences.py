@@ -14,14 +14,15 @@ from ufl_beam.fields import Fields
 from ufl_beam.inelastic import Strains
 from ufl_beam.kinematics import strain
 from ufl_beam.ledger import Ledger
+from ufl_beam.loops import Loop, loop
 from ufl_beam.memory import Memory
-from ufl_beam.schemes import Scheme, Step
+from ufl_beam.schemes import Step
 from ufl_beam.sparse import Csr
 from ufl_beam.terms import Term
 
 
 @singledispatch
-def numerical_forces(scheme: Scheme, fields: Fields, A: Csr, ledger: Ledger) -> list[Term]:
+def numerical_forces(scheme: object, fields: Fields, A: Csr, ledger: Ledger) -> list[Term]:
     """Forces of elastic cells that only the scheme asks for; for most schemes none."""
     return []
 
@@ -62,6 +63,10 @@ class SecondDifferences:
         for kernel in (self._force, self._lost):
             kernel.set(self._q0, step.q0)
             kernel.put(self._before, min(1.0, step.dt / self._last_dt) * self._change)
+
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """Two forms."""
+        return loop("add_cells", self._force.cells), loop("add_cells", self._tangent.cells)
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the forces."""

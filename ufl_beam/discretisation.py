@@ -53,7 +53,7 @@ class Mesh:
     def nodes(self) -> npt.NDArray[np.float64]:
         """Where in a cell, from 0 to 1, its nodes are; ascending: Gauss-Lobatto points."""
         inner = np.polynomial.legendre.Legendre.basis(self.degree).deriv().roots()
-        return np.array([0.0, *(1 + inner) / 2, 1.0])
+        return np.array([0.0, *((1 + x) / 2 for x in inner.tolist()), 1.0])
 
     @cached_property
     def parts(self) -> npt.NDArray[np.float64]:
@@ -64,10 +64,12 @@ class Mesh:
 
     def weights(self, part: float) -> npt.NDArray[np.float64]:
         """Weights of the nodes of a cell in the value at a part of it, by Lagrange."""
-        weights = [
-            np.prod([(part - b) / (a - b) for b in self.nodes if b != a]) for a in self.nodes
-        ]
-        return np.array(weights)
+        return np.asarray(part ** np.arange(self.degree + 1) @ self._polynomials)
+
+    @cached_property
+    def _polynomials(self) -> npt.NDArray[np.float64]:
+        """Coefficients of the polynomials that are one in one node, in columns."""
+        return np.asarray(np.linalg.inv(np.vander(self.nodes, increasing=True)))
 
     def vertices(self, beam: Beam, attached: Sequence[float]) -> list[float]:
         """Parameters of the vertices of a beam: ends, corners and what is ``attached`` among them.

@@ -1,25 +1,14 @@
 /* Elimination of the interior vertices of chains, by blocks of 3 x 3; see elimination.py.
  *
  * A chain is left end - vertices - right end. Its vertices are eliminated from left to right, so that
- * each couples to the left end and to the next vertex when its turn comes. Row r of vertex v is
+ * each couples to the left end and to the next vertex when its turn comes. A chain that begins at a
+ * vertex with one neighbour has no left end. Row r of vertex v is
  * data[indptr[row[3 v + r]]...], nine entries; order[9 v...] says where those of the columns of the
  * vertex before, of v and of the vertex after are among them.
  */
 
 /* What is kept of a vertex: its pivot block as LU, the couplings to and from the left end. */
 enum { PIVOT = 0, TO_LEFT = 9, FROM_LEFT = 18, KEPT = 27 };
-
-typedef struct {
-  int chains;
-  const int32_t *first;     /* first vertex of each chain, and their number */
-  const int32_t *row;       /* vertices x 3 */
-  const int32_t *order;     /* vertices x 9 */
-  const int32_t *from_ends; /* chains x 18: entries of the ends' rows, left and right */
-  const int32_t *indptr;
-  const double *data;
-  double *kept;             /* vertices x KEPT */
-  int32_t *swaps;           /* vertices x 3: rows in the order of the pivots */
-} chains;
 
 /* D = LU with the largest pivot of each column; the reciprocals of the pivots on the diagonal */
 static void factor_block(double *D, int32_t *swap)
@@ -59,12 +48,12 @@ static inline void solve_block(const double *D, const int32_t *swap, int columns
   }
 }
 
-/* Y -= A X for blocks of 3 x 3, X in rows of six */
-static inline void subtract_product(const double *A, const double *X, double *Y)
+/* Y -= A X for blocks of 3 x 3, X in rows of some width */
+static inline void subtract_product(const double *A, const double *X, int width, double *Y)
 {
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)
-      Y[3 * i + j] -= A[3 * i] * X[j] + A[3 * i + 1] * X[6 + j] + A[3 * i + 2] * X[12 + j];
+      Y[3 * i + j] -= A[3 * i] * X[j] + A[3 * i + 1] * X[width + j] + A[3 * i + 2] * X[2 * width + j];
 }
 
 /* y -= A x */
@@ -100,43 +89,61 @@ static inline void drop_faded(double *block)
     if (fabs(block[k]) < 0x1p-511) block[k] = 0;
 }
 
+/* A chain; without a spike nothing couples to a left end. */
+static inline void eliminate_chain(const chains *c, int chain, const int spike, double *ends)
+{
+  double pivot[9], to[9], from[9], below[9], side[18], solved[18];
+  read_block(c, c->first[chain], 1, pivot);
+  if (spike) {
+    read_block(c, c->first[chain], 0, to);
+    for (int k = 0; k < 9; ++k) from[k] = c->data[c->from_ends[18 * chain + k]];
+  }
+  for (int v = c->first[chain]; v < c->first[chain + 1]; ++v) {
+    double *kept = c->kept + KEPT * v, after[9];
+    int32_t *swap = c->swaps + 3 * v;
+    factor_block(pivot, swap);
+    memcpy(kept + PIVOT, pivot, sizeof pivot);
+    read_block(c, v, 2, after);
+    read_below(c, chain, v, below);
+    if (spike) {
+      memcpy(kept + TO_LEFT, to, sizeof to);
+      memcpy(kept + FROM_LEFT, from, sizeof from);
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j)
+          side[6 * i + j] = after[3 * i + j], side[6 * i + 3 + j] = to[3 * i + j];
+      solve_block(pivot, swap, 6, side, solved);
+    } else {
+      solve_block(pivot, swap, 3, after, solved);
+    }
+    if (v + 1 < c->first[chain + 1]) read_block(c, v + 1, 1, pivot);
+    else memset(pivot, 0, sizeof pivot);
+    subtract_product(below, solved, spike ? 6 : 3, pivot);
+    if (spike) {
+      double next_to[9] = {0}, next_from[9] = {0};
+      subtract_product(from, solved + 3, 6, ends);
+      subtract_product(below, solved + 3, 6, next_to);
+      subtract_product(from, solved, 6, next_from);
+      memcpy(to, next_to, sizeof to);
+      memcpy(from, next_from, sizeof from);
+      drop_faded(to);
+      drop_faded(from);
+    }
+  }
+  if (spike) {
+    memcpy(ends + 9, from, sizeof from);
+    memcpy(ends + 18, to, sizeof to);
+  }
+  memcpy(ends + 27, pivot, sizeof pivot);
+}
+
 /* Eliminate all vertices; what that makes of the blocks of the ends, left-left, left-right,
  * right-left and right-right, is added to `left` at the places given for each chain. */
 void eliminate(const chains *c, const int32_t *places, double *left)
 {
   for (int chain = 0; chain < c->chains; ++chain, places += 36) {
-    double ends[36] = {0}, pivot[9], to[9], from[9], below[9], side[18], solved[18];
-    read_block(c, c->first[chain], 1, pivot);
-    read_block(c, c->first[chain], 0, to);
-    for (int k = 0; k < 9; ++k) from[k] = c->data[c->from_ends[18 * chain + k]];
-    for (int v = c->first[chain]; v < c->first[chain + 1]; ++v) {
-      double *kept = c->kept + KEPT * v, after[9];
-      int32_t *swap = c->swaps + 3 * v;
-      factor_block(pivot, swap);
-      memcpy(kept + PIVOT, pivot, sizeof pivot);
-      memcpy(kept + TO_LEFT, to, sizeof to);
-      memcpy(kept + FROM_LEFT, from, sizeof from);
-      read_block(c, v, 2, after);
-      read_below(c, chain, v, below);
-      for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j)
-          side[6 * i + j] = to[3 * i + j], side[6 * i + 3 + j] = after[3 * i + j];
-      solve_block(pivot, swap, 6, side, solved);
-      if (v + 1 < c->first[chain + 1]) read_block(c, v + 1, 1, pivot);
-      else memset(pivot, 0, sizeof pivot);
-      subtract_product(from, solved, ends);
-      memset(to, 0, sizeof to);
-      subtract_product(below, solved, to);
-      subtract_product(below, solved + 3, pivot);
-      double next[9] = {0};
-      subtract_product(from, solved + 3, next);
-      memcpy(from, next, sizeof from);
-      drop_faded(to);
-      drop_faded(from);
-    }
-    memcpy(ends + 9, from, sizeof from);
-    memcpy(ends + 18, to, sizeof to);
-    memcpy(ends + 27, pivot, sizeof pivot);
+    double ends[36] = {0};
+    if (c->spike[chain]) eliminate_chain(c, chain, 1, ends);
+    else eliminate_chain(c, chain, 0, ends);
     for (int k = 0; k < 36; ++k) left[places[k]] += ends[k];
   }
 }
@@ -154,7 +161,7 @@ void eliminate_from(const chains *c, const double *b, double *f, const int32_t *
       read_below(c, chain, v, below);
       memset(next, 0, sizeof next);
       subtract(below, y, next);
-      subtract(kept + FROM_LEFT, y, ends);
+      if (c->spike[chain]) subtract(kept + FROM_LEFT, y, ends);
     }
     memcpy(ends + 3, next, sizeof next);
     for (int k = 0; k < 6; ++k) left[places[k]] += ends[k];
@@ -172,7 +179,7 @@ void substitute(const chains *c, const double *f, const int32_t *places, const d
       const double *kept = c->kept + KEPT * v;
       memcpy(y, f + 3 * v, sizeof y);
       read_block(c, v, 2, after);
-      subtract(kept + TO_LEFT, left, y);
+      if (c->spike[chain]) subtract(kept + TO_LEFT, left, y);
       subtract(after, next, y);
       solve_block(kept + PIVOT, c->swaps + 3 * v, 1, y, next);
       for (int r = 0; r < 3; ++r) x[c->row[3 * v + r]] = next[r];

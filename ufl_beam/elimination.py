@@ -36,6 +36,8 @@ class Chains:
         dofs: Degrees of freedom of the vertices, chain after chain; (num_vertices, 3).
         first: First vertex of each chain, and the number of vertices.
         ends: Degrees of freedom of the left and the right end of each chain; (num_chains, 6).
+        spikes: Which chains have a left end, so that all their vertices come to couple to it; the
+            others begin at a vertex with one neighbour, and have their right end twice in ``ends``.
         order: Where in the rows of a vertex the columns of the vertex before, of itself and of the
             vertex after stand; (num_vertices, 9).
     """
@@ -58,11 +60,33 @@ class Chains:
         ends = np.hstack([start[:-1][first], end[1:][last]])
         inside[inside] = ~middle[ends].any(axis=1)[chain]
 
-        _, first, last = _runs(inside)
-        self.ends = np.hstack([start[:-1][first], end[1:][last]])
-        self.dofs = end[:-1][inside]
-        self.first = np.append(0, np.cumsum(last - first + 1))
-        self.order = np.argsort(np.argsort(around[inside], axis=1), axis=1)
+        chain, first, last = _runs(inside)
+        left, middle_, right = start[:-1][first], end[:-1][inside], end[1:][last]
+        before, after = start[:-1][inside], end[1:][inside]
+        # A vertex with six entries has no neighbour but the first or last of its chain.
+        narrow = alone & (np.diff(A.indptr) == 6)
+        narrow &= np.bincount(A.indices, minlength=A.size) == 6
+        dead_left, dead_right = (narrow[dofs].all(axis=1) for dofs in (left, right))
+        backward = dead_right & ~dead_left
+        dead = dead_left | dead_right
+        long = last - first + 1
+        self.first = np.append(0, np.cumsum(long + dead))
+        begin = self.first[:-1]
+        here = np.arange(len(chain)) - np.append(0, np.cumsum(long))[chain]
+        here = np.where(backward[chain], long[chain] - 1 - here, here)
+        place = begin[chain] + dead[chain] + here
+        around = np.empty((self.first[-1], 3, 3), dtype=np.int64)
+        around[place, 1] = middle_
+        around[place, 0] = np.where(backward[chain, None], after, before)
+        around[place, 2] = np.where(backward[chain, None], before, after)
+        around[begin[dead], 0] = A.size + np.arange(3)
+        around[begin[dead], 1] = np.where(backward[:, None], right, left)[dead]
+        around[begin[dead], 2] = around[begin[dead] + 1, 1]
+        right = np.where(backward[:, None], left, right)
+        self.ends = np.hstack([np.where(dead[:, None], right, left), right])
+        self.dofs, self.spikes = around[:, 1], ~dead
+        around = around.reshape(-1, 9)
+        self.order = np.argsort(np.argsort(around, axis=1), axis=1)
 
 
 def _is_first(values: Index) -> npt.NDArray[np.bool_]:
@@ -134,12 +158,14 @@ class Elimination:
     def _make_arguments(self) -> None:
         A, chains = self._A, self._chains
         ends = chains.ends.reshape(-1, 2, 3, 1)
-        next_to = np.stack([chains.dofs[chains.first[:-1]], chains.dofs[chains.first[1:] - 1]], 1)
+        first, last = (chains.dofs[k] for k in (chains.first[:-1], chains.first[1:] - 1))
+        next_to = np.stack([np.where(chains.spikes[:, None], first, last), last], axis=1)
         rows, columns = np.broadcast_arrays(ends, next_to[:, :, None, :])
         arrays = [
             np.ascontiguousarray(array, dtype=np.int32)
             for array in (
                 chains.first,
+                chains.spikes,
                 chains.dofs,
                 chains.order,
                 A.positions(rows.ravel(), columns.ravel()),

@@ -13,6 +13,19 @@ class SceneError(ValueError):
     """
 
 
+class StepFailed(Exception):
+    """No equilibrium was found for a step; the message says why.
+
+    Attributes:
+        residuals: What is left where it is largest in each beam, body and connector; N, moments
+            over the size of the scene.
+    """
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message)
+        self.residuals: dict[str, float] = {}
+
+
 class ConvergenceError(RuntimeError):
     """A step found no equilibrium, even after it was cut; nothing before it is lost.
 

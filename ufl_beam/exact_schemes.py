@@ -294,10 +294,10 @@ class DecayingMidpoint(_ExactStep, _Midway):
 
     The energy, and c/2 times that of Δe and Δv beside it, never grows, whatever the steps, for
     Δe (Δe - r Δe') = (Δe² - r² Δe'² + (Δe - r Δe')²)/2: the motion never has more energy than it
-    began with and was given.  The entry "numerical" of the ledger has the sum of both, exactly; in
-    a single step it may give back a part of what it took.  Linear momentum is kept; angular momentum
-    is lost at third order by the velocities.  Cells that may yield or break are not damped, so that
-    open hinges turn freely, nor are connectors.
+    began with and was given.  The loss is the entry "numerical" of the ledger, exactly; it is never
+    negative, but a single step may give back a part of what steps before it took.  Linear momentum
+    is kept, angular momentum to second order.  Resultants of cells that may yield or break are not
+    damped, so that open hinges turn freely, nor are connectors.
 
     Args:
         rho_inf: Spectral radius at infinite frequency, from 1/3 to 1; 1 loses nothing.
@@ -316,12 +316,12 @@ class DecayingMidpoint(_ExactStep, _Midway):
 
     @property
     def part(self) -> float:
-        """c, part of what second differences of strains and velocities store that is lost."""
+        """The part c of what second differences of strains and velocities store that is lost."""
         # At infinity (λ + 1)/2 + c (λ - 1)²/λ = 0; λ = -rho_inf is the larger root.
         return self.rho_inf * (1 - self.rho_inf) / (2 * (1 + self.rho_inf) ** 2)
 
     def _remembered(self, dt: float, rates: Rates) -> Array:
-        """c r Δv'."""
+        """What of the last change of velocities counts, c r Δv'."""
         return self.part * min(1.0, dt / rates.last_dt) * (rates.v - rates.v_before)
 
     def way_to_rest(self, dt: float) -> float:
@@ -331,14 +331,15 @@ class DecayingMidpoint(_ExactStep, _Midway):
     def inertia(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
         """Mass times the change of velocity over the time."""
         keep = 0.5 + self.part
-        v = (rates.v - self._remembered(dt, rates)) / keep
+        v: Array = 1 / keep * (rates.v - self._remembered(dt, rates))
         return 1 / (dt**2 * keep), 1 / dt, v
 
     def rates(self, dt: float, s: Array, rates: Rates) -> tuple[Array, ...]:
         """The velocities."""
         keep = 0.5 + self.part
-        v = s / dt - (0.5 - self.part) * rates.v + self._remembered(dt, rates)
-        return (v / keep,)
+        v: Array = 1 / dt * s - (0.5 - self.part) * rates.v + self._remembered(dt, rates)
+        v *= 1 / keep
+        return (v,)
 
     def slip(self, dt: float, change: Array, rates: Rates) -> Array:
         """In proportion to how the change changes."""

@@ -41,7 +41,7 @@ class Fields:
         self._require_direction(grid.points[grid.cells[share.cells[self.order]]])
         self.cell_dofs = share.cell_dofs[self.order]
         self._degree = grid.mesh.degree
-        X = self._along() if self._degree > 1 else None
+        X = self._along() if self._degree > 1 else 0.5
         self.axis = Axis(self.mesh, grid.mesh.nodes, X)
         line = basix.ufl.element("Lagrange", "interval", self._degree)
         self.space = space_with_dofs(
@@ -68,7 +68,8 @@ class Fields:
         Args:
             degree: Of the rule on cells of degree 1; each degree that they have more adds two.
         """
-        return ufl.Measure("dx", domain=self.mesh, metadata={"quadrature_degree": self._rule(degree)})
+        rule = {"quadrature_degree": self._rule(degree)}
+        return ufl.Measure("dx", domain=self.mesh, metadata=rule)
 
     def dx_of_mass(self) -> ufl.Measure:
         """Integration of inertia: exact, or with the nodes as points, which lumps it."""

@@ -13,7 +13,7 @@ import ufl
 
 from ufl_beam.compat import Array, fem, pack
 from ufl_beam.grid import Index
-from ufl_beam.loops import doubles, integers, kernel, lib
+from ufl_beam.loops import doubles, ffi, integers, kernel, lib
 from ufl_beam.sparse import Csr
 
 
@@ -34,6 +34,7 @@ class Kernel:
 
     Attributes:
         compiled: The DOLFINx form.
+        cells: What ``add_cells`` of loops.c takes; a new one after :meth:`share`, :meth:`place`.
     """
 
     def __init__(
@@ -54,11 +55,9 @@ class Kernel:
         self._dofs = np.ascontiguousarray(cell_dofs, dtype=np.int32)
         self._coordinates = coordinates
         self._rows = self._rows_of_cells(form)
-        at = self._columns[unknown].start if self.depends_on(unknown) else 0
-        self._cells = (*self._dofs.shape, integers(self._dofs))
-        unknowns = self._dofs.shape[1] if self.depends_on(unknown) else 0
-        self._head = (tabulator(self.compiled), len(self._dofs), unknowns, self._cells[2])
-        self._at, self._constants = at, doubles(constants)
+        self._at = self._columns[unknown].start if self.depends_on(unknown) else 0
+        self._unknowns = self._dofs.shape[1] if self.depends_on(unknown) else 0
+        self._constants = constants
         self._prepare()
 
     def _rows_of_cells(self, form: ufl.Form) -> Index:
@@ -71,15 +70,28 @@ class Kernel:
         return np.ascontiguousarray(blocks.reshape(len(blocks), width), dtype=np.int32)
 
     def _prepare(self) -> None:
-        """Pointers to all that stays where it is."""
-        self._middle = (
-            self._at,
-            doubles(self._packed),
-            self._packed.shape[1],
-            self._constants,
-            doubles(self._coordinates),
-            self._rows.shape[1],
-            integers(self._rows),
+        """What the loop over the cells is about."""
+        self._arrays = (
+            *map(integers, (self._dofs, self._rows)),
+            *map(doubles, (self._packed, self._constants, self._coordinates)),
+        )
+        dofs, row, packed, constants, coordinates = self._arrays
+        self.cells = ffi.new(
+            "cells *",
+            {
+                "tabulate": tabulator(self.compiled),
+                "number": len(self._dofs),
+                "of_cell": self._dofs.shape[1],
+                "unknowns": self._unknowns,
+                "dofs": dofs,
+                "at": self._at,
+                "width": self._packed.shape[1],
+                "w": packed,
+                "constants": constants,
+                "coordinates": coordinates,
+                "rows": self._rows.shape[1],
+                "row": row,
+            },
         )
 
     def depends_on(self, function: fem.Function) -> bool:
@@ -89,8 +101,7 @@ class Kernel:
     def set(self, function: fem.Function, q: Array) -> None:
         """Give ``function`` the degrees of freedom ``q``, if it appears in the form."""
         if self.depends_on(function):
-            at = self._columns[function].start
-            lib.set_cells(*self._cells, doubles(q), at, *self._middle[1:3])
+            lib.set_cells(self.cells, doubles(q), self._columns[function].start)
 
     def put(self, function: fem.Function, values: Array) -> None:
         """Give ``function`` other values in the cells; shape (num_cells, dofs per cell)."""
@@ -116,11 +127,7 @@ class Kernel:
 
     def add(self, q: Array, b: Array) -> None:
         """Add the form at the unknown ``q`` to a vector, or to the entries of the matrix."""
-        lib.cells_vector(*self._head, doubles(q), *self._middle, doubles(b))
-
-    def arguments(self) -> tuple[Any, ...]:
-        """What the loop over the cells needs besides unknowns and result; while nothing is set."""
-        return (*self._head, *self._middle)
+        lib.add_cells(self.cells, doubles(q), doubles(b))
 
     def value(self, q: Array) -> float:
         """Value of the functional at the unknown ``q``."""

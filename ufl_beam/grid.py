@@ -132,6 +132,12 @@ class Grid:
         Raises:
             SceneError: The beam of the place is not in the scene.
         """
+        cell, part = self._cell_and_part(place)
+        first, *between, last = self.mesh.weights(part)
+        return self.nodes_of_cells[cell], np.array([first, last, *between])
+
+    def _cell_and_part(self, place: Place) -> tuple[int, float]:
+        """The cell at a place, and the part of it that lies before the place."""
         require_kind(place, Place, "place")
         if place.beam not in self._number_of_beam:
             raise SceneError(f"{place}: {place.beam.name} is not in the scene")
@@ -139,8 +145,7 @@ class Grid:
         s = self._parameters[i]
         left = min(max(bisect_left(s, place.s) - 1, 0), len(s) - 2)
         part = (place.s - s[left]) / (s[left + 1] - s[left])
-        first, *between, last = self.mesh.weights(part)
-        return self.nodes_of_cells[self._first[i] - i + left], np.array([first, last, *between])
+        return int(self._first[i]) - i + left, float(part)
 
     def node(self, anchor: Anchor) -> Index:
         """Degrees of freedom of what an anchor that has a vertex, or a body, moves with; (3,).
@@ -165,13 +170,12 @@ class Grid:
 
     def vertex(self, place: Place) -> int:
         """The vertex at a place that something is attached to."""
-        nodes, weights = self.weights(place)
-        return int(nodes[weights.argmax()])
+        cell, part = self._cell_and_part(place)
+        return int(self.cells[cell, round(part)])
 
     def cell(self, place: Place) -> int:
         """The cell at a place; at a vertex the one before it, at the start the first one."""
-        (first, *_), _ = self.weights(place)
-        return int(first) - self._index(place.beam)
+        return self._cell_and_part(place)[0]
 
     def middle(self, cell: int) -> Place:
         """The place in the middle of a cell."""
@@ -248,9 +252,10 @@ class Grid:
             slots[3 * at(one) + component] = same
             shared[same] = True
         kept = slots == np.arange(len(slots))
-        along = [self.nodes_along(beam) for beam in self.scene.beams]
-        rows = np.concatenate([*along, np.arange(nodes, nodes + len(movers))]).astype(np.int64)
-        ordered = (3 * rows[:, None] + np.arange(3)).ravel()
+        inner = self.nodes_of_cells[:, 2:]
+        position = np.arange(nodes + len(movers), dtype=np.float64)
+        position[inner] = self.cells[:, :1] + self.mesh.nodes[1:-1]
+        ordered = (3 * np.argsort(position)[:, None] + np.arange(3)).ravel()
         order = np.concatenate([ordered[(kept & of)[ordered]] for of in (~shared, shared)])
         number = np.empty(len(slots), dtype=np.int64)
         number[order] = np.arange(len(order))

@@ -9,12 +9,12 @@ import numpy as np
 from ufl_beam.beams import Curve
 from ufl_beam.compat import Array
 from ufl_beam.connectors import Guide
+from ufl_beam.errors import StepFailed
 from ufl_beam.grid import Index, Share
 from ufl_beam.links import Links
 from ufl_beam.memory import Memory
 from ufl_beam.responses import Setting
 from ufl_beam.schemes import Step
-from ufl_beam.solve import StepFailed
 from ufl_beam.sparse import Csr
 
 PROJECTIONS = 50
@@ -118,6 +118,9 @@ class Guides(Links):
         """Begin at the points of the last step."""
         self._s = self._s0.copy()
 
+    def loops(self) -> None:
+        """None."""
+
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the forces, and the distances."""
         distance, _, m, _ = self._frames(q1)
@@ -136,7 +139,10 @@ class Guides(Links):
             for j in range(2):
                 np.add.at(data, self._stiff[2 * k + j], λ * dm[:, k, j])
 
-    def excess(self, r: Array, force: float) -> float:
+    def demand(self) -> None:
+        """None."""
+
+    def excess(self, q: Array, r: Array, force: float) -> float:
         """Largest distance, as a part of 1 % of the scene."""
         round_off = 8 * np.spacing(self._size + np.abs(self._points + self._on0).max(axis=1))
         missed = np.maximum(np.abs(r[self._forces_at]) - round_off, 0.0)

@@ -12,7 +12,7 @@ from ufl_beam.grid import Grid, Index
 from ufl_beam.kinematics import strain
 from ufl_beam.laws import Layout
 from ufl_beam.ledger import Ledger
-from ufl_beam.loops import doubles, lib
+from ufl_beam.loops import Loop, doubles, ffi, lib, loop
 from ufl_beam.memory import Memory
 from ufl_beam.points import INPUTS, Course, Points
 from ufl_beam.schemes import Scheme, Step
@@ -106,17 +106,13 @@ class InelasticBeams:
         self._force, self._tangent = (fields.kernel(form, q1) for form in (work, tangent))
         self._tangent.share(self._force)
         self._tangent.place(A)
-        points, (to_b, width), (to_D, _) = self.points, *map(self._force.pointer, (b, D))
-        self._to_linearise = (
-            *(cells, doubles(points.strains), doubles(points.r), doubles(points.D)),
-            *(to_b, to_D, width),
-        )
         self._latest: Array = np.full(fields.share.size, np.nan)
-        self._to_respond = (
-            *(len(self._latest), doubles(self._latest), *self._strains.kernel.arguments()),
-            *(doubles(points.strains), *points.to_respond, to_b, to_D, width),
-        )
-        self._begins = False
+        self._in_c = c = ffi.new("inelastic *")
+        c.points, c.strains = self.points.points, self._strains.kernel.cells
+        c.force, c.tangent = self._force.cells, self._tangent.cells
+        (c.b, c.width), (c.D, _) = self._force.pointer(b), self._force.pointer(D)
+        self._at_latest = doubles(self._latest)
+        c.size, c.latest = len(self._latest), self._at_latest
         self._q: Array = np.empty(0)
 
     # -- the step ------------------------------------------------------------------------------
@@ -129,26 +125,24 @@ class InelasticBeams:
             self.points.start(self._strains(step.q0))
         self.points.begin(step.dt)
         self._latest.fill(np.nan)
-        self._begins = not self._scheme.dynamic
+        self._in_c.begins = not self._scheme.dynamic
 
     def _respond(self, q1: Array) -> None:
         """Resultants at ``q1`` and their derivatives, into the form."""
-        lib.respond_at(doubles(q1), *self._to_respond)
+        lib.respond_at(self._in_c, doubles(q1))
+
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """The points, and two forms."""
+        functions = ("add_inelastic_force", "add_inelastic_tangent")
+        return loop(functions[0], self._in_c), loop(functions[1], self._in_c)
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the internal forces."""
-        self._respond(q1)
-        self._force.add(q1, r)
+        lib.add_inelastic_force(self._in_c, doubles(q1), doubles(r))
 
     def add_tangent(self, q1: Array) -> None:
         """Add the stiffness, material and geometric; see :class:`ElasticBeams`."""
-        self._respond(q1)
-        if self._begins:
-            self.points.r[:] = self.points.kept[:, :3]
-            lib.linearise(*self._to_linearise)
-            self._latest.fill(np.nan)
-        self._tangent.add(q1, self._A.data)
-        self._begins = False
+        lib.add_inelastic_tangent(self._in_c, doubles(q1), doubles(self._A.data))
 
     def change(self, q1: Array) -> float:
         """Energy that cells of this process store and dissipate in the step to ``q1``; J."""

@@ -5,7 +5,7 @@ but the one that the arguments live on.  The letters are the paper's; P(n) is it
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import accumulate, pairwise
 
 import ufl
@@ -18,7 +18,7 @@ class Axis:
     Args:
         mesh: Their mesh.
         nodes: Where in a cell, from 0 to 1, the nodes of configurations are; ascending.
-        X: From 0 to 1 along each cell; only more than two nodes need it.
+        X: From 0 to 1 along each cell; by default the point is in the middle.
 
     Attributes:
         nodes: As given.
@@ -28,9 +28,7 @@ class Axis:
         h: Length of the cell; m.
     """
 
-    def __init__(
-        self, mesh: ufl.Mesh, nodes: Sequence[float] = (0.0, 1.0), X: Expr | None = None
-    ) -> None:
+    def __init__(self, mesh: ufl.Mesh, nodes: Iterable[float] = (0.0, 1.0), X: Expr = 0.5) -> None:
         self.nodes, self.X = [float(a) for a in nodes], X
         J = ufl.Jacobian(mesh)
         self.h = ufl.sqrt(J[0, 0] ** 2 + J[1, 0] ** 2)
@@ -117,13 +115,17 @@ def virtual_strain(q: Expr, w: Expr, axis: Axis) -> Expr:
     return ufl.as_vector([w_Σ, w_Γ, axis.d(w_ψ)])
 
 
-def over_tan(x: Expr) -> Expr:
-    """X / tan x, smooth at zero: the series below 1e-2 has a remainder under 1e-18."""
+def _sinc(x: Expr) -> Expr:
+    """Sin x / x, smooth at zero: the series below 1e-2 has a remainder under 1e-18."""
     x2 = x**2
-    series = 1 - x2 / 3 * (1 + x2 / 15 * (1 + x2 * 2 / 21 * (1 + x2 / 10)))
+    series = 1 - x2 / 6 * (1 - x2 / 20 * (1 - x2 / 42))
     small = ufl.lt(x2, 1e-4)
-    safe = ufl.conditional(small, 1.0, x)
-    return ufl.conditional(small, series, safe * ufl.cos(safe) / ufl.sin(safe))
+    return ufl.conditional(small, series, ufl.sin(x) / ufl.conditional(small, 1.0, x))
+
+
+def over_tan(x: Expr) -> Expr:
+    """X / tan x, smooth at zero."""
+    return ufl.cos(x) / _sinc(x)
 
 
 def virtual_strain_over_step(q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
@@ -150,47 +152,50 @@ def virtual_strain_over_step(q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
     """
     (u0, ψ0), (u1, ψ1), (w_u, w_ψ) = split(q0), split(q1), split(w)
     turn_over_step = _turn_of_two_nodes if len(axis.nodes) == 2 else _turn_of_nodes
-    w_turn, w_K = turn_over_step((ψ1 - ψ0) / 2, w_ψ, axis)
+    w_turn, w_K = turn_over_step(ψ0, ψ1, w_ψ, axis)
     φ_m = axis.t0 + axis.d((u0 + u1) / 2)
     a = axis.d(w_u) - turn(φ_m) * w_turn
     # The mean of both frames is cos δ times the frame of the mean rotation.
-    (Σ0, Γ0), (Σ1, Γ1) = _pull_back(a, ψ0, axis), _pull_back(a, ψ1, axis)
-    w_Σ, w_Γ = (Σ0 + Σ1) / 2, (Γ0 + Γ1) / 2
+    along, across = ufl.dot(a, axis.t0), ufl.dot(a, axis.n0)
+    cos_m, sin_m = ((f(ψ0) + f(ψ1)) / 2 for f in (ufl.cos, ufl.sin))
+    w_Σ, w_Γ = cos_m * along + sin_m * across, cos_m * across - sin_m * along
     return ufl.as_vector([w_Σ, w_Γ, w_K])  # P(82)!
 
 
-def _turn_of_two_nodes(δ: Expr, w: Expr, axis: Axis) -> tuple[Expr, Expr]:
+def _turn_of_two_nodes(ψ0: Expr, ψ1: Expr, w: Expr, axis: Axis) -> tuple[Expr, Expr]:
     """:func:`_turn_of_nodes` in the middle of a cell with two nodes, where it is short."""
     # Half the increments of rotation at both nodes of the cell are δ - e and δ + e.
-    e = axis.h / 2 * axis.d(δ)
-    tan_δ, tan_e = ufl.sin(δ) / ufl.cos(δ), ufl.sin(e) / ufl.cos(e)
+    e = axis.h / 4 * axis.d(ψ1 - ψ0)
+    sinc_e, cos_e = _sinc(e), ufl.cos(e)
+    tan_e = e * sinc_e / cos_e
+    # Of 2 δ = ψ1 - ψ0 no functions are needed but those of the frames.
+    cos_0, sin_0, cos_1, sin_1 = ufl.cos(ψ0), ufl.sin(ψ0), ufl.cos(ψ1), ufl.sin(ψ1)
+    cos_δ_2 = (1 + cos_0 * cos_1 + sin_0 * sin_1) / 2
+    tan_δ = (sin_1 * cos_0 - cos_1 * sin_0) / (2 * cos_δ_2)
     shift = -tan_δ * tan_e / 2
-    stretch = (1 - tan_δ**2 * tan_e**2) / (1 + tan_δ**2) * over_tan(e)
+    stretch = (cos_δ_2 - (1 - cos_δ_2) * tan_e**2) * cos_e / sinc_e
     return w + shift * axis.h * axis.d(w), stretch * axis.d(w)
 
 
-def _turn_of_nodes(δ: Expr, w: Expr, axis: Axis) -> tuple[Expr, Expr]:
+def _turn_of_nodes(ψ0: Expr, ψ1: Expr, w: Expr, axis: Axis) -> tuple[Expr, Expr]:
     """Virtual rotation and curvature at a point: 2 tan δ and 2 δ' if w is 2 tan δ at the nodes.
 
     Both are linear in w, and a uniform w is that rotation, and no curvature; docs/errata.md.
 
     Args:
-        δ: Half the increment of the rotation.
+        ψ0: Rotation at the beginning of the step.
+        ψ1: Rotation at its end; 2 δ is the difference.
         w: Virtual rotation.
         axis: Undeformed axis.
     """
+    δ = (ψ1 - ψ0) / 2
     nodes, virtual = axis.at_nodes(δ), axis.at_nodes(w)
     # Differences of 2 tan δ between neighbours are made differences of 2 δ.
     steps = [
-        _over_sin(b - a) * ufl.cos(a) * ufl.cos(b) * (w_b - w_a)
+        ufl.cos(a) * ufl.cos(b) / _sinc(b - a) * (w_b - w_a)
         for (a, b), (w_a, w_b) in zip(pairwise(nodes), pairwise(virtual), strict=True)
     ]
     y, w_K = axis.interpolate([0, *accumulate(steps)])
     ends = ((nodes[0], virtual[0], y), (nodes[-1], virtual[-1], y - sum(steps, 0)))
-    turns = [w_a + y_a / (_over_sin(δ - a) * ufl.cos(a) * ufl.cos(δ)) for a, w_a, y_a in ends]
+    turns = [w_a + y_a * _sinc(δ - a) / (ufl.cos(a) * ufl.cos(δ)) for a, w_a, y_a in ends]
     return sum(turns, 0) / 2, w_K
-
-
-def _over_sin(x: Expr) -> Expr:
-    """X / sin x, smooth at zero."""
-    return over_tan(x / 2) / ufl.cos(x / 2) ** 2

@@ -62,7 +62,7 @@ class _Standstill(Static):
 
     def rates(self, dt: float, s: Array, rates: Rates) -> tuple[Array, ...]:
         """Velocities are differences over ``dt``."""
-        return (s / dt,)
+        return (np.asarray(s / dt),)
 
     def slip(self, dt: float, change: Array, rates: Rates) -> Array:
         """None."""

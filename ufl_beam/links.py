@@ -31,9 +31,14 @@ class Links:
         self._dofs = share.link_dofs[here].astype(np.int32)
         self._forces_at = self._dofs[:, 6]
         self._A = A
+        self._before: Array = np.zeros(len(self.links))
         self.work: Array = np.zeros(len(self.links))
         self.rate: Array = np.zeros(len(self.links))
 
     def force(self, q: Array) -> Array:
         """Forces that resist the growth of the motions; (num_links,); N or N m."""
         return q[self._forces_at]
+
+    def take(self, q: Array) -> None:
+        """Take the forces in ``q`` as those before the next step."""
+        self._before[:] = self.force(q)

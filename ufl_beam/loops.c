@@ -1,35 +1,45 @@
-/* The loops over cells and rows that a Newton iteration consists of; see loops.py.
- *
- * w holds the packed coefficients of a cell, `width` of them, of which those from `at` on are the
- * unknowns q of the cell; they are brought up to date on the way.
- */
-#include <float.h>
-#include <math.h>
-#include <stdint.h>
-#include <string.h>
+/* The loops over cells and rows that a Newton iteration consists of; see loops.h. */
 
 enum { MOST = 144 }; /* entries of an element vector or matrix: 12 unknowns of degree 3 */
 
 /* The values q of the cells into their packed coefficients, from `at` on. */
-void set_cells(int cells, int dofs_per_cell, const int32_t *dofs, const double *q, int at,
-               double *w, int width)
+void set_cells(const cells *c, const double *q, int at)
 {
-  for (int c = 0; c < cells; ++c, dofs += dofs_per_cell, w += width)
-    for (int i = 0; i < dofs_per_cell; ++i) w[at + i] = q[dofs[i]];
+  const int32_t *dofs = c->dofs;
+  double *w = c->w + at;
+  for (int k = 0; k < c->number; ++k, dofs += c->of_cell, w += c->width)
+    for (int i = 0; i < c->of_cell; ++i) w[i] = q[dofs[i]];
 }
 
-void cells_vector(kernel *tabulate, int cells, int dofs_per_cell, const int32_t *dofs,
-                  const double *q, int at, double *w, int width, const double *constants,
-                  const double *coordinates, int rows, const int32_t *row, double *b)
+/* Add the form at the unknowns q to a vector, or to the entries of a matrix. */
+void add_cells(void *self, const double *q, double *b)
 {
-  double e[MOST];
-  for (int c = 0; c < cells; ++c) {
-    for (int i = 0; i < dofs_per_cell; ++i) w[at + i] = q[dofs[i]];
-    memset(e, 0, rows * sizeof *e);
-    CALL(tabulate, e, w, constants, coordinates);
-    for (int i = 0; i < rows; ++i) b[row[i]] += e[i];
-    dofs += dofs_per_cell, w += width, coordinates += 6, row += rows;
+  const cells *c = self;
+  const int32_t *dofs = c->dofs, *row = c->row;
+  const double *coordinates = c->coordinates;
+  double *w = c->w, e[MOST];
+  for (int k = 0; k < c->number; ++k) {
+    for (int i = 0; i < c->unknowns; ++i) w[c->at + i] = q[dofs[i]];
+    memset(e, 0, c->rows * sizeof *e);
+    CALL(c->tabulate, e, w, c->constants, coordinates);
+    for (int i = 0; i < c->rows; ++i) b[row[i]] += e[i];
+    dofs += c->of_cell, w += c->width, coordinates += 6, row += c->rows;
   }
+}
+
+/* The same of one form at the first call of a step, and of another one then. */
+void add_first_cells(void *self, const double *q, double *b)
+{
+  first_cells *f = self;
+  add_cells((void *)(f->begins ? f->first : f->then), q, b);
+  f->begins = 0;
+}
+
+/* b -= a */
+void subtract_vector(void *self, const double *q, double *b)
+{
+  const vector *a = self;
+  for (int i = 0; i < a->size; ++i) b[i] -= a->values[i];
 }
 
 /* y += A x */
@@ -67,36 +77,35 @@ double step_of_nodes(int size, int rotations, const int32_t *rotation, double *s
   return largest;
 }
 
-/* r += A (factor s - back v), where s, of which only the space is given, is the step of the nodes */
-void add_step_product(int size, const int32_t *indptr, const int32_t *indices, const double *data,
-                      double factor, double back, const double *v, int rotations,
-                      const int32_t *rotation, double *s, const double *q0, const double *q1,
-                      double *r)
+/* r += A (factor s - back v), where s is the step of the nodes from q0 to q */
+void add_step_force(void *self, const double *q, double *r)
 {
-  step_of_nodes(size, rotations, rotation, s, q0, q1);
-  for (int i = 0; i < size; ++i) s[i] = factor * s[i] - back * v[i];
-  add_product(size, indptr, indices, data, s, r);
+  const step_product *p = self;
+  double *s = p->space;
+  step_of_nodes(p->size, p->rotations, p->rotation, s, p->q0, q);
+  for (int i = 0; i < p->size; ++i) s[i] = p->factor * s[i] - p->back * p->v[i];
+  add_product(p->size, p->indptr, p->indices, p->data, s, r);
 }
 
-/* tangent += A, column by column times the derivative 1 + half^2 of the step of the nodes */
-void add_step_tangent(int entries, const int32_t *entry, const int32_t *column, const double *data,
-                      int size, int rotations, const int32_t *rotation, double *half,
-                      const double *q0, const double *q1, double *tangent)
+/* tangent += factor A, column by column times the derivative 1 + half^2 of the step of the nodes */
+void add_step_tangent(void *self, const double *q, double *tangent)
 {
-  memset(half, 0, size * sizeof *half);
-  for (int k = 0; k < rotations; ++k)
-    half[rotation[k]] = tan((q1[rotation[k]] - q0[rotation[k]]) / 2);
-  for (int k = 0; k < entries; ++k) {
-    double h = half[column[k]];
-    tangent[entry[k]] = tangent[entry[k]] + data[k] + data[k] * h * h;
+  const step_product *p = self;
+  double *growth = p->space;
+  for (int i = 0; i < p->size; ++i) growth[i] = p->factor;
+  for (int k = 0; k < p->rotations; ++k) {
+    double half = tan((q[p->rotation[k]] - p->q0[p->rotation[k]]) / 2);
+    growth[p->rotation[k]] += p->factor * half * half;
   }
+  for (int k = 0; k < p->indptr[p->size]; ++k)
+    tangent[p->entry[k]] += p->data[k] * growth[p->indices[k]];
 }
 
-/* sum of w f^2 */
-double weighted_square(int rows, const double *w, const double *f)
+/* sum of w (f / unit)^2 */
+double weighted_square(int rows, const double *w, const double *f, double unit)
 {
-  double sum = 0;
-  for (int i = 0; i < rows; ++i) sum += w[i] * f[i] * f[i];
+  double sum = 0, per = 1 / unit;
+  for (int i = 0; i < rows; ++i) sum += w[i] * (f[i] * per) * (f[i] * per);
   if (sum == 0)
     for (int i = 0; i < rows; ++i)
       if (w[i] * f[i] != 0) return 5e-324; /* the squares are too small for a number */
@@ -160,68 +169,159 @@ static double growth(kernel *excess, double *w)
  * with their elastic stiffness. Where one opens, those around it unload, which their own tangents
  * do not tell, and Newton's method would close what it just opened, again and again.
  */
-void respond(int32_t *course, kernel *bulk, kernel *opening, kernel *excess, int points, const double *B,
-             const double *weight, const double *rest, double theta, const double *e0,
-             double *w, double *r, double *D, int cells, const double *e1)
+void respond(const points *p)
 {
-  double s[2];
-  for (int c = 0; c < cells; ++c, e0 += 3, e1 += 3, r += 3, D += 9) {
+  double s[2], *w = p->w, *r = p->r, *D = p->D;
+  const double *e0 = p->e0, *e1 = p->e1;
+  for (int c = 0; c < p->cells; ++c, e0 += 3, e1 += 3, r += 3, D += 9) {
     memset(D, 0, 9 * sizeof *D);
     for (int k = 0; k < 3; ++k) {
-      r[k] = rest[k] * ((1 - theta) * e0[k] + theta * e1[k]);
-      D[4 * k] = rest[k] * theta;
+      r[k] = p->rest[k] * ((1 - p->theta) * e0[k] + p->theta * e1[k]);
+      D[4 * k] = p->rest[k] * p->theta;
     }
-    for (int i = 0; i < points; ++i, w += WIDTH) {
-      const double *b = B + 3 * i;
+    for (int i = 0; i < p->of_cell; ++i, w += WIDTH) {
+      const double *b = p->B + 3 * i;
       w[STRAIN] = b[0] * e1[0] + b[1] * e1[1] + b[2] * e1[2];
       w[GROWTH] = w[DIRECTION] = 0;
-      ask(bulk, w, 2, s);
+      ask(p->bulk, w, 2, s);
       if (fabs(s[0]) > w[TRACTION]) { /* P(51) */
         w[DIRECTION] = s[0] < 0 ? -1 : 1;
-        w[GROWTH] = growth(excess, w);
-        ask(opening, w, 2, s);
-        course[OPENED] = 1;
-      } else if (course[RELIEF]) {
-        s[1] = theta * w[STIFFNESS];
+        w[GROWTH] = growth(p->excess, w);
+        ask(p->opening, w, 2, s);
+        p->course[OPENED] = 1;
+      } else if (p->course[RELIEF]) {
+        s[1] = p->theta * w[STIFFNESS];
       }
       for (int k = 0; k < 3; ++k) {
-        r[k] += weight[i] * s[0] * b[k];
-        for (int l = 0; l < 3; ++l) D[3 * k + l] += weight[i] * s[1] * b[k] * b[l];
+        r[k] += p->weight[i] * s[0] * b[k];
+        for (int l = 0; l < 3; ++l) D[3 * k + l] += p->weight[i] * s[1] * b[k] * b[l];
       }
     }
   }
 }
 
-/* Resultants as affine functions b + D e of the strains, into the packed values of cells. */
-void linearise(int cells, const double *e, const double *r, const double *D, double *b,
-               double *packed_D, int width)
+/* Resultants as affine functions b + D e of the strains, into the packed values of the cells. */
+static void linearise(const inelastic *m)
 {
-  for (int c = 0; c < cells; ++c, e += 3, r += 3, D += 9, b += width, packed_D += width) {
+  const points *p = m->points;
+  const double *e = p->e1, *r = p->r, *D = p->D;
+  double *b = m->b, *packed = m->D;
+  for (int c = 0; c < p->cells; ++c, e += 3, r += 3, D += 9, b += m->width, packed += m->width) {
     for (int k = 0; k < 3; ++k)
       b[k] = r[k] - D[3 * k] * e[0] - D[3 * k + 1] * e[1] - D[3 * k + 2] * e[2];
-    memcpy(packed_D, D, 9 * sizeof *D);
+    memcpy(packed, D, 9 * sizeof *D);
   }
 }
 
 /* Resultants as affine functions of the strains, at q; nothing is to do if q is the latest.
  *
- * First what the strains at q are computed with, then what responds to them, then where it goes.
+ * First the strains at q, then what responds to them, then where it goes.
  */
-void respond_at(const double *q, int size, double *latest,
-                kernel *strain, int cells, int dofs_per_cell, const int32_t *dofs, int at,
-                double *values, int values_width, const double *constants,
-                const double *coordinates, int rows, const int32_t *row, double *e1,
-                int32_t *course, kernel *bulk, kernel *opening, kernel *excess, int points, const double *B,
-                const double *weight, const double *rest, double theta, const double *e0,
-                double *w, double *r, double *D, double *b, double *packed_D, int width)
+void respond_at(const inelastic *m, const double *q)
 {
-  if (!memcmp(q, latest, size * sizeof *q)) return;
-  memcpy(latest, q, size * sizeof *q);
-  memset(e1, 0, 3 * cells * sizeof *e1);
-  cells_vector(strain, cells, dofs_per_cell, dofs, q, at, values, values_width, constants,
-               coordinates, rows, row, e1);
-  respond(course, bulk, opening, excess, points, B, weight, rest, theta, e0, w, r, D, cells, e1);
-  linearise(cells, e1, r, D, b, packed_D, width);
+  const points *p = m->points;
+  if (!memcmp(q, m->latest, m->size * sizeof *q)) return;
+  memcpy(m->latest, q, m->size * sizeof *q);
+  memset(p->e1, 0, 3 * p->cells * sizeof *p->e1);
+  add_cells((void *)m->strains, q, p->e1);
+  respond(p);
+  linearise(m);
+}
+
+void add_inelastic_force(void *self, const double *q, double *r)
+{
+  const inelastic *m = self;
+  respond_at(m, q);
+  add_cells((void *)m->force, q, r);
+}
+
+/* The first tangent of a static step is of the forces before it, see terms.py. */
+void add_inelastic_tangent(void *self, const double *q, double *tangent)
+{
+  inelastic *m = self;
+  const points *p = m->points;
+  respond_at(m, q);
+  if (m->begins) {
+    for (int c = 0; c < p->cells; ++c) memcpy(p->r + 3 * c, p->kept + 6 * c, 3 * sizeof *p->r);
+    linearise(m);
+    m->latest[0] = NAN;
+  }
+  add_cells((void *)m->tangent, q, tangent);
+  m->begins = 0;
+}
+
+/* -- connectors -------------------------------------------------------------------------------- */
+
+/* Motions of the links at q. */
+void find_motions(const couplings *c, const double *q)
+{
+  memset(c->by_cell, 0, c->number * sizeof *c->by_cell);
+  add_cells((void *)c->motion, q, c->by_cell);
+  for (int k = 0; k < c->number; ++k) c->e1[c->link[k]] = c->by_cell[k];
+}
+
+/* The laws of springs around their motions at q. */
+static void set_rows(const couplings *c, const double *q)
+{
+  const points *p = c->points;
+  if (!p) return;
+  find_motions(c, q);
+  for (int i = 0; i < c->number; ++i) p->e1[3 * i] = c->e1[i];
+  respond(p);
+  for (int k = 0; k < c->number; ++k) {
+    const int i = c->link[k];
+    const double D = p->D[9 * i], row[3] = {-D, 1, p->r[3 * i] - D * c->e1[i]};
+    memcpy(c->row + k * c->width, row, sizeof row);
+    memcpy(c->row_of_tangent + k * c->width_of_tangent, row, sizeof row);
+  }
+}
+
+void add_couplings_force(void *self, const double *q, double *r)
+{
+  const couplings *c = self;
+  set_rows(c, q);
+  add_cells((void *)c->work, q, r);
+}
+
+/* Largest residual of a row: of motions as a part of 1 % of the scene, or of the scale of forces. */
+double missed_by_couplings(void *self, const double *q, const double *r, double scale)
+{
+  const couplings *c = self;
+  const double force = scale > 0 ? scale : 1;
+  double most = 0;
+  for (int k = 0; k < c->number; ++k) {
+    const int i = c->link[k];
+    const int32_t *dofs = c->dofs + 7 * i;
+    const double *row = c->row + k * c->width, length = c->length[i];
+    const double size = fabs(row[1]) < 1 ? 0.01 * length : force * c->size / length;
+    /* Far from where it began, or after many turns, a part has fewer digits left. */
+    double moved = 0, turned = 0;
+    for (int j = 0; j < 4; ++j) moved = fmax(moved, fabs(q[dofs[j]]));
+    for (int j = 4; j < 6; ++j) turned = fmax(turned, fabs(q[dofs[j]]));
+    const double far = 1 + moved / c->size + turned;
+    const double round_off = 8 * fabs(row[0]) * length * (nextafter(far, INFINITY) - far);
+    const double missed = fmax(fabs(r[c->force[i]]) - round_off, 0) / size;
+    if (!(missed <= most)) most = missed;
+  }
+  return most;
+}
+
+/* Take the end of the step as the new state; what all have taken in it. */
+double commit_couplings(const couplings *c, const double *q, double dt)
+{
+  const double a = c->weight_of_before;
+  double sum = 0;
+  find_motions(c, q);
+  for (int i = 0; i < c->number; ++i) {
+    const double f = q[c->force[i]], change = c->e1[i] - c->e0[i];
+    const double work = (a * c->before[i] + (1 - a) * f) * change;
+    c->taken[i] += work;
+    c->rate[i] = change / dt;
+    c->before[i] = f;
+    c->e0[i] = c->e1[i];
+    sum += work;
+  }
+  return sum;
 }
 
 /* Take the end of the step as the new state.
@@ -230,13 +330,12 @@ void respond_at(const double *q, int size, double *latest,
  * strains and by discontinuities; sum gets what all cells dissipated so in the step, what they lost
  * numerically at theta = 1, and what they store elastically and by hardening.
  */
-void commit(kernel *end, int cells, int points, const double *B, const double *weight,
-            const double *rest, const double *length, double *e0, const double *e1,
-            double *w, double *kept, double *sum)
+void commit(const points *p)
 {
-  double s[SAID];
+  double s[SAID], *e0 = p->e0, *w = p->w, *kept = p->kept, *sum = p->sum;
+  const double *e1 = p->e1, *rest = p->rest, *length = p->length, *weight = p->weight;
   memset(sum, 0, 5 * sizeof *sum);
-  for (int c = 0; c < cells; ++c, e0 += 3, e1 += 3, kept += 6) {
+  for (int c = 0; c < p->cells; ++c, e0 += 3, e1 += 3, kept += 6) {
     double plastic = 0, broken = 0;
     for (int k = 0; k < 3; ++k) {
       double change = e1[k] - e0[k];
@@ -245,9 +344,9 @@ void commit(kernel *end, int cells, int points, const double *B, const double *w
       sum[3] += rest[k] * e1[k] * e1[k] / 2 * length[c];
       e0[k] = e1[k];
     }
-    for (int i = 0; i < points; ++i, w += WIDTH) {
+    for (int i = 0; i < p->of_cell; ++i, w += WIDTH) {
       double volume = weight[i] * length[c];
-      ask(end, w, SAID, s);
+      ask(p->end, w, SAID, s);
       w[BEFORE] = w[STRAIN];
       w[PLASTIC] += s[FLOW];
       w[ACCUMULATED] += fabs(s[FLOW]);
@@ -260,7 +359,7 @@ void commit(kernel *end, int cells, int points, const double *B, const double *w
       sum[2] += volume * s[LOST];
       sum[3] += volume * s[ELASTIC];
       sum[4] += volume * s[HARDENING];
-      for (int k = 0; k < 3; ++k) kept[k] += weight[i] * s[STRESS] * B[3 * i + k];
+      for (int k = 0; k < 3; ++k) kept[k] += weight[i] * s[STRESS] * p->B[3 * i + k];
     }
     kept[3] = w[JUMP - WIDTH];
     kept[4] += plastic;

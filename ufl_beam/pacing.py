@@ -13,8 +13,7 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.compat import Array
-from ufl_beam.errors import require_number, require_sequence
-from ufl_beam.solve import StepFailed
+from ufl_beam.errors import StepFailed, require_number, require_sequence
 
 if TYPE_CHECKING:
     from ufl_beam.simulation import Simulation, Trial

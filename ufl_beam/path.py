@@ -11,12 +11,12 @@ import numpy as np
 
 from ufl_beam.compat import Array
 from ufl_beam.couplings import Couplings
+from ufl_beam.errors import StepFailed
 from ufl_beam.grid import Share
 from ufl_beam.guides import Guides
 from ufl_beam.ledger import Ledger
 from ufl_beam.memory import Memory
 from ufl_beam.schemes import Scheme
-from ufl_beam.solve import StepFailed
 from ufl_beam.terms import Beams
 
 FAR = 1e3

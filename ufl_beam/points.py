@@ -152,7 +152,7 @@ class Points:
     Attributes:
         strains: Of the cells at the latest response; (cells, 3); may be written to.
         r, D: The latest response, see :meth:`respond`.
-        to_respond: What the loop over the cells needs, besides their number and strains.
+        points: What the loops over the points take, see loops.h.
         kept: By cell: (N, V, M) in the accepted state, the jump of the last point, and the energy
             dissipated by plastic strains and by discontinuities; (cells, 6); N, N m, rad or m, J.
         sums: Of all cells: dissipated in the last step by plastic strains, by discontinuities,
@@ -196,23 +196,17 @@ class Points:
             np.ascontiguousarray(x, dtype=np.float64)
             for x in (layout.strains, layout.weights, layout.rest)
         )
-        forms, section = self._forms, (n, doubles(B), doubles(weights), doubles(rest))
-        self._course = course
-        self.to_respond = (
-            *(
-                integers(course.flags),
-                forms.bulk,
-                forms.opening,
-                forms.excess,
-                *section,
-                scheme.theta,
-            ),
-            *map(doubles, (self._e0, storage, self.r, self.D)),
-        )
-        self._to_commit = (
-            *(forms.end, cells, *section, doubles(np.ascontiguousarray(length))),
-            *map(doubles, (self._e0, self.strains, storage, self.kept, self.sums)),
-        )
+        self._course, forms = course, self._forms
+        self._alive = [
+            *map(doubles, (B, weights, rest, np.ascontiguousarray(length))),
+            *map(doubles, (self._e0, self.strains, storage, self.r, self.D, self.kept, self.sums)),
+            integers(course.flags),
+        ]
+        self.points = c = ffi.new("points *")
+        c.B, c.weight, c.rest, c.length = self._alive[:4]
+        c.e0, c.e1, c.w, c.r, c.D, c.kept, c.sum, c.course = self._alive[4:]
+        c.bulk, c.opening, c.excess, c.end = forms.bulk, forms.opening, forms.excess, forms.end
+        c.cells, c.of_cell, c.theta = cells, n, scheme.theta
 
     def __getitem__(self, name: str) -> Array:
         """What is known of the points by the name of an input; a view; (cells, n)."""
@@ -244,12 +238,12 @@ class Points:
         They are not a number where an opening was not found.  The arrays are reused.
         """
         self.strains[:] = strains
-        lib.respond(*self.to_respond, len(strains), doubles(self.strains))
+        lib.respond(self.points)
         return self.r, self.D
 
     def accept(self) -> None:
         """Take the strains of the latest response as the new state."""
-        lib.commit(*self._to_commit)
+        lib.commit(self.points)
 
     def change(self) -> float:
         """Energy that :meth:`accept` would add to what is stored and dissipated; J."""
@@ -262,10 +256,15 @@ class Points:
 
     def _sums_to_come(self) -> Array:
         """What :meth:`accept` would make of :attr:`sums`."""
-        state = (self._e0, self.strains, self._storage, self.kept, self.sums)
-        copies = [x.copy() for x in state]
-        lib.commit(*self._to_commit[: -len(copies)], *map(doubles, copies))
-        return copies[-1]
+        copy = ffi.new("points *", self.points[0])
+        sums = np.empty_like(self.sums)
+        state = (self._e0, self._storage, self.kept)
+        copy.e0, copy.w, copy.kept, copy.sum = alive = [doubles(x.copy()) for x in state] + [
+            doubles(sums)
+        ]
+        lib.commit(copy)
+        del alive
+        return sums
 
     def freeze(self) -> None:
         """From now on nothing yields or opens further; hinges that bear nothing any more are free.

@@ -65,6 +65,10 @@ class Response(Protocol):
     steady: bool
     """Whether the rows stay the same during a step."""
 
+    @property
+    def points(self) -> Points | None:
+        """Points whose strains are the motions and whose stresses are the forces, if there are."""
+
     def begin(self, e0: Array, step: Step) -> None:
         """Begin a step at the motions ``e0``."""
 
@@ -103,6 +107,7 @@ class _Working:
     """What responses have in common that store nothing: the work of their forces is entered."""
 
     steady = False
+    points: Points | None = None
     _group = "lost"
     _entry = ""
     _sign = 1.0

@@ -53,8 +53,6 @@ class FrameForces:
 
     kind = "loads"
 
-    kind = "loads"
-
     def __init__(
         self, frame: RotatingFrame, fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr
     ) -> None:
@@ -82,6 +80,9 @@ class FrameForces:
         """Take the state ``q`` as one that is in equilibrium with the forces."""
         self._grown = 1.0
         self.force = self._before = self._pull(self._from_centre + q)
+
+    def loops(self) -> None:
+        """None."""
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Subtract the forces."""

@@ -16,7 +16,8 @@ from ufl_beam.couplings import couplings
 from ufl_beam.dampers import damping_forces
 from ufl_beam.differences import numerical_forces
 from ufl_beam.discretisation import Mesh
-from ufl_beam.errors import ConvergenceError, SceneError, require_kind
+from ufl_beam.equation import Equation
+from ufl_beam.errors import ConvergenceError, SceneError, StepFailed, require_kind
 from ufl_beam.fields import Fields
 from ufl_beam.grid import Grid, Share
 from ufl_beam.inelastic import InelasticBeams, inelastic_cells
@@ -40,7 +41,7 @@ from ufl_beam.rotating import FrameForces
 from ufl_beam.scene import Scene
 from ufl_beam.schemes import Scheme, Step, has_inertia
 from ufl_beam.solution import Solution
-from ufl_beam.solve import Border, Newton, Solver, StepFailed
+from ufl_beam.solve import Border, Newton, Solver
 from ufl_beam.sparse import Csr, Product, as_slice
 from ufl_beam.supports import Supports
 from ufl_beam.terms import KINDS, Beams, ElasticBeams, Inertia, Term
@@ -118,7 +119,9 @@ class Simulation(Live):
         comm = ours() if comm is None else comm
         require_kind(scene, Scene, "scene")
         if not isinstance(scheme, Scheme) or isinstance(scheme, type):
-            raise SceneError(f"scheme = {scheme!r} must be a scheme, such as Static() or Midpoint()")
+            raise SceneError(
+                f"scheme = {scheme!r} must be a scheme, such as Static() or Midpoint()"
+            )
         require_kind(newton or Newton(), Newton, "newton")
         if has_inertia(scheme):
             require_masses(scene)
@@ -158,6 +161,8 @@ class Simulation(Live):
         self._inner: list[Beams] = [*self.beams, *self.couplings]
         self.terms: list[Term] = [*self._inner, *self._others]
         self.supports = Supports(self.share, scheme, self.ledger, self._A)
+        if has_inertia(scheme):
+            self.supports.stop(self.inertia.v)
         if start is not None or (has_inertia(scheme) and scheme.kept):
             for load in self.loads:
                 load.carry_on(self.t, self.q)
@@ -165,8 +170,12 @@ class Simulation(Live):
             memory = Restoring(self.share, start.internal)
             for one in (*self.inelastic, *self.couplings):
                 one.remember(memory, NOWHERE)
-            if has_inertia(scheme) and self._goes_on(start):
-                self.inertia.remember(memory, self.q)
+            if "reactions" in start.internal:
+                self.supports.carry_on(memory, self.q)
+            if has_inertia(scheme) and start.scene is scene and start.times[-1] == t0:
+                # No force has changed since: accelerations are still what they were.
+                known = sum(name in start.internal for name in scheme.kept)
+                self.inertia.carry_on(memory, known)
         self._q_before: Array = self.q
         self.last_dt = math.inf
         self._asking = [
@@ -181,9 +190,14 @@ class Simulation(Live):
         if not scheme.dynamic:
             parts = (self.beams, self.couplings)
             self._path = StaticPath(self.share, scheme, *parts, self.ledger, self.q, t0)
+        equation = None
+        if self.share.comm.size == 1 and not self.supports.turned:
+            terms = (self.beams, self.couplings, self._others)
+            equation = Equation(self._A, *terms, self.supports, self.force)
         self._solver = Solver(
             self.share,
             self._A,
+            equation=equation,
             residual=self._residual,
             complete=self.supports.hold,
             tangent=self._tangent,
@@ -194,11 +208,6 @@ class Simulation(Live):
             newton=newton or Newton(),
         )
         self.solution = Solution(scene, self.grid)
-
-    def _goes_on(self, start: Solution) -> bool:
-        """Whether forces have not changed since, so that what a scheme keeps still holds."""
-        known = "further rates" in start.internal
-        return known and start.scene is self.scene and float(start.times[-1]) == self.t
 
     # -- building ------------------------------------------------------------------------------
 
@@ -254,9 +263,10 @@ class Simulation(Live):
         here = self._course.relieve()
         return self.share.comm.allreduce(here, op=MPI.LOR) if self.share.comm.size > 1 else here
 
-    def _excess(self, r: Array, scale: float) -> float:
+    def _excess(self, x: Array, r: Array, scale: float) -> float:
         """How far the laws of connectors are missed."""
-        here = max((c.excess(r, scale) for c in self.couplings), default=0.0)
+        q1 = self.supports.in_plane(x)
+        here = max((c.excess(q1, r, scale) for c in self.couplings), default=0.0)
         if self.share.comm.size > 1:
             return self.share.comm.allreduce(here, op=MPI.MAX) if self.scene.links else 0.0
         return here
@@ -346,7 +356,11 @@ class Simulation(Live):
             StepFailed: There is no equilibrium, or it is too far away.
         """
         if self._path is None and not self.inertia.ready:
-            self.inertia.prepare(self._attempt(self.t + FIRST * (t1 - self.t), t1).s)
+            first = self._attempt(self.t + FIRST * (t1 - self.t), t1)
+            self.inertia.prepare(first.s)
+            self.supports.take()
+            for coupling in self.couplings:
+                coupling.take(first.q1)
         return self._attempt(t1, end)
 
     def _attempt(self, t1: float, end: float | None) -> Trial:
@@ -359,7 +373,8 @@ class Simulation(Live):
         self.supports.enter(guess)
         self.supports.move(guess, self.supports.in_axes(self.q), step)
         try:
-            q1 = self._solver.solve(guess, [load.force for load in self.loads])
+            like_last = self.scheme.dynamic and math.isclose(step.dt, self.last_dt, rel_tol=1e-6)
+            q1 = self._solver.solve(guess, [load.force for load in self.loads], like_last)
         except StepFailed:
             if said := no_number(self.scene, (step.load_time, step.motion_time)):
                 raise StepFailed(said) from None
@@ -480,6 +495,10 @@ class Simulation(Live):
         memory = Saving(self.share)
         for one in (*self.inelastic, *self.couplings):
             one.remember(memory, self.q)
+        if self.supports.work:
+            self.supports.carry_on(memory, self.q)
+        if self._path is None:
+            self.inertia.carry_on(memory, len(self.inertia.more))
         solution.internal = memory.state()
 
     def state(self) -> State:

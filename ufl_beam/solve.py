@@ -15,17 +15,11 @@ import numpy as np
 
 from ufl_beam.compat import Array
 from ufl_beam.elimination import Elimination
-from ufl_beam.errors import SceneError, require_number
+from ufl_beam.equation import Demand, Equation
+from ufl_beam.errors import SceneError, StepFailed, require_number
 from ufl_beam.grid import Index, Share
-from ufl_beam.loops import doubles, ffi, lib
+from ufl_beam.loops import doubles, ffi, integers, lib
 from ufl_beam.sparse import Csr
-
-CONVERGED = int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE)
-AT_ROUND_OFF = int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS)
-ITERATING = int(PETSc.SNES.ConvergedReason.ITERATING)
-DIVERGED = int(PETSc.SNES.ConvergedReason.DIVERGED_DTOL)
-STALLED = int(PETSc.SNES.ConvergedReason.DIVERGED_LINE_SEARCH)
-SINGULAR = int(PETSc.SNES.ConvergedReason.DIVERGED_LINEAR_SOLVE)
 
 GOOD = int(PETSc.PC.FailedReason.NOERROR)
 BAD_PIVOT = int(PETSc.PC.FailedReason.FACTOR_NUMERIC_ZEROPIVOT)
@@ -53,8 +47,9 @@ PREFIX = "ub_"
 """Prefix of the PETSc options of the solver, as in ``-ub_snes_monitor``."""
 
 JOINTS_IN_NATURAL_ORDER = 60
-"""Up to this number of shared degrees of freedom PETSc alone is as fast as elimination along the
-beams, for 64 as for 32 768 cells: the order of the grid fills in next to nothing."""
+CELLS_IN_NATURAL_ORDER = 2000
+"""Up to these numbers of shared degrees of freedom and of cells PETSc alone is as fast as
+elimination along the beams, which Python calls: the order of the grid fills in next to nothing."""
 
 
 @dataclass(frozen=True)
@@ -64,31 +59,21 @@ class Newton:
     Args:
         rtol: Residual to be reached, as a part of the forces in the scene.
         max_iterations: Iterations before a step is cut.
+        modified: Keep the tangent, also from step to step, while residuals fall fast enough.  What
+            is saved grows with the number of cells; solutions end closer to ``rtol``.
         petsc: PETSc options without their prefix, such as ``{"snes_monitor": None}``; in
             ``PETSC_OPTIONS`` they have the prefix ``ub_``.
     """
 
     rtol: float = 1e-10
     max_iterations: int = 30
+    modified: bool = False
     petsc: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         require_number(self.rtol, "Newton: rtol", positive=True)
         if self.max_iterations < 1:
             raise SceneError(f"Newton: max_iterations = {self.max_iterations} must be at least 1")
-
-
-class StepFailed(Exception):
-    """No equilibrium was found for a step; the message says why.
-
-    Attributes:
-        residuals: What is left where it is largest in each beam, body and connector; N, moments
-            over the size of the scene.
-    """
-
-    def __init__(self, message: str) -> None:
-        super().__init__(message)
-        self.residuals: dict[str, float] = {}
 
 
 class Border(Protocol):
@@ -205,8 +190,9 @@ class Solver:
         tangent: Fills ``A`` at x: ``tangent(x)``.
         forces: Internal forces in the latest residual, one array during a solution; with the loads,
             the scale of convergence.
-        excess: Of a residual and the scale of forces: how far what connectors demand is missed,
-            as a number without dimension that must reach the tolerance too.
+        excess: Of an iterate, its residual and the scale of forces: how far what connectors demand
+            is missed, as a number without dimension that must reach the tolerance too.
+        equation: ``residual``, ``complete`` and ``tangent`` in C, on one process.
         held: Local degrees of freedom that supports hold; what stands for them in A means nothing.
         relieve: Makes tangents stiffer where that may help; says whether it can.
         newton: Tolerances.
@@ -221,10 +207,11 @@ class Solver:
         complete: Callable[[Array], None],
         tangent: Callable[[Array], None],
         forces: Callable[[], Array],
-        excess: Callable[[Array, float], float],
+        excess: Callable[[Array, Array, float], float],
         relieve: Callable[[], bool],
         held: Index,
         newton: Newton,
+        equation: Equation | None = None,
     ) -> None:
         self._share, self._A, self._newton = share, A, newton
         self._residual, self._complete, self._tangent = residual, complete, tangent
@@ -244,11 +231,30 @@ class Solver:
         self._r = self._view(self._f, writable=True)
         self._at_r = doubles(self._r)
         self._ksp = self._make_ksp()
+        self._equation = equation
+        self._course = self._make_course()
         self._snes = self._make_snes(FULL_STEPS)
         self.iterations = self._done = 0
-        self._last = self._best = math.inf
-        self._near, self._slow, self._patience = False, 0, 0
-        self._error: Exception | None = None
+        self._keeps = False
+        self._error: BaseException | None = None
+
+    def _make_course(self) -> Any:
+        """How far a solution is, for :func:`judge` in C; and what the test in C needs."""
+        c = ffi.new("equation *") if self._equation is None else self._equation.c
+        c.rtol, c.modified, c.rate = self._newton.rtol, self._newton.modified, math.inf
+        self._at_diagonal = integers(self._diagonal.astype(np.int32))
+        self._at_sizes = [*map(doubles, (self._lengths, self._moves, np.empty(self._share.size)))]
+        c.weight, c.residual, c.diagonal = self._norm[1], self._at_r, self._at_diagonal
+        c.lengths, c.moves, c.space = self._at_sizes
+        c.x = ffi.cast("void *", self._x.handle)
+        if self._equation is None:
+            self._demand = Demand(self._excess, self._share.size, self._note)
+            self._demands = ffi.new("demand[]", [self._demand.loop])
+            c.demands, c.demand = len(self._demands), self._demands
+        return c
+
+    def _note(self, error: BaseException) -> None:
+        self._error = self._error or error
 
     # -- vectors and the matrix ----------------------------------------------------------------
 
@@ -294,8 +300,9 @@ class Solver:
         factors = ksp.getPC()
         # Constraints make zeros on the diagonal, and PETSc does not exchange rows.
         package = "klu" if len(share.grid.multipliers) else "petsc"
-        many_joints = share.grid.num_shared > JOINTS_IN_NATURAL_ORDER
-        if self._parallel or many_joints:
+        # Cells with inner nodes have no chains to eliminate.
+        long = len(share.cells) > CELLS_IN_NATURAL_ORDER and share.grid.mesh.degree == 1
+        if self._parallel or long or share.grid.num_shared > JOINTS_IN_NATURAL_ORDER:
             factors.setType("python")
             factors.setPythonContext(ChainsFirst(share, self._A, package))
             return ksp
@@ -308,9 +315,12 @@ class Solver:
     def _make_snes(self, search: dict[str, Any]) -> PETSc.SNES:
         snes = PETSc.SNES().create(self._x.comm)
         snes.setOptionsPrefix(PREFIX)
-        snes.setFunction(self._function, self._f)
-        snes.setJacobian(self._jacobian, self._matrix)
-        snes.setConvergenceTest(self._test)
+        if self._equation is not None:
+            self._equation.attach(snes, self._f, self._matrix)
+        else:
+            snes.setFunction(self._function, self._f)
+            snes.setJacobian(self._jacobian, self._matrix)
+            snes.setConvergenceTest(self._test)
         snes.setTolerances(max_it=self._newton.max_iterations)
         snes.setType("newtonls")
         snes.setKSP(self._ksp)
@@ -376,7 +386,7 @@ class Solver:
 
     def _test_along(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, ...]) -> int:
         reason = self._test(snes, iteration, norms)
-        return ITERATING if reason > 0 and not self._border.met() else reason
+        return int(lib.ITERATING) if reason > 0 and not self._border.met() else reason
 
     def solve_along(self, guess: Array, loads: list[Array], border: Border) -> Array:
         """The configuration as :meth:`solve` finds it, together with the unknown of a border.
@@ -409,7 +419,7 @@ class Solver:
         self._complete(r)
 
     def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, J: PETSc.Mat, P: PETSc.Mat) -> None:
-        if self._near:
+        if self._course.near:
             return
         self._update_ghosts(x)
         self._tangent(self._view(x))
@@ -426,7 +436,7 @@ class Solver:
 
     def _size(self, forces: Any) -> float:
         """Euclidean norm over the scene of forces and moments over its size, at a pointer; N."""
-        square = self._share.total(lib.weighted_square(*self._norm, forces))
+        square = self._share.total(lib.weighted_square(*self._norm, forces, 1.0))
         if SMALL < square < LARGE or square == 0.0:
             return math.sqrt(square)
         return self._scaled_size(forces)
@@ -444,29 +454,11 @@ class Solver:
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, ...]) -> int:
         residual = self._size(self._at_r)
         if not math.isfinite(residual):
-            return DIVERGED
+            return int(lib.DIVERGED)
         scale = self._loads + self._size(self._at_forces)
-        wanted = self._newton.rtol * scale
-        if residual <= wanted and self._excess(self._r, scale) <= self._newton.rtol:
-            return CONVERGED
-        kept, self._near = self._near, False
-        if iteration > 1:
-            floor = 8 * self._round_off()
-            # A fraction of the last digit is luck; a few of them that Newton's method no longer
-            # halves are all that can be had: it may go round between two such states for ever.
-            stays = not kept and self._last / 2 < residual <= floor
-            least = residual <= floor / 80 or stays
-            if least and self._excess(self._r, scale) <= self._newton.rtol:
-                return AT_ROUND_OFF
-            # With the tangent of the iterate before, the residual falls by twice the last factor.
-            self._near = (
-                not kept and residual > floor and 20 * residual * (residual / self._last) <= wanted
-            )
-        self._slow += 1
-        if residual <= self._best / 2:
-            self._best, self._slow = residual, 0
-        self._last = residual
-        return STALLED if self._slow == self._patience else ITERATING
+        floor = 8 * self._round_off() if iteration > 1 else 0.0
+        x = doubles(self._view(self._x))
+        return int(lib.judge(self._course, x, iteration, residual, scale, floor))
 
     def _round_off(self) -> float:
         """Residual that the last digit of displacements, strains and rotations makes; N.
@@ -486,19 +478,22 @@ class Solver:
 
     # -- the call ------------------------------------------------------------------------------
 
-    def solve(self, guess: Array, loads: list[Array]) -> Array:
+    def solve(self, guess: Array, loads: list[Array], like_last: bool = False) -> Array:
         """The configuration, found from ``guess``; local values, ghosts included; a new array.
 
         Args:
             guess: Where to begin.
             loads: Vectors of the loads, for the scale of convergence.
+            like_last: Whether the tangent of the last solution may do for this one.
 
         Raises:
             StepFailed: No convergence.
         """
         x = self._start(guess, loads)
+        self._keeps = like_last
         reason = self._iterate(self._snes, 2)
-        if reason == STALLED:
+        self._keeps = False
+        if reason == lib.STALLED:
             reason = self._iterate(self._careful, 10)
         if reason <= 0 and self._relieve():
             x[:] = guess
@@ -510,7 +505,7 @@ class Solver:
         return x.copy()
 
     def _start(self, guess: Array, loads: list[Array]) -> Array:
-        self._loads = sum(self._size(doubles(load)) for load in loads)
+        self._loads = self._course.loads = sum(self._size(doubles(load)) for load in loads)
         self._at_forces = doubles(self._forces())
         x = self._view(self._x)
         x[:] = guess
@@ -519,8 +514,11 @@ class Solver:
 
     def _iterate(self, snes: PETSc.SNES, patience: int) -> int:
         """Solve; give up after so many iterations in a row without half the least residual."""
-        self._last = self._best = math.inf
-        self._near, self._slow, self._patience = False, 0, patience
+        course = self._course
+        course.last = course.best = math.inf
+        course.near, course.slow, course.patience = 0, 0, patience
+        if snes is not self._snes or not self._keeps:
+            course.rate = math.inf
         self._error = None
         try:
             snes.solve(None, self._x)
@@ -528,7 +526,9 @@ class Solver:
         except PETSc.Error as error:
             if error.__cause__ is not None:
                 raise error.__cause__ from None
-            reason = SINGULAR  # KLU stops PETSc where it finds no pivot
+            reason = int(lib.SINGULAR)  # KLU stops PETSc where it finds no pivot
+        if self._equation is not None:
+            self._error = self._error or self._equation.taken_error()
         self._done = snes.getIterationNumber()
         self.iterations += self._done
         return reason

@@ -8,7 +8,7 @@ import numpy as np
 
 from ufl_beam.compat import Array, la
 from ufl_beam.grid import Index
-from ufl_beam.loops import doubles, integers, lib
+from ufl_beam.loops import Loop, doubles, ffi, integers, lib, loop
 
 
 class Csr:
@@ -96,27 +96,35 @@ class StepProduct(Product):
         A: Constant matrix.
         rotations: Degrees of freedom that are rotations, as int32.
         tangent: Matrix of the same structure that takes the derivative.
+
+    Attributes:
+        product: What ``add_step_force`` and ``add_step_tangent`` of loops.c take.
     """
 
     def __init__(self, A: Csr, rotations: Index, tangent: Csr) -> None:
         super().__init__(A)
-        self._nodes = (len(rotations), integers(rotations), doubles(np.empty(A.size)))
-        self._places = (len(self._entries), integers(self._entries), integers(self._columns))
-        self._tangent = doubles(tangent.data)
-        self._factor = 0.0
+        size, indptr, indices, data = self._arrays
+        entry, self._tangent = integers(self._entries), doubles(tangent.data)
+        self._alive = (integers(rotations), entry, doubles(np.empty(size)))
+        self.product = ffi.new("step_product *")
+        c = self.product
+        c.size, c.indptr, c.indices, c.data = size, indptr, indices, data
+        c.rotations, (c.rotation, c.entry, c.space) = len(rotations), self._alive
 
     def begin(self, q0: Array, factor: float, back: float, v: Array) -> None:
         """Prepare what stays constant in the step that begins at ``q0``."""
-        if factor != self._factor:
-            self._factor, self._scaled = factor, doubles(factor * self._data)
-        nodes = (*self._nodes, doubles(q0))
-        self._to_force = (*self._arrays, factor, back, doubles(v), *nodes)
-        self._to_tangent = (*self._places, self._scaled, len(q0), *nodes)
+        c = self.product
+        c.factor, c.back = factor, back
+        self._states = c.v, c.q0 = doubles(v), doubles(q0)
+
+    def loops(self) -> tuple[Loop, Loop]:
+        """The loops of :meth:`add_force` and :meth:`add_tangent`."""
+        return loop("add_step_force", self.product), loop("add_step_tangent", self.product)
 
     def add_force(self, q1: Array, r: Array) -> None:
         """Add the forces at ``q1``."""
-        lib.add_step_product(*self._to_force, doubles(q1), doubles(r))
+        lib.add_step_force(self.product, doubles(q1), doubles(r))
 
     def add_tangent(self, q1: Array) -> None:
         """Add their derivative at ``q1``."""
-        lib.add_step_tangent(*self._to_tangent, doubles(q1), self._tangent)
+        lib.add_step_tangent(self.product, doubles(q1), self._tangent)

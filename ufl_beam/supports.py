@@ -53,7 +53,10 @@ class Supports:
     Attributes:
         reactions: Forces of the supports on the scene in the latest residual, at the degrees of
             freedom that are held, in turned axes.
+        entries: Entries of the matrix that hold them, and those of them on the diagonal.
+        pivots: What stands on the diagonal.
         moving: Local degrees of freedom whose values depend on time.
+        work: Whether there are such anywhere in the scene.
     """
 
     def __init__(self, share: Share, scheme: Scheme, ledger: Ledger, A: Csr) -> None:
@@ -77,14 +80,20 @@ class Supports:
         zero = np.isin(rows, self.dofs) | np.isin(columns, self.dofs)
         self._zero = np.flatnonzero(zero)
         self._diagonal = np.flatnonzero(zero & (rows == columns))
-        self._with_pivots = rows[self._diagonal]
-        self._pivots: Array = np.ones(len(self._diagonal))
+        self.entries = self._zero, self._diagonal
+        self.pivots: Array = np.ones(len(self.dofs))
         self._owned = self.dofs < share.num_owned
         self._acting, self._ledger = scheme.acting, ledger
-        if any(support.moving for support in share.grid.scene.supports):
+        self.work = any(support.moving for support in share.grid.scene.supports)
+        if self.work:
             ledger.supplied["supports"] += 0.0
         self.reactions: Array = np.zeros(len(self.dofs))
-        self._before: Array = self.reactions
+        self._before: Array = self.reactions.copy()
+
+    @property
+    def turned(self) -> bool:
+        """Whether some supports are at an angle to the axes of the plane."""
+        return bool(self._turned)
 
     def enter(self, x: Array) -> None:
         """From the axes of the plane to those of the supports, in place."""
@@ -120,7 +129,7 @@ class Supports:
     def hold(self, r: Array) -> None:
         """Note the reactions in a residual that is complete, and remove them from it."""
         if len(self.dofs):
-            self.reactions = r[self._held].copy()
+            self.reactions[:] = r[self._held]
             r[self._held] = 0.0
 
     def hold_matrix(self, data: Array) -> None:
@@ -131,24 +140,40 @@ class Supports:
             # What stands on the diagonal has the right dimension and size for what is held.
             # Where material that flows freely leaves nothing, what stood there before does as well.
             diagonal = data[self._diagonal]
-            np.copyto(self._pivots, diagonal, where=diagonal != 0.0)
+            np.copyto(self.pivots, diagonal, where=diagonal != 0.0)
             data[self._zero] = 0.0
-            data[self._diagonal] = self._pivots
+            data[self._diagonal] = self.pivots
 
     def accept(self, s: Array) -> None:
         """Work of the supports that move; ``s`` in their axes."""
         if self._motions:
             work = self._acting(self._before, self.reactions) * s[self._held]
             self._ledger.supplied["supports"] += float(np.sum(work[self._owned]))
-        self._before = self.reactions
+            self._before = self.reactions.copy()
+
+    def stop(self, v: Array) -> None:
+        """Set velocities of what does not move to zero, in place; else they would ring."""
+        self.enter(v)
+        v[np.setdiff1d(self.dofs, self.moving)] = 0.0
+        self.leave(v)
+
+    def take(self) -> None:
+        """Take the latest reactions as those before the next step."""
+        self._before = self.reactions.copy()
+
+    def carry_on(self, memory: Memory, q: Array) -> None:
+        """The reactions."""
+        reactions: Array = np.zeros(len(q))
+        reactions[self._held] = self._before if self._motions else self.reactions
+        self.reactions[:] = memory.at_dofs("reactions", reactions)[self._held]
+        self._before = self.reactions.copy()
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The reactions, and what stands for what is held in the tangent."""
-        reactions, pivots = np.zeros((2, len(q)))
-        reactions[self._held], pivots[self._with_pivots] = self._before, self._pivots
-        reactions = memory.at_dofs("reactions", reactions)
-        self.reactions = self._before = reactions[self._held].copy()
-        self._pivots = memory.at_dofs("pivots", pivots)[self._with_pivots]
+        self.carry_on(memory, q)
+        pivots = np.zeros(len(q))
+        pivots[self._held] = self.pivots
+        self.pivots[:] = memory.at_dofs("pivots", pivots)[self._held]
 
     def all_reactions(self, size: int) -> Array:
         """The reactions as a vector of all local degrees of freedom, in the axes of the plane."""

@@ -18,6 +18,7 @@ from ufl_beam.fields import Fields
 from ufl_beam.forms import Kernel
 from ufl_beam.kinematics import split, strain
 from ufl_beam.ledger import Ledger
+from ufl_beam.loops import Loop, doubles, ffi, lib, loop
 from ufl_beam.memory import Memory
 from ufl_beam.schemes import DynamicScheme, Scheme, Step
 from ufl_beam.sparse import Csr, StepProduct
@@ -31,6 +32,9 @@ class Term(Protocol):
 
     kind: str
     """What it is the work of, one of :data:`KINDS`."""
+
+    def loops(self) -> tuple[Loop, Loop | None] | None:
+        """What :meth:`add_residual` and :meth:`add_tangent` are in C, if there is one; or None."""
 
     def begin(self, step: Step) -> None:
         """Take note of the step that is to be solved."""
@@ -86,13 +90,14 @@ class ElasticBeams:
         self._tangent.share(self._force)
         self._tangent.place(A)
         self._first: Kernel | None = None
+        self._tangents = ffi.new("first_cells *", {"then": self._tangent.cells})
         if not scheme.dynamic:
             before = ufl.as_vector([C[i] * e0[i] for i in range(3)])
             geometric = ufl.dot(before, ufl.derivative(w_e, q1, dq))
             material = ufl.dot(ufl.derivative(r, q1, dq), w_e)
             self._first = fields.kernel((geometric + material) * dx, q1)
             self._first.place(A)
-        self._begins = False
+            self._tangents.first = self._first.cells
         self._A, self._ledger = A, ledger
         if losses:
             ledger.lost["numerical"] += 0.0
@@ -103,7 +108,11 @@ class ElasticBeams:
             kernel.set(self._q0, step.q0)
         if self._first is not None:
             self._first.set(self._q0, step.q0)
-            self._begins = True
+            self._tangents.begins = 1
+
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """Two forms."""
+        return loop("add_cells", self._force.cells), loop("add_first_cells", self._tangents)
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the internal forces."""
@@ -115,15 +124,11 @@ class ElasticBeams:
         Extrapolated displacements strain slender beams by nothing but error; forces from that would
         send the first iteration of a static step astray, so it takes those before the step.
         """
-        if self._begins and self._first is not None:
-            self._first.add(q1, self._A.data)
-        else:
-            self._tangent.add(q1, self._A.data)
-        self._begins = False
+        lib.add_first_cells(self._tangents, doubles(q1), doubles(self._A.data))
 
     def accept(self, q1: Array, s: Array) -> None:
         """What the scheme lost."""
-        self._begins = False
+        self._tangents.begins = 0
         for loss in self._losses:
             self._ledger.lost["numerical"] += loss.value(q1)
 
@@ -211,6 +216,10 @@ class Inertia:
         self._dt = step.dt
         self._times.begin(step.q0, *self.scheme.inertia(step.dt, self))
 
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """A matrix times the step of the nodes."""
+        return self._times.loops()
+
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add mass times the acceleration of the step."""
         self._times.add_force(q1, r)
@@ -218,6 +227,11 @@ class Inertia:
     def add_tangent(self, q1: Array) -> None:
         """Add mass times the derivative of the acceleration."""
         self._times.add_tangent(q1)
+
+    def carry_on(self, memory: Memory, known: int) -> None:
+        """State what the scheme keeps besides the velocities, as much as is ``known`` of it."""
+        more = self.more or (self.v,) * known
+        self.more = tuple(map(memory.at_dofs, self.scheme.kept[:known], more))
 
     def velocities(self, s: Array) -> Array:
         """Velocities at the end of a step ``s`` of the nodes."""
@@ -252,7 +266,4 @@ class Inertia:
         self.v = memory.at_dofs("velocity", self.v)
         self.v_before = memory.at_dofs("velocity before", self.v_before)
         self.last_dt = memory.number("step of velocity", self.last_dt)
-        known = int(memory.number("further rates", len(self.more)))
-        more = self.more or (self.v,) * known
-        names = self.scheme.kept[:known]
-        self.more = tuple(memory.at_dofs(*one) for one in zip(names, more, strict=True))
+        self.carry_on(memory, int(memory.number("further rates", len(self.more))))

@@ -10,9 +10,9 @@ import numpy as np
 from ufl_beam.compat import Array
 from ufl_beam.controls import Constraint
 from ufl_beam.critical import Direction, Stiffness, metric
+from ufl_beam.errors import StepFailed
 from ufl_beam.schemes import Step
 from ufl_beam.simulation import Simulation, Trial
-from ufl_beam.solve import StepFailed
 from ufl_beam.terms import Term
 
 FARTHEST = 30

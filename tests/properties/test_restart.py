@@ -21,6 +21,9 @@ SCRIPT = Path(__file__).with_name("restarted.py")
 RUNS = {
     "midpoint": (machine, ub.Midpoint(0.05, 0.02), 0.2, 0.005),
     "adaptive": (machine, ub.Midpoint(0.05, 0.02), 0.1, ub.Adaptive(1e-4)),
+    "decaying": (bend, ub.DecayingMidpoint(), 5.0, 0.1),
+    "Newmark": (bend, ub.Newmark(0.6, 0.35), 5.0, 0.1),
+    "generalised-alpha": (bend, ub.GeneralizedAlpha(), 5.0, 0.1),
     "static": (bend, ub.Static(), 5.0, 0.1),
     "exact static": (bend, ub.ExactStatic(), 5.0, 0.1),
 }

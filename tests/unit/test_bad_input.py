@@ -561,7 +561,9 @@ def test_histories_of_places_elsewhere(shared_path):
 
 def test_start_from_another_scene():
     other = run()
-    with raises("start: the solution is of other beams, joints or cells; use the same Beam objects"):
+    with raises(
+        "start: the solution is of other beams, joints or cells; use the same Beam objects"
+    ):
         run(start=other)
 
 

@@ -178,9 +178,9 @@ def test_short_steps_give_the_variation(cells):
 def test_two_nodes_are_a_case_of_many():
     """The short form in the middle of a cell with two nodes is the general one."""
     cells = Cells(5)
-    δ, w = (cells.field(cells.values(1.2))[0] for _ in range(2))
+    ψ0, ψ1, w = (cells.field(cells.values(1.2))[2] for _ in range(3))
     short, general = (
-        cells.at_points(ufl.as_vector([*turn(δ, w, cells.axis), 0]))
+        cells.at_points(ufl.as_vector([*turn(ψ0, ψ1, w, cells.axis), 0]))
         for turn in (kinematics._turn_of_two_nodes, kinematics._turn_of_nodes)
     )
     assert np.abs(short).max() > 1

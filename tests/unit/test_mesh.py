@@ -4,10 +4,11 @@ import math
 import re
 from fractions import Fraction
 
+from mpi4py import MPI
+
 import basix.ufl
 import numpy as np
 import pytest
-from mpi4py import MPI
 from scipy.sparse import csr_array
 
 import ufl_beam as ub
@@ -216,7 +217,7 @@ def test_nodes_are_those_of_the_element(degree):
 
 @pytest.mark.parametrize("degree", [0, 4, 1.5, "2"])
 def test_no_such_degree(degree):
-    with pytest.raises(ub.SceneError, match="Mesh: degree = .* must be 1, 2 or 3"):
+    with pytest.raises(ub.SceneError, match=r"Mesh: degree = .* must be 1, 2 or 3"):
         ub.Mesh(degree=degree)
 
 
@@ -240,7 +241,7 @@ INELASTIC = {
 def test_higher_degrees_are_for_elastic_beams(kind):
     beam = ub.Beam((0, 0), (1, 0), cells=4, name="girder", **INELASTIC[kind])
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)])
-    with pytest.raises(ub.SceneError, match="degree = 2 is for elastic beams, and girder may yield"):
+    with pytest.raises(ub.SceneError, match="degree = 2 is for elastic beams, and girder"):
         ub.Simulation(scene, ub.Static(), mesh=ub.Mesh(degree=2))
     ub.Simulation(scene, ub.Static()).close()
 
@@ -307,7 +308,8 @@ def test_everything_takes_a_higher_degree(mesh, shared_path, on_first_rank):
     )
     records = [
         ub.XDMF(shared_path / "b.xdmf"), ub.History(shared_path / "b.csv", [arm.at(0.3)]),
-        ub.Extremes(), ub.Fatigue(ub.HotSpot.fibre(arm.at(0.3), y=0.1, E=1e9), ub.SNCurve(range=1e8)),
+        ub.Extremes(),
+        ub.Fatigue(ub.HotSpot.fibre(arm.at(0.3), y=0.1, E=1e9), ub.SNCurve(range=1e8)),
     ]  # fmt: skip
     solution = ub.simulate(
         scene, ub.Midpoint(0.05), t=(0, 0.1), dt=0.01, mesh=mesh, record=records, progress=False

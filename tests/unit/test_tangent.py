@@ -43,6 +43,10 @@ SCHEMES = [
     ub.Midpoint(0.1, 0.1),
     ub.Midpoint(alpha=0.5),
     ub.Midpoint(beta=0.5),
+    ub.PrintedMidpoint(),
+    ub.DecayingMidpoint(),
+    ub.Newmark(0.6, 0.35),
+    ub.GeneralizedAlpha(0.6),
 ]
 
 
@@ -56,7 +60,7 @@ class Probe:
         size = simulation.share.size
         simulation.q = random.uniform(-0.5, 0.5, size)
         if scheme.dynamic:
-            simulation.inertia.v = random.uniform(-1, 1, size)
+            self.in_motion(simulation, random)
         for inelastic in simulation.inelastic:
             self.at_random(inelastic, random)
         simulation.ask()
@@ -65,6 +69,16 @@ class Probe:
             term.begin(step)
         self.x = simulation.supports.in_axes(simulation.q + random.uniform(-turn, turn, size))
         self.free = np.setdiff1d(np.arange(size), simulation.supports.dofs)
+
+    @staticmethod
+    def in_motion(simulation, random):
+        """Random velocities and whatever else schemes keep, as after a step."""
+        inertia = simulation.inertia
+        inertia.v, inertia.v_before = random.uniform(-1, 1, (2, len(inertia.v)))
+        inertia.more = tuple(random.uniform(-1, 1, (len(inertia.scheme.kept), len(inertia.v))))
+        inertia.last_dt = 0.2
+        for term in simulation._numerical:
+            term._change, term._last_dt = random.uniform(-1, 1, term._change.shape), 0.2
 
     @staticmethod
     def at_random(inelastic, random):
@@ -198,7 +212,14 @@ def inelastic_scene(kind):
 @pytest.mark.parametrize("kind", LAWS)
 @pytest.mark.parametrize(
     "scheme",
-    [ub.Static(), ub.ExactStatic(), ub.ExactStatic(0.6), ub.Midpoint(), ub.Midpoint(0.1, 0.1)],
+    [
+        ub.Static(),
+        ub.ExactStatic(),
+        ub.ExactStatic(0.6),
+        ub.Midpoint(),
+        ub.Midpoint(0.1, 0.1),
+        ub.GeneralizedAlpha(0.6),
+    ],
     ids=str,
 )
 def test_tangent_of_inelastic_scenes(kind, scheme):

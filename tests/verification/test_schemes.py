@@ -1,0 +1,356 @@
+"""Time schemes against closed forms: order, amplification of one mode, energy, momenta, refusals.
+
+Sources: N. M. Newmark, J. Eng. Mech. Div. 85 (1959) 67-94; J. Chung, G. M. Hulbert, J. Appl. Mech.
+60 (1993) 371-375; M. Arnold, O. Brüls, Multibody Syst. Dyn. 18 (2007) 185-202.  The polynomials of
+the decaying midpoint rule are derived in docs/schemes.md.
+"""
+
+import math
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from scenes import flying_beam
+
+import ufl_beam as ub
+
+DAMPED = ub.Newmark(gamma=0.6, beta=0.35)
+SECOND_ORDER = [
+    ub.Midpoint(),
+    ub.PrintedMidpoint(),
+    ub.DecayingMidpoint(),
+    ub.DecayingMidpoint(1 / 3),
+    ub.Newmark(),
+    ub.GeneralizedAlpha(0.8),
+    ub.GeneralizedAlpha(0.0),
+]
+FIRST_ORDER = [ub.Midpoint(0.05, 0.05), DAMPED]
+AT_END = [ub.Newmark(), DAMPED, ub.GeneralizedAlpha(0.8), ub.GeneralizedAlpha(0.0)]
+SOFT = ub.Section(EA=400.0, GA=400.0, EI=20.0, rhoA=1.0, rhoI=0.05)
+"""So soft that steps of 1 ms resolve what a mesh of four cells can do."""
+
+
+def go(scene, scheme, end, steps, **more):
+    newton = ub.Newton(rtol=1e-12)
+    return ub.simulate(
+        scene, scheme, t=(0, end), dt=end / steps, newton=newton, progress=False, **more
+    )
+
+
+# -- order -------------------------------------------------------------------------------------
+
+
+def shaken():
+    """A cantilever under a smooth force that begins at zero, bent by a sixth of its length."""
+    beam = ub.Beam((0, 0), (1, 0), SOFT, cells=4)
+    push = ub.PointLoad(beam.end, force=(0, 10), time=lambda t: math.sin(3 * t))
+    damping = [ub.Rayleigh(mass=1.0, stiffness=0.01)]
+    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push], damping=damping)
+
+
+@lru_cache
+def exact():
+    """Displacements and velocities at its end."""
+    solution = go(shaken(), ub.Midpoint(), 0.5, 2000, every=2000)
+    return solution.q[-1], solution.v[-1]
+
+
+def rates(scheme, steps=(50, 100, 200)):
+    """Orders by which errors of displacements and velocities at the end fall, step by step."""
+    runs = [go(shaken(), scheme, 0.5, n) for n in steps]
+    q, v = exact()
+    assert np.abs(q).max() > 0.1  # large motion
+    errors = np.array([[np.abs(r.q[-1] - q).max(), np.abs(r.v[-1] - v).max()] for r in runs])
+    return np.log2(errors[:-1] / errors[1:]), runs
+
+
+@pytest.mark.parametrize("scheme", SECOND_ORDER, ids=str)
+def test_second_order(scheme):
+    """What is measured against has a hundredth of the error of the finest run, so 1 % off 4."""
+    orders, runs = rates(scheme)
+    assert orders.min() > 1.7  # annihilating needs shorter steps until only the leading term counts
+    assert orders[-1] == pytest.approx(2, abs=0.13)
+    imbalances = np.array([run.energy.worst for run in runs])
+    if scheme in AT_END or scheme == ub.PrintedMidpoint():
+        # The ledger does not close, and says so: its imbalance is of second order too.
+        assert 1e-8 < imbalances[-1] < 1e-3
+        assert np.log2(imbalances[:-1] / imbalances[1:]) == pytest.approx(2, abs=0.5)
+    else:
+        assert imbalances.max() < 1e-12
+
+
+@pytest.mark.parametrize("scheme", FIRST_ORDER, ids=str)
+def test_first_order(scheme):
+    orders, _ = rates(scheme)
+    assert orders[-1] == pytest.approx(1, abs=0.2)
+
+
+@pytest.mark.parametrize("scheme", [ub.Newmark(), ub.GeneralizedAlpha(0.8)], ids=str)
+def test_adaptive_steps_keep_to_their_tolerance(scheme):
+
+    def error(tolerance):
+        dt = ub.Adaptive(tolerance)
+        solution = ub.simulate(shaken(), scheme, t=(0, 0.5), dt=dt, progress=False)
+        return np.abs(solution.q[-1] - exact()[0]).max(), solution.time_error
+
+    (coarse, said), (fine, said_fine) = error(1e-5), error(1e-7)
+    assert fine < coarse / 5  # 100**(2/3) = 21 if the order is two, steps being cut alike
+    # The sum of local errors, of which the motion may forget or magnify a part
+    assert coarse < 3 * said
+    assert fine < 3 * said_fine
+
+
+# -- one mode ----------------------------------------------------------------------------------
+
+EA, LENGTH, DENSITY = 300.0, 2.0, 1.5
+OMEGA = math.sqrt(3 * EA / (DENSITY * LENGTH**2))
+"""Of a bar of one cell, held at one end, with a third of its mass at the other; rad/s."""
+
+
+def bar():
+    section = ub.Section(EA=EA, GA=EA, EI=EA, rhoA=DENSITY, rhoI=1.0)
+    beam = ub.Beam((0, 0), (LENGTH, 0), section, cells=1)
+    return ub.Scene(
+        [beam],
+        supports=[ub.Clamped(beam.start), ub.Prescribed(beam.end, v=0, psi=0)],
+        initial=[ub.Velocity([beam], linear=(0.1, 0))],
+    )
+
+
+def polynomial(scheme, Ω):
+    """[closed] Characteristic polynomial of the steps of a mode, Ω = ω dt; highest power first."""
+    if isinstance(scheme, ub.DecayingMidpoint):
+        # u and v/ω are parts of one complex number: p(λ) = λ(λ-1) - iΩ q(λ), for ω and -ω
+        difference, mean = np.array([1, -1, 0]), scheme.part * np.array([1, -2, 1])
+        mean = mean + np.array([0.5, 0.5, 0])
+        return np.polymul(difference, difference) + Ω**2 * np.polymul(mean, mean)
+    α_m, α_f, γ, β = scheme.weights
+    # (u, dt v, dt² a); a1 = X u1 + Y u0 + Z a0 from the equation of the step
+    X, Y, Z = np.array([-(1 - α_f) * Ω**2, -α_f * Ω**2, -α_m]) / (1 - α_m)
+    ahead = np.array([[1, 0, -β], [0, 1, -γ], [-X, 0, 1]])
+    back = np.array([[1, 1, 0.5 - β], [0, 1, 1 - γ], [Y, 0, Z]])
+    return np.poly(np.linalg.solve(ahead, back))
+
+
+@pytest.mark.parametrize("Ω", [0.3, 3.0, 300.0])
+@pytest.mark.parametrize(
+    "scheme", [*AT_END, ub.GeneralizedAlpha(1.0), ub.DecayingMidpoint()], ids=str
+)
+def test_amplification_of_a_mode(scheme, Ω):
+    """[closed] The displacements obey the recurrence of the polynomial."""
+    solution = go(bar(), scheme, 30 * Ω / OMEGA, 30)
+    u = solution.displacement(solution.scene.beams[0].end)[:, 0]
+    p = polynomial(scheme, Ω)
+    begin = 3  # the first two steps of generalised-α and of what remembers a step are their own
+    residual = np.convolve(u[begin:], p / np.abs(p).max(), mode="valid")
+    # Round-off of strains of 0.1, which 1/Ω² of the forces make of those of inertia
+    assert len(residual) > 20
+    assert np.abs(residual).max() < 1e-11 * np.abs(u).max()
+
+
+def test_period_of_average_acceleration():
+    """[closed] tan(θ/2) = Ω/2, θ being the phase of a step; amplitudes stay."""
+    Ω = 0.3
+    θ = 2 * math.atan(Ω / 2)
+    assert np.roots(polynomial(ub.Newmark(), Ω))[:2] == pytest.approx(
+        [np.exp(1j * θ), np.exp(-1j * θ)], rel=1e-12
+    )
+    solution = go(bar(), ub.Newmark(), 400 * Ω / OMEGA, 400)
+    energy = solution.energy.total
+    # Linear: energy is kept but for the first step, whose acceleration is that a 16th later.
+    assert np.ptp(energy[1:]) < 1e-10 * energy[0]
+    assert np.ptp(energy) < 0.07 * Ω**2 * energy[0]
+
+
+@pytest.mark.parametrize("rho_inf", [0.0, 0.4, 0.8, 1.0])
+def test_spectral_radius_at_infinity(rho_inf):
+    """[closed] As told; a triple root is found to the cube root of round-off, 1e-5."""
+    roots = np.roots(polynomial(ub.GeneralizedAlpha(rho_inf), 1e6))
+    assert np.abs(roots).max() == pytest.approx(rho_inf, abs=1e-3)
+    if rho_inf >= 0.4:
+        roots = np.roots(polynomial(ub.DecayingMidpoint(rho_inf), 1e6))
+        assert np.abs(roots).max() == pytest.approx(rho_inf, abs=1e-3)
+
+
+@pytest.mark.parametrize("rho_inf", [1 / 3, 0.6, 0.9])
+@pytest.mark.parametrize("Ω", np.geomspace(1e-2, 1e4, 7))
+def test_decaying_midpoint_never_amplifies(rho_inf, Ω):
+    scheme = ub.DecayingMidpoint(rho_inf)
+    largest = np.abs(np.roots(polynomial(scheme, Ω))).max()
+    assert largest <= 1 + 1e-12
+    if Ω <= 0.1:
+        # What the docstring says: the part c Ω⁴ of the energy, to the next order in Ω²
+        assert 1 - largest**2 == pytest.approx(scheme.part * Ω**4, rel=20 * Ω**2, abs=1e-14)
+
+
+# -- energy and momenta ------------------------------------------------------------------------
+
+
+def test_energy_of_decaying_midpoint_with_its_memory_never_grows():
+    """[closed] E + c/2 (k Δu² + m Δv²), whatever the steps; E loses what the ledger says."""
+    scheme, random = ub.DecayingMidpoint(0.5), np.random.default_rng(4)
+    simulation = ub.Simulation(bar(), scheme)
+    place = simulation.scene.beams[0].end
+    k, m, states, entries = EA / LENGTH, DENSITY * LENGTH / 3, [], []
+    for dt in [0.0, *10 ** random.uniform(-3, 1, 200) / OMEGA]:
+        if dt:
+            simulation.step_to(simulation.t + dt)
+        states.append([simulation.displacement(place)[0], simulation.velocity(place)[0]])
+        entries.append(simulation.entries()[2]["numerical"])
+    simulation.close()
+    squares = np.array(states) ** 2 @ [k, m] / 2
+    memory = scheme.part * np.diff(states, axis=0) ** 2 @ [k, m] / 2
+    stored = squares + np.concatenate([[0.0], memory])
+    assert np.diff(stored).max() <= 1e-12 * stored[0]
+    assert stored[-1] < 0.5 * stored[0]
+    assert squares + np.array(entries) == pytest.approx(np.full(201, squares[0]), rel=1e-10)
+
+
+def thrown(cells=4):
+    """A free beam that moves and turns; its bending and stretching begin at once."""
+    beam = ub.Beam((0, 0), (1, 0), SOFT, cells=cells)
+    return ub.Scene([beam], initial=[ub.Velocity([beam], linear=(1, 2), angular=5.0)])
+
+
+@pytest.mark.parametrize("dt", [0.005, 0.05])
+def test_decaying_midpoint_in_large_motion(dt):
+    solution = go(thrown(), ub.DecayingMidpoint(), 1.0, round(1 / dt))
+    energy, momentum = solution.energy.total, solution.momentum()
+    assert solution.energy.worst < 1e-10
+    assert energy.max() <= energy[0] * (1 + 1e-12)
+    assert energy[-1] < energy[0] * (1 - 1e-9)
+    assert np.abs(momentum[:, :2] - momentum[0, :2]).max() < 1e-10
+    assert solution.energy["numerical"].min() >= 0
+
+
+def test_decaying_midpoint_loses_angular_momentum_at_second_order():
+    drifts = []
+    for steps in (100, 200, 400):
+        momentum = go(thrown(), ub.DecayingMidpoint(), 0.5, steps).momentum()[:, 2]
+        drifts.append(np.abs(momentum - momentum[0]).max())
+    assert np.log2(drifts[-2] / drifts[-1]) == pytest.approx(2, abs=0.1)
+    assert drifts[-1] < 1e-4 * abs(momentum[0])
+
+
+@pytest.mark.parametrize(("dt", "drift"), [(0.01, 1.2e-5), (0.1, 1.1e-3)])
+def test_printed_midpoint_drifts_in_energy_and_keeps_momenta(dt, drift):
+    """[calc] The drift of design notes, by another program, of the flying beam with 8 cells."""
+    solution = go(flying_beam(cells=8), ub.PrintedMidpoint(), 10.0, round(10 / dt))
+    loaded = np.sum(solution.times[1:] - dt / 2 < 2.5 - 1e-9)
+    energy, momentum = solution.energy.total[loaded:], solution.momentum()[loaded:]
+    assert np.ptp(energy) / energy[0] == pytest.approx(drift, rel=0.1)
+    assert np.ptp(momentum, axis=0) == pytest.approx(0, abs=1e-9 * abs(momentum[0, 2]))
+
+
+@pytest.mark.parametrize("scheme", AT_END, ids=str)
+def test_forces_at_the_end_keep_linear_momentum_alone(scheme):
+    momentum = go(thrown(), scheme, 0.5, 50).momentum()
+    assert np.abs(momentum[:, :2] - momentum[0, :2]).max() < 1e-10
+    assert np.abs(momentum[:, 2] - momentum[0, 2]).max() > 1e-6
+
+
+# -- what else steps depend on ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scheme", AT_END, ids=str)
+def test_accelerations_carry_on(scheme):
+    scene = shaken()
+    whole = go(scene, scheme, 0.5, 100)
+    first = go(scene, scheme, 0.25, 50)
+    second = ub.simulate(
+        scene, scheme, t=(0.25, 0.5), dt=0.005, start=first, progress=False, newton=ub.Newton(1e-12)
+    )
+    # The guess of the first step differs, and with it what Newton's method leaves
+    assert np.abs(second.q - whole.q[50:]).max() < 1e-10
+    assert np.abs(second.v - whole.v[50:]).max() < 1e-8
+
+
+@pytest.mark.parametrize("scheme", [ub.Newmark(), ub.GeneralizedAlpha(0.8)], ids=str)
+def test_forces_of_the_beginning_do_their_work(scheme):
+    """What moves from the start on and is pushed at once: the imbalance is of second order."""
+
+    def scene():
+        beam = ub.Beam((0, 0), (1, 0), SOFT, cells=4)
+        push = ub.Slide(ub.ground(0, 0), beam.end, ub.Actuator(lambda t: 3.0), axis=(0, 1))
+        return ub.Scene(
+            [beam],
+            connectors=[push],
+            loads=[ub.PointLoad(beam.start, force=(1, 2)), ub.FollowerLoad(beam.end, force=(1, 1))],
+            initial=[ub.Velocity([beam], linear=(0, 2))],
+        )
+
+    worst = [go(scene(), scheme, 0.2, n).energy.worst for n in (100, 200, 400)]
+    assert np.log2(np.divide(worst[:-1], worst[1:])).min() > 1.8
+
+
+def test_moving_supports_and_joints_of_multipliers_with_generalised_alpha():
+    """A body that turns on the ground and pulls a beam whose end is moved: second order."""
+
+    def scene():
+        body = ub.Body((0.25, 0), mass=1.0, inertia=0.1)
+        beam = ub.Beam((0.5, 0), (1.5, 0), SOFT, cells=2)
+        hinge = ub.Revolute(body.at(0.5, 0), beam.start, measured=True)
+        return ub.Scene(
+            [beam],
+            bodies=[body],
+            joints=[ub.Revolute(ub.ground(0, 0), body.at(0, 0)), hinge],
+            supports=[ub.Prescribed(beam.end, v=lambda t: 0.3 * math.sin(3 * t) ** 4)],
+            damping=[ub.Rayleigh(stiffness=0.02)],
+        )
+
+    finest = go(scene(), ub.Midpoint(), 0.5, 1000)
+    runs = [go(scene(), ub.GeneralizedAlpha(0.6), 0.5, n) for n in (50, 100)]
+    coarse, fine = (np.abs(run.v[-1] - finest.v[-1]).max() for run in runs)
+    assert math.log2(coarse / fine) == pytest.approx(2, abs=0.05)
+    assert runs[-1].energy.worst < 1e-4
+    joint = runs[-1].scene.joints[1]
+    body, beam = runs[-1].scene.bodies[0], runs[-1].scene.beams[0]
+    apart = runs[-1].displacement(body.at(0.5, 0)) - runs[-1].displacement(beam.start)
+    assert joint is not None
+    assert np.abs(apart[:, :2]).max() < 1e-10
+
+
+# -- refusals ------------------------------------------------------------------------------------
+
+
+def one_beam(**parts):
+    beam = ub.Beam((0, 0), (1, 0), SOFT, cells=1)
+    return ub.Scene([beam], **{name: [make(beam)] for name, make in parts.items()})
+
+
+MOVED = one_beam(supports=lambda beam: ub.Prescribed(beam.start, u=math.sin))
+GUIDED = one_beam(joints=lambda beam: ub.Guided(beam.end, lambda s: (1 + s, 0.0)))
+RUBBING = one_beam(
+    connectors=lambda beam: ub.Turn(ub.ground(0, 0), beam.start, ub.Coulomb(1.0)),
+)
+TURNING = one_beam(loads=lambda beam: ub.RotatingFrame(1.0))
+
+
+@pytest.mark.parametrize(
+    ("scheme", "scene", "message"),
+    [
+        (ub.Newmark(), MOVED, "Newmark: the support of beam.start .* prescribes a motion"),
+        (ub.GeneralizedAlpha(1.0), MOVED, "GeneralizedAlpha: the support of beam.start"),
+        (ub.Newmark(0.6, 0.3), MOVED, "prescribes a motion"),
+        (ub.Newmark(), GUIDED, "Newmark: Guided.* use GeneralizedAlpha"),
+        (ub.Newmark(0.6, 0.35), RUBBING, "needs the mean velocity of a step"),
+        (ub.GeneralizedAlpha(), TURNING, "RotatingFrame.* needs the mean velocity"),
+    ],
+)
+def test_refused(scheme, scene, message):
+    with pytest.raises(ub.SceneError, match=message):
+        ub.simulate(scene, scheme, t=(0, 1), dt=0.1)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: ub.Newmark(gamma=0.4), "gamma = 0.4 must be at least 0.5"),
+        (lambda: ub.Newmark(beta=1 / 6), "at least gamma/2 = 0.25"),
+        (lambda: ub.GeneralizedAlpha(1.1), "between 0 and 1"),
+        (lambda: ub.DecayingMidpoint(0.2), "at least 0.333333"),
+    ],
+)
+def test_numbers_out_of_range(make, message):
+    with pytest.raises(ub.SceneError, match=message):
+        make()

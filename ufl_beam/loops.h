@@ -1,0 +1,188 @@
+/* What Python sees of the loops in C: what they loop over, and their functions.
+ *
+ * This is read by cffi as well, which knows no directives of the preprocessor.
+ */
+
+/* Adds to `out`, a vector or the entries of a matrix, its part at the unknowns q. */
+typedef void (part)(void *self, const double *q, double *out);
+typedef struct {
+  part *add;
+  void *self;
+} call;
+
+/* -- forms and constant matrices --------------------------------------------------------------- */
+
+/* A compiled form on some cells. w holds the packed coefficients of a cell, `width` of them, of
+ * which those from `at` on are the unknowns of the cell; they are brought up to date on the way. */
+typedef struct {
+  kernel *tabulate;
+  int number, of_cell, unknowns; /* cells, degrees of freedom of each, those the form depends on */
+  const int32_t *dofs;
+  int at, width;
+  double *w;
+  const double *constants, *coordinates;
+  int rows; /* entries of a cell */
+  const int32_t *row;
+} cells;
+
+typedef struct {
+  const cells *first, *then;
+  int begins;
+} first_cells;
+
+typedef struct {
+  int size;
+  const double *values;
+} vector;
+
+/* A constant matrix A times the step of the nodes from q0, see StepProduct. */
+typedef struct {
+  int size, rotations;
+  const int32_t *rotation, *indptr, *indices, *entry; /* entry: where those of A are in the tangent */
+  const double *data;
+  double factor, back;
+  const double *v, *q0;
+  double *space;
+} step_product;
+
+void set_cells(const cells *c, const double *q, int at);
+void add_cells(void *self, const double *q, double *b);
+void add_first_cells(void *self, const double *q, double *b);
+void subtract_vector(void *self, const double *q, double *b);
+void add_step_force(void *self, const double *q, double *r);
+void add_step_tangent(void *self, const double *q, double *tangent);
+void add_product(int rows, const int32_t *indptr, const int32_t *indices, const double *data,
+                 const double *x, double *y);
+double quadratic_form(int rows, const int32_t *indptr, const int32_t *indices, const double *data,
+                      const double *x);
+double step_of_nodes(int size, int rotations, const int32_t *rotation, double *s,
+                     const double *q0, const double *q1);
+double weighted_square(int rows, const double *w, const double *f, double unit);
+
+/* -- material points --------------------------------------------------------------------------- */
+
+/* Points in cells, `of_cell` in each; see points.py. */
+typedef struct {
+  int32_t *course;
+  kernel *bulk, *opening, *excess, *end;
+  int cells, of_cell;
+  const double *B, *weight, *rest, *length;
+  double theta;
+  double *e0, *e1, *w, *r, *D, *kept, *sum;
+} points;
+
+/* Cells with points: forms of the strains, of the forces and of their tangent, and where these find
+ * the resultants as affine functions b + D e of the strains. */
+typedef struct {
+  const points *points;
+  const cells *strains, *force, *tangent;
+  double *b, *D;
+  int width, size, begins;
+  double *latest; /* the unknowns that the points responded to */
+} inelastic;
+
+/* Connectors of one motion as cells, with their forces as unknowns. Their laws are rows
+ * a e + b f = c in the motion e and the force f; those of springs come of points. */
+typedef struct {
+  const cells *work, *tangent, *motion;
+  const points *points;            /* or none: the rows stay during a step */
+  int number;
+  const int32_t *link, *force;     /* of each cell; where each link's force is among the unknowns */
+  double *row, *row_of_tangent;    /* of the first cell; */
+  int width, width_of_tangent;     /* the way to the next */
+  double *by_cell, *e1;            /* space; motions at the latest unknowns */
+  double *e0, *before, *taken, *rate; /* the accepted state: motion, force, work, rate */
+  double weight_of_before;         /* of the force that works in a step */
+  const int32_t *dofs;             /* seven of each link */
+  const double *length;            /* one where it turns, else the size of the scene */
+  double size;                     /* of the scene */
+} couplings;
+
+void find_motions(const couplings *c, const double *q);
+void add_couplings_force(void *self, const double *q, double *r);
+double missed_by_couplings(void *self, const double *q, const double *r, double scale);
+double commit_couplings(const couplings *c, const double *q, double dt);
+void respond(const points *p);
+void respond_at(const inelastic *m, const double *q);
+void add_inelastic_force(void *self, const double *q, double *r);
+void add_inelastic_tangent(void *self, const double *q, double *tangent);
+void commit(const points *p);
+
+/* -- elimination along chains ------------------------------------------------------------------ */
+
+typedef struct {
+  int chains;
+  const int32_t *first;     /* first vertex of each chain, and their number */
+  const int32_t *spike;     /* whether a chain has a left end */
+  const int32_t *row;       /* vertices x 3 */
+  const int32_t *order;     /* vertices x 9 */
+  const int32_t *from_ends; /* chains x 18: entries of the ends' rows, left and right */
+  const int32_t *indptr;
+  const double *data;
+  double *kept;             /* vertices x KEPT */
+  int32_t *swaps;           /* vertices x 3: rows in the order of the pivots */
+} chains;
+
+void eliminate(const chains *c, const int32_t *places, double *left);
+void eliminate_from(const chains *c, const double *b, double *f, const int32_t *places,
+                    double *left);
+void substitute(const chains *c, const double *f, const int32_t *places, const double *ends,
+                double *x);
+
+/* -- Newton's method, see newton.c ------------------------------------------------------------- */
+
+/* What PETSc offers and the callbacks of SNES need; its objects are opaque. */
+typedef struct {
+  int (*read)(void *vec, const double **values);
+  int (*end_read)(void *vec, const double **values);
+  int (*write)(void *vec, double **values);
+  int (*end_write)(void *vec, double **values);
+  int (*entries)(void *mat, double **values);
+  int (*end_entries)(void *mat, double **values);
+} petsc;
+
+/* How far a law is missed by an iterate q and its residual r, without dimension. */
+typedef struct {
+  double (*missed)(void *self, const double *q, const double *r, double scale);
+  void *self;
+} demand;
+
+/* The equation of a step, and how far its solution is. */
+typedef struct {
+  const petsc *petsc;
+  int size, inner, forces, stiffnesses;
+  const call *force;     /* parts of the residual, the inner forces first */
+  const call *stiffness; /* parts of the tangent */
+  double *inner_force;   /* what the inner ones add up to */
+  int entries;
+  double *tangent;
+  int held, zeros; /* degrees of freedom and entries that supports hold */
+  const int32_t *hold, *zero, *pivot; /* pivot: the entry of each that is held on the diagonal */
+  double *reactions, *pivots;
+
+  double rtol, loads; /* tolerance; size of the loads */
+  void *x;            /* the iterate */
+  const double *weight, *residual; /* of forces; the residual that SNES has */
+  const int32_t *diagonal;
+  double *space;
+  const double *lengths, *moves; /* see Solver */
+  int demands;
+  const demand *demand; /* of connectors */
+  double last, best;
+  int near, slow, patience, modified; /* near: the tangent is kept in the next iteration */
+  double rate;                        /* of a modified Newton's method, by which residuals fall */
+} equation;
+
+/* Values of SNESConvergedReason. */
+enum { ITERATING = 0, AT_ROUND_OFF = 2, CONVERGED = 3, SINGULAR = -3, STALLED = -6, DIVERGED = -9 };
+
+void residual(equation *e, const double *q, double *r);
+void assemble(equation *e, const double *q);
+double last_digits(const equation *e, int dof, double x);
+double size_of_forces(const equation *e, const double *f);
+int judge(equation *e, const double *q, int iteration, double residual, double scale,
+          double floor);
+int snes_function(void *snes, void *x, void *f, void *self);
+int snes_jacobian(void *snes, void *x, void *A, void *P, void *self);
+int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int *reason,
+              void *self);

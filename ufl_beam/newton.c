@@ -1,0 +1,141 @@
+/* The equation of a step as SNES asks for it, without Python; see solve.py.
+ *
+ * What has no loop in C is a part all the same: a function that calls Python.
+ */
+
+/* The residual at q; what supports carry is noted and removed. */
+void residual(equation *e, const double *q, double *r)
+{
+  memset(e->inner_force, 0, e->size * sizeof *r);
+  for (int k = 0; k < e->inner; ++k) e->force[k].add(e->force[k].self, q, e->inner_force);
+  memcpy(r, e->inner_force, e->size * sizeof *r);
+  for (int k = e->inner; k < e->forces; ++k) e->force[k].add(e->force[k].self, q, r);
+  for (int k = 0; k < e->held; ++k) {
+    e->reactions[k] = r[e->hold[k]];
+    r[e->hold[k]] = 0;
+  }
+}
+
+/* The tangent at q. What stands on the diagonal has the right dimension and size for what is held;
+ * where material that flows freely leaves nothing, what stood there before does as well. */
+void assemble(equation *e, const double *q)
+{
+  memset(e->tangent, 0, e->entries * sizeof *e->tangent);
+  for (int k = 0; k < e->stiffnesses; ++k)
+    e->stiffness[k].add(e->stiffness[k].self, q, e->tangent);
+  for (int k = 0; k < e->held; ++k)
+    if (e->tangent[e->pivot[k]] != 0) e->pivots[k] = e->tangent[e->pivot[k]];
+  for (int k = 0; k < e->zeros; ++k) e->tangent[e->zero[k]] = 0;
+  for (int k = 0; k < e->held; ++k) e->tangent[e->pivot[k]] = e->pivots[k];
+}
+
+/* Between them sums of squares have all their digits. */
+static const double SMALL = 1e-250, LARGE = 1e250;
+
+/* Iterations that a tangent may still cost if it is kept: making one costs as much as two. */
+enum { MORE = 3 };
+
+static int demands_met(const equation *e, const double *q, double scale)
+{
+  for (int k = 0; k < e->demands; ++k)
+    if (!(e->demand[k].missed(e->demand[k].self, q, e->residual, scale) <= e->rtol)) return 0;
+  return 1;
+}
+
+/* Whether Newton's method has arrived, goes on, or goes nowhere.
+ *
+ * `floor` is several times the residual that the last digits of the unknowns make.
+ */
+int judge(equation *e, const double *q, int iteration, double residual, double scale, double floor)
+{
+  const double wanted = e->rtol * scale;
+  if (residual <= wanted && demands_met(e, q, scale)) return CONVERGED;
+  const int kept = e->near;
+  e->near = 0;
+  if (iteration > 1) {
+    /* A fraction of the last digit is luck; a few of them that Newton's method no longer halves are
+     * all that can be had: it may go round between two such states for ever. */
+    const int stays = !kept && e->last / 2 < residual && residual <= floor;
+    if ((stays || residual <= floor / 80) && demands_met(e, q, scale)) return AT_ROUND_OFF;
+    /* With the tangent of the iterate before, the residual falls by twice the last factor. */
+    e->near = !kept && residual > floor && 20 * residual * (residual / e->last) <= wanted;
+  }
+  if (e->modified) {
+    /* The residual goes on to fall as it did, if the tangent is kept; from step to step too. */
+    if (iteration > 0) e->rate = residual / e->last;
+    e->near |= residual * pow(e->rate, MORE) <= wanted;
+  }
+  e->slow += 1;
+  if (residual <= e->best / 2) e->best = residual, e->slow = 0;
+  e->last = residual;
+  return e->slow == e->patience ? STALLED : ITERATING;
+}
+
+/* Spacing of the numbers around a displacement or rotation: the last digit of what it is part of. */
+double last_digits(const equation *e, int dof, double x)
+{
+  const double far = fabs(x) + e->lengths[dof];
+  return e->moves[dof] * (nextafter(far, INFINITY) - far);
+}
+
+/* -- what SNES calls --------------------------------------------------------------------------- */
+
+int snes_function(void *snes, void *x, void *f, void *self)
+{
+  equation *e = self;
+  const double *q;
+  double *r;
+  int error = e->petsc->read(x, &q);
+  if (error) return error;
+  if ((error = e->petsc->write(f, &r))) return error;
+  residual(e, q, r);
+  if ((error = e->petsc->end_write(f, &r))) return error;
+  return e->petsc->end_read(x, &q);
+}
+
+int snes_jacobian(void *snes, void *x, void *A, void *P, void *self)
+{
+  equation *e = self;
+  const double *q;
+  double *entries; /* they are those of e; asking for them tells PETSc that they change */
+  if (e->near) return 0;
+  int error = e->petsc->read(x, &q);
+  if (error) return error;
+  if ((error = e->petsc->entries(P, &entries))) return error;
+  assemble(e, q);
+  if ((error = e->petsc->end_entries(P, &entries))) return error;
+  return e->petsc->end_read(x, &q);
+}
+
+/* Size of forces, see Solver; N. */
+double size_of_forces(const equation *e, const double *f)
+{
+  const double square = weighted_square(e->size, e->weight, f, 1);
+  if ((SMALL < square && square < LARGE) || square == 0 || isnan(square)) return sqrt(square);
+  double largest = 0; /* the squares are no numbers any more */
+  for (int i = 0; i < e->size; ++i) largest = fmax(largest, sqrt(e->weight[i]) * fabs(f[i]));
+  if (largest == 0 || !isfinite(largest)) return largest;
+  return largest * sqrt(weighted_square(e->size, e->weight, f, largest));
+}
+
+int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int *reason, void *self)
+{
+  equation *e = self;
+  const double now = size_of_forces(e, e->residual);
+  if (!isfinite(now)) {
+    *reason = DIVERGED;
+    return 0;
+  }
+  const double scale = e->loads + size_of_forces(e, e->inner_force);
+  const double *q;
+  double floor = 0;
+  int error = e->petsc->read(e->x, &q);
+  if (error) return error;
+  if (iteration > 1) {
+    for (int i = 0; i < e->size; ++i)
+      e->space[i] = e->tangent[e->diagonal[i]] * last_digits(e, i, q[i]);
+    floor = 8 * size_of_forces(e, e->space);
+  }
+  *reason = judge(e, q, (int)iteration, now, scale, floor);
+  return e->petsc->end_read(e->x, &q);
+}
