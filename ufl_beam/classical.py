@@ -126,7 +126,7 @@ class _Accelerated(_AtEnd):
     slack = math.inf
     slips = False
     weights: Weights
-    kept: tuple[str, ...] = ("acceleration",)
+    kept: tuple[str, ...]
 
     def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
         """Loads and motions are those of the end."""
@@ -161,11 +161,16 @@ class _Accelerated(_AtEnd):
             )
 
     def _beginning(self, dt: float, rates: Rates) -> tuple[Weights, Array | float, Array | float]:
-        """The weights of the step; a and ü at its beginning."""
+        """The weights of the step; a and ü at its beginning.
+
+        a leads by (α_m - α_f) dt; until it is known by how much, steps do without.
+        """
         if not rates.more:
             return CONSTANT, 0.0, 0.0
-        (acceleration,) = rates.more
-        return self.weights, acceleration, acceleration
+        acceleration, *lead = rates.more
+        if len(rates.more) < len(self.kept):
+            return AVERAGE, acceleration, acceleration
+        return self.weights, acceleration + dt * lead[0] if lead else acceleration, acceleration
 
     def inertia(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
         """Mass times the acceleration at the end."""
@@ -189,9 +194,14 @@ class _Accelerated(_AtEnd):
         return v, a, forced
 
     def rates(self, dt: float, s: Array, rates: Rates) -> tuple[Array, ...]:
-        """Velocities and accelerations."""
-        v, _, acceleration = self._end(dt, s, rates)
-        return v, acceleration
+        """Velocities, accelerations, and what a differs from them by, over the time."""
+        v, a, acceleration = self._end(dt, s, rates)
+        if not rates.more or len(self.kept) == 1:
+            return v, acceleration
+        if len(rates.more) == len(self.kept):
+            return v, acceleration, 1 / dt * (a - acceleration)
+        lead = (self.weights.α_m - self.weights.α_f) / dt
+        return v, acceleration, lead * (acceleration - rates.more[0])
 
     def slip(self, dt: float, change: Array, rates: Rates) -> Array:
         """None that is known."""
@@ -231,6 +241,7 @@ class Newmark(_Accelerated):
     gamma: float = 0.5
     beta: float = 0.25
 
+    kept = ("acceleration",)
     advice = "Try a smaller dt, or GeneralizedAlpha(0.8), or Midpoint(), which conserves energy"
 
     def __post_init__(self) -> None:
@@ -282,25 +293,3 @@ class GeneralizedAlpha(_Accelerated):
         α_m = (2 * self.rho_inf - 1) / (self.rho_inf + 1)
         α_f = self.rho_inf / (self.rho_inf + 1)
         return Weights(α_m, α_f, 0.5 - α_m + α_f, (1 - α_m + α_f) ** 2 / 4)
-
-    def _beginning(self, dt: float, rates: Rates) -> tuple[Weights, Array | float, Array | float]:
-        """Where it is not known yet by how much a leads, the step does without."""
-        if not rates.more:
-            return CONSTANT, 0.0, 0.0
-        acceleration, *lead = rates.more
-        if not lead:
-            return AVERAGE, acceleration, acceleration
-        return self.weights, acceleration + dt * lead[0], acceleration
-
-    def rates(self, dt: float, s: Array, rates: Rates) -> tuple[Array, ...]:
-        """Velocities, accelerations and what a differs from them by, over the time."""
-        v, a, acceleration = self._end(dt, s, rates)
-        lead: Array
-        if not rates.more:
-            return v, acceleration
-        if len(rates.more) == len(self.kept):
-            lead = 1 / dt * (a - acceleration)
-        else:
-            α_m, α_f, _, _ = self.weights
-            lead = (α_m - α_f) / dt * (acceleration - rates.more[0])
-        return v, acceleration, lead
