@@ -144,32 +144,31 @@ class Ladder:
         self.runs: dict[Rung, Run] = {}
         self.failed: dict[Rung, str] = {}
         self.spent = 0.0
+        self._shapes: dict[str, tuple[int, ...]] = {}
 
-    def begin(self) -> None:
+    def begin(self, family: int) -> None:
         """Compile and see that quantities can be compared, on every process.
 
         Raises:
-            SceneError: The scene or a quantity is wrong.
+            SceneError: The scene, its dials or a quantity are wrong.
         """
-        shapes: dict[str, tuple[int, ...]] = {}
         seconds = 0.0
         with alone():
-            for family in range(len(self.families)):
-                for level in (0.0, 1.0):
-                    try:
-                        solution = self._simulate(Rung(family, 1, level))
-                    except ConvergenceError:
-                        continue  # finer steps may do
-                    seconds += solution.seconds
-                    for name, value in self._ask(solution):
-                        if shapes.setdefault(name, value.shape) != value.shape:
-                            raise SceneError(
-                                f"tradeoff: quantity {name!r} has shape {shapes[name]} in a run "
-                                f"and {value.shape} in another with other steps or cells; give a "
-                                "number, or an array at times and places of your own (np.interp)"
-                            )
-
-        self.spent = float(self._comm.bcast(seconds))
+            for level in (0.0, 1.0):
+                try:
+                    solution = self._simulate(Rung(family, 1, level))
+                except ConvergenceError:
+                    continue  # finer steps may do
+                seconds += solution.seconds
+                for name, value in self._ask(solution):
+                    before = self._shapes.setdefault(name, value.shape)
+                    if before != value.shape:
+                        raise SceneError(
+                            f"tradeoff: quantity {name!r} has shape {before} in a run and "
+                            f"{value.shape} in another with other steps or cells; give a number, "
+                            "or an array at times and places of your own (np.interp)"
+                        )
+        self.spent += float(self._comm.bcast(seconds))
 
     def climb(self, rungs: Sequence[Rung], *, short: float = SHORT) -> None:
         """Run what is missing, several at a time where there are processes.

@@ -71,7 +71,7 @@ def tradeoff(
         The runs with their times and errors, and the recommended arguments.
 
     Raises:
-        SceneError: The call is wrong.
+        SceneError: The call is wrong, or no kind of dials can be used for the scene.
         TradeoffError: Self-convergence is not seen, or it would take too long; it says what was
             seen and has the runs.
     """
@@ -87,10 +87,16 @@ def tradeoff(
         scene, quantities, t=t, families=families, newtons=newtons, most=most,
         comm=ours() if comm is None else comm,
     )  # fmt: skip
-    ladder.begin()
     found: list[Found] = []
     notes: list[str] = []
+    wrong: list[SceneError] = []
     for family, dials in enumerate(families):
+        try:
+            ladder.begin(family)
+        except SceneError as error:
+            wrong.append(error)
+            notes.append(f"{dials}: {error}")
+            continue
         try:
             one = Climb(ladder, family, goal).find(found)
         except TradeoffError as error:
@@ -100,6 +106,8 @@ def tradeoff(
             notes.append(f"{dials}: given up, others are better")
         else:
             found.append(one)
+    if len(wrong) == len(families):
+        raise wrong[0]
     if not found:
         raise TradeoffError("tradeoff: " + "\n".join(notes), tuple(ladder.runs.values()))
     best = min(found, key=goal.rank)

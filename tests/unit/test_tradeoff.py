@@ -164,6 +164,20 @@ def test_schemes_that_converge_to_different_limits_are_named(law):
     assert any("its limit of value is 0.1 away" in note for note in found.notes)
 
 
+def test_dials_that_a_scene_cannot_have_leave_the_others(law):
+    def error(h, dt, scheme, newton):
+        if scheme.alpha > 0:
+            raise ub.SceneError("Midpoint: not for this scene")
+        return smooth(h, dt, scheme, newton)
+
+    law(error)
+    found = ask(scheme=[ub.Midpoint(alpha=0.1), ub.Midpoint()], tolerance=1e-3)
+    assert found.best.dials.scheme == ub.Midpoint()
+    assert "not for this scene" in found.notes[0]
+    with raises("not for this scene"):
+        ask(scheme=ub.Midpoint(alpha=0.1), tolerance=1e-3)
+
+
 # -- refusals ----------------------------------------------------------------------------------
 
 
