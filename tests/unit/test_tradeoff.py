@@ -277,8 +277,10 @@ def test_statics_needs_cells_alone():
         scene, {"tip": end}, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance={"tip": 1e-3}
     )
     assert found.best.dials.dt == 0.5
-    again = ub.simulate(scene, **found.recommended, progress=False)
-    fine = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, mesh=ub.Mesh(refine=100))
+    again = ub.simulate(scene, **found.recommended, progress=False, comm=MPI.COMM_SELF)
+    fine = ub.simulate(
+        scene, ub.Static(), t=(0, 1), dt=0.5, mesh=ub.Mesh(refine=100), comm=MPI.COMM_SELF
+    )
     # Of second order in the cells: those of the reference leave 1e-6.
     assert np.abs(end(again) - end(fine)).max() < 1e-3
     assert np.abs(found.limit["tip"] - end(fine)).max() < found.uncertainty["tip"] + 1e-5
@@ -297,7 +299,7 @@ def test_a_vibration():
         scene, {"tip": history}, scheme=ub.Midpoint(), t=(0, 3), dt=0.25, tolerance=0.02
     )
     fine = ub.simulate(
-        scene, ub.Midpoint(), t=(0, 3), dt=0.25 / 64, mesh=ub.Mesh(refine=32), progress=False
+        scene, ub.Midpoint(), t=(0, 3), dt=0.25 / 64, mesh=ub.Mesh(refine=32), comm=MPI.COMM_SELF
     )
     size = np.abs(history(fine)).max()
     assert np.abs(found.best.values["tip"] - history(fine)).max() < 0.02 * size
