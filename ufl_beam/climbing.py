@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from statistics import geometric_mean
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from ufl_beam.richardson import Cost, Cross, Level, size
 PATIENCE = 4
 """Places on the ladder at which self-convergence may not be seen."""
 
-TRIES = 5
+TRIES = 6
 """Settings that are tried."""
 
 CAREFUL = 2.0
@@ -39,7 +40,8 @@ class Climb:
 
     def __init__(self, ladder: Ladder, family: int, goal: Goal) -> None:
         self._ladder, self._family, self._goal = ladder, family, goal
-        self._slower = 1.0  # than the cost that was fitted
+        # What runs of settings took, over the cost that was fitted: machines are noisy
+        self._slower: list[float] = []
 
     def find(self, others: Sequence[Found]) -> Found | None:
         """The setting; none if ``others`` are better.
@@ -84,7 +86,7 @@ class Climb:
                 return found
             if again or len(tried) == TRIES:
                 return min(tried, key=self._goal.rank)
-            self._slower *= found.run.seconds / choice.seconds
+            self._slower.append(found.run.seconds * self._mean / choice.seconds)
             if found.ratio > choice.ratio:
                 more = outlook.bottleneck(choice)
                 base = base[0] + more[0], base[1] + more[1]
@@ -122,7 +124,7 @@ class Climb:
             return None, where + "".join(doubts), (i + cells, j + steps)
         done = [run for run in ladder.of(self._family) if run.rung.newton == 0]
         columns = zip(*((run.steps, run.cells, run.seconds) for run in done), strict=True)
-        cost = Cost.of(*map(np.array, columns)).slower(self._slower)
+        cost = Cost.of(*map(np.array, columns)).slower(self._mean)
         cells_now = runs[base].cells / rungs[0].refine
         return Outlook(crosses, cost, finest.steps / 2 ** (j + 2), cells_now, units), "", base
 
@@ -133,6 +135,10 @@ class Climb:
         if rung in self._ladder.failed:
             raise self._refusal(f"the chosen setting failed: {self._ladder.failed[rung]}")
         return Found(self._ladder.runs[rung], choice, outlook)
+
+    @property
+    def _mean(self) -> float:
+        return geometric_mean(self._slower or [1.0])
 
     def _refusal(self, message: str) -> TradeoffError:
         return TradeoffError(message, tuple(self._ladder.of(self._family)))

@@ -96,5 +96,8 @@ def test_a_budget_is_kept(make):
         scene, {"end": lambda s: s.position(place)[-1]}, scheme=ub.Midpoint(), budget=1.0, **times
     )
     print(found)
+    again = [ub.simulate(scene, **found.recommended, progress=False).seconds for _ in range(3)]
+    if max(again) > 1.2 * min(again):
+        pytest.skip(f"this machine is too busy for times: {min(again):.2f} to {max(again):.2f} s")
     assert 0.8 <= found.best.seconds <= 1.2
     assert found.ratio(found.best) < 0.02
