@@ -1,6 +1,6 @@
 # Every target runs through ./env, which brings DOLFINx where it is missing. `make` lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-mpi verify long demos check bench bench-peers extremes schemes
+.PHONY: help demo test test-mpi verify long demos check bench bench-peers extremes schemes study
 
 # Natively as root Open MPI refuses to start; with more ranks than cores, too (the last two lines: versions 5 and 6).
 # ./env sets the same in its root.
@@ -45,6 +45,9 @@ check: ## lint, format and types
 
 extremes: ## what happens at the extremes, as a table in docs/extremes.md
 	@./env python3 benchmarks/extremes
+
+study: ## what each dial costs and errs, as docs/study.md; twenty minutes, `make study only=--quick` two
+	@./env python3 benchmarks/study $(only)
 
 schemes: ## errors of the time schemes at equal steps, as tables in docs/schemes.md
 	@./env python3 benchmarks/schemes.py

@@ -42,7 +42,7 @@ from ufl_beam.decay import (
 from ufl_beam.discretisation import Mesh
 from ufl_beam.distributions import Lognormal, Normal, TruncatedNormal, Weibull
 from ufl_beam.envelopes import plot_cycles, plot_extremes
-from ufl_beam.errors import ConvergenceError, SceneError
+from ufl_beam.errors import ConvergenceError, SceneError, TradeoffError
 from ufl_beam.events import Event, Events
 from ufl_beam.exact_schemes import DecayingMidpoint, ExactStatic, Midpoint, PrintedMidpoint
 from ufl_beam.extremes import Extent, Extremes
@@ -69,6 +69,7 @@ from ufl_beam.loads import (
 from ufl_beam.mode_pictures import plot_modes
 from ufl_beam.modes import Buckling, Modes, buckling, modes
 from ufl_beam.pacing import Adaptive
+from ufl_beam.precision import Tradeoff
 from ufl_beam.record import XDMF, History, Recorder
 from ufl_beam.render import animate, render
 from ufl_beam.running import say, simulate
@@ -87,8 +88,10 @@ from ufl_beam.simulation import Simulation
 from ufl_beam.solution import Solution
 from ufl_beam.solve import Newton
 from ufl_beam.studies import study
+from ufl_beam.tradeoffs import tradeoff
 from ufl_beam.view import picture, plot, plot_energy, plot_history, plot_shapes
 from ufl_beam.viscous import KelvinVoigt, Rayleigh
+from ufl_beam.work_precision import plot_tradeoff
 
 __all__ = [
     "XDMF",
@@ -179,6 +182,8 @@ __all__ = [
     "Study",
     "Support",
     "Table",
+    "Tradeoff",
+    "TradeoffError",
     "TruncatedNormal",
     "Turn",
     "Velocity",
@@ -205,10 +210,12 @@ __all__ = [
     "plot_modes",
     "plot_moment_curvature",
     "plot_shapes",
+    "plot_tradeoff",
     "rainflow",
     "ramp",
     "render",
     "say",
     "simulate",
     "study",
+    "tradeoff",
 ]

@@ -59,6 +59,18 @@ class ConvergenceError(RuntimeError):
         self.forces = forces
 
 
+class TradeoffError(RuntimeError):
+    """No setting can be recommended: the runs do not converge, or it would take too long.
+
+    Attributes:
+        runs: What was run, see :class:`~ufl_beam.ladders.Run`.
+    """
+
+    def __init__(self, message: str, runs: tuple[Any, ...] = ()) -> None:
+        super().__init__(message)
+        self.runs = runs
+
+
 def require_number(
     value: float, what: str, *, positive: bool = False, at_least: float = -math.inf
 ) -> None:

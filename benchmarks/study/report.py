@@ -1,0 +1,114 @@
+"""The page of the study, made of its results: what to choose when, figures, tables."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from advice import TARGETS, advice, cheapest, overall
+from figures import draw_case, draw_dials
+
+Case = dict[str, Any]
+
+INTRODUCTION = """\
+# Speed and accuracy: the study
+
+Written by `make study`; do not edit. What each dial costs and what it errs, over scenes that are
+smooth, stiff, impulsive, plastic, softening and static. Times are the wall time of a run, building
+the scene included, compiling not. Errors are the largest distance of a place at ten instants from a
+reference that is finer than all that is compared, as a part of the size of the scene; what is below
+twice the error of the reference itself is not counted. The scenes are small and the numbers those
+of one machine: take ratios from here, and settings for your own scene from
+[`ub.tradeoff`](tradeoff.md).
+"""
+
+
+def save(study: dict[str, Any], docs: Path) -> None:
+    """Write ``study.md`` and its figures."""
+    pictures = docs / "pictures"
+    pictures.mkdir(exist_ok=True)
+    cases = study["cases"]
+    lines = [INTRODUCTION]
+    if study["quick"]:
+        lines += ["*A quick study: few and coarse settings, most of them timed once.*", ""]
+    lines += [
+        f"Commit {study['commit']}, Python {study['python']}, DOLFINx {study['dolfinx']}, "
+        f"{study['processor']}, one thread; {study['seconds'] / 60:.0f} minutes.",
+        "",
+        *(f"Without {name}: {_cut(why)}\n" for name, why in study["failed"].items()),
+        "## What to choose when",
+        "",
+        *advice(cases),
+        "",
+        "How many times as long as the fastest scheme each takes, the geometric mean over the "
+        "scenes where it reaches the error at all, and in how many it does:",
+        "",
+        *overall(cases),
+        "",
+        "## Each dial by itself",
+        "",
+        "One dial is turned at a time, from the setting that the tables of the scenes name. Time "
+        "and error are ratios to that setting; the change is what the dial alone does to the "
+        "result.",
+        "",
+        "![Time and error as each dial is turned](pictures/study_dials.png)",
+        "",
+    ]
+    draw_dials(cases, pictures / "study_dials.png")
+    for case in cases:
+        picture = pictures / f"study_{case['name'].replace(' ', '_')}.png"
+        draw_case(case, picture)
+        lines += _section(case, picture)
+    (docs / "study.md").write_text("\n".join(lines).rstrip() + "\n")
+
+
+def _section(case: Case, picture: Path) -> list[str]:
+    """Figure and tables of a scene."""
+    here = case["base"]
+    lines = [
+        f"## {case['name'].capitalize()}: {case['kind']}",
+        "",
+        f"{case['says']} The reference errs by about {case['reference']:.0e}.",
+        "",
+        f"![Error over wall time](pictures/{picture.name})",
+        "",
+        "| error below | scheme | cells | degree | steps | iterations | seconds | error |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for target in TARGETS:
+        run = cheapest(case, target)
+        lines.append(f"| {target:g} | " + (_row(run) if run else "not reached | | | | | |") + " |")
+    if "failed" in here:
+        return [*lines, "", f"The setting for single dials failed: {here['failed']}", ""]
+    lines += [
+        "",
+        f"Dials turned from: {here['scheme']}, {here['cells']} cells, {here['taken']} steps, "
+        f"{here['seconds']:.3g} s, error {here['error']:.1e}.",
+        "",
+        "| dial | time | error | change | iterations | imbalance of the ledger |",
+        "|---|---|---|---|---|---|",
+    ]
+    for run in case["dials"]:
+        if "failed" in run:
+            lines.append(f"| {run['dial']} | {_cut(run['failed'])} | | | | |")
+            continue
+        lines.append(
+            f"| {run['dial']} | × {run['seconds'] / here['seconds']:.2f} "
+            f"| × {run['error'] / here['error']:.2g} | {run['changes']:.1e} "
+            f"| {run['iterations']:.2f} | {run['imbalance']:.1e} |"
+        )
+    failed = {run["scheme"]: run["failed"] for run in case["runs"] if "failed" in run}
+    lines += [""] + [f"{scheme} failed in some: {_cut(why)}  " for scheme, why in failed.items()]
+    return [*lines, ""]
+
+
+def _row(run: dict[str, Any]) -> str:
+    return (
+        f"{run['scheme']} | {run['cells']} | {run['degree']} | {run['taken']} "
+        f"| {run['iterations']:.2f} | {run['seconds']:.3g} | {run['error']:.1e}"
+    )
+
+
+def _cut(message: str) -> str:
+    message = message.replace("|", "\\|")
+    return message if len(message) <= 100 else message[:99].rsplit(" ", 1)[0] + " …"

@@ -1,0 +1,310 @@
+"""Trade-offs: of runs whose errors and times are laws, and of small scenes."""
+
+import math
+import re
+from types import SimpleNamespace
+
+from mpi4py import MPI
+
+import numpy as np
+import pytest
+import scenes
+
+import ufl_beam as ub
+from ufl_beam import ladders
+
+COMM = MPI.COMM_WORLD
+SCENE = scenes.cantilever(cells=4)
+CELLS, STEP, SECONDS = 1e-2, 1e-1, 1e-4
+
+
+def raises(*parts, kind=ub.SceneError):
+    return pytest.raises(kind, match="(?s)" + ".*".join(map(re.escape, parts)))
+
+
+@pytest.fixture
+def law(monkeypatch):
+    """`law(error)`: runs of these errors, of cells and steps, in the place of simulations."""
+
+    def use(error, seconds=lambda cells, steps: 0.1 + SECONDS * steps * (1 + cells / 50)):
+        def simulate(scene, *, scheme, t, dt, mesh, newton, progress):
+            length = dt.tolerance ** (1 / 3) if isinstance(dt, ub.Adaptive) else dt
+            steps, cells = round((t[1] - t[0]) / length), int(4 * mesh.refine)
+            return SimpleNamespace(
+                seconds=seconds(cells, steps), parts=steps, iterations=2 * steps,
+                grid=SimpleNamespace(cells=range(cells)),
+                value=1.0 + error(4 / cells, length, scheme, newton),
+            )  # fmt: skip
+
+        monkeypatch.setattr(ladders, "simulate", simulate)
+
+    return use
+
+
+def smooth(h, dt, scheme, newton):
+    """Second order in both."""
+    return CELLS * h**2 - STEP * dt**2
+
+
+def ask(*, scheme=None, dt=0.1, **goal):
+    return ub.tradeoff(
+        SCENE, {"value": lambda s: s.value}, scheme=scheme or ub.Midpoint(), t=(0.0, 10.0), dt=dt,
+        **goal,
+    )  # fmt: skip
+
+
+# -- laws --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("tolerance", [3e-3, 1e-4, 1e-6])
+def test_a_tolerance_is_met_and_hardly_more(law, tolerance):
+    law(smooth)
+    found = ask(tolerance={"value": tolerance})
+    best = found.best
+    error = abs(best.values["value"] - 1.0)
+    assert error <= tolerance
+    assert abs(found.limit["value"] - 1.0) < 1e-9  # the laws are exact powers
+    # The cheapest of all settings whose errors, not cancelling, are below the tolerance
+    settings = ((r, 100 * 2 ** (k / 16)) for r in range(1, 256) for k in range(16 * 10))
+    cheapest = min(
+        0.1 + SECONDS * n * (1 + 4 * r / 50)
+        for r, n in settings
+        if CELLS / r**2 + STEP * (10 / n) ** 2 <= tolerance
+    )
+    # A safety factor of 1.25 on errors of second order is 1.12 times as many cells and steps.
+    assert best.seconds <= 1.3 * cheapest
+    assert found.ratio(best) == pytest.approx(error / tolerance, rel=1e-3)
+    assert found.spent >= sum(run.seconds for run in found.runs)
+
+
+@pytest.mark.parametrize("budget", [0.3, 1.0, 10.0])
+def test_a_budget_is_used(law, budget):
+    law(smooth)
+    found = ask(budget=budget)
+    assert 0.8 * budget <= found.best.seconds <= budget
+    # The most accurate of all settings of that time
+    least = min(
+        CELLS / r**2 + STEP * (10 / n) ** 2
+        for r in range(1, 512)
+        if (n := (found.best.seconds - 0.1) / (SECONDS * (1 + 4 * r / 50))) >= 100
+    )
+    dials = found.best.dials
+    assert CELLS / float(dials.mesh.refine) ** 2 + STEP * dials.dt**2 <= 1.1 * least
+
+
+def test_the_recommendation_are_arguments_of_simulate(law):
+    law(smooth)
+    found = ask(tolerance=1e-4)
+    assert set(found.recommended) == {"scheme", "t", "dt", "mesh", "newton"}
+    again = ladders.simulate(SCENE, progress=False, **found.recommended)
+    assert again.value == found.best.values["value"]
+    said = str(found)
+    assert "errors of 0.0001 of each quantity" in said
+    assert f"{len(found.runs)} runs took" in said
+    assert f"recommended: {found.best.dials}" in said
+    assert all(str(run.dials) in said for run in found.front)
+
+
+def test_a_dial_that_does_nothing_stays_as_it_is(law):
+    law(lambda h, dt, scheme, newton: CELLS * h**2)
+    assert ask(tolerance=1e-5).best.dials.dt == 0.1
+    law(lambda h, dt, scheme, newton: STEP * dt)  # of first order
+    best = ask(tolerance=1e-4).best
+    assert best.dials.mesh.refine == 1
+    assert 0.5e-4 < abs(best.values["value"] - 1.0) <= 1e-4
+
+
+def test_the_better_scheme_wins(law):
+    """The second one needs steps ten times as short for the same error."""
+    first, second = ub.Midpoint(), ub.Midpoint(alpha=0.1)
+    law(lambda h, dt, scheme, newton: smooth(h, (1 + 90 * scheme.alpha) * dt, scheme, newton))
+    for schemes in ([first, second], [second, first]):
+        found = ask(scheme=schemes, tolerance=1e-4)
+        assert found.best.dials.scheme == first
+    assert any("given up" in note for note in ask(scheme=[first, second], tolerance=1e-4).notes)
+
+
+def test_adaptive_steps_go_by_their_tolerance(law):
+    law(smooth)
+    found = ask(dt=ub.Adaptive(1e-3), tolerance=1e-4)
+    assert found.best.dials.dt.tolerance < 1e-3
+    assert abs(found.best.values["value"] - 1.0) <= 1e-4
+
+
+@pytest.mark.parametrize(("change", "taken"), [(1e-7, True), (1e-3, False)])
+def test_another_newton_is_taken_if_it_changes_little(law, change, taken):
+    def error(h, dt, scheme, newton):
+        law.loose = newton.rtol > 1e-8
+        return smooth(h, dt, scheme, newton) + change * law.loose
+
+    def seconds(cells, steps):
+        return (0.1 + SECONDS * steps * (1 + cells / 50)) * (0.5 if law.loose else 1.0)
+
+    law(error, lambda cells, steps: 0.1 + SECONDS * steps * (1 + cells / 50))
+    strict, loose = ub.Newton(), ub.Newton(rtol=1e-6)
+    # Equal times are no reason to change.
+    found = ask(tolerance=1e-4, newton=[strict, loose])
+    assert found.best.dials.newton == strict
+    assert any(run.dials.newton == loose for run in found.runs)
+    simulate = ladders.simulate
+
+    def faster(scene, *, newton, **others):
+        one = simulate(scene, newton=newton, **others)
+        one.seconds *= 0.5 if newton == loose else 1.0
+        return one
+
+    ladders.simulate = faster  # the fixture restores it
+    found = ask(tolerance=1e-4, newton=[strict, loose])
+    assert found.best.dials.newton == (loose if taken else strict)
+
+
+def test_schemes_that_converge_to_different_limits_are_named(law):
+    law(lambda h, dt, scheme, newton: smooth(h, dt, scheme, newton) + 0.1 * (scheme.alpha > 0))
+    found = ask(scheme=[ub.Midpoint(), ub.Midpoint(alpha=0.1)], tolerance=1e-3)
+    assert any("its limit of value is 0.1 away" in note for note in found.notes)
+
+
+def test_dials_that_a_scene_cannot_have_leave_the_others(law):
+    def error(h, dt, scheme, newton):
+        if scheme.alpha > 0:
+            raise ub.SceneError("Midpoint: not for this scene")
+        return smooth(h, dt, scheme, newton)
+
+    law(error)
+    found = ask(scheme=[ub.Midpoint(alpha=0.1), ub.Midpoint()], tolerance=1e-3)
+    assert found.best.dials.scheme == ub.Midpoint()
+    assert "not for this scene" in found.notes[0]
+    with raises("not for this scene"):
+        ask(scheme=ub.Midpoint(alpha=0.1), tolerance=1e-3)
+
+
+# -- refusals ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("goal", [{"tolerance": 1e-3}, {"budget": 2.0}])
+def test_chaos_is_refused(law, goal):
+    law(lambda h, dt, scheme, newton: math.sin(1e4 / dt + 1e4 / h))
+    with raises("self-convergence is not seen", "steps: changes by", kind=ub.TradeoffError) as info:
+        ask(**goal)
+    assert len(info.value.runs) > 6
+
+
+def test_divergence_is_refused(law):
+    law(lambda h, dt, scheme, newton: 1e-3 / dt)
+    with raises("self-convergence is not seen", "order -1.00", kind=ub.TradeoffError):
+        ask(tolerance=1e-3)
+
+
+def test_what_would_take_too_long_is_refused(law):
+    law(smooth)
+    with raises("runs would take about", "more than most = 5 s", kind=ub.TradeoffError) as info:
+        ask(tolerance=1e-8, most=5.0)
+    assert info.value.runs
+
+
+def test_a_budget_below_the_coarsest_run_is_refused(law):
+    law(smooth)
+    with raises("no setting serves", "the nearest takes", kind=ub.TradeoffError):
+        ask(budget=0.05)
+
+
+def test_coarse_steps_that_fail_are_left_out(law):
+    def error(h, dt, scheme, newton):
+        if dt > 0.06:
+            raise ub.ConvergenceError(
+                "no equilibrium", time=0.0, dt=dt, solution=None, residuals={}, forces={}
+            )
+        return smooth(h, dt, scheme, newton)
+
+    law(error)
+    found = ask(tolerance=1e-5)
+    assert abs(found.best.values["value"] - 1.0) <= 1e-5
+
+
+@pytest.mark.parametrize(
+    ("call", "says"),
+    [
+        ({}, ("give either a tolerance or a budget",)),
+        ({"tolerance": 1.0, "budget": 1.0}, ("give either a tolerance or a budget",)),
+        ({"tolerance": -1.0}, ("tolerance = -1 must be positive",)),
+        ({"tolerance": {"tip": 1.0}}, ("tolerance is of tip, quantities are value",)),
+        ({"tolerance": {"value": 0.0}}, ("tolerance of value = 0 must be positive",)),
+        ({"budget": math.inf}, ("budget = inf is not finite",)),
+        ({"budget": 1.0, "most": 0}, ("most = 0 must be positive",)),
+        ({"budget": 1.0, "scheme": ()}, ("scheme = ",)),
+        ({"budget": 1.0, "dt": []}, ("dt is empty",)),
+        ({"budget": 1.0, "dt": -1.0}, ("dt = -1 must be positive",)),
+        ({"budget": 1.0, "newton": [1]}, ("newton = 1 is not a Newton",)),
+        ({"budget": 1.0, "mesh": [2]}, ("mesh = 2 is not a Mesh",)),
+    ],
+)
+def test_calls(call, says):
+    call = {"scheme": ub.Static(), "t": (0, 1), "dt": 0.5, **call}
+    if call["scheme"] == ():
+        call["scheme"], says = [], ("scheme is empty",)
+    with raises(*says):
+        ub.tradeoff(SCENE, {"value": lambda s: 1.0}, **call)
+
+
+@pytest.mark.parametrize(
+    ("quantities", "says"),
+    [
+        ({}, ("quantities is empty",)),
+        ([1], ("quantities = [1] is not a Mapping",)),
+        ({"tip": 1.0}, ("quantity 'tip' = 1.0 cannot be called",)),
+        ({"q": lambda s: s.times}, ("quantity 'q' has shape (3,)", "np.interp")),
+        ({"q": lambda s: math.nan}, ("quantity 'q' is not finite",)),
+        ({"q": lambda s: 0.0}, ("quantity 'q' is zero",)),
+    ],
+)
+def test_quantities(quantities, says):
+    with raises(*says):
+        ub.tradeoff(SCENE, quantities, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance=0.1)
+
+
+# -- scenes ------------------------------------------------------------------------------------
+
+
+def test_statics_needs_cells_alone():
+    section = ub.Section(EA=1e8, GA=1e8, EI=100.0)
+    scene = scenes.cantilever(section, cells=2, force=(0.0, -300.0))
+    tip = scene.beams[0].end
+
+    def end(solution):
+        return solution.position(tip)[-1]
+
+    found = ub.tradeoff(
+        scene, {"tip": end}, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance={"tip": 1e-3}
+    )
+    assert found.best.dials.dt == 0.5
+    again = ub.simulate(scene, **found.recommended, progress=False, comm=MPI.COMM_SELF)
+    fine = ub.simulate(
+        scene, ub.Static(), t=(0, 1), dt=0.5, mesh=ub.Mesh(refine=100), comm=MPI.COMM_SELF
+    )
+    # Of second order in the cells: those of the reference leave 1e-6.
+    assert np.abs(end(again) - end(fine)).max() < 1e-3
+    assert np.abs(found.limit["tip"] - end(fine)).max() < found.uncertainty["tip"] + 1e-5
+
+
+def test_a_vibration():
+    """A cantilever that is let go: cells and steps; its history as an array of one shape."""
+    section = ub.Section(EA=1e4, GA=1e4, EI=1.0, rhoA=1.0, rhoI=1e-3)
+    scene = scenes.cantilever(section, cells=1, force=(0, 0.1), time=lambda t: math.sin(t) ** 2)
+    tip, at = scene.beams[0].end, np.linspace(0.5, 3.0, 6)
+
+    def history(solution):
+        return np.interp(at, solution.times, solution.displacement(tip)[:, 1])
+
+    found = ub.tradeoff(
+        scene, {"tip": history}, scheme=ub.Midpoint(), t=(0, 3), dt=0.25, tolerance=0.02
+    )
+    fine = ub.simulate(
+        scene, ub.Midpoint(), t=(0, 3), dt=0.25 / 64, mesh=ub.Mesh(refine=32), comm=MPI.COMM_SELF
+    )
+    size = np.abs(history(fine)).max()
+    assert np.abs(found.best.values["tip"] - history(fine)).max() < 0.02 * size
+    assert found.crosses["tip"].cells.order == pytest.approx(2.0, abs=0.3)
+    assert len({run.rung for run in found.runs}) == len(found.runs)
+    texts = COMM.allgather(str(found))
+    assert len(set(texts)) == 1
+    ub.plot_tradeoff(found)
