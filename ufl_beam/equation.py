@@ -30,6 +30,8 @@ _PETSC = ctypes.CDLL(PETSc.__file__)
 CALLED = (
     *("VecGetArrayRead", "VecRestoreArrayRead", "VecGetArray", "VecRestoreArray"),
     *("MatSeqAIJGetArray", "MatSeqAIJRestoreArray"),
+    *("SNESSetIterationNumber", "SNESSetConvergedReason"),
+    *("PCSetUp", "PCGetFailedReason", "PCApply"),
 )
 """What the callbacks need, in the order of ``petsc`` in loops.h."""
 
@@ -136,8 +138,7 @@ class Equation:
         self._stiffnesses = ffi.new("call[]", [s for _, s in loops if s is not None])
         self._petsc = ffi.new("petsc *")
         for (name, field), function in zip(ffi.typeof("petsc").fields, CALLED, strict=True):
-            address = ctypes.cast(getattr(_PETSC, function), ctypes.c_void_p).value
-            setattr(self._petsc, name, ffi.cast(field.type, address))
+            setattr(self._petsc, name, ffi.cast(field.type, _address(function)))
         self._alive = [
             *map(doubles, (force, A.data, supports.reactions, supports.pivots)),
             *(integers(x.astype(np.int32)) for x in (supports.dofs, *supports.entries)),
@@ -184,13 +185,34 @@ class Equation:
 
     def attach(self, snes: PETSc.SNES, f: PETSc.Vec, matrix: PETSc.Mat) -> None:
         """Let SNES call the functions in C."""
-        handles = {"snes": snes.handle, "f": f.handle, "matrix": matrix.handle}
-        at = {name: ctypes.c_void_p(handle) for name, handle in handles.items()}
-        function, jacobian, test = (
-            ctypes.c_void_p(int(ffi.cast("intptr_t", ffi.addressof(lib, f"snes_{name}"))))
-            for name in ("function", "jacobian", "test")
-        )
-        me = ctypes.c_void_p(int(ffi.cast("intptr_t", self.c)))
-        _PETSC.SNESSetFunction(at["snes"], at["f"], function, me)
-        _PETSC.SNESSetJacobian(at["snes"], at["matrix"], at["matrix"], jacobian, me)
-        _PETSC.SNESSetConvergenceTest(at["snes"], test, me, None)
+        at, at_f, at_matrix = (ctypes.c_void_p(one.handle) for one in (snes, f, matrix))
+        function, jacobian, test = map(_in_c, ("snes_function", "snes_jacobian", "snes_test"))
+        me = _pointer(self.c)
+        _PETSC.SNESSetFunction(at, at_f, function, me)
+        _PETSC.SNESSetJacobian(at, at_matrix, at_matrix, jacobian, me)
+        _PETSC.SNESSetConvergenceTest(at, test, me, None)
+
+    def drive(self, snes: PETSc.SNES) -> None:
+        """Let SNES leave Newton's method to the one in C."""
+        at = ctypes.c_void_p(snes.handle)
+        snes.setType("shell")
+        _PETSC.SNESShellSetContext(at, _pointer(self.c))
+        _PETSC.SNESShellSetSolve(at, _in_c("snes_newton"))
+
+
+def _address(function: str) -> int | None:
+    """Where a function of PETSc is."""
+    return ctypes.cast(getattr(_PETSC, function), ctypes.c_void_p).value
+
+
+def _pointer(at: Any) -> ctypes.c_void_p:
+    """A pointer of cffi as one of ctypes."""
+    return ctypes.c_void_p(int(ffi.cast("intptr_t", at)))
+
+
+def _in_c(name: str) -> ctypes.c_void_p:
+    """Where a function of ours is."""
+    return _pointer(ffi.addressof(lib, name))
+
+
+lib.shell_context = ffi.cast("int (*)(void *, void *)", _address("SNESShellGetContext"))

@@ -142,6 +142,11 @@ typedef struct {
   int (*end_write)(void *vec, double **values);
   int (*entries)(void *mat, double **values);
   int (*end_entries)(void *mat, double **values);
+  int (*set_iterations)(void *snes, petsc_int number);
+  int (*set_reason)(void *snes, int reason);
+  int (*factor)(void *pc);
+  int (*failed)(void *pc, int *reason);
+  int (*apply)(void *pc, void *b, void *x);
 } petsc;
 
 /* How far a law is missed by an iterate q and its residual r, without dimension. */
@@ -164,8 +169,10 @@ typedef struct {
   double *reactions, *pivots;
 
   double rtol, loads; /* tolerance; size of the loads */
-  void *x;            /* the iterate */
-  const double *weight, *residual; /* of forces; the residual that SNES has */
+  void *x, *f, *correction, *matrix, *factors; /* in PETSc: vectors, the tangent, its factors */
+  double *residual;                            /* entries of f */
+  const double *change, *weight;               /* entries of the correction; see Solver */
+  int most;                                    /* iterations */
   const int32_t *diagonal;
   double *space;
   const double *lengths, *moves; /* see Solver */
@@ -177,7 +184,10 @@ typedef struct {
 } equation;
 
 /* Values of SNESConvergedReason. */
-enum { ITERATING = 0, AT_ROUND_OFF = 2, CONVERGED = 3, SINGULAR = -3, STALLED = -6, DIVERGED = -9 };
+enum {
+  ITERATING = 0, AT_ROUND_OFF = 2, CONVERGED = 3,
+  SINGULAR = -3, TOO_MANY = -5, STALLED = -6, DIVERGED = -9
+};
 
 void residual(equation *e, const double *q, double *r);
 void assemble(equation *e, const double *q);
@@ -187,5 +197,7 @@ int judge(equation *e, const double *q, int iteration, double residual, double s
           double floor);
 int snes_function(void *snes, void *x, void *f, void *self);
 int snes_jacobian(void *snes, void *x, void *A, void *P, void *self);
+extern int (*shell_context)(void *snes, void *context);
+int snes_newton(void *snes, void *x);
 int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int *reason,
               void *self);

@@ -78,6 +78,9 @@ double last_digits(const equation *e, int dof, double x)
   return e->moves[dof] * (nextafter(far, INFINITY) - far);
 }
 
+/* SNESShellGetContext, which is asked before anything else is known. */
+int (*shell_context)(void *snes, void *context);
+
 /* -- what SNES calls --------------------------------------------------------------------------- */
 
 int snes_function(void *snes, void *x, void *f, void *self)
@@ -118,24 +121,67 @@ double size_of_forces(const equation *e, const double *f)
   return largest * sqrt(weighted_square(e->size, e->weight, f, largest));
 }
 
-int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int *reason, void *self)
+/* What becomes of an iterate q. */
+static int verdict(equation *e, const double *q, int iteration)
 {
-  equation *e = self;
   const double now = size_of_forces(e, e->residual);
-  if (!isfinite(now)) {
-    *reason = DIVERGED;
-    return 0;
-  }
+  if (!isfinite(now)) return DIVERGED;
   const double scale = e->loads + size_of_forces(e, e->inner_force);
-  const double *q;
   double floor = 0;
-  int error = e->petsc->read(e->x, &q);
-  if (error) return error;
   if (iteration > 1) {
     for (int i = 0; i < e->size; ++i)
       e->space[i] = e->tangent[e->diagonal[i]] * last_digits(e, i, q[i]);
     floor = 8 * size_of_forces(e, e->space);
   }
-  *reason = judge(e, q, (int)iteration, now, scale, floor);
+  return judge(e, q, iteration, now, scale, floor);
+}
+
+int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int *reason, void *self)
+{
+  equation *e = self;
+  const double *q;
+  int error = e->petsc->read(e->x, &q);
+  if (error) return error;
+  *reason = verdict(e, q, (int)iteration);
   return e->petsc->end_read(e->x, &q);
+}
+
+#define TRY(call) do { int error = (call); if (error) return error; } while (0)
+
+/* Newton's method with full steps, as a solver of SNES: what its own does beside that takes as long
+ * as all the rest where there are few unknowns. */
+int snes_newton(void *snes, void *x)
+{
+  equation *e;
+  double *q, *entries;
+  int iteration = 0, reason;
+  TRY(shell_context(snes, &e));
+  const petsc *p = e->petsc;
+  TRY(p->write(x, &q));
+  residual(e, q, e->residual);
+  while (!(reason = verdict(e, q, iteration))) {
+    if (iteration == e->most) {
+      reason = TOO_MANY;
+      break;
+    }
+    if (!e->near) {
+      int failed = 0;
+      TRY(p->entries(e->matrix, &entries));
+      assemble(e, q);
+      TRY(p->end_entries(e->matrix, &entries));
+      if (p->factor(e->factors)) failed = 1; /* KLU says so of a singular matrix */
+      else TRY(p->failed(e->factors, &failed));
+      if (failed) {
+        reason = SINGULAR;
+        break;
+      }
+    }
+    TRY(p->apply(e->factors, e->f, e->correction));
+    for (int i = 0; i < e->size; ++i) q[i] -= e->change[i];
+    residual(e, q, e->residual);
+    ++iteration;
+  }
+  TRY(p->end_write(x, &q));
+  TRY(p->set_iterations(snes, iteration));
+  return p->set_reason(snes, reason);
 }

@@ -232,8 +232,9 @@ class Solver:
         self._at_r = doubles(self._r)
         self._ksp = self._make_ksp()
         self._equation = equation
+        self._correction = self._vector()
         self._course = self._make_course()
-        self._snes = self._make_snes(FULL_STEPS)
+        self._snes = self._make_snes({} if equation is not None else FULL_STEPS)
         self.iterations = self._done = 0
         self._keeps = False
         self._error: BaseException | None = None
@@ -246,7 +247,11 @@ class Solver:
         self._at_sizes = [*map(doubles, (self._lengths, self._moves, np.empty(self._share.size)))]
         c.weight, c.residual, c.diagonal = self._norm[1], self._at_r, self._at_diagonal
         c.lengths, c.moves, c.space = self._at_sizes
-        c.x = ffi.cast("void *", self._x.handle)
+        c.x, c.f, c.matrix, c.factors, c.correction = (
+            ffi.cast("void *", one.handle)
+            for one in (self._x, self._f, self._matrix, self._ksp.getPC(), self._correction)
+        )
+        c.change, c.most = doubles(self._view(self._correction)), self._newton.max_iterations
         if self._equation is None:
             self._demand = Demand(self._excess, self._share.size, self._note)
             self._demands = ffi.new("demand[]", [self._demand.loop])
@@ -327,11 +332,14 @@ class Solver:
         snes.setKSP(self._ksp)
         database = PETSc.Options(PREFIX)
         before = database.getAll()
-        chosen = {**search, **before, **self._newton.petsc}
+        chosen = {**(search or FULL_STEPS), **before, **self._newton.petsc}
         try:
             for name, value in chosen.items():
                 database[name] = value
             snes.setFromOptions()
+            if self._equation is not None and not (search or before or self._newton.petsc):
+                self._ksp.getPC().setOperators(self._matrix)
+                self._equation.drive(snes)
         finally:
             # PETSc may have given those of before 3.24 their new names.
             for name in {**chosen, **database.getAll()}:
