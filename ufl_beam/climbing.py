@@ -85,7 +85,7 @@ class Climb:
             if self._goal.accepts(found):
                 return found
             if again or len(tried) == TRIES:
-                return min(tried, key=self._goal.rank)
+                return min(self._all(outlook), key=self._goal.rank)
             self._slower.append(found.run.seconds * self._mean / choice.seconds)
             if found.ratio > choice.ratio:
                 more = outlook.bottleneck(choice)
@@ -135,6 +135,17 @@ class Climb:
         if rung in self._ladder.failed:
             raise self._refusal(f"the chosen setting failed: {self._ladder.failed[rung]}")
         return Found(self._ladder.runs[rung], choice, outlook)
+
+    def _all(self, outlook: Outlook) -> list[Found]:
+        """All runs of the family as if they had been chosen."""
+        found = []
+        for run in self._ladder.of(self._family):
+            refine, level = run.rung.refine, run.rung.level
+            ratio = outlook.ratio(refine, level)
+            found.append(
+                Found(run, Choice(refine, level, run.seconds, ratio, True, False), outlook)
+            )
+        return found
 
     @property
     def _mean(self) -> float:
