@@ -35,8 +35,8 @@ FEW = {512: 50, 4096: 5}
 SWING = {"end": 1.2}
 """How far the ladders of the swing go: all programs get there, with every scheme."""
 
-CONSERVING = ("conserving", {})
-DECAYING = ("decaying", {"alpha": 0.01})
+CONSERVING = ("Midpoint", {})
+DECAYING = ("decaying Midpoint", {"alpha": 0.01, "beta": 0.01})
 TRAPEZOIDAL = {"rho": "trapezoidal"}
 
 
@@ -134,17 +134,31 @@ def portal_ladder(cells, dt):
     )
 
 
-LADDERS = (
+def smooth(scheme):
+    """Cells of degree 2, which smooth elastic beams allow."""
+
+    def ladder(cells, dt):
+        yield from ours((f"{scheme}, degree 2", {"scheme": scheme, "degree": 2}))
+
+    return ladder
+
+
+LADDERS = (  # problem, variants, what is common, cells for each step
     ("P2", flying_ladder, {}, {
         0.1: (8, 16, 32), 0.05: (16, 32, 64), 0.02: (32, 64, 128), 0.01: (64, 128, 256),
         0.005: (128, 256),
     }),
+    ("P2", smooth("PrintedMidpoint"), {}, {
+        0.1: (4, 8), 0.05: (4, 8), 0.02: (8, 16), 0.01: (16, 32), 0.005: (32,),
+    }),
     ("P3", swing_ladder, SWING, {
         5e-3: (8, 16, 32), 2.5e-3: (16, 32, 64), 1e-3: (32, 64, 128), 5e-4: (128,),
     }),
+    ("P3", smooth("Midpoint"), SWING, {5e-3: (4, 8), 2.5e-3: (8, 16), 1e-3: (16,), 5e-4: (16,)}),
     ("P4", portal_ladder, {}, {
-        4e-3: (12, 24), 2e-3: (12, 24, 48), 1e-3: (24, 48, 96), 5e-4: (96,),
+        4e-3: (6, 12, 24), 2e-3: (6, 12, 24, 48), 1e-3: (24, 48, 96), 5e-4: (96,),
     }),
+    ("P4", smooth("Midpoint"), {}, {4e-3: (3, 6), 2e-3: (6, 12), 1e-3: (12,)}),
 )  # fmt: skip
 
 
