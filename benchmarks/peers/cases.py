@@ -134,11 +134,11 @@ def portal_ladder(cells, dt):
     )
 
 
-def smooth(scheme):
+def smooth(scheme, said="", **dials):
     """Cells of degree 2, which smooth elastic beams allow."""
 
     def ladder(cells, dt):
-        yield from ours((f"{scheme}, degree 2", {"scheme": scheme, "degree": 2}))
+        yield from ours((f"{scheme}, degree 2{said}", {"scheme": scheme, "degree": 2, **dials}))
 
     return ladder
 
@@ -160,8 +160,9 @@ LADDERS = (  # problem, variants, what is common, cells for each step
     ("P4", portal_ladder, {}, {
         1e-2: (6, 12), 4e-3: (6, 12, 24), 2e-3: (6, 12, 24, 48), 1e-3: (24, 48, 96), 5e-4: (96,),
     }),
-    ("P4", smooth("Midpoint"), {}, {
-        1e-2: (3, 6), 4e-3: (3, 6, 12), 2e-3: (6, 12), 1e-3: (12,),
+    ("P4", smooth("Midpoint"), {}, {2e-2: (6,), 1e-2: (6,), 4e-3: (6, 12), 2e-3: (12,)}),
+    ("P4", smooth("Midpoint", ", lumped", lumped=True), {}, {
+        2e-2: (6,), 1e-2: (6, 12), 4e-3: (6, 12), 2e-3: (12,),
     }),
 )  # fmt: skip
 
