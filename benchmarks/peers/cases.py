@@ -10,7 +10,7 @@ class Case(NamedTuple):
         label: The setting, for tables and legends; "" for the only one.
         settings: Arguments of the program's function.
         part: "tables" or "figure".
-        long: Left out by ``--quick``.
+        long: Left out by ``--quick``, and run in fewer rounds.
     """
 
     program: str
@@ -103,7 +103,7 @@ TABLES = (  # problem, variants, arguments, and which of them --quick leaves out
     ("P1", roll_up, [{"cells": n, "turns": 0.5} for n in (8, 64, 512)], (512,)),
     ("P1", roll_up, [{"cells": 64, "turns": 1.0}], (64,)),
     ("P2", flying_beam, [{"cells": n, "dt": 0.01} for n in (8, 64, 512, 4096)], (4096,)),
-    ("P2", flying_beam, [{"cells": n, "dt": 0.1} for n in (8, 64, 512, 4096)], (512, 4096)),
+    ("P2", flying_beam, [{"cells": n, "dt": 0.1} for n in (8, 64)], (8, 64)),
     ("P3", swing, [{"cells": n, "dt": 1e-3} for n in (8, 32, 128)], (32, 128)),
     ("P4", portal, [{"cells": n, "dt": 1e-3} for n in (12, 48)], ()),
     ("P5", cantilever, [{"cells": n, "dt": 1e-3} for n in (10_000, 100_000)], (100_000,)),
