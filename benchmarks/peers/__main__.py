@@ -85,7 +85,7 @@ def show(kept):
 
 
 def measure(chosen, rounds, peers):
-    """Run groups of cases in turn, for so many rounds or, where they are long, fewer; the records."""
+    """Records of groups of cases that run in turn; rounds: of short groups, of long ones."""
     for _, group in groupby(chosen, key=lambda case: case.group):
         group = list(group)
         runs = {i: [] for i in range(len(group))}

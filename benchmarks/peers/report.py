@@ -33,13 +33,12 @@ def table(head, rows):
 
 
 def words_of(claim):
-    met = {True: "yes", False: "**no**", None: "—"}[claim.met]
-    return claim.line, claim.ours, claim.peer, claim.ratio, met
+    return claim.line, claim.ours, claim.peer, claim.ratio, "yes" if claim.met else "**no**"
 
 
 def of_claims(records):
     head = ("line", "ufl_beam", "the other", "ratio", "met")
-    return table(head, [words_of(claim) for claim in claims(records)])
+    return table(head, [words_of(claim) for claim in claims(records) if claim.met is not None])
 
 
 def row(record):
