@@ -84,12 +84,12 @@ def show(kept):
     print(line + f"  {kept.get('failed', '')}", flush=True)
 
 
-def measure(chosen, repeat, peers):
-    """Run groups of cases in turn; the records."""
+def measure(chosen, rounds, peers):
+    """Records of groups of cases that run in turn; rounds: of short groups, of long ones."""
     for _, group in groupby(chosen, key=lambda case: case.group):
         group = list(group)
         runs = {i: [] for i in range(len(group))}
-        for _ in range(repeat):
+        for _ in range(rounds[any(case.long for case in group)]):
             for i, case in enumerate(group):
                 runs[i].append(run(case, peers))
         for i, case in enumerate(group):
@@ -106,7 +106,9 @@ def main():
     parser.add_argument("--dt", nargs="*", type=float, help="steps (s)")
     parser.add_argument("--programs", nargs="*", help="ufl_beam exudyn opensees c")
     parser.add_argument("--part", choices=("tables", "figure"))
-    parser.add_argument("--repeat", type=int, help="rounds; 5, of the figure 2")
+    parser.add_argument(
+        "--repeat", type=int, help="rounds; 5, of long cases 3, in the figure 2 and 1"
+    )
     options = parser.parse_args()
 
     def wanted(case):
@@ -121,16 +123,17 @@ def main():
             options.quick and case.long
         )
 
-    parts = ((cases.tables(), 5, 2), (cases.ladders(), 2, 1))  # rounds, and in a quick run
+    parts = ((cases.tables(), (5, 3), 2), (cases.ladders(), (2, 1), 1))
     peers, where, records = installed(), machine(), []
     print(where)
     print(f"{'problem, cells, step (s), program':56s} {'µs/step':>10} {'cpu':>10}  iterations/step")
     some = (options.only, options.cells, options.dt, options.programs, options.part)
     RESULTS.parent.mkdir(exist_ok=True)
     with open(os.devnull if any(some) else RESULTS, "w") as file:
-        for part, rounds, fewer in parts:
-            repeat = options.repeat or (fewer if options.quick else rounds)
-            for kept in measure([case for case in part if wanted(case)], repeat, peers):
+        for part, rounds, quick in parts:
+            if alike := options.repeat or (options.quick and quick):
+                rounds = alike, alike
+            for kept in measure([case for case in part if wanted(case)], rounds, peers):
                 records.append(kept | where)
                 file.write(json.dumps(records[-1]) + "\n")
                 file.flush()

@@ -10,8 +10,9 @@ from ufl_beam.compat import dolfinx
 VERSION = f"DOLFINx {dolfinx.__version__}"
 
 
-def decaying(alpha):
-    return ub.Midpoint(alpha=alpha, beta=alpha)
+def discretised(scheme="Midpoint", degree=1, lumped=False, **dials):
+    """A scheme by its name, with its arguments, and a mesh."""
+    return getattr(ub, scheme)(**dials), ub.Mesh(degree=degree, lumped=lumped)
 
 
 def beams_of(chains):
@@ -20,13 +21,14 @@ def beams_of(chains):
     ]
 
 
-def run(scene, scheme, end, steps, sample=None, every=None):
+def run(scene, discretised, end, steps, sample=None, every=None):
     """Step to the end; only the steps are timed, not what is read after every so many of them.
 
     Returns:
         The simulation at its end, the samples, and what the loop took.
     """
-    simulation = ub.Simulation(scene, scheme)
+    scheme, mesh = discretised
+    simulation = ub.Simulation(scene, scheme, mesh=mesh)
     every = every or steps
     samples, stopwatch = [], Stopwatch()
     for first in range(1, steps + 1, every):
@@ -50,7 +52,7 @@ def roll_up(cells, turns):
     (beam,) = beams_of(p.chains(cells))
     bend = ub.PointLoad(beam.end, moment=p.moment(turns), time=lambda t: t)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[bend])
-    now, _, result = run(scene, ub.Static(), 1.0, p.steps)
+    now, _, result = run(scene, discretised("Static"), 1.0, p.steps)
     return result | {"values": {"tip": where(now, beam.end)}}
 
 
@@ -58,18 +60,18 @@ def where(now, place):
     return np.add(place.point, now.displacement(place)[:2]).tolist()
 
 
-def flying_beam(cells, dt, alpha=0.0, steps=None):
+def flying_beam(cells, dt, steps=None, **dials):
     p = PROBLEMS["P2"]
     (beam,) = beams_of(p.chains(cells))
     push = ub.PointLoad(
         beam.start, force=(p.force, 0), moment=p.moment, time=lambda t: float(t < p.until)
     )
     n = steps or round(p.end / dt)
-    now, _, result = run(ub.Scene([beam], loads=[push]), decaying(alpha), n * dt, n)
+    now, _, result = run(ub.Scene([beam], loads=[push]), discretised(**dials), n * dt, n)
     return result | {"values": {"ends": [where(now, at) for at in (beam.start, beam.end)]}}
 
 
-def swing(cells, dt, alpha=0.0, end=None):
+def swing(cells, dt, end=None, **dials):
     p = PROBLEMS["P3"]
     beam, left, right = beams_of(p.chains(cells))
     middle = beam.at(0.5)
@@ -85,12 +87,12 @@ def swing(cells, dt, alpha=0.0, end=None):
         return *now.displacement(middle)[:2].tolist(), energy(now)
 
     n, every = round((end or p.end) / dt), round(p.sampled / dt)
-    _, samples, result = run(scene, decaying(alpha), n * dt, n, sample, every)
+    _, samples, result = run(scene, discretised(**dials), n * dt, n, sample, every)
     middle, told = [s[:2] for s in samples], [s[2] for s in samples]
     return result | {"values": {"middle": middle, "energy": told}}
 
 
-def portal(cells, dt, alpha=0.0):
+def portal(cells, dt, **dials):
     p = PROBLEMS["P4"]
     left, girder, right = beams_of(p.chains(cells))
     kinematic = p.stiffness * p.ratio / (1 - p.ratio)
@@ -108,17 +110,17 @@ def portal(cells, dt, alpha=0.0):
         return float(now.displacement(left.end)[0]), now.connector(hinge).motion
 
     n, every = round(p.end / dt), round(p.sampled / dt)
-    _, samples, result = run(scene, decaying(alpha), p.end, n, sample, every)
+    _, samples, result = run(scene, discretised(**dials), p.end, n, sample, every)
     u, turn = zip(*samples, strict=True)
     return result | {"values": {"u": u, "turn": turn}}
 
 
-def cantilever(cells, dt):
+def cantilever(cells, dt, **dials):
     p = PROBLEMS["P5"]
     (beam,) = beams_of(p.chains(cells))
     load = ub.PointLoad(beam.end, force=(0, 1), time=p.push)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
-    now, _, result = run(scene, ub.Midpoint(), p.end, round(p.end / dt))
+    now, _, result = run(scene, discretised(**dials), p.end, round(p.end / dt))
     return result | {"values": {"tip": where(now, beam.end)}}
 
 

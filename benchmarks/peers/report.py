@@ -33,13 +33,12 @@ def table(head, rows):
 
 
 def words_of(claim):
-    met = {True: "yes", False: "**no**", None: "—"}[claim.met]
-    return claim.line, claim.ours, claim.peer, claim.ratio, met
+    return claim.line, claim.ours, claim.peer, claim.ratio, "yes" if claim.met else "**no**"
 
 
 def of_claims(records):
     head = ("line", "ufl_beam", "the other", "ratio", "met")
-    return table(head, [words_of(claim) for claim in claims(records)])
+    return table(head, [words_of(claim) for claim in claims(records) if claim.met is not None])
 
 
 def row(record):
@@ -103,12 +102,12 @@ def draw(records):
         return
     mpl.use("Agg")
     figure, axes = plt.subplots(
-        1, len(problems), figsize=(4.6 * len(problems), 4.2), layout="constrained", squeeze=False
+        1, len(problems), figsize=(4.6 * len(problems), 5.0), layout="constrained", squeeze=False
     )
     for ax, problem in zip(axes.flat, problems, strict=True):
         used = dict.fromkeys(COLOURS, 0)
         here = [r for r in drawn if r["problem"] == problem]
-        curves = dict.fromkeys((r["program"], r["label"]) for r in here)
+        curves = sorted({(r["program"], r["label"]) for r in here}, reverse=True)
         for program, label in curves:
             some = [r for r in here if (r["program"], r["label"]) == (program, label)]
             style, colour = STYLES[used[program] % len(STYLES)], COLOURS[program]
@@ -121,7 +120,7 @@ def draw(records):
         ax.set_xlabel("time of the loop (s)")
         ax.grid(which="major", color="0.9")
         ax.spines[["top", "right"]].set_visible(False)
-        ax.legend(frameon=False, fontsize=7)
+        ax.legend(frameon=False, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.14))
     axes[0, 0].set_ylabel("error (m)")
     PICTURE.parent.mkdir(exist_ok=True)
     figure.savefig(PICTURE, dpi=120)
