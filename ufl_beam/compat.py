@@ -14,7 +14,7 @@ try:
     import basix.ufl
     import dolfinx
     import ufl
-    from dolfinx import cpp, fem, io, jit, la, mesh
+    from dolfinx import cpp, fem, io, jit, mesh
 except ImportError as error:  # pragma: no cover - depends on the machine
     raise ImportError(
         "ufl_beam needs DOLFINx 0.9 or newer, which is not on PyPI. "
@@ -29,12 +29,10 @@ __all__ = [
     "Array",
     "cell_coordinates",
     "cpp",
-    "csr_matrix",
     "dolfinx",
     "fem",
     "io",
     "jit_directory",
-    "la",
     "line_mesh",
     "pack",
     "space_with_dofs",
@@ -106,20 +104,3 @@ def space_with_dofs(
     if VERSION < (0, 11):
         arguments.append(list(element.reference_value_shape))
     return fem.FunctionSpace(domain, element, cpp.fem.FunctionSpace_float64(*arguments))
-
-
-def csr_matrix(size: int, *coupled: npt.NDArray[np.int64]) -> la.MatrixCSR:
-    """Empty matrix with a diagonal that couples what stands in a row, on this process alone.
-
-    Args:
-        size: Number of degrees of freedom.
-        coupled: Degrees of freedom of cells, or of what else couples some; (number, some).
-    """
-    index_map = cpp.common.IndexMap(MPI.COMM_SELF, size)
-    pattern = cpp.la.SparsityPattern(MPI.COMM_SELF, [index_map, index_map], [1, 1])
-    pattern.insert_diagonal(np.arange(size, dtype=np.int32))
-    for rows in coupled:
-        for dofs in rows.astype(np.int32):
-            pattern.insert(dofs, dofs)
-    pattern.finalize()
-    return la.matrix_csr(pattern)

@@ -6,10 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import curve_fit
-from scipy.signal import find_peaks
-from scipy.stats import linregress
-from scipy.stats import t as student
+import scipy  # its parts are loaded when they are used
 
 from ufl_beam.errors import SceneError, require_number
 
@@ -153,7 +150,7 @@ def peaks(
     t, x = _series("peaks", t, x, "x")
     require_number(about, "peaks: about")
     require_number(prominence, "peaks: prominence", at_least=0.0)
-    i = find_peaks(x, prominence=prominence * np.ptp(x))[0] if len(x) else np.arange(0)
+    i = scipy.signal.find_peaks(x, prominence=prominence * np.ptp(x))[0] if len(x) else np.arange(0)
     before, after = t[i] - t[i - 1], t[i + 1] - t[i]
     rise, fall = (x[i] - x[i - 1]) / before, (x[i + 1] - x[i]) / after
     curvature = 2 * (fall - rise) / (before + after)
@@ -207,7 +204,7 @@ def fit_decay(t: npt.ArrayLike, amplitudes: npt.ArrayLike) -> Decay:
         raise SceneError(f"fit_decay: amplitudes given: {len(A)}, needed: 3")
     mean, each = logarithmic_decrement(A)
     s = t - t[0]
-    line = linregress(s, A)
+    line = scipy.stats.linregress(s, A)
     linear = _envelope(
         (line.intercept, -line.slope),
         (line.intercept_stderr, line.stderr),
@@ -219,7 +216,7 @@ def fit_decay(t: npt.ArrayLike, amplitudes: npt.ArrayLike) -> Decay:
     guess = np.exp(logarithm), -slope
     try:
         with np.errstate(over="ignore"):
-            found, covariance = curve_fit(_exponential, τ, a, guess, jac=_gradient)
+            found, covariance = scipy.optimize.curve_fit(_exponential, τ, a, guess, jac=_gradient)
     except RuntimeError:
         raise SceneError(
             f"fit_decay: no exponential fits amplitudes from {A.min():g} to {A.max():g}; "
@@ -231,7 +228,7 @@ def fit_decay(t: npt.ArrayLike, amplitudes: npt.ArrayLike) -> Decay:
 
 
 def _envelope(values: npt.ArrayLike, errors: npt.ArrayLike, residuals: Array) -> Envelope:
-    half = student.ppf(0.975, len(residuals) - 2) * np.abs(errors)
+    half = scipy.stats.t.ppf(0.975, len(residuals) - 2) * np.abs(errors)
     rms = np.sqrt(np.mean(residuals**2))
     return Envelope(*np.concatenate([values, half, [rms]]).tolist())
 

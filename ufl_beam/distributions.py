@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+import scipy  # its parts are loaded when they are used
 
 from ufl_beam.errors import SceneError, require_number
 
@@ -64,7 +64,7 @@ class Normal(Distribution):
 
     def law(self) -> Any:
         """The distribution of SciPy."""
-        return stats.norm(self.mean, self.deviation)
+        return scipy.stats.norm(self.mean, self.deviation)
 
 
 class TruncatedNormal(Normal):
@@ -72,7 +72,7 @@ class TruncatedNormal(Normal):
 
     def law(self) -> Any:
         """The distribution of SciPy."""
-        return stats.truncnorm(-self.mean / self.deviation, np.inf, self.mean, self.deviation)
+        return scipy.stats.truncnorm(-self.mean / self.deviation, np.inf, self.mean, self.deviation)
 
 
 class Lognormal(Normal):
@@ -81,7 +81,7 @@ class Lognormal(Normal):
     def law(self) -> Any:
         """The distribution of SciPy."""
         spread = np.sqrt(np.log1p((self.deviation / self.mean) ** 2))
-        return stats.lognorm(spread, scale=self.mean * np.exp(-(spread**2) / 2))
+        return scipy.stats.lognorm(spread, scale=self.mean * np.exp(-(spread**2) / 2))
 
 
 @dataclass(frozen=True)
@@ -102,4 +102,4 @@ class Weibull(Distribution):
 
     def law(self) -> Any:
         """The distribution of SciPy."""
-        return stats.weibull_min(self.shape, scale=self.scale)
+        return scipy.stats.weibull_min(self.shape, scale=self.scale)

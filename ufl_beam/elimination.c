@@ -7,8 +7,9 @@
  * vertex before, of v and of the vertex after are among them.
  */
 
-/* What is kept of a vertex: its pivot block as LU, the couplings to and from the left end. */
-enum { PIVOT = 0, TO_LEFT = 9, FROM_LEFT = 18, KEPT = 27 };
+/* What is kept of a vertex: its pivot block as LU; where there is a spike, the couplings to and from
+ * the left end. */
+enum { PIVOT = 9, TO_LEFT = 0, FROM_LEFT = 9, SIDES = 18 };
 
 /* D = LU with the largest pivot of each column; the reciprocals of the pivots on the diagonal */
 static void factor_block(double *D, int32_t *swap)
@@ -99,15 +100,15 @@ static inline void eliminate_chain(const chains *c, int chain, const int spike, 
     for (int k = 0; k < 9; ++k) from[k] = c->data[c->from_ends[18 * chain + k]];
   }
   for (int v = c->first[chain]; v < c->first[chain + 1]; ++v) {
-    double *kept = c->kept + KEPT * v, after[9];
+    double *sides = c->sides + SIDES * v, after[9];
     int32_t *swap = c->swaps + 3 * v;
     factor_block(pivot, swap);
-    memcpy(kept + PIVOT, pivot, sizeof pivot);
+    memcpy(c->pivots + PIVOT * v, pivot, sizeof pivot);
     read_block(c, v, 2, after);
     read_below(c, chain, v, below);
     if (spike) {
-      memcpy(kept + TO_LEFT, to, sizeof to);
-      memcpy(kept + FROM_LEFT, from, sizeof from);
+      memcpy(sides + TO_LEFT, to, sizeof to);
+      memcpy(sides + FROM_LEFT, from, sizeof from);
       for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j)
           side[6 * i + j] = after[3 * i + j], side[6 * i + 3 + j] = to[3 * i + j];
@@ -155,13 +156,13 @@ void eliminate_from(const chains *c, const double *b, double *f, const int32_t *
     double ends[6] = {0}, next[3], below[9], y[3];
     memset(next, 0, sizeof next);
     for (int v = c->first[chain]; v < c->first[chain + 1]; ++v) {
-      const double *kept = c->kept + KEPT * v;
+      const double *pivot = c->pivots + PIVOT * v, *sides = c->sides + SIDES * v;
       for (int r = 0; r < 3; ++r) f[3 * v + r] = b[c->row[3 * v + r]] + next[r];
-      solve_block(kept + PIVOT, c->swaps + 3 * v, 1, f + 3 * v, y);
+      solve_block(pivot, c->swaps + 3 * v, 1, f + 3 * v, y);
       read_below(c, chain, v, below);
       memset(next, 0, sizeof next);
       subtract(below, y, next);
-      if (c->spike[chain]) subtract(kept + FROM_LEFT, y, ends);
+      if (c->spike[chain]) subtract(sides + FROM_LEFT, y, ends);
     }
     memcpy(ends + 3, next, sizeof next);
     for (int k = 0; k < 6; ++k) left[places[k]] += ends[k];
@@ -176,12 +177,12 @@ void substitute(const chains *c, const double *f, const int32_t *places, const d
     double left[3], after[9], y[3], next[3];
     for (int k = 0; k < 3; ++k) left[k] = ends[places[k]], next[k] = ends[places[3 + k]];
     for (int v = c->first[chain + 1] - 1; v >= c->first[chain]; --v) {
-      const double *kept = c->kept + KEPT * v;
+      const double *pivot = c->pivots + PIVOT * v, *sides = c->sides + SIDES * v;
       memcpy(y, f + 3 * v, sizeof y);
       read_block(c, v, 2, after);
-      if (c->spike[chain]) subtract(kept + TO_LEFT, left, y);
+      if (c->spike[chain]) subtract(sides + TO_LEFT, left, y);
       subtract(after, next, y);
-      solve_block(kept + PIVOT, c->swaps + 3 * v, 1, y, next);
+      solve_block(pivot, c->swaps + 3 * v, 1, y, next);
       for (int r = 0; r < 3; ++r) x[c->row[3 * v + r]] = next[r];
     }
   }

@@ -18,9 +18,6 @@ from ufl_beam.grid import Index, Share
 from ufl_beam.loops import doubles, ffi, integers, lib
 from ufl_beam.sparse import Csr
 
-KEPT = 27
-"""Numbers kept of each vertex that is eliminated; as in ``elimination.c``."""
-
 
 class Chains:
     """Vertices of the cells of one process that couple to their two neighbours and to nothing else.
@@ -75,7 +72,7 @@ class Chains:
         here = np.arange(len(chain)) - np.append(0, np.cumsum(long))[chain]
         here = np.where(backward[chain], long[chain] - 1 - here, here)
         place = begin[chain] + dead[chain] + here
-        around = np.empty((self.first[-1], 3, 3), dtype=np.int64)
+        around = np.empty((self.first[-1], 3, 3), dtype=np.int32)
         around[place, 1] = middle_
         around[place, 0] = np.where(backward[chain, None], after, before)
         around[place, 2] = np.where(backward[chain, None], before, after)
@@ -140,9 +137,10 @@ class Elimination:
 
     def _make_matrix(self, size: int) -> None:
         """Structure of the small matrix, and where its entries come from."""
-        rows, columns = (self._number[i] for i in (self._A.rows(), self._A.indices))
-        self._entries = np.flatnonzero((rows >= 0) & (columns >= 0))
-        keys = rows[self._entries] * size + columns[self._entries]
+        rows, columns, left = self._A.rows(), self._A.indices, self._number >= 0
+        self._entries = np.flatnonzero(left[rows] & left[columns])
+        rows, columns = (self._number[x[self._entries]] for x in (rows, columns))
+        keys = rows * size + columns
         ends = self._number[self._chains.ends].reshape(-1, 2, 3)
         of_blocks = ends[:, :, None, :, None] * size + ends[:, None, :, None, :]
         of_chains = of_blocks.ravel()
@@ -175,8 +173,10 @@ class Elimination:
         vertices = len(chains.dofs)
         self._f = np.zeros(3 * vertices)
         self._at_f = doubles(self._f)
-        kept, swaps = np.empty(KEPT * vertices), np.empty(3 * vertices, dtype=np.int32)
-        self._alive = [*map(integers, arrays), doubles(A.data), doubles(kept), integers(swaps)]
+        pivots, sides = np.empty(9 * vertices), np.empty(18 * vertices)  # as in elimination.c
+        swaps = np.empty(3 * vertices, dtype=np.int32)
+        numbers = map(doubles, (A.data, pivots, sides))
+        self._alive = [*map(integers, arrays), *numbers, integers(swaps)]
         self._c = ffi.new("chains *", (len(chains.ends), *self._alive))
         self._at_places = integers(self._places_of_chains)
         ends_left = np.ascontiguousarray(self._number[chains.ends], dtype=np.int32)

@@ -6,11 +6,11 @@ import basix.ufl
 import numpy as np
 import ufl
 
-from ufl_beam.compat import Array, cell_coordinates, csr_matrix, fem, line_mesh, space_with_dofs
+from ufl_beam.compat import Array, cell_coordinates, fem, line_mesh, space_with_dofs
 from ufl_beam.forms import Kernel
 from ufl_beam.grid import Index, Share
 from ufl_beam.kinematics import Axis
-from ufl_beam.sparse import Csr
+from ufl_beam.sparse import Csr, coupling
 
 
 class Fields:
@@ -40,6 +40,7 @@ class Fields:
         self._coordinates = cell_coordinates(self.mesh)
         self._require_direction(grid.points[grid.cells[share.cells[self.order]]])
         self.cell_dofs = share.cell_dofs[self.order]
+        self._matrix: Csr | None = None
         self._degree = grid.mesh.degree
         X = self._along() if self._degree > 1 else 0.5
         self.axis = Axis(self.mesh, grid.mesh.nodes, X)
@@ -54,8 +55,12 @@ class Fields:
 
     def matrix(self) -> Csr:
         """A new matrix on the degrees of freedom of this process."""
-        share = self.share
-        return Csr(csr_matrix(share.size, share.cell_dofs, share.link_dofs, share.body_dofs))
+        if self._matrix is None:
+            share = self.share
+            couples = (share.cell_dofs, share.link_dofs, share.body_dofs)
+            self._matrix = Csr(coupling(share.size, *couples))
+            return self._matrix
+        return self._matrix.zeros_like()
 
     def _require_direction(self, ends: Array) -> None:
         """The mesh must keep the order of the vertices of a cell, which orients the beam."""

@@ -120,9 +120,10 @@ class Kernel:
 
     def place(self, A: Csr) -> None:
         """Let a bilinear form on the degrees of freedom of the cells add to ``A``."""
-        rows = np.repeat(self._dofs, self._dofs.shape[1], axis=1)
-        columns = np.tile(self._dofs, self._dofs.shape[1])
-        self._rows = A.positions(rows.ravel(), columns.ravel()).reshape(rows.shape)
+        per_cell = self._dofs.shape[1]
+        rows = np.repeat(self._dofs, per_cell, axis=1)
+        self._rows = A.positions(rows.ravel(), np.tile(self._dofs, per_cell).ravel())
+        self._rows.shape = rows.shape
         self._prepare()
 
     def add(self, q: Array, b: Array) -> None:

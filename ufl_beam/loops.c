@@ -62,6 +62,23 @@ void subtract_vector(void *self, const double *q, double *b)
   for (int i = 0; i < a->size; ++i) b[i] -= a->values[i];
 }
 
+/* Where a matrix holds the entries (row, column); whether it has them all. */
+int find_entries(const int32_t *indptr, const int32_t *indices, int number, const int32_t *row,
+                 const int32_t *column, int32_t *found)
+{
+  for (int k = 0; k < number; ++k) {
+    int32_t low = indptr[row[k]], high = indptr[row[k] + 1];
+    while (high - low > 1) { /* columns are in order */
+      const int32_t middle = low + (high - low) / 2;
+      if (indices[middle] <= column[k]) low = middle;
+      else high = middle;
+    }
+    if (low == high || indices[low] != column[k]) return 0;
+    found[k] = low;
+  }
+  return 1;
+}
+
 /* y += A x */
 void add_product(int rows, const int32_t *indptr, const int32_t *indices, const double *data,
                  const double *x, double *y)

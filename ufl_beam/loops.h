@@ -54,6 +54,8 @@ void add_first_cells(void *self, const double *q, double *b);
 void subtract_vector(void *self, const double *q, double *b);
 void add_step_force(void *self, const double *q, double *r);
 void add_step_tangent(void *self, const double *q, double *tangent);
+int find_entries(const int32_t *indptr, const int32_t *indices, int number, const int32_t *row,
+                 const int32_t *column, int32_t *found);
 void add_product(int rows, const int32_t *indptr, const int32_t *indices, const double *data,
                  const double *x, double *y);
 double quadratic_form(int rows, const int32_t *indptr, const int32_t *indices, const double *data,
@@ -122,7 +124,7 @@ typedef struct {
   const int32_t *from_ends; /* chains x 18: entries of the ends' rows, left and right */
   const int32_t *indptr;
   const double *data;
-  double *kept;             /* vertices x KEPT */
+  double *pivots, *sides;   /* vertices x PIVOT, vertices x SIDES */
   int32_t *swaps;           /* vertices x 3: rows in the order of the pivots */
 } chains;
 

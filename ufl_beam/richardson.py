@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import nnls
+import scipy  # its parts are loaded when they are used
 
 Array = npt.NDArray[np.float64]
 Level = tuple[int, int]
@@ -190,7 +190,7 @@ class Cost:
     def of(cls, steps: Array, cells: Array, seconds: Array) -> Cost:
         """Fitted to runs, relative differences by least squares; no coefficient is negative."""
         rows = np.stack([np.ones_like(steps), steps, steps * cells], axis=1)
-        return cls(*nnls(rows / seconds[:, None], np.ones_like(seconds))[0].tolist())
+        return cls(*scipy.optimize.nnls(rows / seconds[:, None], np.ones_like(seconds))[0].tolist())
 
     def slower(self, factor: float) -> Cost:
         """So many times as slow."""

@@ -1,31 +1,67 @@
-"""Index arithmetic on matrices whose arrays DOLFINx fills and PETSc solves with."""
+"""Index arithmetic on matrices whose arrays loops in C fill and PETSc solves with."""
 
 from __future__ import annotations
+
+from copy import copy
+from typing import Any, Protocol
 
 from petsc4py import PETSc
 
 import numpy as np
+import numpy.typing as npt
+from scipy.sparse import csr_array
 
-from ufl_beam.compat import Array, la
+from ufl_beam.compat import Array
 from ufl_beam.grid import Index
 from ufl_beam.loops import Loop, doubles, ffi, integers, lib, loop
 
 
+class Structure(Protocol):
+    """A matrix by rows, the columns of each in order."""
+
+    data: npt.NDArray[Any]
+    indices: npt.NDArray[Any]
+    indptr: npt.NDArray[Any]
+
+
+def coupling(size: int, *coupled: Index) -> Structure:
+    """A matrix of zeros with a diagonal, and entries for what stands in a row.
+
+    Args:
+        size: Number of degrees of freedom.
+        coupled: Degrees of freedom of cells, or of what else couples some; (number, some).
+    """
+    groups = [np.arange(size, dtype=np.int32)[:, None], *coupled]
+    lengths = np.concatenate([np.full(len(rows), rows.shape[1]) for rows in groups])
+    columns = np.concatenate([rows.ravel() for rows in groups]).astype(np.int32)
+    ends = np.append(0, np.cumsum(lengths))
+    parts = csr_array((np.ones(len(columns), np.int8), columns, ends), shape=(len(lengths), size))
+    matrix = parts.T.tocsr() @ parts
+    matrix.sort_indices()
+    arrays = (np.zeros(matrix.nnz), matrix.indices, matrix.indptr)
+    zeros: Structure = csr_array(arrays, shape=matrix.shape)
+    return zeros
+
+
 class Csr:
-    """The arrays of a DOLFINx matrix, looked up once.
+    """The arrays of a matrix, in which PETSc and the loops in C find the entries.
 
     Attributes:
-        matrix: The matrix, for assembly.
         data: Its entries, row after row.
         indices: Column of each entry.
         indptr: First entry of each row, and the number of entries.
     """
 
-    def __init__(self, matrix: la.MatrixCSR) -> None:
-        self.matrix = matrix
+    def __init__(self, matrix: Structure) -> None:
         self.data: Array = matrix.data
         self.indices = matrix.indices.astype(np.int32, copy=False)
-        self.indptr = matrix.indptr.astype(np.int32)
+        self.indptr = matrix.indptr.astype(np.int32, copy=False)
+
+    def zeros_like(self) -> Csr:
+        """A matrix of the same structure, which is stored once."""
+        other = copy(self)
+        other.data = np.zeros_like(self.data)
+        return other
 
     @property
     def size(self) -> int:
@@ -34,16 +70,16 @@ class Csr:
 
     def rows(self) -> Index:
         """Row of each entry."""
-        return np.repeat(np.arange(self.size), np.diff(self.indptr))
+        return np.repeat(np.arange(self.size, dtype=np.int32), np.diff(self.indptr))
 
     def positions(self, rows: Index, columns: Index) -> Index:
         """Where :attr:`data` holds the entries (rows[k], columns[k]); they must exist."""
-        keys = self.rows() * self.size + self.indices
-        wanted = rows.astype(np.int64) * self.size + columns
-        found = np.searchsorted(keys, wanted)
-        if not np.array_equal(keys[found], wanted):
+        found = np.empty(len(rows), dtype=np.int32)
+        structure = (integers(self.indptr), integers(self.indices))
+        pairs = [np.ascontiguousarray(x, dtype=np.int32) for x in (rows, columns)]
+        if not lib.find_entries(*structure, len(found), *map(integers, (*pairs, found))):
             raise ValueError("the matrix has no such entry")
-        return found.astype(np.int32)
+        return found
 
     def petsc(self) -> PETSc.Mat:
         """PETSc matrix on this process with the same arrays: no copy, before or after."""
