@@ -1,0 +1,128 @@
+"""The equation of a step in C against the same terms called by Python."""
+
+from petsc4py import PETSc
+
+import numpy as np
+import pytest
+
+import ufl_beam as ub
+from ufl_beam.loops import lib
+from ufl_beam.supports import Supports
+
+SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
+
+
+def elastic():
+    beam = ub.Beam((0, 0), (4, 3), SECTION, cells=6)
+    loads = [
+        ub.PointLoad(beam.end, force=(3.0, 5.0)),
+        ub.FollowerLoad(beam.at(0.5), force=(0.0, 2.0), time=lambda t: t),
+    ]
+    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=loads)
+
+
+def inelastic():
+    hinge = {1.0: ub.Softening(limit=30.0, energy=5.0)}
+    law = ub.Hardening(limit=20.0, modulus=5.0, kinematic=3.0)
+    soft = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0, bending=law)
+    left = ub.Beam((0, 0), (0, 3), soft, cells=4)
+    roof = ub.Beam((0, 3), (4, 3), SECTION, cells=4, hinges=hinge)
+    return ub.Scene(
+        [left, roof],
+        joints=[ub.Rigid(left.end, roof.start)],
+        supports=[ub.Clamped(left.start), ub.Pinned(roof.end)],
+        loads=[ub.PointLoad(left.end, force=(40.0, -10.0), time=lambda t: min(t, 0.2))],
+        damping=[ub.Rayleigh(mass=0.1, stiffness=1e-3)],
+    )
+
+
+def machine():
+    """Something held, something sprung, a law that only Python knows, and a guide."""
+    crank = ub.Beam((0, 0), (1, 0), SECTION, cells=3)
+    rod = ub.Beam((1, 0), (3, 0), SECTION, cells=4)
+    ground = ub.ground(3.0, 0.5)
+    spring = ub.Spring(50.0, law=ub.Hardening(limit=5.0, kinematic=2.0))
+    return ub.Scene(
+        [crank, rod],
+        joints=[ub.Revolute(crank.end, rod.start), ub.Guided(rod.end, lambda s: (3.0 + s, 0.0))],
+        connectors=[
+            ub.Turn(crank.end, rod.start, spring),
+            ub.Stretch(ground, rod.end, ub.Function(lambda e, de: 3.0 * e**3 + 0.1 * de)),
+        ],
+        supports=[ub.Pinned(crank.start)],
+        loads=[ub.PointLoad(rod.at(0.5), force=(0.0, 10.0))],
+    )
+
+
+def run(scene, newton=None, scheme=None, steps=20):
+    return ub.simulate(
+        scene, scheme or ub.Midpoint(), t=(0, 0.02 * steps), dt=0.02, newton=newton, progress=False
+    )
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("make", [elastic, inelastic, machine])
+@pytest.mark.parametrize("scheme", [ub.Midpoint(alpha=0.05), ub.GeneralizedAlpha(0.8)])
+def test_in_c_as_in_python(make, scheme, monkeypatch):
+    in_c = run(make(), scheme=scheme)
+    monkeypatch.setattr(Supports, "turned", True)  # then SNES calls Python
+    in_python = run(make(), scheme=scheme)
+    assert in_c.iterations == in_python.iterations
+    # The same operations in the same order, but for what compilers contract.
+    assert np.allclose(in_c.q, in_python.q, rtol=0, atol=1e-11)
+
+
+@pytest.mark.serial
+def test_in_c_as_in_python_in_statics(monkeypatch):
+    in_c = run(elastic(), scheme=ub.Static())
+    monkeypatch.setattr(Supports, "turned", True)
+    in_python = run(elastic(), scheme=ub.Static())
+    assert in_c.iterations == in_python.iterations
+    assert np.allclose(in_c.q, in_python.q, rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("options", [{"snes_type": "newtonls"}, {"snes_max_it": 25}])
+def test_options_bring_the_solver_of_petsc(options):
+    of_petsc = run(inelastic(), ub.Newton(petsc=options))
+    assert np.allclose(of_petsc.q, run(inelastic()).q, rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("make", [elastic, inelastic, machine])
+def test_a_modified_method_finds_the_same(make):
+    full, modified = run(make()), run(make(), ub.Newton(modified=True))
+    assert modified.parts == full.parts
+    assert modified.iterations > full.iterations  # tangents were kept
+    # Residuals of 1e-10 of forces of 1e2 N, on stiffnesses of some 10 N/m, in 20 steps.
+    assert np.allclose(full.q, modified.q, rtol=0, atol=20 * 1e-9)
+    assert modified.energy.worst < 1e-8
+
+
+def test_what_python_raises_in_the_middle_arrives():
+    def force(e, de):
+        raise ZeroDivisionError("of the user")
+
+    beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
+    law = ub.Function(force)
+    scene = ub.Scene(
+        [beam],
+        supports=[ub.Clamped(beam.start)],
+        connectors=[ub.Stretch(ub.ground(1.0, 1.0), beam.end, law)],
+    )
+    with pytest.raises(ZeroDivisionError, match="of the user"):
+        run(scene)
+
+
+@pytest.mark.parametrize(
+    ("mine", "theirs"),
+    [
+        ("ITERATING", "ITERATING"),
+        ("AT_ROUND_OFF", "CONVERGED_FNORM_ABS"),
+        ("CONVERGED", "CONVERGED_FNORM_RELATIVE"),
+        ("SINGULAR", "DIVERGED_LINEAR_SOLVE"),
+        ("TOO_MANY", "DIVERGED_MAX_IT"),
+        ("STALLED", "DIVERGED_LINE_SEARCH"),
+        ("DIVERGED", "DIVERGED_DTOL"),
+    ],
+)
+def test_reasons_are_those_of_petsc(mine, theirs):
+    assert getattr(lib, mine) == int(getattr(PETSc.SNES.ConvergedReason, theirs))
