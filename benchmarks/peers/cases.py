@@ -36,6 +36,7 @@ SWING = {"end": 1.2}
 """How far the ladders of the swing go: all programs get there, with every scheme."""
 
 CONSERVING = ("Midpoint", {})
+MODIFIED = ("Midpoint, modified Newton", {"modified": True})
 DECAYING = ("decaying Midpoint", {"alpha": 0.01, "beta": 0.01})
 TRAPEZOIDAL = {"rho": "trapezoidal"}
 
@@ -71,7 +72,7 @@ def roll_up(cells, turns):
 
 
 def flying_beam(cells, dt):
-    yield from ours(CONSERVING)
+    yield from ours(CONSERVING, MODIFIED)
     yield from exudyn(cells)
     fewer = {"steps": FEW[cells]} if cells in FEW else {}
     yield from opensees(("Newmark", fewer))
@@ -79,13 +80,13 @@ def flying_beam(cells, dt):
 
 
 def swing(cells, dt):
-    yield from ours(CONSERVING, DECAYING)
+    yield from ours(CONSERVING, MODIFIED, DECAYING)
     yield from exudyn(cells, said=", ρ∞ 0.6", rho=0.6)
     yield from opensees(("TRBDF2", {}))
 
 
 def portal(cells, dt):
-    yield from ours(CONSERVING)
+    yield from ours(CONSERVING, MODIFIED)
     yield from exudyn(cells)
     yield from opensees(
         ("with shear", {"element": "shear"}), ("without shear", {"element": "euler"})
@@ -93,7 +94,7 @@ def portal(cells, dt):
 
 
 def cantilever(cells, dt):
-    yield from ours(("", {}))
+    yield from ours(("", {}), ("modified Newton", {"modified": True}))
     yield from exudyn(cells)
     yield from opensees(("", {}))
     yield from floor()
@@ -111,7 +112,7 @@ TABLES = (  # problem, variants, arguments, and which of them --quick leaves out
 
 
 def flying_ladder(cells, dt):
-    yield from ours(CONSERVING)
+    yield from ours(CONSERVING, MODIFIED)
     for newton in NEWTON:
         yield "exudyn", f"{newton} Newton", {"newton": newton, "solver": "sparse"}
     if cells <= 64 and dt >= 0.02:
@@ -119,14 +120,14 @@ def flying_ladder(cells, dt):
 
 
 def swing_ladder(cells, dt):
-    yield from ours(CONSERVING)
+    yield from ours(CONSERVING, MODIFIED)
     for label, rho in (("trapezoidal", "trapezoidal"), ("ρ∞ 0.9", 0.9)):
         yield "exudyn", label, {"newton": "modified", "solver": "sparse", "rho": rho}
     yield from opensees(("Newmark", {"integrator": "newmark"}), ("TRBDF2", {}))
 
 
 def portal_ladder(cells, dt):
-    yield from ours(CONSERVING)
+    yield from ours(CONSERVING, MODIFIED)
     for newton in NEWTON:
         yield "exudyn", f"{newton} Newton", {"newton": newton, "solver": "sparse"}
     yield from opensees(

@@ -10,9 +10,10 @@ from ufl_beam.compat import dolfinx
 VERSION = f"DOLFINx {dolfinx.__version__}"
 
 
-def discretised(scheme="Midpoint", degree=1, lumped=False, **dials):
-    """A scheme by its name, with its arguments, and a mesh."""
-    return getattr(ub, scheme)(**dials), ub.Mesh(degree=degree, lumped=lumped)
+def discretised(scheme="Midpoint", degree=1, lumped=False, modified=False, **dials):
+    """A scheme by its name, with its arguments, a mesh, and how Newton's method runs."""
+    mesh = ub.Mesh(degree=degree, lumped=lumped)
+    return getattr(ub, scheme)(**dials), mesh, ub.Newton(modified=modified)
 
 
 def beams_of(chains):
@@ -27,8 +28,8 @@ def run(scene, discretised, end, steps, sample=None, every=None):
     Returns:
         The simulation at its end, the samples, and what the loop took.
     """
-    scheme, mesh = discretised
-    simulation = ub.Simulation(scene, scheme, mesh=mesh)
+    scheme, mesh, newton = discretised
+    simulation = ub.Simulation(scene, scheme, mesh=mesh, newton=newton)
     every = every or steps
     samples, stopwatch = [], Stopwatch()
     for first in range(1, steps + 1, every):
