@@ -57,8 +57,9 @@ int judge(equation *e, const double *q, int iteration, double residual, double s
      * all that can be had: it may go round between two such states for ever. */
     const int stays = !kept && e->last / 2 < residual && residual <= floor;
     if ((stays || residual <= floor / 80) && demands_met(e, q, scale)) return AT_ROUND_OFF;
-    /* With the tangent of the iterate before, the residual falls by twice the last factor. */
-    e->near = !kept && residual > floor && 20 * residual * (residual / e->last) <= wanted;
+    /* With the tangent of the iterate before, the residual falls by twice the last factor; works are
+     * to come out as with a new one, so it must be far enough. */
+    e->near = !kept && residual > floor && 2000 * residual * (residual / e->last) <= wanted;
   }
   if (e->modified) {
     /* The residual goes on to fall as it did, if the tangent is kept; from step to step too. */

@@ -202,7 +202,7 @@ class Simulation(Live):
             residual=self._residual,
             complete=self.supports.hold,
             tangent=self._tangent,
-            forces=lambda: self.force,
+            forces=self.force,
             excess=self._excess,
             relieve=self._relieve,
             held=self.supports.dofs,

@@ -148,6 +148,7 @@ class ChainsFirst:
         self._factors.setOperators(self._matrix)
         self._factors.setType("lu")
         self._factors.setFactorSolverType(package)
+        self._factors.setFactorPivot(0.0)
         if package == "petsc":
             # Of narrow and wide lattices it fills in least: 0.55 and 0.9 of the time of "nd".
             self._factors.setFactorOrdering("amd")
@@ -188,8 +189,7 @@ class Solver:
         residual: Writes the local part of the residual at x into r: ``residual(x, r)``.
         complete: Called with the summed residual; removes what supports carry.
         tangent: Fills ``A`` at x: ``tangent(x)``.
-        forces: Internal forces in the latest residual, one array during a solution; with the loads,
-            the scale of convergence.
+        forces: Internal forces in the latest residual; with the loads, the scale of convergence.
         excess: Of an iterate, its residual and the scale of forces: how far what connectors demand
             is missed, as a number without dimension that must reach the tolerance too.
         equation: ``residual``, ``complete`` and ``tangent`` in C, on one process.
@@ -206,7 +206,7 @@ class Solver:
         residual: Callable[[Array, Array], None],
         complete: Callable[[Array], None],
         tangent: Callable[[Array], None],
-        forces: Callable[[], Array],
+        forces: Array,
         excess: Callable[[Array, Array, float], float],
         relieve: Callable[[], bool],
         held: Index,
@@ -215,7 +215,8 @@ class Solver:
     ) -> None:
         self._share, self._A, self._newton = share, A, newton
         self._residual, self._complete, self._tangent = residual, complete, tangent
-        self._forces, self._excess, self._relieve = forces, excess, relieve
+        self._excess, self._relieve = excess, relieve
+        self._at_forces = doubles(forces)
         self._parallel = share.comm.size > 1
         self._views: dict[int, Array] = {}
         self._weights = self._force_weights()
@@ -242,6 +243,7 @@ class Solver:
     def _make_course(self) -> Any:
         """How far a solution is, for :func:`judge` in C; and what the test in C needs."""
         c = ffi.new("equation *") if self._equation is None else self._equation.c
+        c.size = self._share.size
         c.rtol, c.modified, c.rate = self._newton.rtol, self._newton.modified, math.inf
         self._at_diagonal = integers(self._diagonal.astype(np.int32))
         self._at_sizes = [*map(doubles, (self._lengths, self._moves, np.empty(self._share.size)))]
@@ -314,6 +316,7 @@ class Solver:
             return ksp
         factors.setType("lu")
         factors.setFactorSolverType(package)
+        factors.setFactorPivot(0.0)  # PETSc takes what is below 2e-14 for zero, whatever the units
         if package == "petsc":
             factors.setFactorOrdering("natural")
         return ksp
@@ -445,6 +448,9 @@ class Solver:
 
     def _size(self, forces: Any) -> float:
         """Euclidean norm over the scene of forces and moments over its size, at a pointer; N."""
+        if not self._parallel:
+            size: float = lib.size_of_forces(self._course, forces)
+            return size
         square = self._share.total(lib.weighted_square(*self._norm, forces, 1.0))
         if SMALL < square < LARGE or square == 0.0:
             return math.sqrt(square)
@@ -454,8 +460,7 @@ class Solver:
         """The same of forces whose squares are no numbers any more."""
         here = np.frombuffer(ffi.buffer(forces, self._weights.nbytes)) * np.sqrt(self._weights)
         largest = float(np.abs(here).max(initial=0.0))
-        if self._parallel:
-            largest = self._share.comm.allreduce(largest, op=MPI.MAX)
+        largest = self._share.comm.allreduce(largest, op=MPI.MAX)
         if largest == 0.0 or not math.isfinite(largest):
             return largest
         return largest * math.sqrt(self._share.total(float(np.sum((here / largest) ** 2))))
@@ -514,8 +519,10 @@ class Solver:
         return x.copy()
 
     def _start(self, guess: Array, loads: list[Array]) -> Array:
-        self._loads = self._course.loads = sum(self._size(doubles(load)) for load in loads)
-        self._at_forces = doubles(self._forces())
+        self._loads = 0.0
+        for load in loads:
+            self._loads += self._size(doubles(load))
+        self._course.loads = self._loads
         x = self._view(self._x)
         x[:] = guess
         self._x.stateIncrease()

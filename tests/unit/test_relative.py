@@ -176,8 +176,11 @@ LAWS = {
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_tangent(motion, law, scheme):
     scene, _ = pair(motion, LAWS[law])
-    probe = Probe(scene, scheme, turn=0.8)
-    probe.residual(probe.x)  # rows belong to the latest residual
+    for seed in range(9):
+        probe = Probe(scene, scheme, turn=0.8, seed=seed)
+        # Rows belong to the latest residual; what neither sticks nor slips has no tangent.
+        if np.array_equal(*(probe.residual(probe.x) for _ in range(2))):
+            break
     tangent = probe.tangent()
     # As in test_tangent.py; the slope of a function is itself a difference, to 1e-9
     scale = np.abs(tangent).max()
