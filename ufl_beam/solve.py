@@ -62,7 +62,8 @@ class Newton:
         modified: Keep the tangent, also from step to step, while residuals fall fast enough.  What
             is saved grows with the number of cells; solutions end closer to ``rtol``.
         petsc: PETSc options without their prefix, such as ``{"snes_monitor": None}``; in
-            ``PETSC_OPTIONS`` they have the prefix ``ub_``.
+            ``PETSC_OPTIONS`` they have the prefix ``ub_``.  With any of them Newton's method is that
+            of PETSc, else one in C that does the same in less time where cells are few.
     """
 
     rtol: float = 1e-10
