@@ -64,7 +64,7 @@ def microseconds(function, seconds=0.2):
 
 
 def parts(simulation):
-    """Microseconds of the parts of an iteration, called from Python, which takes half of one each."""
+    """Microseconds of the parts of an iteration; the call itself takes half of one."""
     solver = simulation._solver
     x, equation = solver.iterate(), solver._equation.c
     r = np.zeros_like(x)

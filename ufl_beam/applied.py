@@ -47,12 +47,17 @@ class DeadLoads:
         self.force: Array = np.zeros(share.size)
         self._before: Array = self.force
         self._in_c = ffi.new("vector *", {"size": share.size})
+        self._factors: list[float] = []
 
     def begin(self, step: Step) -> None:
-        """The loads of the step."""
-        self.force = self._at(step.load_time)
+        """The loads of the step; nothing is to do for those that stay."""
+        factors = [time(step.load_time) for time, _ in self._vectors]
+        if factors == self._factors and step.toward == 1:
+            return
+        self.force, self._factors = self._times(factors), factors
         if step.toward < 1:
             self.force = self._before + step.toward * (self.force - self._before)
+            self._factors = []
         self._values = self._in_c.values = doubles(self.force)
 
     def loops(self) -> tuple[Loop, Loop | None]:
@@ -61,14 +66,13 @@ class DeadLoads:
 
     def carry_on(self, t: float, q: Array) -> None:
         """Take the state ``q`` at time ``t`` as one that is in equilibrium with the loads."""
-        self._before = self._at(t)
+        self._before = self._times([time(t) for time, _ in self._vectors])
 
-    def _at(self, t: float) -> Array:
-        (time, vector), *others = self._vectors
-        force = time(t) * vector
-        for time, vector in others:
-            force += time(t) * vector
-        return force
+    def _times(self, factors: list[float]) -> Array:
+        vectors = [
+            factor * vector for factor, (_, vector) in zip(factors, self._vectors, strict=True)
+        ]
+        return vectors[0] if len(vectors) == 1 else np.sum(vectors, axis=0)
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Subtract the loads."""
@@ -79,8 +83,9 @@ class DeadLoads:
 
     def accept(self, q1: Array, s: Array) -> None:
         """Work of the loads."""
-        self._ledger.supplied["loads"] += float(self._acting(self._before, self.force) @ s)
-        self._before = self.force
+        if any(self._factors) or self._before is not self.force:
+            self._ledger.supplied["loads"] += float(self._acting(self._before, self.force) @ s)
+            self._before = self.force
 
     def add_state(self, q: Array) -> None:
         """Loads hold no energy; what a potential would hold is in their work."""
@@ -88,6 +93,7 @@ class DeadLoads:
     def remember(self, memory: Memory, q: Array) -> None:
         """The forces in the equation of the last step."""
         self.force = self._before = memory.added("dead loads", self._before)
+        self._factors = []
 
 
 class FollowerLoads:

@@ -62,8 +62,8 @@ class Newton:
         modified: Keep the tangent, also from step to step, while residuals fall fast enough.  What
             is saved grows with the number of cells; solutions end closer to ``rtol``.
         petsc: PETSc options without their prefix, such as ``{"snes_monitor": None}``; in
-            ``PETSC_OPTIONS`` they have the prefix ``ub_``.  With any of them Newton's method is that
-            of PETSc, else one in C that does the same in less time where cells are few.
+            ``PETSC_OPTIONS`` they have the prefix ``ub_``.  With any of them Newton's method is
+            that of PETSc, else one in C that does the same, faster where cells are few.
     """
 
     rtol: float = 1e-10
@@ -239,6 +239,8 @@ class Solver:
         self._snes = self._make_snes({} if equation is not None else FULL_STEPS)
         self.iterations = self._done = 0
         self._keeps = False
+        self._last_loads: list[Array] = []
+        self._loads = 0.0
         self._error: BaseException | None = None
 
     def _make_course(self) -> Any:
@@ -498,7 +500,7 @@ class Solver:
 
         Args:
             guess: Where to begin.
-            loads: Vectors of the loads, for the scale of convergence.
+            loads: Vectors of the loads, for the scale of convergence; new arrays where they change.
             like_last: Whether the tangent of the last solution may do for this one.
 
         Raises:
@@ -520,10 +522,9 @@ class Solver:
         return x.copy()
 
     def _start(self, guess: Array, loads: list[Array]) -> Array:
-        self._loads = 0.0
-        for load in loads:
-            self._loads += self._size(doubles(load))
-        self._course.loads = self._loads
+        if list(map(id, loads)) != list(map(id, self._last_loads)):
+            self._last_loads = loads
+            self._loads = self._course.loads = sum(self._size(doubles(load)) for load in loads)
         x = self._view(self._x)
         x[:] = guess
         self._x.stateIncrease()
