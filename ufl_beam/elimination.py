@@ -83,7 +83,7 @@ class Chains:
         self.ends = np.hstack([np.where(dead[:, None], right, left), right])
         self.dofs, self.spikes = around[:, 1], ~dead
         around = around.reshape(-1, 9)
-        self.order = np.argsort(np.argsort(around, axis=1), axis=1)
+        self.order = np.argsort(np.argsort(around, axis=1), axis=1).astype(np.int32)
 
 
 def _is_first(values: Index) -> npt.NDArray[np.bool_]:

@@ -36,7 +36,7 @@ from ufl_beam.mechanism import (
 from ufl_beam.memory import NOWHERE, Memory, Restoring, Saving, State
 from ufl_beam.path import StaticPath
 from ufl_beam.points import Course, expect_entries
-from ufl_beam.processes import ours
+from ufl_beam.processes import give_back_memory, ours
 from ufl_beam.responses import Setting
 from ufl_beam.rotating import FrameForces
 from ufl_beam.scene import Scene
@@ -56,6 +56,9 @@ SMALLEST_SHARE = 4_000
 Measured on two cores with lattices: two processes break even at some 1 000 cells each and win by
 1.4 at 4 000; see benchmarks/README.md.
 """
+
+MANY = 10_000
+"""Cells from which on building a scene takes much more memory than running it."""
 
 LARGEST_TURN = 0.75 * math.pi
 """A step that turns a node further is cut; the algorithmic strains end at π."""
@@ -209,6 +212,8 @@ class Simulation(Live):
             newton=newton or Newton(),
         )
         self.solution = Solution(scene, self.grid)
+        if len(self.grid.cells) > MANY:
+            give_back_memory()
 
     # -- building ------------------------------------------------------------------------------
 

@@ -141,11 +141,18 @@ class StepProduct(Product):
         super().__init__(A)
         size, indptr, indices, data = self._arrays
         entry, self._tangent = integers(self._entries), doubles(tangent.data)
+        self._structure = tangent
         self._alive = (integers(rotations), entry, doubles(np.empty(size)))
         self.product = ffi.new("step_product *")
         c = self.product
         c.size, c.indptr, c.indices, c.data = size, indptr, indices, data
         c.rotations, (c.rotation, c.entry, c.space) = len(rotations), self._alive
+
+    def matrix(self) -> Csr:
+        """The matrix; a new one."""
+        A = self._structure.zeros_like()
+        A.data[self._entries] = self._data
+        return A
 
     def begin(self, q0: Array, factor: float, back: float, v: Array) -> None:
         """Prepare what stays constant in the step that begins at ``q0``."""

@@ -192,7 +192,6 @@ class Inertia:
         more: What the scheme keeps besides; empty before the first step.
         last_dt: Length of the last accepted step; s.
         scheme: The time scheme.
-        M: The mass matrix.
     """
 
     kind = "inertia"
@@ -200,9 +199,8 @@ class Inertia:
     def __init__(
         self, fields: Fields, scheme: DynamicScheme, A: Csr, ledger: Ledger, v: Array
     ) -> None:
-        self.M = mass_matrix(fields)
         rotations = scheme.half_tangents(fields.share.rotations())
-        self._times = StepProduct(self.M, rotations, A)
+        self._times = StepProduct(mass_matrix(fields), rotations, A)
         self._ledger = ledger
         if scheme.slips:
             ledger.lost["numerical"] += 0.0
@@ -210,6 +208,11 @@ class Inertia:
         self.v = self.v_before = v
         self.more: tuple[Array, ...] = ()
         self._dt = self.last_dt = math.inf
+
+    @property
+    def M(self) -> Csr:
+        """The mass matrix; a new one."""
+        return self._times.matrix()
 
     def begin(self, step: Step) -> None:
         """Prepare what stays constant in the step."""
