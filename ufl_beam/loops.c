@@ -138,11 +138,11 @@ void add_step_tangent(void *self, const double *q, double *tangent)
     tangent[p->entry[k]] += p->data[k] * growth[p->indices[k]];
 }
 
-/* sum of w (f / unit)^2 */
-double weighted_square(int rows, const double *w, const double *f, double unit)
+/* sum of w f^2 */
+double weighted_square(int rows, const double *w, const double *f)
 {
-  double sum = 0, per = 1 / unit;
-  for (int i = 0; i < rows; ++i) sum += w[i] * (f[i] * per) * (f[i] * per);
+  double sum = 0;
+  for (int i = 0; i < rows; ++i) sum += w[i] * f[i] * f[i];
   if (sum == 0)
     for (int i = 0; i < rows; ++i)
       if (w[i] * f[i] != 0) return 5e-324; /* the squares are too small for a number */

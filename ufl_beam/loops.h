@@ -62,7 +62,7 @@ double quadratic_form(int rows, const int32_t *indptr, const int32_t *indices, c
                       const double *x);
 double step_of_nodes(int size, int rotations, const int32_t *rotation, double *s,
                      const double *q0, const double *q1);
-double weighted_square(int rows, const double *w, const double *f, double unit);
+double weighted_square(int rows, const double *w, const double *f);
 
 /* -- material points --------------------------------------------------------------------------- */
 

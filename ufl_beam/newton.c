@@ -114,12 +114,17 @@ int snes_jacobian(void *snes, void *x, void *A, void *P, void *self)
 /* Size of forces, see Solver; N. */
 double size_of_forces(const equation *e, const double *f)
 {
-  const double square = weighted_square(e->size, e->weight, f, 1);
+  const double square = weighted_square(e->size, e->weight, f);
   if ((SMALL < square && square < LARGE) || square == 0 || isnan(square)) return sqrt(square);
   double largest = 0; /* the squares are no numbers any more */
   for (int i = 0; i < e->size; ++i) largest = fmax(largest, sqrt(e->weight[i]) * fabs(f[i]));
   if (largest == 0 || !isfinite(largest)) return largest;
-  return largest * sqrt(weighted_square(e->size, e->weight, f, largest));
+  double sum = 0;
+  for (int i = 0; i < e->size; ++i) {
+    const double part = sqrt(e->weight[i]) * (f[i] / largest);
+    sum += part * part;
+  }
+  return largest * sqrt(sum);
 }
 
 /* What becomes of an iterate q. */

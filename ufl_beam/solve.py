@@ -454,7 +454,7 @@ class Solver:
         if not self._parallel:
             size: float = lib.size_of_forces(self._course, forces)
             return size
-        square = self._share.total(lib.weighted_square(*self._norm, forces, 1.0))
+        square = self._share.total(lib.weighted_square(*self._norm, forces))
         if SMALL < square < LARGE or square == 0.0:
             return math.sqrt(square)
         return self._scaled_size(forces)
