@@ -69,10 +69,11 @@ class DeadLoads:
         self._before = self._times([time(t) for time, _ in self._vectors])
 
     def _times(self, factors: list[float]) -> Array:
-        vectors = [
-            factor * vector for factor, (_, vector) in zip(factors, self._vectors, strict=True)
-        ]
-        return vectors[0] if len(vectors) == 1 else np.sum(vectors, axis=0)
+        (_, vector), *others = self._vectors
+        force = factors[0] * vector
+        for factor, (_, vector) in zip(factors[1:], others, strict=True):
+            force += factor * vector
+        return force
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Subtract the loads."""

@@ -93,6 +93,7 @@ class Couplings(Links):
         c.weight_of_before = setting.scheme.acting(np.ones(1), np.zeros(1))[0]
         if self.response.points is not None:
             c.points = self.response.points.points
+        self._asks_python = not self.response.steady and self.response.points is None
 
     # -- the step ------------------------------------------------------------------------------
 
@@ -120,7 +121,7 @@ class Couplings(Links):
 
     def loops(self) -> tuple[Loop, Loop | None] | None:
         """Those of laws that are steady or of material points."""
-        if not self.response.steady and self.response.points is None:
+        if self._asks_python:
             return None
         return loop("add_couplings_force", self._in_c), loop("add_cells", self._tangent.cells)
 
@@ -130,7 +131,7 @@ class Couplings(Links):
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the forces on the nodes, and the rows of the laws."""
-        if not self.response.steady and self.response.points is None:
+        if self._asks_python:
             self._put(*self.response.rows(self.motion(q1), self.force(q1)))
         lib.add_couplings_force(self._in_c, doubles(q1), doubles(r))
 
@@ -180,10 +181,7 @@ class Couplings(Links):
         response = self.response
         rows = np.column_stack([self.work, self.rate, self._before, self._e, response.state()])
         rows = memory.rows(type(response).__name__, self.numbers, rows)
-        for mine, column in zip(
-            (self.work, self.rate, self._before, self._e), rows.T, strict=False
-        ):
-            mine[:] = column
+        self.work[:], self.rate[:], self._before[:], self._e[:] = rows[:, :4].T
         response.restore(rows[:, 4:])
         self._q = q
 

@@ -12,11 +12,10 @@ from ufl_beam.errors import SceneError
 from ufl_beam.fields import Fields
 from ufl_beam.kinematics import strain, virtual_strain
 from ufl_beam.ledger import Ledger
-from ufl_beam.loops import Loop, loop
 from ufl_beam.memory import Memory
 from ufl_beam.schemes import Scheme, Step
 from ufl_beam.sparse import Csr, StepProduct
-from ufl_beam.terms import Inertia, Term, mass_matrix
+from ufl_beam.terms import Inertia, OfForms, OfMatrix, Term, mass_matrix
 from ufl_beam.viscous import KelvinVoigt, Rayleigh
 
 
@@ -33,7 +32,7 @@ def damping_forces(
     raise TypeError(f"{damping!r} is not a damping")
 
 
-class KelvinVoigtForces:
+class KelvinVoigtForces(OfForms):
     """Resultants in proportion to the rates of the strains, P(89) with a weight of time over dt."""
 
     kind = "damping"
@@ -64,18 +63,6 @@ class KelvinVoigtForces:
                 kernel.put(self._rate, np.array([self._time / step.dt]))
         self._dt = step.dt
 
-    def loops(self) -> tuple[Loop, Loop | None]:
-        """Two forms."""
-        return loop("add_cells", self._force.cells), loop("add_cells", self._tangent.cells)
-
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Add the damping forces."""
-        self._force.add(q1, r)
-
-    def add_tangent(self, q1: Array) -> None:
-        """Add their derivative."""
-        self._tangent.add(q1, self._A.data)
-
     def accept(self, q1: Array, s: Array) -> None:
         """What was damped."""
         self._ledger.lost["damping"] += self._lost.value(q1)
@@ -101,7 +88,7 @@ def reference_stiffness(fields: Fields) -> Csr:
     return K
 
 
-class RayleighForces:
+class RayleighForces(OfMatrix):
     """A constant matrix times the velocity of the step, P(92)."""
 
     kind = "damping"
@@ -119,18 +106,6 @@ class RayleighForces:
         """Prepare what stays constant in the step."""
         self._dt = step.dt
         self._times.begin(step.q0, *self._inertia.scheme.velocity(step.dt, self._inertia))
-
-    def loops(self) -> tuple[Loop, Loop | None]:
-        """A matrix times the step of the nodes."""
-        return self._times.loops()
-
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Add the damping forces."""
-        self._times.add_force(q1, r)
-
-    def add_tangent(self, q1: Array) -> None:
-        """Add their derivative."""
-        self._times.add_tangent(q1)
 
     def accept(self, q1: Array, s: Array) -> None:
         """What was damped."""

@@ -11,13 +11,13 @@ import ufl
 from ufl_beam.compat import Array
 from ufl_beam.exact_schemes import DecayingMidpoint
 from ufl_beam.fields import Fields
+from ufl_beam.inelastic import Strains
 from ufl_beam.kinematics import strain
 from ufl_beam.ledger import Ledger
-from ufl_beam.loops import Loop, loop
 from ufl_beam.memory import Memory
 from ufl_beam.schemes import Step
 from ufl_beam.sparse import Csr
-from ufl_beam.terms import Term
+from ufl_beam.terms import OfForms, Term
 
 
 @singledispatch
@@ -26,7 +26,7 @@ def numerical_forces(scheme: object, fields: Fields, A: Csr, ledger: Ledger) -> 
     return []
 
 
-class SecondDifferences:
+class SecondDifferences(OfForms):
     """Resultants c C (Δe - r Δe'), see :class:`DecayingMidpoint`."""
 
     kind = "beams"
@@ -45,23 +45,14 @@ class SecondDifferences:
         )
         self._tangent.share(self._force)
         self._tangent.place(A)
-        z = ufl.TestFunction(before.function_space)
-        self._values = fields.kernel(ufl.dot(strain(q1, axis), z) * dx, q1)
+        self._strains = Strains(fields)
         self._cells = fields.share.cells[fields.order]
         self._q: Array = np.empty(0)
-        self._change: Array = np.zeros(before.x.array.size).reshape(len(self._cells), -1)
-        self._e: Array = self._change
-        self._volumes = np.zeros(before.x.array.size)
-        fields.kernel(sum(z) * dx, q1).add(np.zeros(fields.share.size), self._volumes)
+        self._e: Array = np.zeros(self._strains.shape)
+        self._change: Array = np.zeros(self._strains.shape)
         self._dt = self._last_dt = math.inf
         self._A, self._ledger = A, ledger
         ledger.lost["numerical"] += 0.0
-
-    def _strains(self, q: Array) -> Array:
-        """Strains at ``q`` in the points of the cells; (num_cells, 3 points)."""
-        values = np.zeros(len(self._volumes))
-        self._values.add(q, values)
-        return np.asarray(values / self._volumes).reshape(self._change.shape)
 
     def begin(self, step: Step) -> None:
         """Remember the configuration at the beginning, and the changes in the step before."""
@@ -71,18 +62,6 @@ class SecondDifferences:
         for kernel in (self._force, self._lost):
             kernel.set(self._q0, step.q0)
             kernel.put(self._before, min(1.0, step.dt / self._last_dt) * self._change)
-
-    def loops(self) -> tuple[Loop, Loop | None]:
-        """Two forms."""
-        return loop("add_cells", self._force.cells), loop("add_cells", self._tangent.cells)
-
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Add the forces."""
-        self._force.add(q1, r)
-
-    def add_tangent(self, q1: Array) -> None:
-        """Add their derivative."""
-        self._tangent.add(q1, self._A.data)
 
     def accept(self, q1: Array, s: Array) -> None:
         """What was lost; and the changes of the strains."""

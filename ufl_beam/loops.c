@@ -27,6 +27,14 @@ void add_cells(void *self, const double *q, double *b)
   }
 }
 
+/* The same of one form at the first call of a step, and of another one then. */
+void add_first_cells(void *self, const double *q, double *b)
+{
+  first_cells *f = self;
+  add_cells((void *)(f->begins ? f->first : f->then), q, b);
+  f->begins = 0;
+}
+
 /* Value of a functional at the unknowns q. */
 double value_of_cells(const cells *c, const double *q)
 {
@@ -45,14 +53,6 @@ void combine(int size, double a, const double *x, double b, const double *y, dou
 void extrapolate(int size, const double *x, const double *y, double ratio, double *out)
 {
   for (int i = 0; i < size; ++i) out[i] = x[i] + ratio * (x[i] - y[i]);
-}
-
-/* The same of one form at the first call of a step, and of another one then. */
-void add_first_cells(void *self, const double *q, double *b)
-{
-  first_cells *f = self;
-  add_cells((void *)(f->begins ? f->first : f->then), q, b);
-  f->begins = 0;
 }
 
 /* b -= a */
@@ -138,15 +138,35 @@ void add_step_tangent(void *self, const double *q, double *tangent)
     tangent[p->entry[k]] += p->data[k] * growth[p->indices[k]];
 }
 
-/* sum of w f^2 */
-double weighted_square(int rows, const double *w, const double *f)
+/* Sum of the squares of w f. */
+double sum_of_squares(int rows, const double *w, const double *f)
 {
   double sum = 0;
-  for (int i = 0; i < rows; ++i) sum += w[i] * f[i] * f[i];
-  if (sum == 0)
-    for (int i = 0; i < rows; ++i)
-      if (w[i] * f[i] != 0) return 5e-324; /* the squares are too small for a number */
+  for (int i = 0; i < rows; ++i) sum += w[i] * f[i] * (w[i] * f[i]);
   return sum;
+}
+
+/* The same of w f / unit. */
+double scaled_sum_of_squares(int rows, const double *w, const double *f, double unit)
+{
+  double sum = 0;
+  for (int i = 0; i < rows; ++i) sum += w[i] * (f[i] / unit) * (w[i] * (f[i] / unit));
+  return sum;
+}
+
+/* Largest size of w f. */
+double largest_size(int rows, const double *w, const double *f)
+{
+  double largest = 0;
+  for (int i = 0; i < rows; ++i)
+    if (!(w[i] * fabs(f[i]) <= largest)) largest = w[i] * fabs(f[i]);
+  return largest;
+}
+
+/* Whether a sum of squares has all its digits: none of them has become too small or too large. */
+int has_its_digits(double sum)
+{
+  return isnan(sum) || (1e-250 < sum && sum < 1e250);
 }
 
 /* -- material points ------------------------------------------------------------------------- */

@@ -62,7 +62,10 @@ double quadratic_form(int rows, const int32_t *indptr, const int32_t *indices, c
                       const double *x);
 double step_of_nodes(int size, int rotations, const int32_t *rotation, double *s,
                      const double *q0, const double *q1);
-double weighted_square(int rows, const double *w, const double *f);
+double sum_of_squares(int rows, const double *w, const double *f);
+double scaled_sum_of_squares(int rows, const double *w, const double *f, double unit);
+double largest_size(int rows, const double *w, const double *f);
+int has_its_digits(double sum);
 
 /* -- material points --------------------------------------------------------------------------- */
 
@@ -193,7 +196,7 @@ enum {
 
 void residual(equation *e, const double *q, double *r);
 void assemble(equation *e, const double *q);
-double last_digits(const equation *e, int dof, double x);
+void find_last_digits(const equation *e, const double *q, double *digits);
 double size_of_forces(const equation *e, const double *f);
 int judge(equation *e, const double *q, int iteration, double residual, double scale,
           double floor);

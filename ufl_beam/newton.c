@@ -29,9 +29,6 @@ void assemble(equation *e, const double *q)
   for (int k = 0; k < e->held; ++k) e->tangent[e->pivot[k]] = e->pivots[k];
 }
 
-/* Between them sums of squares have all their digits. */
-static const double SMALL = 1e-250, LARGE = 1e250;
-
 /* Iterations that a tangent may still cost if it is kept: making one costs as much as two. */
 enum { MORE = 3 };
 
@@ -72,11 +69,14 @@ int judge(equation *e, const double *q, int iteration, double residual, double s
   return e->slow == e->patience ? STALLED : ITERATING;
 }
 
-/* Spacing of the numbers around a displacement or rotation: the last digit of what it is part of. */
-double last_digits(const equation *e, int dof, double x)
+/* Spacing of the numbers around displacements and rotations: the last digits of what they are part
+ * of. */
+void find_last_digits(const equation *e, const double *q, double *digits)
 {
-  const double far = fabs(x) + e->lengths[dof];
-  return e->moves[dof] * (nextafter(far, INFINITY) - far);
+  for (int i = 0; i < e->size; ++i) {
+    const double far = fabs(q[i]) + e->lengths[i];
+    digits[i] = e->moves[i] * (nextafter(far, INFINITY) - far);
+  }
 }
 
 /* SNESShellGetContext, which is asked before anything else is known. */
@@ -114,17 +114,11 @@ int snes_jacobian(void *snes, void *x, void *A, void *P, void *self)
 /* Size of forces, see Solver; N. */
 double size_of_forces(const equation *e, const double *f)
 {
-  const double square = weighted_square(e->size, e->weight, f);
-  if ((SMALL < square && square < LARGE) || square == 0 || isnan(square)) return sqrt(square);
-  double largest = 0; /* the squares are no numbers any more */
-  for (int i = 0; i < e->size; ++i) largest = fmax(largest, sqrt(e->weight[i]) * fabs(f[i]));
+  const double sum = sum_of_squares(e->size, e->weight, f);
+  if (has_its_digits(sum)) return sqrt(sum);
+  const double largest = largest_size(e->size, e->weight, f);
   if (largest == 0 || !isfinite(largest)) return largest;
-  double sum = 0;
-  for (int i = 0; i < e->size; ++i) {
-    const double part = sqrt(e->weight[i]) * (f[i] / largest);
-    sum += part * part;
-  }
-  return largest * sqrt(sum);
+  return largest * sqrt(scaled_sum_of_squares(e->size, e->weight, f, largest));
 }
 
 /* What becomes of an iterate q. */
@@ -134,9 +128,9 @@ static int verdict(equation *e, const double *q, int iteration)
   if (!isfinite(now)) return DIVERGED;
   const double scale = e->loads + size_of_forces(e, e->inner_force);
   double floor = 0;
-  if (iteration > 1) {
-    for (int i = 0; i < e->size; ++i)
-      e->space[i] = e->tangent[e->diagonal[i]] * last_digits(e, i, q[i]);
+  if (iteration > 1 && (now > e->rtol * scale || e->demands)) {
+    find_last_digits(e, q, e->space);
+    for (int i = 0; i < e->size; ++i) e->space[i] *= e->tangent[e->diagonal[i]];
     floor = 8 * size_of_forces(e, e->space);
   }
   return judge(e, q, iteration, now, scale, floor);

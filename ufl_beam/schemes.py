@@ -3,7 +3,7 @@
 A scheme says, in UFL, which strains vary and which resultants act during a step, how velocities
 follow from displacements, and at what time loads act.  Neither the laws of the material nor the
 solver know which scheme runs.  This is what a scheme must say; the schemes whose forces act over
-the step are in exact.py and decaying.py, those whose forces act at its end in classical.py.
+the step are in exact_schemes.py, those whose forces act at its end in classical.py.
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ from ufl_beam.mechanism import (
 from ufl_beam.memory import NOWHERE, Memory, Restoring, Saving, State
 from ufl_beam.path import StaticPath
 from ufl_beam.points import Course, expect_entries
-from ufl_beam.processes import give_back_memory, ours
+from ufl_beam.processes import ours
 from ufl_beam.responses import Setting
 from ufl_beam.rotating import FrameForces
 from ufl_beam.scene import Scene
@@ -57,12 +57,8 @@ Measured on two cores with lattices: two processes break even at some 1 000 cell
 1.4 at 4 000; see benchmarks/README.md.
 """
 
-MANY = 10_000
-"""Cells from which on building a scene takes much more memory than running it."""
-
 LARGEST_TURN = 0.75 * math.pi
 """A step that turns a node further is cut; the algorithmic strains end at π."""
-
 
 FIRST = 1 / 16
 """Part of the first step after which accelerations are taken for those at the beginning.
@@ -212,8 +208,6 @@ class Simulation(Live):
             newton=newton or Newton(),
         )
         self.solution = Solution(scene, self.grid)
-        if len(self.grid.cells) > MANY:
-            give_back_memory()
 
     # -- building ------------------------------------------------------------------------------
 
@@ -408,7 +402,7 @@ class Simulation(Live):
         """What a step came to, ``q1`` in the axes of the supports, if it was followed."""
         self.supports.leave(q1)
         s, turn = self.scheme.nodal_step(self.q, q1, self._rotations)
-        if self.scene.links:
+        if len(self.grid.multipliers):
             s[self._multipliers] = 0.0
         self._require_small(turn)
         if self._path is not None:

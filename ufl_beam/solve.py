@@ -14,15 +14,12 @@ from petsc4py import PETSc
 import numpy as np
 
 from ufl_beam.compat import Array
-from ufl_beam.elimination import Elimination
 from ufl_beam.equation import Demand, Equation
 from ufl_beam.errors import SceneError, StepFailed, require_number
+from ufl_beam.factors import Bordered, ChainsFirst
 from ufl_beam.grid import Index, Share
 from ufl_beam.loops import doubles, ffi, integers, lib
 from ufl_beam.sparse import Csr
-
-GOOD = int(PETSc.PC.FailedReason.NOERROR)
-BAD_PIVOT = int(PETSc.PC.FailedReason.FACTOR_NUMERIC_ZEROPIVOT)
 
 FULL_STEPS = {"snes_linesearch_type": "basic"}
 """A norm in a line search would add forces and moments, and each search costs a residual."""
@@ -39,9 +36,6 @@ TO_NO_WORK = {
 Forces that grow in an S, as in a point that yields one way or the other, send full steps from one
 branch to the other and back for ever.
 """
-
-SMALL, LARGE = 1e-250, 1e250
-"""Between them sums of squares have all their digits."""
 
 PREFIX = "ub_"
 """Prefix of the PETSc options of the solver, as in ``-ub_snes_monitor``."""
@@ -98,89 +92,6 @@ class Border(Protocol):
         """Whether the equation is."""
 
 
-class Bordered:
-    """What PETSc calls a preconditioner: the tangent bordered by one more unknown and equation.
-
-    By elimination of the border: one factorisation and two solutions, as the tangent alone is
-    banded.  Where that is nearly singular, the next iteration makes up for the lost digits.
-
-    Args:
-        factors: An exact preconditioner of the tangent.
-        rate: The derivative by the unknown.
-        correct: See :class:`Border`; of vectors.
-    """
-
-    def __init__(
-        self, factors: PETSc.PC, rate: PETSc.Vec, correct: Callable[[PETSc.Vec, PETSc.Vec], None]
-    ) -> None:
-        self._factors, self._rate, self._correct = factors, rate, correct
-        self._z = rate.duplicate()
-
-    def setUp(self, pc: PETSc.PC) -> None:
-        """Factor; PETSc asks for it where the matrix has changed."""
-        self._factors.setOperators(*pc.getOperators())
-        self._factors.setUp()
-        pc.setFailedReason(self._factors.getFailedReason())
-
-    def apply(self, pc: PETSc.PC, b: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Solve."""
-        self._factors.apply(b, y)
-        self._factors.apply(self._rate, self._z)
-        self._correct(y, self._z)
-
-
-class ChainsFirst:
-    """What PETSc calls a preconditioner; an exact one: along the beams, then what that leaves.
-
-    Every process factors what is left, which is small, instead of waiting for another.
-
-    Args:
-        share: The degrees of freedom of this process.
-        A: The matrix.
-        package: What factors the matrix that is left.
-    """
-
-    def __init__(self, share: Share, A: Csr, package: str) -> None:
-        self._elimination = left = Elimination(share, A)
-        arrays = (left.indptr.astype(PETSc.IntType), left.indices.astype(PETSc.IntType), left.data)
-        self._matrix = PETSc.Mat().createAIJWithArrays(left.size, arrays, comm=PETSc.COMM_SELF)
-        self._matrix.assemble()
-        self._factors = PETSc.PC().create(PETSc.COMM_SELF)
-        self._factors.setOperators(self._matrix)
-        self._factors.setType("lu")
-        self._factors.setFactorSolverType(package)
-        self._factors.setFactorPivot(0.0)
-        if package == "petsc":
-            # Of narrow and wide lattices it fills in least: 0.55 and 0.9 of the time of "nd".
-            self._factors.setFactorOrdering("amd")
-        self._small = np.zeros(left.size)
-        self._rhs = PETSc.Vec().createWithArray(self._small, comm=PETSc.COMM_SELF)
-        self._solution = self._rhs.duplicate()
-
-    def setUp(self, pc: PETSc.PC) -> None:
-        """Factor; PETSc asks for it where the matrix has changed."""
-        pc.setFailedReason(GOOD if self._elimination.factor() and self._factor() else BAD_PIVOT)
-
-    def _factor(self) -> bool:
-        self._matrix.stateIncrease()
-        try:
-            self._factors.setUp()
-        except PETSc.Error:
-            # KLU says so of a matrix that is singular; its next factorisation does not mind.
-            return False
-        return int(self._factors.getFailedReason()) == GOOD
-
-    def _solve(self) -> None:
-        self._rhs.stateIncrease()
-        self._factors.apply(self._rhs, self._solution)
-
-    def apply(self, pc: PETSc.PC, b: PETSc.Vec, x: PETSc.Vec) -> None:
-        """Solve."""
-        self._elimination.reduce(b.array_r, self._small)
-        self._solve()
-        self._elimination.expand(self._solution.array_r, x.array_w)
-
-
 class Solver:
     """Finds the configuration in which a residual vanishes.
 
@@ -222,7 +133,6 @@ class Solver:
         self._views: dict[int, Array] = {}
         self._weights = self._force_weights()
         self._norm = (len(self._weights), doubles(self._weights))
-        self._lengths = share.lengths()
         self._moves = np.ones(share.size)
         self._moves[held] = 0.0
         self._diagonal = np.flatnonzero(A.rows() == A.indices)
@@ -249,7 +159,9 @@ class Solver:
         c.size = self._share.size
         c.rtol, c.modified, c.rate = self._newton.rtol, self._newton.modified, math.inf
         self._at_diagonal = integers(self._diagonal.astype(np.int32))
-        self._at_sizes = [*map(doubles, (self._lengths, self._moves, np.empty(self._share.size)))]
+        self._at_sizes = [
+            *map(doubles, (self._share.lengths(), self._moves, np.empty(self._share.size)))
+        ]
         c.weight, c.residual, c.diagonal = self._norm[1], self._at_r, self._at_diagonal
         c.lengths, c.moves, c.space = self._at_sizes
         c.x, c.f, c.matrix, c.factors, c.correction = (
@@ -443,9 +355,9 @@ class Solver:
     # -- convergence ---------------------------------------------------------------------------
 
     def _force_weights(self) -> Array:
-        """Of squares: one for forces, one over the squared size of the scene for moments."""
+        """One for forces, one over the size of the scene for moments."""
         weights = np.ones(self._share.size)
-        weights[self._share.rotations()] = 1 / self._share.grid.scene.size**2
+        weights[self._share.rotations()] = 1 / self._share.grid.scene.size
         weights[self._share.multipliers()] = 0.0
         return weights[: self._share.num_owned].copy()
 
@@ -454,19 +366,14 @@ class Solver:
         if not self._parallel:
             size: float = lib.size_of_forces(self._course, forces)
             return size
-        square = self._share.total(lib.weighted_square(*self._norm, forces))
-        if SMALL < square < LARGE or square == 0.0:
+        square = self._share.total(lib.sum_of_squares(*self._norm, forces))
+        if lib.has_its_digits(square):
             return math.sqrt(square)
-        return self._scaled_size(forces)
-
-    def _scaled_size(self, forces: Any) -> float:
-        """The same of forces whose squares are no numbers any more."""
-        here = np.frombuffer(ffi.buffer(forces, self._weights.nbytes)) * np.sqrt(self._weights)
-        largest = float(np.abs(here).max(initial=0.0))
-        largest = self._share.comm.allreduce(largest, op=MPI.MAX)
+        largest = self._share.comm.allreduce(lib.largest_size(*self._norm, forces), op=MPI.MAX)
         if largest == 0.0 or not math.isfinite(largest):
-            return largest
-        return largest * math.sqrt(self._share.total(float(np.sum((here / largest) ** 2))))
+            return float(largest)
+        scaled = lib.scaled_sum_of_squares(*self._norm, forces, largest)
+        return float(largest) * math.sqrt(self._share.total(scaled))
 
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, ...]) -> int:
         residual = self._size(self._at_r)
@@ -486,7 +393,9 @@ class Solver:
         return self._size(doubles(self._A.data[self._diagonal] * self._last_digits()))
 
     def _last_digits(self) -> Array:
-        return np.asarray(self._moves * np.spacing(np.abs(self._view(self._x)) + self._lengths))
+        digits = np.empty(self._share.size)
+        lib.find_last_digits(self._course, doubles(self._view(self._x)), doubles(digits))
+        return digits
 
     def least_work(self, s: Array) -> float:
         """Work in a step ``s`` of what the last digit of displacements makes; less is none; J."""
@@ -560,7 +469,7 @@ class Solver:
         names = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int)}
         scale = self._loads + self._size(self._at_forces)
         weighted = np.zeros(self._share.size)
-        weighted[: len(self._weights)] = np.abs(self._r[: len(self._weights)]) * self._weights**0.5
+        weighted[: len(self._weights)] = np.abs(self._r[: len(self._weights)]) * self._weights
         residuals = self._share.grid.worst(self._share.gather(weighted))
         places = [f"{size:.1e} N in {place}" for place, size in [*residuals.items()][:3]]
         failure = StepFailed(

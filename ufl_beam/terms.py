@@ -65,7 +65,45 @@ class Beams(Term, Protocol):
         """Energy that cells of this process store and dissipate in the step to ``q1``; J."""
 
 
-class ElasticBeams:
+class OfForms:
+    """A term whose forces and their derivative are two forms on cells."""
+
+    _force: Kernel
+    _tangent: Kernel
+    _A: Csr
+
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """Two forms."""
+        return loop("add_cells", self._force.cells), loop("add_cells", self._tangent.cells)
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Add the forces."""
+        self._force.add(q1, r)
+
+    def add_tangent(self, q1: Array) -> None:
+        """Add their derivative."""
+        self._tangent.add(q1, self._A.data)
+
+
+class OfMatrix:
+    """A term whose forces are a constant matrix times the step of the nodes."""
+
+    _times: StepProduct
+
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """The product, and its derivative."""
+        return self._times.loops()
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Add the forces."""
+        self._times.add_force(q1, r)
+
+    def add_tangent(self, q1: Array) -> None:
+        """Add their derivative."""
+        self._times.add_tangent(q1)
+
+
+class ElasticBeams(OfForms):
     """Resultants of elastic cells working on the virtual strains, P(12)."""
 
     kind = "beams"
@@ -113,10 +151,6 @@ class ElasticBeams:
     def loops(self) -> tuple[Loop, Loop | None]:
         """Two forms."""
         return loop("add_cells", self._force.cells), loop("add_first_cells", self._tangents)
-
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Add the internal forces."""
-        self._force.add(q1, r)
 
     def add_tangent(self, q1: Array) -> None:
         """Add the stiffness, material and geometric.
@@ -183,7 +217,7 @@ def mass_matrix(fields: Fields) -> Csr:
     return M
 
 
-class Inertia:
+class Inertia(OfMatrix):
     """Consistent inertia of the beams and inertia of point masses: a constant matrix, P(18).
 
     Attributes:
@@ -218,18 +252,6 @@ class Inertia:
         """Prepare what stays constant in the step."""
         self._dt = step.dt
         self._times.begin(step.q0, *self.scheme.inertia(step.dt, self))
-
-    def loops(self) -> tuple[Loop, Loop | None]:
-        """A matrix times the step of the nodes."""
-        return self._times.loops()
-
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Add mass times the acceleration of the step."""
-        self._times.add_force(q1, r)
-
-    def add_tangent(self, q1: Array) -> None:
-        """Add mass times the derivative of the acceleration."""
-        self._times.add_tangent(q1)
 
     def carry_on(self, memory: Memory, known: int) -> None:
         """State what the scheme keeps besides the velocities, as much as is ``known`` of it."""
