@@ -88,8 +88,7 @@ class Couplings(Links):
         c.link, c.force, c.dofs = self._alive[:3]
         c.by_cell, c.e1, c.e0, c.before, c.taken, c.rate, c.length = self._alive[3:]
         c.number, c.size = n, share.grid.scene.size
-        c.row, c.width = self._work.pointer(row)
-        c.row_of_tangent, c.width_of_tangent = self._tangent.pointer(row)
+        c.row, c.row_of_tangent = (one.position(row) for one in (self._work, self._tangent))
         c.weight_of_before = setting.scheme.acting(np.ones(1), np.zeros(1))[0]
         if self.response.points is not None:
             c.points = self.response.points.points

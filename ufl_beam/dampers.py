@@ -46,13 +46,9 @@ class KelvinVoigtForces(OfForms):
         change = strain(q1, axis) - strain(q0, axis)
         r = ufl.as_vector([rate * C[i] * change[i] for i in range(3)])
         work = ufl.dot(r, scheme.virtual_strain(q0, q1, w, axis)) * dx
-        tangent = ufl.derivative(work, q1, ufl.TrialFunction(fields.space))
         self._q0, self._rate, self._time = q0, rate, damping.time
-        self._force, self._tangent, self._lost = (
-            fields.kernel(form, q1) for form in (work, tangent, ufl.dot(r, change) * dx)
-        )
-        self._tangent.share(self._force)
-        self._tangent.place(A)
+        self._force, self._tangent = fields.force_and_tangent(work, q1, A)
+        self._lost = fields.hot_kernel(ufl.dot(r, change) * dx, q1)
         self._A, self._ledger, self._dt = A, ledger, 0.0
 
     def begin(self, step: Step) -> None:

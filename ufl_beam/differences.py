@@ -38,13 +38,9 @@ class SecondDifferences(OfForms):
         change = strain(q1, axis) - strain(q0, axis)
         r = ufl.as_vector([part * C[i] * (change[i] - before[i]) for i in range(3)])
         work = ufl.dot(r, scheme.virtual_strain(q0, q1, w, axis)) * dx
-        tangent = ufl.derivative(work, q1, ufl.TrialFunction(fields.space))
         self._q0, self._before = q0, before
-        self._force, self._tangent, self._lost = (
-            fields.kernel(form, q1) for form in (work, tangent, ufl.dot(r, change) * dx)
-        )
-        self._tangent.share(self._force)
-        self._tangent.place(A)
+        self._force, self._tangent = fields.force_and_tangent(work, q1, A)
+        self._lost = fields.hot_kernel(ufl.dot(r, change) * dx, q1)
         self._strains = Strains(fields)
         self._cells = fields.share.cells[fields.order]
         self._q: Array = np.empty(0)

@@ -7,9 +7,9 @@
  * vertex before, of v and of the vertex after are among them.
  */
 
-/* What is kept of a vertex: its pivot block as LU; where there is a spike, the couplings to and from
- * the left end. */
-enum { PIVOT = 9, TO_LEFT = 0, FROM_LEFT = 9, SIDES = 18 };
+/* What is kept of a vertex: its pivot block as LU, what that makes of the coupling to the vertex
+ * after, and where there is a spike, of that to the left end; the coupling from there. */
+enum { PIVOT = 9, TO_NEXT = 0, TO_LEFT = 9, FROM_LEFT = 18, SIDES = 27 };
 
 /* D = LU with the largest pivot of each column; the reciprocals of the pivots on the diagonal */
 static void factor_block(double *D, int32_t *swap)
@@ -49,12 +49,12 @@ static inline void solve_block(const double *D, const int32_t *swap, int columns
   }
 }
 
-/* Y -= A X for blocks of 3 x 3, X in rows of some width */
-static inline void subtract_product(const double *A, const double *X, int width, double *Y)
+/* Y -= A X for blocks of 3 x 3 */
+static inline void subtract_product(const double *A, const double *X, double *Y)
 {
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)
-      Y[3 * i + j] -= A[3 * i] * X[j] + A[3 * i + 1] * X[width + j] + A[3 * i + 2] * X[2 * width + j];
+      Y[3 * i + j] -= A[3 * i] * X[j] + A[3 * i + 1] * X[3 + j] + A[3 * i + 2] * X[6 + j];
 }
 
 /* y -= A x */
@@ -93,37 +93,32 @@ static inline void drop_faded(double *block)
 /* A chain; without a spike nothing couples to a left end. */
 static inline void eliminate_chain(const chains *c, int chain, const int spike, double *ends)
 {
-  double pivot[9], to[9], from[9], below[9], side[18], solved[18];
+  double pivot[9], to[9], from[9], below[9], after[9];
   read_block(c, c->first[chain], 1, pivot);
   if (spike) {
     read_block(c, c->first[chain], 0, to);
     for (int k = 0; k < 9; ++k) from[k] = c->data[c->from_ends[18 * chain + k]];
   }
   for (int v = c->first[chain]; v < c->first[chain + 1]; ++v) {
-    double *sides = c->sides + SIDES * v, after[9];
+    double *sides = c->sides + SIDES * v, *to_next = sides + TO_NEXT, *to_left = sides + TO_LEFT;
     int32_t *swap = c->swaps + 3 * v;
     factor_block(pivot, swap);
     memcpy(c->pivots + PIVOT * v, pivot, sizeof pivot);
     read_block(c, v, 2, after);
     read_below(c, chain, v, below);
+    solve_block(pivot, swap, 3, after, to_next);
     if (spike) {
-      memcpy(sides + TO_LEFT, to, sizeof to);
       memcpy(sides + FROM_LEFT, from, sizeof from);
-      for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j)
-          side[6 * i + j] = after[3 * i + j], side[6 * i + 3 + j] = to[3 * i + j];
-      solve_block(pivot, swap, 6, side, solved);
-    } else {
-      solve_block(pivot, swap, 3, after, solved);
+      solve_block(pivot, swap, 3, to, to_left);
     }
     if (v + 1 < c->first[chain + 1]) read_block(c, v + 1, 1, pivot);
     else memset(pivot, 0, sizeof pivot);
-    subtract_product(below, solved, spike ? 6 : 3, pivot);
+    subtract_product(below, to_next, pivot);
     if (spike) {
       double next_to[9] = {0}, next_from[9] = {0};
-      subtract_product(from, solved + 3, 6, ends);
-      subtract_product(below, solved + 3, 6, next_to);
-      subtract_product(from, solved, 6, next_from);
+      subtract_product(from, to_left, ends);
+      subtract_product(below, to_left, next_to);
+      subtract_product(from, to_next, next_from);
       memcpy(to, next_to, sizeof to);
       memcpy(from, next_from, sizeof from);
       drop_faded(to);
@@ -137,53 +132,65 @@ static inline void eliminate_chain(const chains *c, int chain, const int spike, 
   memcpy(ends + 27, pivot, sizeof pivot);
 }
 
-/* Eliminate all vertices; what that makes of the blocks of the ends, left-left, left-right,
- * right-left and right-right, is added to `left` at the places given for each chain. */
-void eliminate(const chains *c, const int32_t *places, double *left)
+/* Eliminate all vertices: what is left is what stays as it is, and what the chains make of the
+ * blocks of their ends, left-left, left-right, right-left and right-right. */
+void eliminate(const chains *c)
 {
+  memset(c->left_data, 0, c->left * sizeof *c->left_data);
+  for (int k = 0; k < c->stay; ++k) c->left_data[c->place[k]] = c->data[c->entry[k]];
+  const int32_t *places = c->places;
   for (int chain = 0; chain < c->chains; ++chain, places += 36) {
     double ends[36] = {0};
     if (c->spike[chain]) eliminate_chain(c, chain, 1, ends);
     else eliminate_chain(c, chain, 0, ends);
-    for (int k = 0; k < 36; ++k) left[places[k]] += ends[k];
+    for (int k = 0; k < 36; ++k) c->left_data[places[k]] += ends[k];
   }
 }
 
-/* The same for a right-hand side b: f of each vertex, and what is added at the six ends' places. */
-void eliminate_from(const chains *c, const double *b, double *f, const int32_t *places, double *left)
+/* The same for a right-hand side b; f takes what pivots make of it. */
+void reduce(const chains *c, const double *b)
 {
-  for (int chain = 0; chain < c->chains; ++chain, places += 6) {
-    double ends[6] = {0}, next[3], below[9], y[3];
-    memset(next, 0, sizeof next);
+  memset(c->left_f, 0, c->left_size * sizeof *c->left_f);
+  for (int k = 0; k < c->rows; ++k) c->left_f[c->number[k]] = b[c->dof[k]];
+  const int32_t *numbers = c->ends;
+  for (int chain = 0; chain < c->chains; ++chain, numbers += 6) {
+    double ends[6] = {0}, next[3] = {0}, below[9];
     for (int v = c->first[chain]; v < c->first[chain + 1]; ++v) {
-      const double *pivot = c->pivots + PIVOT * v, *sides = c->sides + SIDES * v;
-      for (int r = 0; r < 3; ++r) f[3 * v + r] = b[c->row[3 * v + r]] + next[r];
-      solve_block(pivot, c->swaps + 3 * v, 1, f + 3 * v, y);
+      double *f = c->f + 3 * v;
+      for (int r = 0; r < 3; ++r) next[r] += b[c->row[3 * v + r]];
+      solve_block(c->pivots + PIVOT * v, c->swaps + 3 * v, 1, next, f);
       read_below(c, chain, v, below);
       memset(next, 0, sizeof next);
-      subtract(below, y, next);
-      if (c->spike[chain]) subtract(sides + FROM_LEFT, y, ends);
+      subtract(below, f, next);
+      if (c->spike[chain]) subtract(c->sides + SIDES * v + FROM_LEFT, f, ends);
     }
     memcpy(ends + 3, next, sizeof next);
-    for (int k = 0; k < 6; ++k) left[places[k]] += ends[k];
+    for (int k = 0; k < 6; ++k) c->left_f[numbers[k]] += ends[k];
   }
 }
 
-/* The unknowns of all vertices into x, from those of the ends; f as eliminate_from left it. */
-void substitute(const chains *c, const double *f, const int32_t *places, const double *ends,
-                double *x)
+/* The unknowns of all vertices into x, from those that are left; f as reduce left it. */
+void expand(const chains *c, const double *left, double *x)
 {
-  for (int chain = 0; chain < c->chains; ++chain, places += 6) {
-    double left[3], after[9], y[3], next[3];
-    for (int k = 0; k < 3; ++k) left[k] = ends[places[k]], next[k] = ends[places[3 + k]];
+  for (int k = 0; k < c->rows; ++k) x[c->dof[k]] = left[c->number[k]];
+  const int32_t *numbers = c->ends;
+  for (int chain = 0; chain < c->chains; ++chain, numbers += 6) {
+    double first[3], next[3], y[3];
+    for (int k = 0; k < 3; ++k) first[k] = left[numbers[k]], next[k] = left[numbers[3 + k]];
     for (int v = c->first[chain + 1] - 1; v >= c->first[chain]; --v) {
-      const double *pivot = c->pivots + PIVOT * v, *sides = c->sides + SIDES * v;
-      memcpy(y, f + 3 * v, sizeof y);
-      read_block(c, v, 2, after);
-      if (c->spike[chain]) subtract(sides + TO_LEFT, left, y);
-      subtract(after, next, y);
-      solve_block(pivot, c->swaps + 3 * v, 1, y, next);
-      for (int r = 0; r < 3; ++r) x[c->row[3 * v + r]] = next[r];
+      const double *sides = c->sides + SIDES * v;
+      memcpy(y, c->f + 3 * v, sizeof y);
+      if (c->spike[chain]) subtract(sides + TO_LEFT, first, y);
+      subtract(sides + TO_NEXT, next, y);
+      memcpy(next, y, sizeof y);
+      for (int r = 0; r < 3; ++r) x[c->row[3 * v + r]] = y[r];
     }
   }
+}
+
+int all_finite(int size, const double *values)
+{
+  for (int i = 0; i < size; ++i)
+    if (!isfinite(values[i])) return 0;
+  return 1;
 }

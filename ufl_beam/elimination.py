@@ -105,6 +105,7 @@ class Elimination:
 
     The call is :meth:`factor`, and for each right-hand side :meth:`reduce`, the solution of the
     small system by the caller, and :meth:`expand`.  The entries of ``A`` must not change meanwhile.
+    On one process C does the same with :attr:`c`, see newton.c.
 
     Args:
         share: Degrees of freedom of this process.
@@ -114,6 +115,8 @@ class Elimination:
         indptr: First entry of each row of the small matrix, which all processes have.
         indices: Column of each entry.
         data: Its entries; summed over the processes by :meth:`factor`.
+        f: Right-hand side of the small system, of :meth:`reduce`.
+        c: All of it in C, see loops.h.
     """
 
     def __init__(self, share: Share, A: Csr) -> None:
@@ -126,7 +129,6 @@ class Elimination:
         self._number = np.full(share.size, -1)
         self._number[here] = np.searchsorted(numbers, share.dofs[here])
         self._owned = here[here < share.num_owned]
-        self._places_of_owned = self._number[self._owned]
         self._make_matrix(len(numbers))
         self._make_arguments()
 
@@ -148,10 +150,10 @@ class Elimination:
         if self._comm.size > 1:
             mine = np.unique(np.concatenate(self._comm.allgather(mine)))
         self._places = np.searchsorted(mine, keys)
-        self._places_of_chains = np.searchsorted(mine, of_chains).astype(np.int32)
+        self._places_of_chains = np.searchsorted(mine, of_chains)
         self.indices = (mine % size).astype(np.int32)
         self.indptr = np.searchsorted(mine, np.arange(size + 1) * size).astype(np.int32)
-        self.data = np.zeros(len(mine))
+        self.data, self.f = np.zeros(len(mine)), np.zeros(size)
 
     def _make_arguments(self) -> None:
         A, chains = self._A, self._chains
@@ -159,28 +161,42 @@ class Elimination:
         first, last = (chains.dofs[k] for k in (chains.first[:-1], chains.first[1:] - 1))
         next_to = np.stack([np.where(chains.spikes[:, None], first, last), last], axis=1)
         rows, columns = np.broadcast_arrays(ends, next_to[:, :, None, :])
-        arrays = [
-            np.ascontiguousarray(array, dtype=np.int32)
-            for array in (
-                chains.first,
-                chains.spikes,
-                chains.dofs,
-                chains.order,
-                A.positions(rows.ravel(), columns.ravel()),
-                A.indptr,
-            )
-        ]
         vertices = len(chains.dofs)
-        self._f = np.zeros(3 * vertices)
-        self._at_f = doubles(self._f)
-        pivots, sides = np.empty(9 * vertices), np.empty(18 * vertices)  # as in elimination.c
-        swaps = np.empty(3 * vertices, dtype=np.int32)
-        numbers = map(doubles, (A.data, pivots, sides))
-        self._alive = [*map(integers, arrays), *numbers, integers(swaps)]
-        self._c = ffi.new("chains *", (len(chains.ends), *self._alive))
-        self._at_places = integers(self._places_of_chains)
-        ends_left = np.ascontiguousarray(self._number[chains.ends], dtype=np.int32)
-        self._at_ends = integers(ends_left)
+        of_integers = {
+            "first": chains.first,
+            "spike": chains.spikes,
+            "row": chains.dofs,
+            "order": chains.order,
+            "from_ends": A.positions(rows.ravel(), columns.ravel()),
+            "indptr": A.indptr,
+            "swaps": np.empty(3 * vertices),
+            "entry": self._entries,
+            "place": self._places,
+            "places": self._places_of_chains,
+            "dof": self._owned,
+            "number": self._number[self._owned],
+            "ends": self._number[chains.ends],
+        }
+        of_doubles = {
+            "data": A.data,
+            "pivots": np.empty(9 * vertices),  # sizes as in elimination.c
+            "sides": np.empty(27 * vertices),
+            "f": np.zeros(3 * vertices),
+            "left_data": self.data,
+            "left_f": self.f,
+        }
+        self._alive = {
+            **{k: integers(np.ascontiguousarray(v, np.int32)) for k, v in of_integers.items()},
+            **{k: doubles(v) for k, v in of_doubles.items()},
+        }
+        sizes = {
+            "chains": len(chains.ends),
+            "left": len(self.data),
+            "stay": len(self._entries),
+            "rows": len(self._owned),
+            "left_size": self.size,
+        }
+        self.c = ffi.new("chains *", {**self._alive, **sizes})
 
     @property
     def size(self) -> int:
@@ -189,23 +205,18 @@ class Elimination:
 
     def factor(self) -> bool:
         """Eliminate the chains and fill :attr:`data`; whether all of it is finite."""
-        self.data.fill(0.0)
-        self.data[self._places] = self._A.data[self._entries]
-        lib.eliminate(self._c, self._at_places, doubles(self.data))
+        lib.eliminate(self.c)
         self._sum(self.data)
-        return bool(np.isfinite(self.data).all())
+        return bool(lib.all_finite(len(self.data), doubles(self.data)))
 
-    def reduce(self, b: Array, small: Array) -> None:
-        """Right-hand side of the small system; ``b`` at the degrees of freedom owned here."""
-        small.fill(0.0)
-        small[self._places_of_owned] = b[self._owned]
-        lib.eliminate_from(self._c, doubles(b), self._at_f, self._at_ends, doubles(small))
-        self._sum(small)
+    def reduce(self, b: Array) -> None:
+        """Fill :attr:`f`; ``b`` at the degrees of freedom owned here."""
+        lib.reduce(self.c, doubles(b))
+        self._sum(self.f)
 
     def expand(self, small: Array, x: Array) -> None:
         """The solution at the degrees of freedom owned here, after that of the small system."""
-        x[self._owned] = small[self._places_of_owned]
-        lib.substitute(self._c, self._at_f, self._at_ends, doubles(small), doubles(x))
+        lib.expand(self.c, doubles(small), doubles(x))
 
     def _sum(self, values: Array) -> None:
         if self._comm.size > 1:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from petsc4py import PETSc
 
-import numpy as np
-
 from ufl_beam.elimination import Elimination
 from ufl_beam.grid import Share
+from ufl_beam.loops import doubles, ffi
 from ufl_beam.sparse import Csr
 
 GOOD = int(PETSc.PC.FailedReason.NOERROR)
@@ -71,9 +71,17 @@ class ChainsFirst:
         if package == "petsc":
             # Of narrow and wide lattices it fills in least: 0.55 and 0.9 of the time of "nd".
             self._factors.setFactorOrdering("amd")
-        self._small = np.zeros(left.size)
-        self._rhs = PETSc.Vec().createWithArray(self._small, comm=PETSc.COMM_SELF)
+        self._rhs = PETSc.Vec().createWithArray(left.f, comm=PETSc.COMM_SELF)
         self._solution = self._rhs.duplicate()
+        self._found = doubles(self._solution.array_r)
+
+    def drive(self, c: Any) -> None:
+        """Let Newton's method in C do the same; ``c`` is its ``equation`` of loops.h."""
+        c.chains, c.found = self._elimination.c, self._found
+        c.factors, c.left, c.left_f, c.left_x = (
+            ffi.cast("void *", one.handle)
+            for one in (self._factors, self._matrix, self._rhs, self._solution)
+        )
 
     def setUp(self, pc: PETSc.PC) -> None:
         """Factor; PETSc asks for it where the matrix has changed."""
@@ -94,6 +102,6 @@ class ChainsFirst:
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, x: PETSc.Vec) -> None:
         """Solve."""
-        self._elimination.reduce(b.array_r, self._small)
+        self._elimination.reduce(b.array_r)
         self._solve()
         self._elimination.expand(self._solution.array_r, x.array_w)

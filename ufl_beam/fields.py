@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import basix.ufl
 import numpy as np
 import ufl
 
 from ufl_beam.compat import Array, cell_coordinates, fem, line_mesh, space_with_dofs
-from ufl_beam.forms import Kernel
+from ufl_beam.forms import Kernel, in_batches, vectorise
 from ufl_beam.grid import Index, Share
 from ufl_beam.kinematics import Axis
+from ufl_beam.lanes import LANES
 from ufl_beam.sparse import Csr, coupling
 
 
@@ -52,6 +55,25 @@ class Fields:
     def kernel(self, form: ufl.Form, unknown: fem.Function) -> Kernel:
         """A form on the cells, compiled; ``unknown`` is the configuration that changes."""
         return Kernel(form, unknown, self.cell_dofs, self._coordinates)
+
+    def hot_kernel(self, form: ufl.Form, unknown: fem.Function) -> Kernel:
+        """The same for what steps ask again and again: several cells at once."""
+        kernel = self.kernel(form, unknown)
+        vectorise([kernel], self._coordinates_in_lanes)
+        return kernel
+
+    def force_and_tangent(self, work: ufl.Form, q1: fem.Function, A: Csr) -> tuple[Kernel, Kernel]:
+        """A virtual work, and its derivative by ``q1`` that adds to ``A``."""
+        derivative = ufl.derivative(work, q1, ufl.TrialFunction(self.space))
+        force, tangent = self.kernel(work, q1), self.kernel(derivative, q1)
+        vectorise([force, tangent], self._coordinates_in_lanes)
+        tangent.share(force)
+        tangent.place(A)
+        return force, tangent
+
+    @cached_property
+    def _coordinates_in_lanes(self) -> Array:
+        return in_batches(self._coordinates, LANES)
 
     def matrix(self) -> Csr:
         """A new matrix on the degrees of freedom of this process."""

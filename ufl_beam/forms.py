@@ -6,15 +6,46 @@ silently wrong in FFCx 0.9 to 0.11.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import ufl
 
 from ufl_beam.compat import Array, fem, pack
 from ufl_beam.grid import Index
+from ufl_beam.lanes import LANES, in_lanes
 from ufl_beam.loops import doubles, ffi, integers, kernel, lib
 from ufl_beam.sparse import Csr
+
+
+def in_batches(rows: npt.NDArray[Any], lanes: int) -> npt.NDArray[Any]:
+    """Rows of numbers, one of each cell, as loops.h says; (num_batches, numbers, lanes).
+
+    Args:
+        rows: Shape (num_cells, ...).
+        lanes: Number of rows in a batch.
+    """
+    rows = rows.reshape(len(rows), -1)
+    if missing := -len(rows) % lanes:
+        rows = np.concatenate([rows, np.repeat(rows[-1:], missing, axis=0)])
+    return np.ascontiguousarray(rows.reshape(-1, lanes, rows.shape[1]).transpose(0, 2, 1))
+
+
+def vectorise(kernels: Iterable[Kernel], coordinates: Array) -> None:
+    """Let all of some kernels compute several cells at once, or none: they may share numbers.
+
+    Args:
+        kernels: On the same cells.
+        coordinates: Of the cells, in batches of ``LANES``.
+    """
+    addresses = {kernel: kernel.address_in_lanes() for kernel in kernels}
+    known = {kernel: address for kernel, address in addresses.items() if address is not None}
+    if len(known) == len(addresses):
+        for kernel, address in known.items():
+            kernel.compute_in_lanes(address, coordinates)
 
 
 def tabulator(compiled: fem.Form) -> Any:
@@ -34,7 +65,8 @@ class Kernel:
 
     Attributes:
         compiled: The DOLFINx form.
-        cells: What ``add_cells`` of loops.c takes; a new one after :meth:`share`, :meth:`place`.
+        cells: What ``add_cells`` of loops.c takes; a new one after :meth:`share`, :meth:`place`,
+            :meth:`compute_in_lanes`.
     """
 
     def __init__(
@@ -42,7 +74,7 @@ class Kernel:
     ) -> None:
         self.compiled = fem.form(form)
         ufcx = self.compiled.ufcx_form
-        constants, self._packed = pack(self.compiled)
+        constants, packed = pack(self.compiled)
         everything = form.coefficients()
         used = [
             everything[ufcx.original_coefficient_positions[i]] for i in range(ufcx.num_coefficients)
@@ -53,8 +85,11 @@ class Kernel:
             for f, end in zip(used, ends, strict=True)
         }
         self._dofs = np.ascontiguousarray(cell_dofs, dtype=np.int32)
-        self._coordinates = coordinates
-        self._rows = self._rows_of_cells(form)
+        self._lanes, self._in_lanes = 1, ffi.NULL
+        self._packed, self._coordinates = (in_batches(x, 1) for x in (packed, coordinates))
+        self._rows = in_batches(self._rows_of_cells(form), 1)
+        spaces = [argument.ufl_function_space() for argument in form.arguments()]
+        self._entries = math.prod(space.element.space_dimension for space in spaces)
         self._at = self._columns[unknown].start if self.depends_on(unknown) else 0
         self._unknowns = self._dofs.shape[1] if self.depends_on(unknown) else 0
         self._constants = constants
@@ -80,6 +115,8 @@ class Kernel:
             "cells *",
             {
                 "tabulate": tabulator(self.compiled),
+                "in_lanes": self._in_lanes,
+                "lanes": self._lanes,
                 "number": len(self._dofs),
                 "of_cell": self._dofs.shape[1],
                 "unknowns": self._unknowns,
@@ -89,7 +126,7 @@ class Kernel:
                 "w": packed,
                 "constants": constants,
                 "coordinates": coordinates,
-                "rows": self._rows.shape[1],
+                "rows": self._entries,
                 "row": row,
             },
         )
@@ -105,15 +142,18 @@ class Kernel:
 
     def put(self, function: fem.Function, values: Array) -> None:
         """Give ``function`` other values in the cells; shape (num_cells, dofs per cell)."""
-        self._packed[:, self._columns[function]] = values
+        columns = self._columns[function]
+        rows = np.broadcast_to(values, (len(self._dofs), columns.stop - columns.start))
+        self._packed[:, columns] = in_batches(rows, self._lanes)
 
-    def pointer(self, function: fem.Function) -> tuple[Any, int]:
-        """Pointer to the values of ``function`` in the first cell, and the way to the next."""
-        return doubles(self._packed) + self._columns[function].start, self._packed.shape[1]
+    def position(self, function: fem.Function) -> int:
+        """Where the coefficients of a cell have the values of ``function``."""
+        position: int = self._columns[function].start
+        return position
 
     def share(self, other: Kernel) -> None:
         """Use the packed values of ``other``, a form of the same coefficients."""
-        if self._columns != other._columns:
+        if self._columns != other._columns or self._lanes != other._lanes:
             raise ValueError("the forms do not have the same coefficients")
         self._packed = other._packed
         self._prepare()
@@ -122,9 +162,27 @@ class Kernel:
         """Let a bilinear form on the degrees of freedom of the cells add to ``A``."""
         per_cell = self._dofs.shape[1]
         rows = np.repeat(self._dofs, per_cell, axis=1)
-        self._rows = A.positions(rows.ravel(), np.tile(self._dofs, per_cell).ravel())
-        self._rows.shape = rows.shape
+        positions = A.positions(rows.ravel(), np.tile(self._dofs, per_cell).ravel())
+        self._rows = in_batches(positions.reshape(rows.shape), self._lanes)
         self._prepare()
+
+    def address_in_lanes(self) -> int | None:
+        """Address of what computes several cells at once; none if the compiler cannot."""
+        return in_lanes(self.compiled, self._entries, self._packed.shape[1], len(self._constants))
+
+    def compute_in_lanes(self, address: int, coordinates: Array) -> None:
+        """Compute several cells at once from now on, with their coordinates in batches."""
+        self._in_lanes = ffi.cast("void (*)(const cells *, const double *, double *)", address)
+        self._packed, self._rows = (
+            in_batches(x[:, :, 0], LANES) for x in (self._packed, self._rows)
+        )
+        self._lanes, self._coordinates = LANES, coordinates
+        self._prepare()
+
+    @property
+    def vectorised(self) -> bool:
+        """Whether several cells are computed at once."""
+        return self._lanes > 1
 
     def add(self, q: Array, b: Array) -> None:
         """Add the form at the unknown ``q`` to a vector, or to the entries of the matrix."""

@@ -52,7 +52,6 @@ class Grid:
         dofs_of_bodies: Degrees of freedom of each of the scene's movers; shape (num_movers, 3).
         multipliers: Degrees of freedom that are the forces of connectors; shape (num_links,).
         size: Number of degrees of freedom.
-        num_shared: How many of them joints share.
     """
 
     def __init__(self, scene: Scene, mesh: Mesh | None = None) -> None:
@@ -264,7 +263,6 @@ class Grid:
         # Forces come last: eliminating what they act on first leaves no zero on the diagonal.
         self.multipliers = len(order) + np.arange(len(self.scene.links))
         self.size = len(order) + len(self.multipliers)
-        self.num_shared = int(np.sum(kept & shared)) + len(self.multipliers)
 
 
 class Share:

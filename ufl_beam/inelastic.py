@@ -56,7 +56,7 @@ class Strains:
         q = fields.configuration()
         z = ufl.TestFunction(fields.at_points(3).function_space)
         weighted = ufl.dot(strain(q, fields.axis), z) / fields.axis.h
-        self.kernel = fields.kernel(weighted * fields.dx(1), q)
+        self.kernel = fields.hot_kernel(weighted * fields.dx(1), q)
         self._weights = np.repeat(fields.share.grid.mesh.point_weights, 3)
         self.shape = (len(fields.order), len(self._weights))
 
@@ -115,16 +115,13 @@ class InelasticBeams:
         w, axis = ufl.TestFunction(fields.space), fields.axis
         r = b + ufl.dot(D, strain(q1, axis))
         work = ufl.dot(r, scheme.virtual_strain(q0, q1, w, axis)) * fields.dx(1)  # P(34)
-        tangent = ufl.derivative(work, q1, ufl.TrialFunction(fields.space))
         self._q0, self._b, self._D = q0, b, D
-        self._force, self._tangent = (fields.kernel(form, q1) for form in (work, tangent))
-        self._tangent.share(self._force)
-        self._tangent.place(A)
+        self._force, self._tangent = fields.force_and_tangent(work, q1, A)
         self._latest: Array = np.full(fields.share.size, np.nan)
         self._in_c = c = ffi.new("inelastic *")
         c.points, c.strains = self.points.points, self._strains.kernel.cells
         c.force, c.tangent = self._force.cells, self._tangent.cells
-        (c.b, c.width), (c.D, _) = self._force.pointer(b), self._force.pointer(D)
+        c.at_b, c.at_D = map(self._force.position, (b, D))
         self._at_latest = doubles(self._latest)
         c.size, c.latest = len(self._latest), self._at_latest
         self._q: Array = np.empty(0)

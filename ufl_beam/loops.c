@@ -2,19 +2,38 @@
 
 enum { MOST = 144 }; /* entries of an element vector or matrix: 12 unknowns of degree 3 */
 
+/* The coefficients of a cell from `at` on; the way from one to the next is c->lanes. */
+static inline double *in_cell(const cells *c, int cell, int at)
+{
+  return c->w + (cell / c->lanes * c->width + at) * c->lanes + cell % c->lanes;
+}
+
 /* The values q of the cells into their packed coefficients, from `at` on. */
 void set_cells(const cells *c, const double *q, int at)
 {
   const int32_t *dofs = c->dofs;
-  double *w = c->w + at;
-  for (int k = 0; k < c->number; ++k, dofs += c->of_cell, w += c->width)
-    for (int i = 0; i < c->of_cell; ++i) w[i] = q[dofs[i]];
+  const int n = c->lanes;
+  double *batch = c->w + at * n;
+  for (int first = 0; first < c->number; first += n, batch += c->width * n)
+    for (int l = 0; l < n && first + l < c->number; ++l, dofs += c->of_cell)
+      for (int i = 0; i < c->of_cell; ++i) batch[i * n + l] = q[dofs[i]];
+}
+
+/* Some values into the packed coefficients of a cell. */
+void put_in_cell(const cells *c, int cell, int at, int number, const double *values)
+{
+  double *w = in_cell(c, cell, at);
+  for (int i = 0; i < number; ++i) w[i * c->lanes] = values[i];
 }
 
 /* Add the form at the unknowns q to a vector, or to the entries of a matrix. */
 void add_cells(void *self, const double *q, double *b)
 {
   const cells *c = self;
+  if (c->in_lanes) {
+    c->in_lanes(c, q, b);
+    return;
+  }
   const int32_t *dofs = c->dofs, *row = c->row;
   const double *coordinates = c->coordinates;
   double *w = c->w, e[MOST];
@@ -262,11 +281,12 @@ static void linearise(const inelastic *m)
 {
   const points *p = m->points;
   const double *e = p->e1, *r = p->r, *D = p->D;
-  double *b = m->b, *packed = m->D;
-  for (int c = 0; c < p->cells; ++c, e += 3, r += 3, D += 9, b += m->width, packed += m->width) {
+  for (int c = 0; c < p->cells; ++c, e += 3, r += 3, D += 9) {
+    double b[3];
     for (int k = 0; k < 3; ++k)
       b[k] = r[k] - D[3 * k] * e[0] - D[3 * k + 1] * e[1] - D[3 * k + 2] * e[2];
-    memcpy(packed, D, 9 * sizeof *D);
+    put_in_cell(m->force, c, m->at_b, 3, b);
+    put_in_cell(m->force, c, m->at_D, 9, D);
   }
 }
 
@@ -328,8 +348,8 @@ static void set_rows(const couplings *c, const double *q)
   for (int k = 0; k < c->number; ++k) {
     const int i = c->link[k];
     const double D = p->D[9 * i], row[3] = {-D, 1, p->r[3 * i] - D * c->e1[i]};
-    memcpy(c->row + k * c->width, row, sizeof row);
-    memcpy(c->row_of_tangent + k * c->width_of_tangent, row, sizeof row);
+    put_in_cell(c->work, k, c->row, 3, row);
+    put_in_cell(c->tangent, k, c->row_of_tangent, 3, row);
   }
 }
 
@@ -349,8 +369,9 @@ double missed_by_couplings(void *self, const double *q, const double *r, double 
   for (int k = 0; k < c->number; ++k) {
     const int i = c->link[k];
     const int32_t *dofs = c->dofs + 7 * i;
-    const double *row = c->row + k * c->width, length = c->length[i];
-    const double size = fabs(row[1]) < 1 ? 0.01 * length : force * c->size / length;
+    const double *row = in_cell(c->work, k, c->row), length = c->length[i];
+    const int next = c->work->lanes;
+    const double size = fabs(row[next]) < 1 ? 0.01 * length : force * c->size / length;
     /* Far from where it began, or after many turns, a part has fewer digits left. */
     double moved = 0, turned = 0;
     for (int j = 0; j < 4; ++j) moved = fmax(moved, fabs(q[dofs[j]]));

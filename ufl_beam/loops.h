@@ -13,9 +13,16 @@ typedef struct {
 /* -- forms and constant matrices --------------------------------------------------------------- */
 
 /* A compiled form on some cells. w holds the packed coefficients of a cell, `width` of them, of
- * which those from `at` on are the unknowns of the cell; they are brought up to date on the way. */
-typedef struct {
+ * which those from `at` on are the unknowns of the cell, brought up to date on the way.
+ *
+ * Where a form is computed for several cells at once, in_lanes does what add_cells does, and numbers
+ * of cells (w, coordinates, row) come in batches of as many cells: the first number of each of these
+ * cells, then their second numbers, and so on; the last batch is filled up with the last cell. */
+typedef struct cells cells;
+struct cells {
   kernel *tabulate;
+  void (*in_lanes)(const cells *self, const double *q, double *out); /* or none */
+  int lanes; /* cells of a batch, else 1 */
   int number, of_cell, unknowns; /* cells, degrees of freedom of each, those the form depends on */
   const int32_t *dofs;
   int at, width;
@@ -23,7 +30,7 @@ typedef struct {
   const double *constants, *coordinates;
   int rows; /* entries of a cell */
   const int32_t *row;
-} cells;
+};
 
 typedef struct {
   const cells *first, *then;
@@ -46,6 +53,7 @@ typedef struct {
 } step_product;
 
 void set_cells(const cells *c, const double *q, int at);
+void put_in_cell(const cells *c, int cell, int at, int number, const double *values);
 void add_cells(void *self, const double *q, double *b);
 double value_of_cells(const cells *c, const double *q);
 void combine(int size, double a, const double *x, double b, const double *y, double *out);
@@ -84,8 +92,8 @@ typedef struct {
 typedef struct {
   const points *points;
   const cells *strains, *force, *tangent;
-  double *b, *D;
-  int width, size, begins;
+  int at_b, at_D; /* where the coefficients of `force` have b and D */
+  int size, begins;
   double *latest; /* the unknowns that the points responded to */
 } inelastic;
 
@@ -96,8 +104,7 @@ typedef struct {
   const points *points;            /* or none: the rows stay during a step */
   int number;
   const int32_t *link, *force;     /* of each cell; where each link's force is among the unknowns */
-  double *row, *row_of_tangent;    /* of the first cell; */
-  int width, width_of_tangent;     /* the way to the next */
+  int row, row_of_tangent;         /* where the coefficients of work and tangent have the rows */
   double *by_cell, *e1;            /* space; motions at the latest unknowns */
   double *e0, *before, *taken, *rate; /* the accepted state: motion, force, work, rate */
   double weight_of_before;         /* of the force that works in a step */
@@ -129,13 +136,22 @@ typedef struct {
   const double *data;
   double *pivots, *sides;   /* vertices x PIVOT, vertices x SIDES */
   int32_t *swaps;           /* vertices x 3: rows in the order of the pivots */
+  double *f;                /* vertices x 3: right-hand sides */
+
+  /* The system of what is left. */
+  int left, stay, rows;          /* its entries; those of data that stay; degrees of freedom that do */
+  double *left_data, *left_f;
+  int left_size;
+  const int32_t *entry, *place;  /* of those that stay: in data, in left_data */
+  const int32_t *places;         /* chains x 36: where in left_data the blocks of the ends are */
+  const int32_t *dof, *number;   /* of those that stay: here, and among those left */
+  const int32_t *ends;           /* chains x 6: numbers of the ends among those left */
 } chains;
 
-void eliminate(const chains *c, const int32_t *places, double *left);
-void eliminate_from(const chains *c, const double *b, double *f, const int32_t *places,
-                    double *left);
-void substitute(const chains *c, const double *f, const int32_t *places, const double *ends,
-                double *x);
+void eliminate(const chains *c);
+void reduce(const chains *c, const double *b);
+void expand(const chains *c, const double *left, double *x);
+int all_finite(int size, const double *values);
 
 /* -- Newton's method, see newton.c ------------------------------------------------------------- */
 
@@ -174,9 +190,11 @@ typedef struct {
   double *reactions, *pivots;
 
   double rtol, loads; /* tolerance; size of the loads */
-  void *x, *f, *correction, *matrix, *factors; /* in PETSc: vectors, the tangent, its factors */
-  double *residual;                            /* entries of f */
-  const double *change, *weight;               /* entries of the correction; see Solver */
+  const chains *chains;
+  void *x, *left, *factors, *left_f, *left_x; /* in PETSc: the unknowns; what chains leave of the */
+                                              /* tangent, its factors, two vectors */
+  double *residual, *change;                  /* at an iterate, and what it is changed by */
+  const double *found, *weight;               /* entries of left_x; see Solver */
   int most;                                    /* iterations */
   const int32_t *diagonal;
   double *space;

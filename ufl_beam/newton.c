@@ -70,12 +70,14 @@ int judge(equation *e, const double *q, int iteration, double residual, double s
 }
 
 /* Spacing of the numbers around displacements and rotations: the last digits of what they are part
- * of. */
+ * of. The next number has the next pattern of bits. */
 void find_last_digits(const equation *e, const double *q, double *digits)
 {
   for (int i = 0; i < e->size; ++i) {
     const double far = fabs(q[i]) + e->lengths[i];
-    digits[i] = e->moves[i] * (nextafter(far, INFINITY) - far);
+    union { double number; int64_t bits; } next = {far};
+    next.bits += 1;
+    digits[i] = e->moves[i] * (next.number - far);
   }
 }
 
@@ -148,12 +150,35 @@ int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int
 
 #define TRY(call) do { int error = (call); if (error) return error; } while (0)
 
+/* Factors of the tangent; *failed if it is singular. */
+static int factor(const equation *e, int *failed)
+{
+  const petsc *p = e->petsc;
+  double *entries; /* asking for them tells PETSc that they change */
+  TRY(p->entries(e->left, &entries));
+  eliminate(e->chains);
+  TRY(p->end_entries(e->left, &entries));
+  if ((*failed = !all_finite(e->chains->left, e->chains->left_data))) return 0;
+  if (!p->factor(e->factors)) return p->failed(e->factors, failed);
+  *failed = 1; /* KLU says so of a singular matrix */
+  return 0;
+}
+
+/* What Newton's method subtracts from the iterate. */
+static int solve(const equation *e)
+{
+  reduce(e->chains, e->residual);
+  TRY(e->petsc->apply(e->factors, e->left_f, e->left_x));
+  expand(e->chains, e->found, e->change);
+  return 0;
+}
+
 /* Newton's method with full steps, as a solver of SNES: what its own does beside that takes as long
  * as all the rest where there are few unknowns. */
 int snes_newton(void *snes, void *x)
 {
   equation *e;
-  double *q, *entries;
+  double *q;
   int iteration = 0, reason;
   TRY(shell_context(snes, &e));
   const petsc *p = e->petsc;
@@ -166,17 +191,14 @@ int snes_newton(void *snes, void *x)
     }
     if (!e->near) {
       int failed = 0;
-      TRY(p->entries(e->matrix, &entries));
       assemble(e, q);
-      TRY(p->end_entries(e->matrix, &entries));
-      if (p->factor(e->factors)) failed = 1; /* KLU says so of a singular matrix */
-      else TRY(p->failed(e->factors, &failed));
+      TRY(factor(e, &failed));
       if (failed) {
         reason = SINGULAR;
         break;
       }
     }
-    TRY(p->apply(e->factors, e->f, e->correction));
+    TRY(solve(e));
     for (int i = 0; i < e->size; ++i) q[i] -= e->change[i];
     residual(e, q, e->residual);
     ++iteration;

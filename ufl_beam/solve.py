@@ -40,11 +40,6 @@ branch to the other and back for ever.
 PREFIX = "ub_"
 """Prefix of the PETSc options of the solver, as in ``-ub_snes_monitor``."""
 
-JOINTS_IN_NATURAL_ORDER = 60
-CELLS_IN_NATURAL_ORDER = 2000
-"""Up to these numbers of shared degrees of freedom and of cells PETSc alone is as fast as
-elimination along the beams, which Python calls: the order of the grid fills in next to nothing."""
-
 
 @dataclass(frozen=True)
 class Newton:
@@ -142,9 +137,10 @@ class Solver:
         self._f = self._vector()
         self._r = self._view(self._f, writable=True)
         self._at_r = doubles(self._r)
+        self._factors = self._make_factors()
         self._ksp = self._make_ksp()
         self._equation = equation
-        self._correction = self._vector()
+        self._correction = np.empty(share.size)
         self._course = self._make_course()
         self._snes = self._make_snes({} if equation is not None else FULL_STEPS)
         self.iterations = self._done = 0
@@ -164,11 +160,9 @@ class Solver:
         ]
         c.weight, c.residual, c.diagonal = self._norm[1], self._at_r, self._at_diagonal
         c.lengths, c.moves, c.space = self._at_sizes
-        c.x, c.f, c.matrix, c.factors, c.correction = (
-            ffi.cast("void *", one.handle)
-            for one in (self._x, self._f, self._matrix, self._ksp.getPC(), self._correction)
-        )
-        c.change, c.most = doubles(self._view(self._correction)), self._newton.max_iterations
+        c.x = ffi.cast("void *", self._x.handle)
+        self._at_correction = doubles(self._correction)
+        c.change, c.most = self._at_correction, self._newton.max_iterations
         if self._equation is None:
             self._demand = Demand(self._excess, self._share.size, self._note)
             self._demands = ffi.new("demand[]", [self._demand.loop])
@@ -214,26 +208,18 @@ class Solver:
         matrix.setUp()
         return matrix
 
+    def _make_factors(self) -> ChainsFirst:
+        # What is held makes zeros on the diagonal, and PETSc does not exchange rows.
+        holds = any(link.holds for link in self._share.grid.scene.links)
+        return ChainsFirst(self._share, self._A, "klu" if holds else "petsc")
+
     def _make_ksp(self) -> PETSc.KSP:
-        share = self._share
         ksp = PETSc.KSP().create(self._x.comm)
         ksp.setOptionsPrefix(PREFIX)
         ksp.setType("preonly")
         factors = ksp.getPC()
-        # What is held makes zeros on the diagonal, and PETSc does not exchange rows.
-        holds = any(link.holds for link in share.grid.scene.links)
-        package = "klu" if holds else "petsc"
-        # Cells with inner nodes have no chains to eliminate.
-        long = len(share.cells) > CELLS_IN_NATURAL_ORDER and share.grid.mesh.degree == 1
-        if self._parallel or long or share.grid.num_shared > JOINTS_IN_NATURAL_ORDER:
-            factors.setType("python")
-            factors.setPythonContext(ChainsFirst(share, self._A, package))
-            return ksp
-        factors.setType("lu")
-        factors.setFactorSolverType(package)
-        factors.setFactorPivot(0.0)  # PETSc takes what is below 2e-14 for zero, whatever the units
-        if package == "petsc":
-            factors.setFactorOrdering("natural")
+        factors.setType("python")
+        factors.setPythonContext(self._factors)
         return ksp
 
     def _make_snes(self, search: dict[str, Any]) -> PETSc.SNES:
@@ -256,7 +242,7 @@ class Solver:
                 database[name] = value
             snes.setFromOptions()
             if self._equation is not None and not (search or before or self._newton.petsc):
-                self._ksp.getPC().setOperators(self._matrix)
+                self._factors.drive(self._equation.c)
                 self._equation.drive(snes)
         finally:
             # PETSc may have given those of before 3.24 their new names.

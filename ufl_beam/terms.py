@@ -115,21 +115,17 @@ class ElasticBeams(OfForms):
         e0, e1 = strain(q0, axis), strain(q1, axis)
 
         r = scheme.resultants(C, e0, e1, fields.constant)
-        w_e, dq = scheme.virtual_strain(q0, q1, w, axis), ufl.TrialFunction(fields.space)
-        virtual_work = ufl.dot(r, w_e) * dx  # P(12)
-        tangent = ufl.derivative(virtual_work, q1, dq)
+        w_e = scheme.virtual_strain(q0, q1, w, axis)
         stored = sum(C[i] * e1[i] ** 2 / 2 for i in range(3)) * dx  # P(9)
         losses = [d * dx for d in scheme.losses(C, e0, e1, fields.constant)]
 
         self._q0 = q0
-        self._force, self._tangent, self._stored, *self._losses = (
-            fields.kernel(form, q1) for form in (virtual_work, tangent, stored, *losses)
-        )
-        self._tangent.share(self._force)
-        self._tangent.place(A)
+        self._force, self._tangent = fields.force_and_tangent(ufl.dot(r, w_e) * dx, q1, A)  # P(12)
+        self._stored, *self._losses = (fields.hot_kernel(f, q1) for f in (stored, *losses))
         self._first: Kernel | None = None
         self._tangents = ffi.new("first_cells *", {"then": self._tangent.cells})
         if not scheme.dynamic:
+            dq = ufl.TrialFunction(fields.space)
             before = ufl.as_vector([C[i] * e0[i] for i in range(3)])
             geometric = ufl.dot(before, ufl.derivative(w_e, q1, dq))
             material = ufl.dot(ufl.derivative(r, q1, dq), w_e)

@@ -1,0 +1,182 @@
+"""Kernels for several cells at once against the same kernels cell by cell."""
+
+from copy import copy
+from pathlib import Path
+
+import numpy as np
+import pytest
+import ufl
+
+import ufl_beam as ub
+from ufl_beam import lanes
+from ufl_beam.compat import cell_coordinates, fem, line_mesh
+from ufl_beam.forms import Kernel, in_batches, vectorise
+from ufl_beam.loops import ffi
+
+SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
+
+
+def pointwise(expression, values):
+    """The kernel of an expression of one number in each cell, all cells of length 1."""
+    n = len(values)
+    points = np.column_stack([np.arange(n + 1.0), np.zeros(n + 1)])
+    mesh = line_mesh(points, np.column_stack([np.arange(n), np.arange(1, n + 1)]))
+    space = fem.functionspace(mesh, ("DG", 0))
+    f, z = fem.Function(space), ufl.TestFunction(space)
+    form = expression(f) * z * ufl.dx(domain=mesh, metadata={"quadrature_degree": 0})
+    kernel = Kernel(form, f, np.asarray(space.dofmap.list), cell_coordinates(mesh))
+    by_cell = np.empty(n)
+    by_cell[np.asarray(space.dofmap.list)[:, 0]] = values
+    return kernel, by_cell
+
+
+def in_lanes(kernel):
+    """Let it compute several cells at once, if it can."""
+    vectorise([kernel], in_batches(kernel._coordinates[:, :, 0], lanes.LANES))
+
+
+def both(expression, values):
+    """What the kernel makes of the values cell by cell, and several cells at once."""
+    kernel, q = pointwise(expression, values)
+    one, several = np.zeros((2, len(q)))
+    kernel.add(q, one)
+    in_lanes(kernel)
+    assert kernel.vectorised
+    kernel.add(q, several)
+    return one, several
+
+
+ANGLES = np.concatenate(
+    [
+        [0.0, 5e-324, 1e-300, -1e-9, 1e6, -1e6],
+        np.random.default_rng(1).normal(size=500),
+        np.random.default_rng(2).normal(size=500) * 1e3,
+        np.arange(-40, 41) * np.pi / 4,
+        np.nextafter(np.arange(-40, 41) * np.pi / 4, np.inf),
+    ]
+)
+
+
+@pytest.mark.parametrize("function", [ufl.sin, ufl.cos])
+def test_angles(function):
+    """Within two last digits of the C library, also relative to what is near zero."""
+    one, several = both(function, ANGLES)
+    assert np.all(np.abs(several - one) <= 2 * np.spacing(np.abs(one)))
+
+
+def test_far_angles_lose_what_they_do_not_have():
+    x = np.random.default_rng(3).uniform(1e6, 1e9, size=200)
+    one, several = both(ufl.sin, x)
+    assert np.all(np.abs(several - one) <= np.spacing(x))
+    one, several = both(ufl.cos, np.array([np.inf, np.nan, 1.0]))
+    assert np.array_equal(np.isnan(several), np.isnan(one))
+
+
+@pytest.mark.parametrize(
+    "expression",
+    [
+        lambda x: ufl.sqrt(abs(x)) - 2.0,
+        lambda x: x**3 / (1 + x**2) + x**-2,
+        lambda x: ufl.conditional(ufl.lt(x, 0.3), 1.0, ufl.sin(x) / x),
+        lambda x: ufl.conditional(ufl.gt(x**2, 0.3), x, 0.25),
+    ],
+    ids=["root", "powers", "constant or not", "not or constant"],
+)
+@pytest.mark.parametrize("cells", [1, 3, 4, 9])
+def test_expressions(expression, cells):
+    """Any number of cells, also such that leave some lanes empty."""
+    one, several = both(expression, np.linspace(-1.0, 2.0, cells))
+    assert np.allclose(several, one, rtol=1e-14, atol=0)
+
+
+@pytest.mark.parametrize(
+    ("expression", "meant"),
+    [(ufl.atan, np.arctan), (lambda x: (x + 2) ** 0.5, lambda x: (x + 2) ** 0.5)],
+    ids=["another function", "a broken power"],
+)
+def test_what_vectors_cannot_is_computed_cell_by_cell(expression, meant):
+    kernel, q = pointwise(expression, np.linspace(-1.0, 2.0, 5))
+    in_lanes(kernel)
+    assert not kernel.vectorised
+    values = np.zeros(len(q))
+    kernel.add(q, values)
+    assert np.allclose(values, meant(q), rtol=1e-14)
+
+
+def test_without_the_text_of_the_kernel(monkeypatch):
+    """The cache may have lost it."""
+    kernel, _ = pointwise(lambda x: 3 * x, np.ones(2))
+    monkeypatch.setattr(lanes, "Path", lambda name: Path("nowhere") / Path(name).name)
+    in_lanes(kernel)
+    assert not kernel.vectorised
+
+
+# -- the kernels of the hot loop ---------------------------------------------------------------
+
+
+def scene(damping=(), **section):
+    frame = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0, **section)
+    beam = ub.Beam((1, 2), (4, 6), frame, cells=7)
+    loads = [ub.PointLoad(beam.end, force=(30.0, -20.0), moment=40.0)]
+    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=loads, damping=damping)
+
+
+HARD = ub.Hardening(limit=20.0, modulus=5.0)
+RUNS = {
+    "static": (scene(), ub.Static(), {}),
+    "midpoint": (scene(), ub.Midpoint(), {}),
+    "lossy": (scene(), ub.Midpoint(alpha=0.1, beta=0.1), {}),
+    "printed": (scene(), ub.PrintedMidpoint(), {}),
+    "decaying": (scene(), ub.DecayingMidpoint(), {}),
+    "generalised": (scene(), ub.GeneralizedAlpha(0.8), {}),
+    "degree 2": (scene(), ub.Midpoint(), {"mesh": ub.Mesh(degree=2)}),
+    "degree 3": (scene(), ub.PrintedMidpoint(), {"mesh": ub.Mesh(degree=3)}),
+    "inelastic": (scene(bending=HARD), ub.Midpoint(), {}),
+    "viscous": (scene(damping=[ub.KelvinVoigt(time=0.01)]), ub.Midpoint(), {}),
+}
+
+
+def kernels(term):
+    """The kernels that a term keeps."""
+    found = {}
+    for name, value in vars(term).items():
+        if isinstance(value, Kernel):
+            found[name] = value
+        elif hasattr(value, "kernel"):
+            found[name] = value.kernel
+    found.update({f"_losses {i}": k for i, k in enumerate(getattr(term, "_losses", ()))})
+    return found
+
+
+def cell_by_cell(kernel):
+    """The same kernel without lanes."""
+    n, one = len(kernel._dofs), copy(kernel)
+    for name in ("_packed", "_rows", "_coordinates"):
+        batches = getattr(kernel, name).transpose(0, 2, 1)
+        setattr(one, name, in_batches(batches.reshape(-1, batches.shape[2])[:n], 1))
+    one._lanes, one._in_lanes = 1, ffi.NULL
+    one._prepare()
+    return one
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("run", RUNS)
+def test_kernels_of_the_hot_loop(run):
+    scene, scheme, more = RUNS[run]
+    simulation = ub.Simulation(scene, scheme, **more)
+    for n in range(1, 4):
+        simulation.step_to(0.02 * n)
+    rng = np.random.default_rng(7)
+    q = simulation.q + 1e-2 * rng.normal(size=len(simulation.q))
+    compared = 0
+    for term in simulation.terms:
+        for name, kernel in kernels(term).items():
+            if not kernel.vectorised:
+                assert name == "_first"  # once a step is not often
+                continue
+            several, one = np.zeros((2, kernel._rows.max() + 1))
+            kernel.add(q, several)
+            cell_by_cell(kernel).add(q, one)
+            compared += 1
+            assert np.allclose(several, one, rtol=0, atol=1e-13 * np.abs(one).max())
+    assert compared >= 2
