@@ -169,7 +169,7 @@ class Elimination:
             "order": chains.order,
             "from_ends": A.positions(rows.ravel(), columns.ravel()),
             "indptr": A.indptr,
-            "swaps": np.empty(3 * vertices),
+            "swaps": np.empty(3 * vertices, np.int32),
             "entry": self._entries,
             "place": self._places,
             "places": self._places_of_chains,

@@ -28,7 +28,7 @@ def in_batches(rows: npt.NDArray[Any], lanes: int) -> npt.NDArray[Any]:
         rows: Shape (num_cells, ...).
         lanes: Number of rows in a batch.
     """
-    rows = rows.reshape(len(rows), -1)
+    rows = rows.reshape(len(rows), math.prod(rows.shape[1:]))
     if missing := -len(rows) % lanes:
         rows = np.concatenate([rows, np.repeat(rows[-1:], missing, axis=0)])
     return np.ascontiguousarray(rows.reshape(-1, lanes, rows.shape[1]).transpose(0, 2, 1))

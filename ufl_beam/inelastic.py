@@ -78,9 +78,9 @@ class Strains:
 class InelasticBeams:
     """Resultants of cells with material points, working on the virtual strains.
 
-    The points answer the strains of an iterate with resultants and their derivatives; between
-    iterates the form knows the resultants r = b + D e as linear in the strains e, so that UFL
-    derives the tangent, material and geometric.
+    The points answer the strains of an iterate with resultants r and their derivatives D; around
+    it resultants are b + D e, linear in the strains e, from which UFL derives the tangent,
+    material and geometric.
     """
 
     kind = "beams"
@@ -111,17 +111,22 @@ class InelasticBeams:
         )
 
         q0, q1 = fields.configuration(), fields.configuration()
-        b, D = fields.at_points(3), fields.at_points(3, 3)
+        r, b, D = fields.at_points(3), fields.at_points(3), fields.at_points(3, 3)
         w, axis = ufl.TestFunction(fields.space), fields.axis
-        r = b + ufl.dot(D, strain(q1, axis))
-        work = ufl.dot(r, scheme.virtual_strain(q0, q1, w, axis)) * fields.dx(1)  # P(34)
-        self._q0, self._b, self._D = q0, b, D
-        self._force, self._tangent = fields.force_and_tangent(work, q1, A)
+        w_e, dx = scheme.virtual_strain(q0, q1, w, axis), fields.dx(1)
+        around = ufl.dot(b + ufl.dot(D, strain(q1, axis)), w_e) * dx
+        derivative = ufl.derivative(around, q1, ufl.TrialFunction(fields.space))
+        self._q0 = q0
+        self._force, self._tangent = (
+            fields.hot_kernel(form, q1)
+            for form in (ufl.dot(r, w_e) * dx, derivative)  # P(34)
+        )
+        self._tangent.place(A)
         self._latest: Array = np.full(fields.share.size, np.nan)
         self._in_c = c = ffi.new("inelastic *")
         c.points, c.strains = self.points.points, self._strains.kernel.cells
         c.force, c.tangent = self._force.cells, self._tangent.cells
-        c.at_b, c.at_D = map(self._force.position, (b, D))
+        c.at_r, c.at_b, c.at_D = self._force.position(r), *map(self._tangent.position, (b, D))
         self._at_latest = doubles(self._latest)
         c.size, c.latest = len(self._latest), self._at_latest
         self._q: Array = np.empty(0)
@@ -131,6 +136,7 @@ class InelasticBeams:
     def begin(self, step: Step) -> None:
         """Remember the strains at the beginning."""
         self._force.set(self._q0, step.q0)
+        self._tangent.set(self._q0, step.q0)
         if step.q0 is not self._q:
             self._q = step.q0
             self.points.start(self._strains(step.q0))
@@ -139,7 +145,7 @@ class InelasticBeams:
         self._in_c.begins = not self._scheme.dynamic
 
     def _respond(self, q1: Array) -> None:
-        """Resultants at ``q1`` and their derivatives, into the form."""
+        """Resultants at ``q1``, and their derivatives."""
         lib.respond_at(self._in_c, doubles(q1))
 
     def loops(self) -> tuple[Loop, Loop | None]:

@@ -2,10 +2,11 @@
 
 enum { MOST = 144 }; /* entries of an element vector or matrix: 12 unknowns of degree 3 */
 
-/* The coefficients of a cell from `at` on; the way from one to the next is c->lanes. */
+/* The coefficients of a cell from `at` on; the way from one to the next is c->lanes, a power of two:
+ * before the batch of a cell there are cell & -lanes cells. */
 static inline double *in_cell(const cells *c, int cell, int at)
 {
-  return c->w + (cell / c->lanes * c->width + at) * c->lanes + cell % c->lanes;
+  return c->w + (cell & -c->lanes) * c->width + at * c->lanes + (cell & (c->lanes - 1));
 }
 
 /* The values q of the cells into their packed coefficients, from `at` on. */
@@ -20,7 +21,7 @@ void set_cells(const cells *c, const double *q, int at)
 }
 
 /* Some values into the packed coefficients of a cell. */
-void put_in_cell(const cells *c, int cell, int at, int number, const double *values)
+static inline void put_in_cell(const cells *c, int cell, int at, int number, const double *values)
 {
   double *w = in_cell(c, cell, at);
   for (int i = 0; i < number; ++i) w[i * c->lanes] = values[i];
@@ -276,7 +277,7 @@ void respond(const points *p)
   }
 }
 
-/* Resultants as affine functions b + D e of the strains, into the packed values of the cells. */
+/* Resultants as affine functions b + D e of the strains, for the tangent. */
 static void linearise(const inelastic *m)
 {
   const points *p = m->points;
@@ -285,12 +286,12 @@ static void linearise(const inelastic *m)
     double b[3];
     for (int k = 0; k < 3; ++k)
       b[k] = r[k] - D[3 * k] * e[0] - D[3 * k + 1] * e[1] - D[3 * k + 2] * e[2];
-    put_in_cell(m->force, c, m->at_b, 3, b);
-    put_in_cell(m->force, c, m->at_D, 9, D);
+    put_in_cell(m->tangent, c, m->at_b, 3, b);
+    put_in_cell(m->tangent, c, m->at_D, 9, D);
   }
 }
 
-/* Resultants as affine functions of the strains, at q; nothing is to do if q is the latest.
+/* Resultants and their derivatives at q; nothing is to do if q is the latest.
  *
  * First the strains at q, then what responds to them, then where it goes.
  */
@@ -302,7 +303,7 @@ void respond_at(const inelastic *m, const double *q)
   memset(p->e1, 0, 3 * p->cells * sizeof *p->e1);
   add_cells((void *)m->strains, q, p->e1);
   respond(p);
-  linearise(m);
+  for (int c = 0; c < p->cells; ++c) put_in_cell(m->force, c, m->at_r, 3, p->r + 3 * c);
 }
 
 void add_inelastic_force(void *self, const double *q, double *r)
@@ -320,9 +321,9 @@ void add_inelastic_tangent(void *self, const double *q, double *tangent)
   respond_at(m, q);
   if (m->begins) {
     for (int c = 0; c < p->cells; ++c) memcpy(p->r + 3 * c, p->kept + 6 * c, 3 * sizeof *p->r);
-    linearise(m);
     m->latest[0] = NAN;
   }
+  linearise(m);
   add_cells((void *)m->tangent, q, tangent);
   m->begins = 0;
 }

@@ -22,7 +22,7 @@ typedef struct cells cells;
 struct cells {
   kernel *tabulate;
   void (*in_lanes)(const cells *self, const double *q, double *out); /* or none */
-  int lanes; /* cells of a batch, else 1 */
+  int lanes; /* cells of a batch, a power of two; else 1 */
   int number, of_cell, unknowns; /* cells, degrees of freedom of each, those the form depends on */
   const int32_t *dofs;
   int at, width;
@@ -53,7 +53,6 @@ typedef struct {
 } step_product;
 
 void set_cells(const cells *c, const double *q, int at);
-void put_in_cell(const cells *c, int cell, int at, int number, const double *values);
 void add_cells(void *self, const double *q, double *b);
 double value_of_cells(const cells *c, const double *q);
 void combine(int size, double a, const double *x, double b, const double *y, double *out);
@@ -87,12 +86,12 @@ typedef struct {
   double *e0, *e1, *w, *r, *D, *kept, *sum;
 } points;
 
-/* Cells with points: forms of the strains, of the forces and of their tangent, and where these find
- * the resultants as affine functions b + D e of the strains. */
+/* Cells with points: forms of the strains, of the forces, which know the resultants r, and of their
+ * tangent, which knows them as affine functions b + D e of the strains. */
 typedef struct {
   const points *points;
   const cells *strains, *force, *tangent;
-  int at_b, at_D; /* where the coefficients of `force` have b and D */
+  int at_r, at_b, at_D; /* where the coefficients of `force` and `tangent` have r, b and D */
   int size, begins;
   double *latest; /* the unknowns that the points responded to */
 } inelastic;

@@ -146,7 +146,8 @@ def roll_up(cells, turns, newton, solver):
     torque = [0, 0, p.moment(turns)]
     model.system.AddLoad(item.LoadTorqueVector(markerNumber=end, loadVector=torque))
     model.system.Assemble()
-    s = settings(newton, solver)
+    tolerance = 1e-8 if cells <= 10_000 else 1e-6  # it does not reach less on fine meshes
+    s = settings(newton, solver, tolerance, tolerance)
     s.staticSolver.numberOfLoadSteps = p.steps
     s.staticSolver.newton.maxIterations = 60
     result = solve(exu.MainSolverStatic(), model, s)

@@ -105,18 +105,27 @@ def run(steps, dt=None, sample=None, every=None):
     return samples, {"steps": steps, **said, **stopwatch.read()}
 
 
-def roll_up(cells, turns, load_steps=PROBLEMS["P1"].steps):
-    p = PROBLEMS["P1"]
-    (chain,) = p.chains(cells)
+def clamped(chain):
+    """A model of one chain, clamped at its start; the tag of its end."""
     model = Model("euler")
     tags = model.add(chain)
     model.fix(tags[0], 1, 1, 1)
     model.finish()
-    model.load(tags[-1], ("Linear", 1), moment=p.moment(turns))
+    return model, tags[-1]
+
+
+def followed(model, tip, steps, dt=None):
+    """Iterations and the place of the tip, after some steps."""
+    iterations, result = run(steps, dt, ops.testIter, every=1)
+    return result | {"newton": sum(iterations), "values": {"tip": model.where(tip)}}
+
+
+def roll_up(cells, turns, load_steps=PROBLEMS["P1"].steps, steps=None):
+    p = PROBLEMS["P1"]
+    model, tip = clamped(*p.chains(cells))
+    model.load(tip, ("Linear", 1), moment=p.moment(turns))
     analyse("full", ("LoadControl", 1 / load_steps), system="BandGeneral")  # it is indefinite
-    iterations, result = run(load_steps, sample=ops.testIter, every=1)
-    tip = model.where(tags[-1])
-    return result | {"newton": sum(iterations), "values": {"tip": tip}}
+    return followed(model, tip, steps or load_steps)
 
 
 def flying_beam(cells, dt, newton="full", integrator="newmark", steps=None):
@@ -186,17 +195,11 @@ def portal(cells, dt, newton="full", element="euler", integrator="newmark"):
 
 def cantilever(cells, dt, newton="full"):
     p = PROBLEMS["P5"]
-    (chain,) = p.chains(cells)
-    model = Model("euler")
-    tags = model.add(chain)
-    model.fix(tags[0], 1, 1, 1)
-    model.finish()
-    model.load(tags[-1], ("Linear", 1, "-factor", 1 / p.end), fy=p.force)
+    model, tip = clamped(*p.chains(cells))
+    model.load(tip, ("Linear", 1, "-factor", 1 / p.end), fy=p.force)
     tolerance = 1e-8 if cells <= 10_000 else 1e-6  # it does not reach less on fine meshes
     analyse(newton, INTEGRATORS["newmark"], tolerance=tolerance)
-    iterations, result = run(round(p.end / dt), dt, ops.testIter, every=1)
-    tip = model.where(tags[-1])
-    return result | {"newton": sum(iterations), "values": {"tip": tip}}
+    return followed(model, tip, round(p.end / dt), dt)
 
 
 RUNS = {"P1": roll_up, "P2": flying_beam, "P3": swing, "P4": portal, "P5": cantilever}

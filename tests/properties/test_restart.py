@@ -168,22 +168,28 @@ def test_files_go_on(tmp_path):
 # -- kill -9 ---------------------------------------------------------------------------------------
 
 
+def size_of(file):
+    """Bytes; none of one that is not there, as when a run tries whether it can be written."""
+    try:
+        return file.stat().st_size
+    except FileNotFoundError:
+        return 0
+
+
 def until_killed(folder, dice):
     """Run the script and kill it some rows later, at any moment; whether it was still running."""
     table = folder / "run.csv"
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
     process = subprocess.Popen([sys.executable, str(SCRIPT), str(folder)], env=environment)
-    before = table.stat().st_size if table.exists() else 0
+    before = size_of(table)
     more = dice.randrange(200, 2500)  # bytes; a row has some 700
     if dice.random() < 0.1:
         time.sleep(dice.uniform(0, 1.5))  # while it begins
     else:
-        while process.poll() is None and (
-            not table.exists() or table.stat().st_size in (before, 0)
-        ):
+        while process.poll() is None and size_of(table) in (before, 0):
             time.sleep(0.002)
-        begin = table.stat().st_size
-        while process.poll() is None and table.stat().st_size < begin + more:
+        begin = size_of(table)
+        while process.poll() is None and size_of(table) < begin + more:
             time.sleep(0.0005)
         time.sleep(dice.uniform(0, 0.02))
     process.send_signal(signal.SIGKILL)
