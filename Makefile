@@ -55,6 +55,8 @@ schemes: ## errors of the time schemes at equal steps, as tables in docs/schemes
 bench: ## time per step
 	@./env python3 benchmarks/bench_step.py
 	@./env python3 benchmarks/bench_inelastic.py
+	@./env python3 benchmarks/bench_nothing.py
+	@./env python3 benchmarks/bench_budget.py
 	@./env python3 benchmarks/bench_scaling.py
 
 bench-peers: ## beside Exudyn, OpenSees and a C loop: time, memory, error

@@ -50,11 +50,11 @@ from ufl_beam.terms import KINDS, Beams, ElasticBeams, Inertia, Term
 SMALLEST_PART = 2**12
 """A step is cut into at most this number of parts."""
 
-SMALLEST_SHARE = 4_000
+SMALLEST_SHARE = 6_000
 """Scenes with fewer cells per process are computed by each process.
 
-Measured on two cores with lattices: two processes break even at some 1 000 cells each and win by
-1.4 at 4 000; see benchmarks/README.md.
+Measured on two cores with lattices: two processes break even at some 3 000 cells each, and are 1.2
+times as fast at 6 000; see benchmarks/README.md.
 """
 
 LARGEST_TURN = 0.75 * math.pi

@@ -35,7 +35,7 @@ def coupling(size: int, *coupled: Index) -> Structure:
     lengths = np.concatenate([np.full(len(rows), rows.shape[1]) for rows in groups])
     columns = np.concatenate([rows.ravel() for rows in groups]).astype(np.int32)
     ends = np.append(0, np.cumsum(lengths))
-    parts = csr_array((np.ones(len(columns), np.int8), columns, ends), shape=(len(lengths), size))
+    parts = csr_array((np.ones(len(columns), np.bool_), columns, ends), shape=(len(lengths), size))
     matrix = parts.T.tocsr() @ parts
     matrix.sort_indices()
     arrays = (np.zeros(matrix.nnz), matrix.indices, matrix.indptr)

@@ -9,10 +9,9 @@ import math
 
 import numpy as np
 import pytest
+from closed_forms import elastica
 from convergence.study import orders
 from scenes import cantilever, flying_beam
-from scipy.optimize import brentq
-from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
 import ufl_beam as ub
 
@@ -45,23 +44,6 @@ def test_half_circle(degree):
     )
     np.testing.assert_allclose(measured, 2 * degree, atol=0.15)
     assert errors[0] < 0.01
-
-
-def elastica(a):
-    """[closed] (u, v, ψ) of the tip of unit length and stiffness under the transverse load a."""
-
-    def modulus(θ):
-        m = (1 + np.sin(θ)) / 2
-        return m, np.arcsin(1 / np.sqrt(2 * m))
-
-    def excess(θ):
-        m, φ = modulus(θ)
-        return ellipk(m) - ellipkinc(φ, m) - np.sqrt(a)
-
-    θ = brentq(excess, 1e-9, np.pi / 2 - 1e-9, xtol=1e-15)
-    m, φ = modulus(θ)
-    v = 1 - 2 / np.sqrt(a) * (ellipe(m) - ellipeinc(φ, m))
-    return np.array([np.sqrt(2 * np.sin(θ) / a) - 1, v, θ])
 
 
 @pytest.mark.parametrize("degree", MESHES)
