@@ -7,9 +7,9 @@
  * vertex before, of v and of the vertex after are among them.
  */
 
-/* What is kept of a vertex: its pivot block as LU, what that makes of the coupling to the vertex
- * after, and where there is a spike, of that to the left end; the coupling from there. */
-enum { PIVOT = 9, TO_NEXT = 0, TO_LEFT = 9, FROM_LEFT = 18, SIDES = 27 };
+/* What is kept of a vertex: its pivot block as LU, and what that makes of the coupling to the vertex
+ * after; where there is a spike, what it makes of that to the left end, and the coupling from there. */
+enum { BLOCK = 9, TO_LEFT = 0, FROM_LEFT = 9, SIDES = 18 };
 
 /* D = LU with the largest pivot of each column; the reciprocals of the pivots on the diagonal */
 static void factor_block(double *D, int32_t *swap)
@@ -100,24 +100,24 @@ static inline void eliminate_chain(const chains *c, int chain, const int spike, 
     for (int k = 0; k < 9; ++k) from[k] = c->data[c->from_ends[18 * chain + k]];
   }
   for (int v = c->first[chain]; v < c->first[chain + 1]; ++v) {
-    double *sides = c->sides + SIDES * v, *to_next = sides + TO_NEXT, *to_left = sides + TO_LEFT;
+    double *sides = c->sides + SIDES * v, *to_next = c->to_next + BLOCK * v;
     int32_t *swap = c->swaps + 3 * v;
     factor_block(pivot, swap);
-    memcpy(c->pivots + PIVOT * v, pivot, sizeof pivot);
+    memcpy(c->pivots + BLOCK * v, pivot, sizeof pivot);
     read_block(c, v, 2, after);
     read_below(c, chain, v, below);
     solve_block(pivot, swap, 3, after, to_next);
     if (spike) {
       memcpy(sides + FROM_LEFT, from, sizeof from);
-      solve_block(pivot, swap, 3, to, to_left);
+      solve_block(pivot, swap, 3, to, sides + TO_LEFT);
     }
     if (v + 1 < c->first[chain + 1]) read_block(c, v + 1, 1, pivot);
     else memset(pivot, 0, sizeof pivot);
     subtract_product(below, to_next, pivot);
     if (spike) {
       double next_to[9] = {0}, next_from[9] = {0};
-      subtract_product(from, to_left, ends);
-      subtract_product(below, to_left, next_to);
+      subtract_product(from, sides + TO_LEFT, ends);
+      subtract_product(below, sides + TO_LEFT, next_to);
       subtract_product(from, to_next, next_from);
       memcpy(to, next_to, sizeof to);
       memcpy(from, next_from, sizeof from);
@@ -158,7 +158,7 @@ void reduce(const chains *c, const double *b)
     for (int v = c->first[chain]; v < c->first[chain + 1]; ++v) {
       double *f = c->f + 3 * v;
       for (int r = 0; r < 3; ++r) next[r] += b[c->row[3 * v + r]];
-      solve_block(c->pivots + PIVOT * v, c->swaps + 3 * v, 1, next, f);
+      solve_block(c->pivots + BLOCK * v, c->swaps + 3 * v, 1, next, f);
       read_below(c, chain, v, below);
       memset(next, 0, sizeof next);
       subtract(below, f, next);
@@ -178,10 +178,9 @@ void expand(const chains *c, const double *left, double *x)
     double first[3], next[3], y[3];
     for (int k = 0; k < 3; ++k) first[k] = left[numbers[k]], next[k] = left[numbers[3 + k]];
     for (int v = c->first[chain + 1] - 1; v >= c->first[chain]; --v) {
-      const double *sides = c->sides + SIDES * v;
       memcpy(y, c->f + 3 * v, sizeof y);
-      if (c->spike[chain]) subtract(sides + TO_LEFT, first, y);
-      subtract(sides + TO_NEXT, next, y);
+      if (c->spike[chain]) subtract(c->sides + SIDES * v + TO_LEFT, first, y);
+      subtract(c->to_next + BLOCK * v, next, y);
       memcpy(next, y, sizeof y);
       for (int r = 0; r < 3; ++r) x[c->row[3 * v + r]] = y[r];
     }

@@ -121,42 +121,55 @@ class Elimination:
 
     def __init__(self, share: Share, A: Csr) -> None:
         self._comm, self._A = share.comm, A
-        self._chains = chains = Chains(share.cell_dofs, A, self._alone(share))
+        chains = Chains(share.cell_dofs, A, self._alone(share))
         left = np.ones(share.size, dtype=bool)
         left[chains.dofs] = False
         here = np.flatnonzero(left)
         numbers = np.unique(np.concatenate(self._comm.allgather(share.dofs[here])))
-        self._number = np.full(share.size, -1)
-        self._number[here] = np.searchsorted(numbers, share.dofs[here])
-        self._owned = here[here < share.num_owned]
-        self._make_matrix(len(numbers))
-        self._make_arguments()
+        number = np.full(share.size, -1, dtype=np.int32)
+        number[here] = np.searchsorted(numbers, share.dofs[here])
+        ends = number[chains.ends]
+        entries, *places = self._make_matrix(number, ends, len(numbers))
+        owned = here[here < share.num_owned]
+        self._make_arguments(chains, {
+            "entry": entries, "place": places[0], "places": places[1],
+            "dof": owned, "number": number[owned], "ends": ends,
+        })  # fmt: skip
 
     @staticmethod
     def _alone(share: Share) -> npt.NDArray[np.bool_]:
         ghosts = np.concatenate(share.comm.allgather(share.dofs[share.num_owned :]))
         return ~np.isin(share.dofs, ghosts)
 
-    def _make_matrix(self, size: int) -> None:
-        """Structure of the small matrix, and where its entries come from."""
-        rows, columns, left = self._A.rows(), self._A.indices, self._number >= 0
-        self._entries = np.flatnonzero(left[rows] & left[columns])
-        rows, columns = (self._number[x[self._entries]] for x in (rows, columns))
-        keys = rows * size + columns
-        ends = self._number[self._chains.ends].reshape(-1, 2, 3)
-        of_blocks = ends[:, :, None, :, None] * size + ends[:, None, :, None, :]
+    def _make_matrix(self, number: Index, ends: Index, size: int) -> tuple[Index, Index, Index]:
+        """Structure of the small matrix, and where its entries come from.
+
+        Args:
+            number: In the small matrix, of each local degree of freedom; -1 of those eliminated.
+            ends: Those of the ends of the chains; (num_chains, 6).
+            size: Of the small matrix.
+
+        Returns:
+            Entries of ``A`` that stay, where they are in :attr:`data`, and where the blocks of the
+            ends of the chains are.
+        """
+        rows, columns, left = self._A.rows(), self._A.indices, number >= 0
+        entries = np.flatnonzero(left[rows] & left[columns])
+        keys = number[rows[entries]] * np.int64(size) + number[columns[entries]]
+        of_ends = ends.astype(np.int64).reshape(-1, 2, 3)
+        of_blocks = of_ends[:, :, None, :, None] * size + of_ends[:, None, :, None, :]
         of_chains = of_blocks.ravel()
         mine = np.unique(np.concatenate([keys, of_chains]))
         if self._comm.size > 1:
             mine = np.unique(np.concatenate(self._comm.allgather(mine)))
-        self._places = np.searchsorted(mine, keys)
-        self._places_of_chains = np.searchsorted(mine, of_chains)
         self.indices = (mine % size).astype(np.int32)
         self.indptr = np.searchsorted(mine, np.arange(size + 1) * size).astype(np.int32)
         self.data, self.f = np.zeros(len(mine)), np.zeros(size)
+        return entries, np.searchsorted(mine, keys), np.searchsorted(mine, of_chains)
 
-    def _make_arguments(self) -> None:
-        A, chains = self._A, self._chains
+    def _make_arguments(self, chains: Chains, left: dict[str, Index]) -> None:
+        """What C takes: the chains, and of what is left the indices that loops.h names."""
+        A = self._A
         ends = chains.ends.reshape(-1, 2, 3, 1)
         first, last = (chains.dofs[k] for k in (chains.first[:-1], chains.first[1:] - 1))
         next_to = np.stack([np.where(chains.spikes[:, None], first, last), last], axis=1)
@@ -170,17 +183,13 @@ class Elimination:
             "from_ends": A.positions(rows.ravel(), columns.ravel()),
             "indptr": A.indptr,
             "swaps": np.empty(3 * vertices, np.int32),
-            "entry": self._entries,
-            "place": self._places,
-            "places": self._places_of_chains,
-            "dof": self._owned,
-            "number": self._number[self._owned],
-            "ends": self._number[chains.ends],
+            **left,
         }
         of_doubles = {
             "data": A.data,
             "pivots": np.empty(9 * vertices),  # sizes as in elimination.c
-            "sides": np.empty(27 * vertices),
+            "to_next": np.empty(9 * vertices),
+            "sides": np.empty(18 * vertices if chains.spikes.any() else 0),
             "f": np.zeros(3 * vertices),
             "left_data": self.data,
             "left_f": self.f,
@@ -192,8 +201,8 @@ class Elimination:
         sizes = {
             "chains": len(chains.ends),
             "left": len(self.data),
-            "stay": len(self._entries),
-            "rows": len(self._owned),
+            "stay": len(left["entry"]),
+            "rows": len(left["dof"]),
             "left_size": self.size,
         }
         self.c = ffi.new("chains *", {**self._alive, **sizes})

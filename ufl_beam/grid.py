@@ -311,7 +311,7 @@ class Share:
         self.dofs = np.concatenate([touched[mine], touched[~mine]])
         self.num_owned = int(mine.sum())
         self.ghosts = self._global[self.dofs[self.num_owned :]].astype(np.int32)
-        self._local = np.full(grid.size, -1)
+        self._local = np.full(grid.size, -1, dtype=np.int32)
         self._local[self.dofs] = np.arange(len(self.dofs))
         self.cell_dofs = self._local[of_cell[self.cells]]
         self.link_dofs = self._local[of_link[self.links]]

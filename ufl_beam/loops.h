@@ -133,7 +133,8 @@ typedef struct {
   const int32_t *from_ends; /* chains x 18: entries of the ends' rows, left and right */
   const int32_t *indptr;
   const double *data;
-  double *pivots, *sides;   /* vertices x PIVOT, vertices x SIDES */
+  double *pivots, *to_next; /* vertices x BLOCK */
+  double *sides;            /* vertices x SIDES, where there are spikes */
   int32_t *swaps;           /* vertices x 3: rows in the order of the pivots */
   double *f;                /* vertices x 3: right-hand sides */
 

@@ -36,7 +36,7 @@ from ufl_beam.mechanism import (
 from ufl_beam.memory import NOWHERE, Memory, Restoring, Saving, State
 from ufl_beam.path import StaticPath
 from ufl_beam.points import Course, expect_entries
-from ufl_beam.processes import ours
+from ufl_beam.processes import give_back_memory, ours
 from ufl_beam.responses import Setting
 from ufl_beam.rotating import FrameForces
 from ufl_beam.scene import Scene
@@ -208,6 +208,7 @@ class Simulation(Live):
             newton=newton or Newton(),
         )
         self.solution = Solution(scene, self.grid)
+        give_back_memory()
 
     # -- building ------------------------------------------------------------------------------
 
