@@ -155,7 +155,7 @@ class Elimination:
         """
         rows, columns, left = self._A.rows(), self._A.indices, number >= 0
         entries = np.flatnonzero(left[rows] & left[columns])
-        keys = number[rows[entries]] * np.int64(size) + number[columns[entries]]
+        keys = number[rows[entries]].astype(np.int64) * size + number[columns[entries]]
         of_ends = ends.astype(np.int64).reshape(-1, 2, 3)
         of_blocks = of_ends[:, :, None, :, None] * size + of_ends[:, None, :, None, :]
         of_chains = of_blocks.ravel()

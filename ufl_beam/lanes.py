@@ -8,9 +8,8 @@ the cells is that of :mod:`ufl_beam.loops`.
 from __future__ import annotations
 
 import re
-from functools import cache
 from pathlib import Path
-from typing import Any
+from types import ModuleType
 
 import cffi
 import numpy as np
@@ -29,17 +28,24 @@ _NUMBER = r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?"
 _KEYWORDS = {"for", "tabulate"}
 
 
-def in_vectors(kernel: str) -> str | None:
-    """The text of a kernel of FFCx with vectors in the place of numbers; none if it asks for more.
+class NotInVectors(Exception):
+    """A kernel that has to be computed cell by cell."""
+
+
+def in_vectors(kernel: str) -> str:
+    """The text of a kernel of FFCx with vectors in the place of numbers.
 
     Args:
         kernel: Its definition in C.
+
+    Raises:
+        NotInVectors: It asks for functions that lanes.h has not.
     """
     body = kernel[kernel.index("{") :]
     called = set(re.findall(r"\b([a-z_]\w*)\(", body)) - _KEYWORDS
     powers = re.findall(r"\bpow\(\w+, ([^)]+)\)", body)
     if called - FUNCTIONS or not all(re.fullmatch(r"-?\d+", power) for power in powers):
-        return None
+        raise NotInVectors(f"functions: {sorted(called)}, powers: {powers}")
     lines = []
     for line in body.splitlines():
         if not line.startswith("static const"):
@@ -55,43 +61,43 @@ def in_vectors(kernel: str) -> str | None:
     return f"static inline void tabulate({arguments})\n" + "\n".join(lines)
 
 
-def written(form: fem.Form) -> str | None:
-    """The kernel that FFCx wrote for a cell form; none if it is not in the cache any more."""
-    library = Path(form.module.__file__)
+def written(library: Path) -> str:
+    """The kernel that FFCx wrote for a cell form.
+
+    Args:
+        library: Its module; the source is beside it.
+
+    Raises:
+        NotInVectors: It is not in the cache any more.
+    """
     source = library.with_name(library.name.split(".")[0] + ".c")
-    if not source.exists():
-        return None
     pattern = r"^void tabulate_tensor_.*?^}(?=\s*^(?:bool|ufcx_integral) )"
-    found = re.search(pattern, source.read_text(), re.M | re.S)
-    return None if found is None else found[0]
+    if source.exists() and (found := re.search(pattern, source.read_text(), re.M | re.S)):
+        return found[0]
+    raise NotInVectors(f"{source} has no kernel")
 
 
-def _processor() -> str:
-    """What "native" means: what NumPy has found that the processor can."""
-    return repr(np.show_config(mode="dicts"))
+def _loop(library: Path, sizes: dict[str, int]) -> ModuleType:
+    """The module with the loop over the cells."""
+    defined = [f"#define {name} {size}" for name, size in sizes.items()]
+    files = [text("lanes.h"), text("lanes.c")]
 
+    def source() -> str:
+        kernel = in_vectors(written(library))
+        return "\n".join([HEADERS, DECLARATIONS, *defined, files[0], kernel, files[1]])
 
-@cache
-def _loop(kernel: str, entries: int, width: int, constants: int) -> Any:
-    """Address of the loop over the cells; none where the compiler does not know such vectors."""
-    numbers = {"LANES": LANES, "ENTRIES": entries, "WIDTH": width, "CONSTANTS": constants}
-    source = "\n".join(
-        [
-            *(HEADERS, DECLARATIONS),
-            *(f"#define {name} {value}" for name, value in numbers.items()),
-            *(text("lanes.h"), kernel, text("lanes.c")),
-        ]
+    return compiled(
+        "ufl_beam_lanes",
+        "void *in_lanes(void);",
+        source,
+        # FFCx names what it makes by what is in it; NumPy knows what "native" means.
+        made_of=[library.name, *defined, *files, DECLARATIONS, Path(__file__).read_text(), _CPU],
+        flags=["-O2", "-march=native", "-fno-math-errno", "-w"],
     )
-    flags = ["-O2", "-march=native", "-fno-math-errno", "-w"]
-    try:
-        module = compiled("ufl_beam_lanes", "void *in_lanes(void);", source, flags, _processor())
-    except cffi.VerificationError:
-        return None
-    _alive.append(module)
-    return int(module.ffi.cast("intptr_t", module.lib.in_lanes()))
 
 
-_alive: list[Any] = []
+_CPU = repr(np.show_config(mode="dicts"))
+_modules: dict[tuple[str, int, int, int], ModuleType | None] = {}
 
 
 def in_lanes(form: fem.Form, entries: int, width: int, constants: int) -> int | None:
@@ -103,6 +109,13 @@ def in_lanes(form: fem.Form, entries: int, width: int, constants: int) -> int | 
         width: Number of its coefficients' values in a cell.
         constants: Number of its constants.
     """
-    kernel = written(form)
-    vectors = None if kernel is None else in_vectors(kernel)
-    return None if vectors is None else _loop(vectors, entries, width, constants)
+    library = Path(form.module.__file__)
+    key = (library.name, entries, width, constants)
+    if key not in _modules:
+        sizes = {"LANES": LANES, "ENTRIES": entries, "WIDTH": width, "CONSTANTS": constants}
+        try:
+            _modules[key] = _loop(library, sizes)
+        except (NotInVectors, cffi.VerificationError):
+            _modules[key] = None
+    module = _modules[key]
+    return None if module is None else int(module.ffi.cast("intptr_t", module.lib.in_lanes()))

@@ -23,18 +23,20 @@ extern "Python" double missed_in_python(void *self, const double *q, const doubl
 """
 
 
+_SOURCE = "\n".join(
+    [
+        HEADERS,
+        f"#define CALL(f, e, w, c, x) f(e, w, c, x, 0, 0{TABULATE[1]})",
+        DECLARATIONS,
+        *(text(f"{name}.c") for name in SOURCES),
+    ]
+)
 _module = compiled(
     "ufl_beam_loops",
     DECLARATIONS + _CALLBACKS,
-    "\n".join(
-        [
-            HEADERS,
-            f"#define CALL(f, e, w, c, x) f(e, w, c, x, 0, 0{TABULATE[1]})",
-            DECLARATIONS,
-            *(text(f"{name}.c") for name in SOURCES),
-        ]
-    ),
-    ["-O3"],
+    lambda: _SOURCE,
+    made_of=[_SOURCE],
+    flags=["-O3"],
 )
 ffi: Any = _module.ffi
 lib: Any = _module.lib

@@ -11,7 +11,7 @@ import os
 import sys
 import sysconfig
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import ModuleType
 
@@ -41,28 +41,33 @@ DECLARATIONS = "\n".join(
 
 
 def compiled(
-    stem: str, declarations: str, source: str, flags: Sequence[str], machine: str = ""
+    stem: str,
+    declarations: str,
+    source: Callable[[], str],
+    *,
+    made_of: Sequence[str],
+    flags: Sequence[str],
 ) -> ModuleType:
     """The module of cffi with a source, from the cache or made anew.
 
     Args:
         stem: Beginning of its name.
         declarations: What Python sees of it.
-        source: C.
+        source: Its C; called if it is not in the cache.
+        made_of: What the C depends on, and what the flags make of the machine.
         flags: For the compiler.
-        machine: What the flags make of the machine, where they depend on it.
 
     Raises:
         cffi.VerificationError: The compiler refuses.
     """
-    key = "\0".join((declarations, source, *flags, machine, sys.version))
+    key = "\0".join((declarations, *made_of, *flags, sys.version))
     name = f"{stem}_{hashlib.sha256(key.encode()).hexdigest()[:16]}"
     directory = jit_directory()
     library = directory / (name + str(sysconfig.get_config_var("EXT_SUFFIX")))
     if not library.exists():
         builder = cffi.FFI()
         builder.cdef(declarations)
-        builder.set_source(name, source, extra_compile_args=list(flags), libraries=["m"])
+        builder.set_source(name, source(), extra_compile_args=list(flags), libraries=["m"])
         directory.mkdir(parents=True, exist_ok=True)
         # Other processes may compile the same at the same time; the last one wins.
         with tempfile.TemporaryDirectory(dir=directory) as scratch:
