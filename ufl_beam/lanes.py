@@ -97,6 +97,8 @@ def _loop(library: Path, sizes: dict[str, int]) -> ModuleType:
 
 
 _CPU = repr(np.show_config(mode="dicts"))
+"""What NumPy was built for and has found, of which the features of the processor are a part."""
+
 _modules: dict[tuple[str, int, int, int], ModuleType | None] = {}
 
 

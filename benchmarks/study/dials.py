@@ -35,6 +35,7 @@ class Setting:
         modified: Whether it keeps its tangent.
         adaptive: Tolerance of adaptive steps, in the place of equal ones; 0: none.
         every: Steps from one that is kept to the next.
+        history: Whether a table of the place is written, a row each step.
     """
 
     scheme: str
@@ -46,6 +47,7 @@ class Setting:
     modified: bool = False
     adaptive: float = 0.0
     every: int = 1
+    history: bool = False
 
     def arguments(self, case: Case) -> dict:
         """Of `ub.simulate`."""
@@ -115,3 +117,4 @@ def one_by_one(case: Case, quick: bool) -> Iterator[tuple[str, Setting]]:
     yield "Newton: modified", replace(here, modified=True)
     steps = case.steps * 2**here.halvings // len(case.instants)
     yield "output: kept at ten instants", replace(here, every=steps)
+    yield "output: a history beside", replace(here, history=True)

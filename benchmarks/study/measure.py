@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import statistics
 from dataclasses import asdict
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -87,7 +89,11 @@ class Bench:
         }
 
     def _simulate(self, setting: Setting) -> ub.Solution:
-        return ub.simulate(self.scene, progress=False, **setting.arguments(self.case))
+        with TemporaryDirectory() as folder:
+            table = ub.History(Path(folder) / "history.csv", [self.place])
+            record = [table] if setting.history else []
+            arguments = setting.arguments(self.case)
+            return ub.simulate(self.scene, progress=False, record=record, **arguments)
 
     def _values(self, solution: ub.Solution) -> np.ndarray:
         """Positions of the place at the instants; (INSTANTS, 2); m."""
