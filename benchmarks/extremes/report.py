@@ -83,7 +83,7 @@ def _detail(r: dict[str, Any]) -> str:
         note = f" ({r['note']})" if r["note"] else ""
         numbers = f"{r['error']:.1e} | {r['allowed']:.1e} | {r['iterations']:.1f}"
         return f"| {_text(r['value'])} | {numbers} | works{note} |"
-    return f"| {_text(r['value'])} | | | | {r['verdict']}: {_cut(r.get('message', ''), 240)} |"
+    return f"| {_text(r['value'])} | | | | {r['verdict']}: {_cut(r['message'], 240)} |"
 
 
 def _cut(message: str, length: int) -> str:

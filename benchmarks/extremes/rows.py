@@ -106,5 +106,7 @@ def _judge(one: Row, value: Any) -> dict[str, Any]:
         return {"verdict": "stops" if right else "WRONG", "message": message}
     except Exception as error:
         return {"verdict": "WRONG", "message": f"{type(error).__name__}: {error}"}
-    works = math.isfinite(got.error) and got.error <= got.allowed
-    return {"verdict": "works" if works else "WRONG", **asdict(got)}
+    if math.isfinite(got.error) and got.error <= got.allowed:
+        return {"verdict": "works", **asdict(got)}
+    message = f"error {got.error:.2e} of {got.allowed:.2e}"
+    return {"verdict": "WRONG", "message": message, **asdict(got)}
