@@ -84,6 +84,7 @@ class Kernel:
             f: slice(end - f.function_space.element.space_dimension, end)
             for f, end in zip(used, ends, strict=True)
         }
+        self._starts = {id(f): columns.start for f, columns in self._columns.items()}
         self._dofs = np.ascontiguousarray(cell_dofs, dtype=np.int32)
         self._lanes, self._in_lanes = 1, ffi.NULL
         self._packed, self._coordinates = (in_batches(x, 1) for x in (packed, coordinates))
@@ -137,8 +138,9 @@ class Kernel:
 
     def set(self, function: fem.Function, q: Array) -> None:
         """Give ``function`` the degrees of freedom ``q``, if it appears in the form."""
-        if self.depends_on(function):
-            lib.set_cells(self.cells, doubles(q), self._columns[function].start)
+        # By identity: functions of UFL compute what they hash to.
+        if (at := self._starts.get(id(function))) is not None:
+            lib.set_cells(self.cells, doubles(q), at)
 
     def put(self, function: fem.Function, values: Array) -> None:
         """Give ``function`` other values in the cells; shape (num_cells, dofs per cell)."""

@@ -172,6 +172,7 @@ class Points:
         course = course or Course()
         self._forms = PointForms(layout.softening, scheme)
         self._layout, self._storage, self._loss = layout, storage, scheme.loss
+        self._yields, self._softens = layout.yields, layout.softening is not None
         self._at = {name: storage[:, :, i] for i, name in enumerate(INPUTS)}
         self._bulk = bulk = layout.bulk(keys)
         numbers = {"C": bulk.C, "limit": bulk.limit, "H": bulk.H, "B": bulk.B, "eta": bulk.eta}
@@ -179,7 +180,8 @@ class Points:
             self._at[name][:] = value
         self._at["length"][:] = length[:, None]
         self._at["θ"][:] = scheme.theta
-        self._at["dt"][:] = self._dt = 1.0
+        self._steps = self._at["dt"]
+        self._steps[:] = self._dt = 1.0
         self._at["softening energy"][:] = 1.0
         self._at["traction"][:] = np.inf
         if layout.softening is not None:
@@ -230,7 +232,7 @@ class Points:
         """Begin a step of this length; s."""
         self._course.flags[:] = 0
         if dt != self._dt:
-            self["dt"][:] = self._dt = dt
+            self._steps[:] = self._dt = dt
 
     def respond(self, strains: Array) -> tuple[Array, Array]:
         """(N, V, M) that act in a step to these strains, and derivatives; (cells, 3), (cells, 9).
@@ -283,9 +285,9 @@ class Points:
     def enter_losses(self, ledger: Ledger) -> None:
         """Enter what the last step dissipated."""
         plastic, broken, lost, _, _ = self.sums.tolist()
-        if self._layout.yields:
+        if self._yields:
             ledger.lost["plastic"] += plastic
-        if self._layout.softening is not None:
+        if self._softens:
             ledger.lost["hinges"] += broken
         if self._loss:
             ledger.lost["numerical"] += 2 * self._loss * lost
@@ -294,7 +296,7 @@ class Points:
         """Enter what the accepted state stores."""
         _, _, _, elastic, hardening = self.sums.tolist()
         ledger.state["stored"] += elastic
-        if self._layout.yields:
+        if self._yields:
             ledger.state["hardening"] += hardening
 
     # -- the state -----------------------------------------------------------------------------

@@ -98,6 +98,20 @@ def measure(chosen, rounds, peers):
             yield kept
 
 
+def updated(old, new):
+    """Records of which new ones take the place of old ones of the same group."""
+    order = {}
+    for case in (*cases.tables(), *cases.ladders()):
+        order.setdefault(case.group, len(order))
+    groups = [(cases.group_of(one["part"], one["problem"], one["settings"]), one) for one in new]
+    measured = {group for group, _ in groups}
+    for one in old:
+        group = cases.group_of(one["part"], one["problem"], one["settings"])
+        if group in order and group not in measured:
+            groups.append((group, one))
+    return [one for _, one in sorted(groups, key=lambda pair: order[pair[0]])]
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="small cases, few rounds: 5 minutes")
@@ -109,6 +123,10 @@ def main():
     parser.add_argument(
         "--repeat", type=int, help="rounds; 5, of long cases 3, in the figure 2 and 1"
     )
+    parser.add_argument(
+        "--update", action="store_true",
+        help="let what is measured take the place of what was; for whole groups of programs",
+    )  # fmt: skip
     options = parser.parse_args()
 
     def wanted(case):
@@ -129,6 +147,7 @@ def main():
     print(f"{'problem, cells, step (s), program':56s} {'µs/step':>10} {'cpu':>10}  iterations/step")
     some = (options.only, options.cells, options.dt, options.programs, options.part)
     RESULTS.parent.mkdir(exist_ok=True)
+    old = RESULTS.read_text().splitlines() if options.update else []
     with open(os.devnull if any(some) else RESULTS, "w") as file:
         for part, rounds, quick in parts:
             if alike := options.repeat or (options.quick and quick):
@@ -137,7 +156,11 @@ def main():
                 records.append(kept | where)
                 file.write(json.dumps(records[-1]) + "\n")
                 file.flush()
-    if any(some):
+    if options.update:
+        records = updated(map(json.loads, old), records)
+        RESULTS.write_text("".join(json.dumps(one) + "\n" for one in records))
+        report.save(records)
+    elif any(some):
         print("\n".join(report.of_claims(records)))
     else:
         report.save(records)

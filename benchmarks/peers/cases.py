@@ -3,6 +3,11 @@
 from typing import NamedTuple
 
 
+def group_of(part, problem, settings):
+    """What cases have in common that are compared."""
+    return part, problem, *(settings.get(name) for name in ("cells", "dt", "turns", "end"))
+
+
 class Case(NamedTuple):
     """One program at one setting on one problem.
 
@@ -23,8 +28,7 @@ class Case(NamedTuple):
     @property
     def group(self):
         """Cases of one group run in turn, and are compared."""
-        names = ("cells", "dt", "turns", "end")
-        return self.part, self.problem, *(self.settings.get(name) for name in names)
+        return group_of(self.part, self.problem, self.settings)
 
 
 NEWTON = ("full", "modified")
@@ -154,7 +158,7 @@ LADDERS = (  # problem, variants, what is common, cells for each step
         0.005: (128, 256),
     }),
     ("P2", smooth("PrintedMidpoint"), {}, {
-        0.1: (4, 8), 0.05: (4, 8), 0.02: (8, 16), 0.01: (16, 32), 0.005: (32,),
+        0.1: (4, 8), 0.05: (4, 8), 0.02: (8, 16), 0.01: (16, 32), 0.005: (32,), 0.0025: (32, 64),
     }),
     ("P3", swing_ladder, SWING, {
         5e-3: (8, 16, 32), 2.5e-3: (16, 32, 64), 1e-3: (32, 64, 128), 5e-4: (128,),

@@ -79,7 +79,7 @@ def of_machine(records):
     versions = sorted({r["version"] for r in records if r.get("version", "C") != "C"})
     rounds = max((len(r["wall"]) for r in records if "wall" in r), default=0)
     return [
-        f"Commit {one['commit']}, {one['processor']}, one thread; {', '.join(versions)}; "
+        f"Commit {', '.join(dict.fromkeys(r['commit'] for r in records))}, {one['processor']}, one thread; {', '.join(versions)}; "
         f"medians of up to {rounds} rounds."
     ]
 
