@@ -222,6 +222,8 @@ static double growth(kernel *excess, double *w)
   double g[2], theta = w[THETA];
   double strain = (1 - theta) * w[BEFORE] + theta * w[STRAIN] - w[JUMP] / w[LENGTH];
   double bound = fabs(strain - w[PLASTIC]) * w[LENGTH] / theta + DBL_MIN;
+  /* Where a jump has relieved the strain, what the bulk bears has the last digits of both. */
+  double far = fmax(fabs(w[BEFORE]), fabs(w[STRAIN])) * w[LENGTH] + fabs(w[JUMP]);
   w[GROWTH] = 0;
   ask(excess, w, 2, g);
   if (g[0] <= 0) return 0; /* over the limit by a last digit */
@@ -233,7 +235,7 @@ static double growth(kernel *excess, double *w)
     else high = a;
     double next = a - g[0] / g[1], step = fabs(next - a);
     /* So small a relative step was the last but none: the next one would be its square. */
-    if (step <= 1e-9 * a || step <= 4 * DBL_EPSILON * bound) return next > 0 ? next : a;
+    if (step <= 1e-9 * a || step <= 4 * DBL_EPSILON * (bound + far)) return next > 0 ? next : a;
     if (!(next > low && next < high)) next = high < INFINITY ? (low + high) / 2 : 2 * a;
     a = next;
   }

@@ -76,10 +76,11 @@ def of_times(records):
 
 def of_machine(records):
     one = records[0]
+    commits = dict.fromkeys(r["commit"] for r in records)
     versions = sorted({r["version"] for r in records if r.get("version", "C") != "C"})
     rounds = max((len(r["wall"]) for r in records if "wall" in r), default=0)
     return [
-        f"Commit {', '.join(dict.fromkeys(r['commit'] for r in records))}, {one['processor']}, one thread; {', '.join(versions)}; "
+        f"Commit {', '.join(commits)}, {one['processor']}, one thread; {', '.join(versions)}; "
         f"medians of up to {rounds} rounds."
     ]
 
