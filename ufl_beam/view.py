@@ -111,9 +111,15 @@ def plot_shapes(
         magnify: Factor on the displacements.
 
     Raises:
-        SceneError: ``count`` is less than 1, or ``magnify`` is not positive.
+        SceneError: ``times`` is one number, ``count`` is less than 1, or ``magnify`` is not
+            positive.
     """
     require_number(count, "plot_shapes: count", at_least=1)
+    if np.ndim(times) != 1:
+        raise SceneError(
+            f"plot_shapes: times = {times!r} must be a sequence of times (s); for so many shapes "
+            f"say count={times!r}"
+        )
     kept = solution.times
     chosen = nearest(kept, times if len(times) else np.linspace(kept[0], kept[-1], int(count)))
     shapes = [moved_points(solution, n, magnify) for n in chosen]
