@@ -437,8 +437,9 @@ class Solver:
             snes.solve(None, self._x)
             reason = int(snes.getConvergedReason())
         except PETSc.Error as error:
-            if error.__cause__ is not None:
-                raise error.__cause__ from None
+            cause = error.__cause__
+            if cause is not None and not isinstance(cause, PETSc.Error):
+                raise cause from None
             reason = int(lib.SINGULAR)  # KLU stops PETSc where it finds no pivot
         if self._equation is not None:
             self._error = self._error or self._equation.taken_error()
