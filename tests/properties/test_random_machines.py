@@ -9,8 +9,11 @@ from random_machines import STEPS, round_off, script
 
 import ufl_beam as ub
 
-SAMPLE = [seed for seed in range(27) if seed not in (2, 13)]
-"""Seeds of the default run without two of thousands of iterations; the slow one takes all."""
+SAMPLE = [*(seed for seed in range(27) if seed not in (2, 13)), 91]
+"""Seeds of the default run without two of thousands of iterations; the slow one takes all.
+
+In 91 a solution of KLU finds that the tangent is singular, within a careful search.
+"""
 
 ALL = range(500)
 
