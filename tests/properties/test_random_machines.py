@@ -54,7 +54,8 @@ def run(seed):
         faulthandler.cancel_dump_traceback_later()
     assert any(words in said for words in CLEAR), said
     assert np.isfinite(solution.q).all()
-    assert all((np.diff(lost) >= -1e-12 * abs(lost).max()).all() for lost in _sinks(solution))
+    digits = 1e-12 * solution.energy.throughput
+    assert all((np.diff(lost) >= -digits).all() for lost in _sinks(solution))
     imbalance = max(float(np.abs(solution.energy.imbalance).max()) - round_off(solution), 0.0)
     return imbalance / (solution.energy.throughput or 1.0)
 
