@@ -67,7 +67,7 @@ class ChainsFirst:
         self._factors.setOperators(self._matrix)
         self._factors.setType("lu")
         self._factors.setFactorSolverType(package)
-        self._factors.setFactorPivot(0.0)
+        self._factors.setFactorPivot(0.0)  # PETSc takes 2e-14 for zero, whatever the units
         if package == "petsc":
             # Of narrow and wide lattices it fills in least: 0.55 and 0.9 of the time of "nd".
             self._factors.setFactorOrdering("amd")

@@ -90,8 +90,12 @@ def test_expressions(expression, cells):
 
 @pytest.mark.parametrize(
     ("expression", "meant"),
-    [(ufl.atan, np.arctan), (lambda x: (x + 2) ** 0.5, lambda x: (x + 2) ** 0.5)],
-    ids=["another function", "a broken power"],
+    [
+        (ufl.atan, np.arctan),
+        (lambda x: (x + 2) ** 0.5, lambda x: (x + 2) ** 0.5),
+        (lambda x: abs(x) ** 1.5 + x**2, lambda x: abs(x) ** 1.5 + x**2),
+    ],
+    ids=["another function", "a broken power", "beside a whole one"],
 )
 def test_what_vectors_cannot_is_computed_cell_by_cell(expression, meant):
     kernel, q = pointwise(expression, np.linspace(-1.0, 2.0, 5))
