@@ -80,8 +80,8 @@ def test_mesh_of_the_paper(t, mid, A, unit):
 def test_links_keep_their_length_and_do_no_work():
     """To 1e-12 of their length; the energy is that of the pulse, 0.063887 J [calc].
 
-    Newton's method meets constraints to 1e-12 of the size of the scene; on as much the forces, up to
-    150 N, could do a work of 1e-10 J.
+    Newton's method meets constraints to 1e-12 of the size of the scene; on as much the forces, up
+    to 150 N, could do a work of 1e-10 J.
     """
     solution = run()
     for joint, apart in zip(solution.scene.joints, (0.36, math.sqrt(2) * 0.36), strict=True):
