@@ -24,7 +24,7 @@ import numpy as np
 
 import ufl_beam as ub
 from ufl_beam.compat import dolfinx
-from ufl_beam.loops import doubles, lib
+from ufl_beam.loops import doubles, ffi, lib
 
 CASES = ((8, 1000), (64, 500), (512, 200), (4096, 50), (100_000, 10))  # cells, steps
 RESULTS = Path(__file__).parent / "results" / "bench_step.jsonl"
@@ -69,21 +69,15 @@ def parts(simulation):
     x, equation = solver.iterate(), solver._equation.c
     r = np.zeros_like(x)
     at_x, at_r = doubles(x), doubles(r)
-    matrix, factors = solver._matrix, solver._ksp.getPC()
-    b, y = matrix.createVecs()
+    failed = ffi.new("int *")
     lib.assemble(equation, at_x)
-
-    def factor():
-        matrix.stateIncrease()
-        factors.setUp()
-
     return {
         "residual": microseconds(lambda: lib.residual(equation, at_x, at_r)),
         "of it beams": microseconds(lambda: simulation.beams[0].add_residual(x, r)),
         "tangent": microseconds(lambda: lib.assemble(equation, at_x)),
         "of it beams ": microseconds(lambda: simulation.beams[0].add_tangent(x)),
-        "factor": microseconds(factor),
-        "solve": microseconds(lambda: factors.apply(b, y)),
+        "factor": microseconds(lambda: lib.factor_tangent(equation, failed)),
+        "solve": microseconds(lambda: lib.solve_tangent(equation)),
         "sizes of forces": microseconds(lambda: lib.size_of_forces(equation, at_r)),
     }
 

@@ -214,6 +214,8 @@ enum {
 
 void residual(equation *e, const double *q, double *r);
 void assemble(equation *e, const double *q);
+int factor_tangent(const equation *e, int *failed);
+int solve_tangent(const equation *e);
 void find_last_digits(const equation *e, const double *q, double *digits);
 double size_of_forces(const equation *e, const double *f);
 int judge(equation *e, const double *q, int iteration, double residual, double scale,

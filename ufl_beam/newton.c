@@ -151,7 +151,7 @@ int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int
 #define TRY(call) do { int error = (call); if (error) return error; } while (0)
 
 /* Factors of the tangent; *failed if it is singular. */
-static int factor(const equation *e, int *failed)
+int factor_tangent(const equation *e, int *failed)
 {
   const petsc *p = e->petsc;
   double *entries; /* asking for them tells PETSc that they change */
@@ -165,7 +165,7 @@ static int factor(const equation *e, int *failed)
 }
 
 /* What Newton's method subtracts from the iterate. */
-static int solve(const equation *e)
+int solve_tangent(const equation *e)
 {
   reduce(e->chains, e->residual);
   TRY(e->petsc->apply(e->factors, e->left_f, e->left_x));
@@ -192,13 +192,13 @@ int snes_newton(void *snes, void *x)
     if (!e->near) {
       int failed = 0;
       assemble(e, q);
-      TRY(factor(e, &failed));
+      TRY(factor_tangent(e, &failed));
       if (failed) {
         reason = SINGULAR;
         break;
       }
     }
-    TRY(solve(e));
+    TRY(solve_tangent(e));
     for (int i = 0; i < e->size; ++i) q[i] -= e->change[i];
     residual(e, q, e->residual);
     ++iteration;
