@@ -9,20 +9,17 @@ Prints a table and writes one JSON line per scene to ``benchmarks/results/bench_
 """
 
 import argparse
-import json
 import statistics
 import sys
 from pathlib import Path
 
-from bench_step import machine
+from records import keep
 
 import ufl_beam as ub
 
 sys.path.append(str(Path(__file__).parent / "study"))
 
 from cases import CASES
-
-RESULTS = Path(__file__).parent / "results" / "bench_budget.jsonl"
 
 
 def measure(case, budget, repeat):
@@ -49,17 +46,15 @@ def main():
     parser.add_argument("--repeat", type=int, default=5, help="runs of what is recommended")
     options = parser.parse_args()
     print(f"{'':24s} {'asked':>6} {'measured':>9} {'again':>6} {'ratio':>6} {'spent':>6}   s")
-    RESULTS.parent.mkdir(exist_ok=True)
-    with RESULTS.open("a") as file:
-        for case in (case for case in CASES if case.dynamic):
-            one = measure(case, options.budget, options.repeat)
-            file.write(json.dumps({**one, **machine()}) + "\n")
-            print(
-                f"{case.name:24s} {one['asked_s']:6.2f} {one['measured_s']:9.2f} "
-                f"{statistics.median(one['again_s']):6.2f} {one['ratio']:6.2f} "
-                f"{one['spent_s']:6.1f}",
-                flush=True,
-            )
+    for case in (case for case in CASES if case.dynamic):
+        one = measure(case, options.budget, options.repeat)
+        keep("bench_budget", one)
+        print(
+            f"{case.name:24s} {one['asked_s']:6.2f} {one['measured_s']:9.2f} "
+            f"{statistics.median(one['again_s']):6.2f} {one['ratio']:6.2f} "
+            f"{one['spent_s']:6.1f}",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

@@ -12,15 +12,12 @@ per step over the whole time loop; ratios are those of the medians.  One JSON li
 """
 
 import argparse
-import json
 import statistics
-from pathlib import Path
 
-from bench_step import machine, time_loop
+from bench_step import time_loop
+from records import keep, machine
 
 import ufl_beam as ub
-
-RESULTS = Path(__file__).parent / "results" / "bench_inelastic.jsonl"
 
 
 def flying_beam(cells, **laws):
@@ -75,30 +72,26 @@ def main():
     options = parser.parse_args()
     print(f"Midpoint(), medians of {options.repeat} alternations; {machine()}")
     print(f"{'':42s} {'µs per':>9} {'without':>9} {'with':>9} {'ratio':>6}")
-    RESULTS.parent.mkdir(exist_ok=True)
-    with RESULTS.open("a") as file:
-        for name, (*scenes, steps, dt) in PAIRS.items():
-            for scene in scenes:
-                time_loop(scene, 2, dt)  # compiles
-            loops = [
-                [time_loop(scene, steps, dt) for scene in scenes] for _ in range(options.repeat)
-            ]
-            case = {"case": name, "steps": steps, "dt": dt, **machine()}
-            for unit in ("iteration", "step"):
-                without, with_ = (
-                    statistics.median(
-                        1e6 * seconds / (iterations if unit == "iteration" else steps)
-                        for seconds, iterations, _ in one
-                    )
-                    for one in zip(*loops, strict=True)
+    for name, (*scenes, steps, dt) in PAIRS.items():
+        for scene in scenes:
+            time_loop(scene, 2, dt)  # compiles
+        loops = [[time_loop(scene, steps, dt) for scene in scenes] for _ in range(options.repeat)]
+        case = {"case": name, "steps": steps, "dt": dt}
+        for unit in ("iteration", "step"):
+            without, with_ = (
+                statistics.median(
+                    1e6 * seconds / (iterations if unit == "iteration" else steps)
+                    for seconds, iterations, _ in one
                 )
-                ratio = with_ / without
-                case |= {
-                    f"us_per_{unit}_without": without, f"us_per_{unit}_with": with_,
-                    f"ratio_per_{unit}": ratio,
-                }  # fmt: skip
-                print(f"{name:42s} {unit:>9} {without:9.1f} {with_:9.1f} {ratio:6.2f}", flush=True)
-            file.write(json.dumps(case) + "\n")
+                for one in zip(*loops, strict=True)
+            )
+            ratio = with_ / without
+            case |= {
+                f"us_per_{unit}_without": without, f"us_per_{unit}_with": with_,
+                f"ratio_per_{unit}": ratio,
+            }  # fmt: skip
+            print(f"{name:42s} {unit:>9} {without:9.1f} {with_:9.1f} {ratio:6.2f}", flush=True)
+        keep("bench_inelastic", case)
 
 
 if __name__ == "__main__":

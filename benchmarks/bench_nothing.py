@@ -11,16 +11,13 @@ to ``benchmarks/results/bench_nothing.jsonl``.
 """
 
 import argparse
-import json
 import statistics
 import time
-from pathlib import Path
 
-from bench_step import machine
+from records import keep
 
 import ufl_beam as ub
 
-RESULTS = Path(__file__).parent / "results" / "bench_nothing.jsonl"
 SECTION = {"EA": 1e4, "GA": 1e4, "EI": 100.0, "rhoA": 1.0, "rhoI": 1.0}
 
 
@@ -76,31 +73,30 @@ def main():
     print(
         f"{'':22s} {'unknowns':>8} {'entries':>8} {'its/step':>8} {'µs/it':>7} {'ratio':>6}  works"
     )
-    with RESULTS.open("a") as file:
-        for name, (_, scheme) in SCENES.items():
-            simulation, _, iterations = runs[0][name]
-            times = [1e6 * one[name][1] / one[name][2] for one in runs]
-            beside = [
-                (one[name][1] / one[name][2]) / (one[other][1] / one[other][2])
-                for one in runs
-                for other in [plain[scheme.dynamic]]
-            ]
-            case = {
-                "case": name,
-                "unknowns": simulation.grid.size,
-                "entries": len(simulation._A.data),
-                "works": [type(term).__name__ for term in simulation.terms],
-                "iterations_per_step": iterations / options.steps,
-                "us_per_iteration": statistics.median(times),
-                "ratio": statistics.median(beside),
-            }
-            file.write(json.dumps({**case, **machine()}) + "\n")
-            print(
-                f"{name:22s} {case['unknowns']:8d} {case['entries']:8d} "
-                f"{case['iterations_per_step']:8.2f} {case['us_per_iteration']:7.1f} "
-                f"{case['ratio']:6.2f}  {', '.join(case['works'])}",
-                flush=True,
-            )
+    for name, (_, scheme) in SCENES.items():
+        simulation, _, iterations = runs[0][name]
+        times = [1e6 * one[name][1] / one[name][2] for one in runs]
+        beside = [
+            (one[name][1] / one[name][2]) / (one[other][1] / one[other][2])
+            for one in runs
+            for other in [plain[scheme.dynamic]]
+        ]
+        case = {
+            "case": name,
+            "unknowns": simulation.grid.size,
+            "entries": len(simulation._A.data),
+            "works": [type(term).__name__ for term in simulation.terms],
+            "iterations_per_step": iterations / options.steps,
+            "us_per_iteration": statistics.median(times),
+            "ratio": statistics.median(beside),
+        }
+        keep("bench_nothing", case)
+        print(
+            f"{name:22s} {case['unknowns']:8d} {case['entries']:8d} "
+            f"{case['iterations_per_step']:8.2f} {case['us_per_iteration']:7.1f} "
+            f"{case['ratio']:6.2f}  {', '.join(case['works'])}",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

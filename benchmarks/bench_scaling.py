@@ -20,16 +20,14 @@ import subprocess
 import sys
 import time
 from collections import defaultdict
-from pathlib import Path
 
 from mpi4py import MPI
 
-from bench_step import machine
+from records import keep
 
 import ufl_beam as ub
 from ufl_beam import simulation as one_process_below
 
-RESULTS = Path(__file__).parent / "results" / "bench_scaling.jsonl"
 STEEL = {"E": 210e9, "nu": 0.3, "rho": 7850.0}  # Pa, -, kg/m^3
 BAY, MEMBER_CELLS = 3.0, 10  # m
 
@@ -167,24 +165,22 @@ def main():
             print(json.dumps(record))
         return
     runs = [[run(n, options) for n in options.processes] for _ in range(options.repeat)]
-    RESULTS.parent.mkdir(exist_ok=True)
-    with RESULTS.open("a") as file:
-        for same in zip(*runs, strict=True):
-            times = sorted(one["ms_per_iteration"] for one in same)
-            case = {
-                **sorted(same, key=lambda one: one["ms_per_iteration"])[len(same) // 2],
-                "ms_per_iteration": statistics.median(times),
-                "ms_min": times[0], "ms_max": times[-1], **machine(),
-            }  # fmt: skip
-            file.write(json.dumps(case) + "\n")
-            print(
-                f"{case['cells']} cells, {case['processes']} processes: "
-                f"{case['ms_per_iteration']:.1f} ms/iteration ({times[0]:.1f} to {times[-1]:.1f}), "
-                f"built in {case['build_s']:.1f} s, "
-                f"{max(case['memory_mb']):.0f} MB on a process; "
-                + ", ".join(f"{name} {t:.1f}" for name, t in case["parts_ms"].items()),
-                flush=True,
-            )
+    for same in zip(*runs, strict=True):
+        times = sorted(one["ms_per_iteration"] for one in same)
+        case = {
+            **sorted(same, key=lambda one: one["ms_per_iteration"])[len(same) // 2],
+            "ms_per_iteration": statistics.median(times),
+            "ms_min": times[0], "ms_max": times[-1],
+        }  # fmt: skip
+        keep("bench_scaling", case)
+        print(
+            f"{case['cells']} cells, {case['processes']} processes: "
+            f"{case['ms_per_iteration']:.1f} ms/iteration ({times[0]:.1f} to {times[-1]:.1f}), "
+            f"built in {case['build_s']:.1f} s, "
+            f"{max(case['memory_mb']):.0f} MB on a process; "
+            + ", ".join(f"{name} {t:.1f}" for name, t in case["parts_ms"].items()),
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

@@ -11,23 +11,17 @@ are timed by themselves, in a loop, at a state of the motion.
 """
 
 import argparse
-import json
-import platform
 import statistics
-import subprocess
 import sys
 import time
-from functools import cache
-from pathlib import Path
 
 import numpy as np
+from records import keep, machine
 
 import ufl_beam as ub
-from ufl_beam.compat import dolfinx
 from ufl_beam.loops import doubles, ffi, lib
 
 CASES = ((8, 1000), (64, 500), (512, 200), (4096, 50), (100_000, 10))  # cells, steps
-RESULTS = Path(__file__).parent / "results" / "bench_step.jsonl"
 
 
 def flying_beam(cells):
@@ -82,22 +76,6 @@ def parts(simulation):
     }
 
 
-@cache
-def machine():
-    """Commit, versions and machine of a measurement."""
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False
-    ).stdout.strip()
-    return {
-        "commit": commit or "unknown",
-        "python": platform.python_version(),
-        "dolfinx": dolfinx.__version__,
-        "machine": platform.machine(),
-        "processor": processor(),
-        "threads": 1,
-    }
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--repeat", type=int, default=7, help="runs of each case")
@@ -108,39 +86,26 @@ def main():
         f"{'cells':>6} {'µs/step':>10} {'iterations':>10} {'µs/iter':>9} {'µs/cell/iter':>12}"
         "  parts, µs"
     )
-    RESULTS.parent.mkdir(exist_ok=True)
-    with RESULTS.open("a") as file:
-        for cells, steps in CASES:
-            time_loop(flying_beam(cells), 2, options.dt)  # compiles
-            loops = [
-                time_loop(flying_beam(cells), steps, options.dt) for _ in range(options.repeat)
-            ]
-            iterations, simulation = loops[0][1:]
-            seconds = sorted(loop[0] for loop in loops)
-            median = 1e6 * statistics.median(seconds)
-            split = {name: round(t, 2) for name, t in parts(simulation).items()}
-            print(
-                f"{cells:6d} {median / steps:10.1f} {iterations / steps:10.2f} "
-                f"{median / iterations:9.1f} {median / iterations / cells:12.3f}  "
-                + ", ".join(f"{name.strip()} {t:.1f}" for name, t in split.items()),
-                flush=True,
-            )
-            case = {
-                "case": "flying beam", "cells": cells, "steps": steps, "dt": options.dt,
-                "iterations": iterations, "us_per_iteration": median / iterations,
-                "us_min": 1e6 * seconds[0] / iterations, "us_max": 1e6 * seconds[-1] / iterations,
-                "parts_us": split, **machine(),
-            }  # fmt: skip
-            file.write(json.dumps(case) + "\n")
-
-
-def processor():
-    """Name of the processor, where the system tells."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        return platform.processor()
-    return next((x.split(":")[1].strip() for x in lines if x.startswith("model name")), "unknown")
+    for cells, steps in CASES:
+        time_loop(flying_beam(cells), 2, options.dt)  # compiles
+        loops = [time_loop(flying_beam(cells), steps, options.dt) for _ in range(options.repeat)]
+        iterations, simulation = loops[0][1:]
+        seconds = sorted(loop[0] for loop in loops)
+        median = 1e6 * statistics.median(seconds)
+        split = {name: round(t, 2) for name, t in parts(simulation).items()}
+        print(
+            f"{cells:6d} {median / steps:10.1f} {iterations / steps:10.2f} "
+            f"{median / iterations:9.1f} {median / iterations / cells:12.3f}  "
+            + ", ".join(f"{name.strip()} {t:.1f}" for name, t in split.items()),
+            flush=True,
+        )
+        case = {
+            "case": "flying beam", "cells": cells, "steps": steps, "dt": options.dt,
+            "iterations": iterations, "us_per_iteration": median / iterations,
+            "us_min": 1e6 * seconds[0] / iterations, "us_max": 1e6 * seconds[-1] / iterations,
+            "parts_us": split,
+        }  # fmt: skip
+        keep("bench_step", case)
 
 
 if __name__ == "__main__":

@@ -28,7 +28,7 @@ ALONE = dict.fromkeys(
 
 def machine():
     """Commit, versions and machine, asked in a process of its own: this one stays small."""
-    code = "import json, bench_step; print(json.dumps(bench_step.machine()))"
+    code = "import json, records; print(json.dumps(records.machine()))"
     command = [sys.executable, "-c", code]
     done = subprocess.run(command, cwd=HERE.parent, capture_output=True, text=True, check=True)
     return json.loads(done.stdout)

@@ -14,9 +14,9 @@ from pathlib import Path
 
 sys.path.append(str(Path(__file__).parents[1]))
 
-from bench_step import machine
 from cases import CASES
 from measure import Bench
+from records import machine
 from report import save
 
 ROOT = Path(__file__).parents[2]

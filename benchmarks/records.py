@@ -1,0 +1,43 @@
+"""What benchmarks keep of a measurement: a line of JSON, with commit, versions and machine."""
+
+import json
+import platform
+import subprocess
+from functools import cache
+from pathlib import Path
+
+from ufl_beam.compat import dolfinx
+
+RESULTS = Path(__file__).parent / "results"
+
+
+def keep(name, record):
+    """Append a record to ``results/NAME.jsonl``."""
+    RESULTS.mkdir(exist_ok=True)
+    with (RESULTS / f"{name}.jsonl").open("a") as file:
+        file.write(json.dumps({**record, **machine()}) + "\n")
+
+
+@cache
+def machine():
+    """Commit, versions and machine of a measurement."""
+    commit = subprocess.run(
+        ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False
+    ).stdout.strip()
+    return {
+        "commit": commit or "unknown",
+        "python": platform.python_version(),
+        "dolfinx": dolfinx.__version__,
+        "machine": platform.machine(),
+        "processor": processor(),
+        "threads": 1,
+    }
+
+
+def processor():
+    """Name of the processor, where the system tells."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor()
+    return next((x.split(":")[1].strip() for x in lines if x.startswith("model name")), "unknown")
