@@ -144,11 +144,12 @@ class Live:
         rates = np.zeros(len(links))
         for v in self.velocities():
             fastest = np.abs(v).max(initial=0.0) or 1.0
-            ε = 1e-5 * self.scene.size / fastest
+            ε = 1e-5 * self.scene.size
+            way = ε * (v / fastest)
             for coupling in self.couplings:
                 if coupling.links == list(links):
-                    ends = (coupling.motion(self.q + sign * ε * v) for sign in (1, -1))
-                    rates += np.subtract(*ends) / (2 * ε)
+                    ends = (coupling.motion(self.q + sign * way) for sign in (1, -1))
+                    rates += np.subtract(*ends) / (2 * ε) * fastest
         return rates
 
     def section_forces(self) -> Array:

@@ -183,6 +183,15 @@ double largest_size(int rows, const double *w, const double *f)
   return largest;
 }
 
+/* Largest displacement in q, and rotation times the size of the scene; w as for forces. */
+double largest_motion(int rows, const double *w, const double *q)
+{
+  double largest = 0;
+  for (int i = 0; i < rows; ++i)
+    if (w[i] > 0 && !(fabs(q[i]) <= largest * w[i])) largest = fabs(q[i]) / w[i];
+  return largest;
+}
+
 /* Whether a sum of squares has all its digits: none of them has become too small or too large. */
 int has_its_digits(double sum)
 {
@@ -363,25 +372,26 @@ void add_couplings_force(void *self, const double *q, double *r)
   add_cells((void *)c->work, q, r);
 }
 
-/* Largest residual of a row: of motions as a part of 1 % of the scene, or of the scale of forces. */
-double missed_by_couplings(void *self, const double *q, const double *r, double scale)
+/* Largest residual of a row: of motions as a part of 1 % of the largest motion in the scene, or of 1 %
+ * of the scene if that is less; of forces as a part of the scale. What the last digits of the motions
+ * make of a row does not count; far from where it began, or after many turns, it has fewer digits. */
+double missed_by_couplings(void *self, const double *q, const double *r, double scale, double moved)
 {
   const couplings *c = self;
-  const double force = scale > 0 ? scale : 1;
   double most = 0;
   for (int k = 0; k < c->number; ++k) {
     const int i = c->link[k];
     const int32_t *dofs = c->dofs + 7 * i;
     const double *row = in_cell(c->work, k, c->row), length = c->length[i];
     const int next = c->work->lanes;
-    const double size = fabs(row[next]) < 1 ? 0.01 * length : force * c->size / length;
-    /* Far from where it began, or after many turns, a part has fewer digits left. */
-    double moved = 0, turned = 0;
-    for (int j = 0; j < 4; ++j) moved = fmax(moved, fabs(q[dofs[j]]));
-    for (int j = 4; j < 6; ++j) turned = fmax(turned, fabs(q[dofs[j]]));
-    const double far = 1 + moved / c->size + turned;
+    const double part = moved / c->size;
+    const double size = fabs(row[next]) < 1 ? 0.01 * length * part : scale * c->size / length;
+    double far = part;
+    for (int j = 0; j < 4; ++j) far = fmax(far, part + fabs(q[dofs[j]]) / c->size);
+    for (int j = 4; j < 6; ++j) far = fmax(far, part + fabs(q[dofs[j]]));
     const double round_off = 8 * fabs(row[0]) * length * (nextafter(far, INFINITY) - far);
-    const double missed = fmax(fabs(r[c->force[i]]) - round_off, 0) / size;
+    const double left = fabs(r[c->force[i]]) - round_off;
+    const double missed = left > 0 ? left / size : left <= 0 ? 0 : NAN;
     if (!(missed <= most)) most = missed;
   }
   return most;

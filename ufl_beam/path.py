@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
 
 from mpi4py import MPI
@@ -107,7 +108,8 @@ class StaticPath:
         # A motor that stretches a spring gives what the spring takes; their sum measures nothing.
         # Connectors count one by one, so that the size is the same on any number of processes.
         size = abs(work) + abs(in_beams) + total(sum(one.effort(q1) for one in self._couplings))
-        slack = self._scheme.slack * size + least_work
+        # Smaller numbers than the least normal one have not all their digits.
+        slack = self._scheme.slack * size + least_work + sys.float_info.min
         if abs(work - change) > slack + KINK * total(self._ledger.size()):
             raise StepFailed(
                 f"the step stores and dissipates {change:.3e} J, but the forces along it do "

@@ -264,10 +264,10 @@ class Simulation(Live):
         here = self._course.relieve()
         return self.share.comm.allreduce(here, op=MPI.LOR) if self.share.comm.size > 1 else here
 
-    def _excess(self, x: Array, r: Array, scale: float) -> float:
+    def _excess(self, x: Array, r: Array, scale: float, moved: float) -> float:
         """How far the laws of connectors are missed."""
         q1 = self.supports.in_plane(x)
-        here = max((c.excess(q1, r, scale) for c in self.couplings), default=0.0)
+        here = max((c.excess(q1, r, scale, moved) for c in self.couplings), default=0.0)
         if self.share.comm.size > 1:
             return self.share.comm.allreduce(here, op=MPI.MAX) if self.scene.links else 0.0
         return here
