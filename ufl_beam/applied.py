@@ -64,9 +64,10 @@ class DeadLoads:
         """A vector."""
         return loop("subtract_vector", self._in_c), None
 
-    def carry_on(self, t: float, q: Array) -> None:
-        """Take the state ``q`` at time ``t`` as one that is in equilibrium with the loads."""
+    def carry_on(self, t: float, q: Array) -> Array:
+        """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them."""
         self._before = self._times([time(t) for time, _ in self._vectors])
+        return self._before
 
     def _times(self, factors: list[float]) -> Array:
         (_, vector), *others = self._vectors
@@ -143,11 +144,12 @@ class FollowerLoads:
         self._sizes = self._sizes_before + step.toward * (target - self._sizes_before)
         self._ψ0 = step.q0[self._dofs[:, 2]]
 
-    def carry_on(self, t: float, q: Array) -> None:
-        """Take the state ``q`` at time ``t`` as one that is in equilibrium with the loads."""
+    def carry_on(self, t: float, q: Array) -> Array:
+        """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them."""
         self._sizes_before = self._sizes = self._sizes_at(t)
         self._ψ0 = q[self._dofs[:, 2]]
         self.force = self._before = self._in_plane(q)
+        return self.force
 
     def _sizes_at(self, t: float) -> Array:
         factors = np.array([time(t) for time in self._times])

@@ -419,13 +419,14 @@ double commit_couplings(const couplings *c, const double *q, double dt)
  *
  * Each cell keeps what it bears (3), the jump of its last point, and what it dissipated by plastic
  * strains and by discontinuities; sum gets what all cells dissipated so in the step, what they lost
- * numerically at theta = 1, and what they store elastically and by hardening.
+ * numerically at theta = 1, what they store elastically and by hardening, and what breaking points let
+ * go of.
  */
 void commit(const points *p)
 {
   double s[SAID], *e0 = p->e0, *w = p->w, *kept = p->kept, *sum = p->sum;
   const double *e1 = p->e1, *rest = p->rest, *length = p->length, *weight = p->weight;
-  memset(sum, 0, 5 * sizeof *sum);
+  memset(sum, 0, 6 * sizeof *sum);
   for (int c = 0; c < p->cells; ++c, e0 += 3, e1 += 3, kept += 6) {
     double plastic = 0, broken = 0;
     for (int k = 0; k < 3; ++k) {
@@ -445,6 +446,13 @@ void commit(const points *p)
       w[OPENING] += w[GROWTH];
       w[GROWTH] = w[DIRECTION] = 0;
       if (w[TRACTION] < INFINITY) w[TRACTION] = s[RESISTANCE];
+      if (w[TRACTION] == 0) {
+        /* Broken: the mean stress of each step is zero from now on, but stresses at the ends may
+         * alternate about that. The discontinuity takes the elastic strain, which nothing holds. */
+        w[JUMP] += s[STRESS] / w[STIFFNESS] * w[LENGTH];
+        sum[5] += volume * s[ELASTIC];
+        s[STRESS] = s[ELASTIC] = 0;
+      }
       plastic += volume * s[WORKED];
       broken += weight[i] * s[BROKEN];
       sum[2] += volume * s[LOST];

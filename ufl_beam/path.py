@@ -58,6 +58,11 @@ class StaticPath:
             one.begin(scheme.step(t0, t0 + 1.0, t0 + 1.0, q))
             one.add_residual(q, self._before)
 
+    @property
+    def force(self) -> Array:
+        """The internal forces at the end of the last step."""
+        return self._before
+
     def remember(self, memory: Memory, q: Array) -> None:
         """The internal forces at the end of the last step."""
         self._before = memory.added("internal forces", self._before)

@@ -76,10 +76,11 @@ class FrameForces:
         self._q0, self._dt = step.q0, step.dt
         self._growth = self._grown + step.toward * (1.0 - self._grown)
 
-    def carry_on(self, t: float, q: Array) -> None:
-        """Take the state ``q`` as one that is in equilibrium with the forces."""
+    def carry_on(self, t: float, q: Array) -> Array:
+        """The forces at ``q``; take that state as one that is in equilibrium with them."""
         self._grown = 1.0
         self.force = self._before = self._pull(self._from_centre + q)
+        return self.force
 
     def loops(self) -> None:
         """None."""

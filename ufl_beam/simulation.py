@@ -163,9 +163,9 @@ class Simulation(Live):
         self.supports = Supports(self.share, scheme, self.ledger, self._A)
         if has_inertia(scheme):
             self.supports.stop(self.inertia.v)
+        loaded: list[Array] = []
         if start is not None or (has_inertia(scheme) and scheme.kept):
-            for load in self.loads:
-                load.carry_on(self.t, self.q)
+            loaded = [load.carry_on(self.t, self.q) for load in self.loads]
         if start is not None:
             memory = Restoring(self.share, start.internal)
             for one in (*self.inelastic, *self.couplings):
@@ -190,6 +190,7 @@ class Simulation(Live):
         if not scheme.dynamic:
             parts = (self.beams, self.couplings)
             self._path = StaticPath(self.share, scheme, *parts, self.ledger, self.q, t0)
+            self._bear(self._path, loaded)
         equation = None
         if self.share.comm.size == 1 and not self.supports.turned:
             terms = (self.beams, self.couplings, self._others)
@@ -246,6 +247,19 @@ class Simulation(Live):
         if followers:
             loads.append(FollowerLoads(followers, self.share, self.scheme, self.ledger, self._A))
         return loads
+
+    def _bear(self, path: StaticPath, loads: list[Array]) -> None:
+        """Set the reactions to those of the initial state of a static run.
+
+        Args:
+            path: Knows the internal forces of that state.
+            loads: The loads that it is in equilibrium with; none if nothing acts yet.
+        """
+        r = path.force - sum(loads)
+        self.supports.enter(r)
+        self.supports.hold(self.share.added(r))
+        self.supports.take()
+        self.reactions_known = True
 
     # -- the equation of a step ----------------------------------------------------------------
 

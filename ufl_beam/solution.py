@@ -224,8 +224,12 @@ class Solution:
     def reaction(self, support: Support) -> Array:
         """Force and moment of a support on the scene; (n+1, 3); N, N, N m.
 
+        In statics the first row is what the initial state bears: nothing where the run begins with
+        the undeformed scene, for loads act from the first step on; and the reactions of that
+        equilibrium where it begins with ``start=``.
+
         In dynamics they are those that act during the step that ends at each time; the first row is
-        NaN where no step came before.
+        NaN, for no step came before.
 
         Raises:
             SceneError: The support is not in the scene.
