@@ -419,14 +419,14 @@ double commit_couplings(const couplings *c, const double *q, double dt)
  *
  * Each cell keeps what it bears (3), the jump of its last point, and what it dissipated by plastic
  * strains and by discontinuities; sum gets what all cells dissipated so in the step, what they lost
- * numerically at theta = 1, what they store elastically and by hardening, and what breaking points let
- * go of.
+ * numerically at theta = 1, what they store elastically and by hardening, what breaking points let go
+ * of, and what mean stresses do more on plastic strains than those at the end, where these are less.
  */
 void commit(const points *p)
 {
   double s[SAID], *e0 = p->e0, *w = p->w, *kept = p->kept, *sum = p->sum;
   const double *e1 = p->e1, *rest = p->rest, *length = p->length, *weight = p->weight;
-  memset(sum, 0, 6 * sizeof *sum);
+  memset(sum, 0, 7 * sizeof *sum);
   for (int c = 0; c < p->cells; ++c, e0 += 3, e1 += 3, kept += 6) {
     double plastic = 0, broken = 0;
     for (int k = 0; k < 3; ++k) {
@@ -439,6 +439,9 @@ void commit(const points *p)
     for (int i = 0; i < p->of_cell; ++i, w += WIDTH) {
       double volume = weight[i] * length[c];
       ask(p->end, w, SAID, s);
+      const double elastic = w[BEFORE] - w[JUMP] / w[LENGTH] - w[PLASTIC];
+      const double relaxed = (w[STIFFNESS] * elastic - s[STRESS]) / 2 * s[FLOW];
+      if (relaxed > 0) sum[6] += volume * relaxed;
       w[BEFORE] = w[STRAIN];
       w[PLASTIC] += s[FLOW];
       w[ACCUMULATED] += fabs(s[FLOW]);
