@@ -139,8 +139,13 @@ class ExactStatic(_ExactStep):
         return 0.0
 
     def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
-        """Loads act where the resultants are, motions arrive at the end."""
-        return Step(t0, t1, q0, t0 + self.theta * (t1 - t0), motion_time=t1, toward=1.0)
+        """Loads act where the resultants are, on the straight way to those at the end of the step.
+
+        Parts of a step go in proportion, as those of :class:`Static`; so loads and motions that are
+        there at once can be reached in parts.
+        """
+        toward = (t1 - t0) / (end - t0)
+        return Step(t0, t1, q0, load_time=end, motion_time=end, toward=toward, at=self.theta)
 
 
 class _Midway:

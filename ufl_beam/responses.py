@@ -204,15 +204,16 @@ class _Pushed(_Working):
 
     def _note(self, step: Step) -> None:
         wanted = -np.array([self._wanted(link, step) for link in self._links])
-        self._force = self._reached + step.toward * (wanted - self._reached)
+        self._end = self._reached + step.toward * (wanted - self._reached)
+        self._force = self._reached + step.at * (self._end - self._reached)
 
     def accept(self, e1: Array, work: float) -> None:
         """Enter the work."""
         super().accept(e1, work)
-        self._reached = self._force
+        self._reached = self._end
 
     def state(self) -> Array:
-        """The forces of the last step."""
+        """The forces at the end of the last step."""
         return self._reached[:, None]
 
     def restore(self, rows: Array) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple, NoReturn
 
 from mpi4py import MPI
@@ -59,6 +60,18 @@ times as fast at 6 000; see benchmarks/README.md.
 
 LARGEST_TURN = 0.75 * math.pi
 """A step that turns a node further is cut; the algorithmic strains end at π."""
+
+APPLYING = 1 / 8
+"""Part of the first step in which loads that are there from the start are applied."""
+
+APPLYING_TURN = 0.02
+"""Largest turn of a node meanwhile in a part; rad.
+
+Over a part a moment is in error by a quarter of the square: some 1e-4 of it.
+"""
+
+SHORT_PART = 512
+"""So many times shorter parts may turn nodes further: their oscillations do not become smaller."""
 
 FIRST = 1 / 16
 """Part of the first step after which accelerations are taken for those at the beginning.
@@ -186,6 +199,7 @@ class Simulation(Live):
         self._multipliers = as_slice(self.share.multipliers())
         for term in self.terms:
             term.add_state(self.q)
+        self._continues = start is not None
         self._path: StaticPath | None = None
         if not scheme.dynamic:
             parts = (self.beams, self.couplings)
@@ -341,6 +355,44 @@ class Simulation(Live):
             ConvergenceError: Even the smallest part failed; the state is that of the last part that
                 was accepted, which the solution of the error ends with.
         """
+        if self.parts == 0 and self._begins_loaded():
+            begin = self.t
+            self._in_parts(
+                begin + APPLYING * (t1 - begin),
+                lambda part, end: self._attempt_loads(begin, part, end),
+            )
+        self._in_parts(t1, self.attempt)
+
+    def _begins_loaded(self) -> bool:
+        """Whether the loads at the beginning are to be applied before the first step.
+
+        Where forces act over the step, a step that turns a node far does not end in equilibrium.
+        So the loads are applied in parts that turn nodes little, and the rest of the step has
+        nothing left to do but to follow them.
+        """
+        over_step = self.scheme.average(0.0, 1.0) != 1.0
+        if self.scheme.dynamic or not over_step or self._continues:
+            return False
+        frames = any(isinstance(load, RotatingFrame) for load in self.scene.loads)
+        return frames or any(f(self.t) != 0 for _, f in self.scene.time_functions())
+
+    def _attempt_loads(self, begin: float, t1: float, end: float) -> Trial:
+        """Solve a part of the application of the loads at the time ``begin``; it lasts to ``end``.
+
+        Raises:
+            StepFailed: There is no equilibrium; or a node turns far, and shorter parts may help.
+        """
+        step = self.scheme.step(self.t, t1, end, self.q)
+        trial = self._attempt(step._replace(load_time=begin, motion_time=begin))
+        turn = np.abs(trial.q1 - self.q)[self._rotations].max(initial=0.0)
+        if self.share.comm.size > 1:
+            turn = self.share.comm.allreduce(turn, op=MPI.MAX)
+        if turn > APPLYING_TURN and SHORT_PART * step.dt > end - begin:
+            raise StepFailed("a node turns too far while the loads at the beginning are applied")
+        return trial
+
+    def _in_parts(self, t1: float, attempt: Callable[[float, float], Trial]) -> None:
+        """Go to the time ``t1`` by attempts of the whole way or of parts of it."""
         t0, done, part = self.t, 0, SMALLEST_PART
         while done < SMALLEST_PART:
             end = (
@@ -349,7 +401,7 @@ class Simulation(Live):
                 else t0 + (t1 - t0) * (done + part) / SMALLEST_PART
             )
             try:
-                self.accept(self.attempt(end, t1))
+                self.accept(attempt(end, t1))
             except StepFailed as failure:
                 if part == 1:
                     self.give_up(failure, end)
@@ -371,16 +423,16 @@ class Simulation(Live):
             StepFailed: There is no equilibrium, or it is too far away.
         """
         if self._path is None and not self.inertia.ready:
-            first = self._attempt(self.t + FIRST * (t1 - self.t), t1)
+            t = self.t + FIRST * (t1 - self.t)
+            first = self._attempt(self.scheme.step(self.t, t, t1, self.q))
             self.inertia.prepare(first.s)
             self.supports.take()
             for coupling in self.couplings:
                 coupling.take(first.q1)
-        return self._attempt(t1, end)
+        return self._attempt(self.scheme.step(self.t, t1, t1 if end is None else end, self.q))
 
-    def _attempt(self, t1: float, end: float | None) -> Trial:
-        """See :meth:`attempt`."""
-        step = self.scheme.step(self.t, t1, t1 if end is None else end, self.q)
+    def _attempt(self, step: Step) -> Trial:
+        """Solve a step; see :meth:`attempt`."""
         self.ask()
         for term in self.terms:
             term.begin(step)
