@@ -15,6 +15,7 @@ from ufl_beam.compat import Array
 from ufl_beam.connectors import Controller, Coulomb
 from ufl_beam.couplings import couplings
 from ufl_beam.dampers import damping_forces
+from ufl_beam.diagnosis import singularity
 from ufl_beam.differences import numerical_forces
 from ufl_beam.discretisation import Mesh
 from ufl_beam.equation import Equation
@@ -317,6 +318,11 @@ class Simulation(Live):
         self.supports.hold_matrix(self._A.data)
         return self._A
 
+    @property
+    def tangent(self) -> Csr:
+        """The latest tangent, the local part; with rows and columns of a diagonal for what is held."""
+        return self._A
+
     def _assemble(self, q1: Array) -> None:
         self._A.data.fill(0.0)
         for term in self.terms:
@@ -517,14 +523,20 @@ class Simulation(Live):
         self.end()
         dt, forces = end - self.t, self._forces_by_kind()
         sizes = ", ".join(f"{kind} {size:.1e} N" for kind, size in forces.items())
+        where = f"at t = {self.t:.9g} s"
+        if dt != 0:
+            where = f"after t = {self.t:.9g} s, even with dt = {dt:.3g} s"
+        why = singularity(self, self.supports.in_plane(self._solver.iterate()))
+        said = f"{failure} ({sizes})" if sizes else str(failure)
         raise ConvergenceError(
-            f"no equilibrium after t = {self.t:.9g} s, even with dt = {dt:.3g} s: {failure} "
-            f"({sizes}). {advice or self.scheme.advice}",
+            f"no equilibrium {where}: {why}{'; ' if why else ''}{said}. "
+            f"{advice or self.scheme.advice}",
             time=self.t,
             dt=dt,
             solution=self.solution,
             residuals=failure.residuals,
             forces=forces,
+            reason=failure.reason,
         ) from failure
 
     def _forces_by_kind(self) -> dict[str, float]:

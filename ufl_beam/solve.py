@@ -37,6 +37,15 @@ Forces that grow in an S, as in a point that yields one way or the other, send f
 branch to the other and back for ever.
 """
 
+REASONS = {
+    lib.SINGULAR: "found a singular tangent",
+    lib.TOO_MANY: "did not converge",
+    lib.STALLED: "came no closer to an equilibrium",
+    lib.DIVERGED: "met a force that is not a finite number",
+    -4: "met a force that is not a finite number",  # PETSc's name for it changed in 3.24
+}
+"""Reasons for which Newton's method stops, in words; by values of SNESConvergedReason."""
+
 PREFIX = "ub_"
 """Prefix of the PETSc options of the solver, as in ``-ub_snes_monitor``."""
 
@@ -471,11 +480,12 @@ class Solver:
         residuals = self._share.grid.worst(self._share.gather(weighted))
         places = [f"{size:.1e} N in {place}" for place, size in [*residuals.items()][:3]]
         failure = StepFailed(
-            f"SNES {names.get(reason, reason)} after {self._done} iterations; "
-            f"residual {self._size(self._at_r):.3e} N, largest: {', '.join(places) or 'nowhere'}; "
+            f"Newton's method {REASONS.get(reason, 'was stopped by PETSc')} after {self._done} "
+            f"iterations; residual {self._size(self._at_r):.3e} N, largest: {', '.join(places) or 'nowhere'}; "
             f"forces in the scene {scale:.3e} N"
         )
         failure.residuals = residuals
+        failure.reason = str(names.get(reason, reason))
         return failure
 
     def iterate(self) -> Array:
