@@ -72,7 +72,9 @@ class _OverStep:
 
 
 class _ExactStep(_OverStep):
-    """What steps have in common whose works are exact increments of energy."""
+    """Steps whose works are exact increments of energy."""
+
+    exact_ledger = True
 
     def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
         """The variation that turns the step into the increment of the strains."""

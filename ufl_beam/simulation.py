@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable
 from typing import NamedTuple, NoReturn
 
@@ -19,7 +20,13 @@ from ufl_beam.diagnosis import singularity
 from ufl_beam.differences import numerical_forces
 from ufl_beam.discretisation import Mesh
 from ufl_beam.equation import Equation
-from ufl_beam.errors import ConvergenceError, SceneError, StepFailed, require_kind
+from ufl_beam.errors import (
+    ConvergenceError,
+    ModelWarning,
+    SceneError,
+    StepFailed,
+    require_kind,
+)
 from ufl_beam.fields import Fields
 from ufl_beam.grid import Grid, Share
 from ufl_beam.inelastic import InelasticBeams, inelastic_cells
@@ -73,6 +80,9 @@ Over a part a moment is in error by a quarter of the square: some 1e-4 of it.
 
 SHORT_PART = 512
 """So many times shorter parts may turn nodes further: their oscillations do not become smaller."""
+
+ROOM = 10.0
+"""Largest imbalance of an exact ledger over the tolerance of the solver."""
 
 FIRST = 1 / 16
 """Part of the first step after which accelerations are taken for those at the beginning.
@@ -609,6 +619,26 @@ class Simulation(Live):
         self.supports.remember(memory, self.q)
         if self._path is not None:
             self._path.remember(memory, self.q)
+
+    def check_ledger(self) -> None:
+        """Warn, and note in the solution, if a ledger is open that the scheme claims to close.
+
+        All processes call it together, at the end of a run.
+
+        Warns:
+            ModelWarning: It is open, perhaps by round-off.
+        """
+        if not getattr(self.scheme, "exact_ledger", False) or len(self.solution) < 2:
+            return
+        energy, claimed = self.solution.energy, ROOM * self._solver.rtol
+        if not energy.opened(claimed, 0.0):
+            return
+        # Errors of steps are independent: their squares add up.
+        steps = np.sqrt(np.sum(np.diff(self.solution.q, axis=0) ** 2, axis=0))[self.share.dofs]
+        round_off = self._solver.random_work(steps)
+        self.solution.open_ledger = energy.opened(claimed, round_off)
+        if self.comm.rank == 0:
+            warnings.warn(self.solution.open_ledger, ModelWarning, stacklevel=3)
 
     def close(self) -> None:
         """Give back what PETSc holds."""

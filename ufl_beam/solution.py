@@ -61,6 +61,7 @@ class Solution:
             of the size of the scene, rad; NaN if nobody did.
         seconds: Wall time of the run, building the scene included; s.
         every: Steps from one that was kept to the next.
+        open_ledger: How far the energy ledger is open, in words; empty if it closes as claimed.
         internal: What cells and connectors remember at the end of the run.
     """
 
@@ -71,6 +72,7 @@ class Solution:
         self.time_error = math.nan
         self.seconds = 0.0
         self.every = 1
+        self.open_ledger = ""
         self._times: list[float] = []
         self._q: list[Array] = []
         self._v: list[Array] = []
@@ -372,4 +374,5 @@ class Solution:
             f"t = {self._times[0]:g} to {self._times[-1]:g} s in {self.parts} steps, "
             f"{self.iterations / max(self.parts, 1):.2f} Newton iterations each, "
             f"{self.seconds:.2f} s of wall time\n{self.energy}"
+            + (f"\n{self.open_ledger}" if self.open_ledger else "")
         )

@@ -408,6 +408,12 @@ class Solver:
         works = self._A.data[self._diagonal] * self._last_digits() * np.abs(s)
         return self._share.total(float(works[: len(self._weights)].sum()))
 
+    def random_work(self, s: Array) -> float:
+        """Work of the last digits as :meth:`least_work`, were they independent of each other; J."""
+        self._find_motion()
+        works = self._A.data[self._diagonal] * self._last_digits() * s
+        return math.sqrt(self._share.total(float(np.sum(works[: len(self._weights)] ** 2))))
+
     # -- the call ------------------------------------------------------------------------------
 
     def solve(self, guess: Array, loads: list[Array], like_last: bool = False) -> Array:
@@ -487,6 +493,11 @@ class Solver:
         failure.residuals = residuals
         failure.reason = str(names.get(reason, reason))
         return failure
+
+    @property
+    def rtol(self) -> float:
+        """Residual to be reached, as a part of the forces in the scene."""
+        return self._newton.rtol
 
     def iterate(self) -> Array:
         """The latest configuration, converged or not; local values, ghosts included."""
