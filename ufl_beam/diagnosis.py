@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from mpi4py import MPI
 
 import numpy as np
+import numpy.typing as npt
 from scipy.sparse import coo_array, csc_array, diags_array, eye_array
 from scipy.sparse.linalg import splu
 
 from ufl_beam.compat import Array
+from ufl_beam.couplings import Couplings
 from ufl_beam.grid import Grid, Index
 
 if TYPE_CHECKING:
@@ -25,12 +27,33 @@ SINGULAR = 1e-12
 SHARE = 0.1
 """Part of the largest motion from which on a motion or a deformation is named."""
 
+SOFT = 1e-3
+"""Part of its elastic stiffness up to which a connector or a cell gives way."""
+
 NAMED = 3
 """Largest number of names in a list."""
 
 
+class Softest(NamedTuple):
+    """The motion that meets least resistance.
+
+    Attributes:
+        x: It, at all degrees of freedom; largest where one is a radian or the size of the scene.
+        motions: Sizes of its parts, those of forces zero; (grid.size,).
+        links: Sizes of the motions of connectors; (num_links,).
+        cells: Sizes of the strains of cells, see :func:`_strains`; (num_cells,).
+        yielding: Connectors, and cells, that have lost their stiffness in this motion.
+    """
+
+    x: Array
+    motions: Array
+    links: Array
+    cells: Array
+    yielding: tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]
+
+
 def singularity(simulation: Simulation, q: Array) -> str:
-    """Describe why the latest tangent of a simulation is singular; empty if it is not.
+    """Describe why the latest tangent of a simulation is singular, or nearly so; else empty.
 
     All processes call it together, after a step has failed.
 
@@ -45,11 +68,62 @@ def singularity(simulation: Simulation, q: Array) -> str:
         size, vector = null_vector(K)
     except (np.linalg.LinAlgError, RuntimeError):
         return ""
-    if not size <= SINGULAR:
-        return ""
     x = np.zeros(simulation.grid.size)
     x[free] = vector
-    return _describe(simulation, q, x)
+    grid, scene = simulation.grid, simulation.scene
+    motions = np.abs(x)
+    turns = np.zeros(grid.size, dtype=bool)
+    turns[[*grid.dofs[:, 2], *grid.dofs_of_bodies[:, 2]]] = True
+    motions[~turns] /= scene.size
+    motions[grid.multipliers] = 0.0
+    largest = float(motions.max())
+    if not np.isfinite(largest):
+        return ""
+    if largest == 0.0:
+        forces = np.abs(x[grid.multipliers])
+        names = [str(scene.links[i]) for i in _named(forces / forces.max())]
+        said = f"the tangent stiffness is singular: {_list(names)} hold the same motion twice"
+        return said if size <= SINGULAR else ""
+    found = _softest(simulation, q, x / largest, motions / largest)
+    mechanism = not (_deforms(found, 1) | _deforms(found, 0)) and any(
+        part.any() for part in found.yielding
+    )
+    if size <= SINGULAR:
+        return f"the tangent stiffness is singular: {_describe(simulation, found)}"
+    return f"a mechanism has formed: {_describe(simulation, found)}" if mechanism else ""
+
+
+def _softest(simulation: Simulation, q: Array, x: Array, motions: Array) -> Softest:
+    """What a motion deforms, and what has lost its stiffness there."""
+    grid, scene, share = simulation.grid, simulation.scene, simulation.share
+    here, ε = x[share.dofs], 1e-6
+    links, left = np.zeros(len(scene.links)), np.ones(len(scene.links))
+    for one in simulation.couplings:
+        change = (one.motion(q + ε * here) - one.motion(q - ε * here)) / (2 * ε)
+        links[one.numbers] = np.abs(change)
+        if isinstance(one, Couplings) and one.response.points is not None:
+            unit = np.zeros((len(change), 3))
+            unit[:, 0] = 1.0
+            left[one.numbers] = one.response.points.remaining(unit)
+    links /= np.where([link.turns for link in scene.links], 1.0, scene.size)
+    strains, left_of_cells = _strains(grid, share.gather(q), x), np.ones(len(grid.cells))
+    for inelastic in simulation.inelastic:
+        cells, _ = inelastic.kept()
+        left_of_cells[cells] = inelastic.points.remaining(strains[cells])
+    if share.comm.size > 1:
+        share.comm.Allreduce(MPI.IN_PLACE, links)
+        share.comm.Allreduce(MPI.IN_PLACE, left, op=MPI.MIN)
+        share.comm.Allreduce(MPI.IN_PLACE, left_of_cells, op=MPI.MIN)
+    strains[:, :2] /= scene.size
+    sizes = np.abs(strains).max(axis=1, initial=0.0)
+    yielding = (left <= SOFT) & (links >= SHARE), (left_of_cells <= SOFT) & (sizes >= SHARE)
+    return Softest(x, motions, links, sizes, yielding)
+
+
+def _deforms(found: Softest, of: int) -> bool:
+    """Whether connectors (0) or cells (1) deform that have their stiffness."""
+    sizes = (found.links, found.cells)[of]
+    return bool((sizes[~found.yielding[of]] >= SHARE).any())
 
 
 def _free_matrix(simulation: Simulation) -> tuple[csc_array, Index]:
@@ -97,65 +171,41 @@ def _equilibrated(K: csc_array) -> tuple[csc_array, Array]:
     return K, columns
 
 
-def _describe(simulation: Simulation, q: Array, x: Array) -> str:
-    """Words for a motion ``x`` of all degrees of freedom that meets no force."""
+def _describe(simulation: Simulation, found: Softest) -> str:
+    """Words for a motion that meets no force."""
     grid, scene = simulation.grid, simulation.scene
-    motions = np.abs(x)
-    turns = np.zeros(grid.size, dtype=bool)
-    turns[grid.dofs[:, 2]] = True
-    turns[grid.dofs_of_bodies[:, 2]] = True
-    motions[~turns] /= scene.size
-    motions[grid.multipliers] = 0.0
-    largest = float(motions.max())
-    beginning = "the tangent stiffness is singular: "
-    if largest == 0.0:
-        forces = np.abs(x[grid.multipliers])
-        which = np.flatnonzero(forces >= SHARE * forces.max())
-        names = [str(scene.links[i]) for i in which]
-        return f"{beginning}{_list(names)} hold the same motion more than once"
-    x = x / largest
-    moving = np.where(motions >= largest / 2, motions, 0.0)
+    moving = np.where(found.motions >= 1 / 2, found.motions, 0.0)
     parts = [_component(words) for words in grid.worst(moving)]
-    share = simulation.share
-    here = x[share.dofs]
-    links, ε = np.zeros(len(scene.links)), 1e-6
-    for coupling in simulation.couplings:
-        change = coupling.motion(q + ε * here) - coupling.motion(q - ε * here)
-        links[coupling.numbers] = np.abs(change) / (2 * ε)
-    links /= np.where([link.turns for link in scene.links], 1.0, scene.size)
-    if share.comm.size > 1:
-        share.comm.Allreduce(MPI.IN_PLACE, links)
-    cells = _deformation(grid, share.gather(q), x)
-    inelastic = np.zeros(len(grid.cells), dtype=bool)
-    for numbers, _ in simulation.material():
-        inelastic[numbers] = True
-    ways = [str(scene.links[i]) for i in _named(links)]
-    ways += [_cell(grid, i) for i in _named(np.where(inelastic, cells, 0.0))]
-    if np.where(inelastic, 0.0, cells).max(initial=0.0) >= SHARE:
+    elastic = np.where(found.yielding[1], 0.0, found.cells)
+    if elastic.max(initial=0.0) >= SHARE:
         return (
-            f"{beginning}the forces no longer resist a motion that is largest in {_list(parts)}, "
-            "as at a limit load or a bifurcation"
+            f"the forces no longer resist a motion that is largest in {_list(parts)}, as at a "
+            "limit load or a bifurcation"
         )
-    said = f"{beginning}{_list(parts)} {'is' if len(parts) == 1 else 'are'} held by nothing"
+    said = f"{_list(parts)} {'is' if len(parts) == 1 else 'are'} held by nothing"
+    ways = [str(scene.links[i]) for i in _named(np.where(found.yielding[0], found.links, 0.0))]
+    ways += [_cell(grid, i) for i in _named(np.where(found.yielding[1], found.cells, 0.0))]
     if ways:
-        together = "gives way" if len(ways) == 1 else "give way together"
-        said += f"; {_list(ways)} {together} at no further force"
+        give = "gives way" if len(ways) == 1 else "give way together"
+        said += f"; {_list(ways)} {give} at no further force"
     return said
 
 
-def _deformation(grid: Grid, q: Array, x: Array) -> Array:
-    """Sizes of the strains times the lengths of the cells that a small motion ``x`` makes.
+def _strains(grid: Grid, q: Array, x: Array) -> Array:
+    """Strains times the lengths of the cells that a small motion ``x`` makes; (num_cells, 3).
 
-    Elongations and shear count as parts of the size of the scene, bending as a rotation.
+    Elongation and shear of the chord in m, bending in rad.
     """
     first, last = grid.cells[:, 0], grid.cells[:, 1]
-    position = grid.points + q[grid.dofs[:, :2]]
-    motion = x[grid.dofs]
+    position, motion = grid.points + q[grid.dofs[:, :2]], x[grid.dofs]
     d = position[last] - position[first]
+    across = np.column_stack([-d[:, 1], d[:, 0]])
+    change = motion[last] - motion[first]
     ψ = (motion[first, 2] + motion[last, 2]) / 2
-    change = (motion[last] - motion[first])[:, :2] - ψ[:, None] * np.column_stack([-d[:, 1], d[:, 0]])
-    bending = np.abs(motion[last, 2] - motion[first, 2])
-    return np.maximum(np.linalg.norm(change, axis=1) / grid.scene.size, bending)
+    apart = change[:, :2] - ψ[:, None] * across
+    length = np.linalg.norm(d, axis=1)
+    along, shear = (np.sum(apart * axis, axis=1) / length for axis in (d, across))
+    return np.column_stack([along, shear, change[:, 2]])
 
 
 def _named(sizes: Array) -> Index:
