@@ -101,10 +101,8 @@ def _softest(simulation: Simulation, q: Array, x: Array, motions: Array) -> Soft
     for one in simulation.couplings:
         change = (one.motion(q + ε * here) - one.motion(q - ε * here)) / (2 * ε)
         links[one.numbers] = np.abs(change)
-        if isinstance(one, Couplings) and one.response.points is not None:
-            unit = np.zeros((len(change), 3))
-            unit[:, 0] = 1.0
-            left[one.numbers] = one.response.points.remaining(unit)
+        if isinstance(one, Couplings):
+            left[one.numbers] = one.response.remaining()
     links /= np.where([link.turns for link in scene.links], 1.0, scene.size)
     strains, left_of_cells = _strains(grid, share.gather(q), x), np.ones(len(grid.cells))
     for inelastic in simulation.inelastic:

@@ -439,8 +439,10 @@ void commit(const points *p)
     for (int i = 0; i < p->of_cell; ++i, w += WIDTH) {
       double volume = weight[i] * length[c];
       ask(p->end, w, SAID, s);
-      const double elastic = w[BEFORE] - w[JUMP] / w[LENGTH] - w[PLASTIC];
-      const double relaxed = (w[STIFFNESS] * elastic - s[STRESS]) / 2 * s[FLOW];
+      const double before = w[STIFFNESS] * (w[BEFORE] - w[JUMP] / w[LENGTH] - w[PLASTIC]);
+      const double change = s[STRESS] - before;
+      const double hardened = s[LOST] - change * change / (2 * w[STIFFNESS]);
+      const double relaxed = hardened - change / 2 * s[FLOW];
       if (relaxed > 0) sum[6] += volume * relaxed;
       w[BEFORE] = w[STRAIN];
       w[PLASTIC] += s[FLOW];

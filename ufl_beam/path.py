@@ -54,9 +54,14 @@ class StaticPath:
         self._beams, self._couplings = beams, couplings
         self._rotations = share.rotations()
         self._before: Array = np.zeros(share.size)
-        for one in (*beams, *couplings):
-            one.begin(scheme.step(t0, t0 + 1.0, t0 + 1.0, q))
-            one.add_residual(q, self._before)
+        # In so short a step nothing viscous flows; forces of connectors are among the unknowns.
+        short = scheme.step(0.0, sys.float_info.min, sys.float_info.min, q)
+        for beam in beams:
+            beam.begin(short)
+            beam.add_residual(q, self._before)
+        for coupling in couplings:
+            coupling.begin(scheme.step(t0, t0 + 1.0, t0 + 1.0, q))
+            coupling.add_residual(q, self._before)
 
     @property
     def force(self) -> Array:

@@ -84,6 +84,9 @@ class Response(Protocol):
     def change(self, e1: Array, work: float) -> float:
         """Energy that the step stores, dissipates or gives away; J."""
 
+    def remaining(self) -> Array:
+        """Part of the elastic stiffness that is left in the latest iterate; (num_links,)."""
+
     def state(self) -> Array:
         """What is remembered besides motions and forces; (num_links, k)."""
 
@@ -143,6 +146,10 @@ class _Working:
     def change(self, e1: Array, work: float) -> float:
         """The work."""
         return work
+
+    def remaining(self) -> Array:
+        """All of it: nothing yields."""
+        return np.ones(len(self._links))
 
     def state(self) -> Array:
         """Nothing is remembered."""
@@ -405,6 +412,10 @@ class _Sprung:
         """Energy stored and dissipated in the step; J."""
         self.points.respond(self._at(e1))
         return self.points.change()
+
+    def remaining(self) -> Array:
+        """Part of the elastic stiffness that is left in the latest iterate; (num_links,)."""
+        return self.points.remaining(np.eye(1, 3).repeat(len(self._strains), axis=0))
 
     def state(self) -> Array:
         """Internal variables."""
