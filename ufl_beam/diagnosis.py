@@ -22,7 +22,7 @@ DENSE = 300
 """Up to this number of unknowns the null vector comes from a singular value decomposition."""
 
 SINGULAR = 1e-12
-"""Smallest singular value of an equilibrated matrix, over its largest entry, that counts as zero."""
+"""Singular values of an equilibrated matrix up to this part of its entries count as zero."""
 
 SHARE = 0.1
 """Part of the largest motion from which on a motion or a deformation is named."""
@@ -71,7 +71,7 @@ def singularity(simulation: Simulation, q: Array) -> str:
     x = np.zeros(simulation.grid.size)
     x[free] = vector
     grid, scene = simulation.grid, simulation.scene
-    motions = np.abs(x)
+    motions: Array = np.abs(x)
     turns = np.zeros(grid.size, dtype=bool)
     turns[[*grid.dofs[:, 2], *grid.dofs_of_bodies[:, 2]]] = True
     motions[~turns] /= scene.size

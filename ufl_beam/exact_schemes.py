@@ -104,7 +104,10 @@ class ExactStatic(_ExactStep):
 
     :class:`Static` finds equilibrium at the ends of the steps and counts works by the trapezoidal
     rule; here the equation of the step is that of :class:`Midpoint`.  Inelastic material follows
-    its laws over the step, not only at its end.  A leap to another branch of equilibria does not
+    its laws over the step, not only at its end.  The ledger is exact, the solution is of first
+    order in the step with ``theta=1`` and of second order with ``theta=1/2``; docs/schemes.md has
+    measured errors.  Loads that are there from the start are applied in the first step, in parts
+    that turn nodes little.  A leap to another branch of equilibria does not
     stop it, but what that sets free is in the entry "numerical"; :class:`Static` stops.
 
     Args:
@@ -221,7 +224,8 @@ class Midpoint(_ExactStep, _Velocities):
     Laws of inelastic material are stated in the middle of the step, which is of second order;
     ``alpha = 1/2`` states them at its end: backward Euler, of first order.  In the middle of the
     step stresses lie on the yield surface, and an open hinge bears nothing; at the ends they
-    alternate about that by the order of a step, which a small ``alpha`` damps.
+    alternate about that by the order of a step, which a small ``alpha`` damps.  The elastic energy
+    of what breaks completely is lost at once, as "numerical".
 
     Args:
         alpha: Dissipation by the resultants, from 0 to 1/2.

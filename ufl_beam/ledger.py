@@ -10,7 +10,6 @@ import numpy as np
 
 from ufl_beam.compat import Array
 
-
 EXPLAINED = 0.1
 """Part of an imbalance from which on an estimate of round-off explains it."""
 
@@ -104,7 +103,7 @@ class Energy:
         if part >= EXPLAINED * self.worst:
             return said + (
                 f"round-off is estimated at {part:.1e}, the last digits of positions times the "
-                "largest stiffness; lower stiffness of what hardly deforms, or fewer cells, close it"
+                "largest stiffness; less stiffness of what hardly deforms, or fewer cells, close it"
             )
         return said + (
             f"round-off is estimated at {part:.1e} and does not explain it; a smaller rtol of "

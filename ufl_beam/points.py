@@ -250,14 +250,14 @@ class Points:
         """Part of the elastic stiffness that is left in the latest response; (cells,).
 
         Args:
-            change: Small changes of the strains of the cells, of which not all are zero; (cells, 3).
+            change: Small changes of the strains of the cells; (cells, 3).
         """
         layout, stiffness = self._layout, self._at["θ"][0, 0] * self._at["C"]
         by_point = change @ layout.strains.T
         elastic = self._at["θ"][0, 0] * change**2 @ layout.rest
         elastic += (stiffness * by_point**2) @ layout.weights
         now = np.einsum("ci,cij,cj->c", change, self.D.reshape(-1, 3, 3), change)
-        return np.divide(now, elastic, out=np.ones(len(now)), where=elastic > 0)
+        return np.asarray(np.divide(now, elastic, out=np.ones(len(now)), where=elastic > 0))
 
     def accept(self) -> None:
         """Take the strains of the latest response as the new state."""

@@ -109,9 +109,7 @@ def _length(d: Expr) -> Expr:
 def _stretching(q: Pair, n: Numbers) -> Expr:
     # (d·d - d0·d0) / (|d| + |d0|) with d = d0 + moved; a difference of lengths would lose digits.
     moved = _moved(q, n)
-    return ufl.dot(n.apart + n.apart + moved, moved) / (
-        _length(_between(q, n)) + _length(n.apart)
-    )
+    return ufl.dot(n.apart + n.apart + moved, moved) / (_length(_between(q, n)) + _length(n.apart))
 
 
 def _virtual_stretching(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Averaging) -> Expr:

@@ -330,7 +330,7 @@ class Simulation(Live):
 
     @property
     def tangent(self) -> Csr:
-        """The latest tangent, the local part; with rows and columns of a diagonal for what is held."""
+        """Local part of the latest tangent; what is held has nothing but a diagonal entry."""
         return self._A
 
     def _assemble(self, q1: Array) -> None:

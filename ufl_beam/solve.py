@@ -485,9 +485,10 @@ class Solver:
         weighted[: len(self._weights)] = np.abs(self._r[: len(self._weights)]) * self._weights
         residuals = self._share.grid.worst(self._share.gather(weighted))
         places = [f"{size:.1e} N in {place}" for place, size in [*residuals.items()][:3]]
+        largest = ", ".join(places) or "nowhere"
         failure = StepFailed(
             f"Newton's method {REASONS.get(reason, 'was stopped by PETSc')} after {self._done} "
-            f"iterations; residual {self._size(self._at_r):.3e} N, largest: {', '.join(places) or 'nowhere'}; "
+            f"iterations; residual {self._size(self._at_r):.3e} N, largest: {largest}; "
             f"forces in the scene {scale:.3e} N"
         )
         failure.residuals = residuals

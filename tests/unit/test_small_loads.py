@@ -35,8 +35,8 @@ def ends(scene, scheme):
 def test_static_loads_down_to_nothing(scheme):
     """Displacements are in proportion to loads from 1e-6 N, u/L of some 1e-14, to 1e-290 N.
 
-    So they are to the digits of a linear problem, some 1e-9 after its conditioning; a load of 1e-6 N
-    strains no beam by more than 1e-14, so nothing is nonlinear.
+    So they are to the digits of a linear problem, some 1e-9 after its conditioning; a load of
+    1e-6 N strains no beam by more than 1e-14, so nothing is nonlinear.
     """
     unit = ends(braced(1e-6), scheme) / 1e-6
     assert np.abs(unit).max() > 1e-10

@@ -76,7 +76,7 @@ def test_a_steady_motion_and_a_steady_actuator():
 
 def test_loads_that_grow_are_not_applied_before():
     """Nothing precedes the first step where loads begin at zero, nor in a run that goes on."""
-    beam, scene = cantilever(lambda b: ub.PointLoad(b.end, force=(0, -1.0), time=lambda t: t))
+    _, scene = cantilever(lambda b: ub.PointLoad(b.end, force=(0, -1.0), time=lambda t: t))
     first = run(scene, ub.ExactStatic())
     assert first.parts == 10
     again = run(scene, ub.ExactStatic(), t=(1, 2), start=first)
@@ -115,7 +115,7 @@ def test_relaxation_is_not_cut():
 def test_the_first_reaction(scheme):
     """Zero in the undeformed scene; that of the equilibrium with which a run begins."""
     growing = {"time": lambda t: min(t, 1.0)}
-    beam, scene = cantilever(
+    _, scene = cantilever(
         lambda b: ub.PointLoad(b.end, force=(0, -0.2), **growing),
         lambda b: ub.LineLoad(b, force=(0, -0.4), **growing),
     )
@@ -156,7 +156,7 @@ def test_a_broken_spring_stores_nothing(scheme, dt):
 
 
 def test_the_order_of_the_work_of_inelastic_laws():
-    """Of first order with θ = 1, of second with θ = 1/2 and by the trapezoidal rule; docs/schemes.md."""
+    """Of first order with θ = 1, of second with θ = 1/2; docs/schemes.md has the errors."""
 
     def work(scheme, steps):
         law = ub.Hardening(limit=5.0, viscosity=ub.DuvautLions(0.5))
