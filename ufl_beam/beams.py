@@ -14,7 +14,7 @@ from ufl_beam.errors import (
     require_number,
     require_vector,
 )
-from ufl_beam.laws import Softening
+from ufl_beam.laws import HingeLaw, require_hinge_law
 from ufl_beam.sections import Section
 
 Point = tuple[float, float]
@@ -34,14 +34,15 @@ class Beam:
         name: What error messages and pictures call it.
         curve: Axis from ``s = 0`` at ``a`` to ``s = 1`` at ``b``.
         corners: Parameters ``s`` that must be vertices.
-        hinges: Laws of hinges in single cells, by a parameter ``s`` in the cell; at a vertex the
-            cell before it.  They come before the law of the section.  A hinge sits in the middle of
-            its cell, and where it turns far the cell keeps its length while its axis turns half as
-            far: positions are off by up to the length of the cell, so let it be short (corners).
+        hinges: Plastic hinges of zero length, by their parameter ``s``, which becomes a vertex:
+            ``{0.0: Softening(limit, energy)}``.  A hinge is rigid until the moment at ``s`` reaches
+            its limit; then it follows its law, :class:`Softening` or :class:`Hardening` (limit in
+            N m, moduli in N m/rad, ``eta`` in N m s).  At an end it comes before the law of the
+            section.
 
     Raises:
         SceneError: Zero length, ``cells < 1``, coordinates that are no finite numbers, or hinges in
-            a section that has none.
+            a section of fibres.
     """
 
     a: Point
@@ -52,7 +53,7 @@ class Beam:
     name: str = "beam"
     curve: Curve = field(default=None, repr=False)  # type: ignore[assignment]
     corners: tuple[float, ...] = ()
-    hinges: Mapping[float, Softening] = field(default_factory=dict)
+    hinges: Mapping[float, HingeLaw] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         a, b = (require_vector(x, f"{self.name}: end") for x in (self.a, self.b))
@@ -79,7 +80,7 @@ class Beam:
             require_number(s, f"{self.name}: hinge at")
             if not 0.0 <= s <= 1.0:
                 raise SceneError(f"{self.name}: hinge at s = {s:g} must lie between 0 and 1")
-            require_kind(law, Softening, f"{self.name}: hinge at s = {s:g}")
+            require_hinge_law(law, f"{self.name}: hinge at s = {s:g}")
         if self.hinges and self.section.fibres is not None:
             raise SceneError(
                 f"{self.name}: hinges are for resultants; here the fibres of the section soften"
@@ -179,10 +180,13 @@ class Place:
     Attributes:
         beam: The beam, by identity.
         s: Parameter of its axis, from 0 to 1.
+        beyond: Whether the cross-section beyond the plastic hinge at ``s`` is meant, the one that
+            no joint, support or load is attached to.
     """
 
     beam: Beam
     s: float
+    beyond: bool = False
 
     def __post_init__(self) -> None:
         if not isinstance(self.beam, Beam):
@@ -200,7 +204,8 @@ class Place:
     def __str__(self) -> str:
         ends = {0.0: "start", 1.0: "end"}
         x, y = self.point
-        return f"{self.beam.name}.{ends.get(self.s, f'at({self.s:g})')} ({x:g}, {y:g})"
+        name = f"{self.beam.name}.{ends.get(self.s, f'at({self.s:g})')} ({x:g}, {y:g})"
+        return f"{name} beyond the hinge" if self.beyond else name
 
 
 def _between(p: Point, q: Point, s: float) -> Point:

@@ -201,7 +201,7 @@ enum {
 enum { FLOW, WORKED, BROKEN, LOST, ELASTIC, HARDENING, STRESS, RESISTANCE, SAID };
 
 /* What points know of each other in a step; the order in points.py. */
-enum { OPENED, RELIEF };
+enum { OPENED, RELIEF, HOLD, OVER };
 
 static const double unit_cell[6] = {0, 0, 0, 1, 0, 0};
 
@@ -340,20 +340,34 @@ void find_motions(const couplings *c, const double *q)
   for (int k = 0; k < c->number; ++k) c->e1[c->link[k]] = c->by_cell[k];
 }
 
+static void put_row(const couplings *c, int cell, const double *row)
+{
+  put_in_cell(c->work, cell, c->row, 3, row);
+  put_in_cell(c->tangent, cell, c->row_of_tangent, 3, row);
+}
+
 /* The laws of springs around their motions at q. */
-static void set_rows(const couplings *c, const double *q)
+static void set_rows_of_springs(const couplings *c)
 {
   const points *p = c->points;
-  if (!p) return;
-  find_motions(c, q);
   for (int i = 0; i < c->number; ++i) p->e1[3 * i] = c->e1[i];
   respond(p);
   for (int k = 0; k < c->number; ++k) {
     const int i = c->link[k];
     const double D = p->D[9 * i], row[3] = {-D, 1, p->r[3 * i] - D * c->e1[i]};
-    put_in_cell(c->work, k, c->row, 3, row);
-    put_in_cell(c->tangent, k, c->row_of_tangent, 3, row);
+    put_row(c, k, row);
   }
+}
+
+/* The laws of springs and rigid-plastic connectors around their motions at q. */
+static void set_rows(const couplings *c, const double *q)
+{
+  if (!c->points && !c->rigid_plastic) return;
+  find_motions(c, q);
+  if (c->points) set_rows_of_springs(c);
+  if (!c->rigid_plastic) return;
+  set_rows_of_rigid_plastic(c, q);
+  for (int k = 0; k < c->number; ++k) put_row(c, k, c->rigid_plastic->rows + 3 * c->link[k]);
 }
 
 void add_couplings_force(void *self, const double *q, double *r)

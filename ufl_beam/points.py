@@ -130,7 +130,7 @@ class Course:
     """
 
     def __init__(self) -> None:
-        self.flags: Index = np.zeros(2, dtype=np.int32)
+        self.flags: Index = np.zeros(4, dtype=np.int32)
 
     def relieve(self) -> bool:
         """Let points around those that open answer elastically, if there are any."""

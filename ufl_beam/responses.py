@@ -27,7 +27,7 @@ from ufl_beam.connectors import (
 )
 from ufl_beam.laws import Hardening, Layout
 from ufl_beam.ledger import Ledger
-from ufl_beam.points import INPUTS, Points, expect_entries
+from ufl_beam.points import INPUTS, Course, Points, expect_entries
 from ufl_beam.schemes import Scheme, Step
 
 if TYPE_CHECKING:
@@ -51,12 +51,14 @@ class Setting(NamedTuple):
         scheme: Says what acts in a step.
         ledger: Takes energies and works.
         friction_repeats: Whether places that stick may hold what is held already.
+        course: Shared by all that opens or slips in a step.
     """
 
     simulation: Simulation
     scheme: Scheme
     ledger: Ledger
     friction_repeats: bool
+    course: Course
 
 
 class Response(Protocol):
@@ -65,9 +67,8 @@ class Response(Protocol):
     steady: bool
     """Whether the rows stay the same during a step."""
 
-    @property
-    def points(self) -> Points | None:
-        """Points whose strains are the motions and whose stresses are the forces, if there are."""
+    in_c: dict[str, Any]
+    """Data of laws that C evaluates, by their names in ``couplings`` of loops.h."""
 
     def begin(self, e0: Array, step: Step) -> None:
         """Begin a step at the motions ``e0``."""
@@ -83,6 +84,9 @@ class Response(Protocol):
 
     def change(self, e1: Array, work: float) -> float:
         """Energy that the step stores, dissipates or gives away; J."""
+
+    def dissipation(self, e1: Array) -> float:
+        """Energy dissipated plastically in a step to the motions ``e1``; J."""
 
     def state(self) -> Array:
         """What is remembered besides motions and forces; (num_links, k)."""
@@ -107,7 +111,7 @@ class _Working:
     """What responses have in common that store nothing: the work of their forces is entered."""
 
     steady = False
-    points: Points | None = None
+    in_c: dict[str, Any] = {}  # noqa: RUF012
     _group = "lost"
     _entry = ""
     _sign = 1.0
@@ -143,6 +147,10 @@ class _Working:
     def change(self, e1: Array, work: float) -> float:
         """The work."""
         return work
+
+    def dissipation(self, e1: Array) -> float:
+        """None by plastic flow."""
+        return 0.0
 
     def state(self) -> Array:
         """Nothing is remembered."""
@@ -376,6 +384,7 @@ class _Sprung:
         self._ledger = setting.ledger
         expect_entries(layout, setting.scheme, setting.ledger)
         self._strains = np.zeros((number, 3))
+        self.in_c = {"points": self.points.points}
 
     def _at(self, e: Array) -> Array:
         self._strains[:, 0] = e
@@ -404,6 +413,11 @@ class _Sprung:
         """Energy stored and dissipated in the step; J."""
         self.points.respond(self._at(e1))
         return self.points.change()
+
+    def dissipation(self, e1: Array) -> float:
+        """Energy dissipated in the step; J."""
+        self.points.respond(self._at(e1))
+        return self.points.dissipation()
 
     def state(self) -> Array:
         """Internal variables."""

@@ -146,7 +146,7 @@ class Simulation(Live):
         self._numerical: list[Term] = []
         self._make_beams()
         self.force = np.zeros(self.share.size)
-        setting = Setting(self, scheme, self.ledger, friction_repeats(scene))
+        setting = Setting(self, scheme, self.ledger, friction_repeats(scene), self._course)
         self.couplings = couplings(self.share, setting, self._A)
         self.loads = self._make_loads()
         self._others: list[Term] = [*self.loads, *self._numerical]

@@ -63,7 +63,10 @@ class Walk:
 
     def dissipation(self, q: Array) -> float:
         """What beams dissipate in the step to ``q``; J."""
-        return self.share.total(sum(one.dissipation(q) for one in self.simulation.inelastic))
+        return self.share.total(sum(
+            one.dissipation(q)
+            for one in (*self.simulation.inelastic, *self.simulation.couplings)
+        ))
 
     def aim(self, reach: float) -> Direction:
         """A way along which so much is dissipated, if nothing gives way; ``reach`` in J.

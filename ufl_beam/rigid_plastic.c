@@ -1,0 +1,81 @@
+/* Rigid-plastic connectors, such as plastic hinges: held up to a limit, then following a law. */
+
+/* What the kernels know of a connector; the order in rigid_plastic.py. */
+enum { SLIP, SLIP_DIRECTION, SLIPPED, SLIP_START };
+
+/* What the kernel of the end of a step says; the order in rigid_plastic.py. */
+enum { SLIP_DISSIPATED, SLIP_LOST, SLIP_STORED, SLIP_LIMIT, SLIP_BACK_FORCE, SLIP_SAID };
+
+/* Direction in which connector i slips in an iterate, or 0 if it is held.
+ *
+ * It slips from where its force exceeds the limit until its motion turns back. While HOLD is set,
+ * those that did not slip in the last step are held, and OVER says that one bears too much.
+ */
+static int direction_of_slip(const rigid_plastic *p, int i, double motion, double force, double tiny)
+{
+  const double over = force - p->back_force[i];
+  const int way = p->way[i];
+  if (p->limit[i] == 0) return motion < 0 ? -1 : 1;
+  if (way) return way * motion < -tiny ? 0 : way;
+  if (!(fabs(over) > p->limit[i] * (1 + 1e-12))) return 0;
+  if (p->course[HOLD] && !p->slipped[i]) {
+    p->course[OVER] = 1;
+    return 0;
+  }
+  p->course[OPENED] = 1;
+  return over < 0 ? -1 : 1;
+}
+
+/* Rows of the connectors at their motions c->e1 and forces in q. */
+void set_rows_of_rigid_plastic(const couplings *c, const double *q)
+{
+  const rigid_plastic *p = c->rigid_plastic;
+  double *w = p->w, s[2];
+  for (int i = 0; i < c->number; ++i, w += p->width) {
+    const double motion = c->e1[i] - c->e0[i];
+    const int way = direction_of_slip(p, i, motion, q[c->force[i]], 1e-14 * c->length[i]);
+    double *row = p->rows + 3 * i;
+    row[0] = 1, row[1] = 0, row[2] = c->e0[i];
+    p->way[i] = way;
+    if (!way) continue;
+    w[SLIP] = fmax(way * motion, 0), w[SLIP_DIRECTION] = way;
+    ask(p->force, w, 2, s);
+    const double slope = way * s[1];
+    row[0] = -slope, row[1] = 1, row[2] = s[0] - slope * c->e1[i];
+  }
+}
+
+/* What the connectors dissipate in a step to the motions e1. */
+double dissipation_of_rigid_plastic(const rigid_plastic *p, const double *e1)
+{
+  double *w = p->w, s[SLIP_SAID], sum = 0;
+  for (int i = 0; i < p->number; ++i, w += p->width) {
+    const double motion = e1[i] - w[SLIP_START];
+    const int way = p->way[i] ? p->way[i] : motion < 0 ? -1 : 1;
+    w[SLIP] = fmax(way * motion, 0), w[SLIP_DIRECTION] = way;
+    if (w[SLIP] == 0) continue;
+    ask(p->end, w, SLIP_SAID, s);
+    sum += s[SLIP_DISSIPATED];
+  }
+  return sum;
+}
+
+/* Take the motions e1 as the new state; sums get what the step dissipated and lost numerically, and
+ * what the connectors store. */
+void commit_rigid_plastic(const rigid_plastic *p, const double *e1, double *sums)
+{
+  double *w = p->w, s[SLIP_SAID];
+  memset(sums, 0, 3 * sizeof *sums);
+  for (int i = 0; i < p->number; ++i, w += p->width) {
+    const int way = p->way[i];
+    w[SLIP] = fmax(way * (e1[i] - w[SLIP_START]), 0), w[SLIP_DIRECTION] = way;
+    if (p->limit[i] < INFINITY) {
+      ask(p->end, w, SLIP_SAID, s);
+      for (int k = 0; k < 3; ++k) sums[k] += s[SLIP_DISSIPATED + k];
+      p->limit[i] = s[SLIP_LIMIT], p->back_force[i] = s[SLIP_BACK_FORCE];
+    }
+    p->slipped[i] = w[SLIP] > 0;
+    w[SLIPPED] += w[SLIP];
+    w[SLIP_START] = e1[i];
+  }
+}
