@@ -172,6 +172,10 @@ class Couplings(Links):
         """Energy that the connectors take in the step to ``q1``; J."""
         return self.response.change(self.motion(q1), float(self._taken(q1).sum()))
 
+    def dissipated(self) -> Array:
+        """Energy that each connector has dissipated by yielding and softening; (num_links,); J."""
+        return self.response.dissipated
+
     def effort(self, q1: Array) -> float:
         """Sum of the sizes of the works that the connectors take in the step to ``q1``; J."""
         return float(np.abs(self._taken(q1)).sum())

@@ -21,6 +21,7 @@ import numpy.typing as npt
 from ufl_beam.beams import Beam, Place
 from ufl_beam.bodies import Anchor, Body, Node, Spot, node
 from ufl_beam.compat import Array
+from ufl_beam.connectors import Connector
 from ufl_beam.discretisation import Mesh
 from ufl_beam.errors import SceneError, require_kind
 from ufl_beam.laws import Softening
@@ -206,9 +207,20 @@ class Grid:
         beam: Beam = self.scene.beams[number]
         return beam.at((s[i] + s[i + 1]) / 2)
 
+    def place_of(self, number: int) -> Place:
+        """The middle of a cell or, numbered after the cells, the place of a plastic hinge."""
+        if number < len(self.cells):
+            return self.middle(number)
+        hinge = self.scene.hinges[number - len(self.cells)]
+        return hinge.a.beam.at(hinge.a.s)
+
     def hinges(self, beam: Beam) -> list[Softening | None]:
         """Law of the hinge that may open in the middle of each cell of a beam."""
         return [beam.section.hinge] * len(self.cells_of(beam))
+
+    def hinge_at(self, place: Place) -> Connector | None:
+        """The plastic hinge of zero length at a place, if there is one."""
+        return next((h for h in self.scene.hinges if place in (h.a, h.b)), None)
 
     def keys(self, cells: Index) -> list[tuple[int, int]]:
         """A number for the ends of the beam, and the number in the beam, of some cells."""

@@ -152,6 +152,10 @@ class Guides(Links):
         """Guides take no energy."""
         return 0.0
 
+    def dissipated(self) -> Array:
+        """None: guides do not yield."""
+        return np.zeros(len(self.links))
+
     def dissipation(self, q1: Array) -> float:
         """None: guides do no work."""
         return 0.0

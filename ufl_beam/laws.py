@@ -146,6 +146,11 @@ class Hardening:
         return bool(self.limit != np.inf)
 
     @property
+    def energy(self) -> float:
+        """Fracture energy: infinite, as it never breaks."""
+        return np.inf
+
+    @property
     def bounded(self) -> bool:
         """Whether the stress never exceeds the limit."""
         viscous = bool(np.any(self.viscosity.coefficient(np.ones(1)) > 0.0))

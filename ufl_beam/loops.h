@@ -103,6 +103,7 @@ typedef struct {
   int number, width;
   double *w;                   /* what the kernels know, `width` numbers of each connector */
   double *limit, *back_force;  /* in the accepted state: |force - back force| up to which it is held */
+  double *dissipated;          /* by each since the beginning */
   int32_t *slipped;            /* whether each did in the last step */
   int32_t *way;                /* whether, and in what direction, each slips in the present iterate */
   double *rows;                /* of each connector, three */

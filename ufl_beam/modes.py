@@ -20,7 +20,7 @@ from ufl_beam.errors import SceneError, require_count, require_kind, require_num
 from ufl_beam.fields import Fields
 from ufl_beam.grid import Grid, Share
 from ufl_beam.initial import mesh_of
-from ufl_beam.joints import velocity_of
+from ufl_beam.joints import Connection, velocity_of
 from ufl_beam.linearised import SmallMotions
 from ufl_beam.loads import FollowerLoad, RotatingFrame
 from ufl_beam.mechanism import require_no_mechanism
@@ -147,13 +147,16 @@ class _Frame:
         self.q, self.t = shapes.q + change, t
         self._forces, self._state, self._change = forces, shapes.q, change
 
+    may_break = False
+    """Whether something yields; modes are elastic."""
+
     def material(self) -> list[Any]:
         """Nothing yields."""
         return []
 
     def connections(self) -> Array:
         """What connectors do is left out."""
-        return np.zeros((len(self.scene.links), 4))
+        return np.zeros((len(self.scene.links), len(Connection._fields)))
 
     def section_forces(self) -> Array:
         """Those of the shape alone: a derivative, by a small difference."""

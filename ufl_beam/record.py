@@ -123,7 +123,7 @@ class XDMF(Recorder):
         self._put(simulation)
 
     def _prepare(self, simulation: Simulation) -> None:
-        self._inelastic = len(simulation.material()) > 0
+        self._inelastic = simulation.may_break
         self._rods = rods_of(simulation.scene)
         links = simulation.scene.links
         self._pulling = [
@@ -195,10 +195,7 @@ class XDMF(Recorder):
         q = simulation.share.gather(simulation.q)
         columns = [*simulation.section_forces().T]
         if self._inelastic:
-            jump, dissipated = np.zeros((2, len(simulation.grid.cells)))
-            for cells, rows in simulation.material():
-                jump[cells], dissipated[cells] = rows[:, 3], rows[:, 4] + rows[:, 5]
-            columns += [jump, dissipated]
+            columns += simulation.damage()
         columns = [np.repeat(column, simulation.grid.mesh.degree) for column in columns]
         if self._rods:
             columns = self._with_rods(columns, simulation.connections())

@@ -88,6 +88,10 @@ class Response(Protocol):
     def dissipation(self, e1: Array) -> float:
         """Energy dissipated plastically in a step to the motions ``e1``; J."""
 
+    @property
+    def dissipated(self) -> Array:
+        """Energy that each connector has dissipated plastically; (num_links,); J."""
+
     def state(self) -> Array:
         """What is remembered besides motions and forces; (num_links, k)."""
 
@@ -151,6 +155,11 @@ class _Working:
     def dissipation(self, e1: Array) -> float:
         """None by plastic flow."""
         return 0.0
+
+    @property
+    def dissipated(self) -> Array:
+        """None by plastic flow."""
+        return np.zeros(len(self._links))
 
     def state(self) -> Array:
         """Nothing is remembered."""
@@ -418,6 +427,11 @@ class _Sprung:
         """Energy dissipated in the step; J."""
         self.points.respond(self._at(e1))
         return self.points.dissipation()
+
+    @property
+    def dissipated(self) -> Array:
+        """Energy that each spring has dissipated; (num_links,); J."""
+        return np.asarray(self.points.kept[:, 4:].sum(axis=1))
 
     def state(self) -> Array:
         """Internal variables."""

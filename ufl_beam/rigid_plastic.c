@@ -72,6 +72,7 @@ void commit_rigid_plastic(const rigid_plastic *p, const double *e1, double *sums
     if (p->limit[i] < INFINITY) {
       ask(p->end, w, SLIP_SAID, s);
       for (int k = 0; k < 3; ++k) sums[k] += s[SLIP_DISSIPATED + k];
+      p->dissipated[i] += s[SLIP_DISSIPATED];
       p->limit[i] = s[SLIP_LIMIT], p->back_force[i] = s[SLIP_BACK_FORCE];
     }
     p->slipped[i] = w[SLIP] > 0;

@@ -154,11 +154,12 @@ class RigidPlasticResponse:
         self._limit, self._back_force = self._at["limit"].copy(), np.zeros(n)
         self._slipped, self._way, self._way_before = np.zeros((3, n), dtype=np.int32)
         self._rows, self._sums, self._stored = np.zeros((n, 3)), np.zeros(3), 0.0
+        self.dissipated: Array = np.zeros(n)
         self._c = c = ffi.new("rigid_plastic *")
         c.force, c.end, c.number, c.width = self._forms.force, self._forms.end, n, len(INPUTS)
-        arrays = (self._storage, self._limit, self._back_force, self._rows)
+        arrays = (self._storage, self._limit, self._back_force, self.dissipated, self._rows)
         self._alive = [*map(doubles, arrays), *map(integers, (self._slipped, self._way))]
-        c.w, c.limit, c.back_force, c.rows, c.slipped, c.way = self._alive
+        c.w, c.limit, c.back_force, c.dissipated, c.rows, c.slipped, c.way = self._alive
         self._course = integers(setting.course.flags)
         c.course = self._course
         self.in_c = {"rigid_plastic": c}
@@ -200,20 +201,23 @@ class RigidPlasticResponse:
     # -- the state -----------------------------------------------------------------------------
 
     def state(self) -> Array:
-        """Internal variables; (num_links, 6)."""
+        """Internal variables; (num_links, 7)."""
         stored = np.zeros(len(self._rows))
         stored[:1] = self._stored  # of all together; to whom it belongs does not matter
-        at = (self._at["slipped"], self._at["start"], self._limit, self._back_force)
-        return np.column_stack([*at, self._way_before, stored])
+        return np.column_stack([*self._variables, stored])
 
     def restore(self, rows: Array) -> None:
         """Take over :meth:`state`."""
-        names = (self._at["slipped"], self._at["start"], self._limit, self._back_force)
-        for mine, values in zip(names, rows.T, strict=False):
+        *variables, stored = rows.T
+        for mine, values in zip(self._variables, variables, strict=True):
             mine[:] = values
-        self._way_before[:] = rows[:, 4]
         self._slipped[:] = np.abs(self._way_before)
-        self._stored = float(rows[:, 5].sum())
+        self._stored = float(stored.sum())
+
+    @property
+    def _variables(self) -> tuple[Array, ...]:
+        at = self._at["slipped"], self._at["start"]
+        return (*at, self._limit, self._back_force, self.dissipated, self._way_before)
 
     def start(self, e: Array) -> None:
         """Begin at motions that no step has led to."""

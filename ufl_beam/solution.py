@@ -301,15 +301,23 @@ class Solution:
     def material_at(self, place: Place) -> Material:
         """The same in the cell at a place at all kept times; the arrays begin with (n+1,).
 
+        Where a plastic hinge is at the place, M, the jump and the energy are those of the hinge; M
+        is the moment during the step that ends at each time.
+
         Raises:
             SceneError: The scene is elastic, or the beam of the place is not in it.
         """
         cell = self.grid.cell(place)
         kept = [self._of_material(n, cell) for n in range(len(self._times))]
-        return Material(*(np.array(field) for field in zip(*kept, strict=True)))
+        forces, jump, plastic, energy = (np.array(field) for field in zip(*kept, strict=True))
+        hinge = self.grid.hinge_at(place)
+        if hinge is not None:
+            of_hinge = self.connector(hinge)
+            forces[:, 2], jump, energy = of_hinge.force, of_hinge.motion, of_hinge.dissipated
+        return Material(forces, jump, plastic, energy)
 
     def _of_material(self, n: int, cells: Index | int) -> Material:
-        if not self._material[n]:
+        if not self._material[n] and not self.scene.hinges:
             raise SceneError("material: nothing in the scene yields or breaks; it is elastic")
         everything = np.zeros((len(self.grid.cells), 6))
         everything[:, :3] = self._forces(n)
