@@ -84,6 +84,7 @@ typedef struct {
   const double *B, *weight, *rest, *length;
   double theta;
   double *e0, *e1, *w, *r, *D, *kept, *sum;
+  double *over; /* largest excess of a closed point over its limit in the latest response */
 } points;
 
 /* Cells with points: forms of the strains, of the forces, which know the resultants r, and of their
@@ -117,6 +118,7 @@ void add_couplings_force(void *self, const double *q, double *r);
 double missed_by_couplings(void *self, const double *q, const double *r, double scale);
 double commit_couplings(const couplings *c, const double *q, double dt);
 void respond(const points *p);
+void release(const points *p, double least);
 void respond_at(const inelastic *m, const double *q);
 void add_inelastic_force(void *self, const double *q, double *r);
 void add_inelastic_tangent(void *self, const double *q, double *tangent);

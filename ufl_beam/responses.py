@@ -27,7 +27,7 @@ from ufl_beam.connectors import (
 )
 from ufl_beam.laws import Hardening, Layout
 from ufl_beam.ledger import Ledger
-from ufl_beam.points import INPUTS, Points, expect_entries
+from ufl_beam.points import INPUTS, Course, Points, expect_entries
 from ufl_beam.schemes import Scheme, Step
 
 if TYPE_CHECKING:
@@ -51,12 +51,14 @@ class Setting(NamedTuple):
         scheme: Says what acts in a step.
         ledger: Takes energies and works.
         friction_repeats: Whether places that stick may hold what is held already.
+        course: Flags that all points of the scene share.
     """
 
     simulation: Simulation
     scheme: Scheme
     ledger: Ledger
     friction_repeats: bool
+    course: Course
 
 
 class Response(Protocol):
@@ -372,7 +374,9 @@ class _Sprung:
         number = len(links)
         keys = [(0, i) for i in range(number)]
         storage = np.zeros((number, 1, len(INPUTS)))
-        self.points = Points(layout, keys, np.ones(number), setting.scheme, storage)
+        self.points = Points(
+            layout, keys, np.ones(number), setting.scheme, storage, setting.course
+        )
         self._ledger = setting.ledger
         expect_entries(layout, setting.scheme, setting.ledger)
         self._strains = np.zeros((number, 3))
