@@ -29,7 +29,7 @@ from ufl_beam.pacing import Pace
 from ufl_beam.record import Recorder, on_first
 from ufl_beam.simulation import Simulation
 
-FORMAT = "checkpoint of ufl_beam, 1"
+FORMAT = "checkpoint of ufl_beam, 2"
 """To be counted up whenever files of before mean something else."""
 
 HEADER = 512

@@ -172,6 +172,10 @@ class Couplings(Links):
         """Energy that the connectors take in the step to ``q1``; J."""
         return self.response.change(self.motion(q1), float(self._taken(q1).sum()))
 
+    def shown_motion(self, q: Array) -> Array:
+        """Motions of the accepted state ``q`` as solutions show them; (num_links,); m or rad."""
+        return self.response.motion(self.motion(q))
+
     def dissipated(self) -> Array:
         """Energy that each connector has dissipated by yielding and softening; (num_links,); J."""
         return self.response.dissipated

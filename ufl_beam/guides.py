@@ -152,6 +152,10 @@ class Guides(Links):
         """Guides take no energy."""
         return 0.0
 
+    def shown_motion(self, q: Array) -> Array:
+        """Motions of the accepted state ``q``; (num_links,); m."""
+        return self.motion(q)
+
     def dissipated(self) -> Array:
         """None: guides do not yield."""
         return np.zeros(len(self.links))

@@ -106,7 +106,7 @@ class Live:
         for coupling in self.couplings:
             q = self.q
             here[coupling.numbers] = np.column_stack(
-                [coupling.motion(q), coupling.force(q), coupling.work, coupling.rate,
+                [coupling.shown_motion(q), coupling.force(q), coupling.work, coupling.rate,
                  coupling.dissipated()]
             )  # fmt: skip
         if self.share.comm.size > 1:

@@ -193,14 +193,17 @@ int has_its_digits(double sum)
 
 /* What a point is about; the order of INPUTS in points.py. */
 enum {
-  STRAIN, GROWTH, DIRECTION, TRACTION, BEFORE, PLASTIC, ACCUMULATED, JUMP, OPENING, STIFFNESS,
-  LENGTH, THETA, WIDTH = 19
+  STRAIN, GROWTH, DIRECTION, TRACTION, BEFORE, PLASTIC, ACCUMULATED, JUMP, OPENING, FLOWS,
+  STIFFNESS, LENGTH, THETA, WIDTH = 20
 };
+
+/* Values of FLOWS: did not grow in the last step, grew in it, may open in this one; see points.py. */
+enum { CLOSED, FLOWING, RELEASED };
 
 /* What the kernel of the end of a step says; the order in points.py. */
 enum { FLOW, WORKED, BROKEN, LOST, ELASTIC, HARDENING, STRESS, RESISTANCE, SAID };
 
-/* What points know of each other in a step; the order in points.py. */
+/* Flags that all points of a scene share in a step; see Course in points.py. */
 enum { OPENED, RELIEF, HOLD, OVER };
 
 static const double unit_cell[6] = {0, 0, 0, 1, 0, 0};
@@ -247,11 +250,15 @@ static double growth(kernel *excess, double *w)
  * `course` notes that a point opens, and may ask for relief: then points that do not open answer
  * with their elastic stiffness. Where one opens, those around it unload, which their own tangents
  * do not tell, and Newton's method would close what it just opened, again and again.
+ *
+ * While `course` asks to hold, closed points stay closed whatever they bear, and `over` is the
+ * largest of |stress| / limit - 1 of those that bear more than their limit, else zero.
  */
 void respond(const points *p)
 {
   double s[2], *w = p->w, *r = p->r, *D = p->D;
   const double *e0 = p->e0, *e1 = p->e1;
+  *p->over = 0;
   for (int c = 0; c < p->cells; ++c, e0 += 3, e1 += 3, r += 3, D += 9) {
     memset(D, 0, 9 * sizeof *D);
     for (int k = 0; k < 3; ++k) {
@@ -263,7 +270,11 @@ void respond(const points *p)
       w[STRAIN] = b[0] * e1[0] + b[1] * e1[1] + b[2] * e1[2];
       w[GROWTH] = w[DIRECTION] = 0;
       ask(p->bulk, w, 2, s);
-      if (fabs(s[0]) > w[TRACTION]) { /* P(51) */
+      const int over = fabs(s[0]) > w[TRACTION]; /* P(51) */
+      if (over && p->course[HOLD] && w[FLOWS] == CLOSED && w[TRACTION] > 0) {
+        *p->over = fmax(*p->over, fabs(s[0]) / w[TRACTION] - 1);
+        p->course[OVER] = 1;
+      } else if (over) {
         w[DIRECTION] = s[0] < 0 ? -1 : 1;
         w[GROWTH] = growth(p->excess, w);
         ask(p->opening, w, 2, s);
@@ -276,6 +287,17 @@ void respond(const points *p)
         for (int l = 0; l < 3; ++l) D[3 * k + l] += p->weight[i] * s[1] * b[k] * b[l];
       }
     }
+  }
+}
+
+/* Let the closed points open, in this step, whose excess in the latest response is so large. */
+void release(const points *p, double least)
+{
+  double s[2], *w = p->w;
+  for (int i = 0; i < p->cells * p->of_cell; ++i, w += WIDTH) {
+    if (w[FLOWS] != CLOSED || !(w[TRACTION] < INFINITY)) continue;
+    ask(p->bulk, w, 2, s);
+    if (fabs(s[0]) > w[TRACTION] && fabs(s[0]) / w[TRACTION] - 1 >= least) w[FLOWS] = RELEASED;
   }
 }
 
@@ -447,6 +469,7 @@ void commit(const points *p)
       w[ACCUMULATED] += fabs(s[FLOW]);
       w[JUMP] += w[DIRECTION] * w[GROWTH];
       w[OPENING] += w[GROWTH];
+      w[FLOWS] = w[GROWTH] > 0 ? FLOWING : CLOSED;
       w[GROWTH] = w[DIRECTION] = 0;
       if (w[TRACTION] < INFINITY) w[TRACTION] = s[RESISTANCE];
       plastic += volume * s[WORKED];

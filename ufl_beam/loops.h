@@ -84,6 +84,7 @@ typedef struct {
   const double *B, *weight, *rest, *length;
   double theta;
   double *e0, *e1, *w, *r, *D, *kept, *sum;
+  double *over; /* largest excess of a closed point over its limit in the latest response */
 } points;
 
 /* Cells with points: forms of the strains, of the forces, which know the resultants r, and of their
@@ -104,7 +105,8 @@ typedef struct {
   double *w;                   /* what the kernels know, `width` numbers of each connector */
   double *limit, *back_force;  /* in the accepted state: |force - back force| up to which it is held */
   double *dissipated;          /* by each since the beginning */
-  int32_t *slipped;            /* whether each did in the last step */
+  int32_t *slipped;            /* whether each did in the last step, or may in this one; as FLOWS */
+  double *excess;              /* |force - back force| / limit - 1 of those held that bear too much */
   int32_t *way;                /* whether, and in what direction, each slips in the present iterate */
   double *rows;                /* of each connector, three */
 } rigid_plastic;
@@ -134,6 +136,7 @@ void add_couplings_force(void *self, const double *q, double *r);
 double missed_by_couplings(void *self, const double *q, const double *r, double scale);
 double commit_couplings(const couplings *c, const double *q, double dt);
 void respond(const points *p);
+void release(const points *p, double least);
 void respond_at(const inelastic *m, const double *q);
 void add_inelastic_force(void *self, const double *q, double *r);
 void add_inelastic_tangent(void *self, const double *q, double *tangent);

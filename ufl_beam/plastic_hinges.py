@@ -22,9 +22,9 @@ def merged(groups: Iterable[Sequence[Slot]]) -> dict[Slot, Slot]:
             slot = parent[slot]
         return slot
 
-    for first, *others in groups:
-        for other in others:
-            a, b = root(first), root(other)
+    for group in groups:
+        for other in group[1:]:
+            a, b = root(group[0]), root(other)
             if a != b:
                 parent[b] = a
     return {slot: root(slot) for slot in parent}

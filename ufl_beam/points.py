@@ -32,6 +32,8 @@ INPUTS = (
     *("strain", "growth", "direction"),
     # the state at t_n: resistance, strain, plastic strain and its sum, jump and its sum
     *("traction", "before", "p", "ξ", "jump", "opening"),
+    # 1 if the opening grew in the last step, 2 if it may in this one, else 0
+    "flows",
     # numbers of the point; the order of these so far is that of loops.c
     *("C", "length", "θ", "dt", "limit", "H", "B", "eta", "softening limit", "softening energy"),
 )
@@ -40,7 +42,7 @@ INPUTS = (
 SPENT, NOTHING = 1e-6, 1e-30
 """Part of its limit below which an open hinge counts as a joint; factor of its stiffness then."""
 
-STATE = ("p", "ξ", "jump", "opening", "before", "traction")
+STATE = ("p", "ξ", "jump", "opening", "before", "traction", "flows")
 """The internal variables, and what else of an accepted state the next step depends on."""
 
 
@@ -122,20 +124,34 @@ class PointForms:
         return tabulator(form)
 
 
+OPENED, RELIEF, HOLD, OVER = range(4)
+"""Entries of :attr:`Course.flags`; the order in loops.c."""
+
+RELEASED = 2.0
+"""Value of "flows" of a point that may open in this step although it did not flow in the last."""
+
+
 class Course:
-    """What points know of each other in a step.
+    """Flags that all points of a scene share in a step.
 
     Attributes:
-        flags: Whether one has opened, and whether the others are to relieve it; (2,), int32.
+        flags: Of the present search for an equilibrium; (4,), int32.  OPENED: a point has opened.
+            RELIEF: points that do not open answer elastically.  HOLD: points that do not flow stay
+            closed.  OVER: one of them has borne more than its limit.
     """
 
     def __init__(self) -> None:
         self.flags: Index = np.zeros(4, dtype=np.int32)
 
+    def begin(self, hold: bool) -> None:
+        """Begin a search for an equilibrium."""
+        self.flags[:] = 0
+        self.flags[HOLD] = hold
+
     def relieve(self) -> bool:
         """Let points around those that open answer elastically, if there are any."""
-        self.flags[1] = self.flags[0]
-        return bool(self.flags[1])
+        self.flags[RELIEF] = self.flags[OPENED]
+        return bool(self.flags[RELIEF])
 
 
 class Points:
@@ -150,6 +166,7 @@ class Points:
         course: Shared by all points of a scene.
 
     Attributes:
+        softens: Whether they can open.
         strains: Of the cells at the latest response; (cells, 3); may be written to.
         r, D: The latest response, see :meth:`respond`.
         points: What the loops over the points take, see loops.h.
@@ -172,7 +189,8 @@ class Points:
         course = course or Course()
         self._forms = PointForms(layout.softening, scheme)
         self._layout, self._storage, self._loss = layout, storage, scheme.loss
-        self._yields, self._softens = layout.yields, layout.softening is not None
+        self._yields, self.softens = layout.yields, layout.softening is not None
+        self._released = False
         self._at = {name: storage[:, :, i] for i, name in enumerate(INPUTS)}
         self._bulk = bulk = layout.bulk(keys)
         numbers = {"C": bulk.C, "limit": bulk.limit, "H": bulk.H, "B": bulk.B, "eta": bulk.eta}
@@ -194,6 +212,7 @@ class Points:
         self.kept, self.sums = np.zeros((cells, 6)), np.zeros(5)
         self.r, self.D = np.zeros((cells, 3)), np.zeros((cells, 9))
         self._e0, self.strains = np.zeros((cells, 3)), np.zeros((cells, 3))
+        self._over = np.zeros(1)
         B, weights, rest = (
             np.ascontiguousarray(x, dtype=np.float64)
             for x in (layout.strains, layout.weights, layout.rest)
@@ -202,11 +221,11 @@ class Points:
         self._alive = [
             *map(doubles, (B, weights, rest, np.ascontiguousarray(length))),
             *map(doubles, (self._e0, self.strains, storage, self.r, self.D, self.kept, self.sums)),
-            integers(course.flags),
+            integers(course.flags), doubles(self._over),
         ]
         self.points = c = ffi.new("points *")
         c.B, c.weight, c.rest, c.length = self._alive[:4]
-        c.e0, c.e1, c.w, c.r, c.D, c.kept, c.sum, c.course = self._alive[4:]
+        c.e0, c.e1, c.w, c.r, c.D, c.kept, c.sum, c.course, c.over = self._alive[4:]
         c.bulk, c.opening, c.excess, c.end = forms.bulk, forms.opening, forms.excess, forms.end
         c.cells, c.of_cell, c.theta = cells, n, scheme.theta
 
@@ -230,7 +249,6 @@ class Points:
 
     def begin(self, dt: float) -> None:
         """Begin a step of this length; s."""
-        self._course.flags[:] = 0
         if dt != self._dt:
             self._steps[:] = self._dt = dt
 
@@ -242,6 +260,23 @@ class Points:
         self.strains[:] = strains
         lib.respond(self.points)
         return self.r, self.D
+
+    @property
+    def excess(self) -> float:
+        """Largest ``|stress| / limit - 1`` of a point that was held closed, or zero."""
+        return float(self._over[0])
+
+    def release(self, least: float) -> None:
+        """Let held points open from now on whose excess was so large in the latest response."""
+        lib.release(self.points, least)
+        self._released = True
+
+    def hold(self) -> None:
+        """Take back :meth:`release`."""
+        if self._released:
+            flows = self["flows"]
+            flows[flows == RELEASED] = 0.0
+            self._released = False
 
     def accept(self) -> None:
         """Take the strains of the latest response as the new state."""
@@ -287,7 +322,7 @@ class Points:
         plastic, broken, lost, _, _ = self.sums.tolist()
         if self._yields:
             ledger.lost["plastic"] += plastic
-        if self._softens:
+        if self.softens:
             ledger.lost["hinges"] += broken
         if self._loss:
             ledger.lost["numerical"] += 2 * self._loss * lost

@@ -27,6 +27,7 @@ from ufl_beam.connectors import (
 )
 from ufl_beam.laws import Hardening, Layout
 from ufl_beam.ledger import Ledger
+from ufl_beam.openings import Openable
 from ufl_beam.points import INPUTS, Course, Points, expect_entries
 from ufl_beam.schemes import Scheme, Step
 
@@ -51,7 +52,7 @@ class Setting(NamedTuple):
         scheme: Says what acts in a step.
         ledger: Takes energies and works.
         friction_repeats: Whether places that stick may hold what is held already.
-        course: Shared by all that opens or slips in a step.
+        course: Flags that all points of the scene share.
     """
 
     simulation: Simulation
@@ -69,6 +70,12 @@ class Response(Protocol):
 
     in_c: dict[str, Any]
     """Data of laws that C evaluates, by their names in ``couplings`` of loops.h."""
+
+    openable: Openable | None
+    """Those that open beyond a limit, if there are."""
+
+    def motion(self, e: Array) -> Array:
+        """Motions of the accepted state as solutions show them; ``e`` are those of the nodes."""
 
     def begin(self, e0: Array, step: Step) -> None:
         """Begin a step at the motions ``e0``."""
@@ -116,6 +123,7 @@ class _Working:
 
     steady = False
     in_c: dict[str, Any] = {}  # noqa: RUF012
+    openable: Openable | None = None
     _group = "lost"
     _entry = ""
     _sign = 1.0
@@ -139,6 +147,10 @@ class _Working:
 
     def _note(self, step: Step) -> None:
         """What a law notes at the beginning of a step."""
+
+    def motion(self, e: Array) -> Array:
+        """Those of the nodes."""
+        return e
 
     def accept(self, e1: Array, work: float) -> None:
         """Enter the work."""
@@ -389,11 +401,18 @@ class _Sprung:
         number = len(links)
         keys = [(0, i) for i in range(number)]
         storage = np.zeros((number, 1, len(INPUTS)))
-        self.points = Points(layout, keys, np.ones(number), setting.scheme, storage)
+        self.points = Points(
+            layout, keys, np.ones(number), setting.scheme, storage, setting.course
+        )
         self._ledger = setting.ledger
         expect_entries(layout, setting.scheme, setting.ledger)
         self._strains = np.zeros((number, 3))
         self.in_c = {"points": self.points.points}
+        self.openable = self.points if self.points.softens else None
+
+    def motion(self, e: Array) -> Array:
+        """Those of the nodes."""
+        return e
 
     def _at(self, e: Array) -> Array:
         self._strains[:, 0] = e

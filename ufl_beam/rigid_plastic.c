@@ -9,21 +9,23 @@ enum { SLIP_DISSIPATED, SLIP_LOST, SLIP_STORED, SLIP_LIMIT, SLIP_BACK_FORCE, SLI
 /* Direction in which connector i slips in an iterate, or 0 if it is held.
  *
  * It slips from where its force exceeds the limit until its motion turns back. While HOLD is set,
- * those that did not slip in the last step are held, and OVER says that one bears too much.
+ * those that did not slip in the last step are held, and their excess is |force| / limit - 1.
  */
 static int direction_of_slip(const rigid_plastic *p, int i, double motion, double force, double tiny)
 {
-  const double over = force - p->back_force[i];
+  const double beyond = force - p->back_force[i];
   const int way = p->way[i];
+  p->excess[i] = 0;
   if (p->limit[i] == 0) return motion < 0 ? -1 : 1;
   if (way) return way * motion < -tiny ? 0 : way;
-  if (!(fabs(over) > p->limit[i] * (1 + 1e-12))) return 0;
-  if (p->course[HOLD] && !p->slipped[i]) {
+  if (!(fabs(beyond) > p->limit[i] * (1 + 1e-12))) return 0;
+  if (p->course[HOLD] && p->slipped[i] == CLOSED) {
+    p->excess[i] = fabs(beyond) / p->limit[i] - 1;
     p->course[OVER] = 1;
     return 0;
   }
   p->course[OPENED] = 1;
-  return over < 0 ? -1 : 1;
+  return beyond < 0 ? -1 : 1;
 }
 
 /* Rows of the connectors at their motions c->e1 and forces in q. */
@@ -32,10 +34,10 @@ void set_rows_of_rigid_plastic(const couplings *c, const double *q)
   const rigid_plastic *p = c->rigid_plastic;
   double *w = p->w, s[2];
   for (int i = 0; i < c->number; ++i, w += p->width) {
-    const double motion = c->e1[i] - c->e0[i];
+    const double motion = c->e1[i] - w[SLIP_START];
     const int way = direction_of_slip(p, i, motion, q[c->force[i]], 1e-14 * c->length[i]);
     double *row = p->rows + 3 * i;
-    row[0] = 1, row[1] = 0, row[2] = c->e0[i];
+    row[0] = 1, row[1] = 0, row[2] = w[SLIP_START];
     p->way[i] = way;
     if (!way) continue;
     w[SLIP] = fmax(way * motion, 0), w[SLIP_DIRECTION] = way;
@@ -60,7 +62,7 @@ double dissipation_of_rigid_plastic(const rigid_plastic *p, const double *e1)
   return sum;
 }
 
-/* Take the motions e1 as the new state; sums get what the step dissipated and lost numerically, and
+/* Take the motions e1 as the new state, those of held connectors as they were; sums get what the step dissipated and lost numerically, and
  * what the connectors store. */
 void commit_rigid_plastic(const rigid_plastic *p, const double *e1, double *sums)
 {
@@ -75,8 +77,8 @@ void commit_rigid_plastic(const rigid_plastic *p, const double *e1, double *sums
       p->dissipated[i] += s[SLIP_DISSIPATED];
       p->limit[i] = s[SLIP_LIMIT], p->back_force[i] = s[SLIP_BACK_FORCE];
     }
-    p->slipped[i] = w[SLIP] > 0;
+    p->slipped[i] = w[SLIP] > 0 ? FLOWING : CLOSED;
     w[SLIPPED] += w[SLIP];
-    w[SLIP_START] = e1[i];
+    w[SLIP_START] += way * w[SLIP];
   }
 }

@@ -20,7 +20,8 @@ from ufl_beam.connectors import Connector, RigidPlastic
 from ufl_beam.forms import tabulator
 from ufl_beam.laws import Bulk, Hardening, Softening
 from ufl_beam.loops import doubles, ffi, integers, lib
-from ufl_beam.points import NOTHING, SPENT
+from ufl_beam.openings import Openable
+from ufl_beam.points import NOTHING, RELEASED, SPENT
 from ufl_beam.responses import Rows, Setting
 from ufl_beam.schemes import Scheme, Step
 
@@ -155,11 +156,15 @@ class RigidPlasticResponse:
         self._slipped, self._way, self._way_before = np.zeros((3, n), dtype=np.int32)
         self._rows, self._sums, self._stored = np.zeros((n, 3)), np.zeros(3), 0.0
         self.dissipated: Array = np.zeros(n)
+        self._excess = np.zeros(n)
         self._c = c = ffi.new("rigid_plastic *")
         c.force, c.end, c.number, c.width = self._forms.force, self._forms.end, n, len(INPUTS)
         arrays = (self._storage, self._limit, self._back_force, self.dissipated, self._rows)
-        self._alive = [*map(doubles, arrays), *map(integers, (self._slipped, self._way))]
-        c.w, c.limit, c.back_force, c.dissipated, c.rows, c.slipped, c.way = self._alive
+        self._alive = [
+            *map(doubles, (*arrays, self._excess)),
+            *map(integers, (self._slipped, self._way)),
+        ]
+        c.w, c.limit, c.back_force, c.dissipated, c.rows, c.excess, c.slipped, c.way = self._alive
         self._course = integers(setting.course.flags)
         c.course = self._course
         self.in_c = {"rigid_plastic": c}
@@ -188,6 +193,32 @@ class RigidPlasticResponse:
         """Enter the energy that hardening stores."""
         if self._stores:
             self._ledger.state["hardening"] += self._stored
+
+    # -- openings, see openings.py -------------------------------------------------------------
+
+    @property
+    def openable(self) -> Openable:
+        """Connectors that slip beyond a limit: these."""
+        return self
+
+    @property
+    def excess(self) -> float:
+        """Largest ``|force| / limit - 1`` of a connector that was held, or zero."""
+        return float(self._excess.max(initial=0.0))
+
+    def release(self, least: float) -> None:
+        """Let held connectors slip from now on whose excess was so large."""
+        self._slipped[(self._excess > 0) & (self._excess >= least)] = RELEASED
+
+    def hold(self) -> None:
+        """Take back :meth:`release`."""
+        self._slipped[:] = np.abs(self._way_before)
+
+    # -- energies ------------------------------------------------------------------------------
+
+    def motion(self, e: Array) -> Array:
+        """Motions without the round-off of those that are held."""
+        return self._at["start"].copy()
 
     def change(self, e1: Array, work: float) -> float:
         """Energy stored and dissipated in the step: the work; J."""

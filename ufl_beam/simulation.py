@@ -12,7 +12,7 @@ import numpy as np
 from ufl_beam.applied import DeadLoads, FollowerLoads
 from ufl_beam.compat import Array
 from ufl_beam.connectors import Controller, Coulomb
-from ufl_beam.couplings import couplings
+from ufl_beam.couplings import Couplings, couplings
 from ufl_beam.dampers import damping_forces
 from ufl_beam.differences import numerical_forces
 from ufl_beam.discretisation import Mesh
@@ -34,6 +34,7 @@ from ufl_beam.mechanism import (
     require_no_mechanism,
 )
 from ufl_beam.memory import NOWHERE, Memory, Restoring, Saving, State
+from ufl_beam.openings import Openable, Openings
 from ufl_beam.path import StaticPath
 from ufl_beam.points import Course, expect_entries
 from ufl_beam.processes import give_back_memory, ours
@@ -148,6 +149,7 @@ class Simulation(Live):
         self.force = np.zeros(self.share.size)
         setting = Setting(self, scheme, self.ledger, friction_repeats(scene), self._course)
         self.couplings = couplings(self.share, setting, self._A)
+        self._openings = Openings(self._course, self._openable(), self.share.comm)
         self.loads = self._make_loads()
         self._others: list[Term] = [*self.loads, *self._numerical]
         if has_inertia(scheme):
@@ -233,6 +235,12 @@ class Simulation(Live):
             fields = self.fields if elastic.all() else Fields(self.share, part)
             self.beams.append(ElasticBeams(fields, self.scheme, self._A, self.ledger))
             self._numerical = numerical_forces(self.scheme, fields, self._A, self.ledger)
+
+    def _openable(self) -> list[Openable]:
+        """What may open on this process: hinges and cracks of cells, springs that soften."""
+        cells: list[Openable] = [one for one in self.inelastic if one.points.softens]
+        groups = [one.response.openable for one in self.couplings if isinstance(one, Couplings)]
+        return [*cells, *(places for places in groups if places is not None)]
 
     def _make_loads(self) -> list[DeadLoads | FollowerLoads | FrameForces]:
         followers = [load for load in self.scene.loads if isinstance(load, FollowerLoad)]
@@ -368,14 +376,17 @@ class Simulation(Live):
         """See :meth:`attempt`."""
         step = self.scheme.step(self.t, t1, t1 if end is None else end, self.q)
         self.ask()
-        for term in self.terms:
-            term.begin(step)
+        self._begin(step)
         guess = extrapolated(self.q, self._q_before, step.dt / self.last_dt)
         self.supports.enter(guess)
         self.supports.move(guess, self.supports.in_axes(self.q), step)
         try:
             like_last = self.scheme.dynamic and math.isclose(step.dt, self.last_dt, rel_tol=1e-6)
-            q1 = self._solver.solve(guess, [load.force for load in self.loads], like_last)
+            q1 = self._openings.solve(
+                guess,
+                lambda x: self._solver.solve(x, self._loads(), like_last and x is guess),
+                lambda: self._begin(step),
+            )
         except StepFailed:
             if said := no_number(self.scene, (step.load_time, step.motion_time)):
                 raise StepFailed(said) from None
@@ -394,10 +405,24 @@ class Simulation(Live):
             StepFailed: There is no equilibrium, or it is too far away.
         """
         self.ask()
+        self._begin(step)
+        loads, t = self._loads(), border.t
+
+        def again() -> None:
+            self._begin(step)
+            border.t = t
+
+        q1 = self._openings.solve(
+            guess, lambda x: self._solver.solve_along(x, loads, border), again
+        )
+        return self._trial(step, q1)
+
+    def _begin(self, step: Step) -> None:
         for term in self.terms:
             term.begin(step)
-        loads = [load.force for load in self.loads]
-        return self._trial(step, self._solver.solve_along(guess, loads, border))
+
+    def _loads(self) -> list[Array]:
+        return [load.force for load in self.loads]
 
     def _trial(self, step: Step, q1: Array) -> Trial:
         """What a step came to, ``q1`` in the axes of the supports, if it was followed."""

@@ -67,7 +67,13 @@ class Newton:
 
 
 class Border(Protocol):
-    """One more unknown on which the residual depends, and one more equation."""
+    """One more unknown on which the residual depends, and one more equation.
+
+    Attributes:
+        t: The unknown.
+    """
+
+    t: float
 
     def arrive(self, x: Array) -> None:
         """Take note of an iterate; the residual that follows is at the unknown found so far."""

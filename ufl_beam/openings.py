@@ -1,0 +1,95 @@
+"""Search for the equilibrium of a step in which no more opens than must.
+
+With strong softening a step has two solutions, one in which a hinge stays closed and one in which
+it has opened.  The rule that chooses: a hinge, a crack of a fibre or a softening spring that does
+not flow at the beginning of a step stays closed in it if there is an equilibrium in which it bears
+at most its limit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from mpi4py import MPI
+
+from ufl_beam.compat import Array
+from ufl_beam.errors import StepFailed
+from ufl_beam.points import OVER, Course
+
+FIRST_PART = 0.5
+"""Held places open first whose excess over their limit is at least this part of the largest one.
+
+Where one opens, others may unload.  The part is halved with each further solution, so that few are
+needed where many open in a step.
+"""
+
+
+class Openable(Protocol):
+    """Places of one kind that open beyond a limit, and are held closed while HOLD is set."""
+
+    @property
+    def excess(self) -> float:
+        """Largest ``|stress| / limit - 1`` of a held place in the latest residual, or zero."""
+
+    def release(self, least: float) -> None:
+        """Let held places open from now on whose excess is at least so large."""
+
+    def hold(self) -> None:
+        """Take back :meth:`release`."""
+
+
+class Openings:
+    """Solves a step with what does not flow held closed, then lets open what bears too much.
+
+    Args:
+        course: Flags that all places share.
+        places: Those of this process.
+        comm: Processes that share the scene.
+    """
+
+    def __init__(self, course: Course, places: Sequence[Openable], comm: MPI.Intracomm) -> None:
+        self._course, self._places, self._comm = course, places, comm
+        self._any = bool(self._largest(float(bool(places))))
+
+    def solve(
+        self, guess: Array, solve: Callable[[Array], Array], again: Callable[[], None]
+    ) -> Array:
+        """Find the equilibrium of a step.
+
+        Args:
+            guess: Configuration where the search begins.
+            solve: Finds an equilibrium from a configuration; raises :class:`StepFailed`.
+            again: Begins the step again.
+
+        Raises:
+            StepFailed: There is none, neither with places held closed nor with all of them free.
+        """
+        if not self._any:
+            return solve(guess)
+        course = self._course
+        course.begin(hold=True)
+        try:
+            return self._open_few(solve(guess), solve)
+        except StepFailed:
+            if not self._largest(float(course.flags[OVER])):
+                raise  # nothing would open
+        finally:
+            course.begin(hold=False)
+            for one in self._places:
+                one.hold()
+        again()
+        return solve(guess)
+
+    def _open_few(self, q: Array, solve: Callable[[Array], Array]) -> Array:
+        """Let places open that bear too much, those with the largest excess first."""
+        part = FIRST_PART
+        while excess := self._largest(max((one.excess for one in self._places), default=0.0)):
+            for one in self._places:
+                one.release(part * excess)
+            q, part = solve(q), part / 2
+        return q
+
+    def _largest(self, here: float) -> float:
+        """Maximum over the processes that share the scene."""
+        return here if self._comm.size == 1 else self._comm.allreduce(here, op=MPI.MAX)
