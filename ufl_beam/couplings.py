@@ -172,6 +172,10 @@ class Couplings(Links):
         """Energy that the connectors take in the step to ``q1``; J."""
         return self.response.change(self.motion(q1), float(self._taken(q1).sum()))
 
+    def flows(self) -> bool:
+        """Whether a connector of this process slips plastically in the latest iterate."""
+        return self.response.flows()
+
     def shown_motion(self, q: Array) -> Array:
         """Motions of the accepted state ``q`` as solutions show them; (num_links,); m or rad."""
         return self.response.motion(self.motion(q))
@@ -186,7 +190,7 @@ class Couplings(Links):
 
     def dissipation(self, q1: Array) -> float:
         """Energy that connectors of this process dissipate plastically in the step to ``q1``; J."""
-        return self.response.dissipation(self.motion(q1))
+        return self.response.dissipation(self.motion(q1), self.force(q1))
 
     def accept(self, q1: Array, s: Array) -> None:
         """Enter what was supplied or lost."""

@@ -152,6 +152,10 @@ class Guides(Links):
         """Guides take no energy."""
         return 0.0
 
+    def flows(self) -> bool:
+        """None does."""
+        return False
+
     def shown_motion(self, q: Array) -> Array:
         """Motions of the accepted state ``q``; (num_links,); m."""
         return self.motion(q)

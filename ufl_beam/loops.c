@@ -410,7 +410,7 @@ double missed_by_couplings(void *self, const double *q, const double *r, double 
     const int32_t *dofs = c->dofs + 7 * i;
     const double *row = in_cell(c->work, k, c->row), length = c->length[i];
     const int next = c->work->lanes;
-    const double size = fabs(row[next]) < 1 ? 0.01 * length : force * c->size / length;
+    const double size = fabs(row[next]) < 1 ? 0.01 * length * fabs(row[0]) : force * c->size / length;
     /* Far from where it began, or after many turns, a part has fewer digits left. */
     double moved = 0, turned = 0;
     for (int j = 0; j < 4; ++j) moved = fmax(moved, fabs(q[dofs[j]]));

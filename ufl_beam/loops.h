@@ -106,6 +106,7 @@ typedef struct {
   double *limit, *back_force;  /* in the accepted state: |force - back force| up to which it is held */
   double *dissipated;          /* by each since the beginning */
   int32_t *slipped;            /* whether each did in the last step, or may in this one; as FLOWS */
+  const double *slope;         /* r > 0 of the equation of each, see rigid_plastic.c */
   double *excess;              /* |force - back force| / limit - 1 of those held that bear too much */
   int32_t *way;                /* whether, and in what direction, each slips in the present iterate */
   double *rows;                /* of each connector, three */
@@ -130,7 +131,7 @@ typedef struct {
 
 void find_motions(const couplings *c, const double *q);
 void set_rows_of_rigid_plastic(const couplings *c, const double *q);
-double dissipation_of_rigid_plastic(const rigid_plastic *p, const double *e1);
+double dissipation_of_rigid_plastic(const rigid_plastic *p, const double *e1, const double *force);
 void commit_rigid_plastic(const rigid_plastic *p, const double *e1, double *sums);
 void add_couplings_force(void *self, const double *q, double *r);
 double missed_by_couplings(void *self, const double *q, const double *r, double scale);

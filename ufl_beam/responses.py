@@ -92,8 +92,11 @@ class Response(Protocol):
     def change(self, e1: Array, work: float) -> float:
         """Energy that the step stores, dissipates or gives away; J."""
 
-    def dissipation(self, e1: Array) -> float:
+    def dissipation(self, e1: Array, λ: Array) -> float:
         """Energy dissipated plastically in a step to the motions ``e1``; J."""
+
+    def flows(self) -> bool:
+        """Whether one slips plastically in the latest iterate."""
 
     @property
     def dissipated(self) -> Array:
@@ -164,9 +167,13 @@ class _Working:
         """The work."""
         return work
 
-    def dissipation(self, e1: Array) -> float:
+    def dissipation(self, e1: Array, λ: Array) -> float:
         """None by plastic flow."""
         return 0.0
+
+    def flows(self) -> bool:
+        """None does."""
+        return False
 
     @property
     def dissipated(self) -> Array:
@@ -442,10 +449,14 @@ class _Sprung:
         self.points.respond(self._at(e1))
         return self.points.change()
 
-    def dissipation(self, e1: Array) -> float:
+    def dissipation(self, e1: Array, λ: Array) -> float:
         """Energy dissipated in the step; J."""
         self.points.respond(self._at(e1))
         return self.points.dissipation()
+
+    def flows(self) -> bool:
+        """Their motions tell."""
+        return False
 
     @property
     def dissipated(self) -> Array:

@@ -18,7 +18,7 @@ from ufl.core.expr import Expr
 from ufl_beam.compat import Array, fem, line_mesh
 from ufl_beam.connectors import Connector, RigidPlastic
 from ufl_beam.forms import tabulator
-from ufl_beam.laws import Bulk, Hardening, Softening
+from ufl_beam.laws import Bulk, Hardening, HingeLaw, Softening
 from ufl_beam.loops import doubles, ffi, integers, lib
 from ufl_beam.openings import Openable
 from ufl_beam.points import NOTHING, RELEASED, SPENT
@@ -99,6 +99,22 @@ def _(law: Hardening) -> dict[str, float]:
     return {"limit": law.limit, "H": law.modulus, "B": law.kinematic, "eta": eta}
 
 
+EARLY = 0.01
+"""Motion, in rad or as a part of the scene, that counts as much as the limit in deciding whether a
+connector slips in an iterate; solutions do not depend on it."""
+
+
+def _slope(link: Connector, size: float) -> float:
+    """Factor of motions beside forces in the equation of a connector, see rigid_plastic.c.
+
+    It is above the steepest softening, so that an open branch is found open.
+    """
+    law: HingeLaw = link.law.law  # type: ignore[union-attr]
+    if not 0.0 < law.limit < np.inf:
+        return 1.0
+    return 2 * law.limit**2 / law.energy + law.limit / (EARLY * (1.0 if link.turns else size))
+
+
 class SlipForms:
     """Compiled laws of slip: C functions of :data:`INPUTS`.
 
@@ -157,14 +173,16 @@ class RigidPlasticResponse:
         self._rows, self._sums, self._stored = np.zeros((n, 3)), np.zeros(3), 0.0
         self.dissipated: Array = np.zeros(n)
         self._excess = np.zeros(n)
+        self._slope = np.array([_slope(link, setting.simulation.scene.size) for link in links])
         self._c = c = ffi.new("rigid_plastic *")
         c.force, c.end, c.number, c.width = self._forms.force, self._forms.end, n, len(INPUTS)
         arrays = (self._storage, self._limit, self._back_force, self.dissipated, self._rows)
         self._alive = [
-            *map(doubles, (*arrays, self._excess)),
+            *map(doubles, (*arrays, self._slope, self._excess)),
             *map(integers, (self._slipped, self._way)),
         ]
-        c.w, c.limit, c.back_force, c.dissipated, c.rows, c.excess, c.slipped, c.way = self._alive
+        c.w, c.limit, c.back_force, c.dissipated, c.rows, c.slope = self._alive[:6]
+        c.excess, c.slipped, c.way = self._alive[6:]
         self._course = integers(setting.course.flags)
         c.course = self._course
         self.in_c = {"rigid_plastic": c}
@@ -224,10 +242,15 @@ class RigidPlasticResponse:
         """Energy stored and dissipated in the step: the work; J."""
         return work
 
-    def dissipation(self, e1: Array) -> float:
-        """Energy dissipated in a step to the motions ``e1``; J."""
-        dissipated: float = lib.dissipation_of_rigid_plastic(self._c, doubles(e1))
+    def dissipation(self, e1: Array, λ: Array) -> float:
+        """Energy dissipated in a step to the motions ``e1``, positive where one would slip; J."""
+        arrays = doubles(e1), doubles(np.ascontiguousarray(λ))
+        dissipated: float = lib.dissipation_of_rigid_plastic(self._c, *arrays)
         return dissipated
+
+    def flows(self) -> bool:
+        """Whether one slips in the latest iterate."""
+        return bool(self._way.any())
 
     # -- the state -----------------------------------------------------------------------------
 

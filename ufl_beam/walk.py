@@ -108,7 +108,8 @@ class Walk:
     def side(self, q: Array, way: Direction) -> float:
         """Positive where more dissipates along a way from ``q``, negative where against it."""
         now, size = self.dissipation(q), self.length(Direction(way.q, 0.0), 1.0)
-        for doubled in range(FARTHEST if now > 0 and size > 0 else 0):
+        flows = self.share.total(float(any(one.flows() for one in self.simulation.couplings)))
+        for doubled in range(FARTHEST if (now > 0 or flows) and size > 0 else 0):
             δ = 1e-9 * 2**doubled / size
             more = self.dissipation(q + δ * way.q) - self.dissipation(q - δ * way.q)
             if abs(more) > now:
