@@ -38,7 +38,7 @@ class Beam:
             ``{0.0: Softening(limit, energy)}``.  A hinge is rigid until the moment at ``s`` reaches
             its limit; then it follows its law, :class:`Softening` or :class:`Hardening` (limit in
             N m, moduli in N m/rad, ``eta`` in N m s).  At an end it comes before the law of the
-            section.
+            section; ``None`` there is an end without a hinge.
 
     Raises:
         SceneError: Zero length, ``cells < 1``, coordinates that are no finite numbers, or hinges in
@@ -53,7 +53,7 @@ class Beam:
     name: str = "beam"
     curve: Curve = field(default=None, repr=False)  # type: ignore[assignment]
     corners: tuple[float, ...] = ()
-    hinges: Mapping[float, HingeLaw] = field(default_factory=dict)
+    hinges: Mapping[float, HingeLaw | None] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         a, b = (require_vector(x, f"{self.name}: end") for x in (self.a, self.b))
@@ -80,7 +80,8 @@ class Beam:
             require_number(s, f"{self.name}: hinge at")
             if not 0.0 <= s <= 1.0:
                 raise SceneError(f"{self.name}: hinge at s = {s:g} must lie between 0 and 1")
-            require_hinge_law(law, f"{self.name}: hinge at s = {s:g}")
+            if law is not None or s not in (0.0, 1.0):
+                require_hinge_law(law, f"{self.name}: hinge at s = {s:g}")
         if self.hinges and self.section.fibres is not None:
             raise SceneError(
                 f"{self.name}: hinges are for resultants; here the fibres of the section soften"

@@ -409,8 +409,8 @@ double missed_by_couplings(void *self, const double *q, const double *r, double 
     const int i = c->link[k];
     const int32_t *dofs = c->dofs + 7 * i;
     const double *row = in_cell(c->work, k, c->row), length = c->length[i];
-    const int next = c->work->lanes;
-    const double size = fabs(row[next]) < 1 ? 0.01 * length * fabs(row[0]) : force * c->size / length;
+    const double weight = fabs(row[c->work->lanes]), unit = c->rigid_plastic ? c->rigid_plastic->slope[i] : 1;
+    const double size = weight * unit < 1 - 1e-12 ? 0.01 * length : weight * force * c->size / length;
     /* Far from where it began, or after many turns, a part has fewer digits left. */
     double moved = 0, turned = 0;
     for (int j = 0; j < 4; ++j) moved = fmax(moved, fabs(q[dofs[j]]));

@@ -72,10 +72,9 @@ def plastic_hinges(
 
 def _laws(beam: Beam) -> dict[Place, HingeLaw]:
     """Laws of the hinges that a beam may have, by place."""
-    laws: dict[Place, HingeLaw] = {}
-    if beam.section.hinge is not None:
-        laws = dict.fromkeys((beam.start, beam.end), beam.section.hinge)
-    return laws | {beam.at(float(s)): law for s, law in beam.hinges.items()}
+    laws: dict[float, HingeLaw | None] = dict.fromkeys((0.0, 1.0), beam.section.hinge)
+    laws |= {float(s): law for s, law in beam.hinges.items()}
+    return {beam.at(s): law for s, law in laws.items() if law is not None}
 
 
 def _outlasts(place: Place, others: Sequence[Node], laws: Mapping[Place, HingeLaw]) -> bool:

@@ -46,7 +46,8 @@ static int direction_of_slip(const rigid_plastic *p, int i, double *w, double mo
   return way;
 }
 
-/* Rows of the connectors at their motions c->e1 and forces in q. */
+/* Rows of the connectors at their motions c->e1 and forces in q: the equations above over -r, which
+ * leaves the tangent of held ones symmetric. */
 void set_rows_of_rigid_plastic(const couplings *c, const double *q)
 {
   const rigid_plastic *p = c->rigid_plastic;
@@ -55,13 +56,13 @@ void set_rows_of_rigid_plastic(const couplings *c, const double *q)
     const double motion = c->e1[i] - w[SLIP_START];
     const int way = direction_of_slip(p, i, w, motion, q[c->force[i]]);
     double *row = p->rows + 3 * i;
-    row[0] = -p->slope[i], row[1] = 0, row[2] = -p->slope[i] * w[SLIP_START];
+    row[0] = 1, row[1] = 0, row[2] = w[SLIP_START];
     p->way[i] = way;
     if (!way) continue;
     set_slip(w, motion, way);
     ask(p->force, w, 2, s);
-    const double slope = way * s[1];
-    row[0] = -slope, row[1] = 1, row[2] = s[0] - slope * c->e1[i];
+    const double slope = way * s[1], r = p->slope[i];
+    row[0] = slope / r, row[1] = -1 / r, row[2] = (slope * c->e1[i] - s[0]) / r;
   }
 }
 

@@ -99,6 +99,7 @@ class Probe:
 
     def tangent(self):
         A = self.simulation._A
+        self.residual(self.x)  # rows of connectors are those of the latest residual
         for _ in range(2):  # the first tangent of a static step takes the forces before the step
             self.simulation._tangent(self.x)
         matrix = csr_array((A.data, A.indices, A.indptr)).toarray()
