@@ -20,6 +20,9 @@ from ufl_beam.sections import Section
 Point = tuple[float, float]
 Curve = Callable[[float], Sequence[float]]
 
+TOGETHER = 1e-9
+"""Part of a cell below which two places of a beam are one."""
+
 
 @dataclass(frozen=True, eq=False)
 class Beam:
@@ -82,6 +85,11 @@ class Beam:
                 raise SceneError(f"{self.name}: hinge at s = {s:g} must lie between 0 and 1")
             if law is not None or s not in (0.0, 1.0):
                 require_hinge_law(law, f"{self.name}: hinge at s = {s:g}")
+        for first, second in pairwise(sorted(self.hinges)):
+            if (second - first) * self.cells <= TOGETHER:
+                raise SceneError(
+                    f"{self.name}: two hinges at s = {first:g}; give one, with the law of both"
+                )
         if self.hinges and self.section.fibres is not None:
             raise SceneError(
                 f"{self.name}: hinges are for resultants; here the fibres of the section soften"
@@ -162,13 +170,13 @@ class Beam:
     def vertices(self, attached: Sequence[float]) -> list[float]:
         """Parameters of the vertices: equal cells, the corners and what is ``attached``.
 
-        A place nearer to a regular vertex than 1e-9 of a cell is that vertex.
+        A place nearer to a regular vertex than :data:`TOGETHER` is that vertex.
         """
         regular = [i / self.cells for i in range(self.cells + 1)]
         vertices = sorted({*regular, *self.corners, *attached})
         kept = [0.0]
         for s in vertices[1:]:
-            if (s - kept[-1]) * self.cells > 1e-9:
+            if (s - kept[-1]) * self.cells > TOGETHER:
                 kept.append(s)
         kept[-1] = 1.0
         return kept

@@ -71,7 +71,7 @@ def _(law: Softening, at: Mapping[str, Expr], scheme: Scheme) -> Slip:
 def _(law: Hardening, at: Mapping[str, Expr], scheme: Scheme) -> Slip:
     a, ξ, s, e, θ, H, B = (at[n] for n in ("slip", "slipped", "direction", "start", "θ", "H", "B"))
     numbers = Bulk(0.0, at["limit"], H, B, at["eta"])
-    resistance = at["limit"] + H * (ξ + θ * a) + at["eta"] * a / at["dt"]  # P(38), P(39)
+    resistance = at["limit"] + H * (ξ + θ * a) + at["eta"] * a / at["dt"]
     return Slip(
         s * resistance + B * (e + θ * s * a),
         numbers.dissipation(a, at["dt"]),

@@ -27,6 +27,7 @@ RECORDS = [
     "fibres",
     "laws",
     "loads",
+    "plastic_hinges",
     "scene",
     "sections",
     "viscous",
