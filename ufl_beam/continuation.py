@@ -17,10 +17,11 @@ from ufl_beam.connectors import Actuator, Controller, Motor
 from ufl_beam.controls import Control, Given
 from ufl_beam.critical import Branch, CriticalPoint, Direction, Stiffness
 from ufl_beam.discretisation import Mesh
-from ufl_beam.errors import SceneError, StepFailed, require_count, require_kind, require_sequence
+from ufl_beam.errors import SceneError, StepFailed, require_count, require_kind
 from ufl_beam.loads import TimeFunction
+from ufl_beam.outputs import take
 from ufl_beam.processes import ours
-from ufl_beam.record import Recorder, on_first
+from ufl_beam.record import Recorder, close_all, recorders_of
 from ufl_beam.scene import Scene
 from ufl_beam.simulation import Simulation, Trial
 from ufl_beam.solution import Solution
@@ -348,10 +349,7 @@ def follow(
     require_count(steps, "follow: steps")
     if start is not None:
         require_kind(start, (Solution, Branch), "follow: start")
-    recorders = (record,) if isinstance(record, Recorder) else require_sequence(record, "record")
-    for i, recorder in enumerate(recorders):
-        require_kind(recorder, Recorder, f"follow: record[{i}]")
-        on_first(comm, recorder.require_writable)
+    recorders, outputs = recorders_of(record, comm, "follow")
     branch, state = (start, start.state) if isinstance(start, Branch) else (None, start)
     t0 = 0.0 if state is None else float(state.times[-1])
     _require_driven(scene, t0)
@@ -362,6 +360,7 @@ def follow(
     simulation.solution = path = Path(scene, simulation.grid)
     route = Route(simulation, control)
     path.critical = route.critical
+    release = take(outputs)
     try:
         route.begin(branch, fresh=state is None)
         for recorder in recorders:
@@ -381,10 +380,10 @@ def follow(
         error.__dict__["solution"] = path
         raise
     finally:
-        for recorder in recorders:
-            recorder.close()
-        simulation.close()
+        release()
         path.seconds = time.perf_counter() - began
+        simulation.close()
+        close_all(recorders)
     return path
 
 
