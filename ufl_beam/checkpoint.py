@@ -85,7 +85,7 @@ class Checkpoint:
     def files(self) -> tuple[Path, ...]:
         """The file, and the one that takes its place; no other output may write them."""
         path = Path(self.path)
-        return path, path.with_name(path.name + ".part")
+        return path, path.parent / f"{path.name}.part"
 
 
 class Keeper:
@@ -133,7 +133,13 @@ class Keeper:
             raise SceneError(f"checkpoint {self.path}: there is no directory {folder}; make it")
         if not os.access(folder, os.W_OK):
             raise SceneError(f"checkpoint {self.path}: the directory cannot be written to")
-        if self.path.exists():
+        try:
+            exists = self.path.exists()
+        except OSError as error:
+            raise SceneError(
+                f"checkpoint {self.path} cannot be written: {error.strerror}"
+            ) from None
+        if exists:
             self.found = read(self.path)
             self._require_same(self.found)
 

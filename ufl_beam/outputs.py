@@ -25,26 +25,29 @@ _in_use: list[Output] = []
 def require_path(path: str | Path, what: str) -> Path:
     """Return ``path`` as a :class:`Path`, or raise :class:`SceneError` naming ``what``."""
     try:
-        found = Path(path)
+        return Path(path)
     except TypeError:
         raise SceneError(f"{what}: path = {path!r} must be the name of a file") from None
-    if "\0" in str(found):
-        raise SceneError(f"{what}: path = {path!r} has a null character in it")
-    return found
 
 
 def require_writable(path: Path) -> None:
     """Raise :class:`SceneError` if a file cannot be written; its content stays as it is."""
+    why = ""
     try:
         if not path.parent.is_dir():
-            raise SceneError(f"output {path}: there is no directory {path.parent}; make it first")
-        new = not path.exists()
-        with path.open("ab"):
-            pass
-        if new:
-            path.unlink()
+            why = f": there is no directory {path.parent}; make it first"
+        else:
+            new = not path.exists()
+            with path.open("ab"):
+                pass
+            if new:
+                path.unlink()
     except OSError as error:
-        raise SceneError(f"output {path} cannot be written: {error.strerror}") from None
+        why = f" cannot be written: {error.strerror}"
+    except ValueError as error:  # a null character
+        why = f" cannot be written: {error}"
+    if why:
+        raise SceneError(f"output {path}{why}")
 
 
 def require_apart(outputs: Sequence[Output], call: str) -> None:
@@ -71,11 +74,13 @@ def require_apart(outputs: Sequence[Output], call: str) -> None:
 
 def _identities(path: Path) -> list[object]:
     """The real path, and the inode of a file that exists; none of a device."""
-    real = os.path.realpath(path)
     try:
+        real = os.path.realpath(path)
         found = os.stat(real)
     except OSError:
         return [real]
+    except ValueError as error:  # a null character
+        raise SceneError(f"output {path} cannot be written: {error}") from None
     return [real, (found.st_dev, found.st_ino)] if stat.S_ISREG(found.st_mode) else []
 
 
@@ -206,11 +211,8 @@ def warn_of_removal(path: Path) -> None:
 def failure(error: OSError, path: Path) -> OSError:
     """An error in writing in words: the file, the reason, the free space, what is kept."""
     space = ""
-    if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        try:
-            space = f" ({shutil.disk_usage(path.parent).free / 1e6:.3g} MB are free)"
-        except OSError:
-            space = ""
+    if error.errno == errno.ENOSPC and path.is_file():
+        space = f" ({shutil.disk_usage(path.parent).free / 1e6:.3g} MB are free)"
     return OSError(
         error.errno or errno.EIO,
         f"output {path} cannot be written: {error.strerror or error}{space}; what was written "
