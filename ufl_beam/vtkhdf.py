@@ -2,11 +2,14 @@
 
 The layout is "UnstructuredGrid" of version 2.0 with "Steps", see the documentation of VTK's file
 formats; VTK 9.3, PyVista and ParaView 5.13 read it.  All data sets are made at the beginning, since
-a kill damages an HDF5 file more easily when one is made than when one grows.
+a kill damages an HDF5 file more easily when one is made than when one grows.  HDF5 itself is not to
+meet a full disk, after which it dies: the space that a step may need is allocated before.
 """
 
 from __future__ import annotations
 
+import errno
+import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,7 +20,7 @@ import numpy as np
 from ufl_beam.compat import Array
 from ufl_beam.grid import Index
 from ufl_beam.line_data import LineFields
-from ufl_beam.outputs import failure, is_at, removed, warn_of_removal
+from ufl_beam.outputs import OutputFile, failure, is_at, removed, warn_of_removal
 
 LAYOUT = (2, 0)
 """Of the format; VTK 9.3 warns of later ones."""
@@ -33,6 +36,9 @@ ROWS = 1024
 
 BLOCK = 4096
 """Rows in a chunk of a field, at least those of one step."""
+
+INDEX = 1 << 20
+"""Bytes that the indices of all data sets grow by in a step, and some more."""
 
 
 class VtkhdfWriter:
@@ -76,45 +82,25 @@ class VtkhdfWriter:
             "Types": np.full(len(cells), LINE, dtype=np.uint8),
             **{f"CellData/{name}": values for name, values in constant.items()},
         }
+        if steps is None:
+            new = OutputFile(path)
+            new.put(0, _empty_file(mesh, [*constant], fields))
+            new.close()
         try:
             # Without a lock others may look at the file while the run goes on.
-            self._file = h5py.File(path, "w" if steps is None else "r+", locking=False)
-            if steps is None:
-                self._make(mesh, [*constant], fields)
-            elif not self._is_same(mesh, fields):
-                self._file.close()
-                raise ValueError("not the file that was written up to there")
-            self._find(fields)
-            self._cut()
-        except (OSError, RuntimeError) as error:
-            raise _in_words(error, path) from None
+            self._file = h5py.File(path, "r+", locking=False)
+        except OSError:
+            if path.exists():
+                raise ValueError("the file is damaged") from None
+            raise
+        if not self._is_same(mesh, fields):
+            self._file.close()
+            raise ValueError("not the file that was written up to there")
+        self._descriptor = int(self._file.id.get_vfd_handle())
+        self._find(fields)
+        self._cut()
 
     # -- data sets -----------------------------------------------------------------------------
-
-    def _make(self, mesh: Mapping[str, Array], constant: list[str], fields: LineFields) -> None:
-        root = self._file.create_group("VTKHDF")
-        root.attrs["Version"] = np.array(LAYOUT)
-        root.attrs["Type"] = np.bytes_("UnstructuredGrid")  # of fixed length; a str is refused
-        for name, values in mesh.items():
-            root[name] = values
-        steps = root.create_group("Steps")
-        steps.attrs["NSteps"] = np.int64(0)
-        _series(steps, "Values", (), np.float64)
-        _series(steps, "NumberOfParts", (), np.int64)
-        # All steps have one mesh, so that all these are 0: one data set under several names.
-        zeros = _series(steps, "PartOffsets", (), np.int64)
-        for name in ("PointOffsets", *(f"CellDataOffsets/{name}" for name in constant)):
-            steps[name] = zeros
-        steps["ConnectivityIdOffsets"] = _series(steps, "CellOffsets", (1,), np.int64)
-        for kind, by_name in zip(KINDS, fields, strict=True):
-            offsets: Any = None
-            for name, values in by_name.items():
-                rows = len(values) * max(1, BLOCK // len(values))
-                _series(root.require_group(kind), name, values.shape[1:], np.float64, rows)
-                if offsets is None:
-                    offsets = _series(steps.require_group(f"{kind}Offsets"), name, (), np.int64)
-                else:
-                    steps[f"{kind}Offsets/{name}"] = offsets
 
     def _is_same(self, mesh: Mapping[str, Array], fields: LineFields) -> bool:
         """Whether the file has this mesh, these fields, and enough steps."""
@@ -147,6 +133,9 @@ class VtkhdfWriter:
         names = [f"{kind}Offsets/{name}" for kind, name, _ in firsts]
         names += ["PartOffsets", "CellOffsets", "NumberOfParts", "Values"]
         self._growing += [(steps[name].id, (1, *steps[name].shape[1:])) for name in names]
+        self._room = INDEX + sum(
+            8 * math.prod(dataset.get_create_plist().get_chunk()) for dataset, _ in self._growing
+        )
 
     # -- steps ---------------------------------------------------------------------------------
 
@@ -155,14 +144,22 @@ class VtkhdfWriter:
         n = self.steps
         numbers = (*(n * count for count in self._counts), 0, 0, 1, t)
         rows: list[Any] = [*(values for by_name in fields for values in by_name.values()), *numbers]
-        try:
-            for (dataset, shape), values in zip(self._growing, rows, strict=True):
-                self._put(dataset, n, np.broadcast_to(values, shape))
-            self._file.flush()
-            self._count(n + 1)
-        except (OSError, RuntimeError) as error:
-            raise _in_words(error, self._path) from None
+        self._allocate()
+        for (dataset, shape), values in zip(self._growing, rows, strict=True):
+            self._put(dataset, n, np.broadcast_to(values, shape))
+        self._file.flush()
+        self._count(n + 1)
         self.steps = n + 1
+
+    def _allocate(self) -> None:
+        """Let the disk be full now rather than within HDF5, which cuts off what it has not used."""
+        size, end = os.fstat(self._descriptor).st_size, self._file.id.get_filesize() + self._room
+        if size < end and hasattr(os, "posix_fallocate"):
+            try:
+                os.posix_fallocate(self._descriptor, size, end - size)
+            except OSError as error:
+                if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL):  # no such thing there
+                    raise failure(error, self._path) from None
 
     def _put(self, dataset: Any, n: int, values: Array) -> None:
         """Write the rows of the n-th step by HDF5's own functions, which are the fastest."""
@@ -194,10 +191,6 @@ class VtkhdfWriter:
         self._file.flush()
         os.fsync(self._descriptor)
 
-    @property
-    def _descriptor(self) -> int:
-        return int(self._file.id.get_vfd_handle())
-
     def close(self) -> None:
         """Close the file, without what an interrupt has left behind the last complete step."""
         if not self._file:
@@ -211,13 +204,40 @@ class VtkhdfWriter:
             warn_of_removal(self._path)
 
 
+def _empty_file(mesh: Mapping[str, Array], constant: list[str], fields: LineFields) -> bytes:
+    """A file without steps, made in memory."""
+    import h5py
+
+    with h5py.File("vtkhdf", "w", driver="core", backing_store=False) as file:
+        root = file.create_group("VTKHDF")
+        root.attrs["Version"] = np.array(LAYOUT)
+        root.attrs["Type"] = np.bytes_("UnstructuredGrid")  # of fixed length; a str is refused
+        for name, values in mesh.items():
+            root[name] = values
+        steps = root.create_group("Steps")
+        steps.attrs["NSteps"] = np.int64(0)
+        _series(steps, "Values", (), np.float64)
+        _series(steps, "NumberOfParts", (), np.int64)
+        # All steps have one mesh, so that all these are 0: one data set under several names.
+        zeros = _series(steps, "PartOffsets", (), np.int64)
+        for name in ("PointOffsets", *(f"CellDataOffsets/{name}" for name in constant)):
+            steps[name] = zeros
+        steps["ConnectivityIdOffsets"] = _series(steps, "CellOffsets", (1,), np.int64)
+        for kind, by_name in zip(KINDS, fields, strict=True):
+            offsets: Any = None
+            for name, values in by_name.items():
+                rows = len(values) * max(1, BLOCK // len(values))
+                _series(root.require_group(kind), name, values.shape[1:], np.float64, rows)
+                if offsets is None:
+                    offsets = _series(steps.require_group(f"{kind}Offsets"), name, (), np.int64)
+                else:
+                    steps[f"{kind}Offsets/{name}"] = offsets
+        file.flush()
+        return bytes(file.id.get_file_image())
+
+
 def _series(group: Any, name: str, shape: tuple[int, ...], dtype: Any, rows: int = ROWS) -> Any:
     """Make a data set that grows by rows of a shape."""
     return group.create_dataset(
         name, (0, *shape), dtype, maxshape=(None, *shape), chunks=(rows, *shape)
     )
-
-
-def _in_words(error: OSError | RuntimeError, path: Path) -> OSError:
-    """An error of HDF5, with its number if it tells one."""
-    return failure(error if isinstance(error, OSError) else OSError(str(error)), path)
