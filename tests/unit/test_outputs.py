@@ -279,7 +279,7 @@ def test_a_device_that_is_full():
 
 @pytest.mark.serial
 @pytest.mark.parametrize(
-    ("recorder", "limit"), [(ub.History, 100_000), (ub.XDMF, 300_000), (ub.VTKHDF, 1_900_000)]
+    ("recorder", "limit"), [(ub.History, 100_000), (ub.XDMF, 300_000), (ub.VTKHDF, 2_000_000)]
 )
 def test_a_disk_that_is_full(recorder, limit, tmp_path):
     """As on a full disk, by a limit on files: the steps before are there, and the solution.
