@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from mpi4py import MPI
 
@@ -19,6 +19,7 @@ from ufl_beam.critical import Branch, CriticalPoint, Direction, Stiffness
 from ufl_beam.discretisation import Mesh
 from ufl_beam.errors import SceneError, StepFailed, require_count, require_kind
 from ufl_beam.loads import TimeFunction
+from ufl_beam.memory import State
 from ufl_beam.outputs import take
 from ufl_beam.processes import ours
 from ufl_beam.record import Recorder, close_all, recorders_of
@@ -77,6 +78,27 @@ class Path(Solution):
     def factor(self) -> Array:
         """Load factors, the time of the time functions; (n+1,)."""
         return self.times
+
+    def _content(self) -> tuple[dict[str, Any], State]:
+        text, arrays = super()._content()
+        text["critical"] = [{"kind": c.kind, "factor": c.factor, "n": c.n} for c in self.critical]
+        for k, point in enumerate(self.critical):
+            arrays[f"critical/{k}/mode"] = point.mode
+            for name, values in point.state._arrays().items():
+                arrays[f"critical/{k}/state/{name}"] = values
+        return text, arrays
+
+    def _take(self, text: dict[str, Any], arrays: State) -> None:
+        super()._take(text, arrays)
+        critical = []
+        for k, one in enumerate(text["critical"]):
+            state, prefix = Solution(self.scene, self.grid), f"critical/{k}/state/"
+            state._take(
+                text,
+                {n.removeprefix(prefix): a for n, a in arrays.items() if n.startswith(prefix)},
+            )
+            critical.append(CriticalPoint(**one, state=state, mode=arrays[f"critical/{k}/mode"]))
+        self.critical = critical
 
 
 class Candidate(NamedTuple):

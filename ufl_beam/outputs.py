@@ -182,6 +182,27 @@ class OutputFile:
                 warn_of_removal(self.path)
 
 
+def replace_file(path: Path, data: bytes) -> None:
+    """Write a whole file; the one before stays until the new one is on the disk.
+
+    Raises:
+        OSError: It cannot be written.
+    """
+    part = path.parent / f"{path.name}.part"
+    try:
+        with part.open("wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(part, path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise failure(error, path) from None
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+
+
 def is_at(file: int, path: Path) -> bool:
     """Whether a path leads to an open file."""
     try:
