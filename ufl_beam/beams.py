@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from itertools import pairwise
 
+from ufl_beam.curves import Arc, Polyline, Straight
+from ufl_beam.curves import Point as Point
 from ufl_beam.errors import (
     SceneError,
     require_count,
@@ -17,7 +19,6 @@ from ufl_beam.errors import (
 from ufl_beam.laws import HingeLaw, require_hinge_law
 from ufl_beam.sections import Section
 
-Point = tuple[float, float]
 Curve = Callable[[float], Sequence[float]]
 
 TOGETHER = 1e-9
@@ -69,7 +70,7 @@ class Beam:
         if self.curve is None:
             if a == b:
                 raise SceneError(f"{self.name}: zero length, both ends are at {a}")
-            object.__setattr__(self, "curve", lambda s: _between(a, b, s))
+            object.__setattr__(self, "curve", Straight(a, b))
         for s, end in ((0.0, a), (1.0, b)):
             there = require_vector(self.curve(s), f"{self.name}: curve({s:g})")
             if math.dist(there, end) > 1e-9 * max(math.hypot(*there), math.hypot(*end)):
@@ -109,16 +110,13 @@ class Beam:
         name: str = "beam",
     ) -> Beam:
         """Circular arc from ``angles[0]`` to ``angles[1]`` (rad, counter-clockwise from x)."""
-        cx, cy = require_vector(center, f"{name}: center")
+        middle = require_vector(center, f"{name}: center")
         require_number(radius, f"{name}: radius", positive=True)
         first, last = require_vector(angles, f"{name}: angles")
         if first == last:
             raise SceneError(f"{name}: zero length, both angles of the arc are {first:g}")
 
-        def curve(s: float) -> Point:
-            angle = first + s * (last - first)
-            return cx + radius * math.cos(angle), cy + radius * math.sin(angle)
-
+        curve = Arc(middle, float(radius), first, last)
         return cls(curve(0), curve(1), section, cells=cells, name=name, curve=curve)
 
     @classmethod
@@ -136,10 +134,7 @@ class Beam:
             ends.append(ends[-1] + math.dist(p, q))
         at = [end / ends[-1] for end in ends]
 
-        def curve(s: float) -> Point:
-            i = next((k for k, limit in enumerate(at[1:-1]) if s <= limit), len(at) - 2)
-            return _between(xy[i], xy[i + 1], (s - at[i]) / (at[i + 1] - at[i]))
-
+        curve = Polyline(tuple(xy), tuple(at))
         corners = tuple(at[1:-1])
         return cls(xy[0], xy[-1], section, cells=cells, name=name, curve=curve, corners=corners)
 
@@ -215,8 +210,3 @@ class Place:
         x, y = self.point
         name = f"{self.beam.name}.{ends.get(self.s, f'at({self.s:g})')} ({x:g}, {y:g})"
         return f"{name} beyond the hinge" if self.beyond else name
-
-
-def _between(p: Point, q: Point, s: float) -> Point:
-    """The point at part ``s`` of the way from ``p`` to ``q``; exact at both ends."""
-    return p[0] * (1 - s) + q[0] * s, p[1] * (1 - s) + q[1] * s

@@ -87,6 +87,15 @@ class Grid:
             and np.array_equal(self.dofs, other.dofs)
         )
 
+    def checksum(self) -> int:
+        """A number that tells points and numberings apart."""
+        numbers = np.concatenate([self.dofs.ravel(), self.dofs_of_bodies.ravel(), self.multipliers])
+        return crc32(numbers.astype("<i8").tobytes(), crc32(self.points.astype("<f8").tobytes()))
+
+    def parameters(self, beam: Beam) -> Array:
+        """Parameters of the vertices of a beam."""
+        return self._parameters[self._index(beam)]
+
     @cached_property
     def _number_of_beam(self) -> dict[Beam, int]:
         return {beam: i for i, beam in enumerate(self.scene.beams)}

@@ -26,10 +26,11 @@ from ufl_beam.loads import FollowerLoad, RotatingFrame
 from ufl_beam.mechanism import require_no_mechanism
 from ufl_beam.memory import State
 from ufl_beam.processes import ours
-from ufl_beam.record import XDMF, on_first
+from ufl_beam.record import on_first
 from ufl_beam.scene import Scene
 from ufl_beam.solution import Solution
 from ufl_beam.terms import SectionForces
+from ufl_beam.time_series import VTKHDF, XDMF, TimeSeries
 
 AMPLITUDE = 0.1
 """Largest displacement of what is shown of a mode, as a part of the size of the scene."""
@@ -93,12 +94,12 @@ class Shapes(ABC):
         return solution
 
     def write(self, path: str | Path, *, amplitude: float = AMPLITUDE) -> None:
-        """Write an XDMF file for ParaView: the k-th shape is what it shows at time k.
+        """Write a time series for ParaView: the k-th shape is what it shows at time k.
 
         Displacements are those of the state and the shape together, N, V, M those of the shape.
 
         Args:
-            path: File, ending in ``.xdmf``; the data are beside it in ``.h5``.
+            path: File, ending in ``.xdmf`` or ``.vtkhdf``, see :class:`XDMF`, :class:`VTKHDF`.
             amplitude: Largest displacement, as a part of the size of the scene.
 
         Raises:
@@ -106,10 +107,10 @@ class Shapes(ABC):
         """
         require_number(amplitude, "write: amplitude", positive=True)
         self._require(0)
-        recorder = XDMF(path)
+        recorder = VTKHDF(path) if Path(path).suffix == VTKHDF.ending else XDMF(path)
         on_first(ours(), lambda: self._write(recorder, amplitude))
 
-    def _write(self, recorder: XDMF, amplitude: float) -> None:
+    def _write(self, recorder: TimeSeries, amplitude: float) -> None:
         recorder.require_writable()
         share = Share(self.grid, MPI.COMM_SELF)
         forces = SectionForces(Fields(share))
@@ -149,6 +150,10 @@ class _Frame:
 
     may_break = False
     """Whether something yields; modes are elastic."""
+
+    def velocities(self) -> list[Array]:
+        """Shapes have none."""
+        return []
 
     def material(self) -> list[Any]:
         """Nothing yields."""

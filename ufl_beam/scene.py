@@ -27,6 +27,7 @@ from ufl_beam.errors import (
     require_vector,
 )
 from ufl_beam.loads import (
+    Constant,
     FollowerLoad,
     Gravity,
     LineLoad,
@@ -126,7 +127,7 @@ def Prescribed(
 
 def _constant(value: float, place: Anchor, component: int) -> TimeFunction:
     require_number(value, f"Prescribed at {place}: {COMPONENTS[component]}")
-    return still if value == 0 else lambda t: float(value)
+    return still if value == 0 else Constant(float(value))
 
 
 # -- masses and initial motion -----------------------------------------------------------------
@@ -249,6 +250,22 @@ class Scene:
             if node(connector.a) == node(connector.b):
                 raise SceneError(f"{connector}: both ends are at the same body or cross-section")
         self._require_single_supports()
+
+    def __getitem__(self, name: str) -> Beam | Body:
+        """The beam or body of a name, as in ``scene["left"].end``.
+
+        Raises:
+            SceneError: There is none, or more than one.
+        """
+        everything: tuple[Beam | Body, ...] = (*self.beams, *self.bodies)
+        found = [one for one in everything if one.name == name]
+        if len(found) != 1:
+            there = ", ".join(dict.fromkeys(str(one.name) for one in everything))
+            raise SceneError(
+                f"Scene: {len(found) or 'no'} beams and bodies are called {name!r}; "
+                f"there is {there}; scene.beams[i] and scene.bodies[i] are those of a number"
+            )
+        return found[0]
 
     @cached_property
     def size(self) -> float:
