@@ -158,9 +158,9 @@ class Couplings(Links):
         """Add the derivative; the rows are those of the latest residual."""
         self._tangent.add(q1, self._A.data)
 
-    def excess(self, q: Array, r: Array, force: float) -> float:
-        """Largest residual of a row: of motions as a part of 1 % of the scene, or of ``force``."""
-        missed: float = lib.missed_by_couplings(self._in_c, doubles(q), doubles(r), force)
+    def excess(self, q: Array, r: Array, force: float, moved: float) -> float:
+        """Largest residual of a row: of motions as a part of 1 % of ``moved``, or of ``force``."""
+        missed: float = lib.missed_by_couplings(self._in_c, doubles(q), doubles(r), force, moved)
         return missed
 
     def _taken(self, q1: Array) -> Array:

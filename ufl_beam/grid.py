@@ -434,6 +434,15 @@ class Share:
         result[self._all_owned] = parts
         return result
 
+    def added(self, values: Array) -> Array:
+        """Sums over the processes of values at the local degrees of freedom."""
+        if self.comm.size == 1:
+            return values
+        sums = np.zeros(self.grid.size)
+        sums[self.dofs] = values
+        self.comm.Allreduce(MPI.IN_PLACE, sums)
+        return np.asarray(sums[self.dofs])
+
     def gather_cells(self, values: Array) -> Array:
         """Values of all cells, in the order of the grid, on every process."""
         if self.comm.size == 1:

@@ -142,7 +142,7 @@ class Guides(Links):
     def demand(self) -> None:
         """None."""
 
-    def excess(self, q: Array, r: Array, force: float) -> float:
+    def excess(self, q: Array, r: Array, force: float, moved: float) -> float:
         """Largest distance, as a part of 1 % of the scene."""
         round_off = 8 * np.spacing(self._size + np.abs(self._points + self._on0).max(axis=1))
         missed = np.maximum(np.abs(r[self._forces_at]) - round_off, 0.0)

@@ -39,6 +39,7 @@ class Live:
         t: Time; s.
         q: Configuration at the local degrees of freedom.
         parts: Number of steps so far, parts of cut steps counted each.
+        reactions_known: Whether the reactions of the initial state are; in dynamics they are not.
     """
 
     scene: Scene
@@ -52,6 +53,7 @@ class Live:
     ledger: Ledger
     supports: Supports
     inertia: Inertia
+    reactions_known: bool = False
     couplings: list[Couplings | Guides]
     inelastic: list[InelasticBeams]
     _has_inelastic: bool
@@ -64,7 +66,7 @@ class Live:
         """Forces of all supports on the scene; (num_supports, 3); N, N, N m."""
         if not self.scene.supports:
             return NO_REACTIONS
-        if self.parts == 0:
+        if self.parts == 0 and not self.reactions_known:
             return np.full((len(self.scene.supports), 3), np.nan)
         dofs, mine = self._support_dofs
         here = np.where(mine, self.supports.all_reactions(self.share.size)[dofs], 0.0)
@@ -146,11 +148,12 @@ class Live:
         rates = np.zeros(len(links))
         for v in self.velocities():
             fastest = np.abs(v).max(initial=0.0) or 1.0
-            ε = 1e-5 * self.scene.size / fastest
+            ε = 1e-5 * self.scene.size
+            way = ε * (v / fastest)
             for coupling in self.couplings:
                 if coupling.links == list(links):
-                    ends = (coupling.motion(self.q + sign * ε * v) for sign in (1, -1))
-                    rates += np.subtract(*ends) / (2 * ε)
+                    ends = (coupling.motion(self.q + sign * way) for sign in (1, -1))
+                    rates += np.subtract(*ends) / (2 * ε) * fastest
         return rates
 
     def section_forces(self) -> Array:

@@ -72,6 +72,7 @@ double step_of_nodes(int size, int rotations, const int32_t *rotation, double *s
 double sum_of_squares(int rows, const double *w, const double *f);
 double scaled_sum_of_squares(int rows, const double *w, const double *f, double unit);
 double largest_size(int rows, const double *w, const double *f);
+double largest_motion(int rows, const double *w, const double *q);
 int has_its_digits(double sum);
 
 /* -- material points --------------------------------------------------------------------------- */
@@ -134,7 +135,8 @@ void set_rows_of_rigid_plastic(const couplings *c, const double *q);
 double dissipation_of_rigid_plastic(const rigid_plastic *p, const double *e1, const double *force);
 void commit_rigid_plastic(const rigid_plastic *p, const double *e1, double *sums);
 void add_couplings_force(void *self, const double *q, double *r);
-double missed_by_couplings(void *self, const double *q, const double *r, double scale);
+double missed_by_couplings(void *self, const double *q, const double *r, double scale,
+                           double moved);
 double commit_couplings(const couplings *c, const double *q, double dt);
 void respond(const points *p);
 void release(const points *p, double least);
@@ -191,9 +193,10 @@ typedef struct {
   int (*apply)(void *pc, void *b, void *x);
 } petsc;
 
-/* How far a law is missed by an iterate q and its residual r, without dimension. */
+/* How far a law is missed by an iterate q and its residual r, without dimension; scale is the size
+ * of the forces, and moved the largest motion, see largest_motion. */
 typedef struct {
-  double (*missed)(void *self, const double *q, const double *r, double scale);
+  double (*missed)(void *self, const double *q, const double *r, double scale, double moved);
   void *self;
 } demand;
 
@@ -220,6 +223,7 @@ typedef struct {
   const int32_t *diagonal;
   double *space;
   const double *lengths, *moves; /* see Solver */
+  double scene, moved; /* size of the scene; largest motion of the latest iterate, at most that size */
   int demands;
   const demand *demand; /* of connectors */
   double last, best;
@@ -237,6 +241,7 @@ void residual(equation *e, const double *q, double *r);
 void assemble(equation *e, const double *q);
 int factor_tangent(const equation *e, int *failed);
 int solve_tangent(const equation *e);
+double motion_of(const equation *e, const double *q);
 void find_last_digits(const equation *e, const double *q, double *digits);
 double size_of_forces(const equation *e, const double *f);
 int judge(equation *e, const double *q, int iteration, double residual, double scale,

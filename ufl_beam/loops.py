@@ -19,7 +19,8 @@ SOURCES = ("loops", "rigid_plastic", "elimination", "newton")
 
 _CALLBACKS = """
 extern "Python" void add_in_python(void *self, const double *q, double *out);
-extern "Python" double missed_in_python(void *self, const double *q, const double *r, double scale);
+extern "Python" double missed_in_python(void *self, const double *q, const double *r, double scale,
+                                        double moved);
 """
 
 

@@ -102,6 +102,9 @@ class Response(Protocol):
     def dissipated(self) -> Array:
         """Energy that each connector has dissipated plastically; (num_links,); J."""
 
+    def remaining(self) -> Array:
+        """Part of the elastic stiffness that is left in the latest iterate; (num_links,)."""
+
     def state(self) -> Array:
         """What is remembered besides motions and forces; (num_links, k)."""
 
@@ -180,6 +183,10 @@ class _Working:
         """None by plastic flow."""
         return np.zeros(len(self._links))
 
+    def remaining(self) -> Array:
+        """All of it: nothing yields."""
+        return np.ones(len(self._links))
+
     def state(self) -> Array:
         """Nothing is remembered."""
         return np.zeros((len(self._links), 0))
@@ -240,15 +247,16 @@ class _Pushed(_Working):
 
     def _note(self, step: Step) -> None:
         wanted = -np.array([self._wanted(link, step) for link in self._links])
-        self._force = self._reached + step.toward * (wanted - self._reached)
+        self._end = self._reached + step.toward * (wanted - self._reached)
+        self._force = self._reached + step.at * (self._end - self._reached)
 
     def accept(self, e1: Array, work: float) -> None:
         """Enter the work."""
         super().accept(e1, work)
-        self._reached = self._force
+        self._reached = self._end
 
     def state(self) -> Array:
-        """The forces of the last step."""
+        """The forces at the end of the last step."""
         return self._reached[:, None]
 
     def restore(self, rows: Array) -> None:
@@ -462,6 +470,10 @@ class _Sprung:
     def dissipated(self) -> Array:
         """Energy that each spring has dissipated; (num_links,); J."""
         return np.asarray(self.points.kept[:, 4:].sum(axis=1))
+
+    def remaining(self) -> Array:
+        """Part of the elastic stiffness that is left in the latest iterate; (num_links,)."""
+        return self.points.remaining(np.eye(1, 3).repeat(len(self._strains), axis=0))
 
     def state(self) -> Array:
         """Internal variables."""

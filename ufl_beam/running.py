@@ -130,6 +130,7 @@ def simulate(
                     keeper.note(simulation, pace, recorders)
                 bar.update(pace.progress - bar.n)
         simulation.end()
+        simulation.check_ledger()
     except BaseException as error:
         # Whatever stops a run, an interrupt or a user's function, what was reached is not lost.
         if simulation.comm.size == 1:

@@ -82,6 +82,7 @@ class Solution:
             of the size of the scene, rad; NaN if nobody did.
         seconds: Wall time of the run, building the scene included; s.
         every: Steps from one that was kept to the next.
+        open_ledger: How far the energy ledger is open, in words; empty if it closes as claimed.
         internal: What cells and connectors remember at the end of the run.
     """
 
@@ -92,6 +93,7 @@ class Solution:
         self.time_error = math.nan
         self.seconds = 0.0
         self.every = 1
+        self.open_ledger = ""
         self._times: list[float] = []
         self._q: list[Array] = []
         self._v: list[Array] = []
@@ -324,8 +326,12 @@ class Solution:
     def reaction(self, support: Support) -> Array:
         """Force and moment of a support on the scene; (n+1, 3); N, N, N m.
 
+        In statics the first row is what the initial state bears: nothing where the run begins with
+        the undeformed scene, for loads act from the first step on; and the reactions of that
+        equilibrium where it begins with ``start=``.
+
         In dynamics they are those that act during the step that ends at each time; the first row is
-        NaN where no step came before.
+        NaN, for no step came before.
 
         Raises:
             SceneError: The support is not in the scene.
@@ -476,6 +482,7 @@ class Solution:
             f"t = {self._times[0]:g} to {self._times[-1]:g} s in {self.parts} steps, "
             f"{self.iterations / max(self.parts, 1):.2f} Newton iterations each, "
             f"{self.seconds:.2f} s of wall time\n{self.energy}"
+            + (f"\n{self.open_ledger}" if self.open_ledger else "")
         )
 
 
