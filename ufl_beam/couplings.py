@@ -152,6 +152,10 @@ class Couplings(Links):
         """Energy that the connectors take in the step to ``q1``; J."""
         return self.response.change(self.motion(q1), float(self._taken(q1).sum()))
 
+    def dissipation(self, q1: Array) -> float:
+        """Energy that springs dissipate in the step to ``q1``; J."""
+        return self.response.dissipation(self.motion(q1))
+
     def effort(self, q1: Array) -> float:
         """Sum of the sizes of the works that the connectors take in the step to ``q1``; J."""
         return float(np.abs(self._taken(q1)).sum())

@@ -173,8 +173,8 @@ class Stiffness:
         x[n:] = given + self._unit * x[n:]
         return x
 
-    def passes(self, other: Stiffness) -> bool:
-        """Whether an eigenvalue has passed zero between this state and another one."""
+    def passed(self, other: Stiffness) -> bool:
+        """Whether an eigenvalue has passed zero on the way from another state."""
         change = self.negative - other.negative
         return bool(change if self.symmetric and other.symmetric else change % 2)
 

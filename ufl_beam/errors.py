@@ -25,6 +25,12 @@ class StepFailed(Exception):
         super().__init__(message)
         self.residuals: dict[str, float] = {}
 
+    def saying(self, message: str) -> StepFailed:
+        """The same failure with another message."""
+        other = StepFailed(message)
+        other.residuals = self.residuals
+        return other
+
 
 class ConvergenceError(RuntimeError):
     """A step found no equilibrium, even after it was cut; nothing before it is lost.

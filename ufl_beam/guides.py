@@ -152,6 +152,10 @@ class Guides(Links):
         """Guides take no energy."""
         return 0.0
 
+    def dissipation(self, q1: Array) -> float:
+        """Guides take no energy."""
+        return 0.0
+
     def effort(self, q1: Array) -> float:
         """Guides take no energy."""
         return 0.0

@@ -84,6 +84,9 @@ class Response(Protocol):
     def change(self, e1: Array, work: float) -> float:
         """Energy that the step stores, dissipates or gives away; J."""
 
+    def dissipation(self, e1: Array) -> float:
+        """Energy that points would dissipate in a step to ``e1``; J."""
+
     def state(self) -> Array:
         """What is remembered besides motions and forces; (num_links, k)."""
 
@@ -143,6 +146,10 @@ class _Working:
     def change(self, e1: Array, work: float) -> float:
         """The work."""
         return work
+
+    def dissipation(self, e1: Array) -> float:
+        """There are no points."""
+        return 0.0
 
     def state(self) -> Array:
         """Nothing is remembered."""
@@ -404,6 +411,11 @@ class _Sprung:
         """Energy stored and dissipated in the step; J."""
         self.points.respond(self._at(e1))
         return self.points.change()
+
+    def dissipation(self, e1: Array) -> float:
+        """Energy dissipated in the step; J."""
+        self.points.respond(self._at(e1))
+        return self.points.dissipation()
 
     def state(self) -> Array:
         """Internal variables."""
