@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import basix.ufl
 import numpy as np
 import ufl
@@ -19,6 +21,7 @@ from ufl_beam.relative import MOTIONS, Numbers, Pair
 from ufl_beam.responses import Setting, respond
 from ufl_beam.schemes import Step
 from ufl_beam.sparse import Csr
+from ufl_beam.tangent_change import TangentChange
 
 
 def _alike(link: Connector) -> tuple[str, object]:
@@ -70,7 +73,8 @@ class Couplings(Links):
         def kernel(form: ufl.Form) -> Kernel:
             return Kernel(form, q1, dofs[order], coordinates)
 
-        self._q0, self._row = q0, row
+        self._q0, self._q1, self._row, self._bend = q0, q1, row, given()
+        self._forms, self._kernel = (e, w_λ, tangent, dx), kernel
         self._work, self._tangent, self._value = map(kernel, (work, tangent, e * z * dx))
         self._tangent.place(A)
         self.response = respond(links[0].law, links, setting)
@@ -165,6 +169,26 @@ class Couplings(Links):
         taken: float = lib.commit_couplings(self._in_c, doubles(q1), self._dt)
         self._q = q1
         self.response.accept(self._e, taken)
+
+    def add_tangent_change(self, q1: Array, u: Array) -> None:
+        """Add the derivative of the tangent at ``q1`` along ``u``."""
+        change = self._tangent_change
+        change.put(self._row, self._rows[self._order])
+        bends = self.response.bends(self.motion(q1))
+        change.put(self._bend, bends[self._order, None])
+        change.add(q1, u)
+
+    @cached_property
+    def _tangent_change(self) -> TangentChange:
+        e, w_λ, tangent, dx = self._forms
+        q1, bend = self._q1, self._bend
+
+        def of_rows(u: fem.Function) -> ufl.Form:
+            """Rows of laws change with the motion, too."""
+            dq = ufl.TrialFunction(q1.function_space)
+            return w_λ * bend * ufl.derivative(e, q1, u) * ufl.derivative(e, q1, dq) * dx
+
+        return TangentChange(tangent, q1, self._kernel, self._A, of_rows)
 
     def freeze(self) -> None:
         """From now on nothing yields or breaks further."""
