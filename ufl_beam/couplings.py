@@ -172,10 +172,12 @@ class Couplings(Links):
 
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """Add the derivative of the tangent at ``q1`` along ``u``."""
-        change = self._tangent_change
-        change.put(self._row, self._rows[self._order])
-        bends = self.response.bends(self.motion(q1))
-        change.put(self._bend, bends[self._order, None])
+        change, e = self._tangent_change, self.motion(q1)
+        rows = np.zeros_like(self._rows)
+        for column, numbers in enumerate(self.response.rows(e, self.force(q1))):
+            rows[:, column] = numbers
+        change.put(self._row, rows[self._order])
+        change.put(self._bend, self.response.bends(e)[self._order, None])
         change.add(q1, u)
 
     @cached_property

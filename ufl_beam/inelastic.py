@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import ufl
@@ -194,7 +194,8 @@ class InelasticBeams:
 
     @cached_property
     def _cell_tangent(self) -> CellTangent:
-        return CellTangent(self._around, self._q1, self._fields.kernel, self._A)
+        kernel = partial(self._fields.kernel, unknown=self._q1)
+        return CellTangent(self._around, self._q1, kernel, self._A)
 
     def freeze(self) -> None:
         """From now on nothing yields or opens further."""

@@ -11,7 +11,7 @@ from ufl_beam.compat import Array, fem
 from ufl_beam.forms import Kernel
 from ufl_beam.sparse import Csr
 
-Compile = Callable[[ufl.Form, fem.Function], Kernel]
+Compile = Callable[[ufl.Form], Kernel]
 
 
 class TangentChange:
@@ -20,7 +20,7 @@ class TangentChange:
     Args:
         tangent: Bilinear form of the tangent.
         q1: The configuration that it depends on.
-        kernel: Compiles a form.
+        kernel: Compiles a form; ``q1`` is the configuration that changes.
         A: Matrix that takes the derivative.
         more: Form to be added, made from the direction.
     """
@@ -35,12 +35,13 @@ class TangentChange:
     ) -> None:
         self._u, self._A = fem.Function(q1.function_space), A
         change = ufl.derivative(tangent, q1, self._u)
-        self._kernel = kernel(change if more is None else change + more(self._u), q1)
+        self._kernel = kernel(change if more is None else change + more(self._u))
         self._kernel.place(A)
 
     def put(self, function: fem.Function, values: Array) -> None:
-        """Give a coefficient values in the cells."""
-        self._kernel.put(function, values)
+        """Give a coefficient values in the cells; the derivative may not depend on it."""
+        if self._kernel.uses(function):
+            self._kernel.put(function, values)
 
     def add(self, q1: Array, u: Array) -> None:
         """Add the derivative at ``q1`` along ``u`` to the matrix."""
@@ -57,7 +58,7 @@ class CellTangent:
     Args:
         work: Virtual work.
         q1: The configuration that it depends on.
-        kernel: Compiles a form.
+        kernel: Compiles a form; ``q1`` is the configuration that changes.
         A: Matrix that takes the derivative.
     """
 
@@ -76,7 +77,7 @@ class CellTangent:
     def _works(self) -> tuple[Kernel, Kernel]:
         tangent = ufl.action(ufl.derivative(self._work, self._q1, self._x), self._y)
         change = ufl.derivative(tangent, self._q1, self._u)
-        return self._compile(tangent, self._q1), self._compile(change, self._q1)
+        return self._compile(tangent), self._compile(change)
 
     def put(self, function: fem.Function, values: Array) -> None:
         """Give a coefficient values in the cells."""
@@ -93,7 +94,8 @@ class CellTangent:
         of_tangent, of_change = self._works
         for kernel in self._works:
             for function, values in self._values.items():
-                kernel.put(function, values)
+                if kernel.uses(function):
+                    kernel.put(function, values)
             kernel.set(self._x, x)
             kernel.set(self._y, y)
         of_change.set(self._u, u)

@@ -8,7 +8,7 @@ what several processes add to one degree of freedom is summed by the solver.
 from __future__ import annotations
 
 import math
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Protocol
 
 import numpy as np
@@ -193,7 +193,8 @@ class ElasticBeams(OfForms):
 
     @cached_property
     def _cell_tangent(self) -> CellTangent:
-        return CellTangent(self._work, self._q1, self._fields.kernel, self._A)
+        kernel = partial(self._fields.kernel, unknown=self._q1)
+        return CellTangent(self._work, self._q1, kernel, self._A)
 
 
 class SectionForces:
