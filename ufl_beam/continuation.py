@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -19,6 +18,7 @@ from ufl_beam.critical import Branch, CriticalPoint, Direction, Stiffness
 from ufl_beam.discretisation import Mesh
 from ufl_beam.errors import SceneError, StepFailed, require_count, require_kind, require_sequence
 from ufl_beam.loads import TimeFunction
+from ufl_beam.parameter import FACTOR
 from ufl_beam.processes import ours
 from ufl_beam.record import Recorder, on_first
 from ufl_beam.scene import Scene
@@ -71,11 +71,19 @@ class Path(Solution):
     """
 
     critical: Sequence[CriticalPoint] = ()
+    parameter = FACTOR
 
     @property
     def factor(self) -> Array:
         """Load factors, the time of the time functions; (n+1,)."""
         return self.times
+
+    @property
+    def progress(self) -> Array:
+        """Arc length of the path in the displacements of nodes, root mean square; (n+1,); m."""
+        nodes = np.unique(np.vstack([self.grid.dofs, self.grid.dofs_of_bodies])[:, :2])
+        steps = np.sqrt(2 * np.mean(np.diff(self.q[:, nodes], axis=0) ** 2, axis=1))
+        return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 class Candidate(NamedTuple):
@@ -141,9 +149,8 @@ class Route:
         walk.direction = Direction(sign * way.q, sign * way.t)
 
     def _tried(self) -> float:
-        """The load factor of the latest attempt."""
-        t = self._walk.t
-        return t if math.isfinite(t) else self._walk.simulation.t
+        """The load factor at which the latest attempt began."""
+        return self._walk.simulation.t + self._walk.sought.t
 
     def advance(self) -> None:
         """One step; where it fails, a shorter one; where it passes a critical point, up to there.

@@ -235,7 +235,7 @@ class XDMF(Recorder):
 class History(Recorder):
     """Table of the motion of places and of the ledger, one row a step, complete if the run dies.
 
-    Columns: t; u, v, psi of each place; motion, force, work of each connector; then the entries of
+    Columns: t, or the load factor of a path; u, v, psi of each place; motion, force, work of each connector; then the entries of
     the ledger (J).
 
     Args:
@@ -287,7 +287,7 @@ class History(Recorder):
         }
         names = [f"{c} {place}" for place in self._places for c in ("u", "v", "psi")]
         names += [f"{c} {x}" for x in self._links.values() for c in ("motion", "force", "work")]
-        return ["t", *names, *simulation.ledger_names()]
+        return [simulation.solution.parameter.column, *names, *simulation.ledger_names()]
 
     def _begin(self, header: list[str], row: list[str]) -> None:
         self._files = [self._path.open("w", newline="")]

@@ -489,11 +489,11 @@ class Simulation(Live):
             ConvergenceError: With the solution so far.
         """
         self.end()
-        dt, forces = end - self.t, self._forces_by_kind()
+        dt, forces, named = end - self.t, self._forces_by_kind(), self.solution.parameter
         sizes = ", ".join(f"{kind} {size:.1e} N" for kind, size in forces.items())
         raise ConvergenceError(
-            f"no equilibrium after t = {self.t:.9g} s, even with dt = {dt:.3g} s: {failure} "
-            f"({sizes}). {advice or self.scheme.advice}",
+            f"no equilibrium after {named.at(self.t, '.9g')}, even with {named.over(dt)}: "
+            f"{failure} ({sizes}). {advice or self.scheme.advice}",
             time=self.t,
             dt=dt,
             solution=self.solution,

@@ -21,6 +21,7 @@ from ufl_beam.inelastic import Strains
 from ufl_beam.joints import Connection, JointHistory, links_of, motion_of, of_joint, velocity_of
 from ufl_beam.ledger import Energy
 from ufl_beam.memory import State
+from ufl_beam.parameter import TIME
 from ufl_beam.scene import Scene, Support
 from ufl_beam.sparse import Product
 from ufl_beam.terms import SectionForces, mass_matrix
@@ -61,8 +62,11 @@ class Solution:
             of the size of the scene, rad; NaN if nobody did.
         seconds: Wall time of the run, building the scene included; s.
         every: Steps from one that was kept to the next.
+        parameter: Words for :attr:`times`, which are load factors in a path.
         internal: What cells and connectors remember at the end of the run.
     """
+
+    parameter = TIME
 
     def __init__(self, scene: Scene, grid: Grid) -> None:
         self.scene, self.grid = scene, grid
@@ -156,6 +160,11 @@ class Solution:
     def times(self) -> Array:
         """Times that were kept, n after the initial one; (n+1,); s."""
         return np.array(self._times)
+
+    @property
+    def progress(self) -> Array:
+        """How far each kept state is from the first one, never falling; here the time; (n+1,)."""
+        return self.times
 
     @property
     def q(self) -> Array:
@@ -359,13 +368,14 @@ class Solution:
             "beam": len(scene.beams), "cell": len(self.grid.cells),
             "bod": len(scene.bodies), "link": len(scene.links),
         }  # fmt: skip
+        span = f"{self._times[0]:g} to {self._times[-1]:g}"
         endings = {"bod": ("y", "ies")}
         parts = [
             f"{n} {name}{endings.get(name, ('', 's'))[n != 1]}" for name, n in counts.items() if n
         ]
         return (
             f"{', '.join(parts)}, {self.grid.size} degrees of freedom\n"
-            f"t = {self._times[0]:g} to {self._times[-1]:g} s in {self.parts} steps, "
+            f"{self.parameter.value.format(span)} in {self.parts} steps, "
             f"{self.iterations / max(self.parts, 1):.2f} Newton iterations each, "
             f"{self.seconds:.2f} s of wall time\n{self.energy}"
         )
