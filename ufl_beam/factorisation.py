@@ -48,11 +48,11 @@ class Factorisation:
     """
 
     def __init__(self, A: csr_array) -> None:
+        if not np.isfinite(A.data).all():
+            raise SingularMatrix
         rows = np.repeat(np.arange(A.shape[0]), np.diff(A.indptr))
         self._scale = _scale(A, rows)
         scaled = A.data * (self._scale[rows] * self._scale[A.indices])
-        if not np.isfinite(scaled).all():
-            raise SingularMatrix
         S = csr_array((scaled, A.indices, A.indptr), shape=A.shape)
         self.symmetric = bool(abs(S - S.T).max() <= SYMMETRIC)
         self._S = csr_array((S + S.T) / 2) if self.symmetric else S

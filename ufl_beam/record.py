@@ -235,8 +235,8 @@ class XDMF(Recorder):
 class History(Recorder):
     """Table of the motion of places and of the ledger, one row a step, complete if the run dies.
 
-    Columns: t, or the load factor of a path; u, v, psi of each place; motion, force, work of each connector; then the entries of
-    the ledger (J).
+    Columns: t, or the load factor of a path; u, v, psi of each place; motion, force, work of each
+    connector; then the entries of the ledger (J).
 
     Args:
         path: File, ending in ``.csv``.

@@ -30,8 +30,8 @@ from ufl_beam.symbols import FILLED, FRONT, MIDDLE, Pin, Stroke
 from ufl_beam.view import (
     RESULTANTS,
     decimal_prefix,
-    moved_points,
     evenly,
+    moved_points,
     open_hinges,
     require_choice,
 )

@@ -81,7 +81,7 @@ class Walk:
         Raises:
             StepFailed: Nothing dissipates.
         """
-        simulation, way = self.simulation, self.direction
+        way = self.direction
         self.begin()
         gone = Direction(np.zeros(self.share.size), 0.0)
         if not self.dissipates:
@@ -106,7 +106,8 @@ class Walk:
         low, high = 0.0, length
         for _ in range(HALVINGS):
             middle = (low + high) / 2
-            low, high = (low, middle) if self.dissipation(q + middle * way.q) > 0 else (middle, high)
+            begun = self.dissipation(q + middle * way.q) > 0
+            low, high = (low, middle) if begun else (middle, high)
         gone = Direction(high * way.q, high * way.t)
         return gone, self._bent(gone)
 
