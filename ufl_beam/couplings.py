@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import singledispatch
+from functools import cached_property, singledispatch
 
 import basix.ufl
 import numpy as np
@@ -22,6 +22,7 @@ from ufl_beam.responses import Setting, respond
 from ufl_beam.rigid_plastic import RigidPlasticResponse
 from ufl_beam.schemes import Step
 from ufl_beam.sparse import Csr
+from ufl_beam.tangent_change import TangentChange
 
 respond.register(RigidPlastic, RigidPlasticResponse)
 
@@ -90,7 +91,8 @@ class Couplings(Links):
         def kernel(form: ufl.Form) -> Kernel:
             return Kernel(form, q1, dofs[order], coordinates)
 
-        self._q0, self._row = q0, row
+        self._q0, self._q1, self._row, self._bend = q0, q1, row, given()
+        self._forms, self._kernel = (e, w_λ, tangent, dx), kernel
         self._work, self._tangent, self._value = map(kernel, (work, tangent, e * z * dx))
         self._tangent.place(A)
         self.response = respond(links[0].law, links, setting)
@@ -197,6 +199,28 @@ class Couplings(Links):
         taken: float = lib.commit_couplings(self._in_c, doubles(q1), self._dt)
         self._q = q1
         self.response.accept(self._e, taken)
+
+    def add_tangent_change(self, q1: Array, u: Array) -> None:
+        """Add the derivative of the tangent at ``q1`` along ``u``."""
+        change, e = self._tangent_change, self.motion(q1)
+        rows = np.zeros_like(self._rows)
+        for column, numbers in enumerate(self.response.rows(e, self.force(q1))):
+            rows[:, column] = numbers
+        change.put(self._row, rows[self._order])
+        change.put(self._bend, self.response.bends(e)[self._order, None])
+        change.add(q1, u)
+
+    @cached_property
+    def _tangent_change(self) -> TangentChange:
+        e, w_λ, tangent, dx = self._forms
+        q1, bend = self._q1, self._bend
+
+        def of_rows(u: fem.Function) -> ufl.Form:
+            """Rows of laws change with the motion, too."""
+            dq = ufl.TrialFunction(q1.function_space)
+            return w_λ * bend * ufl.derivative(e, q1, u) * ufl.derivative(e, q1, dq) * dx
+
+        return TangentChange(tangent, q1, self._kernel, self._A, of_rows)
 
     def freeze(self) -> None:
         """From now on nothing yields or breaks further."""

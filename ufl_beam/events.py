@@ -11,6 +11,7 @@ import numpy.typing as npt
 from ufl_beam.beams import Place
 from ufl_beam.connectors import Connector, Coulomb, Stop
 from ufl_beam.memory import State
+from ufl_beam.parameter import TIME, Parameter
 from ufl_beam.record import Recorder
 
 if TYPE_CHECKING:
@@ -38,17 +39,19 @@ class Event(NamedTuple):
     """Something that happened in a step.
 
     Attributes:
-        time: End of the step; s.
+        time: End of the step; s; on a path its load factor.
         where: A place in the middle of a cell, that of a plastic hinge, or a connector.
         what: "yields", "opens", "is free" in a cell; "touches", "lets go", "slides", "sticks".
+        parameter: Words for the time.
     """
 
     time: float
     where: Place | Connector
     what: str
+    parameter: Parameter = TIME
 
     def __str__(self) -> str:
-        return f"t = {self.time:.9g} s: {self.where} {self.what}"
+        return f"{self.parameter.at(self.time, '.9g')}: {self.where} {self.what}"
 
 
 class Events(Recorder):
@@ -133,8 +136,9 @@ class Events(Recorder):
 
     def _add(self, simulation: Simulation, rows: list[Row]) -> list[Event]:
         links, grid = simulation.scene.links, simulation.grid
+        named = simulation.solution.parameter
         events = [
-            Event(t, grid.place_of(number) if what in IN_CELLS else links[number], what)
+            Event(t, grid.place_of(number) if what in IN_CELLS else links[number], what, named)
             for t, number, what in rows
         ]
         self._rows += rows

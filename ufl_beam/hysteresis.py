@@ -61,7 +61,7 @@ def plot_moment_curvature(solution: Solution, place: Place) -> Figure:
     M, K = solution.material_at(place).forces[:, 2], solution.strains_at(place)[:, 2]
     with picture((8.0, 5.4)) as figure:
         axes = figure.add_subplot()
-        _draw_path(figure, axes, solution.times, K, M)
+        _draw_path(figure, axes, solution, K, M)
         axes.set_xlabel("curvature K (1/m)")
         axes.set_title(f"cell at {place}", loc="left", color=INK)
     return figure
@@ -93,7 +93,7 @@ def plot_hinge(solution: Solution, place: Place) -> Figure:
         axes = figure.add_subplot()
         for part in _monotone(jump):
             axes.fill_between(jump[part], M[part], facecolor=(ORANGE, 0.3), linewidth=0.0, zorder=2)
-        _draw_path(figure, axes, solution.times, jump, M)
+        _draw_path(figure, axes, solution, jump, M)
         _prefix(axes, "x", jump, "jump of rotation", "rad")
         spent = f"{with_unit(lost, 'J')} dissipated"
         if math.isfinite(law.energy):
@@ -129,7 +129,7 @@ def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Fig
     # Upright frames need less; the bar and the legend have their own widths.
     across = height * float(np.divide(*np.ptp(room, axis=0)))
     with picture((min(width, max(6.0, across + 3.0)), height)) as figure:
-        axes = plane_axes(figure, f"damage at t = {solution.times[n]:.4g} s{factor}")
+        axes = plane_axes(figure, f"damage at {solution.parameter.at(solution.times[n])}{factor}")
         axes.update_datalim(room)
         draw_undeformed(axes, stage)
         draw_axes(axes, solution, points, color=INK, linewidth=2.0, zorder=2)
@@ -162,7 +162,7 @@ def plot_dissipation(solution: Solution) -> Figure:
     """
     if not solution.scene.connectors:
         _require_inelastic(solution)
-    energy, t = solution.energy, solution.times
+    energy, t = solution.energy, solution.progress
     held = energy.total
     supplied = held[0] + sum(energy.supplied.values(), np.zeros_like(t))
     start = held[0] > 1e-12 * energy.throughput
@@ -178,7 +178,7 @@ def plot_dissipation(solution: Solution) -> Figure:
         axes.plot(t, supplied, color=INK, label=label)
         axes.plot(t, held, color=BLUE, label="in the scene")
         _prefix(axes, "y", np.concatenate([supplied, held]), "energy", "J")
-        axes.set_xlabel("time t (s)")
+        axes.set_xlabel(solution.parameter.progress)
         axes.set_title(
             f"worst imbalance {_scientific(energy.worst)} of {with_unit(energy.throughput, 'J')} "
             "throughput",
@@ -256,8 +256,9 @@ def _prefix(axes: Axes, which: str, values: Array, quantity: str, unit: str) -> 
     axis.set_label_text(f"{quantity} ({prefix}{unit})")
 
 
-def _draw_path(figure: Figure, axes: Axes, times: Array, x: Array, M: Array) -> None:
+def _draw_path(figure: Figure, axes: Axes, solution: Solution, x: Array, M: Array) -> None:
     """M against x, from light to dark in time; a ring at the beginning, a dot at the end."""
+    times, named = solution.progress, solution.parameter
     from matplotlib.collections import LineCollection
 
     colors = scale("viridis_r", 0.12, 1.0, float(times[0]), float(times[-1]))
@@ -271,14 +272,14 @@ def _draw_path(figure: Figure, axes: Axes, times: Array, x: Array, M: Array) -> 
         at_zero(0.0, color=GREY, linewidth=1.0, zorder=1)
     axes.add_collection(pieces)
     for i, inside in ((0, "white"), (-1, INK)):
-        label = f"t = {times[i]:.4g} s"
+        label = named.at(solution.times[i])
         axes.plot(
             *path[i], "o", ms=8.0, mfc=inside, mec=INK, mew=1.6, zorder=5, ls="none", label=label
         )
     axes.autoscale_view()
     axes.tick_params(labelsize=12, color="#888888")
     _prefix(axes, "y", M, "bending moment M", "N m")
-    draw_bar(figure, axes, colors, "time t (s)")
+    draw_bar(figure, axes, colors, named.progress)
     figure.legend(loc="outside upper left", ncols=2)
 
 

@@ -145,8 +145,8 @@ def close_all(recorders: Sequence[Recorder]) -> None:
 class History(Recorder):
     """Table of the motion of places and of the ledger, one row a step, complete if the run dies.
 
-    Columns: t; u, v, psi of each place; motion, force, work of each connector; then the entries of
-    the ledger.  The names of the columns end in their units.
+    Columns: t, or the load factor of a path; u, v, psi of each place; motion, force, work of each
+    connector; then the entries of the ledger.  The names of the columns end in their units.
 
     Args:
         path: File, ending in ``.csv``.
@@ -210,7 +210,7 @@ class History(Recorder):
             units = ROTATION if simulation.scene.links[link].turns else TRANSLATION
             names += [f"{c} {name} [{unit}]" for c, unit in units]
         energies = (f"{name} [J]" for name in simulation.ledger_names())
-        self._header = _line(["t [s]", *names, *energies])
+        self._header = _line([simulation.solution.parameter.column, *names, *energies])
 
     def _begin(self, row: bytes) -> None:
         self.close()

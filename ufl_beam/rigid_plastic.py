@@ -248,6 +248,10 @@ class RigidPlasticResponse:
         dissipated: float = lib.dissipation_of_rigid_plastic(self._c, *arrays)
         return dissipated
 
+    def bends(self, e1: Array) -> Array:
+        """None: held connectors stay held, internal variables kept."""
+        return np.zeros(len(e1))
+
     def remaining(self) -> Array:
         """Part of the stiffness that is left in the latest iterate, 0 of what slips."""
         return np.where(self._way == 0, 1.0, 0.0)

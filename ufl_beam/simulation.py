@@ -370,6 +370,46 @@ class Simulation(Live):
                 term.add_tangent(q)
         return r, self._A.data.copy()
 
+    def tangent_change(self, q: Array, u: Array) -> Array:
+        """Derivative of the tangent of :meth:`linearise` along ``u``; entries of the matrix.
+
+        Args:
+            q: Configuration at the local degrees of freedom, which was linearised about last.
+            u: Direction, forces of connectors included.
+        """
+        self._A.data.fill(0.0)
+        for one in self._inner:
+            one.add_tangent_change(q, u)
+        return self._A.data.copy()
+
+    def tangent_works(self, q: Array, u: Array, X: Array, Y: Array) -> tuple[Array, Array]:
+        """Works of the tangent for the motions X on Y, and of its derivative along u; J.
+
+        Args:
+            q: See :meth:`tangent_change`.
+            u: Direction, forces of connectors included.
+            X: Motions, in columns.
+            Y: Virtual motions, in columns.
+
+        Returns:
+            Two symmetric matrices.
+        """
+        works = np.zeros((2, X.shape[1], Y.shape[1]))
+        for i, j in zip(*np.triu_indices(X.shape[1]), strict=True):
+            x, y = (np.ascontiguousarray(one) for one in (X[:, i], Y[:, j]))
+            works[:, i, j] = np.sum([b.tangent_works(q, u, x, y) for b in self.beams], axis=0)
+        for k, work in enumerate(works):
+            self._A.data.fill(0.0)
+            for one in self.couplings:
+                if k == 0:
+                    one.add_tangent(q)
+                else:
+                    one.add_tangent_change(q, u)
+            times = Product(self._A)
+            work += np.triu([times(np.ascontiguousarray(x)) @ Y for x in X.T])
+            work += np.triu(work, 1).T
+        return works[0], works[1]
+
     # -- stepping ------------------------------------------------------------------------------
 
     def step_to(self, t1: float) -> None:
@@ -556,11 +596,11 @@ class Simulation(Live):
             ConvergenceError: With the solution so far.
         """
         self.end()
-        dt, forces = end - self.t, self._forces_by_kind()
+        dt, forces, named = end - self.t, self._forces_by_kind(), self.solution.parameter
         sizes = ", ".join(f"{kind} {size:.1e} N" for kind, size in forces.items())
-        where = f"at t = {self.t:.9g} s"
+        where = f"at {named.at(self.t, '.9g')}"
         if dt != 0:
-            where = f"after t = {self.t:.9g} s, even with dt = {dt:.3g} s"
+            where = f"after {named.at(self.t, '.9g')}, even with {named.over(dt)}"
         why = singularity(self, self.supports.in_plane(self._solver.iterate()))
         said = f"{failure} ({sizes})" if sizes else str(failure)
         raise ConvergenceError(

@@ -29,6 +29,7 @@ from ufl_beam.processes import ours
 from ufl_beam.record import on_first
 from ufl_beam.saved_functions import SavedCurve, SavedFunction
 from ufl_beam.saved_scene import from_data, lost, to_data
+from ufl_beam.parameter import TIME
 from ufl_beam.scene import Scene, Support
 from ufl_beam.sparse import Product
 from ufl_beam.terms import SectionForces, mass_matrix
@@ -82,9 +83,12 @@ class Solution:
             of the size of the scene, rad; NaN if nobody did.
         seconds: Wall time of the run, building the scene included; s.
         every: Steps from one that was kept to the next.
+        parameter: Words for :attr:`times`, which are load factors in a path.
         open_ledger: How far the energy ledger is open, in words; empty if it closes as claimed.
         internal: What cells and connectors remember at the end of the run.
     """
+
+    parameter = TIME
 
     def __init__(self, scene: Scene, grid: Grid) -> None:
         self.scene, self.grid = scene, grid
@@ -258,6 +262,11 @@ class Solution:
     def times(self) -> Array:
         """Times that were kept, n after the initial one; (n+1,); s."""
         return np.array(self._times)
+
+    @property
+    def progress(self) -> Array:
+        """How far each kept state is from the first one, never falling; here the time; (n+1,)."""
+        return self.times
 
     @property
     def q(self) -> Array:
@@ -473,13 +482,14 @@ class Solution:
             "beam": len(scene.beams), "cell": len(self.grid.cells),
             "bod": len(scene.bodies), "link": len(scene.links),
         }  # fmt: skip
+        span = f"{self._times[0]:g} to {self._times[-1]:g}"
         endings = {"bod": ("y", "ies")}
         parts = [
             f"{n} {name}{endings.get(name, ('', 's'))[n != 1]}" for name, n in counts.items() if n
         ]
         return (
             f"{', '.join(parts)}, {self.grid.size} degrees of freedom\n"
-            f"t = {self._times[0]:g} to {self._times[-1]:g} s in {self.parts} steps, "
+            f"{self.parameter.value.format(span)} in {self.parts} steps, "
             f"{self.iterations / max(self.parts, 1):.2f} Newton iterations each, "
             f"{self.seconds:.2f} s of wall time\n{self.energy}"
             + (f"\n{self.open_ledger}" if self.open_ledger else "")
