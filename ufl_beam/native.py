@@ -41,7 +41,7 @@ DECLARATIONS = "\n".join(
 
 SANITIZERS = (
     "-O1",
-    "-g",
+    "-g1",  # line numbers
     "-fno-omit-frame-pointer",
     "-fno-wrapv",
     "-fsanitize=address,undefined,bounds-strict",
