@@ -70,6 +70,7 @@ from ufl_beam.loads import (
 from ufl_beam.mode_pictures import plot_modes
 from ufl_beam.modes import Buckling, Modes, buckling, modes
 from ufl_beam.pacing import Adaptive
+from ufl_beam.pictures import plot
 from ufl_beam.precision import Tradeoff
 from ufl_beam.record import History, Recorder
 from ufl_beam.render import animate, render
@@ -92,7 +93,7 @@ from ufl_beam.studies import study
 from ufl_beam.time_series import VTKHDF, XDMF
 from ufl_beam.tradeoffs import tradeoff
 from ufl_beam.version import version
-from ufl_beam.view import picture, plot, plot_energy, plot_history, plot_shapes
+from ufl_beam.view import picture, plot_energy, plot_history, plot_shapes
 from ufl_beam.viscous import KelvinVoigt, Rayleigh
 from ufl_beam.work_precision import plot_tradeoff
 

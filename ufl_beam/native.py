@@ -39,6 +39,19 @@ DECLARATIONS = "\n".join(
 )
 """What all files of C know of each other."""
 
+SANITIZERS = (
+    "-O1",
+    "-g1",  # line numbers
+    "-fno-omit-frame-pointer",
+    "-fno-wrapv",
+    "-fsanitize=address,undefined,bounds-strict",
+    "-fno-sanitize-recover=all",
+)
+"""Flags that make the compiler check addresses and undefined behaviour; see `make sanitize`."""
+
+EXTRA = SANITIZERS if os.environ.get("UFL_BEAM_SANITIZE", "0") != "0" else ()
+"""Flags after those of each library: the sanitizers if ``UFL_BEAM_SANITIZE=1``, else none."""
+
 
 def compiled(
     stem: str,
@@ -60,6 +73,7 @@ def compiled(
     Raises:
         cffi.VerificationError: The compiler refuses.
     """
+    flags = [*flags, *EXTRA]
     key = "\0".join((declarations, *made_of, *flags, sys.version))
     name = f"{stem}_{hashlib.sha256(key.encode()).hexdigest()[:16]}"
     directory = jit_directory()
@@ -67,7 +81,13 @@ def compiled(
     if not library.exists():
         builder = cffi.FFI()
         builder.cdef(declarations)
-        builder.set_source(name, source(), extra_compile_args=list(flags), libraries=["m"])
+        builder.set_source(
+            name,
+            source(),
+            extra_compile_args=flags,
+            extra_link_args=list(EXTRA),
+            libraries=["m"],
+        )
         directory.mkdir(parents=True, exist_ok=True)
         # Other processes may compile the same at the same time; the last one wins.
         with tempfile.TemporaryDirectory(dir=directory) as scratch:

@@ -505,7 +505,7 @@ def draw_strokes(axes: Axes, strokes: Iterable[Stroke], color: Any = None) -> No
 
 
 def _draw_masses(axes: Axes, pose: Pose, color: Any) -> None:
-    for mass in pose.stage.solution.scene.masses:
+    for mass in pose.stage.scene.masses:
         axes.plot(*pose.at(mass.place), "o", ms=10.0, color=color, zorder=5)
 
 

@@ -35,7 +35,19 @@ RECORDS = [
 ]
 """What users say; it must be readable and usable without any of the machinery."""
 
-PICTURES = ["envelopes", "hysteresis", "mode_pictures", "render", "view", "work_precision"]
+PICTURES = [
+    "captions",
+    "envelopes",
+    "hysteresis",
+    "load_symbols",
+    "mode_pictures",
+    "model_pictures",
+    "model_symbols",
+    "pictures",
+    "render",
+    "view",
+    "work_precision",
+]
 
 MACHINERY = {"basix", "cffi", "dolfinx", "ffcx", "mpi4py", "petsc4py", "ufl"}
 
