@@ -21,6 +21,7 @@ from ufl_beam.grid import Index
 from ufl_beam.laws import Bulk, Layout, Softening
 from ufl_beam.ledger import Ledger
 from ufl_beam.loops import doubles, ffi, integers, lib
+from ufl_beam.native import compiled_form
 from ufl_beam.schemes import Scheme
 
 laws.where.register(Condition, ufl.conditional)
@@ -117,7 +118,7 @@ class PointForms:
     def _compile(self, *outputs: Expr) -> Any:
         z = ufl.TestFunction(self._values(len(outputs)))
         dx = ufl.Measure("dx", domain=self._cell, metadata={"quadrature_degree": 1})
-        form = fem.form(ufl.dot(ufl.as_vector(outputs), z) * dx)
+        form, _ = compiled_form(ufl.dot(ufl.as_vector(outputs), z) * dx)
         self._compiled.append(form)
         return tabulator(form)
 
