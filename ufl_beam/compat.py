@@ -50,6 +50,10 @@ if VERSION < (0, 9):  # pragma: no cover - depends on the machine
         "run through ./env of the source tree, or see docs/installation.md"
     )
 
+if not (logging.getLogger().handlers or logging.getLogger("py.warnings").handlers):
+    # FFCx sends all warnings of Python to the log, where without a handler nobody sees them.
+    logging.captureWarnings(False)
+
 
 TABULATE = (
     "double *A, const double *w, const double *c, const double *x, const int *entity, "

@@ -368,6 +368,26 @@ def test_a_directory_of_another_in_the_place_of_temporary_files(home):
     assert place != other
 
 
+WARNS = "import ufl_beam, warnings; warnings.warn('is it seen?', RuntimeWarning)"
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("before", ["", "import dolfinx; "])
+def test_warnings_are_seen(before):
+    """FFCx has all of them logged, which without a handler is nowhere."""
+    command = [sys.executable, "-c", before + WARNS]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    assert "RuntimeWarning: is it seen?" in run.stderr
+
+
+@pytest.mark.serial
+def test_warnings_are_logged_where_the_user_has_a_log():
+    log = "import logging; logging.basicConfig(format='log: %(message)s'); "
+    command = [sys.executable, "-c", log + WARNS]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    assert run.stderr.startswith("log: <string>:1: RuntimeWarning: is it seen?")
+
+
 # -- compilers -----------------------------------------------------------------------------------
 
 
