@@ -8,15 +8,13 @@ lock of an entry belongs to the operating system, which frees it when the proces
 from __future__ import annotations
 
 import atexit
-import fcntl
 import hashlib
 import os
 import shutil
 import stat
 import tempfile
 import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import TypeVar
@@ -24,6 +22,7 @@ from typing import TypeVar
 from mpi4py import MPI
 
 from ufl_beam.compat import jit_directory
+from ufl_beam.locks import locked
 
 T = TypeVar("T")
 
@@ -116,17 +115,6 @@ def _sync(path: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
-
-
-@contextmanager
-def locked(path: Path) -> Iterator[None]:
-    """Exclude other processes."""
-    with path.open("ab") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX)
-        except OSError:
-            pass  # a file system without locks: an entry may be built twice, but never in parts
-        yield
 
 
 # -- directories ---------------------------------------------------------------------------------

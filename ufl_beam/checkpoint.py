@@ -25,6 +25,7 @@ import numpy as np
 from ufl_beam.compat import Array
 from ufl_beam.describe import CODE, Description, difference, has_state, kind_of
 from ufl_beam.errors import SceneError, require_count, require_number, require_sequence
+from ufl_beam.locks import Lock
 from ufl_beam.pacing import Pace
 from ufl_beam.record import Recorder, on_first
 from ufl_beam.simulation import Simulation
@@ -90,10 +91,11 @@ class Keeper:
         comm: Processes of the run.
 
     Raises:
-        SceneError: The file is damaged, or of another run, or cannot be written.
+        SceneError: Another run writes the file, or it is damaged, or of another run, or cannot be
+            written.
 
     Attributes:
-        path: The file.
+        path: The file; locked until :meth:`close`.
         found: What it has; empty if there is none.
     """
 
@@ -111,7 +113,12 @@ class Keeper:
         also = {f"also[{i}]": one for i, one in enumerate(choice.also)}
         self._stateful = {**self._described.stateful, **also}
         self.found: Content = {}
-        on_first(comm, self._find)
+        self._lock = Lock(self.path)
+        try:
+            on_first(comm, self._find)
+        except BaseException:
+            self.close()
+            raise
         if comm.size > 1:
             self.found = comm.bcast(self.found)
         self._last_time, self._last_step = time.perf_counter(), -1
@@ -125,6 +132,17 @@ class Keeper:
             raise SceneError(f"checkpoint {self.path}: there is no directory {folder}; make it")
         if not os.access(folder, os.W_OK):
             raise SceneError(f"checkpoint {self.path}: the directory cannot be written to")
+        try:
+            owner = self._lock.take()
+        except OSError as error:
+            raise SceneError(
+                f"checkpoint {self.path}: {self._lock.path} cannot be written: {error.strerror}"
+            ) from None
+        if owner:
+            raise SceneError(
+                f"checkpoint {self.path} is in use: {owner} writes it. Let that run end, or stop "
+                "it, or name another file"
+            )
         if self.path.exists():
             self.found = read(self.path)
             self._require_same(self.found)
@@ -148,6 +166,10 @@ class Keeper:
                 f"checkpoint {self.path} is of another run: {differs}. Delete the file to begin "
                 "anew, or name another"
             )
+
+    def close(self) -> None:
+        """Let other runs have the file."""
+        self._lock.release()
 
     def resume(
         self, simulation: Simulation, pace: Pace, recorders: Sequence[Recorder], t1: float

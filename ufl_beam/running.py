@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
+from contextlib import ExitStack
 
 from mpi4py import MPI
 
@@ -98,12 +99,18 @@ def simulate(
         for recorder in recorders:
             require_continuable(recorder)
         keeper = Keeper(checkpoint, call, step, comm)
-    simulation = Simulation(scene, scheme, t0=t0, start=start, newton=newton, mesh=mesh, comm=comm)
-    pace: Pace = (
-        AdaptiveSteps(simulation, t1, dt)
-        if isinstance(dt, Adaptive)
-        else EqualSteps(simulation.t, t1, dt)
-    )
+    with ExitStack() as stack:
+        if keeper is not None:
+            stack.callback(keeper.close)
+        simulation = Simulation(
+            scene, scheme, t0=t0, start=start, newton=newton, mesh=mesh, comm=comm
+        )
+        pace: Pace = (
+            AdaptiveSteps(simulation, t1, dt)
+            if isinstance(dt, Adaptive)
+            else EqualSteps(simulation.t, t1, dt)
+        )
+        stack.pop_all()  # the run closes it
     solution = simulation.solution
     try:
         solution.every = every
@@ -140,6 +147,8 @@ def simulate(
         for recorder in recorders:
             recorder.close()
         simulation.close()
+        if keeper is not None:
+            keeper.close()
         solution.seconds = time.perf_counter() - begin
     return solution
 
