@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Protocol
 
-from mpi4py import MPI
-
 import numpy as np
 
 from ufl_beam.compat import Array
@@ -249,8 +247,7 @@ class AdaptiveSteps:
         moves = np.hypot(error[self._x], error[self._y]).max(initial=0.0)
         turns = np.abs(error[self._turns]).max(initial=0.0)
         here = float(max(moves / simulation.scene.size, turns))
-        share = simulation.share
-        return share.comm.allreduce(here, op=MPI.MAX) if share.comm.size > 1 else here
+        return simulation.share.largest(here)
 
     def _missed(self, dt: float) -> float:
         """What the middle of the step misses of a load, as a part of its largest impulse."""
