@@ -21,8 +21,11 @@ from ufl_beam.errors import StepFailed
 
 T = TypeVar("T")
 
-GRACE = 5.0
+GRACE = 3.0
 """Time for which a process that failed waits for the others; s."""
+
+FAILED = 32_749
+"""Tag of the messages of processes that end with an exception; MPI has tags up to 32767."""
 
 
 class Agreement:
@@ -102,10 +105,10 @@ def portable(error: BaseException | None) -> BaseException | None:
     return error
 
 
-def _completed(request: MPI.Request) -> bool:
-    """Wait for a collective call, but not for ever."""
+def _completed(*requests: MPI.Request) -> bool:
+    """Wait for communication with the others, but not for ever."""
     end = time.monotonic() + GRACE
-    while not request.Test():
+    while not MPI.Request.Testall(list(requests)):
         if time.monotonic() > end:
             return False
         time.sleep(1e-3)
@@ -131,8 +134,15 @@ def _end_together(
 ) -> None:
     """Print an exception that nobody catches; abort unless all processes end with one."""
     _print_exception(kind, error, trace)
-    if not MPI.Is_finalized() and not _completed(MPI.COMM_WORLD.Ibarrier()):
-        abort(MPI.COMM_WORLD)
+    if MPI.Is_finalized():
+        return
+    world = MPI.COMM_WORLD
+    others = [rank for rank in range(world.size) if rank != world.rank]
+    # No collective call, which might meet one of those that the others are in.
+    told = [world.Isend(bytearray(), rank, FAILED) for rank in others]
+    heard = [world.Irecv(bytearray(), rank, FAILED) for rank in others]
+    if not _completed(*told, *heard):
+        abort(world)
 
 
 _print_exception = sys.excepthook

@@ -231,7 +231,7 @@ class Keeper:
             "step": self._step,
             "seconds": time.perf_counter() - self._begin,
             "pace": pace.state(),
-            "stateful": {name: _state(one) for name, one in self._stateful.items()},
+            "stateful": simulation.together(self._states),
             **_above("state/", simulation.state()),
         }
         parts = [recorder.state() for recorder in recorders]
@@ -244,6 +244,10 @@ class Keeper:
 
         on_first(self._comm, put)
         self._last_time, self._last_step = time.perf_counter(), pace.steps
+
+    def _states(self) -> dict[str, Any]:
+        """States of the user's objects, by name."""
+        return {name: _state(one) for name, one in self._stateful.items()}
 
     def _require_told(self) -> None:
         """Raise if what functions use changes without their saying so: it would be lost."""

@@ -235,7 +235,8 @@ class AdaptiveSteps:
         jerk = (a - before) / between
         c2, c3 = inertia.scheme.error_weights()
         error = self._size(simulation, trial, c2 * dt**2 * a + c3 * dt**3 * jerk)
-        return trial, max(error, self._missed(dt))
+        missed = simulation.share.largest(simulation.together(self._missed, dt))
+        return trial, max(error, missed)
 
     def _size(self, simulation: Simulation, trial: Trial, error: Array) -> float:
         """Largest error of a position over the size of the scene, or of a rotation."""
