@@ -410,22 +410,26 @@ def follow(
     route = Route(simulation, control)
     path.critical = route.critical
     release = take(outputs)
+
+    def after_step() -> bool:
+        path.keep(simulation)
+        for recorder in recorders:
+            recorder.write(simulation)
+        return until is not None and bool(until(simulation))
+
     try:
         route.begin(branch, fresh=state is None)
         for recorder in recorders:
-            recorder.open(simulation)
+            simulation.together(recorder.open, simulation)
         path.keep(simulation)
         for _ in range(steps):
             route.advance()
-            path.keep(simulation)
-            for recorder in recorders:
-                recorder.write(simulation)
-            if until is not None and until(simulation):
+            if simulation.share.largest(simulation.together(after_step)):
                 break
         simulation.end()
     except BaseException as error:
-        if simulation.comm.size == 1:
-            simulation.end()  # several processes may not all be here
+        if simulation.share.comm.size == 1 or error is simulation.together.raised:
+            simulation.end()  # else the processes may not all be here
         error.__dict__["solution"] = path
         raise
     finally:

@@ -12,7 +12,7 @@ from ufl_beam.beams import Place
 from ufl_beam.connectors import Connector, Coulomb, Stop
 from ufl_beam.memory import State
 from ufl_beam.parameter import TIME, Parameter
-from ufl_beam.record import Recorder
+from ufl_beam.record import Recorder, on_first
 
 if TYPE_CHECKING:
     from ufl_beam.simulation import Simulation
@@ -130,8 +130,12 @@ class Events(Recorder):
                 begins, ends = BETWEEN[type(simulation.scene.links[link].law)]
                 new.append((simulation.t, link, begins if now else ends))
         events = self._add(simulation, new)
-        if self._tell is not None and simulation.comm.rank == 0:
-            for event in events:
+        if self._tell is not None and events:
+            on_first(simulation.comm, lambda: self._tell_all(events))
+
+    def _tell_all(self, events: list[Event]) -> None:
+        for event in events:
+            if self._tell is not None:
                 self._tell(event)
 
     def _add(self, simulation: Simulation, rows: list[Row]) -> list[Event]:

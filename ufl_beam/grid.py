@@ -7,6 +7,7 @@ process.
 
 from __future__ import annotations
 
+import math
 import struct
 from bisect import bisect_left
 from functools import cache, cached_property
@@ -452,3 +453,13 @@ class Share:
     def total(self, value: float) -> float:
         """Sum over the processes."""
         return value if self.comm.size == 1 else float(self.comm.allreduce(value))
+
+    def largest(self, value: float) -> float:
+        """Largest over the processes; infinite where one has no number.
+
+        MPI does not say what the largest of numbers is with one that is none, and processes that
+        learn different ones part.
+        """
+        if self.comm.size == 1:
+            return value
+        return float(self.comm.allreduce(math.inf if math.isnan(value) else value, op=MPI.MAX))

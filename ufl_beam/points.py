@@ -8,19 +8,18 @@ from __future__ import annotations
 
 from typing import Any
 
-import basix.ufl
 import numpy as np
 import ufl
 from ufl.conditional import Condition
 from ufl.core.expr import Expr
 
 from ufl_beam import laws
-from ufl_beam.compat import Array, fem, line_mesh
-from ufl_beam.forms import tabulator
+from ufl_beam.compat import Array
 from ufl_beam.grid import Index
 from ufl_beam.laws import Bulk, Layout, Softening
 from ufl_beam.ledger import Ledger
 from ufl_beam.loops import doubles, ffi, integers, lib
+from ufl_beam.pointwise import Pointwise
 from ufl_beam.schemes import Scheme
 
 laws.where.register(Condition, ufl.conditional)
@@ -74,10 +73,8 @@ class PointForms:
     """
 
     def __init__(self, softening: Softening | None, scheme: Scheme) -> None:
-        self._cell = line_mesh(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0, 1]]))
-        self._compiled: list[fem.Form] = []
-        x = fem.Function(self._values(len(INPUTS)))
-        at = {name: x[i] for i, name in enumerate(INPUTS)}
+        self._pointwise = pointwise = Pointwise(INPUTS)
+        at = pointwise.at
         strain, a = ufl.variable(at["strain"]), ufl.variable(at["growth"])
         s, p, ξ, length, θ, dt = (at[n] for n in ("direction", "p", "ξ", "length", "θ", "dt"))
         bulk = Bulk(at["C"], at["limit"], at["H"], at["B"], at["eta"])
@@ -87,7 +84,7 @@ class PointForms:
         e = (1 - θ) * at["before"] + θ * strain - (relieved + θ * s * a / length)  # P(30)
         dp = bulk.flow(e, p, ξ, θ, dt)
         σ = bulk.stress(e, p + θ * dp)
-        self.bulk = self._compile(σ, ufl.diff(σ, strain))
+        self.bulk = pointwise.compile(σ, ufl.diff(σ, strain))
 
         e0, e1 = at["before"] - relieved - p, strain - (relieved + s * a / length) - p - dp
         broken, traction = 0 * a, 0 * a
@@ -98,11 +95,11 @@ class PointForms:
             excess = s * σ - resistance  # P(32), its second equation
             growth_by_strain = -ufl.diff(excess, strain) / ufl.diff(excess, a)
             tangent = ufl.diff(σ, strain) + ufl.diff(σ, a) * growth_by_strain  # P(76)
-            self.opening = self._compile(σ, tangent)
-            self.excess = self._compile(excess, ufl.diff(excess, a))
+            self.opening = pointwise.compile(σ, tangent)
+            self.excess = pointwise.compile(excess, ufl.diff(excess, a))
             broken = a * law.mean_traction(at["opening"], a)
             traction = law.traction(at["opening"] + a)
-        self.end = self._compile(
+        self.end = pointwise.compile(
             dp,
             bulk.dissipation(dp, dt),
             broken,
@@ -112,17 +109,6 @@ class PointForms:
             bulk.stress(e1, 0),
             traction,
         )
-
-    def _values(self, n: int) -> fem.FunctionSpace:
-        element = basix.ufl.quadrature_element("interval", value_shape=(n,), degree=1)
-        return fem.functionspace(self._cell, element)
-
-    def _compile(self, *outputs: Expr) -> Any:
-        z = ufl.TestFunction(self._values(len(outputs)))
-        dx = ufl.Measure("dx", domain=self._cell, metadata={"quadrature_degree": 1})
-        form = fem.form(ufl.dot(ufl.as_vector(outputs), z) * dx)
-        self._compiled.append(form)
-        return tabulator(form)
 
 
 OPENED, RELIEF, HOLD, OVER = range(4)

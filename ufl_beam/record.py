@@ -15,6 +15,7 @@ from mpi4py import MPI
 
 import numpy as np
 
+from ufl_beam.agreement import portable
 from ufl_beam.bodies import Anchor
 from ufl_beam.connectors import Connector, Joint
 from ufl_beam.errors import SceneError, require_count, require_kind, require_sequence
@@ -87,14 +88,14 @@ class Recorder(ABC):
 
 def on_first(comm: MPI.Intracomm, action: Callable[[], None]) -> None:
     """Do something on the first process; what it raises there is raised on all of them."""
-    error: Exception | None = None
+    error: BaseException | None = None
     if comm.rank == 0:
         try:
             action()
-        except Exception as caught:
+        except BaseException as caught:
             error = caught
     if comm.size > 1:
-        error = comm.bcast(error)
+        error = comm.bcast(portable(error))
     if error is not None:
         raise error
 

@@ -10,18 +10,17 @@ from collections.abc import Mapping, Sequence
 from functools import singledispatch
 from typing import Any, NamedTuple
 
-import basix.ufl
 import numpy as np
 import ufl
 from ufl.core.expr import Expr
 
-from ufl_beam.compat import Array, fem, line_mesh
+from ufl_beam.compat import Array
 from ufl_beam.connectors import Connector, RigidPlastic
-from ufl_beam.forms import tabulator
 from ufl_beam.laws import Bulk, Hardening, HingeLaw, Softening
 from ufl_beam.loops import doubles, ffi, integers, lib
 from ufl_beam.openings import Openable
 from ufl_beam.points import NOTHING, RELEASED, SPENT
+from ufl_beam.pointwise import Pointwise
 from ufl_beam.responses import Rows, Setting
 from ufl_beam.schemes import Scheme, Step
 
@@ -124,25 +123,11 @@ class SlipForms:
     """
 
     def __init__(self, law: Softening | Hardening, scheme: Scheme) -> None:
-        self._cell = line_mesh(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0, 1]]))
-        x = fem.Function(self._values(len(INPUTS)))
-        at = {name: x[i] for i, name in enumerate(INPUTS)}
-        at["slip"] = ufl.variable(at["slip"])
+        self._pointwise = pointwise = Pointwise(INPUTS)
+        at = {**pointwise.at, "slip": ufl.variable(pointwise.at["slip"])}
         force, *end = slip(law, at, scheme)
-        self._compiled: list[fem.Form] = []
-        self.force = self._compile(force, ufl.diff(force, at["slip"]))
-        self.end = self._compile(*end)
-
-    def _values(self, n: int) -> fem.FunctionSpace:
-        element = basix.ufl.quadrature_element("interval", value_shape=(n,), degree=1)
-        return fem.functionspace(self._cell, element)
-
-    def _compile(self, *outputs: Expr) -> Any:
-        z = ufl.TestFunction(self._values(len(outputs)))
-        dx = ufl.Measure("dx", domain=self._cell, metadata={"quadrature_degree": 1})
-        form = fem.form(ufl.dot(ufl.as_vector(outputs), z) * dx)
-        self._compiled.append(form)
-        return tabulator(form)
+        self.force = pointwise.compile(force, ufl.diff(force, at["slip"]))
+        self.end = pointwise.compile(*end)
 
 
 class RigidPlasticResponse:

@@ -11,6 +11,7 @@ from mpi4py import MPI
 
 import numpy as np
 
+from ufl_beam.agreement import Agreement
 from ufl_beam.applied import DeadLoads, FollowerLoads
 from ufl_beam.compat import Array
 from ufl_beam.connectors import Controller, Coulomb
@@ -127,6 +128,7 @@ class Simulation(Live):
         ledger: Energies of this process.
         solution: The motion so far.
         parts: Number of parts that steps were cut into, those not cut included.
+        together: Calls that raise on all processes of a shared scene what they raise on one.
         last_dt: Length of the last accepted step; s.
     """
 
@@ -158,6 +160,7 @@ class Simulation(Live):
         self.grid = Grid(scene, mesh_of(start, mesh))
         together = len(self.grid.cells) >= comm.size * SMALLEST_SHARE
         self.share = Share(self.grid, comm if together else MPI.COMM_SELF)
+        self.together = Agreement(self.share.comm)
         q, v = initial_state(self.grid, start)
         self.fields = Fields(self.share)
         self._A = self.fields.matrix()
@@ -234,6 +237,7 @@ class Simulation(Live):
             relieve=self._relieve,
             held=self.supports.dofs,
             newton=newton or Newton(),
+            agreement=self.together,
         )
         self.solution = Solution(scene, self.grid)
         give_back_memory()
@@ -315,9 +319,7 @@ class Simulation(Live):
         """How far the laws of connectors are missed."""
         q1 = self.supports.in_plane(x)
         here = max((c.excess(q1, r, scale, moved) for c in self.couplings), default=0.0)
-        if self.share.comm.size > 1:
-            return self.share.comm.allreduce(here, op=MPI.MAX) if self.scene.links else 0.0
-        return here
+        return self.share.largest(here) if self.scene.links else 0.0
 
     def _tangent(self, x: Array) -> None:
         self._assemble(self.supports.in_plane(x))
@@ -448,9 +450,7 @@ class Simulation(Live):
         """
         step = self.scheme.step(self.t, t1, end, self.q)
         trial = self._attempt(step._replace(load_time=begin, motion_time=begin))
-        turn = np.abs(trial.q1 - self.q)[self._rotations].max(initial=0.0)
-        if self.share.comm.size > 1:
-            turn = self.share.comm.allreduce(turn, op=MPI.MAX)
+        turn = self.share.largest(np.abs(trial.q1 - self.q)[self._rotations].max(initial=0.0))
         if turn > APPLYING_TURN and SHORT_PART * step.dt > end - begin:
             raise StepFailed("a node turns too far while the loads at the beginning are applied")
         return trial
@@ -497,23 +497,42 @@ class Simulation(Live):
 
     def _attempt(self, step: Step) -> Trial:
         """Solve a step; see :meth:`attempt`."""
-        self.ask()
-        self._begin(step)
-        guess = extrapolated(self.q, self._q_before, step.dt / self.last_dt)
-        self.supports.enter(guess)
-        self.supports.move(guess, self.supports.in_axes(self.q), step)
+        guess = self.together(self._begin, step)
         try:
             like_last = self.scheme.dynamic and math.isclose(step.dt, self.last_dt, rel_tol=1e-6)
             q1 = self._openings.solve(
                 guess,
                 lambda x: self._solver.solve(x, self._loads(), like_last and x is guess),
-                lambda: self._begin(step),
+                lambda: self._begin_terms(step),
             )
         except StepFailed:
-            if said := no_number(self.scene, (step.load_time, step.motion_time)):
-                raise StepFailed(said) from None
+            try:
+                self.together(self._require_numbers, step)
+            except StepFailed as better:
+                raise better from None
             raise
         return self._trial(step, q1)
+
+    def _begin(self, step: Step) -> Array:
+        """Begin a step; return a guess of its end, in the axes of the supports."""
+        self._ask_and_begin(step)
+        guess = extrapolated(self.q, self._q_before, step.dt / self.last_dt)
+        self.supports.enter(guess)
+        self.supports.move(guess, self.supports.in_axes(self.q), step)
+        return guess
+
+    def _ask_and_begin(self, step: Step) -> None:
+        self.ask()
+        self._begin_terms(step)
+
+    def _begin_terms(self, step: Step) -> None:
+        for term in self.terms:
+            term.begin(step)
+
+    def _require_numbers(self, step: Step) -> None:
+        """Raise :class:`StepFailed` if a time function is no finite number in a step."""
+        if said := no_number(self.scene, (step.load_time, step.motion_time)):
+            raise StepFailed(said)
 
     def attempt_along(self, step: Step, guess: Array, border: Border) -> Trial:
         """Solve the next step together with the load factor; :meth:`accept` may take it.
@@ -526,22 +545,17 @@ class Simulation(Live):
         Raises:
             StepFailed: There is no equilibrium, or it is too far away.
         """
-        self.ask()
-        self._begin(step)
+        self.together(self._ask_and_begin, step)
         loads, t = self._loads(), border.t
 
         def again() -> None:
-            self._begin(step)
+            self._begin_terms(step)
             border.t = t
 
         q1 = self._openings.solve(
             guess, lambda x: self._solver.solve_along(x, loads, border), again
         )
         return self._trial(step, q1)
-
-    def _begin(self, step: Step) -> None:
-        for term in self.terms:
-            term.begin(step)
 
     def _loads(self) -> list[Array]:
         return [load.force for load in self.loads]
@@ -559,6 +573,10 @@ class Simulation(Live):
 
     def accept(self, trial: Trial) -> None:
         """Go where the latest :meth:`attempt` went."""
+        self.together(self._accept, trial)
+
+    def _accept(self, trial: Trial) -> None:
+        """See :meth:`accept`."""
         step, q1, s = trial
         if self._path is not None:
             self._path.accept(self.force)
@@ -582,8 +600,7 @@ class Simulation(Live):
 
     def _require_small(self, turn: float) -> None:
         """Raise if a node of any process turns too far in the step."""
-        if self.share.comm.size > 1:
-            turn = self.share.comm.allreduce(turn, op=MPI.MAX)
+        turn = self.share.largest(turn)
         if not turn <= LARGEST_TURN:
             raise StepFailed(
                 f"a node turns by {turn:.3g} rad in the step, and |Δψ| must stay below π; reduce dt"
@@ -621,7 +638,7 @@ class Simulation(Live):
         for term in self.terms:
             try:
                 term.add_residual(q1, forces[term.kind])
-            except StepFailed:
+            except Exception:
                 forces[term.kind].fill(np.nan)  # it is why the step has failed
         sizes = {kind: self._solver.size(force) for kind, force in forces.items()}
         return {kind: size for kind, size in sizes.items() if size}
