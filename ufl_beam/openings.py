@@ -50,7 +50,15 @@ class Openings:
 
     def __init__(self, course: Course, places: Sequence[Openable], comm: MPI.Intracomm) -> None:
         self._course, self._places, self._comm = course, places, comm
-        self._any = bool(self._largest(float(bool(places))))
+        self._parallel, self._released = comm.size > 1, False
+
+    @classmethod
+    def of(
+        cls, course: Course, places: Sequence[Openable], comm: MPI.Intracomm
+    ) -> Openings | None:
+        """The openings of a scene; none if no process has a place that may open."""
+        one = cls(course, places, comm)
+        return one if one._largest(float(bool(places))) else None
 
     def solve(
         self, guess: Array, solve: Callable[[Array], Array], again: Callable[[], None]
@@ -65,19 +73,20 @@ class Openings:
         Raises:
             StepFailed: There is none, neither with places held closed nor with all of them free.
         """
-        if not self._any:
-            return solve(guess)
         course = self._course
         course.begin(hold=True)
         try:
-            return self._open_few(solve(guess), solve)
+            q = solve(guess)
+            return self._open_few(q, solve) if self._parallel or course.flags[OVER] else q
         except StepFailed:
             if not self._largest(float(course.flags[OVER])):
                 raise  # nothing would open
         finally:
             course.begin(hold=False)
-            for one in self._places:
-                one.hold()
+            if self._released:
+                self._released = False
+                for one in self._places:
+                    one.hold()
         again()
         return solve(guess)
 
@@ -85,6 +94,7 @@ class Openings:
         """Let places open that bear too much, those with the largest excess first."""
         part = FIRST_PART
         while excess := self._largest(max((one.excess for one in self._places), default=0.0)):
+            self._released = True
             for one in self._places:
                 one.release(part * excess)
             q, part = solve(q), part / 2
@@ -92,4 +102,4 @@ class Openings:
 
     def _largest(self, here: float) -> float:
         """Maximum over the processes that share the scene."""
-        return here if self._comm.size == 1 else self._comm.allreduce(here, op=MPI.MAX)
+        return self._comm.allreduce(here, op=MPI.MAX) if self._parallel else here

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import NamedTuple, NoReturn
 
 from mpi4py import MPI
@@ -149,7 +150,7 @@ class Simulation(Live):
         self.force = np.zeros(self.share.size)
         setting = Setting(self, scheme, self.ledger, friction_repeats(scene), self._course)
         self.couplings = couplings(self.share, setting, self._A)
-        self._openings = Openings(self._course, self._openable(), self.share.comm)
+        self._openings = Openings.of(self._course, self._openable(), self.share.comm)
         self.loads = self._make_loads()
         self._others: list[Term] = [*self.loads, *self._numerical]
         if has_inertia(scheme):
@@ -376,17 +377,19 @@ class Simulation(Live):
         """See :meth:`attempt`."""
         step = self.scheme.step(self.t, t1, t1 if end is None else end, self.q)
         self.ask()
-        self._begin(step)
+        for term in self.terms:
+            term.begin(step)
         guess = extrapolated(self.q, self._q_before, step.dt / self.last_dt)
         self.supports.enter(guess)
         self.supports.move(guess, self.supports.in_axes(self.q), step)
         try:
             like_last = self.scheme.dynamic and math.isclose(step.dt, self.last_dt, rel_tol=1e-6)
-            q1 = self._openings.solve(
-                guess,
-                lambda x: self._solver.solve(x, self._loads(), like_last and x is guess),
-                lambda: self._begin(step),
-            )
+            loads = [load.force for load in self.loads]
+            if self._openings is None:
+                q1 = self._solver.solve(guess, loads, like_last)
+            else:
+                solve = partial(self._solver.solve, loads=loads, like_last=like_last)
+                q1 = self._openings.solve(guess, solve, partial(self._begin, step))
         except StepFailed:
             if said := no_number(self.scene, (step.load_time, step.motion_time)):
                 raise StepFailed(said) from None
@@ -406,23 +409,21 @@ class Simulation(Live):
         """
         self.ask()
         self._begin(step)
-        loads, t = self._loads(), border.t
+        loads, t = [load.force for load in self.loads], border.t
+        solve = partial(self._solver.solve_along, loads=loads, border=border)
 
         def again() -> None:
             self._begin(step)
             border.t = t
 
-        q1 = self._openings.solve(
-            guess, lambda x: self._solver.solve_along(x, loads, border), again
+        find = solve if self._openings is None else partial(
+            self._openings.solve, solve=solve, again=again
         )
-        return self._trial(step, q1)
+        return self._trial(step, find(guess))
 
     def _begin(self, step: Step) -> None:
         for term in self.terms:
             term.begin(step)
-
-    def _loads(self) -> list[Array]:
-        return [load.force for load in self.loads]
 
     def _trial(self, step: Step, q1: Array) -> Trial:
         """What a step came to, ``q1`` in the axes of the supports, if it was followed."""
