@@ -385,6 +385,7 @@ def follow(
             recorder.close()
         simulation.close()
         path.seconds = time.perf_counter() - began
+    path.opened.warn(simulation.scheme, path.times)
     return path
 
 

@@ -53,9 +53,7 @@ class Openings:
         self._parallel, self._released = comm.size > 1, False
 
     @classmethod
-    def of(
-        cls, course: Course, places: Sequence[Openable], comm: MPI.Intracomm
-    ) -> Openings | None:
+    def of(cls, course: Course, places: Sequence[Openable], comm: MPI.Intracomm) -> Openings | None:
         """The openings of a scene; none if no process has a place that may open."""
         one = cls(course, places, comm)
         return one if one._largest(float(bool(places))) else None

@@ -221,7 +221,8 @@ class Points:
         self._alive = [
             *map(doubles, (B, weights, rest, np.ascontiguousarray(length))),
             *map(doubles, (self._e0, self.strains, storage, self.r, self.D, self.kept, self.sums)),
-            integers(course.flags), doubles(self._over),
+            integers(course.flags),
+            doubles(self._over),
         ]
         self.points = c = ffi.new("points *")
         c.B, c.weight, c.rest, c.length = self._alive[:4]

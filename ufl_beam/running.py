@@ -141,6 +141,7 @@ def simulate(
             recorder.close()
         simulation.close()
         solution.seconds = time.perf_counter() - begin
+    solution.opened.warn(scheme, solution.times)
     return solution
 
 

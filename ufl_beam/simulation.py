@@ -12,7 +12,7 @@ import numpy as np
 
 from ufl_beam.applied import DeadLoads, FollowerLoads
 from ufl_beam.compat import Array
-from ufl_beam.connectors import Controller, Coulomb
+from ufl_beam.connectors import Connector, Controller, Coulomb
 from ufl_beam.couplings import Couplings, couplings
 from ufl_beam.dampers import damping_forces
 from ufl_beam.differences import numerical_forces
@@ -180,11 +180,11 @@ class Simulation(Live):
                 known = sum(name in start.internal for name in scheme.kept)
                 self.inertia.carry_on(memory, known)
         self._q_before: Array = self.q
-        self.last_dt = math.inf
+        self.last_dt: float = math.inf
         self._asking = [
             (link, link.law) for link in scene.links if isinstance(link.law, Controller | Coulomb)
         ]
-        self.asked = dict.fromkeys((link for link, _ in self._asking), 0.0)
+        self.asked: dict[Connector, float] = dict.fromkeys((link for link, _ in self._asking), 0.0)
         self._rotations = self.share.rotations()
         self._multipliers = as_slice(self.share.multipliers())
         for term in self.terms:
@@ -210,7 +210,7 @@ class Simulation(Live):
             held=self.supports.dofs,
             newton=newton or Newton(),
         )
-        self.solution = Solution(scene, self.grid)
+        self.solution: Solution = Solution(scene, self.grid)
         give_back_memory()
 
     # -- building ------------------------------------------------------------------------------
@@ -416,10 +416,9 @@ class Simulation(Live):
             self._begin(step)
             border.t = t
 
-        find = solve if self._openings is None else partial(
-            self._openings.solve, solve=solve, again=again
-        )
-        return self._trial(step, find(guess))
+        if self._openings is None:
+            return self._trial(step, solve(guess))
+        return self._trial(step, self._openings.solve(guess, solve, again))
 
     def _begin(self, step: Step) -> None:
         for term in self.terms:

@@ -21,6 +21,7 @@ from ufl_beam.inelastic import Strains
 from ufl_beam.joints import Connection, JointHistory, links_of, motion_of, of_joint, velocity_of
 from ufl_beam.ledger import Energy
 from ufl_beam.memory import State
+from ufl_beam.opened import Opened
 from ufl_beam.scene import Scene, Support
 from ufl_beam.sparse import Product
 from ufl_beam.terms import SectionForces, mass_matrix
@@ -308,6 +309,21 @@ class Solution:
         kept = [self._of_material(n, cell) for n in range(len(self._times))]
         return Material(*(np.array(field) for field in zip(*kept, strict=True)))
 
+    @property
+    def opened(self) -> Opened:
+        """The cells whose embedded hinge or cracks opened in the run."""
+        return Opened(self.grid, self._material)
+
+    def hinge_place_error(self) -> dict[Beam, float]:
+        """Largest part of its limit by which the place of an embedded hinge shifts it, by beam.
+
+        A hinge of ``Section(hinge=)`` is in the middle of its cell of length h and opens where the
+        moment there reaches the limit; at the ends of the cell the moment differs by |V| h/2.  The
+        number is |V| h / (2 limit) with the larger V of the kept times before and after the
+        opening.  Beams without embedded hinges that opened in the run are left out.
+        """
+        return {one.beam: one.error for one in self.opened.hinges()}
+
     def _of_material(self, n: int, cells: Index | int) -> Material:
         if not self._material[n]:
             raise SceneError("material: nothing in the scene yields or breaks; it is elastic")
@@ -367,5 +383,17 @@ class Solution:
             f"{', '.join(parts)}, {self.grid.size} degrees of freedom\n"
             f"t = {self._times[0]:g} to {self._times[-1]:g} s in {self.parts} steps, "
             f"{self.iterations / max(self.parts, 1):.2f} Newton iterations each, "
-            f"{self.seconds:.2f} s of wall time\n{self.energy}"
+            f"{self.seconds:.2f} s of wall time\n{self._about_hinges()}{self.energy}"
+        )
+
+    def _about_hinges(self) -> str:
+        """A line about embedded hinges that opened, if there are any."""
+        hinges = self.opened.hinges()
+        if not hinges:
+            return ""
+        number, worst = sum(one.number for one in hinges), max(hinges, key=lambda one: one.error)
+        return (
+            f"embedded hinges opened in {number} cell{'s'[: number != 1]}; their place within the "
+            f"cell shifts the limit by at most {100 * worst.error:.2g} % ({worst.beam.name}, cell "
+            f"at s = {worst.place.s:.3g})\n"
         )
