@@ -57,7 +57,8 @@ class Opened:
     Attributes:
         first: Number of the first kept time after the opening; 0 of cells that were open at the
             beginning, -1 of those that stayed closed; (num_cells,).
-        shear: Largest |V| at that kept time and the one before; (num_cells,); N.
+        shear: |V| at the kept time before that one, or at that one where the run began in between;
+            (num_cells,); N.
     """
 
     def __init__(self, grid: Grid, kept: Kept) -> None:
@@ -70,7 +71,8 @@ class Opened:
             for cells, rows in groups:
                 V, new = np.abs(rows[:, 1]), (rows[:, 5] > 0) & (self.first[cells] < 0)
                 self.first[cells[new]] = n
-                self.shear[cells[new]] = np.maximum(V, before[cells])[new]
+                # After an opening in a jump V is that of vibrations.
+                self.shear[cells[new]] = (before[cells] if n > 1 else V)[new]
                 before[cells] = V
 
     def hinges(self) -> list[OpenedHinges]:
@@ -123,11 +125,18 @@ class Opened:
         for beam, number, error, place in self.hinges():
             if error > LARGE:
                 _warn(
-                    f"{beam.name}: hinges of the section opened in {number} cells, in the middle "
-                    f"of each, and the moment at the ends of the cell at s = {place.s:.3g} differs "
-                    f"from that in its middle by {100 * error:.2g} % of the limit. Put a hinge "
-                    "where it belongs, Beam(hinges={s: law}), or use shorter cells"
+                    f"{beam.name}: the hinge of the section opened in {cells_in_words(number)}, "
+                    "in the middle of a cell. At the ends of the cell at "
+                    f"s = {place.s:.3g} the moment differs from that in its middle by "
+                    f"{100 * error:.2g} % of the limit, so the load at which the hinge opens is "
+                    "uncertain by as much. Put a hinge exactly where it belongs, "
+                    "Beam(hinges={s: law}), or use shorter cells"
                 )
+
+
+def cells_in_words(number: int) -> str:
+    """A number of cells in words: "1 cell", "2 cells"."""
+    return f"{number} cell{'s'[: number != 1]}"
 
 
 def _warn(message: str) -> None:

@@ -21,7 +21,7 @@ from ufl_beam.inelastic import Strains
 from ufl_beam.joints import Connection, JointHistory, links_of, motion_of, of_joint, velocity_of
 from ufl_beam.ledger import Energy
 from ufl_beam.memory import State
-from ufl_beam.opened import Opened
+from ufl_beam.opened import Opened, cells_in_words
 from ufl_beam.scene import Scene, Support
 from ufl_beam.sparse import Product
 from ufl_beam.terms import SectionForces, mass_matrix
@@ -319,8 +319,8 @@ class Solution:
 
         A hinge of ``Section(hinge=)`` is in the middle of its cell of length h and opens where the
         moment there reaches the limit; at the ends of the cell the moment differs by |V| h/2.  The
-        number is |V| h / (2 limit) with the larger V of the kept times before and after the
-        opening.  Beams without embedded hinges that opened in the run are left out.
+        number is |V| h / (2 limit), V being that of the last kept time before the opening.  Beams
+        without embedded hinges that opened in the run are left out.
         """
         return {one.beam: one.error for one in self.opened.hinges()}
 
@@ -393,7 +393,7 @@ class Solution:
             return ""
         number, worst = sum(one.number for one in hinges), max(hinges, key=lambda one: one.error)
         return (
-            f"embedded hinges opened in {number} cell{'s'[: number != 1]}; their place within the "
-            f"cell shifts the limit by at most {100 * worst.error:.2g} % ({worst.beam.name}, cell "
-            f"at s = {worst.place.s:.3g})\n"
+            f"embedded hinges opened in {cells_in_words(number)}; their place within the cell "
+            f"shifts the limit by at most {100 * worst.error:.2g} % ({worst.beam.name}, cell at "
+            f"s = {worst.place.s:.3g})\n"
         )
