@@ -19,7 +19,7 @@ from ufl_beam.errors import StepFailed
 from ufl_beam.points import OVER, Course
 
 FALL = 0.7
-"""Held places open from the largest excess over their limit on, then from this part of it, and so on.
+"""Held places open from the largest excess over their limit on, then from this part of it on, ...
 
 Where one opens, others may unload; so the worst one opens first.  That the part falls keeps the
 number of solutions small where many open in a step: up to 14, with 8000 fibres in steps of any
