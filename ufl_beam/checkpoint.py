@@ -25,6 +25,7 @@ import numpy as np
 from ufl_beam.compat import Array
 from ufl_beam.describe import CODE, Description, difference, has_state, kind_of
 from ufl_beam.errors import SceneError, require_count, require_number, require_sequence
+from ufl_beam.outputs import require_path
 from ufl_beam.pacing import Pace
 from ufl_beam.record import Recorder, on_first
 from ufl_beam.simulation import Simulation
@@ -64,6 +65,7 @@ class Checkpoint:
     also: Sequence[Any] = ()
 
     def __post_init__(self) -> None:
+        require_path(self.path, "Checkpoint")
         what = f"Checkpoint {self.path}"
         if self.every is None and self.minutes is None:
             raise SceneError(f"{what}: say how often, every=1000 (steps), minutes=10, or both")
@@ -78,6 +80,12 @@ class Checkpoint:
                     f"{what}: also[{i}] = {one!r} has no state; give a random generator of NumPy, "
                     "or an object with methods state() and restore(state)"
                 )
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The file, and the one that takes its place; no other output may write them."""
+        path = Path(self.path)
+        return path, path.parent / f"{path.name}.part"
 
 
 class Keeper:
@@ -125,7 +133,13 @@ class Keeper:
             raise SceneError(f"checkpoint {self.path}: there is no directory {folder}; make it")
         if not os.access(folder, os.W_OK):
             raise SceneError(f"checkpoint {self.path}: the directory cannot be written to")
-        if self.path.exists():
+        try:
+            exists = self.path.exists()
+        except OSError as error:
+            raise SceneError(
+                f"checkpoint {self.path} cannot be written: {error.strerror}"
+            ) from None
+        if exists:
             self.found = read(self.path)
             self._require_same(self.found)
 

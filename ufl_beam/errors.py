@@ -28,11 +28,14 @@ class StepFailed(Exception):
     Attributes:
         residuals: What is left where it is largest in each beam, body and connector; N, moments
             over the size of the scene.
+        reason: Name that PETSc has for why its solver stopped, such as "DIVERGED_MAX_IT"; empty if
+            it did not fail.
     """
 
     def __init__(self, message: str) -> None:
         super().__init__(message)
         self.residuals: dict[str, float] = {}
+        self.reason = ""
 
 
 class ConvergenceError(RuntimeError):
@@ -48,6 +51,8 @@ class ConvergenceError(RuntimeError):
             equilibria were found but refused.
         forces: Sizes of the forces that should be in equilibrium, by kind: "beams", "connectors",
             "loads", "inertia", "damping"; N.
+        reason: Name that PETSc has for why its solver stopped, such as "DIVERGED_MAX_IT"; empty if
+            equilibria were found but refused.
     """
 
     def __init__(
@@ -59,6 +64,7 @@ class ConvergenceError(RuntimeError):
         solution: Any,
         residuals: dict[str, float],
         forces: dict[str, float],
+        reason: str = "",
     ) -> None:
         super().__init__(message)
         self.time = time
@@ -66,6 +72,7 @@ class ConvergenceError(RuntimeError):
         self.solution = solution
         self.residuals = residuals
         self.forces = forces
+        self.reason = reason
 
 
 class TradeoffError(RuntimeError):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import warnings
+from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple, NoReturn
 
@@ -15,10 +17,17 @@ from ufl_beam.compat import Array
 from ufl_beam.connectors import Connector, Controller, Coulomb
 from ufl_beam.couplings import Couplings, couplings
 from ufl_beam.dampers import damping_forces
+from ufl_beam.diagnosis import singularity
 from ufl_beam.differences import numerical_forces
 from ufl_beam.discretisation import Mesh
 from ufl_beam.equation import Equation
-from ufl_beam.errors import ConvergenceError, SceneError, StepFailed, require_kind
+from ufl_beam.errors import (
+    ConvergenceError,
+    ModelWarning,
+    SceneError,
+    StepFailed,
+    require_kind,
+)
 from ufl_beam.fields import Fields
 from ufl_beam.grid import Grid, Share
 from ufl_beam.inelastic import InelasticBeams, inelastic_cells
@@ -61,6 +70,21 @@ times as fast at 6 000; see benchmarks/README.md.
 
 LARGEST_TURN = 0.75 * math.pi
 """A step that turns a node further is cut; the algorithmic strains end at π."""
+
+APPLYING = 1 / 8
+"""Part of the first step in which loads that are there from the start are applied."""
+
+APPLYING_TURN = 0.02
+"""Largest turn of a node meanwhile in a part; rad.
+
+Over a part a moment is in error by a quarter of the square: some 1e-4 of it.
+"""
+
+SHORT_PART = 512
+"""So many times shorter parts may turn nodes further: their oscillations do not become smaller."""
+
+ROOM = 10.0
+"""Largest imbalance of an exact ledger over the tolerance of the solver."""
 
 FIRST = 1 / 16
 """Part of the first step after which accelerations are taken for those at the beginning.
@@ -166,9 +190,9 @@ class Simulation(Live):
         self.supports = Supports(self.share, scheme, self.ledger, self._A)
         if has_inertia(scheme):
             self.supports.stop(self.inertia.v)
+        loaded: list[Array] = []
         if start is not None or (has_inertia(scheme) and scheme.kept):
-            for load in self.loads:
-                load.carry_on(self.t, self.q)
+            loaded = [load.carry_on(self.t, self.q) for load in self.loads]
         if start is not None:
             memory = Restoring(self.share, start.internal)
             for one in (*self.inelastic, *self.couplings):
@@ -189,10 +213,12 @@ class Simulation(Live):
         self._multipliers = as_slice(self.share.multipliers())
         for term in self.terms:
             term.add_state(self.q)
+        self._continues = start is not None
         self._path: StaticPath | None = None
         if not scheme.dynamic:
             parts = (self.beams, self.couplings)
             self._path = StaticPath(self.share, scheme, *parts, self.ledger, self.q, t0)
+            self._bear(self._path, loaded)
         equation = None
         if self.share.comm.size == 1 and not self.supports.turned:
             terms = (self.beams, self.couplings, self._others)
@@ -240,8 +266,8 @@ class Simulation(Live):
     def _openable(self) -> list[Openable]:
         """What may open on this process: hinges and cracks of cells, springs that soften."""
         cells: list[Openable] = [one for one in self.inelastic if one.points.softens]
-        groups = [one.response.points for one in self.couplings if isinstance(one, Couplings)]
-        return [*cells, *(points for points in groups if points is not None and points.softens)]
+        groups = [one.response.openable for one in self.couplings if isinstance(one, Couplings)]
+        return [*cells, *(places for places in groups if places is not None)]
 
     def _make_loads(self) -> list[DeadLoads | FollowerLoads | FrameForces]:
         followers = [load for load in self.scene.loads if isinstance(load, FollowerLoad)]
@@ -255,6 +281,19 @@ class Simulation(Live):
         if followers:
             loads.append(FollowerLoads(followers, self.share, self.scheme, self.ledger, self._A))
         return loads
+
+    def _bear(self, path: StaticPath, loads: list[Array]) -> None:
+        """Set the reactions to those of the initial state of a static run.
+
+        Args:
+            path: Knows the internal forces of that state.
+            loads: The loads that it is in equilibrium with; none if nothing acts yet.
+        """
+        r = path.force - sum(loads)
+        self.supports.enter(r)
+        self.supports.hold(self.share.added(r))
+        self.supports.take()
+        self.reactions_known = True
 
     # -- the equation of a step ----------------------------------------------------------------
 
@@ -273,10 +312,10 @@ class Simulation(Live):
         here = self._course.relieve()
         return self.share.comm.allreduce(here, op=MPI.LOR) if self.share.comm.size > 1 else here
 
-    def _excess(self, x: Array, r: Array, scale: float) -> float:
+    def _excess(self, x: Array, r: Array, scale: float, moved: float) -> float:
         """How far the laws of connectors are missed."""
         q1 = self.supports.in_plane(x)
-        here = max((c.excess(q1, r, scale) for c in self.couplings), default=0.0)
+        here = max((c.excess(q1, r, scale, moved) for c in self.couplings), default=0.0)
         if self.share.comm.size > 1:
             return self.share.comm.allreduce(here, op=MPI.MAX) if self.scene.links else 0.0
         return here
@@ -296,6 +335,11 @@ class Simulation(Live):
             self.supports.enter(forces)
             r += forces
         self.supports.hold_matrix(self._A.data)
+        return self._A
+
+    @property
+    def tangent(self) -> Csr:
+        """Local part of the latest tangent; what is held has nothing but a diagonal entry."""
         return self._A
 
     def _assemble(self, q1: Array) -> None:
@@ -336,6 +380,44 @@ class Simulation(Live):
             ConvergenceError: Even the smallest part failed; the state is that of the last part that
                 was accepted, which the solution of the error ends with.
         """
+        if self.parts == 0 and self._begins_loaded():
+            begin = self.t
+            self._in_parts(
+                begin + APPLYING * (t1 - begin),
+                lambda part, end: self._attempt_loads(begin, part, end),
+            )
+        self._in_parts(t1, self.attempt)
+
+    def _begins_loaded(self) -> bool:
+        """Whether the loads at the beginning are to be applied before the first step.
+
+        Where forces act over the step, a step that turns a node far does not end in equilibrium.
+        So the loads are applied in parts that turn nodes little, and the rest of the step has
+        nothing left to do but to follow them.
+        """
+        over_step = self.scheme.average(0.0, 1.0) != 1.0
+        if self.scheme.dynamic or not over_step or self._continues:
+            return False
+        frames = any(isinstance(load, RotatingFrame) for load in self.scene.loads)
+        return frames or any(f(self.t) != 0 for _, f in self.scene.time_functions())
+
+    def _attempt_loads(self, begin: float, t1: float, end: float) -> Trial:
+        """Solve a part of the application of the loads at the time ``begin``; it lasts to ``end``.
+
+        Raises:
+            StepFailed: There is no equilibrium; or a node turns far, and shorter parts may help.
+        """
+        step = self.scheme.step(self.t, t1, end, self.q)
+        trial = self._attempt(step._replace(load_time=begin, motion_time=begin))
+        turn = np.abs(trial.q1 - self.q)[self._rotations].max(initial=0.0)
+        if self.share.comm.size > 1:
+            turn = self.share.comm.allreduce(turn, op=MPI.MAX)
+        if turn > APPLYING_TURN and SHORT_PART * step.dt > end - begin:
+            raise StepFailed("a node turns too far while the loads at the beginning are applied")
+        return trial
+
+    def _in_parts(self, t1: float, attempt: Callable[[float, float], Trial]) -> None:
+        """Go to the time ``t1`` by attempts of the whole way or of parts of it."""
         t0, done, part = self.t, 0, SMALLEST_PART
         while done < SMALLEST_PART:
             end = (
@@ -344,7 +426,7 @@ class Simulation(Live):
                 else t0 + (t1 - t0) * (done + part) / SMALLEST_PART
             )
             try:
-                self.accept(self.attempt(end, t1))
+                self.accept(attempt(end, t1))
             except StepFailed as failure:
                 if part == 1:
                     self.give_up(failure, end)
@@ -366,16 +448,16 @@ class Simulation(Live):
             StepFailed: There is no equilibrium, or it is too far away.
         """
         if self._path is None and not self.inertia.ready:
-            first = self._attempt(self.t + FIRST * (t1 - self.t), t1)
+            t = self.t + FIRST * (t1 - self.t)
+            first = self._attempt(self.scheme.step(self.t, t, t1, self.q))
             self.inertia.prepare(first.s)
             self.supports.take()
             for coupling in self.couplings:
                 coupling.take(first.q1)
-        return self._attempt(t1, end)
+        return self._attempt(self.scheme.step(self.t, t1, t1 if end is None else end, self.q))
 
-    def _attempt(self, t1: float, end: float | None) -> Trial:
-        """See :meth:`attempt`."""
-        step = self.scheme.step(self.t, t1, t1 if end is None else end, self.q)
+    def _attempt(self, step: Step) -> Trial:
+        """Solve a step; see :meth:`attempt`."""
         self.ask()
         for term in self.terms:
             term.begin(step)
@@ -476,14 +558,20 @@ class Simulation(Live):
         self.end()
         dt, forces = end - self.t, self._forces_by_kind()
         sizes = ", ".join(f"{kind} {size:.1e} N" for kind, size in forces.items())
+        where = f"at t = {self.t:.9g} s"
+        if dt != 0:
+            where = f"after t = {self.t:.9g} s, even with dt = {dt:.3g} s"
+        why = singularity(self, self.supports.in_plane(self._solver.iterate()))
+        said = f"{failure} ({sizes})" if sizes else str(failure)
         raise ConvergenceError(
-            f"no equilibrium after t = {self.t:.9g} s, even with dt = {dt:.3g} s: {failure} "
-            f"({sizes}). {advice or self.scheme.advice}",
+            f"no equilibrium {where}: {why}{'; ' if why else ''}{said}. "
+            f"{advice or self.scheme.advice}",
             time=self.t,
             dt=dt,
             solution=self.solution,
             residuals=failure.residuals,
             forces=forces,
+            reason=failure.reason,
         ) from failure
 
     def _forces_by_kind(self) -> dict[str, float]:
@@ -556,6 +644,26 @@ class Simulation(Live):
         self.supports.remember(memory, self.q)
         if self._path is not None:
             self._path.remember(memory, self.q)
+
+    def check_ledger(self) -> None:
+        """Warn, and note in the solution, if a ledger is open that the scheme claims to close.
+
+        All processes call it together, at the end of a run.
+
+        Warns:
+            ModelWarning: It is open, perhaps by round-off.
+        """
+        if not getattr(self.scheme, "exact_ledger", False) or len(self.solution) < 2:
+            return
+        energy, claimed = self.solution.energy, ROOM * self._solver.rtol
+        if not energy.opened(claimed, 0.0):
+            return
+        # Errors of steps are independent: their squares add up.
+        steps = np.sqrt(np.sum(np.diff(self.solution.q, axis=0) ** 2, axis=0))[self.share.dofs]
+        round_off = self._solver.random_work(steps)
+        self.solution.open_ledger = energy.opened(claimed, round_off)
+        if self.comm.rank == 0:
+            warnings.warn(self.solution.open_ledger, ModelWarning, stacklevel=3)
 
     def close(self) -> None:
         """Give back what PETSc holds."""

@@ -37,6 +37,15 @@ Forces that grow in an S, as in a point that yields one way or the other, send f
 branch to the other and back for ever.
 """
 
+REASONS = {
+    lib.SINGULAR: "found a singular tangent",
+    lib.TOO_MANY: "did not converge",
+    lib.STALLED: "came no closer to an equilibrium",
+    lib.DIVERGED: "met a force that is not a finite number",
+    -4: "met a force that is not a finite number",  # PETSc's name for it changed in 3.24
+}
+"""Reasons for which Newton's method stops, in words; by values of SNESConvergedReason."""
+
 PREFIX = "ub_"
 """Prefix of the PETSc options of the solver, as in ``-ub_snes_monitor``."""
 
@@ -103,8 +112,9 @@ class Solver:
         complete: Called with the summed residual; removes what supports carry.
         tangent: Fills ``A`` at x: ``tangent(x)``.
         forces: Internal forces in the latest residual; with the loads, the scale of convergence.
-        excess: Of an iterate, its residual and the scale of forces: how far what connectors demand
-            is missed, as a number without dimension that must reach the tolerance too.
+        excess: Of an iterate, its residual, the scale of forces and the largest motion: how far
+            what connectors demand is missed, as a number without dimension that must reach the
+            tolerance too.
         equation: ``residual``, ``complete`` and ``tangent`` in C, on one process.
         held: Local degrees of freedom that supports hold; what stands for them in A means nothing.
         relieve: Makes tangents stiffer where that may help; says whether it can.
@@ -120,7 +130,7 @@ class Solver:
         complete: Callable[[Array], None],
         tangent: Callable[[Array], None],
         forces: Array,
-        excess: Callable[[Array, Array, float], float],
+        excess: Callable[[Array, Array, float, float], float],
         relieve: Callable[[], bool],
         held: Index,
         newton: Newton,
@@ -166,6 +176,7 @@ class Solver:
         ]
         c.weight, c.residual, c.diagonal = self._norm[1], self._at_r, self._at_diagonal
         c.lengths, c.moves, c.space = self._at_sizes
+        c.scene = self._share.grid.scene.size
         c.x = ffi.cast("void *", self._x.handle)
         self._at_correction = doubles(self._correction)
         c.change, c.most = self._at_correction, self._newton.max_iterations
@@ -215,9 +226,10 @@ class Solver:
         return matrix
 
     def _make_factors(self) -> ChainsFirst:
-        # What is held makes zeros on the diagonal, and PETSc does not exchange rows.
-        holds = any(link.holds for link in self._share.grid.scene.links)
-        return ChainsFirst(self._share, self._A, "klu" if holds else "petsc")
+        # A connector alone may hold a part whose own stiffness leaves zeros, or nothing but
+        # round-off, on the diagonal; PETSc's factorisation does not exchange rows, KLU's does.
+        connected = len(self._share.grid.multipliers) > 0
+        return ChainsFirst(self._share, self._A, "klu" if connected else "petsc")
 
     def _make_ksp(self) -> PETSc.KSP:
         ksp = PETSc.KSP().create(self._x.comm)
@@ -372,6 +384,7 @@ class Solver:
         if not math.isfinite(residual):
             return int(lib.DIVERGED)
         scale = self._loads + self._size(self._at_forces)
+        self._find_motion()
         floor = 8 * self._round_off() if iteration > 1 else 0.0
         x = doubles(self._view(self._x))
         return int(lib.judge(self._course, x, iteration, residual, scale, floor))
@@ -379,10 +392,16 @@ class Solver:
     def _round_off(self) -> float:
         """Residual that the last digit of displacements, strains and rotations makes; N.
 
-        A strain is the difference of two numbers near one, so stiff or finely divided beams cannot
-        be solved any better, however small the forces are.
+        Stiff or finely divided beams cannot be solved any better, however small the forces are.
         """
         return self._size(doubles(self._A.data[self._diagonal] * self._last_digits()))
+
+    def _find_motion(self) -> None:
+        """Note the largest motion of the iterate in any process, at most the size of the scene."""
+        largest = lib.largest_motion(*self._norm, doubles(self._view(self._x)))
+        if self._parallel:
+            largest = self._share.comm.allreduce(largest, op=MPI.MAX)
+        self._course.moved = min(largest, self._course.scene)
 
     def _last_digits(self) -> Array:
         digits = np.empty(self._share.size)
@@ -391,8 +410,15 @@ class Solver:
 
     def least_work(self, s: Array) -> float:
         """Work in a step ``s`` of what the last digit of displacements makes; less is none; J."""
+        self._find_motion()
         works = self._A.data[self._diagonal] * self._last_digits() * np.abs(s)
         return self._share.total(float(works[: len(self._weights)].sum()))
+
+    def random_work(self, s: Array) -> float:
+        """Work of the last digits as :meth:`least_work`, were they independent of each other; J."""
+        self._find_motion()
+        works = self._A.data[self._diagonal] * self._last_digits() * s
+        return math.sqrt(self._share.total(float(np.sum(works[: len(self._weights)] ** 2))))
 
     # -- the call ------------------------------------------------------------------------------
 
@@ -465,13 +491,20 @@ class Solver:
         weighted[: len(self._weights)] = np.abs(self._r[: len(self._weights)]) * self._weights
         residuals = self._share.grid.worst(self._share.gather(weighted))
         places = [f"{size:.1e} N in {place}" for place, size in [*residuals.items()][:3]]
+        largest = ", ".join(places) or "nowhere"
         failure = StepFailed(
-            f"SNES {names.get(reason, reason)} after {self._done} iterations; "
-            f"residual {self._size(self._at_r):.3e} N, largest: {', '.join(places) or 'nowhere'}; "
+            f"Newton's method {REASONS.get(reason, 'was stopped by PETSc')} after {self._done} "
+            f"iterations; residual {self._size(self._at_r):.3e} N, largest: {largest}; "
             f"forces in the scene {scale:.3e} N"
         )
         failure.residuals = residuals
+        failure.reason = str(names.get(reason, reason))
         return failure
+
+    @property
+    def rtol(self) -> float:
+        """Residual to be reached, as a part of the forces in the scene."""
+        return self._newton.rtol
 
     def iterate(self) -> Array:
         """The latest configuration, converged or not; local values, ghosts included."""

@@ -63,7 +63,12 @@ class Walk:
 
     def dissipation(self, q: Array) -> float:
         """What beams dissipate in the step to ``q``; J."""
-        return self.share.total(sum(one.dissipation(q) for one in self.simulation.inelastic))
+        return self.share.total(
+            sum(
+                one.dissipation(q)
+                for one in (*self.simulation.inelastic, *self.simulation.couplings)
+            )
+        )
 
     def aim(self, reach: float) -> Direction:
         """A way along which so much is dissipated, if nothing gives way; ``reach`` in J.
@@ -105,7 +110,8 @@ class Walk:
     def side(self, q: Array, way: Direction) -> float:
         """Positive where more dissipates along a way from ``q``, negative where against it."""
         now, size = self.dissipation(q), self.length(Direction(way.q, 0.0), 1.0)
-        for doubled in range(FARTHEST if now > 0 and size > 0 else 0):
+        flows = self.share.total(float(any(one.flows() for one in self.simulation.couplings)))
+        for doubled in range(FARTHEST if (now > 0 or flows) and size > 0 else 0):
             δ = 1e-9 * 2**doubled / size
             more = self.dissipation(q + δ * way.q) - self.dissipation(q - δ * way.q)
             if abs(more) > now:

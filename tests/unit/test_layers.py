@@ -21,12 +21,14 @@ RECORDS = [
     "beams",
     "bodies",
     "connectors",
+    "curves",
     "discretisation",
     "distributions",
     "errors",
     "fibres",
     "laws",
     "loads",
+    "plastic_hinges",
     "scene",
     "sections",
     "viscous",
@@ -232,4 +234,4 @@ def test_the_script_of_the_readme_runs(tmp_path, monkeypatch):
     assert names["solution"].times[-1] == 0.4
     assert names["solution"].energy.worst < 1e-9  # the ledger closes, design.md section 9
     assert (tmp_path / "portal.png").stat().st_size > 1000
-    assert (tmp_path / "portal.h5").exists()
+    assert (tmp_path / "portal.xdmf").exists()

@@ -18,6 +18,10 @@ LONGER = 0.75 * LENGTH
 each_law = pytest.mark.parametrize("law", [ub.Softening, ub.LinearSoftening])
 
 
+warns = pytest.mark.serial
+"""Warnings are those of the first process."""
+
+
 def pushed(hinge=None, *, cells=8, fibres=None, name="girder"):
     """A beam on two supports that is moved by 4 mm at a quarter of its length."""
     section = ub.Section(EA=1e6, GA=1e6, EI=EI, rhoA=1.0, rhoI=1e-3, hinge=hinge)
@@ -42,6 +46,7 @@ def place_error(cells):
 # -- the place of a hinge --------------------------------------------------------------------------
 
 
+@warns
 @pytest.mark.parametrize("cells", [4, 8, 12])
 def test_place_error(cells):
     """The closed form, to 3 %: V is that of a kept time, 0.01 s of 0.5 s from the opening."""
@@ -57,6 +62,7 @@ def test_place_error(cells):
     assert line in str(solution).splitlines()
 
 
+@warns
 def test_the_limit_is_shifted_by_the_place_error():
     """The moment under the push is above the limit by the place error when the hinge opens."""
     beam, scene = pushed(ub.Softening(LIMIT, 100.0))
@@ -98,6 +104,7 @@ def test_cracks_have_no_place():
     assert solution.hinge_place_error() == {}
 
 
+@warns
 def test_only_the_run_in_which_it_opened_tells():
     """A run that goes on from another one does not know what V was."""
     _, scene = pushed(ub.Softening(LIMIT, 100.0))
@@ -127,6 +134,7 @@ def test_what_a_cell_can_follow(law, scheme):
     assert _fall(layout, scheme) * 0.25 == pytest.approx(needed(law, scheme, 8) / 3.0, rel=2e-6)
 
 
+@warns
 @each_law
 def test_an_opening_in_a_jump_is_warned_about(law):
     """With 10 % less energy than needed, and not with 10 % more.
@@ -152,6 +160,7 @@ def test_no_jump_that_did_not_happen():
     assert run(scene, ub.Midpoint()).energy.lost["hinges"][-1] == 0.0
 
 
+@warns
 def test_cracks_open_in_a_jump():
     """A crack in a fibre of stiffness E; one warning of the beam, whatever the number of cracks."""
     law = ub.Fibres(ub.Hardening(math.inf), number=4, softening=ub.Softening(3e4, 1.1e-3))
@@ -166,6 +175,7 @@ def test_cracks_open_in_a_jump():
     assert one.filename == ub.simulate.__code__.co_filename or one.filename == __file__
 
 
+@warns
 def test_paths_warn_too():
     """At the end of :func:`follow`."""
     beam, scene = pushed(ub.Softening(LIMIT, 100.0))
