@@ -437,6 +437,8 @@ def follow(
         path.seconds = time.perf_counter() - began
         simulation.close()
         close_all(recorders)
+    if comm.rank == 0:
+        path.opened.warn(simulation.scheme, path.times)
     return path
 
 

@@ -210,6 +210,11 @@ class Grid:
         """The cell at a place; at a vertex the one before it, at the start the first one."""
         return self._cell_and_part(place)[0]
 
+    def lengths(self, cells: Index) -> Array:
+        """Lengths of some cells; (len(cells),); m."""
+        ends = self.points[self.cells[cells]]
+        return np.asarray(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
+
     def middle(self, cell: int) -> Place:
         """The place in the middle of a cell."""
         number = int(self.beam_of_cell[cell])
@@ -397,8 +402,7 @@ class Share:
 
     def cell_lengths(self) -> Array:
         """Lengths of the cells; m."""
-        ends = self.grid.points[self.grid.cells[self.cells]]
-        return np.asarray(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
+        return self.grid.lengths(self.cells)
 
     def lengths(self) -> Array:
         """What a strain of one is to each local degree of freedom: a cell's length, or a radian.

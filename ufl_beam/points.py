@@ -129,11 +129,12 @@ class Course:
 
     def __init__(self) -> None:
         self.flags: Index = np.zeros(4, dtype=np.int32)
+        self._first: tuple[Index, Index] = (self.flags.copy(), self.flags.copy())
+        self._first[True][HOLD] = 1
 
     def begin(self, hold: bool) -> None:
         """Begin a search for an equilibrium."""
-        self.flags[:] = 0
-        self.flags[HOLD] = hold
+        self.flags[:] = self._first[hold]
 
     def relieve(self) -> bool:
         """Let points around those that open answer elastically, if there are any."""
@@ -179,7 +180,6 @@ class Points:
         self._forms = PointForms(layout.softening, scheme)
         self._layout, self._storage, self._loss = layout, storage, scheme.loss
         self._yields, self.softens = layout.yields, layout.softening is not None
-        self._released = False
         self._at = {name: storage[:, :, i] for i, name in enumerate(INPUTS)}
         self._bulk = bulk = layout.bulk(keys)
         numbers = {"C": bulk.C, "limit": bulk.limit, "H": bulk.H, "B": bulk.B, "eta": bulk.eta}
@@ -210,7 +210,8 @@ class Points:
         self._alive = [
             *map(doubles, (B, weights, rest, np.ascontiguousarray(length))),
             *map(doubles, (self._e0, self.strains, storage, self.r, self.D, self.kept, self.sums)),
-            integers(course.flags), doubles(self._over),
+            integers(course.flags),
+            doubles(self._over),
         ]
         self.points = c = ffi.new("points *")
         c.B, c.weight, c.rest, c.length = self._alive[:4]
@@ -258,14 +259,11 @@ class Points:
     def release(self, least: float) -> None:
         """Let held points open from now on whose excess was so large in the latest response."""
         lib.release(self.points, least)
-        self._released = True
 
     def hold(self) -> None:
         """Take back :meth:`release`."""
-        if self._released:
-            flows = self["flows"]
-            flows[flows == RELEASED] = 0.0
-            self._released = False
+        flows = self["flows"]
+        flows[flows == RELEASED] = 0.0
 
     def remaining(self, change: Array) -> Array:
         """Part of the elastic stiffness that is left in the latest response; (cells,).

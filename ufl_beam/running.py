@@ -155,6 +155,8 @@ def simulate(
         if keeper is not None:
             keeper.close()
         solution.seconds = time.perf_counter() - begin
+    if comm.rank == 0:
+        solution.opened.warn(scheme, solution.times)
     return solution
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple, NoReturn
 
 from mpi4py import MPI
@@ -14,7 +15,7 @@ import numpy as np
 from ufl_beam.agreement import Agreement
 from ufl_beam.applied import DeadLoads, FollowerLoads
 from ufl_beam.compat import Array
-from ufl_beam.connectors import Controller, Coulomb
+from ufl_beam.connectors import Connector, Controller, Coulomb
 from ufl_beam.couplings import Couplings, couplings
 from ufl_beam.dampers import damping_forces
 from ufl_beam.diagnosis import singularity
@@ -176,7 +177,7 @@ class Simulation(Live):
         self.force = np.zeros(self.share.size)
         setting = Setting(self, scheme, self.ledger, friction_repeats(scene), self._course)
         self.couplings = couplings(self.share, setting, self._A)
-        self._openings = Openings(self._course, self._openable(), self.share.comm)
+        self._openings = Openings.of(self._course, self._openable(), self.share.comm)
         self.loads = self._make_loads()
         self._others: list[Term] = [*self.loads, *self._numerical]
         if has_inertia(scheme):
@@ -206,11 +207,11 @@ class Simulation(Live):
                 known = sum(name in start.internal for name in scheme.kept)
                 self.inertia.carry_on(memory, known)
         self._q_before: Array = self.q
-        self.last_dt = math.inf
+        self.last_dt: float = math.inf
         self._asking = [
             (link, link.law) for link in scene.links if isinstance(link.law, Controller | Coulomb)
         ]
-        self.asked = dict.fromkeys((link for link, _ in self._asking), 0.0)
+        self.asked: dict[Connector, float] = dict.fromkeys((link for link, _ in self._asking), 0.0)
         self._rotations = self.share.rotations()
         self._multipliers = as_slice(self.share.multipliers())
         for term in self.terms:
@@ -239,7 +240,7 @@ class Simulation(Live):
             newton=newton or Newton(),
             agreement=self.together,
         )
-        self.solution = Solution(scene, self.grid)
+        self.solution: Solution = Solution(scene, self.grid)
         give_back_memory()
 
     # -- building ------------------------------------------------------------------------------
@@ -500,11 +501,12 @@ class Simulation(Live):
         guess = self.together(self._begin, step)
         try:
             like_last = self.scheme.dynamic and math.isclose(step.dt, self.last_dt, rel_tol=1e-6)
-            q1 = self._openings.solve(
-                guess,
-                lambda x: self._solver.solve(x, self._loads(), like_last and x is guess),
-                lambda: self._begin_terms(step),
-            )
+            loads = self._loads()
+            if self._openings is None:
+                q1 = self._solver.solve(guess, loads, like_last)
+            else:
+                solve = partial(self._solver.solve, loads=loads, like_last=like_last)
+                q1 = self._openings.solve(guess, solve, partial(self._begin_terms, step))
         except StepFailed:
             try:
                 self.together(self._require_numbers, step)
@@ -547,15 +549,15 @@ class Simulation(Live):
         """
         self.together(self._ask_and_begin, step)
         loads, t = self._loads(), border.t
+        solve = partial(self._solver.solve_along, loads=loads, border=border)
 
         def again() -> None:
             self._begin_terms(step)
             border.t = t
 
-        q1 = self._openings.solve(
-            guess, lambda x: self._solver.solve_along(x, loads, border), again
-        )
-        return self._trial(step, q1)
+        if self._openings is None:
+            return self._trial(step, solve(guess))
+        return self._trial(step, self._openings.solve(guess, solve, again))
 
     def _loads(self) -> list[Array]:
         return [load.force for load in self.loads]

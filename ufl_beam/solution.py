@@ -24,6 +24,7 @@ from ufl_beam.inelastic import Strains
 from ufl_beam.joints import Connection, JointHistory, links_of, motion_of, of_joint, velocity_of
 from ufl_beam.ledger import Energy
 from ufl_beam.memory import State
+from ufl_beam.opened import Opened, cells_in_words
 from ufl_beam.outputs import require_path
 from ufl_beam.processes import ours
 from ufl_beam.record import on_first
@@ -431,6 +432,21 @@ class Solution:
             forces[:, 2], jump, energy = of_hinge.force, of_hinge.motion, of_hinge.dissipated
         return Material(forces, jump, plastic, energy)
 
+    @property
+    def opened(self) -> Opened:
+        """The cells whose embedded hinge or cracks opened in the run."""
+        return Opened(self.grid, self._material)
+
+    def hinge_place_error(self) -> dict[Beam, float]:
+        """Largest part of its limit by which the place of an embedded hinge shifts it, by beam.
+
+        A hinge of ``Section(hinge=)`` is in the middle of its cell of length h and opens where the
+        moment there reaches the limit; at the ends of the cell the moment differs by |V| h/2.  The
+        number is |V| h / (2 limit), V being that of the last kept time before the opening.  Beams
+        without embedded hinges that opened in the run are left out.
+        """
+        return {one.beam: one.error for one in self.opened.hinges()}
+
     def _of_material(self, n: int, cells: Index | int) -> Material:
         if not self._material[n] and not self.scene.hinges:
             raise SceneError("material: nothing in the scene yields or breaks; it is elastic")
@@ -491,8 +507,20 @@ class Solution:
             f"{', '.join(parts)}, {self.grid.size} degrees of freedom\n"
             f"{self.parameter.value.format(span)} in {self.parts} steps, "
             f"{self.iterations / max(self.parts, 1):.2f} Newton iterations each, "
-            f"{self.seconds:.2f} s of wall time\n{self.energy}"
+            f"{self.seconds:.2f} s of wall time\n{self._about_hinges()}{self.energy}"
             + (f"\n{self.open_ledger}" if self.open_ledger else "")
+        )
+
+    def _about_hinges(self) -> str:
+        """A line about embedded hinges that opened, if there are any."""
+        hinges = self.opened.hinges()
+        if not hinges:
+            return ""
+        number, worst = sum(one.number for one in hinges), max(hinges, key=lambda one: one.error)
+        return (
+            f"embedded hinges opened in {cells_in_words(number)}; their place within the cell "
+            f"shifts the limit by at most {100 * worst.error:.2g} % ({worst.beam.name}, cell at "
+            f"s = {worst.place.s:.3g})\n"
         )
 
 

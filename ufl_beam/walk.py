@@ -51,7 +51,7 @@ class Walk:
         self.t = simulation.t
         self.dissipates = False
         self._driven: list[Term] = [*simulation.loads, *simulation.couplings]
-        self.direction = Direction(np.zeros(self.share.size), 0.0)
+        self.direction: Direction = Direction(np.zeros(self.share.size), 0.0)
         self.sought = self.direction
 
     # -- measures ------------------------------------------------------------------------------
