@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from functools import cached_property, singledispatch
+
 import basix.ufl
 import numpy as np
 import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.compat import Array, fem, line_mesh, space_with_dofs
-from ufl_beam.connectors import HELD, Connector, Law, Spring
+from ufl_beam.connectors import HELD, Connector, Law, RigidPlastic, Spring
 from ufl_beam.forms import Kernel
 from ufl_beam.grid import Index, Share
 from ufl_beam.guides import Guides
@@ -17,14 +19,33 @@ from ufl_beam.loops import Loop, doubles, ffi, integers, lib, loop
 from ufl_beam.memory import Memory
 from ufl_beam.relative import MOTIONS, Numbers, Pair
 from ufl_beam.responses import Setting, respond
+from ufl_beam.rigid_plastic import RigidPlasticResponse
 from ufl_beam.schemes import Step
 from ufl_beam.sparse import Csr
+from ufl_beam.tangent_change import TangentChange
+
+respond.register(RigidPlastic, RigidPlasticResponse)
 
 
 def _alike(link: Connector) -> tuple[str, object]:
-    """What the connectors of one :class:`Couplings` have in common."""
-    law: Law = link.law
-    return link.motion, law if isinstance(law, Spring) else (type(law), law is HELD)
+    """Key that the connectors of one :class:`Couplings` have in common."""
+    return link.motion, _kind(link.law)
+
+
+@singledispatch
+def _kind(law: Law) -> object:
+    """Key of a law: connectors with the same one are computed together."""
+    return type(law), law is HELD
+
+
+@_kind.register
+def _(law: Spring) -> object:
+    return law
+
+
+@_kind.register
+def _(law: RigidPlastic) -> object:
+    return RigidPlastic, type(law.law)
 
 
 class Couplings(Links):
@@ -70,7 +91,8 @@ class Couplings(Links):
         def kernel(form: ufl.Form) -> Kernel:
             return Kernel(form, q1, dofs[order], coordinates)
 
-        self._q0, self._row = q0, row
+        self._q0, self._q1, self._row, self._bend = q0, q1, row, given()
+        self._forms, self._kernel = (e, w_λ, tangent, dx), kernel
         self._work, self._tangent, self._value = map(kernel, (work, tangent, e * z * dx))
         self._tangent.place(A)
         self.response = respond(links[0].law, links, setting)
@@ -90,9 +112,9 @@ class Couplings(Links):
         c.number, c.size = n, share.grid.scene.size
         c.row, c.row_of_tangent = (one.position(row) for one in (self._work, self._tangent))
         c.weight_of_before = setting.scheme.acting(np.ones(1), np.zeros(1))[0]
-        if self.response.points is not None:
-            c.points = self.response.points.points
-        self._asks_python = not self.response.steady and self.response.points is None
+        for name, data in self.response.in_c.items():
+            setattr(c, name, data)
+        self._asks_python = not self.response.steady and not self.response.in_c
 
     # -- the step ------------------------------------------------------------------------------
 
@@ -152,15 +174,53 @@ class Couplings(Links):
         """Energy that the connectors take in the step to ``q1``; J."""
         return self.response.change(self.motion(q1), float(self._taken(q1).sum()))
 
+    def flows(self) -> bool:
+        """Whether a connector of this process slips plastically in the latest iterate."""
+        return self.response.flows()
+
+    def shown_motion(self, q: Array) -> Array:
+        """Motions of the accepted state ``q`` as solutions show them; (num_links,); m or rad."""
+        return self.response.motion(self.motion(q))
+
+    def dissipated(self) -> Array:
+        """Energy that each connector has dissipated by yielding and softening; (num_links,); J."""
+        return self.response.dissipated
+
     def effort(self, q1: Array) -> float:
         """Sum of the sizes of the works that the connectors take in the step to ``q1``; J."""
         return float(np.abs(self._taken(q1)).sum())
+
+    def dissipation(self, q1: Array) -> float:
+        """Energy that connectors of this process dissipate plastically in the step to ``q1``; J."""
+        return self.response.dissipation(self.motion(q1), self.force(q1))
 
     def accept(self, q1: Array, s: Array) -> None:
         """Enter what was supplied or lost."""
         taken: float = lib.commit_couplings(self._in_c, doubles(q1), self._dt)
         self._q = q1
         self.response.accept(self._e, taken)
+
+    def add_tangent_change(self, q1: Array, u: Array) -> None:
+        """Add the derivative of the tangent at ``q1`` along ``u``."""
+        change, e = self._tangent_change, self.motion(q1)
+        rows = np.zeros_like(self._rows)
+        for column, numbers in enumerate(self.response.rows(e, self.force(q1))):
+            rows[:, column] = numbers
+        change.put(self._row, rows[self._order])
+        change.put(self._bend, self.response.bends(e)[self._order, None])
+        change.add(q1, u)
+
+    @cached_property
+    def _tangent_change(self) -> TangentChange:
+        e, w_λ, tangent, dx = self._forms
+        q1, bend = self._q1, self._bend
+
+        def of_rows(u: fem.Function) -> ufl.Form:
+            """Rows of laws change with the motion, too."""
+            dq = ufl.TrialFunction(q1.function_space)
+            return w_λ * bend * ufl.derivative(e, q1, u) * ufl.derivative(e, q1, dq) * dx
+
+        return TangentChange(tangent, q1, self._kernel, self._A, of_rows)
 
     def freeze(self) -> None:
         """From now on nothing yields or breaks further."""

@@ -37,13 +37,19 @@ class StepFailed(Exception):
         self.residuals: dict[str, float] = {}
         self.reason = ""
 
+    def saying(self, message: str) -> StepFailed:
+        """The same failure with another message."""
+        other = StepFailed(message)
+        other.residuals = self.residuals
+        return other
+
 
 class ConvergenceError(RuntimeError):
     """A step found no equilibrium, even after it was cut; nothing before it is lost.
 
     Attributes:
-        time: Time of the last accepted state; s.
-        dt: The smallest step that was tried; s.
+        time: Time of the last accepted state, on a path its load factor; s.
+        dt: The smallest step that was tried, on a path the change of the load factor; s.
         solution: The :class:`~ufl_beam.solution.Solution` up to ``time``; ``start=solution`` goes
             on from there with another step or scheme.
         residuals: What is left of the equilibrium where it is largest in each beam, body and

@@ -14,7 +14,7 @@ import numpy as np
 from ufl_beam.compat import TABULATE, Array
 from ufl_beam.native import DECLARATIONS, HEADERS, compiled, text
 
-SOURCES = ("loops", "elimination", "newton")
+SOURCES = ("loops", "rigid_plastic", "elimination", "newton")
 """Files of C beside this one; they are one translation unit."""
 
 _CALLBACKS = """

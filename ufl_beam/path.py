@@ -6,8 +6,6 @@ import math
 import sys
 from collections.abc import Sequence
 
-from mpi4py import MPI
-
 import numpy as np
 
 from ufl_beam.compat import Array
@@ -96,9 +94,7 @@ class StaticPath:
         size = self._share.grid.scene.size
         moves = np.abs(s) / size
         moves[self._rotations] *= size
-        far = moves.max(initial=0.0)
-        if self._share.comm.size > 1:
-            far = self._share.comm.allreduce(far, op=MPI.MAX)
+        far = self._share.largest(moves.max(initial=0.0))
         if not far <= FAR:
             raise StepFailed(
                 f"a node moves by {far:.1e} times the size of the scene, or turns by so many "

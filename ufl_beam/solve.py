@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Protocol
 
-from mpi4py import MPI
 from petsc4py import PETSc
 
 import numpy as np
 
+from ufl_beam.agreement import Agreement
 from ufl_beam.compat import Array
 from ufl_beam.equation import Demand, Equation, unlock
 from ufl_beam.errors import SceneError, StepFailed, require_number
@@ -76,7 +77,13 @@ class Newton:
 
 
 class Border(Protocol):
-    """One more unknown on which the residual depends, and one more equation."""
+    """One more unknown on which the residual depends, and one more equation.
+
+    Attributes:
+        t: The unknown.
+    """
+
+    t: float
 
     def arrive(self, x: Array) -> None:
         """Take note of an iterate; the residual that follows is at the unknown found so far."""
@@ -113,6 +120,7 @@ class Solver:
         held: Local degrees of freedom that supports hold; what stands for them in A means nothing.
         relieve: Makes tangents stiffer where that may help; says whether it can.
         newton: Tolerances.
+        agreement: Raises on all processes what one has raised.
     """
 
     def __init__(
@@ -128,11 +136,13 @@ class Solver:
         relieve: Callable[[], bool],
         held: Index,
         newton: Newton,
+        agreement: Agreement,
         equation: Equation | None = None,
     ) -> None:
         self._share, self._A, self._newton = share, A, newton
         self._residual, self._complete, self._tangent = residual, complete, tangent
         self._excess, self._relieve = excess, relieve
+        self._agreement = agreement
         self._at_forces = doubles(forces)
         self._parallel = share.comm.size > 1
         self._views: dict[int, Array] = {}
@@ -182,6 +192,17 @@ class Solver:
 
     def _note(self, error: BaseException) -> None:
         self._error = self._error or error
+
+    @contextmanager
+    def _noted(self) -> Iterator[None]:
+        """Note exceptions, which must not pass through PETSc while other processes go on.
+
+        From then on the residual is no number, so that all processes stop together.
+        """
+        try:
+            yield
+        except BaseException as error:
+            self._note(error)
 
     # -- vectors and the matrix ----------------------------------------------------------------
 
@@ -287,14 +308,16 @@ class Solver:
 
     def _function_along(self, snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
         self._update_ghosts(x)
-        self._border.arrive(self._view(x))
+        with self._noted():
+            self._border.arrive(self._view(x))
         self._function(snes, x, f)
 
     def _jacobian_along(self, snes: PETSc.SNES, x: PETSc.Vec, J: PETSc.Mat, P: PETSc.Mat) -> None:
         self._update_ghosts(x)
         rate = self._view(self._rate, writable=True)
         rate.fill(0.0)
-        self._border.tangent(self._view(x), rate)
+        with self._noted():
+            self._border.tangent(self._view(x), rate)
         P.stateIncrease()
         if self._parallel:
             self._rate.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
@@ -306,7 +329,8 @@ class Solver:
         self._update_ghosts(self._y)
         self._update_ghosts(z)
         corrected = self._view(self._y, writable=True)
-        self._border.correct(corrected, self._view(z))
+        with self._noted():
+            self._border.correct(corrected, self._view(z))
         y.array_w[:] = corrected[: len(self._weights)]
 
     def _test_along(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, ...]) -> int:
@@ -332,11 +356,10 @@ class Solver:
     def _function(self, snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
         self._update_ghosts(x)
         r = self._view(f, writable=True)
-        try:
+        with self._noted():
             self._residual(self._view(x), r)
-        except Exception as error:
+        if self._error is not None:
             # It may have failed on this process alone; by the sum all give up together.
-            self._error = error
             r.fill(np.nan)
         if self._parallel:
             f.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
@@ -347,7 +370,8 @@ class Solver:
         if self._course.near:
             return
         self._update_ghosts(x)
-        self._tangent(self._view(x))
+        with self._noted():
+            self._tangent(self._view(x))
         P.stateIncrease()
 
     # -- convergence ---------------------------------------------------------------------------
@@ -367,11 +391,13 @@ class Solver:
         square = self._share.total(lib.sum_of_squares(*self._norm, forces))
         if lib.has_its_digits(square):
             return math.sqrt(square)
-        largest = self._share.comm.allreduce(lib.largest_size(*self._norm, forces), op=MPI.MAX)
+        if math.isnan(square):
+            return square
+        largest = self._share.largest(lib.largest_size(*self._norm, forces))
         if largest == 0.0 or not math.isfinite(largest):
-            return float(largest)
+            return largest
         scaled = lib.scaled_sum_of_squares(*self._norm, forces, largest)
-        return float(largest) * math.sqrt(self._share.total(scaled))
+        return largest * math.sqrt(self._share.total(scaled))
 
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, ...]) -> int:
         residual = self._size(self._at_r)
@@ -433,7 +459,7 @@ class Solver:
         self._keeps = False
         if reason == lib.STALLED:
             reason = self._iterate(self._careful, 10)
-        if reason <= 0 and self._relieve():
+        if reason <= 0 and self._may_go_on() and self._relieve():
             x[:] = guess
             self._x.stateIncrease()
             reason = self._iterate(self._snes, self._newton.max_iterations)
@@ -443,7 +469,8 @@ class Solver:
         return x.copy()
 
     def _start(self, guess: Array, loads: list[Array]) -> Array:
-        if list(map(id, loads)) != list(map(id, self._last_loads)):
+        # On several processes they may change on some only.
+        if self._parallel or list(map(id, loads)) != list(map(id, self._last_loads)):
             self._last_loads = loads
             self._loads = self._course.loads = sum(self._size(doubles(load)) for load in loads)
         x = self._view(self._x)
@@ -475,12 +502,14 @@ class Solver:
         self.iterations += self._done
         return reason
 
+    def _may_go_on(self) -> bool:
+        """Return True; raise what a function of the user has raised on any process."""
+        error = self._error
+        self._agreement.settle(None if isinstance(error, StepFailed) else error)
+        return True
+
     def _failure(self, reason: int) -> StepFailed:
-        errors = [e for e in self._share.comm.allgather(self._error) if e is not None]
-        if errors and not isinstance(errors[0], StepFailed):
-            raise errors[0]  # what a function of the user has raised
-        if errors:
-            return StepFailed(str(errors[0]))
+        self._agreement.settle(self._error)
         names = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int)}
         scale = self._loads + self._size(self._at_forces)
         weighted = np.zeros(self._share.size)
