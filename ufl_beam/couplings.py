@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property, partial
+
 import basix.ufl
 import numpy as np
 import ufl
@@ -67,11 +69,12 @@ class Couplings(Links):
         tangent = ufl.derivative(work, q1, ufl.TrialFunction(space))
         z = ufl.TestFunction(given().function_space)
 
-        def kernel(form: ufl.Form) -> Kernel:
-            return Kernel(form, q1, dofs[order], coordinates)
-
-        self._q0, self._row = q0, row
-        self._work, self._tangent, self._value = map(kernel, (work, tangent, e * z * dx))
+        self._kernel = partial(
+            Kernel, unknown=q1, cell_dofs=dofs[order], coordinates=coordinates
+        )
+        self._space, self._motion = space, e * z * dx
+        self._q0, self._q1, self._row = q0, q1, row
+        self._work, self._tangent, self._value = map(self._kernel, (work, tangent, self._motion))
         self._tangent.place(A)
         self.response = respond(links[0].law, links, setting)
         self._length = np.where([c.turns for c in links], 1.0, share.grid.scene.size)
@@ -100,6 +103,22 @@ class Couplings(Links):
         """Relative motions at ``q``; (num_links,); m or rad."""
         lib.find_motions(self._in_c, doubles(q))
         return self._now.copy()
+
+    @cached_property
+    def _velocity(self) -> tuple[Kernel, fem.Function]:
+        """The rates of the motions, and the velocities that they are of; friction asks for them."""
+        velocity = fem.Function(self._space)
+        form = ufl.derivative(self._motion, self._q1, velocity)
+        return self._kernel(form), velocity
+
+    def rates(self, q: Array, v: Array) -> Array:
+        """Rates of the motions at ``q`` if the velocities are ``v``; (num_links,); m/s or rad/s."""
+        kernel, velocity = self._velocity
+        by_cell, rates = np.zeros((2, len(self.links)))
+        kernel.set(velocity, v)
+        kernel.add(q, by_cell)
+        rates[self._order] = by_cell
+        return rates
 
     def begin(self, step: Step) -> None:
         """Remember the motions at the beginning."""

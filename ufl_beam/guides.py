@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from ufl_beam.beams import Curve
 from ufl_beam.compat import Array
 from ufl_beam.connectors import Guide
+from ufl_beam.curves import REACH, nearest, parameter_step, tangent
 from ufl_beam.errors import StepFailed
 from ufl_beam.grid import Index, Share
 from ufl_beam.links import Links
@@ -16,33 +14,6 @@ from ufl_beam.memory import Memory
 from ufl_beam.responses import Setting
 from ufl_beam.schemes import Step
 from ufl_beam.sparse import Csr
-
-PROJECTIONS = 50
-"""Iterations in which the nearest point of a curve is sought."""
-
-
-def tangent(curve: Curve, s: float) -> Array:
-    """Derivative of a curve by its parameter; (2,); m."""
-    ε = 1e-6
-    return np.asarray(np.subtract(curve(s + ε), curve(s - ε)) / (2 * ε))
-
-
-def nearest(curve: Curve, point: Array, s: float) -> float:
-    """Parameter of the point of a curve that is nearest to another; not a number if none is found.
-
-    Args:
-        curve: ``s -> (x, y)``; m.
-        point: Shape (2,); m.
-        s: Where to begin.
-    """
-    for _ in range(PROJECTIONS):
-        t = tangent(curve, s)
-        step = float((point - curve(s)) @ t / (t @ t))
-        s += step
-        if abs(step) * math.hypot(*t) <= 1e-15 * math.hypot(*point):
-            return s
-    return s if abs(step) <= 1e-9 else math.nan
-
 
 class Guides(Links):
     """Forces across curves; those over a step are across the chord, so that they do no work.
@@ -66,21 +37,24 @@ class Guides(Links):
         self._s: Array = np.zeros(n)
         self._s0: Array = np.zeros(n)
         self._on0 = self._points.copy()
-        self._size = share.grid.scene.size
+        self._size = size = share.grid.scene.size
+        self._steps: Array = np.array([parameter_step(law.curve, 0.0, size) for law in self._laws])
 
     # -- geometry ------------------------------------------------------------------------------
 
     def _nearest(self, p: Array) -> tuple[Array, Array]:
-        """Points of the curves nearest to ``p``, and unit tangents there; from the latest ones."""
+        """Points of the curves nearest to ``p``, and tangents there; from the latest ones."""
         curves = [law.curve for law in self._laws]
-        found = np.array([nearest(c, p[k], float(self._s[k])) for k, c in enumerate(curves)])
+        starts = zip(curves, p, self._s.tolist(), self._steps.tolist(), strict=True)
+        found = np.array([nearest(*start, self._size) for start in starts])
         if not np.isfinite(found).all():
             place = self.links[int(np.argmin(np.isfinite(found)))].b
             raise StepFailed(f"{place} is where no nearest point of its guide curve was found")
         self._s = found
-        t = np.array([tangent(curve, s) for curve, s in zip(curves, self._s, strict=True)])
+        places = zip(curves, self._s.tolist(), self._steps.tolist(), strict=True)
+        t = np.array([tangent(*place) for place in places])
         on = np.array([curve(s) for curve, s in zip(curves, self._s, strict=True)], dtype=float)
-        return on, t / np.linalg.norm(t, axis=1)[:, None]
+        return on, t
 
     def _at(self, q: Array) -> Array:
         return self._points + np.column_stack([q[self._x], q[self._y]])
@@ -89,6 +63,7 @@ class Guides(Links):
         """Distance, normals there and over the step, and how these change with the point."""
         p = self._at(q1)
         on, t = self._nearest(p)
+        t /= np.linalg.norm(t, axis=1)[:, None]
         n = np.column_stack([-t[:, 1], t[:, 0]])
         # In statics forces are across the curve at the end of the step, else across the chord.
         chord = on - self._on0
@@ -158,7 +133,8 @@ class Guides(Links):
 
     def accept(self, q1: Array, s: Array) -> None:
         """Remember the points on the curves."""
-        self._on0, _ = self._nearest(self._at(q1))
+        self._on0, t = self._nearest(self._at(q1))
+        self._steps = REACH * self._size / np.linalg.norm(t, axis=1)
         self._s0 = self._s.copy()
 
     def freeze(self) -> None:
@@ -170,8 +146,8 @@ class Guides(Links):
         """Nothing is stored."""
 
     def remember(self, memory: Memory, q: Array) -> None:
-        """The points on the curves, and their parameters."""
-        rows = np.column_stack([self.work, self.rate, self._s, self._s0, self._on0])
-        rows = memory.rows("guides", self.numbers, rows)
-        self.work, self.rate, self._s, self._s0 = rows[:, :4].T.copy()
-        self._on0 = rows[:, 4:].copy()
+        """The points on the curves, their parameters, and the steps of these for tangents."""
+        numbers = (self.work, self.rate, self._s, self._s0, self._steps)
+        rows = memory.rows("guides", self.numbers, np.column_stack([*numbers, self._on0]))
+        self.work, self.rate, self._s, self._s0, self._steps = rows[:, :5].T.copy()
+        self._on0 = rows[:, 5:].copy()

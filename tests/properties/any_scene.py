@@ -247,8 +247,8 @@ class _Writer(Laws):
     def _body(self, parent):
         i = sum(part.startswith("body") for part in self._parts)
         name, say = f"body{i}", self._say
-        mass = self._rhoA * self._L * self._size(-1, 1)
-        inertia = mass * self._L**2 * self._size(-2, -0.5)
+        mass = self._rhoA * self._L * self._size(-0.5, 1)
+        inertia = mass * self._L**2 * self._size(-1.5, -0.5)
         joint = self._one(["Rigid", "Rigid", "Revolute", "RigidLink"])
         if self._static and joint == "Revolute":
             joint = "Rigid"
@@ -393,7 +393,7 @@ class _Writer(Laws):
     # -- loads, masses, damping ----------------------------------------------------------------
 
     def _load(self):
-        size, say = self._F * self._size(-1, 0.3), self._say
+        size, say = self._F * self._size(-1.3, 0), self._say
         place, beam = self._one(self._anchors), self._one(self._lists["beams"])
         force, moment = say.vector(self._polar(size), "N"), self._some(-1, 1) * size * self._L
         line, more = self._polar(size / self._L), self._some(-0.3, 0.3) * size

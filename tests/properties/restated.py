@@ -42,8 +42,7 @@ class Run:
         self.seconds = statement.unit("s")
 
     def motion(self):
-        """(u, v, ψ) by time, of places of all parts; lengths as parts of the size of the scene."""
-        size = self.scene.size / self.statement.unit("m")
+        """Times, s; (u, v, ψ) of places of all parts in SI and the axes of the first statement."""
         rows = {}
         for beam in self.scene.beams:
             for s in PLACES:
@@ -54,7 +53,6 @@ class Run:
         for body in self.scene.bodies:
             rows[body.name, 0.0] = self.statement.motion(self.solution.displacement(body.middle))
         values = np.array([rows[key] for key in sorted(rows)])
-        values[..., :2] /= size
         return self.solution.times / self.seconds, values
 
     def is_backwards(self, beam):
@@ -69,7 +67,8 @@ def difference(one, other):
     (t, x), (s, y) = one.motion(), other.motion()
     common = [(i, j) for i, j in _common(t, s, 1e-9 * max(t[-1], s[-1]))]
     a, b = (np.array(k) for k in zip(*common, strict=True))
-    x, y = x[:, a], y[:, b]
+    size = one.scene.size / one.statement.unit("m")
+    x, y = (z[:, k] / [size, size, 1.0] for z, k in ((x, a), (y, b)))
     return float(np.abs(x - y).max() / max(1.0, np.abs(x).max())), len(common)
 
 

@@ -21,6 +21,7 @@ RECORDS = [
     "beams",
     "bodies",
     "connectors",
+    "curves",
     "discretisation",
     "distributions",
     "errors",
