@@ -18,6 +18,10 @@ from ufl_beam.sparse import Csr
 class Guides(Links):
     """Forces across curves; those over a step are across the chord, so that they do no work.
 
+    The last digits of the curve spoil the direction of a short chord.  Where it is so short that
+    they spoil more than the curvature does, the direction in its middle takes its place: either errs
+    by the last digits to the power of two thirds at most.
+
     The motion of a guide is the distance from its curve, zero when a step is accepted.
     """
 
@@ -32,12 +36,14 @@ class Guides(Links):
         self._across = [A.positions(d, self._forces_at) for d in (self._x, self._y)]
         self._rows = [A.positions(self._forces_at, d) for d in (self._x, self._y)]
         self._points = np.array([link.b.point for link in self.links])
-        self._average = setting.scheme.average
+        self._over_step = np.full(len(self.links), setting.scheme.average(0.0, 1.0) != 1.0)
         n = len(self.links)
         self._s: Array = np.zeros(n)
         self._s0: Array = np.zeros(n)
         self._on0 = self._points.copy()
         self._size = size = share.grid.scene.size
+        last_digit = np.spacing(size + np.abs(self._points).max(axis=1))
+        self._shortest = size * (24 * last_digit / size) ** (1 / 3)
         self._steps: Array = np.array([parameter_step(law.curve, 0.0, size) for law in self._laws])
 
     # -- geometry ------------------------------------------------------------------------------
@@ -68,19 +74,28 @@ class Guides(Links):
         # In statics forces are across the curve at the end of the step, else across the chord.
         chord = on - self._on0
         length = np.linalg.norm(chord, axis=1)
-        moves = (length > 1e-8 * self._size) & (self._average(0.0, 1.0) != 1.0)
-        d = np.where(moves[:, None], chord / np.where(moves, length, 1.0)[:, None], t)
-        d *= np.sign(np.sum(d * t, axis=1))[:, None]
-        m = np.column_stack([-d[:, 1], d[:, 0]])
-        # dm = W (I - d d) t t.dp / length
-        across = t - d * np.sum(d * t, axis=1)[:, None]
-        across *= np.sign(np.sum(chord * d, axis=1))[:, None]
-        turning = (
-            np.column_stack([-across[:, 1], across[:, 0]])
-            / np.where(moves, length, np.inf)[:, None]
-        )
+        far = self._over_step & (length > self._shortest)
+        d, bend = t.copy(), np.zeros_like(t)
+        d[far] = chord[far] / length[far, None]
+        d[far] *= np.sign(np.sum(d[far] * t[far], axis=1))[:, None]
+        # d changes with the point by (I - d d) t t.dp / length
+        back = np.sign(np.sum(chord[far] * d[far], axis=1)) / length[far]
+        bend[far] = (t[far] - d[far] * np.sum(d * t, axis=1)[far, None]) * back[:, None]
+        for k in np.flatnonzero(self._over_step & ~far):
+            d[k], bend[k] = self._in_the_middle(k)
+        m, turning = (np.column_stack([-x[:, 1], x[:, 0]]) for x in (d, bend))
         distance = np.sum(n * (p - on), axis=1)
         return distance, n, m, np.einsum("ki,kj->kij", turning, t)
+
+    def _in_the_middle(self, k: int) -> tuple[Array, Array]:
+        """Direction of a curve in the middle of a short step, and its change with the end."""
+        curve, step, s = self._laws[k].curve, self._steps[k], (self._s0[k] + self._s[k]) / 2
+        t = tangent(curve, s, step)
+        speed = np.linalg.norm(t)
+        d = t / speed
+        second = np.add(curve(s + step), curve(s - step)) - np.multiply(2, curve(s))
+        bend = second / (step * speed) ** 2
+        return d, (bend - d * (d @ bend)) / 2
 
     # -- the step ------------------------------------------------------------------------------
 

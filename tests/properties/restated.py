@@ -65,7 +65,10 @@ def difference(one, other):
     A rotation of many turns has the digits of its size.
     """
     (t, x), (s, y) = one.motion(), other.motion()
-    common = [(i, j) for i, j in _common(t, s, 1e-9 * max(t[-1], s[-1]))]
+    if len(t) == len(s):  # each step with its own length, if steps are adaptive
+        common = [(i, i) for i in range(len(t))]
+    else:
+        common = [(i, j) for i, j in _common(t, s, 1e-12 * max(t[-1], s[-1]))]
     a, b = (np.array(k) for k in zip(*common, strict=True))
     size = one.scene.size / one.statement.unit("m")
     x, y = (z[:, k] / [size, size, 1.0] for z, k in ((x, a), (y, b)))
