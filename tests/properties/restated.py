@@ -65,14 +65,15 @@ def difference(one, other):
     A rotation of many turns has the digits of its size.
     """
     (t, x), (s, y) = one.motion(), other.motion()
-    if len(t) == len(s):  # each step with its own length, if steps are adaptive
+    if len(t) == len(s) and not (one.failure or other.failure):
+        # Each step with its own length, if steps are adaptive
         common = [(i, i) for i in range(len(t))]
     else:
         common = [(i, j) for i, j in _common(t, s, 1e-12 * max(t[-1], s[-1]))]
     a, b = (np.array(k) for k in zip(*common, strict=True))
     size = one.scene.size / one.statement.unit("m")
     x, y = (z[:, k] / [size, size, 1.0] for z, k in ((x, a), (y, b)))
-    return float(np.abs(x - y).max() / max(1.0, np.abs(x).max())), len(common)
+    return float(np.abs(x - y).max() / max(1.0, np.abs(x).max()))
 
 
 def _common(t, s, near):
