@@ -120,6 +120,18 @@ class Couplings(Links):
         rates[self._order] = by_cell
         return rates
 
+    def again(self) -> None:
+        """Begin the step again: forget what its iterates have tried."""
+        self.response.again()
+
+    def put_motions(self, q: Array, v: Array, works: Array) -> None:
+        """Put minus the change of the motions where the row is about the force."""
+        about_motion = np.array([link.holds for link in self.links]) & (self._rows[:, 1] != 1.0)
+        if not about_motion.all():
+            works[self._forces_at] = np.where(
+                about_motion, works[self._forces_at], -self.rates(q, v)
+            )
+
     def begin(self, step: Step) -> None:
         """Remember the motions at the beginning."""
         self._work.set(self._q0, step.q0)

@@ -106,6 +106,10 @@ class Guides(Links):
 
     def begin(self, step: Step) -> None:
         """Begin at the points of the last step."""
+        self.again()
+
+    def again(self) -> None:
+        """Begin at the points of the last step."""
         self._s = self._s0.copy()
 
     def loops(self) -> None:

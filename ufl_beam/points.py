@@ -132,10 +132,11 @@ class Course:
     def __init__(self) -> None:
         self.flags: Index = np.zeros(2, dtype=np.int32)
 
-    def relieve(self) -> bool:
-        """Let points around those that open answer elastically, if there are any."""
-        self.flags[1] = self.flags[0]
-        return bool(self.flags[1])
+    def relieve(self, relief: bool) -> bool:
+        """Let points around those that open answer elastically, or no more; whether there are any.
+        """
+        self.flags[1] = relief and self.flags[0]
+        return bool(self.flags[0])
 
 
 class Points:

@@ -125,7 +125,8 @@ class _Writer(Laws):
         at_end = self._name.startswith(("Newmark", "Generalized"))
         self._rubs = not at_end and not self._static
         self._may_hold = self._name != "Newmark()"
-        adapts = self._chance(0.2) and not self._static
+        # Nothing bounds the energy of undamped Newmark, which steps that adapt would follow.
+        adapts = self._chance(0.2) and not self._static and self._name != "Newmark()"
         self._step = self._say.number(self._dt, "s")
         if adapts:
             stops = ", ".join(self._say.number(self._end * k / 4, "s") for k in (1, 2, 3))
