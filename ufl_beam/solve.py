@@ -25,6 +25,12 @@ from ufl_beam.sparse import Csr
 FULL_STEPS = {"snes_linesearch_type": "basic"}
 """A norm in a line search would add forces and moments, and each search costs a residual."""
 
+PATIENCE = 10
+"""Iterations in a row without half the least residual that are one too many.
+
+Those that wander longer find a solution by luck: the last digits of the data would decide.
+"""
+
 PREFIX = "ub_"
 """Prefix of the PETSc options of the solver, as in ``-ub_snes_monitor``."""
 
@@ -418,7 +424,7 @@ class Solver:
         reason = self._iterate(self._snes, 2)
         self._keeps = False
         if reason == lib.STALLED:
-            reason = self._iterate(self._careful, 10)
+            reason = self._iterate(self._careful, PATIENCE)
         if reason <= 0 and self._relieve(True):
             x[:] = guess
             self._x.stateIncrease()
@@ -430,7 +436,7 @@ class Solver:
 
     def _relieved(self) -> int:
         """Iterate with stiffer tangents, which come near but slowly, then with true ones."""
-        slow = self._iterate(self._snes, self._newton.max_iterations)
+        slow = self._iterate(self._snes, PATIENCE)
         self._relieve(False)
         if slow != lib.TOO_MANY and slow <= 0:
             return slow
