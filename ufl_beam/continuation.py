@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from mpi4py import MPI
 
@@ -16,11 +16,13 @@ from ufl_beam.connectors import Actuator, Controller, Motor
 from ufl_beam.controls import Control, Given
 from ufl_beam.critical import Branch, CriticalPoint, Direction, Stiffness
 from ufl_beam.discretisation import Mesh
-from ufl_beam.errors import SceneError, StepFailed, require_count, require_kind, require_sequence
+from ufl_beam.errors import SceneError, StepFailed, require_count, require_kind
 from ufl_beam.loads import TimeFunction
+from ufl_beam.memory import State
+from ufl_beam.outputs import take
 from ufl_beam.parameter import FACTOR
 from ufl_beam.processes import ours
-from ufl_beam.record import Recorder, on_first
+from ufl_beam.record import Recorder, close_all, recorders_of
 from ufl_beam.scene import Scene
 from ufl_beam.simulation import Simulation, Trial
 from ufl_beam.solution import Solution
@@ -77,6 +79,27 @@ class Path(Solution):
     def factor(self) -> Array:
         """Load factors, the time of the time functions; (n+1,)."""
         return self.times
+
+    def _content(self) -> tuple[dict[str, Any], State]:
+        text, arrays = super()._content()
+        text["critical"] = [{"kind": c.kind, "factor": c.factor, "n": c.n} for c in self.critical]
+        for k, point in enumerate(self.critical):
+            arrays[f"critical/{k}/mode"] = point.mode
+            for name, values in point.state._arrays().items():
+                arrays[f"critical/{k}/state/{name}"] = values
+        return text, arrays
+
+    def _take(self, text: dict[str, Any], arrays: State) -> None:
+        super()._take(text, arrays)
+        critical = []
+        for k, one in enumerate(text["critical"]):
+            state, prefix = Solution(self.scene, self.grid), f"critical/{k}/state/"
+            state._take(
+                text,
+                {n.removeprefix(prefix): a for n, a in arrays.items() if n.startswith(prefix)},
+            )
+            critical.append(CriticalPoint(**one, state=state, mode=arrays[f"critical/{k}/mode"]))
+        self.critical = critical
 
     @property
     def progress(self) -> Array:
@@ -375,10 +398,7 @@ def follow(
     require_count(steps, "follow: steps")
     if start is not None:
         require_kind(start, (Solution, Branch), "follow: start")
-    recorders = (record,) if isinstance(record, Recorder) else require_sequence(record, "record")
-    for i, recorder in enumerate(recorders):
-        require_kind(recorder, Recorder, f"follow: record[{i}]")
-        on_first(comm, recorder.require_writable)
+    recorders, outputs = recorders_of(record, comm, "follow")
     branch, state = (start, start.state) if isinstance(start, Branch) else (None, start)
     t0 = 0.0 if state is None else float(state.times[-1])
     _require_driven(scene, t0)
@@ -389,29 +409,36 @@ def follow(
     simulation.solution = path = Path(scene, simulation.grid)
     route = Route(simulation, control)
     path.critical = route.critical
+    release = take(outputs)
+
+    def after_step() -> bool:
+        path.keep(simulation)
+        for recorder in recorders:
+            recorder.write(simulation)
+        return until is not None and bool(until(simulation))
+
     try:
         route.begin(branch, fresh=state is None)
         for recorder in recorders:
-            recorder.open(simulation)
+            simulation.together(recorder.open, simulation)
         path.keep(simulation)
         for _ in range(steps):
             route.advance()
-            path.keep(simulation)
-            for recorder in recorders:
-                recorder.write(simulation)
-            if until is not None and until(simulation):
+            if simulation.share.largest(simulation.together(after_step)):
                 break
         simulation.end()
     except BaseException as error:
-        if simulation.comm.size == 1:
-            simulation.end()  # several processes may not all be here
+        if simulation.share.comm.size == 1 or error is simulation.together.raised:
+            simulation.end()  # else the processes may not all be here
         error.__dict__["solution"] = path
         raise
     finally:
-        for recorder in recorders:
-            recorder.close()
-        simulation.close()
+        release()
         path.seconds = time.perf_counter() - began
+        simulation.close()
+        close_all(recorders)
+    if comm.rank == 0:
+        path.opened.warn(simulation.scheme, path.times)
     return path
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cached_property, singledispatch
 
 import basix.ufl
 import numpy as np
@@ -10,7 +10,7 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.compat import Array, fem, line_mesh, space_with_dofs
-from ufl_beam.connectors import HELD, Connector, Law, Spring
+from ufl_beam.connectors import HELD, Connector, Law, RigidPlastic, Spring
 from ufl_beam.forms import Kernel
 from ufl_beam.grid import Index, Share
 from ufl_beam.guides import Guides
@@ -19,15 +19,33 @@ from ufl_beam.loops import Loop, doubles, ffi, integers, lib, loop
 from ufl_beam.memory import Memory
 from ufl_beam.relative import MOTIONS, Numbers, Pair
 from ufl_beam.responses import Setting, respond
+from ufl_beam.rigid_plastic import RigidPlasticResponse
 from ufl_beam.schemes import Step
 from ufl_beam.sparse import Csr
 from ufl_beam.tangent_change import TangentChange
 
+respond.register(RigidPlastic, RigidPlasticResponse)
+
 
 def _alike(link: Connector) -> tuple[str, object]:
-    """What the connectors of one :class:`Couplings` have in common."""
-    law: Law = link.law
-    return link.motion, law if isinstance(law, Spring) else (type(law), law is HELD)
+    """Key that the connectors of one :class:`Couplings` have in common."""
+    return link.motion, _kind(link.law)
+
+
+@singledispatch
+def _kind(law: Law) -> object:
+    """Key of a law: connectors with the same one are computed together."""
+    return type(law), law is HELD
+
+
+@_kind.register
+def _(law: Spring) -> object:
+    return law
+
+
+@_kind.register
+def _(law: RigidPlastic) -> object:
+    return RigidPlastic, type(law.law)
 
 
 class Couplings(Links):
@@ -94,9 +112,9 @@ class Couplings(Links):
         c.number, c.size = n, share.grid.scene.size
         c.row, c.row_of_tangent = (one.position(row) for one in (self._work, self._tangent))
         c.weight_of_before = setting.scheme.acting(np.ones(1), np.zeros(1))[0]
-        if self.response.points is not None:
-            c.points = self.response.points.points
-        self._asks_python = not self.response.steady and self.response.points is None
+        for name, data in self.response.in_c.items():
+            setattr(c, name, data)
+        self._asks_python = not self.response.steady and not self.response.in_c
 
     # -- the step ------------------------------------------------------------------------------
 
@@ -142,9 +160,9 @@ class Couplings(Links):
         """Add the derivative; the rows are those of the latest residual."""
         self._tangent.add(q1, self._A.data)
 
-    def excess(self, q: Array, r: Array, force: float) -> float:
-        """Largest residual of a row: of motions as a part of 1 % of the scene, or of ``force``."""
-        missed: float = lib.missed_by_couplings(self._in_c, doubles(q), doubles(r), force)
+    def excess(self, q: Array, r: Array, force: float, moved: float) -> float:
+        """Largest residual of a row: of motions as a part of 1 % of ``moved``, or of ``force``."""
+        missed: float = lib.missed_by_couplings(self._in_c, doubles(q), doubles(r), force, moved)
         return missed
 
     def _taken(self, q1: Array) -> Array:
@@ -156,13 +174,25 @@ class Couplings(Links):
         """Energy that the connectors take in the step to ``q1``; J."""
         return self.response.change(self.motion(q1), float(self._taken(q1).sum()))
 
-    def dissipation(self, q1: Array) -> float:
-        """Energy that springs dissipate in the step to ``q1``; J."""
-        return self.response.dissipation(self.motion(q1))
+    def flows(self) -> bool:
+        """Whether a connector of this process slips plastically in the latest iterate."""
+        return self.response.flows()
+
+    def shown_motion(self, q: Array) -> Array:
+        """Motions of the accepted state ``q`` as solutions show them; (num_links,); m or rad."""
+        return self.response.motion(self.motion(q))
+
+    def dissipated(self) -> Array:
+        """Energy that each connector has dissipated by yielding and softening; (num_links,); J."""
+        return self.response.dissipated
 
     def effort(self, q1: Array) -> float:
         """Sum of the sizes of the works that the connectors take in the step to ``q1``; J."""
         return float(np.abs(self._taken(q1)).sum())
+
+    def dissipation(self, q1: Array) -> float:
+        """Energy that connectors of this process dissipate plastically in the step to ``q1``; J."""
+        return self.response.dissipation(self.motion(q1), self.force(q1))
 
     def accept(self, q1: Array, s: Array) -> None:
         """Enter what was supplied or lost."""

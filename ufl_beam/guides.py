@@ -175,7 +175,7 @@ class Guides(Links):
     def demand(self) -> None:
         """None."""
 
-    def excess(self, q: Array, r: Array, force: float) -> float:
+    def excess(self, q: Array, r: Array, force: float, moved: float) -> float:
         """Largest distance, as a part of 1 % of the scene."""
         round_off = 8 * np.spacing(self._size + np.abs(self._points + self._on0).max(axis=1))
         missed = np.maximum(np.abs(r[self._forces_at]) - round_off, 0.0)
@@ -185,8 +185,20 @@ class Guides(Links):
         """Guides take no energy."""
         return 0.0
 
+    def flows(self) -> bool:
+        """None does."""
+        return False
+
+    def shown_motion(self, q: Array) -> Array:
+        """Motions of the accepted state ``q``; (num_links,); m."""
+        return self.motion(q)
+
+    def dissipated(self) -> Array:
+        """None: guides do not yield."""
+        return np.zeros(len(self.links))
+
     def dissipation(self, q1: Array) -> float:
-        """Guides take no energy."""
+        """None: guides do no work."""
         return 0.0
 
     def effort(self, q1: Array) -> float:

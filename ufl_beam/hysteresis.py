@@ -75,16 +75,19 @@ def plot_hinge(solution: Solution, place: Place) -> Figure:
 
     Args:
         solution: What to show.
-        place: Where; at a vertex it is the cell before it.
+        place: Where; without a plastic hinge at the place it is that of the cell, at a vertex of
+            the cell before it.
 
     Raises:
-        SceneError: The scene is elastic, the cell has no hinge, or the beam of the place is not in
-            the scene.
+        SceneError: The scene is elastic, there is no hinge, or the beam of the place is not in the
+            scene.
     """
     kept, grid = solution.material_at(place), solution.grid
-    law = grid.hinges(place.beam)[grid.cell(place) - int(grid.cells_of(place.beam)[0])]
+    hinge = grid.hinge_at(place)
+    in_cell = grid.hinges(place.beam)[grid.cell(place) - int(grid.cells_of(place.beam)[0])]
+    law = in_cell if hinge is None else hinge.law.law
     if law is None or np.isinf(law.limit):
-        raise SceneError(f"plot_hinge: the cell at {place} has no hinge")
+        raise SceneError(f"plot_hinge: neither {place} nor the cell there has a hinge")
     M, jump, lost = kept.forces[:, 2], kept.jump, float(kept.hinge[-1])
     with picture((8.0, 5.4)) as figure:
         axes = figure.add_subplot()
@@ -92,11 +95,10 @@ def plot_hinge(solution: Solution, place: Place) -> Figure:
             axes.fill_between(jump[part], M[part], facecolor=(ORANGE, 0.3), linewidth=0.0, zorder=2)
         _draw_path(figure, axes, solution, jump, M)
         _prefix(axes, "x", jump, "jump of rotation", "rad")
-        of_all = f"{with_unit(lost, 'J')} of {with_unit(law.energy, 'J')}"
-        axes.set_title(
-            f"hinge at {place}: {of_all} dissipated, {_percent(lost / law.energy)}",
-            loc="left", color=INK,
-        )  # fmt: skip
+        spent = f"{with_unit(lost, 'J')} dissipated"
+        if math.isfinite(law.energy):
+            spent += f", {_percent(lost / law.energy)} of {with_unit(law.energy, 'J')}"
+        axes.set_title(f"hinge at {place}: {spent}", loc="left", color=INK)
     return figure
 
 
@@ -283,18 +285,17 @@ def _draw_path(figure: Figure, axes: Axes, solution: Solution, x: Array, M: Arra
 
 def _draw_hinges(figure: Figure, axes: Axes, solution: Solution, n: int, points: Array) -> None:
     """Circles at the hinges that have opened, and what their sizes mean."""
-    cells, parts = open_hinges(solution, n)
-    if not len(cells):
+    hinges = open_hinges(solution, n, points)
+    if not hinges:
         return
-    centers = points[solution.grid.cells[cells]].mean(axis=1)
 
     def circle(part: float) -> dict[str, Any]:
         inside = "white" if part >= FULLY_OPEN else BLUE
         size = 4.0 + 6.0 * math.sqrt(part)
         return {"ms": size, "mfc": inside, "mec": "white" if inside == BLUE else BLUE, "ls": "none"}
 
-    for center, part in zip(centers, parts, strict=True):
-        axes.plot(*center, "o", mew=1.8, zorder=6, **circle(part))
+    for hinge in hinges:
+        axes.plot(*hinge.at, "o", mew=1.8, zorder=6, **circle(hinge.part))
     for example, text in ((0.1, "hinge, 10 % broken"), (0.5, "50 %"), (1.0, "fully open")):
         axes.plot([], [], "o", mew=1.8, label=text, **circle(example))
     figure.legend(loc="outside upper left", ncols=3)

@@ -197,6 +197,22 @@ class InelasticBeams:
         kernel = partial(self._fields.kernel, unknown=self._q1)
         return CellTangent(self._around, self._q1, kernel, self._A)
 
+    # -- see openings.py -----------------------------------------------------------------------
+
+    @property
+    def excess(self) -> float:
+        """Largest excess of a held point over its limit, as a part of it."""
+        return self.points.excess
+
+    def release(self, least: float) -> None:
+        """Let held points open whose excess is so large."""
+        self.points.release(least)
+        self._latest.fill(np.nan)
+
+    def hold(self) -> None:
+        """Take back :meth:`release`."""
+        self.points.hold()
+
     def freeze(self) -> None:
         """From now on nothing yields or opens further."""
         self.points.freeze()

@@ -31,12 +31,12 @@ class Parameter(NamedTuple):
         return self.step.format(format(step, ".3g"))
 
 
-TIME = Parameter("time t (s)", "t = {} s", "dt = {} s", "t", "time t (s)")
+TIME = Parameter("time t (s)", "t = {} s", "dt = {} s", "t [s]", "time t (s)")
 
 FACTOR = Parameter(
     "load factor",
     "load factor {}",
     "a change of the load factor by {}",
-    "load factor",
+    "load factor [-]",
     "way along the path, root mean square of the nodes (m)",
 )

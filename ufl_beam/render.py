@@ -418,11 +418,10 @@ def _cylinder(pyvista: Any, look: _Look, pin: Pin) -> Any:
 
 def _add_hinges(pyvista: Any, plotter: Any, look: _Look, n: int, points: Array) -> None:
     """Open hinges as orange pins."""
-    grid, hinges = look.solution.grid, []
-    for cell in open_hinges(look.solution, n)[0]:
-        beam = look.solution.scene.beams[grid.beam_of_cell[cell]]
-        pin = Pin(points[grid.cells[cell]].mean(axis=0), True, (beam.start,))
-        hinges.append(_cylinder(pyvista, look, pin))
+    hinges = [
+        _cylinder(pyvista, look, Pin(hinge.at, True, (hinge.beam.start,)))
+        for hinge in open_hinges(look.solution, n, points)
+    ]
     _add(pyvista, plotter, hinges, ORANGE, "hinges")
 
 

@@ -10,16 +10,18 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import cycle, groupby, islice
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ufl_beam import symbols
+from ufl_beam.beams import Beam
 from ufl_beam.bodies import Anchor
 from ufl_beam.compat import Array
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.glyphs import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY
 from ufl_beam.grid import Index
+from ufl_beam.laws import HingeLaw
 from ufl_beam.processes import ours
 from ufl_beam.solution import Solution
 from ufl_beam.stage import Pose, Stage
@@ -224,24 +226,49 @@ def moved_points(solution: Solution, n: int, magnify: float) -> Array:
     return np.asarray(grid.points + magnify * solution.q[n][grid.dofs[:, :2]])
 
 
-def open_hinges(solution: Solution, n: int) -> tuple[Index, Array]:
-    """Cells whose hinge has opened at the n-th kept time, and the broken part of its energy.
+class OpenHinge(NamedTuple):
+    """A hinge that has opened.
 
-    Returns:
-        Numbers of the cells, and parts from 0 (closed) to 1 (a joint); both (num_open,).
+    Attributes:
+        beam: Its beam.
+        at: Where it is now; (2,); m.
+        part: Part of its fracture energy that is spent, from 0 (closed) to 1 (a joint); 0 if it
+            hardens.
     """
-    cells, parts = [], []
+
+    beam: Beam
+    at: Array
+    part: float
+
+
+def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
+    """Hinges that have opened at the n-th kept time: in cells, and of zero length.
+
+    Args:
+        points: Where the nodes of the grid are; (num_nodes, 2); m.
+    """
+    grid, found = solution.grid, []
     for beam in solution.scene.beams:
-        numbers, laws = solution.grid.cells_of(beam), solution.grid.hinges(beam)
+        laws = grid.hinges(beam)
         if all(law is None or math.isinf(law.limit) for law in laws):
             continue
         state = solution.material(beam, n)
-        for cell, law, jump, lost in zip(numbers, laws, state.jump, state.hinge, strict=True):
+        rows = zip(grid.cells_of(beam), laws, state.jump, state.hinge, strict=True)
+        for cell, law, jump, lost in rows:
             if law is not None and (jump != 0.0 or lost > 0.0):
-                cells.append(int(cell))
-                # What never resisted is a joint from the beginning.
-                parts.append(min(lost / law.energy, 1.0) if law.limit > 0.0 else 1.0)
-    return np.array(cells, dtype=np.int64), np.array(parts)
+                at = points[grid.cells[cell]].mean(axis=0)
+                found.append(OpenHinge(beam, at, _spent(law, lost)))
+    for hinge, vertex in zip(solution.scene.hinges, grid.vertices_at_hinges, strict=True):
+        state = solution.connector(hinge)
+        if state.motion[n] != 0.0 or state.dissipated[n] > 0.0:
+            law, lost = hinge.law.law, float(state.dissipated[n])
+            found.append(OpenHinge(hinge.a.beam, points[vertex], _spent(law, lost)))
+    return found
+
+
+def _spent(law: HingeLaw, dissipated: float) -> float:
+    """Part of the fracture energy that is spent; a hinge that never resisted is a joint."""
+    return min(dissipated / law.energy, 1.0) if law.limit > 0.0 else 1.0
 
 
 def evenly(solution: Solution, count: int) -> list[int]:
@@ -478,7 +505,7 @@ def draw_strokes(axes: Axes, strokes: Iterable[Stroke], color: Any = None) -> No
 
 
 def _draw_masses(axes: Axes, pose: Pose, color: Any) -> None:
-    for mass in pose.stage.solution.scene.masses:
+    for mass in pose.stage.scene.masses:
         axes.plot(*pose.at(mass.place), "o", ms=10.0, color=color, zorder=5)
 
 

@@ -51,7 +51,7 @@ class Walk:
         self.t = simulation.t
         self.dissipates = False
         self._driven: list[Term] = [*simulation.loads, *simulation.couplings]
-        self.direction = Direction(np.zeros(self.share.size), 0.0)
+        self.direction: Direction = Direction(np.zeros(self.share.size), 0.0)
         self.sought = self.direction
 
     # -- measures ------------------------------------------------------------------------------
@@ -138,7 +138,8 @@ class Walk:
     def side(self, q: Array, way: Direction) -> float:
         """Positive where more dissipates along a way from ``q``, negative where against it."""
         now, size = self.dissipation(q), self.size(way)
-        for doubled in range(FARTHEST if now > 0 and size > 0 else 0):
+        flows = self.share.total(float(any(one.flows() for one in self.simulation.couplings)))
+        for doubled in range(FARTHEST if (now > 0 or flows) and size > 0 else 0):
             δ = 1e-9 * 2**doubled / size
             more = self.dissipation(q + δ * way.q) - self.dissipation(q - δ * way.q)
             if abs(more) > now:
@@ -219,22 +220,24 @@ class Walk:
         self.t = simulation.t + length * way.t
         step, guess = self.step_at(self.t), simulation.q + length * way.q
         simulation.supports.enter(guess)
-        simulation.supports.move(guess, guess, step)
+        simulation.together(simulation.supports.move, guess, guess, step)
         trial = simulation.attempt_along(step, guess, self)
         return trial._replace(step=self.step_at(self.t))
 
     def begin(self) -> None:
         """Let all terms begin a step at the present state and load factor."""
-        self._give(self.step_at(self.simulation.t), self.simulation.terms)
+        simulation = self.simulation
+        simulation.together(self._give, self.step_at(simulation.t), simulation.terms)
 
     def look(self, q: Array) -> Stiffness:
         """The stiffness at a state."""
         supports = self.simulation.supports
         x = supports.in_axes(q)
         # The first tangent of a step is that of the forces before it, and may not yet be taken.
-        self.tangent(x, np.zeros(self.share.size))
+        together = self.simulation.together
+        together(self.tangent, x, np.zeros(self.share.size))
         rate = np.zeros(self.share.size)
-        self.tangent(x, rate)
+        together(self.tangent, x, rate)
         return Stiffness(self.share, self._A, supports.dofs, rate)
 
     def flow(self, stiffness: Stiffness) -> Direction:
