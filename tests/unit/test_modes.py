@@ -283,7 +283,7 @@ def mixed():
     b = ub.Beam((0.3, 1), (1.5, 1.2), yielding, cells=3, name="b")
     c = ub.Beam((1.5, 1.2), (2, 0), elastic, cells=2, name="c")
     d = ub.Beam((0, 2), (1, 2.5), elastic, cells=2, name="d")
-    body = ub.Body((1, 2.7), name="body")
+    body = ub.Body((1, 2.7), mass=1.0, inertia=1.0, name="body")
     return ub.Scene(
         [a, b, c, d],
         bodies=[body],
