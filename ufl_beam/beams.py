@@ -7,8 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from itertools import pairwise
 
-from ufl_beam.curves import Arc, Polyline, Straight
-from ufl_beam.curves import Point as Point
+from ufl_beam.axis_curves import Arc, Polyline, Straight
+from ufl_beam.axis_curves import Point as Point
+from ufl_beam.curves import tangent_within
 from ufl_beam.errors import (
     SceneError,
     require_count,
@@ -204,6 +205,19 @@ class Place:
         """Coordinates in the undeformed scene; m."""
         x, y = self.beam.curve(self.s)
         return float(x), float(y)
+
+    @property
+    def direction(self) -> Point:
+        """Unit tangent of the undeformed axis; at a corner the mean of both sides."""
+        edges = sorted({0.0, *self.beam.corners, 1.0})
+        sides = [
+            tangent_within(self.beam.curve, self.s, low, high)
+            for low, high in pairwise(edges)
+            if low <= self.s <= high
+        ]
+        x, y = sum(side / math.hypot(*side) for side in sides)
+        length = math.hypot(x, y)
+        return float(x / length), float(y / length)
 
     def __str__(self) -> str:
         ends = {0.0: "start", 1.0: "end"}

@@ -389,6 +389,7 @@ class Joint:
             unknown; so are displacements of anchors that their nodes carry.
         holders: What is held besides, by connectors.
         meets: Whether the anchors are at one point of the undeformed scene.
+        advice: For anchors that should meet and do not.
     """
 
     kind: str
@@ -396,6 +397,7 @@ class Joint:
     shared: tuple[int, ...]
     holders: tuple[Connector, ...] = field(default=(), repr=False)
     meets: bool = False
+    advice: str = "RigidLink and Link join places that are apart"
 
     def __post_init__(self) -> None:
         if len(self.places) < 2:
@@ -509,23 +511,22 @@ def Guided(place: Anchor, curve: Curve) -> Joint:
         curve: ``s -> (x, y)`` for all s that the motion may reach; ``curve(0)`` is at the place; m.
 
     Raises:
-        SceneError: The place is not on the curve at s = 0, or the curve stands still there.
+        SceneError: The curve stands still at s = 0.  A scene raises it where ``curve(0)`` is not at
+            the place.
     """
     require_anchor(place, "Guided")
     if not carries(place):
         raise SceneError(f"Guided({place}): it must be the centre of the body")
     law = Guide(curve)
     x, y = require_vector(curve(0.0), f"Guided({place}): curve(0)")
-    if math.dist((x, y), place.point) > 1e-9 * max(math.hypot(x, y), math.hypot(*place.point)):
-        raise SceneError(f"Guided({place}): curve(0) = ({x:g}, {y:g}) must be at the place")
     (x0, y0), (x1, y1) = curve(-1e-6), curve(1e-6)
     length = math.hypot(x1 - x0, y1 - y0)
     if length == 0.0:
         raise SceneError(f"Guided({place}): the curve stands still at s = 0")
     base, across = ground(x, y), ((y0 - y1) / length, (x1 - x0) / length)
-    return Joint(
-        "Guided", (base, place), (), (Connector("Guided", "guided", base, place, law, across),)
-    )
+    holder = Connector("Guided", "guided", base, place, law, across)
+    advice = "curve(0) must be at the place"
+    return Joint("Guided", (base, place), (), (holder,), meets=True, advice=advice)
 
 
 def Release(a: Place, b: Anchor, *, free: str) -> Joint:
@@ -545,10 +546,7 @@ def Release(a: Place, b: Anchor, *, free: str) -> Joint:
     shared = () if "M" in free else (2,)
     if not set(free) & set("NV"):
         return _joined("Release", (a, b), (0, 1, *shared))
-    low, high = max(a.s - 1e-6, 0.0), min(a.s + 1e-6, 1.0)
-    (x0, y0), (x1, y1) = a.beam.curve(low), a.beam.curve(high)
-    length = math.hypot(x1 - x0, y1 - y0)
-    x, y = (x1 - x0) / length, (y1 - y0) / length
+    x, y = a.direction
     held = [axis for name, axis in (("N", (x, y)), ("V", (-y, x))) if name not in free]
     holders = tuple(Connector("Release", "sliding", a, b, HELD, axis) for axis in held)
     return Joint("Release", (a, b), shared, holders, meets=True)

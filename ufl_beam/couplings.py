@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property, singledispatch
+from functools import cached_property, partial, singledispatch
 
 import basix.ufl
 import numpy as np
@@ -88,12 +88,13 @@ class Couplings(Links):
         tangent = ufl.derivative(work, q1, ufl.TrialFunction(space))
         z = ufl.TestFunction(given().function_space)
 
-        def kernel(form: ufl.Form) -> Kernel:
-            return Kernel(form, q1, dofs[order], coordinates)
-
+        self._kernel = kernel = partial(
+            Kernel, unknown=q1, cell_dofs=dofs[order], coordinates=coordinates
+        )
+        self._space, self._motion = space, e * z * dx
         self._q0, self._q1, self._row, self._bend = q0, q1, row, given()
-        self._forms, self._kernel = (e, w_λ, tangent, dx), kernel
-        self._work, self._tangent, self._value = map(kernel, (work, tangent, e * z * dx))
+        self._forms = e, w_λ, tangent, dx
+        self._work, self._tangent, self._value = map(kernel, (work, tangent, self._motion))
         self._tangent.place(A)
         self.response = respond(links[0].law, links, setting)
         self._length = np.where([c.turns for c in links], 1.0, share.grid.scene.size)
@@ -122,6 +123,34 @@ class Couplings(Links):
         """Relative motions at ``q``; (num_links,); m or rad."""
         lib.find_motions(self._in_c, doubles(q))
         return self._now.copy()
+
+    @cached_property
+    def _velocity(self) -> tuple[Kernel, fem.Function]:
+        """The rates of the motions, and the velocities that they are of; friction asks for them."""
+        velocity = fem.Function(self._space)
+        form = ufl.derivative(self._motion, self._q1, velocity)
+        return self._kernel(form), velocity
+
+    def rates(self, q: Array, v: Array) -> Array:
+        """Rates of the motions at ``q`` if the velocities are ``v``; (num_links,); m/s or rad/s."""
+        kernel, velocity = self._velocity
+        by_cell, rates = np.zeros((2, len(self.links)))
+        kernel.set(velocity, v)
+        kernel.add(q, by_cell)
+        rates[self._order] = by_cell
+        return rates
+
+    def again(self) -> None:
+        """Begin the step again: forget what its iterates have tried."""
+        self.response.again()
+
+    def put_motions(self, q: Array, v: Array, works: Array) -> None:
+        """Put minus the change of the motions where the row is about the force."""
+        about_force = self.response.about_force(self._rows)
+        if about_force.any():
+            works[self._forces_at] = np.where(
+                about_force != 0.0, -about_force * self.rates(q, v), works[self._forces_at]
+            )
 
     def begin(self, step: Step) -> None:
         """Remember the motions at the beginning."""

@@ -144,16 +144,12 @@ class Live:
         return float(np.linalg.norm(self.connections()[numbers, 1]))
 
     def rates(self, links: Sequence[Connector]) -> Array:
-        """Rates of relative motions of this process now, by a difference; m/s or rad/s."""
+        """Rates of the relative motions of one kind of connectors now; m/s or rad/s."""
         rates = np.zeros(len(links))
         for v in self.velocities():
-            fastest = np.abs(v).max(initial=0.0) or 1.0
-            ε = 1e-5 * self.scene.size
-            way = ε * (v / fastest)
             for coupling in self.couplings:
-                if coupling.links == list(links):
-                    ends = (coupling.motion(self.q + sign * way) for sign in (1, -1))
-                    rates += np.subtract(*ends) / (2 * ε) * fastest
+                if isinstance(coupling, Couplings) and coupling.links == list(links):
+                    rates += coupling.rates(self.q, v)
         return rates
 
     def section_forces(self) -> Array:

@@ -136,10 +136,10 @@ class Course:
         """Begin a search for an equilibrium."""
         self.flags[:] = self._first[hold]
 
-    def relieve(self) -> bool:
-        """Let points around those that open answer elastically, if there are any."""
-        self.flags[RELIEF] = self.flags[OPENED]
-        return bool(self.flags[RELIEF])
+    def relieve(self, relief: bool) -> bool:
+        """Let points around those that open answer elastically, or no more; whether there are any."""
+        self.flags[RELIEF] = relief and self.flags[OPENED]
+        return bool(self.flags[OPENED])
 
 
 class Points:

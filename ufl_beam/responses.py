@@ -80,6 +80,9 @@ class Response(Protocol):
     def begin(self, e0: Array, step: Step) -> None:
         """Begin a step at the motions ``e0``."""
 
+    def again(self) -> None:
+        """Begin the step again: forget what its iterates have tried."""
+
     def rows(self, e1: Array, λ: Array) -> Rows:
         """α, β, γ around an iterate."""
 
@@ -101,6 +104,16 @@ class Response(Protocol):
     @property
     def dissipated(self) -> Array:
         """Energy that each connector has dissipated plastically; (num_links,); J."""
+
+    def about_force(self, rows: Array) -> Array:
+        """Factor by which rows about the force are divided, zero for rows about the motion.
+
+        Args:
+            rows: The latest ones that Python has put; (num_links, 3).
+
+        Returns:
+            Shape (num_links,).
+        """
 
     def remaining(self) -> Array:
         """Part of the elastic stiffness that is left in the latest iterate; (num_links,)."""
@@ -161,6 +174,9 @@ class _Working:
         """Those of the nodes."""
         return e
 
+    def again(self) -> None:
+        """Nothing depends on iterates."""
+
     def accept(self, e1: Array, work: float) -> None:
         """Enter the work."""
         if self._entry:
@@ -185,6 +201,11 @@ class _Working:
     def dissipated(self) -> Array:
         """None by plastic flow."""
         return np.zeros(len(self._links))
+
+    def about_force(self, rows: Array) -> Array:
+        """Factors of one, but for those that are held in the iterate."""
+        about_motion = np.array([link.holds for link in self._links]) & (rows[:, 1] != 1.0)
+        return np.where(about_motion, 0.0, 1.0)
 
     def remaining(self) -> Array:
         """All of it: nothing yields."""
@@ -348,17 +369,18 @@ class _Rubbing(_Working):
     def _prepare(self) -> None:
         size = self._setting.simulation.scene.size
         self._slip: Array = np.zeros(len(self._links))
+        self._accepted: Array = self._slip
         lengths = np.where([c.turns for c in self._links], 1.0, size)
         self._tiny = 1e-14 * lengths
         self._softness = (CREEP if self._setting.friction_repeats else 0.0) * lengths
 
     def state(self) -> Array:
         """Which way each slips."""
-        return self._slip[:, None]
+        return self._accepted[:, None]
 
     def restore(self, rows: Array) -> None:
         """Take over :meth:`state`."""
-        self._slip = rows[:, 0].copy()
+        self._slip = self._accepted = rows[:, 0].copy()
 
     def _note(self, step: Step) -> None:
         simulation = self._setting.simulation
@@ -366,7 +388,17 @@ class _Rubbing(_Working):
         self._creep = self._softness / np.where(limit > 0, limit, np.inf)
         # With this way the velocity at the end is zero; with none, that before would come back.
         self._way = self._setting.scheme.way_to_rest(step.dt) * simulation.rates(self._links)
+        self.again()
+
+    def again(self) -> None:
+        """Slip as before the step; an attempt that failed tells nothing."""
+        self._slip = self._accepted
         self._against = np.zeros(len(self._links), dtype=bool)
+
+    def accept(self, e1: Array, work: float) -> None:
+        """Enter the work, and take which way each slips."""
+        super().accept(e1, work)
+        self._accepted = self._slip
 
     def rows(self, e1: Array, λ: Array) -> Rows:
         """What sticks comes to rest until it bears too much; what slips goes on until it turns."""
@@ -457,6 +489,13 @@ class _Sprung:
         """The force around the iterate."""
         r, D = self.points.respond(self._at(e1))
         return -D[:, 0], 1.0, r[:, 0] - D[:, 0] * e1
+
+    def again(self) -> None:
+        """Points answer each iterate anew."""
+
+    def about_force(self, rows: Array) -> Array:
+        """Factors of one."""
+        return np.ones(len(self._strains))
 
     def accept(self, e1: Array, work: float) -> None:
         """Commit the internal variables."""

@@ -237,6 +237,14 @@ class RigidPlasticResponse:
         """None: held connectors stay held, internal variables kept."""
         return np.zeros(len(e1))
 
+    def again(self) -> None:
+        """Go on from the accepted state."""
+        self._way[:] = self._way_before
+
+    def about_force(self, rows: Array) -> Array:
+        """Factors of the rows of those that slip, see rigid_plastic.c."""
+        return np.where(self._way == 0, 0.0, -self._slope)
+
     def remaining(self) -> Array:
         """Part of the stiffness that is left in the latest iterate, 0 of what slips."""
         return np.where(self._way == 0, 1.0, 0.0)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
-from ufl_beam.curves import Point
+from ufl_beam.axis_curves import Point
 from ufl_beam.errors import SceneError
 
 SAMPLES = 1000

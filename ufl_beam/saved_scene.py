@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 
 from ufl_beam import (
+    axis_curves,
     beams,
     bodies,
     connectors,
-    curves,
     discretisation,
     distributions,
     fibres,
@@ -40,7 +40,7 @@ Sampling = Callable[[Any, str, Any], Any]
 """Record that stands for a function, given the record and the field that it is in."""
 
 MODULES: tuple[ModuleType, ...] = (
-    *(beams, bodies, connectors, curves, discretisation, distributions, fibres, laws, loads),
+    *(axis_curves, beams, bodies, connectors, discretisation, distributions, fibres, laws, loads),
     *(saved_functions, scene, sections, viscous),
 )
 

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, singledispatch
 
+import numpy as np
+
 from ufl_beam.beams import Beam, Place, Point
 from ufl_beam.bodies import (
     GROUND,
@@ -19,6 +21,7 @@ from ufl_beam.bodies import (
     require_anchor,
 )
 from ufl_beam.connectors import Actuator, Connector, Joint, Motor
+from ufl_beam.curves import enclosing_diameter
 from ufl_beam.errors import (
     SceneError,
     require_kind,
@@ -269,12 +272,15 @@ class Scene:
 
     @cached_property
     def size(self) -> float:
-        """Diagonal of the box around the undeformed scene; m."""
+        """Diameter of the smallest circle around the undeformed scene; m.
+
+        It is the same in all axes.  A single point is as large as its radius of gyration.
+        """
         points = [b.curve(s) for b in self.beams for s in b.vertices(())]
         points += [body.center for body in self.bodies]
         points += [place.point for _, place in self._attachments() if isinstance(place, Spot)]
-        xs, ys = zip(*points, strict=True)
-        return math.hypot(max(xs) - min(xs), max(ys) - min(ys)) or 1.0
+        gyration = [math.sqrt(b.inertia / b.mass) for b in self.bodies if b.mass > 0]
+        return enclosing_diameter(np.array(points)) or max(gyration, default=0.0) or 1.0
 
     @cached_property
     def links(self) -> tuple[Connector, ...]:
@@ -374,7 +380,7 @@ class Scene:
             if joint.meets and gap > 1e-9 * self.size:
                 raise SceneError(
                     f"{joint.kind}: joint ends lie {gap:.6g} m apart: {here} and {other}; "
-                    "RigidLink and Link join places that are apart"
+                    f"{joint.advice}"
                 )
 
     @cached_property

@@ -236,6 +236,7 @@ class Simulation(Live):
             forces=self.force,
             excess=self._excess,
             relieve=self._relieve,
+            working=self._working,
             held=self.supports.dofs,
             newton=newton or Newton(),
             agreement=self.together,
@@ -311,9 +312,12 @@ class Simulation(Live):
             term.add_residual(q1, r)
         self.supports.enter(r)
 
-    def _relieve(self) -> bool:
-        """Whether another try with relieved points makes sense."""
-        here = self._course.relieve()
+    def _relieve(self, relief: bool) -> bool:
+        """Begin again with relieved points, or end that; whether it makes a difference."""
+        here = self._course.relieve(relief)
+        if relief:
+            for coupling in self.couplings:
+                coupling.again()
         return self.share.comm.allreduce(here, op=MPI.LOR) if self.share.comm.size > 1 else here
 
     def _excess(self, x: Array, r: Array, scale: float, moved: float) -> float:
@@ -321,6 +325,13 @@ class Simulation(Live):
         q1 = self.supports.in_plane(x)
         here = max((c.excess(q1, r, scale, moved) for c in self.couplings), default=0.0)
         return self.share.largest(here) if self.scene.links else 0.0
+
+    def _working(self, x: Array, y: Array) -> Array:
+        """What residuals work on in the step ``y`` from ``x``: laws of connectors on motions."""
+        q, v, works = self.supports.in_plane(x), self.supports.in_plane(y), y.copy()
+        for coupling in self.couplings:
+            coupling.put_motions(q, v, works)
+        return works
 
     def _tangent(self, x: Array) -> None:
         self._assemble(self.supports.in_plane(x))

@@ -19,23 +19,17 @@ from ufl_beam.equation import Demand, Equation
 from ufl_beam.errors import SceneError, StepFailed, require_number
 from ufl_beam.factors import Bordered, ChainsFirst
 from ufl_beam.grid import Index, Share
+from ufl_beam.line_search import SearchingNewton
 from ufl_beam.loops import doubles, ffi, integers, lib
 from ufl_beam.sparse import Csr
 
 FULL_STEPS = {"snes_linesearch_type": "basic"}
 """A norm in a line search would add forces and moments, and each search costs a residual."""
 
-TO_NO_WORK = {
-    "snes_linesearch_type": "cp",
-    "snes_linesearch_max_it": 4,
-    "snes_linesearch_atol": 0.0,
-    "snes_linesearch_rtol": 0.5,
-    "snes_linesearch_maxstep": 1.0,
-}
-"""Steps to where the residual does no work on them: for points that flow to and fro.
+PATIENCE = 10
+"""Iterations in a row without half the least residual that are one too many.
 
-Forces that grow in an S, as in a point that yields one way or the other, send full steps from one
-branch to the other and back for ever.
+Those that wander longer find a solution by luck: the last digits of the data would decide.
 """
 
 REASONS = {
@@ -118,7 +112,10 @@ class Solver:
             tolerance too.
         equation: ``residual``, ``complete`` and ``tangent`` in C, on one process.
         held: Local degrees of freedom that supports hold; what stands for them in A means nothing.
-        relieve: Makes tangents stiffer where that may help; says whether it can.
+        relieve: Begins again with tangents that are stiffer where that may help, or ends that; says
+            whether they differ: ``relieve(relief)``.
+        working: Of an iterate and a step from it: what the residual works on, see
+            :class:`SearchingNewton`; new arrays.
         newton: Tolerances.
         agreement: Raises on all processes what one has raised.
     """
@@ -133,7 +130,8 @@ class Solver:
         tangent: Callable[[Array], None],
         forces: Array,
         excess: Callable[[Array, Array, float, float], float],
-        relieve: Callable[[], bool],
+        relieve: Callable[[bool], bool],
+        working: Callable[[Array, Array], Array],
         held: Index,
         newton: Newton,
         agreement: Agreement,
@@ -141,7 +139,7 @@ class Solver:
     ) -> None:
         self._share, self._A, self._newton = share, A, newton
         self._residual, self._complete, self._tangent = residual, complete, tangent
-        self._excess, self._relieve = excess, relieve
+        self._excess, self._relieve, self._working = excess, relieve, working
         self._agreement = agreement
         self._at_forces = doubles(forces)
         self._parallel = share.comm.size > 1
@@ -286,8 +284,28 @@ class Solver:
         return snes
 
     @cached_property
-    def _careful(self) -> PETSc.SNES:
-        return self._make_snes(TO_NO_WORK)
+    def _careful(self) -> SearchingNewton:
+        return SearchingNewton(
+            self._snes,
+            self._ksp,
+            x=self._x,
+            f=self._f,
+            y=self._vector(),
+            w=self._vector(),
+            matrix=self._matrix,
+            test=lambda iteration: self._test(self._snes, iteration, ()),
+            near=lambda: bool(self._course.near),
+            work=self._work_on,
+            most=self._newton.max_iterations,
+        )
+
+    def _work_on(self, y: PETSc.Vec) -> Callable[[], float]:
+        """Work of the latest residual on a step from the present iterate; J."""
+        for vector in (self._x, y):
+            self._update_ghosts(vector)
+        number = len(self._weights)
+        step = self._working(self._view(self._x), self._view(y))[:number]
+        return lambda: self._share.total(float(self._r[:number] @ step))
 
     # -- with a border -------------------------------------------------------------------------
 
@@ -458,15 +476,28 @@ class Solver:
         reason = self._iterate(self._snes, 2)
         self._keeps = False
         if reason == lib.STALLED:
-            reason = self._iterate(self._careful, 10)
-        if reason <= 0 and self._may_go_on() and self._relieve():
+            reason = self._iterate(self._careful, PATIENCE)
+        if reason <= 0 and self._may_go_on() and self._relieve(True):
             x[:] = guess
             self._x.stateIncrease()
-            reason = self._iterate(self._snes, self._newton.max_iterations)
+            reason = self._relieved()
         if reason <= 0:
             raise self._failure(reason)
         self._update_ghosts(self._x)
         return x.copy()
+
+    def _relieved(self) -> int:
+        """Iterate with stiffer tangents, which come near but slowly, then with true ones."""
+        slow = self._iterate(self._snes, PATIENCE)
+        self._relieve(False)
+        if slow != lib.TOO_MANY and slow <= 0:
+            return slow
+        near = self._view(self._x).copy()
+        exact = self._iterate(self._snes, 2)
+        if exact <= 0:
+            self._view(self._x)[:] = near
+            self._x.stateIncrease()
+        return exact if exact > 0 else slow
 
     def _start(self, guess: Array, loads: list[Array]) -> Array:
         # On several processes they may change on some only.
@@ -478,7 +509,7 @@ class Solver:
         self._x.stateIncrease()
         return x
 
-    def _iterate(self, snes: PETSc.SNES, patience: int) -> int:
+    def _iterate(self, snes: PETSc.SNES | SearchingNewton, patience: int) -> int:
         """Solve; give up after so many iterations in a row without half the least residual."""
         course = self._course
         course.last = course.best = math.inf
