@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from ufl_beam.beams import Curve, Place, Point
 from ufl_beam.bodies import Anchor, arm, carries, ground, require_anchor
 from ufl_beam.errors import SceneError, require_kind, require_number, require_vector
-from ufl_beam.laws import Hardening, Softening
+from ufl_beam.laws import Hardening, HingeLaw, Softening, require_hinge_law
 from ufl_beam.loads import TimeFunction, require_time_function
 
 if TYPE_CHECKING:
@@ -186,6 +186,27 @@ class Coulomb:
 
 
 @dataclass(frozen=True)
+class RigidPlastic:
+    """No motion up to the limit of a law, which the motion follows beyond it.
+
+    There is no elastic stiffness: below the limit the motion is held exactly.  Plastic hinges of
+    beams, ``Beam(hinges={s: law})``, are rotations with this law.
+
+    Args:
+        law: :class:`Softening` or :class:`Hardening`; limit in N m or N, moduli in N m/rad or N/m,
+            fracture energy in J.
+
+    Raises:
+        SceneError: A law of another kind, or one that relaxes an elastic stress.
+    """
+
+    law: HingeLaw
+
+    def __post_init__(self) -> None:
+        require_hinge_law(self.law, "RigidPlastic: law")
+
+
+@dataclass(frozen=True)
 class Guide:
     """The point stays on a curve of the plane, free along it; see :func:`Guided`.
 
@@ -200,7 +221,18 @@ class Guide:
             raise SceneError(f"Guide: {self.curve!r} must be a function of s, giving (x, y)")
 
 
-Law = Guide | Motor | Actuator | Controller | Spring | Damper | Stop | Function | Coulomb
+Law = (
+    Guide
+    | Motor
+    | Actuator
+    | Controller
+    | Spring
+    | Damper
+    | Stop
+    | Function
+    | Coulomb
+    | RigidPlastic
+)
 
 
 def _still(t: float) -> float:
@@ -260,7 +292,7 @@ class Connector:
     @property
     def holds(self) -> bool:
         """Whether the law may demand a motion, whatever force that takes."""
-        return isinstance(self.law, Motor | Coulomb | Guide)
+        return isinstance(self.law, Motor | Coulomb | Guide | RigidPlastic)
 
     @property
     def arms(self) -> tuple[Point, Point]:

@@ -62,6 +62,19 @@ class Guides(Links):
         on = np.array([curve(s) for curve, s in zip(curves, self._s, strict=True)], dtype=float)
         return on, t
 
+    def _curvatures(self, n: Array) -> Array:
+        """Curvatures at the latest points, towards the normals ``n``; 1/m.
+
+        By second differences over 1e-4 of the scene, which leave 1e-8 of round-off.
+        """
+        found = []
+        for law, s, normal in zip(self._laws, self._s, n, strict=True):
+            on, t = np.asarray(law.curve(s)), tangent(law.curve, s)
+            ε = 1e-4 * self._size / math.hypot(*t)
+            bend = np.add(law.curve(s + ε), law.curve(s - ε)) - 2 * on
+            found.append(float(normal @ bend) / (ε**2 * float(t @ t)))
+        return np.array(found)
+
     def _at(self, q: Array) -> Array:
         return self._points + np.column_stack([q[self._x], q[self._y]])
 
@@ -85,6 +98,10 @@ class Guides(Links):
             d[k], bend[k] = self._in_the_middle(k)
         m, turning = (np.column_stack([-x[:, 1], x[:, 0]]) for x in (d, bend))
         distance = np.sum(n * (p - on), axis=1)
+        if not moves.all():
+            # The normal at the end turns by the curvature κ: dn = -κ t t.dp / (1 - κ distance).
+            κ = self._curvatures(n)
+            turning = np.where(moves[:, None], turning, (-κ / (1 - κ * distance))[:, None] * t)
         return distance, n, m, np.einsum("ki,kj->kij", turning, t)
 
     def _in_the_middle(self, k: int) -> tuple[Array, Array]:
@@ -133,10 +150,26 @@ class Guides(Links):
             for j in range(2):
                 np.add.at(data, self._stiff[2 * k + j], λ * dm[:, k, j])
 
+    def add_tangent_change(self, q1: Array, u: Array) -> None:
+        """Add the derivative of the tangent at ``q1`` along ``u``.
+
+        Only Python knows the curves, so it is a difference of fourth order, over a hundredth of
+        the scene: curvatures are known to 1e-8, which leaves 1e-6.
+        """
+        way = np.abs(u[np.r_[self._x, self._y]]).max(initial=0.0)
+        ε = 1e-2 * self._size / way if way > 0 else 1.0
+        data = self._A.data
+        before, change = data.copy(), np.zeros_like(data)
+        for k, weight in ((-2, 1), (-1, -8), (1, 8), (2, -1)):
+            data.fill(0.0)
+            self.add_tangent(q1 + k * ε * u)
+            change += weight / (12 * ε) * data
+        data[:] = before + change
+
     def demand(self) -> None:
         """None."""
 
-    def excess(self, q: Array, r: Array, force: float) -> float:
+    def excess(self, q: Array, r: Array, force: float, moved: float) -> float:
         """Largest distance, as a part of 1 % of the scene."""
         round_off = 8 * np.spacing(self._size + np.abs(self._points + self._on0).max(axis=1))
         missed = np.maximum(np.abs(r[self._forces_at]) - round_off, 0.0)
@@ -144,6 +177,22 @@ class Guides(Links):
 
     def change(self, q1: Array) -> float:
         """Guides take no energy."""
+        return 0.0
+
+    def flows(self) -> bool:
+        """None does."""
+        return False
+
+    def shown_motion(self, q: Array) -> Array:
+        """Motions of the accepted state ``q``; (num_links,); m."""
+        return self.motion(q)
+
+    def dissipated(self) -> Array:
+        """None: guides do not yield."""
+        return np.zeros(len(self.links))
+
+    def dissipation(self, q1: Array) -> float:
+        """None: guides do no work."""
         return 0.0
 
     def effort(self, q1: Array) -> float:
