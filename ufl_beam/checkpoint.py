@@ -26,11 +26,12 @@ from ufl_beam.compat import Array
 from ufl_beam.describe import CODE, Description, difference, has_state, kind_of
 from ufl_beam.errors import SceneError, require_count, require_number, require_sequence
 from ufl_beam.locks import Lock
+from ufl_beam.outputs import require_path
 from ufl_beam.pacing import Pace
 from ufl_beam.record import Recorder, on_first
 from ufl_beam.simulation import Simulation
 
-FORMAT = "checkpoint of ufl_beam, 1"
+FORMAT = "checkpoint of ufl_beam, 2"
 """To be counted up whenever files of before mean something else."""
 
 HEADER = 512
@@ -65,6 +66,7 @@ class Checkpoint:
     also: Sequence[Any] = ()
 
     def __post_init__(self) -> None:
+        require_path(self.path, "Checkpoint")
         what = f"Checkpoint {self.path}"
         if self.every is None and self.minutes is None:
             raise SceneError(f"{what}: say how often, every=1000 (steps), minutes=10, or both")
@@ -79,6 +81,12 @@ class Checkpoint:
                     f"{what}: also[{i}] = {one!r} has no state; give a random generator of NumPy, "
                     "or an object with methods state() and restore(state)"
                 )
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The file, and the one that takes its place; no other output may write them."""
+        path = Path(self.path)
+        return path, path.parent / f"{path.name}.part"
 
 
 class Keeper:
@@ -134,6 +142,7 @@ class Keeper:
             raise SceneError(f"checkpoint {self.path}: the directory cannot be written to")
         try:
             owner = self._lock.take()
+            exists = self.path.exists()
         except OSError as error:
             raise SceneError(
                 f"checkpoint {self.path}: {self._lock.path} cannot be written: {error.strerror}"
@@ -143,7 +152,7 @@ class Keeper:
                 f"checkpoint {self.path} is in use: {owner} writes it. Let that run end, or stop "
                 "it, or name another file"
             )
-        if self.path.exists():
+        if exists:
             self.found = read(self.path)
             self._require_same(self.found)
 

@@ -143,6 +143,10 @@ class Kernel:
         if (at := self._starts.get(id(function))) is not None:
             lib.set_cells(self.cells, doubles(q), at)
 
+    def uses(self, function: fem.Function) -> bool:
+        """Whether a function appears in the form."""
+        return id(function) in self._starts
+
     def put(self, function: fem.Function, values: Array) -> None:
         """Give ``function`` other values in the cells; shape (num_cells, dofs per cell)."""
         columns = self._columns[function]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
+import os
 import sys
 import sysconfig
 from collections.abc import Callable, Iterator, Sequence
@@ -41,6 +42,19 @@ DECLARATIONS = "\n".join(
 )
 """What all files of C know of each other."""
 
+SANITIZERS = (
+    "-O1",
+    "-g1",  # line numbers
+    "-fno-omit-frame-pointer",
+    "-fno-wrapv",
+    "-fsanitize=address,undefined,bounds-strict",
+    "-fno-sanitize-recover=all",
+)
+"""Flags that make the compiler check addresses and undefined behaviour; see `make sanitize`."""
+
+EXTRA = SANITIZERS if os.environ.get("UFL_BEAM_SANITIZE", "0") != "0" else ()
+"""Flags after those of each library: the sanitizers if ``UFL_BEAM_SANITIZE=1``, else none."""
+
 
 class CompilerError(RuntimeError):
     """The C compiler is missing, or refuses the code."""
@@ -66,12 +80,19 @@ def compiled(
     Raises:
         CompilerError: The compiler is missing, or refuses.
     """
+    flags = [*flags, *EXTRA]
     name = f"{stem}_{_digest(declarations, *made_of, *flags, sys.version)}"
 
     def build(directory: Path) -> ModuleType:
         builder = cffi.FFI()
         builder.cdef(declarations)
-        builder.set_source(name, source(), extra_compile_args=list(flags), libraries=["m"])
+        builder.set_source(
+            name,
+            source(),
+            extra_compile_args=flags,
+            extra_link_args=list(EXTRA),
+            libraries=["m"],
+        )
         with _explained(stem):
             builder.compile(tmpdir=directory)
         return load(directory)

@@ -18,12 +18,12 @@ from ufl_beam.errors import (
     require_count,
     require_kind,
     require_number,
-    require_sequence,
 )
 from ufl_beam.initial import mesh_of
+from ufl_beam.outputs import take
 from ufl_beam.pacing import Adaptive, AdaptiveSteps, EqualSteps, Pace
 from ufl_beam.processes import in_study, ours
-from ufl_beam.record import UNLIMITED, Recorder, on_first
+from ufl_beam.record import UNLIMITED, Recorder, close_all, recorders_of
 from ufl_beam.scene import Scene
 from ufl_beam.schemes import Scheme, has_inertia
 from ufl_beam.simulation import SMALLEST_PART, Simulation
@@ -82,14 +82,13 @@ def simulate(
     _require_step(dt, scheme, (t0, t1))
     require_count(every, "simulate: every")
     require_count(most, "simulate: most")
-    recorders = (record,) if isinstance(record, Recorder) else require_sequence(record, "record")
-    for i, recorder in enumerate(recorders):
-        require_kind(recorder, Recorder, f"simulate: record[{i}]")
-        on_first(comm, recorder.require_writable)
+    if checkpoint is not None:
+        require_kind(checkpoint, Checkpoint, "simulate: checkpoint")
+    kept = [] if checkpoint is None else [("checkpoint", checkpoint.files)]
+    recorders, outputs = recorders_of(record, comm, "simulate", *kept)
     begin = time.perf_counter()
     keeper: Keeper | None = None
     if checkpoint is not None:
-        require_kind(checkpoint, Checkpoint, "simulate: checkpoint")
         step = None if isinstance(dt, Adaptive) else EqualSteps(t0, t1, dt).dt
         call = {
             "scene": scene, "scheme": scheme, "t[0]": t0, "dt": dt, "every": every, "most": most,
@@ -112,6 +111,7 @@ def simulate(
         )
         stack.pop_all()  # the run closes it
     solution = simulation.solution
+    release = take(outputs)
 
     def after_step() -> None:
         if pace.steps % solution.every == 0 or pace.finished:
@@ -141,6 +141,7 @@ def simulate(
                 simulation.together(after_step)
                 bar.update(pace.progress - bar.n)
         simulation.end()
+        simulation.check_ledger()
     except BaseException as error:
         # Whatever stops a run, an interrupt or a user's function, what was reached is not lost.
         if simulation.share.comm.size == 1 or error is simulation.together.raised:
@@ -148,12 +149,14 @@ def simulate(
         error.__dict__["solution"] = solution
         raise
     finally:
-        for recorder in recorders:
-            recorder.close()
+        release()
+        close_all(recorders)
         simulation.close()
         if keeper is not None:
             keeper.close()
         solution.seconds = time.perf_counter() - begin
+    if comm.rank == 0:
+        solution.opened.warn(scheme, solution.times)
     return solution
 
 
