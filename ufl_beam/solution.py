@@ -19,7 +19,7 @@ from ufl_beam.connectors import Connector, Controller, Function, Guide, Joint
 from ufl_beam.errors import SceneError
 from ufl_beam.fields import Fields
 from ufl_beam.grid import Grid, Index, Share
-from ufl_beam.guides import nearest
+from ufl_beam.curves import nearest, parameter_step
 from ufl_beam.inelastic import Strains
 from ufl_beam.joints import Connection, JointHistory, links_of, motion_of, of_joint, velocity_of
 from ufl_beam.ledger import Energy
@@ -233,7 +233,8 @@ class Solution:
             if isinstance(link.law, Guide) and link.law.curve is curve:
                 s = 0.0
                 for point in self.position(link.b):
-                    s = nearest(curve, point, s)
+                    step = parameter_step(curve, s, self.scene.size)
+                    s = nearest(curve, point, s, step, self.scene.size)
                     used.append(s)
         first, last = float(np.nanmin(used)), float(np.nanmax(used))
         more = 0.1 * (last - first) or 1e-3
