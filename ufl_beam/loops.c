@@ -479,9 +479,9 @@ void commit(const points *p)
       ask(p->end, w, SAID, s);
       const double before = w[STIFFNESS] * (w[BEFORE] - w[JUMP] / w[LENGTH] - w[PLASTIC]);
       const double change = s[STRESS] - before;
-      const double hardened = s[LOST] - change * change / (2 * w[STIFFNESS]);
+      const double hardened = s[LOST] - change / w[STIFFNESS] * change / 2;
       const double relaxed = hardened - change / 2 * s[FLOW];
-      if (relaxed > 0) sum[6] += volume * relaxed;
+      if (s[FLOW] != 0 && relaxed > 0) sum[6] += volume * relaxed;
       w[BEFORE] = w[STRAIN];
       w[PLASTIC] += s[FLOW];
       w[ACCUMULATED] += fabs(s[FLOW]);

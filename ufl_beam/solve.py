@@ -441,9 +441,7 @@ class Solver:
     def _find_motion(self) -> None:
         """Note the largest motion of the iterate in any process, at most the size of the scene."""
         largest = lib.largest_motion(*self._norm, doubles(self._view(self._x)))
-        if self._parallel:
-            largest = self._share.comm.allreduce(largest, op=MPI.MAX)
-        self._course.moved = min(largest, self._course.scene)
+        self._course.moved = min(self._share.largest(largest), self._course.scene)
 
     def _last_digits(self) -> Array:
         digits = np.empty(self._share.size)
