@@ -24,7 +24,7 @@ from ufl_beam.inelastic import Strains
 from ufl_beam.joints import Connection, JointHistory, links_of, motion_of, of_joint, velocity_of
 from ufl_beam.ledger import Energy
 from ufl_beam.memory import State
-from ufl_beam.opened import Opened, cells_in_words
+from ufl_beam.opened import Opened, cells_in_words, percent
 from ufl_beam.outputs import require_path
 from ufl_beam.parameter import TIME
 from ufl_beam.processes import ours
@@ -520,7 +520,7 @@ class Solution:
         number, worst = sum(one.number for one in hinges), max(hinges, key=lambda one: one.error)
         return (
             f"embedded hinges opened in {cells_in_words(number)}; their place within the cell "
-            f"shifts the limit by at most {100 * worst.error:.2g} % ({worst.beam.name}, cell at "
+            f"shifts the limit by at most {percent(worst.error)} ({worst.beam.name}, cell at "
             f"s = {worst.place.s:.3g})\n"
         )
 
