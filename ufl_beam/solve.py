@@ -15,7 +15,7 @@ import numpy as np
 
 from ufl_beam.agreement import Agreement
 from ufl_beam.compat import Array
-from ufl_beam.equation import Demand, Equation
+from ufl_beam.equation import Demand, Equation, unlock
 from ufl_beam.errors import SceneError, StepFailed, require_number
 from ufl_beam.factors import Bordered, ChainsFirst
 from ufl_beam.grid import Index, Share
@@ -531,6 +531,8 @@ class Solver:
             reason = int(lib.SINGULAR)  # KLU stops PETSc where it finds no pivot
         if self._equation is not None:
             self._error = self._error or self._equation.taken_error()
+        if reason <= 0:
+            unlock(self._f)
         self._done = snes.getIterationNumber()
         self.iterations += self._done
         return reason
