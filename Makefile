@@ -1,6 +1,6 @@
 # Every target runs through ./env, which brings DOLFINx where it is missing. `make` lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-mpi verify sanitize long demos check bench bench-peers extremes schemes study
+.PHONY: help demo test test-mpi verify sanitize long demos check check-paraview bench bench-peers extremes schemes study
 
 # Natively as root Open MPI refuses to start; with more ranks than cores, too (the last two lines: versions 5 and 6).
 # ./env sets the same in its root.
@@ -46,6 +46,9 @@ demos: ## all demos one after the other, then the cheap ones on 2 ranks
 
 check: ## lint, format and types
 	@./env sh -ec '$(with_ruff); $$ruff check; $$ruff format --check; python3 -m mypy'
+
+check-paraview: ## whether ParaView shows what runs write; builds a root with ParaView once, 2.3 GB
+	@tests/paraview/check
 
 extremes: ## what happens at the extremes, as a table in docs/extremes.md
 	@./env python3 benchmarks/extremes

@@ -20,6 +20,7 @@ from ufl_beam.connectors import (
     Revolute,
     Rigid,
     RigidLink,
+    RigidPlastic,
     Slide,
     Spring,
     Stop,
@@ -42,7 +43,7 @@ from ufl_beam.decay import (
 from ufl_beam.discretisation import Mesh
 from ufl_beam.distributions import Lognormal, Normal, TruncatedNormal, Weibull
 from ufl_beam.envelopes import plot_cycles, plot_extremes
-from ufl_beam.errors import ConvergenceError, SceneError, TradeoffError
+from ufl_beam.errors import ConvergenceError, ModelWarning, SceneError, TradeoffError
 from ufl_beam.events import Event, Events
 from ufl_beam.exact_schemes import DecayingMidpoint, ExactStatic, Midpoint, PrintedMidpoint
 from ufl_beam.extremes import Extent, Extremes
@@ -71,7 +72,7 @@ from ufl_beam.modes import Buckling, Modes, buckling, modes
 from ufl_beam.pacing import Adaptive
 from ufl_beam.pictures import plot
 from ufl_beam.precision import Tradeoff
-from ufl_beam.record import XDMF, History, Recorder
+from ufl_beam.record import History, Recorder
 from ufl_beam.render import animate, render
 from ufl_beam.running import say, simulate
 from ufl_beam.scene import (
@@ -86,15 +87,20 @@ from ufl_beam.scene import (
 )
 from ufl_beam.sections import Section
 from ufl_beam.simulation import Simulation
-from ufl_beam.solution import Solution
+from ufl_beam.solution import Solution, load
 from ufl_beam.solve import Newton
 from ufl_beam.studies import study
+from ufl_beam.time_series import VTKHDF, XDMF
 from ufl_beam.tradeoffs import tradeoff
+from ufl_beam.version import version
 from ufl_beam.view import picture, plot_energy, plot_history, plot_shapes
 from ufl_beam.viscous import KelvinVoigt, Rayleigh
 from ufl_beam.work_precision import plot_tradeoff
 
+__version__ = version()
+
 __all__ = [
+    "VTKHDF",
     "XDMF",
     "Actuator",
     "Adaptive",
@@ -145,6 +151,7 @@ __all__ = [
     "Lognormal",
     "Mesh",
     "Midpoint",
+    "ModelWarning",
     "Modes",
     "Motor",
     "Newmark",
@@ -165,6 +172,7 @@ __all__ = [
     "Revolute",
     "Rigid",
     "RigidLink",
+    "RigidPlastic",
     "Roller",
     "RotatingFrame",
     "SNCurve",
@@ -196,6 +204,7 @@ __all__ = [
     "fit_decay",
     "follow",
     "ground",
+    "load",
     "logarithmic_decrement",
     "modes",
     "peaks",

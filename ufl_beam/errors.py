@@ -13,25 +13,43 @@ class SceneError(ValueError):
     """
 
 
+class ModelWarning(UserWarning):
+    """A scene or a call that is likely, but not surely, wrong.
+
+    The message says which object it is about, what is unusual and what to do.  To silence one
+    that is meant: ``warnings.filterwarnings("ignore", category=ub.ModelWarning)``; to make all of
+    them errors: ``warnings.simplefilter("error", ub.ModelWarning)``.
+    """
+
+
 class StepFailed(Exception):
     """No equilibrium was found for a step; the message says why.
 
     Attributes:
         residuals: What is left where it is largest in each beam, body and connector; N, moments
             over the size of the scene.
+        reason: Name that PETSc has for why its solver stopped, such as "DIVERGED_MAX_IT"; empty if
+            it did not fail.
     """
 
     def __init__(self, message: str) -> None:
         super().__init__(message)
         self.residuals: dict[str, float] = {}
+        self.reason = ""
+
+    def saying(self, message: str) -> StepFailed:
+        """The same failure with another message."""
+        other = StepFailed(message)
+        other.residuals = self.residuals
+        return other
 
 
 class ConvergenceError(RuntimeError):
     """A step found no equilibrium, even after it was cut; nothing before it is lost.
 
     Attributes:
-        time: Time of the last accepted state; s.
-        dt: The smallest step that was tried; s.
+        time: Time of the last accepted state, on a path its load factor; s.
+        dt: The smallest step that was tried, on a path the change of the load factor; s.
         solution: The :class:`~ufl_beam.solution.Solution` up to ``time``; ``start=solution`` goes
             on from there with another step or scheme.
         residuals: What is left of the equilibrium where it is largest in each beam, body and
@@ -39,6 +57,8 @@ class ConvergenceError(RuntimeError):
             equilibria were found but refused.
         forces: Sizes of the forces that should be in equilibrium, by kind: "beams", "connectors",
             "loads", "inertia", "damping"; N.
+        reason: Name that PETSc has for why its solver stopped, such as "DIVERGED_MAX_IT"; empty if
+            equilibria were found but refused.
     """
 
     def __init__(
@@ -50,6 +70,7 @@ class ConvergenceError(RuntimeError):
         solution: Any,
         residuals: dict[str, float],
         forces: dict[str, float],
+        reason: str = "",
     ) -> None:
         super().__init__(message)
         self.time = time
@@ -57,6 +78,7 @@ class ConvergenceError(RuntimeError):
         self.solution = solution
         self.residuals = residuals
         self.forces = forces
+        self.reason = reason
 
 
 class TradeoffError(RuntimeError):

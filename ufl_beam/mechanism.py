@@ -12,7 +12,7 @@ from scipy.sparse.linalg import eigsh
 from ufl_beam.beams import Beam, Point
 from ufl_beam.bodies import GROUND, Anchor, Body, Node, Spot, node
 from ufl_beam.compat import Array
-from ufl_beam.connectors import Connector, Coulomb, Function, Guide, Motor, Spring
+from ufl_beam.connectors import Connector, Coulomb, Function, Guide, Motor, RigidPlastic, Spring
 from ufl_beam.errors import SceneError
 from ufl_beam.scene import Scene, Slot
 
@@ -161,7 +161,7 @@ def _center(part: Beam | Body) -> Point:
     return (xa + xb) / 2, (ya + yb) / 2
 
 
-RESISTING = (Motor, Guide, Spring, Function)
+RESISTING = (Motor, Guide, Spring, Function, RigidPlastic)
 """Laws of connectors that resist every motion; others bear nothing, or what they are told."""
 
 

@@ -102,7 +102,7 @@ def notes_of(scene: Scene) -> list[str]:
     laws = {b.section.hinge for b in scene.beams if b.section.hinge and b.section.hinge.opens}
     if laws:
         limits = sorted({with_unit(law.limit, "N m") for law in laws})
-        notes.append(f"dots: a hinge may form in each cell, from {', '.join(limits[:4])}")
+        notes.append(f"dots: hinges may form, from {', '.join(limits[:4])}")
     return notes
 
 

@@ -14,7 +14,7 @@ from ufl_beam.beams import Curve
 from ufl_beam.bodies import GROUND, Anchor, Body, Spot
 from ufl_beam.compat import Array
 from ufl_beam.connectors import Connector, Guide
-from ufl_beam.guides import nearest, tangent
+from ufl_beam.curves import nearest, parameter_step, tangent
 from ufl_beam.joints import motion_of, turned
 from ufl_beam.scene import Scene
 from ufl_beam.skeleton import spots_of
@@ -107,7 +107,8 @@ class Model(Setting):
 
     def _start(self, holder: Connector) -> tuple[float, float]:
         if isinstance(holder.law, Guide):
-            return _used(holder.law.curve, np.empty((0, 2)), (), 3.0 * self.unit)
+            more, size = 3.0 * self.unit, self.made.size
+            return _used(holder.law.curve, np.empty((0, 2)), (), more, size)
         start = float(np.dot(_along(holder), holder.apart))
         return start, start
 
@@ -210,7 +211,8 @@ def _travel(stage: Stage, holder: Connector) -> tuple[float, float]:
     shown = range(len(solution.times)) if stage.shown is None else stage.shown
     points = solution.position(holder.b)
     if isinstance(holder.law, Guide):
-        return _used(holder.law.curve, points, shown, 3.0 * stage.unit)
+        size = stage.scene.size
+        return _used(holder.law.curve, points, shown, 3.0 * stage.unit, size)
     along = _along(holder)
     ahead = turned(along, solution.displacement(holder.a)[:, 2])
     way = np.sum((points - solution.position(holder.a)) * ahead, axis=1)[list(shown)]
@@ -219,15 +221,18 @@ def _travel(stage: Stage, holder: Connector) -> tuple[float, float]:
     return min(start, float(way.min())), max(start, float(way.max()))
 
 
-def _used(curve: Curve, points: Array, shown: Sequence[int], more: float) -> tuple[float, float]:
+def _used(
+    curve: Curve, points: Array, shown: Sequence[int], more: float, size: float
+) -> tuple[float, float]:
     """Parameters between which a guide curve was used, and a length more if it goes on."""
     found = [0.0]
     for point in points:
-        found.append(nearest(curve, point, found[-1]))
+        step = parameter_step(curve, found[-1], size)
+        found.append(nearest(curve, point, found[-1], step, size))
     used = [0.0, *(found[1:][n] for n in shown)]
 
     def beyond(s: float, sign: float) -> float:
-        there = s + sign * more / math.hypot(*tangent(curve, s))
+        there = s + sign * more / math.hypot(*tangent(curve, s, parameter_step(curve, s, size)))
         try:
             goes_on = bool(np.isfinite(curve(there)).all())
         except (ValueError, ArithmeticError):

@@ -21,12 +21,14 @@ RECORDS = [
     "beams",
     "bodies",
     "connectors",
+    "curves",
     "discretisation",
     "distributions",
     "errors",
     "fibres",
     "laws",
     "loads",
+    "plastic_hinges",
     "scene",
     "sections",
     "viscous",
@@ -136,7 +138,7 @@ def test_records_need_no_machinery(module):
         assert not outside(one) & MACHINERY, one
 
 
-PETSC = {"eigen", "equation", "factors", "native", "solve", "sparse"}
+PETSC = {"eigen", "equation", "factorisation", "factors", "native", "solve", "sparse"}
 
 
 def test_only_what_solves_imports_petsc():
@@ -244,4 +246,4 @@ def test_the_script_of_the_readme_runs(tmp_path, monkeypatch):
     assert names["solution"].times[-1] == 0.4
     assert names["solution"].energy.worst < 1e-9  # the ledger closes, design.md section 9
     assert (tmp_path / "portal.png").stat().st_size > 1000
-    assert (tmp_path / "portal.h5").exists()
+    assert (tmp_path / "portal.xdmf").exists()

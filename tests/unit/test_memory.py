@@ -75,6 +75,7 @@ def test_memory_does_not_grow():
 
 @unsanitized
 @pytest.mark.serial
+@pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")
 def test_memory_does_not_grow_with_inelastic_material():
     """A frame that yields and breaks, swayed to and fro in 2000 steps."""
     section = ub.Section(

@@ -53,6 +53,7 @@ LAWS = {
     "actuator": ub.Actuator(lambda t: t),
     "controller": ub.Controller(lambda simulation: 0.0),
     "function": ub.Function(lambda motion, rate: motion),
+    "rigid-plastic": ub.RigidPlastic(ub.Softening(1e3, 10.0)),
 }
 
 OBJECTS = {
@@ -186,9 +187,22 @@ def test_hinges_are_shown_where_they_are():
     law = ub.Softening(2e4, 1e3)
     beam = ub.Beam((0, 0), (4, 0), STEEL, cells=4, hinges={0.0: law, 0.75: law})
     figure = ub.plot(ub.Scene([beam], supports=[ub.Clamped(beam.start)]))
-    middles = [np.ptp(x, axis=0) / 2 + x.min(axis=0) for x in shapes(figure, "hinges")]
-    np.testing.assert_allclose(middles, [(0.0, 0.0), (3.0, 0.0)], atol=1e-9)
+    found = shapes(figure, "hinges")
+    middles = np.array(sorted(tuple(np.ptp(x, axis=0) / 2 + x.min(axis=0)) for x in found))
+    np.testing.assert_allclose(middles[:, 1], 0.0, atol=1e-9)
+    assert 0.0 < middles[0, 0] < 0.3  # beside the clamp
+    assert middles[1, 0] == pytest.approx(3.0)
     assert words(figure).count("hinge 20 kN m") == 2
+
+
+def test_a_section_with_a_hinge_shows_it_in_all_cells_and_at_the_ends():
+    law = ub.Softening(2e4, 1e3)
+    section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0, hinge=law)
+    beam = ub.Beam((0, 0), (4, 0), section, cells=4)
+    supports = [ub.Clamped(beam.start), ub.Clamped(beam.end)]
+    figure = ub.plot(ub.Scene([beam], supports=supports))
+    assert len(shapes(figure, "hinges")) == 4 + 2
+    assert words(figure) == ["dots: hinges may form, from 20 kN m", "beam"]
 
 
 def boxes(figure, gid="labels"):
