@@ -26,11 +26,11 @@ from ufl_beam.ledger import Energy
 from ufl_beam.memory import State
 from ufl_beam.opened import Opened, cells_in_words
 from ufl_beam.outputs import require_path
+from ufl_beam.parameter import TIME
 from ufl_beam.processes import ours
 from ufl_beam.record import on_first
 from ufl_beam.saved_functions import SavedCurve, SavedFunction
 from ufl_beam.saved_scene import from_data, lost, to_data
-from ufl_beam.parameter import TIME
 from ufl_beam.scene import Scene, Support
 from ufl_beam.sparse import Product
 from ufl_beam.terms import SectionForces, mass_matrix

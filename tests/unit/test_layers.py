@@ -138,7 +138,10 @@ def test_records_need_no_machinery(module):
         assert not outside(one) & MACHINERY, one
 
 
-PETSC = {"eigen", "equation", "factorisation", "factors", "native", "solve", "sparse"}
+PETSC = {
+    *{"eigen", "equation", "factorisation", "factors"},
+    *{"line_search", "native", "solve", "sparse"},
+}
 
 
 def test_only_what_solves_imports_petsc():
