@@ -42,7 +42,7 @@ from ufl_beam.decay import (
 from ufl_beam.discretisation import Mesh
 from ufl_beam.distributions import Lognormal, Normal, TruncatedNormal, Weibull
 from ufl_beam.envelopes import plot_cycles, plot_extremes
-from ufl_beam.errors import ConvergenceError, SceneError, TradeoffError
+from ufl_beam.errors import ConvergenceError, ModelWarning, SceneError, TradeoffError
 from ufl_beam.events import Event, Events
 from ufl_beam.exact_schemes import DecayingMidpoint, ExactStatic, Midpoint, PrintedMidpoint
 from ufl_beam.extremes import Extent, Extremes
@@ -144,6 +144,7 @@ __all__ = [
     "Lognormal",
     "Mesh",
     "Midpoint",
+    "ModelWarning",
     "Modes",
     "Motor",
     "Newmark",

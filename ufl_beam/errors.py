@@ -13,6 +13,15 @@ class SceneError(ValueError):
     """
 
 
+class ModelWarning(UserWarning):
+    """A scene or a call that is likely, but not surely, wrong.
+
+    The message says which object it is about, what is unusual and what to do.  To silence one
+    that is meant: ``warnings.filterwarnings("ignore", category=ub.ModelWarning)``; to make all of
+    them errors: ``warnings.simplefilter("error", ub.ModelWarning)``.
+    """
+
+
 class StepFailed(Exception):
     """No equilibrium was found for a step; the message says why.
 
