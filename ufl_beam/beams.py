@@ -10,9 +10,14 @@ from itertools import pairwise
 from ufl_beam.errors import (
     SceneError,
     require_count,
+    require_function,
     require_kind,
+    require_memory,
     require_number,
+    require_sequence,
+    require_text,
     require_vector,
+    shorten,
 )
 from ufl_beam.laws import Softening
 from ufl_beam.sections import Section
@@ -55,22 +60,25 @@ class Beam:
     hinges: Mapping[float, Softening] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        require_text(self.name, "Beam: name")
         a, b = (require_vector(x, f"{self.name}: end") for x in (self.a, self.b))
         object.__setattr__(self, "a", a)
         object.__setattr__(self, "b", b)
         if not isinstance(self.section, Section):
-            raise SceneError(f"{self.name}: section = {self.section!r} is not a Section")
-        require_count(self.cells, f"{self.name}: cells")
-        object.__setattr__(self, "cells", int(self.cells))
+            raise SceneError(f"{self.name}: section = {shorten(self.section)} is not a Section")
+        object.__setattr__(self, "cells", require_count(self.cells, f"{self.name}: cells"))
+        require_memory(self.cells, f"{self.name}: cells = {self.cells}")
         if self.curve is None:
             if a == b:
                 raise SceneError(f"{self.name}: zero length, both ends are at {a}")
             object.__setattr__(self, "curve", lambda s: _between(a, b, s))
         for s, end in ((0.0, a), (1.0, b)):
-            there = require_vector(self.curve(s), f"{self.name}: curve({s:g})")
+            there = point_of(self.curve, s, f"{self.name}: curve")
             if math.dist(there, end) > 1e-9 * max(math.hypot(*there), math.hypot(*end)):
                 raise SceneError(f"{self.name}: curve({s:g}) = {there} is not the end {end}")
-        for s in self.corners:
+        corners = require_sequence(self.corners, f"{self.name}: corners")
+        object.__setattr__(self, "corners", corners)
+        for s in corners:
             require_number(s, f"{self.name}: corner")
             if not 0.0 < s < 1.0:
                 raise SceneError(f"{self.name}: corner s = {s:g} must lie between 0 and 1")
@@ -85,7 +93,7 @@ class Beam:
                 f"{self.name}: hinges are for resultants; here the fibres of the section soften"
             )
         for s in (*self.corners, *(i / self.cells for i in range(self.cells + 1))):
-            require_vector(self.curve(s), f"{self.name}: curve({s:g})")
+            point_of(self.curve, s, f"{self.name}: curve")
 
     @classmethod
     def arc(
@@ -116,6 +124,7 @@ class Beam:
         cls, points: Sequence[Point], section: Section, *, cells: int = 8, name: str = "beam"
     ) -> Beam:
         """Straight pieces through ``points``, rigidly joined; ``s`` is the part of the length."""
+        points = require_sequence(points, f"{name}: points")
         xy = [require_vector(p, f"{name}: point {i}") for i, p in enumerate(points)]
         if len(xy) < 2:
             raise SceneError(f"{name}: a polyline needs at least two points, not {len(xy)}")
@@ -136,8 +145,7 @@ class Beam:
     @classmethod
     def along(cls, curve: Curve, section: Section, *, cells: int = 8, name: str = "beam") -> Beam:
         """Any curve ``s -> (x, y)``, ``s`` from 0 to 1; m."""
-        a = require_vector(curve(0.0), f"{name}: curve(0)")
-        b = require_vector(curve(1.0), f"{name}: curve(1)")
+        a, b = (point_of(curve, s, f"{name}: curve") for s in (0.0, 1.0))
         return cls(a, b, section, cells=cells, name=name, curve=curve)
 
     def at(self, s: float) -> Place:
@@ -186,7 +194,7 @@ class Place:
 
     def __post_init__(self) -> None:
         if not isinstance(self.beam, Beam):
-            raise SceneError(f"Place: {self.beam!r} is not a Beam")
+            raise SceneError(f"Place: {shorten(self.beam)} is not a Beam")
         require_number(self.s, f"{self.beam.name}.at(s): s")
         if not 0.0 <= self.s <= 1.0:
             raise SceneError(f"{self.beam.name}.at({self.s:g}): s must lie between 0 and 1")
@@ -201,6 +209,20 @@ class Place:
         ends = {0.0: "start", 1.0: "end"}
         x, y = self.point
         return f"{self.beam.name}.{ends.get(self.s, f'at({self.s:g})')} ({x:g}, {y:g})"
+
+
+def point_of(curve: Curve, s: float, what: str) -> Point:
+    """Evaluate a curve of a user.
+
+    Raises:
+        SceneError: It fails there, or returns no pair of finite numbers; the message has ``what``.
+    """
+    require_function(curve, what, "s that returns (x, y)")
+    try:
+        point = curve(s)
+    except Exception as error:
+        raise SceneError(f"{what}({s:g}) fails: {shorten(error)}") from error
+    return require_vector(point, f"{what}({s:g})")
 
 
 def _between(p: Point, q: Point, s: float) -> Point:

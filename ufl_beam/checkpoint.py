@@ -24,7 +24,14 @@ import numpy as np
 
 from ufl_beam.compat import Array
 from ufl_beam.describe import CODE, Description, difference, has_state, kind_of
-from ufl_beam.errors import SceneError, require_count, require_number, require_sequence
+from ufl_beam.errors import (
+    SceneError,
+    require_count,
+    require_number,
+    require_path,
+    require_sequence,
+    shorten,
+)
 from ufl_beam.pacing import Pace
 from ufl_beam.record import Recorder, on_first
 from ufl_beam.simulation import Simulation
@@ -64,6 +71,7 @@ class Checkpoint:
     also: Sequence[Any] = ()
 
     def __post_init__(self) -> None:
+        require_path(self.path, "Checkpoint: path")
         what = f"Checkpoint {self.path}"
         if self.every is None and self.minutes is None:
             raise SceneError(f"{what}: say how often, every=1000 (steps), minutes=10, or both")
@@ -75,8 +83,8 @@ class Checkpoint:
         for i, one in enumerate(self.also):
             if not has_state(one):
                 raise SceneError(
-                    f"{what}: also[{i}] = {one!r} has no state; give a random generator of NumPy, "
-                    "or an object with methods state() and restore(state)"
+                    f"{what}: also[{i}] = {shorten(one)} has no state; give a random generator of "
+                    "NumPy, or an object with methods state() and restore(state)"
                 )
 
 

@@ -55,8 +55,9 @@ class Grid:
     """
 
     def __init__(self, scene: Scene, mesh: Mesh | None = None) -> None:
-        require_kind(mesh or Mesh(), Mesh, "mesh")
-        self.scene, self.mesh = scene, mesh or Mesh()
+        mesh = Mesh() if mesh is None else mesh
+        require_kind(mesh, Mesh, "mesh")
+        self.scene, self.mesh = scene, mesh
         self._parameters = [np.array(self.mesh.vertices(b, scene.attached[b])) for b in scene.beams]
         counts = np.array([len(p) for p in self._parameters], dtype=np.int64)
         self._first = np.concatenate([[0], np.cumsum(counts)])

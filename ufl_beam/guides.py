@@ -9,7 +9,7 @@ import numpy as np
 from ufl_beam.beams import Curve
 from ufl_beam.compat import Array
 from ufl_beam.connectors import Guide
-from ufl_beam.errors import StepFailed
+from ufl_beam.errors import SceneError, StepFailed, shorten
 from ufl_beam.grid import Index, Share
 from ufl_beam.links import Links
 from ufl_beam.memory import Memory
@@ -24,7 +24,21 @@ PROJECTIONS = 50
 def tangent(curve: Curve, s: float) -> Array:
     """Derivative of a curve by its parameter; (2,); m."""
     ε = 1e-6
-    return np.asarray(np.subtract(curve(s + ε), curve(s - ε)) / (2 * ε))
+    return (_on(curve, s + ε) - _on(curve, s - ε)) / (2 * ε)
+
+
+def _on(curve: Curve, s: float) -> Array:
+    """Point of a curve; (2,); m."""
+    try:
+        point = np.asarray(curve(s), dtype=np.float64)
+        if point.shape == (2,):
+            return point
+    except (TypeError, ValueError):
+        pass
+    raise SceneError(
+        f"guide curve: curve({s:g}) = {shorten(curve(s))} must be a pair (x, y); it must be one "
+        "for all s that the motion may reach"
+    )
 
 
 def nearest(curve: Curve, point: Array, s: float) -> float:
@@ -37,7 +51,7 @@ def nearest(curve: Curve, point: Array, s: float) -> float:
     """
     for _ in range(PROJECTIONS):
         t = tangent(curve, s)
-        step = float((point - curve(s)) @ t / (t @ t))
+        step = float((point - _on(curve, s)) @ t / (t @ t))
         s += step
         if abs(step) * math.hypot(*t) <= 1e-15 * math.hypot(*point):
             return s
@@ -79,7 +93,7 @@ class Guides(Links):
             raise StepFailed(f"{place} is where no nearest point of its guide curve was found")
         self._s = found
         t = np.array([tangent(curve, s) for curve, s in zip(curves, self._s, strict=True)])
-        on = np.array([curve(s) for curve, s in zip(curves, self._s, strict=True)], dtype=float)
+        on = np.array([_on(curve, s) for curve, s in zip(curves, self._s, strict=True)])
         return on, t / np.linalg.norm(t, axis=1)[:, None]
 
     def _at(self, q: Array) -> Array:

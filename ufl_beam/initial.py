@@ -14,10 +14,13 @@ from ufl_beam.solution import Solution
 
 def mesh_of(start: Solution | None, mesh: Mesh | None) -> Mesh:
     """The mesh of a call: the one it says, that of the solution it starts with, or that given."""
+    if mesh is not None:
+        require_kind(mesh, Mesh, "mesh")
+        return mesh
     if start is None:
-        return mesh or Mesh()
+        return Mesh()
     require_kind(start, Solution, "start")
-    return mesh or start.grid.mesh
+    return start.grid.mesh
 
 
 def initial_state(grid: Grid, start: Solution | None) -> tuple[Array, Array]:

@@ -14,6 +14,7 @@ from ufl_beam.bodies import GROUND, Anchor, Body, Node, Spot, node
 from ufl_beam.compat import Array
 from ufl_beam.connectors import Connector, Coulomb, Function, Guide, Motor, Spring
 from ufl_beam.errors import SceneError
+from ufl_beam.loads import value_at
 from ufl_beam.scene import Scene, Slot
 
 DENSE = 90
@@ -43,7 +44,7 @@ def no_number(scene: Scene, times: Iterable[float]) -> str:
     """What has a time function that is no finite number at one of the times; empty if nothing."""
     for t in times:
         for owner, function in scene.time_functions():
-            if not math.isfinite(value := float(function(t))):
+            if not math.isfinite(value := value_at(function, t, owner)):
                 return f"{owner}: the time function is {value} at t = {t:.9g} s"
     return ""
 

@@ -16,10 +16,10 @@ from mpi4py import MPI
 import basix.ufl
 import numpy as np
 
-from ufl_beam.bodies import Anchor
+from ufl_beam.bodies import Anchor, require_anchor
 from ufl_beam.compat import Array, fem, io, line_mesh
 from ufl_beam.connectors import Connector, Joint
-from ufl_beam.errors import SceneError, require_count
+from ufl_beam.errors import SceneError, require_count, require_kind, require_path, require_sequence
 from ufl_beam.grid import Grid
 from ufl_beam.joints import links_of, motion_of
 from ufl_beam.memory import State
@@ -104,6 +104,7 @@ class XDMF(Recorder):
     """
 
     def __init__(self, path: str | Path, *, every: int = 1) -> None:
+        require_path(path, "XDMF: path")
         require_count(every, f"XDMF {path}: every")
         self._path, self._every = Path(path), every
         if self._path.suffix != ".xdmf":
@@ -260,11 +261,16 @@ class History(Recorder):
         every: int = 1,
         most: int = UNLIMITED,
     ) -> None:
+        require_path(path, "History: path")
         require_count(every, f"History {path}: every")
         require_count(most, f"History {path}: most")
         self._first_every, self._most = every, most
-        self._path, self._places = Path(path), tuple(places)
-        self._connectors = tuple(connectors)
+        self._path, self._places = Path(path), require_sequence(places, f"History {path}: places")
+        self._connectors = require_sequence(connectors, f"History {path}: connectors")
+        for i, place in enumerate(self._places):
+            require_anchor(place, f"History {path}: places[{i}]")
+        for i, one in enumerate(self._connectors):
+            require_kind(one, (Connector, Joint), f"History {path}: connectors[{i}]")
         self._files: list[Any] = []
 
     def require_writable(self) -> None:

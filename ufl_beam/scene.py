@@ -19,7 +19,7 @@ from ufl_beam.bodies import (
     node,
     require_anchor,
 )
-from ufl_beam.connectors import Actuator, Connector, Joint, Motor
+from ufl_beam.connectors import Actuator, Bearing, Connector, Joint, Motor
 from ufl_beam.errors import (
     SceneError,
     require_kind,
@@ -36,6 +36,7 @@ from ufl_beam.loads import (
     RotatingFrame,
     TimeFunction,
     require_time_function,
+    value_at,
 )
 from ufl_beam.viscous import Damping, KelvinVoigt, Rayleigh
 
@@ -47,7 +48,7 @@ Slot = tuple[Node, int]
 
 
 @dataclass(frozen=True, eq=False)
-class Support:
+class Support(Bearing):
     """Components of motion of a place that are given; made by :func:`Clamped` and its siblings.
 
     Attributes:
@@ -387,7 +388,7 @@ def _(load: PointLoad) -> tuple[Connector, ...]:
         return ()
 
     def push(motion: str, size: float, axis: Point = (1.0, 0.0)) -> Connector:
-        law = Actuator(lambda t: size * load.time(t))
+        law = Actuator(lambda t: size * value_at(load.time, t, load))
         return Connector("PointLoad", motion, ground(*load.place.point), load.place, law, axis)
 
     (x, y), moment = load.force, load.moment

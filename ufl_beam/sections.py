@@ -65,6 +65,8 @@ class Section:
             require_number(getattr(self, name), f"Section: {name}", at_least=0.0)
         if self.depth == 0.0:
             object.__setattr__(self, "depth", math.sqrt(12 * self.EI / self.EA))
+        if self.fibres is not None:
+            require_kind(self.fibres, PlacedFibres, "Section: fibres")
         laws = {name: getattr(self, name) for name in ("axial", "shear", "bending", "hinge")}
         for name, law in laws.items():
             if law is not None:
@@ -126,9 +128,14 @@ class Section:
             fibres: Fibres; their sums are then EA and EI.
             laws: ``axial``, ``shear``, ``bending`` and ``hinge`` of :class:`Section`.
         """
-        if not -1.0 < nu <= 0.5:
+        for name, value in (("A", A), ("I", I), ("E", E), ("shear_factor", shear_factor)):
+            require_number(value, f"Section: {name}", positive=True)
+        for name, value in (("rho", rho), ("depth", depth)):
+            require_number(value, f"Section: {name}", at_least=0.0)
+        if not -1.0 < require_number(nu, "Section: nu") <= 0.5:
             raise SceneError(f"Section: nu = {nu} must lie in (-1, 0.5]")
-        require_number(E, "Section: E", positive=True)
+        if fibres is not None:
+            require_kind(fibres, PlacedFibres, "Section: fibres")
         GA = shear_factor * A * E / (2 * (1 + nu))
         EA, EI = (E * A, E * I) if fibres is None else (fibres.EA, fibres.EI)
         return cls(
@@ -155,6 +162,7 @@ class Section:
             SceneError: The lists do not fit, or all fibres lie at one y.
         """
         require_kind(fibres, Fibres, "Section.of_fibres: fibres")
+        require_number(E, "Section: E", positive=True)
         placed = PlacedFibres.at(fibres, E, y, A)
         total, depth = float(placed.A.sum()), float(np.ptp(placed.y))
         return cls.of_shape(
@@ -310,6 +318,7 @@ def _place(
     if fibres is None:
         return None
     require_kind(fibres, Fibres, "Section: fibres")
+    require_number(E, "Section: E", positive=True)
     return PlacedFibres.layers(fibres, E, h, area, first_moment, edges)
 
 

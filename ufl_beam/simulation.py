@@ -17,7 +17,14 @@ from ufl_beam.dampers import damping_forces
 from ufl_beam.differences import numerical_forces
 from ufl_beam.discretisation import Mesh
 from ufl_beam.equation import Equation
-from ufl_beam.errors import ConvergenceError, SceneError, StepFailed, require_kind
+from ufl_beam.errors import (
+    ConvergenceError,
+    SceneError,
+    StepFailed,
+    require_kind,
+    require_number,
+    shorten,
+)
 from ufl_beam.fields import Fields
 from ufl_beam.grid import Grid, Share
 from ufl_beam.inelastic import InelasticBeams, inelastic_cells
@@ -36,7 +43,7 @@ from ufl_beam.mechanism import (
 from ufl_beam.memory import NOWHERE, Memory, Restoring, Saving, State
 from ufl_beam.path import StaticPath
 from ufl_beam.points import Course, expect_entries
-from ufl_beam.processes import give_back_memory, ours
+from ufl_beam.processes import communicator, give_back_memory
 from ufl_beam.responses import Setting
 from ufl_beam.rotating import FrameForces
 from ufl_beam.scene import Scene
@@ -116,13 +123,15 @@ class Simulation(Live):
         mesh: Mesh | None = None,
         comm: MPI.Intracomm | None = None,
     ) -> None:
-        comm = ours() if comm is None else comm
+        comm = communicator(comm, "comm")
         require_kind(scene, Scene, "scene")
         if not isinstance(scheme, Scheme) or isinstance(scheme, type):
             raise SceneError(
-                f"scheme = {scheme!r} must be a scheme, such as Static() or Midpoint()"
+                f"scheme = {shorten(scheme)} must be a scheme, such as Static() or Midpoint()"
             )
-        require_kind(newton or Newton(), Newton, "newton")
+        require_number(t0, "t0")
+        newton = Newton() if newton is None else newton
+        require_kind(newton, Newton, "newton")
         if has_inertia(scheme):
             require_masses(scene)
             scheme.require(scene)
@@ -205,7 +214,7 @@ class Simulation(Live):
             excess=self._excess,
             relieve=self._relieve,
             held=self.supports.dofs,
-            newton=newton or Newton(),
+            newton=newton,
         )
         self.solution = Solution(scene, self.grid)
         give_back_memory()
@@ -431,7 +440,7 @@ class Simulation(Live):
 
         All processes ask together, whoever computes the connector.
         """
-        self.asked = {link: law.ask(self) for link, law in self._asking}
+        self.asked = {link: law.ask(self, link) for link, law in self._asking}
 
     def _require_small(self, turn: float) -> None:
         """Raise if a node of any process turns too far in the step."""

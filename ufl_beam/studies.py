@@ -19,9 +19,9 @@ from mpi4py.futures import MPICommExecutor
 
 from tqdm import tqdm
 
-from ufl_beam.errors import SceneError, require_sequence
+from ufl_beam.errors import SceneError, require_path, require_sequence, require_switch, shorten
 from ufl_beam.gathered import Outcome, Study, numbers_of, text_of
-from ufl_beam.processes import alone, ours
+from ufl_beam.processes import alone, communicator
 from ufl_beam.record import on_first
 from ufl_beam.running import say
 
@@ -69,7 +69,11 @@ def study(
             and arrays, or not the names and shapes of the others; the file has those before.
         RuntimeError: All members failed.
     """
-    comm = ours() if comm is None else comm
+    comm = communicator(comm, "study: comm")
+    require_switch(anew, "study: anew")
+    require_switch(progress, "study: progress")
+    if path is not None:
+        require_path(path, "study: path")
     name = getattr(member, "__name__", type(member).__name__)
     todo: dict[str, Case] = {}
     records: dict[str, tuple[Outcome, float]] = {}
@@ -77,7 +81,7 @@ def study(
 
     def prepare() -> None:
         if not callable(member):
-            raise SceneError(f"study: member = {member!r} cannot be called; give a function")
+            raise SceneError(f"study: member = {shorten(member)} cannot be called; give a function")
         for i, case in enumerate(require_sequence(cases, "study: cases")):
             key = text_of(case, f"study: cases[{i}]")
             if key in todo:

@@ -27,6 +27,7 @@ RECORDS = [
     "fibres",
     "laws",
     "loads",
+    "numeric",
     "scene",
     "sections",
     "viscous",
