@@ -201,7 +201,7 @@ class Coulomb:
         """Return the limit of the next step; all processes call it together."""
         if self.joint is None:
             return self.force
-        return self.force + self.coefficient * simulation.press(self.joint)
+        return self.force + self.coefficient * simulation.press(self.joint)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ PROJECTIONS = 50
 def tangent(curve: Curve, s: float) -> Array:
     """Derivative of a curve by its parameter; (2,); m."""
     ε = 1e-6
-    return (_on(curve, s + ε) - _on(curve, s - ε)) / (2 * ε)
+    return np.asarray((_on(curve, s + ε) - _on(curve, s - ε)) / (2 * ε))
 
 
 def _on(curve: Curve, s: float) -> Array:

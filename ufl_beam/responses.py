@@ -282,7 +282,7 @@ class _Asked(_Working):
         return -slope, 1.0, force - slope * e1
 
 
-def _given(link: Connector, force: Any, motion: float, rate: float) -> float:
+def _given(link: Connector, force: Any, motion: Any, rate: Any) -> float:
     """Evaluate the force of a :class:`Function`; its owner is named if it is no number."""
     value = force(motion, rate)
     if isinstance(value, float):

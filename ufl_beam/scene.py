@@ -19,7 +19,7 @@ from ufl_beam.bodies import (
     node,
     require_anchor,
 )
-from ufl_beam.connectors import Actuator, Bearing, Connector, Joint, Motor
+from ufl_beam.connectors import Actuator, Bearing, Connector, Coulomb, Joint, Motor
 from ufl_beam.errors import (
     SceneError,
     require_kind,
@@ -250,6 +250,8 @@ class Scene:
         for connector in self.links:
             if node(connector.a) == node(connector.b):
                 raise SceneError(f"{connector}: both ends are at the same body or cross-section")
+            if isinstance(connector.law, Coulomb) and connector.law.joint is not None:
+                self._require_pressing(connector, connector.law.joint)
         self._require_single_supports()
 
     @cached_property
@@ -334,6 +336,24 @@ class Scene:
                     f"{joint.kind}: joint ends lie {gap:.6g} m apart: {here} and {other}; "
                     "RigidLink and Link join places that are apart"
                 )
+
+    def _require_pressing(self, connector: Connector, pressing: Bearing) -> None:
+        """Raise unless the force of what presses on friction can be known."""
+        if pressing not in (*self.joints, *self.supports):
+            raise SceneError(
+                f"{connector}: {pressing}, which presses on its friction, is not in the scene; add "
+                "it to joints or supports"
+            )
+        if isinstance(pressing, Support) and not pressing.held.keys() & {0, 1}:
+            raise SceneError(
+                f"{connector}: {pressing}, which presses on its friction, holds no displacement "
+                "and bears no force; name another support or joint"
+            )
+        if isinstance(pressing, Joint) and all(holder.turns for holder in pressing.holders):
+            raise SceneError(
+                f"{connector}: {pressing}, which presses on its friction, shares unknowns, so that "
+                "its force is not known; make it with measured=True"
+            )
 
     @cached_property
     def representatives(self) -> dict[Slot, Slot]:

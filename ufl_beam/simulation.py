@@ -506,7 +506,7 @@ class Simulation(Live):
         memory = Saving(self.share)
         for one in (*self.inelastic, *self.couplings):
             one.remember(memory, self.q)
-        if self.supports.work:
+        if self.supports.work or any(isinstance(law, Coulomb) for _, law in self._asking):
             self.supports.carry_on(memory, self.q)
         if self._path is None:
             self.inertia.carry_on(memory, len(self.inertia.more))

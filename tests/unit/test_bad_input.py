@@ -381,6 +381,45 @@ def test_supports_at_one_place_that_hold_different_things():
     assert len(scene.supports) == 4
 
 
+# -- what presses on friction --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("press", "says"),
+    [
+        (lambda a, b: ub.Revolute(a.end, b.start), ("shares unknowns", "measured=True")),
+        (lambda a, b: ub.Release(a.end, b.start, free="M"), ("shares unknowns", "measured=True")),
+        (lambda a, b: ub.Prescribed(a.start, psi=0.0), ("holds no displacement",)),
+    ],
+)
+def test_friction_pressed_by_a_force_that_is_not_known(press, says):
+    a, b = beam(name="a"), ub.Beam((1, 0), (2, 0), SECTION, name="b")
+    pressing = press(a, b)
+    rub = ub.Turn(a.end, b.start, ub.Coulomb(coefficient=1.0, joint=pressing))
+    kind = "joints" if isinstance(pressing, ub.Joint) else "supports"
+    with raises("Turn(a.end (1, 0), b.start (1, 0))", str(pressing), *says):
+        ub.Scene([a, b], connectors=[rub], **{kind: [pressing]})
+    with raises("Turn(a.end (1, 0), b.start (1, 0))", str(pressing), "is not in the scene"):
+        ub.Scene([a, b], connectors=[rub])
+
+
+@pytest.mark.parametrize("free", ["M", "N", "V", "NV", "NM"])
+def test_a_release_can_be_measured(free):
+    """What it transmits is held by forces, its rotation too."""
+    a, b = beam(name="a"), ub.Beam((1, 0), (2, 0), SECTION, name="b")
+    joint = ub.Release(a.end, b.start, free=free, measured=True)
+    assert joint.shared == ()
+    assert len(joint.holders) == 3 - len(free)
+    held = [ub.Clamped(a.start), ub.Clamped(b.end)]
+    push = ub.PointLoad(a.at(0.5), force=(1.0, 1.0), moment=1.0)
+    motions = []
+    for one in (ub.Release(a.end, b.start, free=free), joint):
+        scene = ub.Scene([a, b], joints=[one], supports=held, loads=[push])
+        motions.append(run(scene, ub.Static()).displacement(b.start)[-1])
+    # The same equilibrium with other unknowns; Newton's tolerance is 1e-10 of the forces
+    np.testing.assert_allclose(motions[1], motions[0], rtol=1e-7, atol=1e-12)
+
+
 # -- mechanisms in statics -----------------------------------------------------------------------
 
 

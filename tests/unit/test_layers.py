@@ -125,10 +125,11 @@ def test_records_need_no_machinery(module):
         assert not outside(one) & MACHINERY, one
 
 
-PETSC = {"eigen", "equation", "factors", "native", "solve", "sparse"}
+PETSC = {"compat", "eigen", "equation", "factors", "native", "solve", "sparse"}
 
 
 def test_only_what_solves_imports_petsc():
+    """And `compat`, which explains what is not installed."""
     assert {m for m in MODULES if "petsc4py" in outside(m)} <= PETSC
 
 
