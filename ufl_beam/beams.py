@@ -18,6 +18,7 @@ from ufl_beam.errors import (
     require_text,
     require_vector,
     shorten,
+    warn,
 )
 from ufl_beam.laws import Softening
 from ufl_beam.sections import Section
@@ -92,8 +93,19 @@ class Beam:
             raise SceneError(
                 f"{self.name}: hinges are for resultants; here the fibres of the section soften"
             )
-        for s in (*self.corners, *(i / self.cells for i in range(self.cells + 1))):
-            point_of(self.curve, s, f"{self.name}: curve")
+        at = sorted({*self.corners, *(i / self.cells for i in range(self.cells + 1))})
+        points = [point_of(self.curve, s, f"{self.name}: curve") for s in at]
+        self._warn_of_thickness(sum(math.dist(p, q) for p, q in pairwise(points)))
+
+    def _warn_of_thickness(self, length: float) -> None:
+        """Warn if the radius of gyration of a section is larger than the beam is long."""
+        depth = self.section.depth
+        if depth > math.sqrt(12) * length > 0.0:
+            warn(
+                f"{self.name}: its section is {depth:.3g} m deep (sqrt(12 EI/EA) where no depth is "
+                f"given), but it is only {length:.3g} m long. Are sizes of the section in mm? "
+                "Units are SI: m, N, N m². If EI is large on purpose, give the section its depth"
+            )
 
     @classmethod
     def arc(

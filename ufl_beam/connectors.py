@@ -393,6 +393,12 @@ class Joint(Bearing):
         return f"{self.kind}({', '.join(map(str, self.places))})"
 
     @property
+    def sameness(self) -> object:
+        """Key that joints share if they hold the same motions of the same places."""
+        held = [(link.motion, link.axis, id(link.law)) for link in self.holders]
+        return self.kind, frozenset(self.places), tuple(held)
+
+    @property
     def carriers(self) -> tuple[Anchor, ...]:
         """The anchors whose displacement is that of their node."""
         return tuple(place for place in self.places if carries(place))

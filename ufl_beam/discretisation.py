@@ -15,7 +15,14 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.beams import Beam
-from ufl_beam.errors import SceneError, require_count, require_kind, require_number, shorten
+from ufl_beam.errors import (
+    SceneError,
+    require_count,
+    require_kind,
+    require_memory,
+    require_number,
+    shorten,
+)
 
 
 @dataclass(frozen=True)
@@ -100,6 +107,7 @@ class Mesh:
                     f"must be vertices; {beam.name} can take multiples of {least}"
                 )
         number = int((len(given) - 1) * self.refine)
+        require_memory(number, f"Mesh: refine = {self.refine} of {beam.name}, {number} cells,")
         return [_between(given, i / Fraction(self.refine)) for i in range(number + 1)]
 
 

@@ -112,6 +112,11 @@ def shorten(value: object) -> str:
         text = " ".join(repr(value).split())
     except Exception:  # of a class of the user, or of an integer with too many digits
         text = f"<{type(value).__name__}>"
+    return clip(text)
+
+
+def clip(text: str) -> str:
+    """Cut a text in the middle to a readable length."""
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 20]} ... {text[-15:]}"
 
 

@@ -97,6 +97,17 @@ class Grid:
             raise SceneError(f"{beam.name} is not in the scene")
         return self._number_of_beam[beam]
 
+    @property
+    def first_vertices(self) -> Index:
+        """First vertex of each beam, and the number of all vertices; (num_beams + 1,)."""
+        return self._first
+
+    def place(self, vertex: int) -> Place:
+        """Place of a vertex."""
+        number = int(np.searchsorted(self._first, vertex, side="right")) - 1
+        beam: Beam = self.scene.beams[number]
+        return beam.at(float(self._parameters[number][vertex - self._first[number]]))
+
     def vertices_of(self, beam: Beam) -> Index:
         """Vertices of a beam from start to end."""
         i = self._index(beam)

@@ -7,8 +7,9 @@ import numpy as np
 from ufl_beam.compat import Array
 from ufl_beam.connectors import HELD
 from ufl_beam.discretisation import Mesh
-from ufl_beam.errors import SceneError, require_kind
+from ufl_beam.errors import SceneError, require_kind, warn
 from ufl_beam.grid import Grid
+from ufl_beam.scene import COMPONENTS, Support
 from ufl_beam.solution import Solution
 
 
@@ -55,7 +56,43 @@ def _initial_velocity(grid: Grid) -> Array:
     known: Array = np.asarray(np.nan_to_num(v))
     if grid.scene.initial:
         _require_held(grid, known)
+        _require_free(grid, known)
     return known
+
+
+def _require_free(grid: Grid, v: Array) -> None:
+    """Refuse velocities that supports take away altogether, and warn of those that lose a part."""
+    held: dict[int, Support] = {}
+    for support in grid.scene.supports:
+        if support.moving:
+            continue
+        dofs = grid.node(support.place)
+        held.update((int(dofs[c]), support) for c in support.held if not support.angle)
+    fastest = np.abs(v).max() * max(grid.scene.size, 1.0)
+    stopped = {dof for dof in held if abs(v[dof]) > 1e-9 * fastest}
+    for velocity in grid.scene.initial:
+        for one in velocity.beams:
+            dofs = np.unique(grid.nodes_of(one)[1])
+            moving = {int(dof) for dof in dofs if abs(v[dof]) > 1e-9 * fastest}
+            lost = moving & stopped
+            if lost and lost == moving:
+                raise SceneError(
+                    f"Velocity: {one.name} does not move, because {held[min(lost)]} holds it; "
+                    "remove the support or the velocity"
+                )
+            if lost:
+                names = ", ".join(COMPONENTS[c] for c in _components(grid, lost))
+                warn(
+                    f"Velocity of {one.name}: {held[min(lost)]} holds {names} there, so that its "
+                    "velocity is zero there from the start while that of the rest is not, a blow. "
+                    "Give a velocity that agrees with the support, about= its place"
+                )
+
+
+def _components(grid: Grid, dofs: set[int]) -> list[int]:
+    """Components (0, 1, 2) of motion that degrees of freedom belong to."""
+    columns = np.vstack([grid.dofs, grid.dofs_of_bodies]).T
+    return [c for c in range(3) if np.isin(columns[c], list(dofs)).any()]
 
 
 def _require_held(grid: Grid, v: Array) -> None:

@@ -22,6 +22,7 @@ from ufl_beam.bodies import (
 from ufl_beam.connectors import Actuator, Bearing, Connector, Coulomb, Joint, Motor
 from ufl_beam.errors import (
     SceneError,
+    clip,
     require_kind,
     require_number,
     require_sequence,
@@ -162,13 +163,13 @@ class Velocity:
         beams: The beams and bodies that move so.
         linear: Velocity of the point ``about``; m/s.
         angular: Angular velocity; rad/s.
-        about: Point of the undeformed scene; m.
+        about: Point of the undeformed scene, by default the origin; m.
     """
 
     beams: tuple[Beam | Body, ...]
     linear: tuple[float, float] = (0.0, 0.0)
     angular: float = 0.0
-    about: Point = (0.0, 0.0)
+    about: Point | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "beams", require_sequence(self.beams, "Velocity: beams"))
@@ -176,13 +177,15 @@ class Velocity:
             require_kind(beam, (Beam, Body), f"Velocity: beams[{i}]")
         require_vector(self.linear, "Velocity: linear")
         require_number(self.angular, "Velocity: angular")
-        require_vector(self.about, "Velocity: about")
+        if self.about is not None:
+            require_vector(self.about, "Velocity: about")
 
     def at(self, x: float, y: float) -> tuple[float, float, float]:
         """(du/dt, dv/dt, dψ/dt) of the point (x, y); m/s, m/s, rad/s."""
+        about_x, about_y = self.about or (0.0, 0.0)
         return (
-            self.linear[0] - self.angular * (y - self.about[1]),
-            self.linear[1] + self.angular * (x - self.about[0]),
+            self.linear[0] - self.angular * (y - about_y),
+            self.linear[1] + self.angular * (x - about_x),
             self.angular,
         )
 
@@ -240,11 +243,12 @@ class Scene:
                     raise SceneError(
                         f"Scene: {one.name} is in the scene twice, as {first} and {part}[{i}]"
                     )
-        for owner, place in self._attachments():
+        for owner, place in self.attachments():
             one = place.beam if isinstance(place, Place) else place.body
             if one not in known:
                 part = "beams" if isinstance(one, Beam) else "bodies"
                 raise SceneError(f"{owner}: {one.name} is not in the scene; add it to {part}")
+        self._require_once()
         for joint in self.joints:
             self._require_together(joint)
         for connector in self.links:
@@ -259,7 +263,7 @@ class Scene:
         """Diagonal of the box around the undeformed scene; m."""
         points = [b.curve(s) for b in self.beams for s in b.vertices(())]
         points += [body.center for body in self.bodies]
-        points += [place.point for _, place in self._attachments() if isinstance(place, Spot)]
+        points += [place.point for _, place in self.attachments() if isinstance(place, Spot)]
         xs, ys = zip(*points, strict=True)
         return math.hypot(max(xs) - min(xs), max(ys) - min(ys)) or 1.0
 
@@ -273,7 +277,7 @@ class Scene:
     @cached_property
     def movers(self) -> tuple[Body, ...]:
         """The bodies, and the ground if something is attached to it."""
-        attached = [place for _, place in self._attachments()]
+        attached = [place for _, place in self.attachments()]
         attached += [link.a for link in self.links]
         return (*self.bodies, *((GROUND,) if any(node(p) is GROUND for p in attached) else ()))
 
@@ -291,8 +295,8 @@ class Scene:
             if isinstance(link.law, Actuator):
                 yield link, link.law.force
 
-    def _attachments(self) -> Iterator[tuple[object, Anchor]]:
-        """Everything with a place, and its place."""
+    def attachments(self) -> Iterator[tuple[object, Anchor]]:
+        """Iterate over all that has a place, and its place."""
         for joint in self.joints:
             for place in joint.places:
                 yield joint, place
@@ -320,10 +324,29 @@ class Scene:
     def attached(self) -> dict[Beam, list[float]]:
         """Parameters of the places of each beam that must be vertices."""
         found: dict[Beam, list[float]] = {beam: [] for beam in self.beams}
-        for _, place in self._attachments():
+        for _, place in self.attachments():
             if isinstance(place, Place):
                 found[place.beam].append(place.s)
         return found
+
+    def _require_once(self) -> None:
+        """Raise if a record is in a list twice, or if two joints are the same."""
+        for part in ("joints", "connectors", "loads", "masses", "initial", "damping"):
+            first: dict[int, int] = {}
+            for i, record in enumerate(getattr(self, part)):
+                j = first.setdefault(id(record), i)
+                if i != j:
+                    raise SceneError(
+                        f"Scene: {clip(str(record))} is there twice, as {part}[{j}] and "
+                        f"{part}[{i}]; remove one, or make two of them"
+                    )
+        seen: dict[object, int] = {}
+        for i, joint in enumerate(self.joints):
+            j = seen.setdefault(joint.sameness, i)
+            if i != j:
+                raise SceneError(
+                    f"Scene: {joint} is there twice, as joints[{j}] and joints[{i}]; remove one"
+                )
 
     def _require_together(self, joint: Joint) -> None:
         here, *others = joint.places

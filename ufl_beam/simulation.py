@@ -37,11 +37,19 @@ from ufl_beam.mechanism import (
     friction_repeats,
     no_number,
     require_independent,
+    require_inertia,
     require_masses,
     require_no_mechanism,
 )
 from ufl_beam.memory import NOWHERE, Memory, Restoring, Saving, State
 from ufl_beam.path import StaticPath
+from ufl_beam.plausibility import (
+    warn_of_far_points,
+    warn_of_jumps,
+    warn_of_masses,
+    warn_of_origin,
+    warn_of_touching,
+)
 from ufl_beam.points import Course, expect_entries
 from ufl_beam.processes import communicator, give_back_memory
 from ufl_beam.responses import Setting
@@ -134,12 +142,19 @@ class Simulation(Live):
         require_kind(newton, Newton, "newton")
         if has_inertia(scheme):
             require_masses(scene)
+            require_inertia(scene)
+            warn_of_masses(scene)
+            if scene.initial:
+                warn_of_origin(scene)
             scheme.require(scene)
         else:
             require_no_mechanism(scene)
         require_independent(scene)
         self.scene, self.scheme, self.comm = scene, scheme, comm
+        warn_of_far_points(scene)
         self.grid = Grid(scene, mesh_of(start, mesh))
+        if has_inertia(scheme):
+            warn_of_touching(self.grid)
         together = len(self.grid.cells) >= comm.size * SMALLEST_SHARE
         self.share = Share(self.grid, comm if together else MPI.COMM_SELF)
         q, v = initial_state(self.grid, start)
@@ -195,6 +210,9 @@ class Simulation(Live):
         self._multipliers = as_slice(self.share.multipliers())
         for term in self.terms:
             term.add_state(self.q)
+        if has_inertia(scheme):
+            motions = self.connections()[:, 0]
+            warn_of_jumps(self.grid, t0, q, motions)
         self._path: StaticPath | None = None
         if not scheme.dynamic:
             parts = (self.beams, self.couplings)

@@ -846,6 +846,7 @@ def turned(psi, **more):
     return ub.Scene([one], supports=[support], **more)
 
 
+@pytest.mark.filterwarnings("ignore:Prescribed at girder.start .* psi jumps:ufl_beam.ModelWarning")
 @pytest.mark.parametrize(
     ("psi", "time"),
     [(lambda t: 4.0 * (t > 0.55), 0.55), (lambda t: 4.0 * (t > 0), 0.0), (4.0, 0.0)],
@@ -954,6 +955,7 @@ def test_the_solution_of_an_interrupted_run_goes_on():
     np.testing.assert_allclose(rest.section_forces(one), whole.section_forces(one), atol=1e-9)
 
 
+@pytest.mark.filterwarnings("ignore:Prescribed at girder.start .* psi jumps:ufl_beam.ModelWarning")
 def test_a_simulation_after_a_failure_is_as_good_as_any():
     one = beam()
     scene = ub.Scene([one], loads=[ub.PointLoad(one.end, force=(1, 0))])
