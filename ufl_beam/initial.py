@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ufl_beam.compat import Array
@@ -9,8 +11,10 @@ from ufl_beam.connectors import HELD
 from ufl_beam.discretisation import Mesh
 from ufl_beam.errors import SceneError, require_kind, warn
 from ufl_beam.grid import Grid
+from ufl_beam.memory import State
 from ufl_beam.scene import COMPONENTS, Support
 from ufl_beam.solution import Solution
+from ufl_beam.transfer import Transfer, same_unknowns
 
 
 def mesh_of(start: Solution | None, mesh: Mesh | None) -> Mesh:
@@ -24,17 +28,36 @@ def mesh_of(start: Solution | None, mesh: Mesh | None) -> Mesh:
     return start.grid.mesh
 
 
-def initial_state(grid: Grid, start: Solution | None) -> tuple[Array, Array]:
-    """Configuration and velocities at all degrees of freedom, before anything is built."""
-    q, v = np.zeros(grid.size), _initial_velocity(grid)
+class InitialState(NamedTuple):
+    """State that a run begins with, in the numbering of its grid.
+
+    Attributes:
+        q: Configuration at all degrees of freedom.
+        v: Velocities at all degrees of freedom.
+        internal: Internal variables of cells and connectors; empty at the beginning.
+    """
+
+    q: Array
+    v: Array
+    internal: State
+
+
+def initial_state(grid: Grid, start: Solution | None) -> InitialState:
+    """Find the state that a run begins with, before anything is built.
+
+    Raises:
+        SceneError: The solution is of a scene whose state cannot be taken over.
+    """
+    v = _initial_velocity(grid)
     if start is None:
-        return q, v
-    if not grid.agrees(start.grid):
-        raise SceneError(
-            "start: the solution is of other beams, joints or cells; use the same Beam objects, "
-            "joined alike, and the same Mesh"
-        )
-    return start.q[-1], start.v[-1] if len(start.v) else v
+        return InitialState(np.zeros(grid.size), v, {})
+    q0, v0 = start.q[-1], start.v[-1] if len(start.v) else None
+    if same_unknowns(start.grid, grid):
+        return InitialState(q0, v if v0 is None else v0, start.internal)
+    transfer = Transfer(start.grid, grid)
+    q = transfer.state(q0)
+    velocity = v if v0 is None else transfer.velocity(v0)
+    return InitialState(q, velocity, transfer.internal(start.internal))
 
 
 def _initial_velocity(grid: Grid) -> Array:

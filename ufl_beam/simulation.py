@@ -157,7 +157,7 @@ class Simulation(Live):
             warn_of_touching(self.grid)
         together = len(self.grid.cells) >= comm.size * SMALLEST_SHARE
         self.share = Share(self.grid, comm if together else MPI.COMM_SELF)
-        q, v = initial_state(self.grid, start)
+        q, v, internal = initial_state(self.grid, start)
         self.fields = Fields(self.share)
         self._A = self.fields.matrix()
         self.t = t0
@@ -191,14 +191,14 @@ class Simulation(Live):
             for load in self.loads:
                 load.carry_on(self.t, self.q)
         if start is not None:
-            memory = Restoring(self.share, start.internal)
+            memory = Restoring(self.share, internal)
             for one in (*self.inelastic, *self.couplings):
                 one.remember(memory, NOWHERE)
-            if "reactions" in start.internal:
+            if "reactions" in internal:
                 self.supports.carry_on(memory, self.q)
             if has_inertia(scheme) and start.scene is scene and start.times[-1] == t0:
                 # No force has changed since: accelerations are still what they were.
-                known = sum(name in start.internal for name in scheme.kept)
+                known = sum(name in internal for name in scheme.kept)
                 self.inertia.carry_on(memory, known)
         self._q_before: Array = self.q
         self.last_dt = math.inf
@@ -210,7 +210,7 @@ class Simulation(Live):
         self._multipliers = as_slice(self.share.multipliers())
         for term in self.terms:
             term.add_state(self.q)
-        if has_inertia(scheme):
+        if has_inertia(scheme) and (scene.links or scene.supports):
             motions = self.connections()[:, 0]
             warn_of_jumps(self.grid, t0, q, motions)
         self._path: StaticPath | None = None

@@ -606,11 +606,34 @@ def test_start_from_another_scene():
         run(start=other)
 
 
-def test_start_from_other_joints():
-    a, b = beam(name="a"), ub.Beam((1, 0), (2, 0), SECTION, name="b")
-    hinged = run(ub.Scene([a, b], joints=[ub.Revolute(a.end, b.start)]))
+def test_start_from_other_cells():
+    """What is attached inside of a beam makes a vertex there."""
+    one = beam()
+    first = run(ub.Scene([one], masses=[ub.PointMass(one.at(0.3), 1.0)]))
+    with raises("start: girder has other vertices", "corners=(s, ...)"):
+        run(ub.Scene([one]), start=first)
     with raises("start: the solution is of other beams, joints or cells"):
-        run(ub.Scene([a, b], joints=[ub.Rigid(a.end, b.start)]), start=hinged)
+        run(ub.Scene([one]), start=first, mesh=ub.Mesh(2))
+
+
+def test_start_with_a_body_that_was_not_there():
+    one = beam()
+    hub = ub.Body((3, 0), mass=1.0, inertia=1.0, name="hub")
+    with raises("start: hub is not in the scene of the solution"):
+        run(ub.Scene([one], bodies=[hub]), start=run(ub.Scene([one])))
+
+
+def test_start_where_a_new_joint_is_apart():
+    """The hinge has turned by 2 rad/s · 1 s; a rigid joint would have to turn it back."""
+    a, b = beam(name="a"), ub.Beam((1, 0), (2, 0), SECTION, name="b")
+    turns = [ub.Velocity([x], angular=w, about=(1, 0)) for x, w in ((a, 0.0), (b, 2.0))]
+    hinge = ub.Revolute(a.end, b.start)
+    for end, says in ((1.0, ("are", "rad apart")), (1e-9, ("move", "rad/s apart"))):
+        hinged = run(ub.Scene([a, b], joints=[hinge], initial=turns), t=(0, end), dt=end / 8)
+        with raises("start: the new scene joins places that", *says, "psi of"):
+            run(ub.Scene([a, b], joints=[ub.Rigid(a.end, b.start)]), start=hinged)
+    still = run(ub.Scene([a, b], joints=[hinge]))
+    run(ub.Scene([a, b], joints=[ub.Rigid(a.end, b.start)]), start=still)
 
 
 # -- initial velocities --------------------------------------------------------------------------
