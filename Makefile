@@ -1,6 +1,6 @@
 # Every target runs through ./env, which brings DOLFINx where it is missing. `make` lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-mpi verify long demos check bench bench-peers extremes schemes study
+.PHONY: help demo test test-mpi verify sanitize long demos check check-paraview bench bench-peers extremes schemes study
 
 # Natively as root Open MPI refuses to start; with more ranks than cores, too (the last two lines: versions 5 and 6).
 # ./env sets the same in its root.
@@ -30,8 +30,12 @@ test-mpi: ## unit and property tests on 2 and on 3 ranks
 	@$(call mpi,2) $(pytest_mpi)
 	@$(call mpi,3) $(pytest_mpi)
 
-verify: ## the slow verification studies
+verify: ## the slow verification studies, then the unit tests with sanitizers
 	@./env python3 -m pytest -m slow
+	@$(MAKE) --no-print-directory sanitize
+
+sanitize: ## the unit tests with address and undefined-behaviour sanitizers in C; `make sanitize every=10` a tenth of them
+	@./env sh -ec '$(with_sanitizers) python3 -m pytest tests/unit --capture=sys -p no:cacheprovider --every=$(every)'
 
 long: ## a million steps of a softening frame: memory, files and ledger; a quarter of an hour
 	@UFL_BEAM_STEPS=1000000 ./env python3 -m pytest -m slow -s tests/verification/test_long_run.py
@@ -42,6 +46,9 @@ demos: ## all demos one after the other, then the cheap ones on 2 ranks
 
 check: ## lint, format and types
 	@./env sh -ec '$(with_ruff); $$ruff check; $$ruff format --check; python3 -m mypy'
+
+check-paraview: ## whether ParaView shows what runs write; builds a root with ParaView once, 2.3 GB
+	@tests/paraview/check
 
 extremes: ## what happens at the extremes, as a table in docs/extremes.md
 	@./env python3 benchmarks/extremes
@@ -61,6 +68,14 @@ bench: ## time per step
 
 bench-peers: ## beside Exudyn, OpenSees and a C loop: time, memory, error
 	@./env python3 benchmarks/peers
+
+# The library of the address sanitizer must be the first one of Python; exceptions of C++ need theirs beside it. Leaks are
+# looked for by no one: Python and MPI leave many. Each object has memory of its own, so that one sees where it ends, and
+# what is printed when the run ends goes past pytest.
+every ?= 1
+with_sanitizers = export UFL_BEAM_SANITIZE=1 PYTHONMALLOC=malloc PETSC_OPTIONS=-no_signal_handler; \
+	export ASAN_OPTIONS=detect_leaks=0:abort_on_error=1:allocator_may_return_null=1 UBSAN_OPTIONS=print_stacktrace=1; \
+	LD_PRELOAD=$$(gcc -print-file-name=libasan.so):$$(gcc -print-file-name=libstdc++.so.6)
 
 # ruff, which Debian lacks: from a venv beside the root of ./env, made on first use; its version is in pyproject.toml.
 with_ruff = tools=$${XDG_CACHE_HOME:-$$HOME/.cache}/ufl_beam/tools; ruff=$$tools/bin/ruff; \

@@ -55,7 +55,7 @@ def hub(t):
 
 def run(hinges, record=()):
     """The arm, its drive, and its motion for 1.3 s."""
-    arm = ub.Beam((0, 0), (L, 0), tube, cells=20, corners=(flange / L,), hinges=hinges, name="arm")
+    arm = ub.Beam((0, 0), (L, 0), tube, cells=20, hinges=hinges, name="arm")
     drive = ub.Prescribed(arm.start, u=0, v=0, psi=hub)
     scene = ub.Scene([arm], supports=[drive], masses=[ub.PointMass(arm.end, payload)])
     scheme = ub.Midpoint(alpha=0.02)

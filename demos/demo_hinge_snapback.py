@@ -36,7 +36,7 @@ def broken(ratio, cells=16):
     """The path of the cantilever, its tip load in parts of M_u/L."""
     energy = M_u**2 / (ratio * 3 * EI / L)  # J
     beam = ub.Beam(
-        (0, 0), (L, 0), section, cells=cells, corners=(1e-6,),
+        (0, 0), (L, 0), section, cells=cells,
         hinges={0.0: ub.Softening(limit=M_u, energy=energy)},
     )  # fmt: skip
     load = ub.PointLoad(beam.end, force=(0, M_u / L), time=lambda t: t)

@@ -181,4 +181,5 @@ ub.say("the ledger closes, and nothing overtakes sound")
 #
 # * `mpirun -n 2 python3 demos/demo_lattice.py`: the same numbers, in less time,
 # * `--cells 1000`: a wall of seven bays, in a second,
-# * `output/lattice.xdmf` in ParaView: *Warp By Vector* with the displacement, coloured by `M`.
+# * `output/lattice.xdmf` in ParaView: *Warp By Vector* with the displacement, coloured by `M`;
+#   then *Rescale to data range over all timesteps*, for at t = 0 nothing moves.

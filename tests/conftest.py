@@ -25,14 +25,20 @@ def _no_garbage():
     gc.collect()
 
 
+def pytest_addoption(parser):
+    """Add `--every=N`, for runs that are slow because something watches them."""
+    parser.addoption("--every", type=int, default=1, help="run the first of N tests each")
+
+
+@pytest.hookimpl(trylast=True)  # after the selection by markers
 def pytest_collection_modifyitems(config, items):
-    """Deselect what is marked `serial` on several ranks, the same on all of them."""
-    if COMM.size == 1:
-        return
-    serial = [item for item in items if item.get_closest_marker("serial")]
-    if serial:
-        config.hook.pytest_deselected(items=serial)
-        items[:] = [item for item in items if item not in serial]
+    """Deselect what is marked `serial` on several ranks, and all but every N-th test."""
+    serial = {i for i in items if COMM.size > 1 and i.get_closest_marker("serial")}
+    kept = [item for item in items if item not in serial][:: config.getoption("every")]
+    chosen = set(kept)
+    if deselected := [item for item in items if item not in chosen]:
+        config.hook.pytest_deselected(items=deselected)
+        items[:] = kept
 
 
 @pytest.fixture

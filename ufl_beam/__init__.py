@@ -24,6 +24,7 @@ from ufl_beam.connectors import (
     Revolute,
     Rigid,
     RigidLink,
+    RigidPlastic,
     Slide,
     Spring,
     Stop,
@@ -73,8 +74,9 @@ from ufl_beam.loads import (
 from ufl_beam.mode_pictures import plot_modes
 from ufl_beam.modes import Buckling, Modes, buckling, modes
 from ufl_beam.pacing import Adaptive
+from ufl_beam.pictures import plot
 from ufl_beam.precision import Tradeoff
-from ufl_beam.record import XDMF, History, Recorder
+from ufl_beam.record import History, Recorder
 from ufl_beam.render import animate, render
 from ufl_beam.running import say, simulate
 from ufl_beam.scene import (
@@ -89,15 +91,20 @@ from ufl_beam.scene import (
 )
 from ufl_beam.sections import Section
 from ufl_beam.simulation import Simulation
-from ufl_beam.solution import Solution
+from ufl_beam.solution import Solution, load
 from ufl_beam.solve import Newton
 from ufl_beam.studies import study
+from ufl_beam.time_series import VTKHDF, XDMF
 from ufl_beam.tradeoffs import tradeoff
-from ufl_beam.view import picture, plot, plot_energy, plot_history, plot_shapes
+from ufl_beam.version import version
+from ufl_beam.view import picture, plot_energy, plot_history, plot_shapes
 from ufl_beam.viscous import KelvinVoigt, Rayleigh
 from ufl_beam.work_precision import plot_tradeoff
 
+__version__ = version()
+
 __all__ = [
+    "VTKHDF",
     "XDMF",
     "Actuator",
     "Adaptive",
@@ -169,6 +176,7 @@ __all__ = [
     "Revolute",
     "Rigid",
     "RigidLink",
+    "RigidPlastic",
     "Roller",
     "RotatingFrame",
     "SNCurve",
@@ -200,6 +208,7 @@ __all__ = [
     "fit_decay",
     "follow",
     "ground",
+    "load",
     "logarithmic_decrement",
     "modes",
     "peaks",

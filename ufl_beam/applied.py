@@ -46,17 +46,21 @@ class DeadLoads:
         ledger.supplied["loads"] += 0.0
         self.force: Array = np.zeros(share.size)
         self._before: Array = self.force
+        self._end: Array = self.force
         self._in_c = ffi.new("vector *", {"size": share.size})
         self._factors: list[float] = []
 
     def begin(self, step: Step) -> None:
         """The loads of the step; nothing is to do for those that stay."""
         factors = self._factors_at(step.load_time)
-        if factors == self._factors and step.toward == 1:
+        if factors == self._factors and step.toward == step.at == 1:
             return
-        self.force, self._factors = self._times(factors), factors
-        if step.toward < 1:
-            self.force = self._before + step.toward * (self.force - self._before)
+        self.force = self._end = self._times(factors)
+        self._factors = factors
+        if step.toward < 1 or step.at < 1:
+            change = step.toward * (self._end - self._before)
+            self._end = self._before + change
+            self.force = self._end if step.at == 1 else self._before + step.at * change
             self._factors = []
         self._values = self._in_c.values = doubles(self.force)
 
@@ -64,9 +68,10 @@ class DeadLoads:
         """A vector."""
         return loop("subtract_vector", self._in_c), None
 
-    def carry_on(self, t: float, q: Array) -> None:
-        """Take the state ``q`` at time ``t`` as one that is in equilibrium with the loads."""
+    def carry_on(self, t: float, q: Array) -> Array:
+        """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them."""
         self._before = self._times(self._factors_at(t))
+        return self._before
 
     def _factors_at(self, t: float) -> list[float]:
         """Factors of the vectors; a vector belongs to its first load for messages."""
@@ -90,14 +95,14 @@ class DeadLoads:
         """Work of the loads."""
         if any(self._factors) or self._before is not self.force:
             self._ledger.supplied["loads"] += float(self._acting(self._before, self.force) @ s)
-            self._before = self.force
+            self._before = self._end
 
     def add_state(self, q: Array) -> None:
         """Loads hold no energy; what a potential would hold is in their work."""
 
     def remember(self, memory: Memory, q: Array) -> None:
-        """The forces in the equation of the last step."""
-        self.force = self._before = memory.added("dead loads", self._before)
+        """The forces at the end of the last step."""
+        self.force = self._end = self._before = memory.added("dead loads", self._before)
         self._factors = []
 
 
@@ -143,15 +148,17 @@ class FollowerLoads:
 
     def begin(self, step: Step) -> None:
         """The size of the loads in the step."""
-        target = self._sizes_at(step.load_time)
-        self._sizes = self._sizes_before + step.toward * (target - self._sizes_before)
+        before, target = self._sizes_before, self._sizes_at(step.load_time)
+        self._sizes_at_end = before + step.toward * (target - before)
+        self._sizes = before + step.at * (self._sizes_at_end - before)
         self._ψ0 = step.q0[self._dofs[:, 2]]
 
-    def carry_on(self, t: float, q: Array) -> None:
-        """Take the state ``q`` at time ``t`` as one that is in equilibrium with the loads."""
+    def carry_on(self, t: float, q: Array) -> Array:
+        """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them."""
         self._sizes_before = self._sizes = self._sizes_at(t)
         self._ψ0 = q[self._dofs[:, 2]]
         self.force = self._before = self._in_plane(q)
+        return self.force
 
     def _sizes_at(self, t: float) -> Array:
         factors = np.array([value_at(load.time, t, load) for load in self._loads])
@@ -188,7 +195,7 @@ class FollowerLoads:
     def accept(self, q1: Array, s: Array) -> None:
         """Work of the loads."""
         self._ledger.supplied["loads"] += float(self._acting(self._before, self.force) @ s)
-        self._before, self._sizes_before = self.force, self._sizes
+        self._before, self._sizes_before = self.force, self._sizes_at_end
 
     def add_state(self, q: Array) -> None:
         """Loads hold no energy; what a potential would hold is in their work."""

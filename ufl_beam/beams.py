@@ -7,6 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from itertools import pairwise
 
+from ufl_beam.axis_curves import Arc, Polyline, Straight
+from ufl_beam.axis_curves import Point as Point
+from ufl_beam.curves import tangent_within
 from ufl_beam.errors import (
     SceneError,
     require_count,
@@ -20,11 +23,13 @@ from ufl_beam.errors import (
     shorten,
     warn,
 )
-from ufl_beam.laws import Softening
+from ufl_beam.laws import HingeLaw, require_hinge_law
 from ufl_beam.sections import Section
 
-Point = tuple[float, float]
 Curve = Callable[[float], Sequence[float]]
+
+TOGETHER = 1e-9
+"""Part of a cell below which two places of a beam are one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,14 +45,15 @@ class Beam:
         name: What error messages and pictures call it.
         curve: Axis from ``s = 0`` at ``a`` to ``s = 1`` at ``b``.
         corners: Parameters ``s`` that must be vertices.
-        hinges: Laws of hinges in single cells, by a parameter ``s`` in the cell; at a vertex the
-            cell before it.  They come before the law of the section.  A hinge sits in the middle of
-            its cell, and where it turns far the cell keeps its length while its axis turns half as
-            far: positions are off by up to the length of the cell, so let it be short (corners).
+        hinges: Plastic hinges of zero length, by their parameter ``s``, which becomes a vertex:
+            ``{0.0: Softening(limit, energy)}``.  A hinge is rigid until the moment at ``s`` reaches
+            its limit; then it follows its law, :class:`Softening` or :class:`Hardening` (limit in
+            N m, moduli in N m/rad, ``eta`` in N m s).  At an end it comes before the law of the
+            section; ``None`` there is an end without a hinge.
 
     Raises:
         SceneError: Zero length, ``cells < 1``, coordinates that are no finite numbers, or hinges in
-            a section that has none.
+            a section of fibres.
     """
 
     a: Point
@@ -58,7 +64,7 @@ class Beam:
     name: str = "beam"
     curve: Curve = field(default=None, repr=False)  # type: ignore[assignment]
     corners: tuple[float, ...] = ()
-    hinges: Mapping[float, Softening] = field(default_factory=dict)
+    hinges: Mapping[float, HingeLaw | None] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         require_text(self.name, "Beam: name")
@@ -72,7 +78,7 @@ class Beam:
         if self.curve is None:
             if a == b:
                 raise SceneError(f"{self.name}: zero length, both ends are at {a}")
-            object.__setattr__(self, "curve", lambda s: _between(a, b, s))
+            object.__setattr__(self, "curve", Straight(a, b))
         for s, end in ((0.0, a), (1.0, b)):
             there = point_of(self.curve, s, f"{self.name}: curve")
             if math.dist(there, end) > 1e-9 * max(math.hypot(*there), math.hypot(*end)):
@@ -88,7 +94,13 @@ class Beam:
             require_number(s, f"{self.name}: hinge at")
             if not 0.0 <= s <= 1.0:
                 raise SceneError(f"{self.name}: hinge at s = {s:g} must lie between 0 and 1")
-            require_kind(law, Softening, f"{self.name}: hinge at s = {s:g}")
+            if law is not None or s not in (0.0, 1.0):
+                require_hinge_law(law, f"{self.name}: hinge at s = {s:g}")
+        for first, second in pairwise(sorted(self.hinges)):
+            if (second - first) * self.cells <= TOGETHER:
+                raise SceneError(
+                    f"{self.name}: two hinges at s = {first:g}; give one, with the law of both"
+                )
         if self.hinges and self.section.fibres is not None:
             raise SceneError(
                 f"{self.name}: hinges are for resultants; here the fibres of the section soften"
@@ -119,16 +131,13 @@ class Beam:
         name: str = "beam",
     ) -> Beam:
         """Circular arc from ``angles[0]`` to ``angles[1]`` (rad, counter-clockwise from x)."""
-        cx, cy = require_vector(center, f"{name}: center")
+        middle = require_vector(center, f"{name}: center")
         require_number(radius, f"{name}: radius", positive=True)
         first, last = require_vector(angles, f"{name}: angles")
         if first == last:
             raise SceneError(f"{name}: zero length, both angles of the arc are {first:g}")
 
-        def curve(s: float) -> Point:
-            angle = first + s * (last - first)
-            return cx + radius * math.cos(angle), cy + radius * math.sin(angle)
-
+        curve = Arc(middle, float(radius), first, last)
         return cls(curve(0), curve(1), section, cells=cells, name=name, curve=curve)
 
     @classmethod
@@ -147,10 +156,7 @@ class Beam:
             ends.append(ends[-1] + math.dist(p, q))
         at = [end / ends[-1] for end in ends]
 
-        def curve(s: float) -> Point:
-            i = next((k for k, limit in enumerate(at[1:-1]) if s <= limit), len(at) - 2)
-            return _between(xy[i], xy[i + 1], (s - at[i]) / (at[i + 1] - at[i]))
-
+        curve = Polyline(tuple(xy), tuple(at))
         corners = tuple(at[1:-1])
         return cls(xy[0], xy[-1], section, cells=cells, name=name, curve=curve, corners=corners)
 
@@ -180,13 +186,13 @@ class Beam:
     def vertices(self, attached: Sequence[float]) -> list[float]:
         """Parameters of the vertices: equal cells, the corners and what is ``attached``.
 
-        A place nearer to a regular vertex than 1e-9 of a cell is that vertex.
+        A place nearer to a regular vertex than :data:`TOGETHER` is that vertex.
         """
         regular = [i / self.cells for i in range(self.cells + 1)]
         vertices = sorted({*regular, *self.corners, *attached})
         kept = [0.0]
         for s in vertices[1:]:
-            if (s - kept[-1]) * self.cells > 1e-9:
+            if (s - kept[-1]) * self.cells > TOGETHER:
                 kept.append(s)
         kept[-1] = 1.0
         return kept
@@ -199,10 +205,13 @@ class Place:
     Attributes:
         beam: The beam, by identity.
         s: Parameter of its axis, from 0 to 1.
+        beyond: Whether the cross-section beyond the plastic hinge at ``s`` is meant, the one that
+            no joint, support or load is attached to.
     """
 
     beam: Beam
     s: float
+    beyond: bool = False
 
     def __post_init__(self) -> None:
         if not isinstance(self.beam, Beam):
@@ -217,10 +226,24 @@ class Place:
         x, y = self.beam.curve(self.s)
         return float(x), float(y)
 
+    @property
+    def direction(self) -> Point:
+        """Unit tangent of the undeformed axis; at a corner the mean of both sides."""
+        edges = sorted({0.0, *self.beam.corners, 1.0})
+        sides = [
+            tangent_within(self.beam.curve, self.s, low, high)
+            for low, high in pairwise(edges)
+            if low <= self.s <= high
+        ]
+        x, y = sum(side / math.hypot(*side) for side in sides)
+        length = math.hypot(x, y)
+        return float(x / length), float(y / length)
+
     def __str__(self) -> str:
         ends = {0.0: "start", 1.0: "end"}
         x, y = self.point
-        return f"{self.beam.name}.{ends.get(self.s, f'at({self.s:g})')} ({x:g}, {y:g})"
+        name = f"{self.beam.name}.{ends.get(self.s, f'at({self.s:g})')} ({x:g}, {y:g})"
+        return f"{name} beyond the hinge" if self.beyond else name
 
 
 def point_of(curve: Curve, s: float, what: str) -> Point:
@@ -235,8 +258,3 @@ def point_of(curve: Curve, s: float, what: str) -> Point:
     except Exception as error:
         raise SceneError(f"{what}({s:g}) fails: {shorten(error)}") from error
     return require_vector(point, f"{what}({s:g})")
-
-
-def _between(p: Point, q: Point, s: float) -> Point:
-    """The point at part ``s`` of the way from ``p`` to ``q``; exact at both ends."""
-    return p[0] * (1 - s) + q[0] * s, p[1] * (1 - s) + q[1] * s

@@ -24,19 +24,14 @@ import numpy as np
 
 from ufl_beam.compat import Array
 from ufl_beam.describe import CODE, Description, difference, has_state, kind_of
-from ufl_beam.errors import (
-    SceneError,
-    require_count,
-    require_number,
-    require_path,
-    require_sequence,
-    shorten,
-)
+from ufl_beam.errors import SceneError, require_count, require_number, require_sequence, shorten
+from ufl_beam.locks import Lock
+from ufl_beam.outputs import require_path
 from ufl_beam.pacing import Pace
 from ufl_beam.record import Recorder, on_first
 from ufl_beam.simulation import Simulation
 
-FORMAT = "checkpoint of ufl_beam, 1"
+FORMAT = "checkpoint of ufl_beam, 2"
 """To be counted up whenever files of before mean something else."""
 
 HEADER = 512
@@ -71,7 +66,7 @@ class Checkpoint:
     also: Sequence[Any] = ()
 
     def __post_init__(self) -> None:
-        require_path(self.path, "Checkpoint: path")
+        require_path(self.path, "Checkpoint")
         what = f"Checkpoint {self.path}"
         if self.every is None and self.minutes is None:
             raise SceneError(f"{what}: say how often, every=1000 (steps), minutes=10, or both")
@@ -87,6 +82,12 @@ class Checkpoint:
                     "NumPy, or an object with methods state() and restore(state)"
                 )
 
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The file, and the one that takes its place; no other output may write them."""
+        path = Path(self.path)
+        return path, path.parent / f"{path.name}.part"
+
 
 class Keeper:
     """The checkpoint of one run.
@@ -98,10 +99,11 @@ class Keeper:
         comm: Processes of the run.
 
     Raises:
-        SceneError: The file is damaged, or of another run, or cannot be written.
+        SceneError: Another run writes the file, or it is damaged, or of another run, or cannot be
+            written.
 
     Attributes:
-        path: The file.
+        path: The file; locked until :meth:`close`.
         found: What it has; empty if there is none.
     """
 
@@ -119,7 +121,12 @@ class Keeper:
         also = {f"also[{i}]": one for i, one in enumerate(choice.also)}
         self._stateful = {**self._described.stateful, **also}
         self.found: Content = {}
-        on_first(comm, self._find)
+        self._lock = Lock(self.path)
+        try:
+            on_first(comm, self._find)
+        except BaseException:
+            self.close()
+            raise
         if comm.size > 1:
             self.found = comm.bcast(self.found)
         self._last_time, self._last_step = time.perf_counter(), -1
@@ -133,7 +140,19 @@ class Keeper:
             raise SceneError(f"checkpoint {self.path}: there is no directory {folder}; make it")
         if not os.access(folder, os.W_OK):
             raise SceneError(f"checkpoint {self.path}: the directory cannot be written to")
-        if self.path.exists():
+        try:
+            owner = self._lock.take()
+            exists = self.path.exists()
+        except OSError as error:
+            raise SceneError(
+                f"checkpoint {self.path}: {self._lock.path} cannot be written: {error.strerror}"
+            ) from None
+        if owner:
+            raise SceneError(
+                f"checkpoint {self.path} is in use: {owner} writes it. Let that run end, or stop "
+                "it, or name another file"
+            )
+        if exists:
             self.found = read(self.path)
             self._require_same(self.found)
 
@@ -156,6 +175,10 @@ class Keeper:
                 f"checkpoint {self.path} is of another run: {differs}. Delete the file to begin "
                 "anew, or name another"
             )
+
+    def close(self) -> None:
+        """Let other runs have the file."""
+        self._lock.release()
 
     def resume(
         self, simulation: Simulation, pace: Pace, recorders: Sequence[Recorder], t1: float
@@ -217,7 +240,7 @@ class Keeper:
             "step": self._step,
             "seconds": time.perf_counter() - self._begin,
             "pace": pace.state(),
-            "stateful": {name: _state(one) for name, one in self._stateful.items()},
+            "stateful": simulation.together(self._states),
             **_above("state/", simulation.state()),
         }
         parts = [recorder.state() for recorder in recorders]
@@ -230,6 +253,10 @@ class Keeper:
 
         on_first(self._comm, put)
         self._last_time, self._last_step = time.perf_counter(), pace.steps
+
+    def _states(self) -> dict[str, Any]:
+        """States of the user's objects, by name."""
+        return {name: _state(one) for name, one in self._stateful.items()}
 
     def _require_told(self) -> None:
         """Raise if what functions use changes without their saying so: it would be lost."""

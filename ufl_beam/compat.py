@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import sysconfig
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +16,7 @@ try:
 
     import basix.ufl
     import dolfinx
+    import ffcx
     import ufl
     from dolfinx import cpp, fem, io, jit, mesh
 except ImportError as error:  # pragma: no cover - depends on the machine
@@ -29,9 +32,11 @@ __all__ = [
     "VERSION",
     "Array",
     "cell_coordinates",
+    "compile_form",
     "cpp",
     "dolfinx",
     "fem",
+    "form_key",
     "io",
     "jit_directory",
     "line_mesh",
@@ -46,6 +51,10 @@ if VERSION < (0, 9):  # pragma: no cover - depends on the machine
         "run through ./env of the source tree, or see docs/installation.md"
     )
 
+if not (logging.getLogger().handlers or logging.getLogger("py.warnings").handlers):
+    # FFCx sends all warnings of Python to the log, where without a handler nobody sees them.
+    logging.captureWarnings(False)
+
 
 TABULATE = (
     "double *A, const double *w, const double *c, const double *x, const int *entity, "
@@ -56,8 +65,41 @@ TABULATE = (
 
 
 def jit_directory() -> Path:
-    """Where DOLFINx keeps what it compiled."""
-    return Path(jit.get_options()["cache_dir"])
+    """Directory in which DOLFINx keeps compiled forms.
+
+    Raises:
+        RuntimeError: The options of DOLFINx cannot be read.
+    """
+    return Path(_jit_options()["cache_dir"])
+
+
+def _jit_options() -> dict[str, Any]:
+    try:
+        options: dict[str, Any] = jit.get_options()
+    except OSError as error:
+        raise RuntimeError(
+            f"DOLFINx cannot read its options in {error.filename}: {error.strerror}; set "
+            "XDG_CONFIG_HOME to a directory that can be read"
+        ) from None
+    return options
+
+
+def compile_form(form: ufl.Form, directory: Path) -> fem.Form:
+    """Compile a form with FFCx, or load it from a directory in which it was compiled before."""
+    logger = logging.getLogger()
+    handlers = logger.handlers[:]
+    try:
+        return fem.form(form, jit_options={"cache_dir": directory})
+    finally:
+        logger.handlers = handlers  # FFCx exchanges them, and an interrupt leaves its own
+
+
+def form_key(form: ufl.Form) -> str:
+    """Text that differs between forms which FFCx compiles to different code."""
+    options = {k: v for k, v in _jit_options().items() if k not in ("cache_dir", "timeout")}
+    system = [sysconfig.get_config_var(name) for name in ("CFLAGS", "EXT_SUFFIX")]
+    ours = (form.signature(), ffcx.__version__, dolfinx.__version__, ffcx.get_options(), options)
+    return "\0".join(map(repr, (*ours, *system)))
 
 
 def pack(form: fem.Form) -> tuple[Array, Array]:

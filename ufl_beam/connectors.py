@@ -20,7 +20,7 @@ from ufl_beam.errors import (
     require_text,
     require_vector,
 )
-from ufl_beam.laws import Hardening, Softening
+from ufl_beam.laws import Hardening, HingeLaw, Softening, require_hinge_law
 from ufl_beam.loads import TimeFunction, require_time_function
 
 if TYPE_CHECKING:
@@ -205,6 +205,27 @@ class Coulomb:
 
 
 @dataclass(frozen=True)
+class RigidPlastic:
+    """No motion up to the limit of a law, which the motion follows beyond it.
+
+    There is no elastic stiffness: below the limit the motion is held exactly.  Plastic hinges of
+    beams, ``Beam(hinges={s: law})``, are rotations with this law.
+
+    Args:
+        law: :class:`Softening` or :class:`Hardening`; limit in N m or N, moduli in N m/rad or N/m,
+            fracture energy in J.
+
+    Raises:
+        SceneError: A law of another kind, or one that relaxes an elastic stress.
+    """
+
+    law: HingeLaw
+
+    def __post_init__(self) -> None:
+        require_hinge_law(self.law, "RigidPlastic: law")
+
+
+@dataclass(frozen=True)
 class Guide:
     """The point stays on a curve of the plane, free along it; see :func:`Guided`.
 
@@ -218,7 +239,18 @@ class Guide:
         require_function(self.curve, "Guide: curve", "s that returns (x, y)")
 
 
-Law = Guide | Motor | Actuator | Controller | Spring | Damper | Stop | Function | Coulomb
+Law = (
+    Guide
+    | Motor
+    | Actuator
+    | Controller
+    | Spring
+    | Damper
+    | Stop
+    | Function
+    | Coulomb
+    | RigidPlastic
+)
 
 
 def _still(t: float) -> float:
@@ -278,7 +310,7 @@ class Connector:
     @property
     def holds(self) -> bool:
         """Whether the law may demand a motion, whatever force that takes."""
-        return isinstance(self.law, Motor | Coulomb | Guide)
+        return isinstance(self.law, Motor | Coulomb | Guide | RigidPlastic)
 
     @property
     def arms(self) -> tuple[Point, Point]:
@@ -375,6 +407,7 @@ class Joint(Bearing):
             unknown; so are displacements of anchors that their nodes carry.
         holders: What is held besides, by connectors.
         meets: Whether the anchors are at one point of the undeformed scene.
+        advice: For anchors that should meet and do not.
     """
 
     kind: str
@@ -382,6 +415,7 @@ class Joint(Bearing):
     shared: tuple[int, ...]
     holders: tuple[Connector, ...] = field(default=(), repr=False)
     meets: bool = False
+    advice: str = "RigidLink and Link join places that are apart"
 
     def __post_init__(self) -> None:
         if len(self.places) < 2:
@@ -503,23 +537,22 @@ def Guided(place: Anchor, curve: Curve) -> Joint:
         curve: ``s -> (x, y)`` for all s that the motion may reach; ``curve(0)`` is at the place; m.
 
     Raises:
-        SceneError: The place is not on the curve at s = 0, or the curve stands still there.
+        SceneError: The curve stands still at s = 0.  A scene raises it where ``curve(0)`` is not at
+            the place.
     """
     require_anchor(place, "Guided")
     if not carries(place):
         raise SceneError(f"Guided({place}): it must be the centre of the body")
     law = Guide(curve)
     x, y = point_of(curve, 0.0, f"Guided({place}): curve")
-    if math.dist((x, y), place.point) > 1e-9 * max(math.hypot(x, y), math.hypot(*place.point)):
-        raise SceneError(f"Guided({place}): curve(0) = ({x:g}, {y:g}) must be at the place")
     (x0, y0), (x1, y1) = (point_of(curve, s, f"Guided({place}): curve") for s in (-1e-6, 1e-6))
     length = math.hypot(x1 - x0, y1 - y0)
     if length == 0.0:
         raise SceneError(f"Guided({place}): the curve stands still at s = 0")
     base, across = ground(x, y), ((y0 - y1) / length, (x1 - x0) / length)
-    return Joint(
-        "Guided", (base, place), (), (Connector("Guided", "guided", base, place, law, across),)
-    )
+    holder = Connector("Guided", "guided", base, place, law, across)
+    advice = "curve(0) must be at the place"
+    return Joint("Guided", (base, place), (), (holder,), meets=True, advice=advice)
 
 
 def Release(a: Place, b: Anchor, *, free: str, measured: bool = False) -> Joint:
@@ -543,10 +576,7 @@ def Release(a: Place, b: Anchor, *, free: str, measured: bool = False) -> Joint:
     shared = () if "M" in free else (2,)
     if not set(free) & set("NV"):
         return _joined("Release", (a, b), (0, 1, *shared), measured)
-    low, high = max(a.s - 1e-6, 0.0), min(a.s + 1e-6, 1.0)
-    (x0, y0), (x1, y1) = a.beam.curve(low), a.beam.curve(high)
-    length = math.hypot(x1 - x0, y1 - y0)
-    x, y = (x1 - x0) / length, (y1 - y0) / length
+    x, y = a.direction
     held = [axis for name, axis in (("N", (x, y)), ("V", (-y, x))) if name not in free]
     holders = [Connector("Release", "sliding", a, b, HELD, axis) for axis in held]
     if shared and measured:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from mpi4py import MPI
 
@@ -17,17 +16,13 @@ from ufl_beam.connectors import Actuator, Controller, Motor
 from ufl_beam.controls import Control, Given
 from ufl_beam.critical import Branch, CriticalPoint, Direction, Stiffness
 from ufl_beam.discretisation import Mesh
-from ufl_beam.errors import (
-    SceneError,
-    StepFailed,
-    require_count,
-    require_function,
-    require_kind,
-    require_sequence,
-)
+from ufl_beam.errors import SceneError, StepFailed, require_count, require_function, require_kind
 from ufl_beam.loads import TimeFunction
+from ufl_beam.memory import State
+from ufl_beam.outputs import take
+from ufl_beam.parameter import FACTOR
 from ufl_beam.processes import communicator
-from ufl_beam.record import Recorder, on_first
+from ufl_beam.record import Recorder, close_all, recorders_of
 from ufl_beam.scene import Scene
 from ufl_beam.simulation import Simulation, Trial
 from ufl_beam.solution import Solution
@@ -67,7 +62,7 @@ AGAIN = 1e-3
 """Part of a step within which a critical point is the one that the path has just reached."""
 
 SOFT = 1e-3
-"""At a bifurcation the softest eigenvalue is at most this part of one at the ends of the step."""
+"""Part of its size at the ends of a step below which what vanishes at a critical point is zero."""
 
 
 class Path(Solution):
@@ -78,11 +73,40 @@ class Path(Solution):
     """
 
     critical: Sequence[CriticalPoint] = ()
+    parameter = FACTOR
 
     @property
     def factor(self) -> Array:
         """Load factors, the time of the time functions; (n+1,)."""
         return self.times
+
+    def _content(self) -> tuple[dict[str, Any], State]:
+        text, arrays = super()._content()
+        text["critical"] = [{"kind": c.kind, "factor": c.factor, "n": c.n} for c in self.critical]
+        for k, point in enumerate(self.critical):
+            arrays[f"critical/{k}/mode"] = point.mode
+            for name, values in point.state._arrays().items():
+                arrays[f"critical/{k}/state/{name}"] = values
+        return text, arrays
+
+    def _take(self, text: dict[str, Any], arrays: State) -> None:
+        super()._take(text, arrays)
+        critical = []
+        for k, one in enumerate(text["critical"]):
+            state, prefix = Solution(self.scene, self.grid), f"critical/{k}/state/"
+            state._take(
+                text,
+                {n.removeprefix(prefix): a for n, a in arrays.items() if n.startswith(prefix)},
+            )
+            critical.append(CriticalPoint(**one, state=state, mode=arrays[f"critical/{k}/mode"]))
+        self.critical = critical
+
+    @property
+    def progress(self) -> Array:
+        """Arc length of the path in the displacements of nodes, root mean square; (n+1,); m."""
+        nodes = np.unique(np.vstack([self.grid.dofs, self.grid.dofs_of_bodies])[:, :2])
+        steps = np.sqrt(2 * np.mean(np.diff(self.q[:, nodes], axis=0) ** 2, axis=1))
+        return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 class Candidate(NamedTuple):
@@ -98,9 +122,13 @@ class Candidate(NamedTuple):
     stiffness: Stiffness
     way: Direction
 
-    def signs(self) -> tuple[int, bool]:
-        """What changes at critical points: negative pivots, and whether the load factor falls."""
-        return self.stiffness.negative, self.way.t < 0
+    def passed(self, before: Candidate) -> bool:
+        """Whether a critical point lies between ``before`` and this state.
+
+        An eigenvalue of the stiffness has passed zero there, or the load factor has turned.
+        """
+        turned = (self.way.t < 0) != (before.way.t < 0)
+        return turned or self.stiffness.passed(before.stiffness)
 
 
 class Route:
@@ -144,9 +172,8 @@ class Route:
         walk.direction = Direction(sign * way.q, sign * way.t)
 
     def _tried(self) -> float:
-        """The load factor of the latest attempt."""
-        t = self._walk.t
-        return t if math.isfinite(t) else self._walk.simulation.t
+        """The load factor at which the latest attempt began."""
+        return self._walk.simulation.t + self._walk.sought.t
 
     def advance(self) -> None:
         """One step; where it fails, a shorter one; where it passes a critical point, up to there.
@@ -174,7 +201,7 @@ class Route:
     def _accept(self, found: Candidate, part: float) -> None:
         """Go to the end of a step, or to a critical point before it."""
         walk, before = self._walk, self._before
-        if before is None or found.signs() == before.signs():
+        if before is None or not found.passed(before):
             self._landed = False
             self._take(found)
             return
@@ -185,8 +212,8 @@ class Route:
             self._landed = False
             self._take(self._seek(part))
             return
-        self._landed = found.signs() != before.signs()
-        limit = found.way.t * walk.direction.t < 0
+        self._landed = found.passed(before)
+        limit = self._turns(found, before, after)
         if self._landed and not walk.dissipates and walk.dissipation(found.trial.q1) > 0:
             self._pass_kink(found, reached - 2 * LOCATED * part, part, limit)
             return
@@ -196,7 +223,7 @@ class Route:
         way = walk.direction
         self._take(found)
         if self._landed and soft:
-            self._note(found, way, len(walk.simulation.solution.times))
+            self._note(found, way, len(walk.simulation.solution.times), limit)
 
     def _pass_kink(self, after: Candidate, last: float, part: float, limit: bool) -> None:
         """Go to the last state in which nothing dissipates, if the load factor turns there."""
@@ -204,7 +231,7 @@ class Route:
         if limit:
             if last > 0:
                 self._take(self._seek(last))
-            self._note(after, before, len(walk.simulation.solution.times) - (last <= 0))
+            self._note(after, before, len(walk.simulation.solution.times) - (last <= 0), limit)
         if not limit or last <= 0:
             self._take(self._seek(part))
             return
@@ -225,8 +252,7 @@ class Route:
         gone = Direction(trial.q1 - simulation.q, trial.step.t1 - simulation.t)
         if part > SHORT:
             self._require_near(gone)
-        side = walk.side(trial.q1, way)
-        if (side or walk.product(gone, way, walk.factor)) < 0:
+        if self._control.onward(walk, gone, way) < 0:
             way = Direction(-way.q, -way.t)
         return Candidate(trial, stiffness, way)
 
@@ -264,7 +290,7 @@ class Route:
                     self._part = (high - low) / 2
                     return self._seek(low), low
                 break
-            side = 1 if found.signs() == before.signs() else -1
+            side = -1 if found.passed(before) else 1
             if side > 0:
                 low, here = middle, measure(found)
                 there /= 2 if last == side else 1
@@ -277,20 +303,37 @@ class Route:
     def _measure(self, after: Candidate) -> Callable[[Candidate], float]:
         """Size of what vanishes at the critical point before ``after``."""
         if after.way.t * self._walk.direction.t < 0:
-            return lambda found: abs(found.way.t)
+            return self._slope
         return lambda found: abs(self._softest(found)[0])
+
+    def _slope(self, found: Candidate) -> float:
+        """Change of the load factor along the path over that of the configuration.
+
+        As K q' = f t', a slope of zero means that the direction of the path is a critical one, and
+        that the load f does work on it.  At a bifurcation it does none on the critical direction.
+        """
+        return abs(found.way.t) / self._walk.size(found.way)
+
+    def _turns(self, found: Candidate, before: Candidate, after: Candidate) -> bool:
+        """Whether the load factor turns in a state that was located between two others.
+
+        Either it has turned there, as at a kink, or its slope vanishes.  The load factor and the
+        eigenvalue need not change their signs in the same last digit.
+        """
+        if found.way.t * self._walk.direction.t < 0:
+            return True
+        slope, *ends = (self._slope(one) for one in (found, before, after))
+        return slope < SOFT * max(ends)
 
     def _softest(self, found: Candidate) -> tuple[float, Array]:
         return found.stiffness.softest(self._weights)
 
-    def _note(self, found: Candidate, before: Direction, n: int) -> None:
+    def _note(self, found: Candidate, before: Direction, n: int, limit: bool) -> None:
         """Remember the state as a critical point, the n-th of the path; ``found`` is beyond it."""
         walk, simulation, way = self._walk, self._walk.simulation, found.way
-        limit = way.t * before.t < 0
         if limit:
             # At a limit point the path goes along the mode.
-            size = walk.length(Direction(way.q, 0.0), 1.0)
-            mode = np.asarray(way.q / size, dtype=np.float64)
+            mode = np.asarray(way.q / walk.size(way), dtype=np.float64)
         else:
             mode = np.asarray(self._softest(found)[1][walk.share.dofs], dtype=np.float64)
             simulation.supports.leave(mode)
@@ -357,10 +400,7 @@ def follow(
     require_count(steps, "follow: steps")
     if start is not None:
         require_kind(start, (Solution, Branch), "follow: start")
-    recorders = (record,) if isinstance(record, Recorder) else require_sequence(record, "record")
-    for i, recorder in enumerate(recorders):
-        require_kind(recorder, Recorder, f"follow: record[{i}]")
-        on_first(comm, recorder.require_writable)
+    recorders, outputs = recorders_of(record, comm, "follow")
     branch, state = (start, start.state) if isinstance(start, Branch) else (None, start)
     t0 = 0.0 if state is None else float(state.times[-1])
     _require_driven(scene, t0)
@@ -371,29 +411,36 @@ def follow(
     simulation.solution = path = Path(scene, simulation.grid)
     route = Route(simulation, control)
     path.critical = route.critical
+    release = take(outputs)
+
+    def after_step() -> bool:
+        path.keep(simulation)
+        for recorder in recorders:
+            recorder.write(simulation)
+        return until is not None and bool(until(simulation))
+
     try:
         route.begin(branch, fresh=state is None)
         for recorder in recorders:
-            recorder.open(simulation)
+            simulation.together(recorder.open, simulation)
         path.keep(simulation)
         for _ in range(steps):
             route.advance()
-            path.keep(simulation)
-            for recorder in recorders:
-                recorder.write(simulation)
-            if until is not None and until(simulation):
+            if simulation.share.largest(simulation.together(after_step)):
                 break
         simulation.end()
     except BaseException as error:
-        if simulation.comm.size == 1:
-            simulation.end()  # several processes may not all be here
+        if simulation.share.comm.size == 1 or error is simulation.together.raised:
+            simulation.end()  # else the processes may not all be here
         error.__dict__["solution"] = path
         raise
     finally:
-        for recorder in recorders:
-            recorder.close()
-        simulation.close()
+        release()
         path.seconds = time.perf_counter() - began
+        simulation.close()
+        close_all(recorders)
+    if comm.rank == 0:
+        path.opened.warn(simulation.scheme, path.times)
     return path
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import KW_ONLY, dataclass, field
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
@@ -16,6 +17,9 @@ from ufl_beam.simulation import Trial
 
 if TYPE_CHECKING:
     from ufl_beam.walk import Walk
+
+SHORTEST = 1e-3
+"""Part of a step of arc length that is gone at least beyond a bend."""
 
 
 # -- equations of steps --------------------------------------------------------------------------
@@ -38,11 +42,16 @@ class Plane:
         walk: What steps.
         normal: In the space of configurations and load factors.
         reach: How far.
+        gone: Where this is measured from, seen from the accepted state; from there without it.
     """
 
-    def __init__(self, walk: Walk, normal: Direction, reach: float) -> None:
+    def __init__(
+        self, walk: Walk, normal: Direction, reach: float, gone: Direction | None = None
+    ) -> None:
         self._total, self._normal, self._reach = walk.share.total, normal, reach
         self._q0, self._t0 = walk.simulation.q, walk.simulation.t
+        if gone is not None:
+            self._q0, self._t0 = self._q0 + gone.q, self._t0 + gone.t
 
     def miss(self, q: Array, t: float) -> float:
         """Part of the reach."""
@@ -91,21 +100,46 @@ class Dissipated:
 
     def slope(self, q: Array, way: Direction) -> float:
         """By a central difference over a small part of the step; nothing else asks for it."""
-        size = self._walk.length(Direction(way.q, 0.0), 1.0)
-        gone = self._walk.length(Direction(q - self._walk.simulation.q, 0.0), 1.0)
+        size = self._walk.size(way)
+        gone = self._walk.size(Direction(q - self._walk.simulation.q, 0.0))
         if size == 0.0:
             return 0.0
         ε = 1e-3 * gone / size
         return (self.miss(q + ε * way.q, 0.0) - self.miss(q - ε * way.q, 0.0)) / (2 * ε)
 
 
-def _across(walk: Walk, normal: Direction, reach: float, turns: str) -> Trial:
-    """Solve for where the path reaches a plane; ``turns`` says why it may not."""
-    way = walk.direction
-    speed = walk.share.total(float(normal.q @ way.q)) + normal.t * way.t
-    if not speed * reach > 0:
-        raise StepFailed(f"{turns}, where this control cannot follow; take ArcLength")
-    return walk.attempt(way, reach / speed, Plane(walk, normal, reach))
+def _across(walk: Walk, normal: Direction, reach: float, what: str) -> Trial:
+    """Solve for where the path reaches a plane; ``what`` is the quantity that grows towards it.
+
+    Raises:
+        StepFailed: It does not reach it.
+    """
+
+    def along(way: Direction) -> float:
+        return walk.share.total(float(normal.q @ way.q)) + normal.t * way.t
+
+    def length(rest: float, way: Direction) -> float:
+        """How far to go along a way."""
+        speed = along(way)
+        if not speed * reach > 0:
+            raise StepFailed(f"{what} turns back, where this control cannot follow; take ArcLength")
+        return rest / speed
+
+    way, plane = walk.direction, Plane(walk, normal, reach)
+    size = length(reach, way)
+    try:
+        return walk.attempt(way, size, plane)
+    except StepFailed as failure:
+        if (bend := walk.bend(size)) is None:
+            more = f"{failure}; perhaps {what} turns back here, where this control cannot follow"
+            raise failure.saying(f"{more}: take ArcLength") from None
+    gone, way = bend
+    return walk.attempt(_joined(gone, way, length(reach - along(gone), way)), 1.0, plane)
+
+
+def _joined(gone: Direction, way: Direction, length: float) -> Direction:
+    """A direction, and so far along another one from its end."""
+    return Direction(gone.q + length * way.q, gone.t + length * way.t)
 
 
 # -- controls ----------------------------------------------------------------------------------
@@ -124,6 +158,9 @@ class Control(Protocol):
 
     def ahead(self, walk: Walk, way: Direction) -> float:
         """Positive if ``way`` is the one in which a path begins."""
+
+    def onward(self, walk: Walk, gone: Direction, way: Direction) -> float:
+        """Positive if a path that came by ``gone`` in the step goes on along ``way``."""
 
     def seek(self, walk: Walk, part: float) -> Trial:
         """Solve for the end of a step, or of a part of it.
@@ -169,15 +206,34 @@ class ArcLength:
         """The sign of the step is that of the first change of the load factor."""
         return self.step * way.t
 
+    def onward(self, walk: Walk, gone: Direction, way: Direction) -> float:
+        """What yields or opens goes on doing so; else the path turns by less than a right angle."""
+        side = walk.side(walk.simulation.q + gone.q, way)
+        return side or walk.product(gone, way, self.factor)
+
     def seek(self, walk: Walk, part: float) -> Trial:
         """On the plane across the direction."""
         reach = abs(self.step) * part
-        size = walk.length(walk.direction, self.factor)
-        unit_q: Array = np.asarray(walk.direction.q / size, dtype=np.float64)
-        unit = Direction(unit_q, walk.direction.t / size)
+        unit = self._unit(walk, walk.direction)
+        try:
+            return walk.attempt(unit, reach, Plane(walk, self._across(walk, unit), reach))
+        except StepFailed:
+            if (bend := walk.bend(reach / walk.length(walk.direction, self.factor))) is None:
+                raise
+        gone, unit = bend[0], self._unit(walk, bend[1])
+        rest = max(reach - walk.length(gone, self.factor), SHORTEST * reach)
+        plane = Plane(walk, self._across(walk, unit), rest, gone)
+        return walk.attempt(_joined(gone, unit, rest), 1.0, plane)
+
+    def _unit(self, walk: Walk, way: Direction) -> Direction:
+        """A direction of length one."""
+        size = walk.length(way, self.factor)
+        return Direction(np.asarray(way.q / size, dtype=np.float64), way.t / size)
+
+    def _across(self, walk: Walk, unit: Direction) -> Direction:
+        """Normal of the plane across a direction."""
         across: Array = np.asarray(walk.weights * unit.q, dtype=np.float64)
-        normal = Direction(across, unit.t / self.factor**2)
-        return walk.attempt(unit, reach, Plane(walk, normal, reach))
+        return Direction(across, unit.t / self.factor**2)
 
 
 @dataclass(frozen=True)
@@ -204,10 +260,14 @@ class Load:
         """As the load factor changes."""
         return self.step * way.t
 
+    def onward(self, walk: Walk, gone: Direction, way: Direction) -> float:
+        """As the load factor changes."""
+        return self.ahead(walk, way)
+
     def seek(self, walk: Walk, part: float) -> Trial:
         """At the next load factor."""
         normal = Direction(np.zeros(walk.share.size), 1.0)
-        return _across(walk, normal, self.step * part, "the load factor turns")
+        return _across(walk, normal, self.step * part, "the load factor")
 
 
 @dataclass(frozen=True)
@@ -226,7 +286,7 @@ class Displacement:
     place: Place
     component: str
     step: float
-    factor = 1.0
+    factor = math.inf
 
     def __post_init__(self) -> None:
         require_kind(self.place, Place, "Displacement: place")
@@ -256,10 +316,14 @@ class Displacement:
         """As the place moves."""
         return self.step * walk.share.total(float(self._normal(walk).q @ way.q))
 
+    def onward(self, walk: Walk, gone: Direction, way: Direction) -> float:
+        """As the place moves."""
+        return self.ahead(walk, way)
+
     def seek(self, walk: Walk, part: float) -> Trial:
         """At the next displacement."""
-        turns = f"{self.component} of {self.place} turns back"
-        return _across(walk, self._normal(walk), self.step * part, turns)
+        what = f"{self.component} of {self.place}"
+        return _across(walk, self._normal(walk), self.step * part, what)
 
 
 @dataclass(frozen=True)
@@ -294,6 +358,10 @@ class Dissipation:
     def ahead(self, walk: Walk, way: Direction) -> float:
         """As the arc length begins."""
         return self.otherwise.ahead(walk, way)
+
+    def onward(self, walk: Walk, gone: Direction, way: Direction) -> float:
+        """As the arc length goes on."""
+        return self.otherwise.onward(walk, gone, way)
 
     def seek(self, walk: Walk, part: float) -> Trial:
         """At the next dissipated energy, unless a step of arc length dissipates nothing."""

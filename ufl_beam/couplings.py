@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from functools import cached_property, partial, singledispatch
+
 import basix.ufl
 import numpy as np
 import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.compat import Array, fem, line_mesh, space_with_dofs
-from ufl_beam.connectors import HELD, Connector, Law, Spring
+from ufl_beam.connectors import HELD, Connector, Law, RigidPlastic, Spring
 from ufl_beam.forms import Kernel
 from ufl_beam.grid import Index, Share
 from ufl_beam.guides import Guides
@@ -17,14 +19,33 @@ from ufl_beam.loops import Loop, doubles, ffi, integers, lib, loop
 from ufl_beam.memory import Memory
 from ufl_beam.relative import MOTIONS, Numbers, Pair
 from ufl_beam.responses import Setting, respond
+from ufl_beam.rigid_plastic import RigidPlasticResponse
 from ufl_beam.schemes import Step
 from ufl_beam.sparse import Csr
+from ufl_beam.tangent_change import TangentChange
+
+respond.register(RigidPlastic, RigidPlasticResponse)
 
 
 def _alike(link: Connector) -> tuple[str, object]:
-    """What the connectors of one :class:`Couplings` have in common."""
-    law: Law = link.law
-    return link.motion, law if isinstance(law, Spring) else (type(law), law is HELD)
+    """Key that the connectors of one :class:`Couplings` have in common."""
+    return link.motion, _kind(link.law)
+
+
+@singledispatch
+def _kind(law: Law) -> object:
+    """Key of a law: connectors with the same one are computed together."""
+    return type(law), law is HELD
+
+
+@_kind.register
+def _(law: Spring) -> object:
+    return law
+
+
+@_kind.register
+def _(law: RigidPlastic) -> object:
+    return RigidPlastic, type(law.law)
 
 
 class Couplings(Links):
@@ -67,11 +88,13 @@ class Couplings(Links):
         tangent = ufl.derivative(work, q1, ufl.TrialFunction(space))
         z = ufl.TestFunction(given().function_space)
 
-        def kernel(form: ufl.Form) -> Kernel:
-            return Kernel(form, q1, dofs[order], coordinates)
-
-        self._q0, self._row = q0, row
-        self._work, self._tangent, self._value = map(kernel, (work, tangent, e * z * dx))
+        self._kernel = kernel = partial(
+            Kernel, unknown=q1, cell_dofs=dofs[order], coordinates=coordinates
+        )
+        self._space, self._motion = space, e * z * dx
+        self._q0, self._q1, self._row, self._bend = q0, q1, row, given()
+        self._forms = e, w_λ, tangent, dx
+        self._work, self._tangent, self._value = map(kernel, (work, tangent, self._motion))
         self._tangent.place(A)
         self.response = respond(links[0].law, links, setting)
         self._length = np.where([c.turns for c in links], 1.0, share.grid.scene.size)
@@ -90,9 +113,9 @@ class Couplings(Links):
         c.number, c.size = n, share.grid.scene.size
         c.row, c.row_of_tangent = (one.position(row) for one in (self._work, self._tangent))
         c.weight_of_before = setting.scheme.acting(np.ones(1), np.zeros(1))[0]
-        if self.response.points is not None:
-            c.points = self.response.points.points
-        self._asks_python = not self.response.steady and self.response.points is None
+        for name, data in self.response.in_c.items():
+            setattr(c, name, data)
+        self._asks_python = not self.response.steady and not self.response.in_c
 
     # -- the step ------------------------------------------------------------------------------
 
@@ -100,6 +123,34 @@ class Couplings(Links):
         """Relative motions at ``q``; (num_links,); m or rad."""
         lib.find_motions(self._in_c, doubles(q))
         return self._now.copy()
+
+    @cached_property
+    def _velocity(self) -> tuple[Kernel, fem.Function]:
+        """The rates of the motions, and the velocities that they are of; friction asks for them."""
+        velocity = fem.Function(self._space)
+        form = ufl.derivative(self._motion, self._q1, velocity)
+        return self._kernel(form), velocity
+
+    def rates(self, q: Array, v: Array) -> Array:
+        """Rates of the motions at ``q`` if the velocities are ``v``; (num_links,); m/s or rad/s."""
+        kernel, velocity = self._velocity
+        by_cell, rates = np.zeros((2, len(self.links)))
+        kernel.set(velocity, v)
+        kernel.add(q, by_cell)
+        rates[self._order] = by_cell
+        return rates
+
+    def again(self) -> None:
+        """Begin the step again: forget what its iterates have tried."""
+        self.response.again()
+
+    def put_motions(self, q: Array, v: Array, works: Array) -> None:
+        """Put minus the change of the motions where the row is about the force."""
+        about_force = self.response.about_force(self._rows)
+        if about_force.any():
+            works[self._forces_at] = np.where(
+                about_force != 0.0, -about_force * self.rates(q, v), works[self._forces_at]
+            )
 
     def begin(self, step: Step) -> None:
         """Remember the motions at the beginning."""
@@ -138,9 +189,9 @@ class Couplings(Links):
         """Add the derivative; the rows are those of the latest residual."""
         self._tangent.add(q1, self._A.data)
 
-    def excess(self, q: Array, r: Array, force: float) -> float:
-        """Largest residual of a row: of motions as a part of 1 % of the scene, or of ``force``."""
-        missed: float = lib.missed_by_couplings(self._in_c, doubles(q), doubles(r), force)
+    def excess(self, q: Array, r: Array, force: float, moved: float) -> float:
+        """Largest residual of a row: of motions as a part of 1 % of ``moved``, or of ``force``."""
+        missed: float = lib.missed_by_couplings(self._in_c, doubles(q), doubles(r), force, moved)
         return missed
 
     def _taken(self, q1: Array) -> Array:
@@ -152,15 +203,53 @@ class Couplings(Links):
         """Energy that the connectors take in the step to ``q1``; J."""
         return self.response.change(self.motion(q1), float(self._taken(q1).sum()))
 
+    def flows(self) -> bool:
+        """Whether a connector of this process slips plastically in the latest iterate."""
+        return self.response.flows()
+
+    def shown_motion(self, q: Array) -> Array:
+        """Motions of the accepted state ``q`` as solutions show them; (num_links,); m or rad."""
+        return self.response.motion(self.motion(q))
+
+    def dissipated(self) -> Array:
+        """Energy that each connector has dissipated by yielding and softening; (num_links,); J."""
+        return self.response.dissipated
+
     def effort(self, q1: Array) -> float:
         """Sum of the sizes of the works that the connectors take in the step to ``q1``; J."""
         return float(np.abs(self._taken(q1)).sum())
+
+    def dissipation(self, q1: Array) -> float:
+        """Energy that connectors of this process dissipate plastically in the step to ``q1``; J."""
+        return self.response.dissipation(self.motion(q1), self.force(q1))
 
     def accept(self, q1: Array, s: Array) -> None:
         """Enter what was supplied or lost."""
         taken: float = lib.commit_couplings(self._in_c, doubles(q1), self._dt)
         self._q = q1
         self.response.accept(self._e, taken)
+
+    def add_tangent_change(self, q1: Array, u: Array) -> None:
+        """Add the derivative of the tangent at ``q1`` along ``u``."""
+        change, e = self._tangent_change, self.motion(q1)
+        rows = np.zeros_like(self._rows)
+        for column, numbers in enumerate(self.response.rows(e, self.force(q1))):
+            rows[:, column] = numbers
+        change.put(self._row, rows[self._order])
+        change.put(self._bend, self.response.bends(e)[self._order, None])
+        change.add(q1, u)
+
+    @cached_property
+    def _tangent_change(self) -> TangentChange:
+        e, w_λ, tangent, dx = self._forms
+        q1, bend = self._q1, self._bend
+
+        def of_rows(u: fem.Function) -> ufl.Form:
+            """Rows of laws change with the motion, too."""
+            dq = ufl.TrialFunction(q1.function_space)
+            return w_λ * bend * ufl.derivative(e, q1, u) * ufl.derivative(e, q1, dq) * dx
+
+        return TangentChange(tangent, q1, self._kernel, self._A, of_rows)
 
     def freeze(self) -> None:
         """From now on nothing yields or breaks further."""

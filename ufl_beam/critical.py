@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.linalg import splu
+from scipy.sparse import block_array, coo_array, csr_array, diags_array
 
 from ufl_beam.compat import Array
 from ufl_beam.errors import SceneError, StepFailed
+from ufl_beam.factorisation import Factorisation, SingularMatrix
 from ufl_beam.grid import Index, Share
 from ufl_beam.solution import Solution
 from ufl_beam.sparse import Csr
@@ -103,10 +103,12 @@ class Stiffness:
         rate: Its part of the residual's derivative by the load factor.
 
     Attributes:
-        negative: Number of negative pivots, those of the forces of connectors left out.  Where the
-            stiffness is symmetric, of negative eigenvalues; else its parity is the sign of the
-            determinant.
-        flow: What a unit of the load factor moves; (grid.size,), without what is held.
+        symmetric: Whether it is; follower loads make it unsymmetric.
+        negative: Number of negative eigenvalues of the stiffness that is left when the forces of
+            connectors are eliminated and constraints fulfilled.  Where it is not symmetric: 1 if
+            its determinant is negative, else 0.
+        flow: Change of the configuration for a unit of the load factor; (grid.size,), zero where
+            supports hold.
 
     Raises:
         StepFailed: It is exactly singular.
@@ -122,23 +124,59 @@ class Stiffness:
             of_all = np.concatenate(share.comm.allgather(of_all))
         free = np.setdiff1d(np.arange(grid.size), of_all)
         shape = (grid.size, grid.size)
-        self._K = coo_array((data, (rows, columns)), shape=shape).tocsc()[:, free][free]
+        self._K = csr_array(coo_array((data, (rows, columns)), shape=shape))[free][:, free]
         forces = np.bincount(dofs, weights=rates, minlength=grid.size)[free]
-        try:
-            # Pivots on the diagonal are those of L D L'.  The order of the grid has the forces of
-            # connectors last, where they find no zero there.
-            self._factors = splu(
-                self._K,
-                permc_spec="NATURAL" if len(grid.multipliers) else "MMD_AT_PLUS_A",
-                diag_pivot_thresh=0.0,
-                options={"SymmetricMode": True, "Equil": False},
-            )
-        except RuntimeError as error:
-            raise StepFailed("the tangent stiffness is singular") from error
-        pivots = self._factors.U.diagonal()
-        self.negative = int(np.sum(pivots < 0)) - len(grid.multipliers)
         self._free, self._size = free, grid.size
-        self.flow = self._spread(-self._factors.solve(forces))
+        self._motions = len(free) - len(grid.multipliers)
+        self._factor()
+        self.flow = self._spread(-self._solve(forces))
+
+    def _factor(self) -> None:
+        """Factor a symmetric form of the tangent.
+
+        A connector has the gradient g of its motion in its column, and α g and β in its row.  The
+        row is divided by α.  Where β is not zero, the unit of the force is such that ±1 stands on
+        the diagonal, so a law whose force does not answer the motion (α = 0) is no exception.
+        Each force brings one negative eigenvalue if it holds a motion or resists its growth, and
+        none if it falls when the motion grows.
+        """
+        n = self._motions
+        K, G, rows = self._K[:n, :n], self._K[:n, n:], self._K[n:, :n]
+        β = self._K.diagonal()[n:]
+        squares = np.asarray(G.multiply(G).sum(axis=0)).ravel()
+        products = np.asarray(G.multiply(rows.T).sum(axis=0)).ravel()
+        α = products / np.where(squares > 0, squares, 1.0)
+        holds = β == 0.0
+        slope = α / np.where(holds, 1.0, β)
+        self._unit = np.where(holds, 1.0, np.sqrt(np.abs(slope)))
+        self._of_row = self._unit / np.where(α == 0.0, 1.0, α)
+        self._β, self._G = np.where(holds, np.inf, β), G
+        negative = holds | (slope < 0.0)
+        diagonal = np.where(holds, 0.0, np.where(negative, -1.0, 1.0))
+        of_forces = diags_array(self._of_row) @ rows
+        blocks = [[K, G @ diags_array(self._unit)], [of_forces, diags_array(diagonal)]]
+        try:
+            self._factors = Factorisation(csr_array(block_array(blocks)))
+        except SingularMatrix:
+            raise StepFailed("the tangent stiffness is singular") from None
+        self.symmetric = self._factors.symmetric
+        self.negative = self._factors.negative - int(negative.sum())
+        if not self.symmetric:
+            self.negative %= 2
+
+    def _solve(self, b: Array) -> Array:
+        """The solution of the tangent for one right-hand side."""
+        n = self._motions
+        given = b[n:] / self._β
+        held = np.where(np.isinf(self._β), self._of_row * b[n:], 0.0)
+        x = self._factors.solve(np.concatenate([b[:n] - self._G @ given, held]))
+        x[n:] = given + self._unit * x[n:]
+        return x
+
+    def passed(self, other: Stiffness) -> bool:
+        """Whether an eigenvalue has passed zero on the way from another state."""
+        change = self.negative - other.negative
+        return bool(change if self.symmetric and other.symmetric else change % 2)
 
     def _spread(self, of_free: Array) -> Array:
         values = np.zeros(self._size)
@@ -155,7 +193,7 @@ class Stiffness:
         mode = np.random.default_rng(0).normal(size=len(w)) / np.sqrt(np.maximum(w, w.max()))
         λ = np.inf
         for _ in range(ITERATIONS):
-            mode = self._factors.solve(w * mode)
+            mode = self._solve(w * mode)
             mode /= np.sqrt(w @ mode**2)
             before, λ = λ, float(mode @ (self._K @ mode))
             if abs(λ - before) <= 1e-10 * abs(λ):

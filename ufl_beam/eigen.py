@@ -102,6 +102,20 @@ def quadratic(
     return _solved(solver, size, n, shift)
 
 
+def small(A: Array, B: Array) -> tuple[Array, Array]:
+    """All eigenvalues of ``A x = λ B x`` of small matrices; values (n,), vectors (size, n).
+
+    Args:
+        A: Symmetric; rows and columns may differ in size.
+        B: Symmetric.
+    """
+    sizes = np.sqrt(np.abs(A.diagonal()) + np.abs(B.diagonal()))
+    scale = 1 / np.where(sizes > 0, sizes, 1.0)
+    across = np.outer(scale, scale)
+    θ, x = _inverse(A * across, B * across)
+    return (1 / θ).real, scale[:, None] * x.real
+
+
 def _inverse(A: Array, B: Array) -> tuple[Complex, Complex]:
     """Eigenvalues of A⁻¹ B and vectors, the largest first, zeros left out."""
     θ, x = np.linalg.eig(np.linalg.solve(A, B))

@@ -82,22 +82,31 @@ static inline void read_below(const chains *c, int chain, int vertex, double *bl
     for (int k = 0; k < 9; ++k) block[k] = c->data[c->from_ends[18 * chain + 9 + k]];
 }
 
-/* What couples to the left end fades along a chain. Where a product of two such numbers underflows
- * they are nothing, and arithmetic with what is less than normal takes a hundred times as long. */
-static inline void drop_faded(double *block)
+static inline double largest_entry(const double *block)
+{
+  double largest = 0;
+  for (int k = 0; k < 9; ++k) largest = fmax(largest, fabs(block[k]));
+  return largest;
+}
+
+/* The coupling to the left end fades along a chain. Entries whose product with such others is nothing
+ * beside the first ones become zero: arithmetic with numbers that are less than normal takes a hundred
+ * times as long. */
+static inline void drop_faded(double *block, double faded)
 {
   for (int k = 0; k < 9; ++k)
-    if (fabs(block[k]) < 0x1p-511) block[k] = 0;
+    if (fabs(block[k]) < faded) block[k] = 0;
 }
 
 /* A chain; without a spike nothing couples to a left end. */
 static inline void eliminate_chain(const chains *c, int chain, const int spike, double *ends)
 {
-  double pivot[9], to[9], from[9], below[9], after[9];
+  double pivot[9], to[9], from[9], below[9], after[9], faded = 0;
   read_block(c, c->first[chain], 1, pivot);
   if (spike) {
     read_block(c, c->first[chain], 0, to);
     for (int k = 0; k < 9; ++k) from[k] = c->data[c->from_ends[18 * chain + k]];
+    faded = 0x1p-511 * fmin(largest_entry(to), largest_entry(from));
   }
   for (int v = c->first[chain]; v < c->first[chain + 1]; ++v) {
     double *sides = c->sides + SIDES * v, *to_next = c->to_next + BLOCK * v;
@@ -121,8 +130,8 @@ static inline void eliminate_chain(const chains *c, int chain, const int spike, 
       subtract_product(from, to_next, next_from);
       memcpy(to, next_to, sizeof to);
       memcpy(from, next_from, sizeof from);
-      drop_faded(to);
-      drop_faded(from);
+      drop_faded(to, faded);
+      drop_faded(from, faded);
     }
   }
   if (spike) {

@@ -57,9 +57,8 @@ def plot_extremes(solution: Solution, extremes: Extremes, what: str = "M") -> Fi
     stage = plane_stage(solution, [0], 1.0)
     pose = stage.pose(0)
     with picture(plane_size(points, pose.points())) as figure:
-        axes = plane_axes(
-            figure, f"extremes of the {RESULTANTS[what][0]} {what} until {solution.times[-1]:.4g} s"
-        )
+        until = solution.parameter.at(solution.times[-1])
+        axes = plane_axes(figure, f"extremes of the {RESULTANTS[what][0]} {what} until {until}")
         draw_diagrams(axes, solution, what, diagrams, points)
         draw_axes(axes, solution, points, color=INK, linewidth=2.6, zorder=4)
         draw_symbols(axes, pose)

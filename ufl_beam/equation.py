@@ -73,14 +73,15 @@ class Demand:
     """What connectors demand, seen by Python.
 
     Args:
-        missed: Of the unknowns, the residual and the scale of forces: how far it is missed.
+        missed: Of the unknowns, the residual, the scale of forces and the largest motion: how far
+            it is missed.
         size: Number of unknowns.
         failed: Told of exceptions.
     """
 
     def __init__(
         self,
-        missed: Callable[[Array, Array, float], float],
+        missed: Callable[[Array, Array, float, float], float],
         size: int,
         failed: Callable[[BaseException], None],
     ) -> None:
@@ -88,19 +89,19 @@ class Demand:
         self._handle = ffi.new_handle(self)
         self.loop = (lib.missed_in_python, self._handle)
 
-    def __call__(self, q: Any, r: Any, scale: float) -> float:
+    def __call__(self, q: Any, r: Any, scale: float, moved: float) -> float:
         """How far; not a number where that fails."""
         try:
-            return self._missed(_lent(q, self._size), _lent(r, self._size), scale)
+            return self._missed(_lent(q, self._size), _lent(r, self._size), scale, moved)
         except BaseException as error:
             self._failed(error)
             return math.nan
 
 
 @ffi.def_extern()  # type: ignore[misc, untyped-decorator, unused-ignore]
-def missed_in_python(handle: Any, q: Any, r: Any, scale: float) -> float:
+def missed_in_python(handle: Any, q: Any, r: Any, scale: float, moved: float) -> float:
     """What loops.h declares."""
-    missed: float = ffi.from_handle(handle)(q, r, scale)
+    missed: float = ffi.from_handle(handle)(q, r, scale, moved)
     return missed
 
 

@@ -41,19 +41,28 @@ class StepFailed(Exception):
     Attributes:
         residuals: What is left where it is largest in each beam, body and connector; N, moments
             over the size of the scene.
+        reason: Name that PETSc has for why its solver stopped, such as "DIVERGED_MAX_IT"; empty if
+            it did not fail.
     """
 
     def __init__(self, message: str) -> None:
         super().__init__(message)
         self.residuals: dict[str, float] = {}
+        self.reason = ""
+
+    def saying(self, message: str) -> StepFailed:
+        """The same failure with another message."""
+        other = StepFailed(message)
+        other.residuals = self.residuals
+        return other
 
 
 class ConvergenceError(RuntimeError):
     """A step found no equilibrium, even after it was cut; nothing before it is lost.
 
     Attributes:
-        time: Time of the last accepted state; s.
-        dt: The smallest step that was tried; s.
+        time: Time of the last accepted state, on a path its load factor; s.
+        dt: The smallest step that was tried, on a path the change of the load factor; s.
         solution: The :class:`~ufl_beam.solution.Solution` up to ``time``; ``start=solution`` goes
             on from there with another step or scheme.
         residuals: What is left of the equilibrium where it is largest in each beam, body and
@@ -61,6 +70,8 @@ class ConvergenceError(RuntimeError):
             equilibria were found but refused.
         forces: Sizes of the forces that should be in equilibrium, by kind: "beams", "connectors",
             "loads", "inertia", "damping"; N.
+        reason: Name that PETSc has for why its solver stopped, such as "DIVERGED_MAX_IT"; empty if
+            equilibria were found but refused.
     """
 
     def __init__(
@@ -72,6 +83,7 @@ class ConvergenceError(RuntimeError):
         solution: Any,
         residuals: dict[str, float],
         forces: dict[str, float],
+        reason: str = "",
     ) -> None:
         super().__init__(message)
         self.time = time
@@ -79,6 +91,7 @@ class ConvergenceError(RuntimeError):
         self.solution = solution
         self.residuals = residuals
         self.forces = forces
+        self.reason = reason
 
 
 class TradeoffError(RuntimeError):
@@ -214,12 +227,6 @@ def require_switch(value: Any, what: str) -> None:
     """Raise :class:`SceneError` naming ``what`` unless ``value`` is True or False."""
     if type(value).__name__ not in ("bool", "bool_"):
         raise SceneError(f"{what} = {shorten(value)} must be True or False")
-
-
-def require_path(value: Any, what: str) -> None:
-    """Raise :class:`SceneError` naming ``what`` unless ``value`` names a file."""
-    if not isinstance(value, str | os.PathLike) or not os.fspath(value):
-        raise SceneError(f"{what} = {shorten(value)} must be the name of a file")
 
 
 def require_function(value: Any, what: str, of: str) -> None:

@@ -12,7 +12,8 @@ from ufl_beam.beams import Place
 from ufl_beam.connectors import Connector, Coulomb, Stop
 from ufl_beam.errors import require_function
 from ufl_beam.memory import State
-from ufl_beam.record import Recorder
+from ufl_beam.parameter import TIME, Parameter
+from ufl_beam.record import Recorder, on_first
 
 if TYPE_CHECKING:
     from ufl_beam.simulation import Simulation
@@ -39,24 +40,27 @@ class Event(NamedTuple):
     """Something that happened in a step.
 
     Attributes:
-        time: End of the step; s.
-        where: A place in the middle of a cell, or a connector.
+        time: End of the step; s; on a path its load factor.
+        where: A place in the middle of a cell, that of a plastic hinge, or a connector.
         what: "yields", "opens", "is free" in a cell; "touches", "lets go", "slides", "sticks".
+        parameter: Words for the time.
     """
 
     time: float
     where: Place | Connector
     what: str
+    parameter: Parameter = TIME
 
     def __str__(self) -> str:
-        return f"t = {self.time:.9g} s: {self.where} {self.what}"
+        return f"{self.parameter.at(self.time, '.9g')}: {self.where} {self.what}"
 
 
 class Events(Recorder):
     """A list of what happens, for scenes with hinges, inelastic material, stops or friction.
 
     A hinge "is free" when it has dissipated 99.9 % of its energy; stops touch and let go, friction
-    slides and sticks as often as they do, the rest happens once in a cell.
+    slides and sticks as often as they do, the rest happens once in a cell or hinge.  A hinge that
+    hardens "yields".
 
     Args:
         tell: Called on the first process with each event as it happens, such as ``print``.
@@ -83,21 +87,28 @@ class Events(Recorder):
     def _watch(self, simulation: Simulation) -> None:
         """What may happen in a scene, and what has."""
         grid = simulation.grid
-        laws = [law for beam in simulation.scene.beams for law in grid.hinges(beam)]
+        in_cells = [law for beam in simulation.scene.beams for law in grid.hinges(beam)]
+        laws = [*in_cells, *(hinge.law.law for hinge in simulation.scene.hinges)]
         breaking = [law is not None and law.limit > 0 for law in laws]
-        energies = [law.energy if law is not None else np.inf for law in laws]
-        self._enough = np.where(breaking, FREE * np.array(energies), np.inf)
+        energies = np.array([law.energy if law is not None else np.inf for law in laws])
+        self._enough = np.where(breaking, FREE * energies, np.inf)
+        self._breaks = np.isfinite(energies)
         links = simulation.scene.links
         self._links = [i for i, link in enumerate(links) if type(link.law) in BETWEEN]
         self._flags = self._look(simulation)
 
     def _look(self, simulation: Simulation) -> tuple[Flags, list[bool]]:
-        """What has happened in each cell; what goes on in each connector that is watched."""
-        in_cells = np.zeros((len(simulation.grid.cells), len(IN_CELLS)), dtype=bool)
+        """What has happened in each cell and hinge; what goes on in each connector watched."""
+        in_cells = np.zeros((len(self._enough), len(IN_CELLS)), dtype=bool)
         for cells, rows in simulation.material():
             plastic, broken = rows[:, 4], rows[:, 5]
             happened = (plastic > 0, broken > 0, broken >= self._enough[cells])
             in_cells[cells] = np.column_stack(happened)
+        if simulation.scene.hinges:
+            hinges = slice(len(simulation.grid.cells), None)
+            lost, breaks = simulation.hinges()[:, -1], self._breaks[hinges]
+            happened = ((lost > 0) & ~breaks, (lost > 0) & breaks, lost >= self._enough[hinges])
+            in_cells[hinges] = np.column_stack(happened)
         if not self._links:
             return in_cells, []
         forces = np.abs(simulation.connections()[self._links, 1])
@@ -122,14 +133,19 @@ class Events(Recorder):
                 begins, ends = BETWEEN[type(simulation.scene.links[link].law)]
                 new.append((simulation.t, link, begins if now else ends))
         events = self._add(simulation, new)
-        if self._tell is not None and simulation.comm.rank == 0:
-            for event in events:
+        if self._tell is not None and events:
+            on_first(simulation.comm, lambda: self._tell_all(events))
+
+    def _tell_all(self, events: list[Event]) -> None:
+        for event in events:
+            if self._tell is not None:
                 self._tell(event)
 
     def _add(self, simulation: Simulation, rows: list[Row]) -> list[Event]:
         links, grid = simulation.scene.links, simulation.grid
+        named = simulation.solution.parameter
         events = [
-            Event(t, grid.middle(number) if what in IN_CELLS else links[number], what)
+            Event(t, grid.place_of(number) if what in IN_CELLS else links[number], what, named)
             for t, number, what in rows
         ]
         self._rows += rows

@@ -72,7 +72,9 @@ class _OverStep:
 
 
 class _ExactStep(_OverStep):
-    """What steps have in common whose works are exact increments of energy."""
+    """Steps whose works are exact increments of energy."""
+
+    exact_ledger = True
 
     def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
         """The variation that turns the step into the increment of the strains."""
@@ -102,7 +104,10 @@ class ExactStatic(_ExactStep):
 
     :class:`Static` finds equilibrium at the ends of the steps and counts works by the trapezoidal
     rule; here the equation of the step is that of :class:`Midpoint`.  Inelastic material follows
-    its laws over the step, not only at its end.  A leap to another branch of equilibria does not
+    its laws over the step, not only at its end.  The ledger is exact, the solution is of first
+    order in the step with ``theta=1`` and of second order with ``theta=1/2``; docs/schemes.md has
+    measured errors.  Loads that are there from the start are applied in the first step, in parts
+    that turn nodes little.  A leap to another branch of equilibria does not
     stop it, but what that sets free is in the entry "numerical"; :class:`Static` stops.
 
     Args:
@@ -139,8 +144,13 @@ class ExactStatic(_ExactStep):
         return 0.0
 
     def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
-        """Loads act where the resultants are, motions arrive at the end."""
-        return Step(t0, t1, q0, t0 + self.theta * (t1 - t0), motion_time=t1, toward=1.0)
+        """Loads act where the resultants are, on the straight way to those at the end of the step.
+
+        Parts of a step go in proportion, as those of :class:`Static`; so loads and motions that are
+        there at once can be reached in parts.
+        """
+        toward = (t1 - t0) / (end - t0)
+        return Step(t0, t1, q0, load_time=end, motion_time=end, toward=toward, at=self.theta)
 
 
 class _Midway:
@@ -214,7 +224,8 @@ class Midpoint(_ExactStep, _Velocities):
     Laws of inelastic material are stated in the middle of the step, which is of second order;
     ``alpha = 1/2`` states them at its end: backward Euler, of first order.  In the middle of the
     step stresses lie on the yield surface, and an open hinge bears nothing; at the ends they
-    alternate about that by the order of a step, which a small ``alpha`` damps.
+    alternate about that by the order of a step, which a small ``alpha`` damps.  The elastic energy
+    of what breaks completely is lost at once, as "numerical".
 
     Args:
         alpha: Dissipation by the resultants, from 0 to 1/2.

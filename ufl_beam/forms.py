@@ -18,6 +18,7 @@ from ufl_beam.compat import Array, fem, pack
 from ufl_beam.grid import Index
 from ufl_beam.lanes import LANES, in_lanes
 from ufl_beam.loops import doubles, ffi, integers, kernel, lib
+from ufl_beam.native import compiled_form
 from ufl_beam.sparse import Csr
 
 
@@ -72,7 +73,7 @@ class Kernel:
     def __init__(
         self, form: ufl.Form, unknown: fem.Function, cell_dofs: Index, coordinates: Array
     ) -> None:
-        self.compiled = fem.form(form)
+        self.compiled, self._source = compiled_form(form)
         ufcx = self.compiled.ufcx_form
         constants, packed = pack(self.compiled)
         everything = form.coefficients()
@@ -142,6 +143,10 @@ class Kernel:
         if (at := self._starts.get(id(function))) is not None:
             lib.set_cells(self.cells, doubles(q), at)
 
+    def uses(self, function: fem.Function) -> bool:
+        """Whether a function appears in the form."""
+        return id(function) in self._starts
+
     def put(self, function: fem.Function, values: Array) -> None:
         """Give ``function`` other values in the cells; shape (num_cells, dofs per cell)."""
         columns = self._columns[function]
@@ -170,7 +175,7 @@ class Kernel:
 
     def address_in_lanes(self) -> int | None:
         """Address of what computes several cells at once; none if the compiler cannot."""
-        return in_lanes(self.compiled, self._entries, self._packed.shape[1], len(self._constants))
+        return in_lanes(self._source, self._entries, self._packed.shape[1], len(self._constants))
 
     def compute_in_lanes(self, address: int, coordinates: Array) -> None:
         """Compute several cells at once from now on, with their coordinates in batches."""

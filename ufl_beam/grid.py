@@ -7,6 +7,7 @@ process.
 
 from __future__ import annotations
 
+import math
 import struct
 from bisect import bisect_left
 from functools import cache, cached_property
@@ -21,6 +22,7 @@ import numpy.typing as npt
 from ufl_beam.beams import Beam, Place
 from ufl_beam.bodies import Anchor, Body, Node, Spot, node
 from ufl_beam.compat import Array
+from ufl_beam.connectors import Connector
 from ufl_beam.discretisation import Mesh
 from ufl_beam.errors import SceneError, require_kind
 from ufl_beam.laws import Softening
@@ -43,8 +45,8 @@ class Grid:
         mesh: How finely; with the cells of its beams by default.
 
     Attributes:
-        points: Nodes of all beams: the vertices, beam after beam, then those inside of cells;
-            shape (num_nodes, 2); m.
+        points: Nodes of all beams: the vertices, beam after beam, those inside of cells, and the
+            second vertex of each plastic hinge; shape (num_nodes, 2); m.
         cells: Vertices of the cells; shape (num_cells, 2).
         nodes_of_cells: Both vertices of the cells and the nodes between; (num_cells, degree + 1).
         beam_of_cell: Number of the beam of each cell; shape (num_cells,).
@@ -74,8 +76,9 @@ class Grid:
         between = begins[:, None] + inner[:, None] * (ends - begins)[:, None]
         self.points = np.concatenate([vertices, between.reshape(-1, 2)])
         numbers = len(vertices) + np.arange(between[..., 0].size).reshape(between.shape[:2])
-        self.nodes_of_cells = np.hstack([self.cells, numbers])
         self._require_length()
+        self._add_hinges()
+        self.nodes_of_cells = np.hstack([self.cells, numbers])
         self._number()
 
     def agrees(self, other: Grid) -> bool:
@@ -85,6 +88,15 @@ class Grid:
             and np.array_equal(self.points, other.points)
             and np.array_equal(self.dofs, other.dofs)
         )
+
+    def checksum(self) -> int:
+        """A number that tells points and numberings apart."""
+        numbers = np.concatenate([self.dofs.ravel(), self.dofs_of_bodies.ravel(), self.multipliers])
+        return crc32(numbers.astype("<i8").tobytes(), crc32(self.points.astype("<f8").tobytes()))
+
+    def parameters(self, beam: Beam) -> Array:
+        """Parameters of the vertices of a beam."""
+        return self._parameters[self._index(beam)]
 
     @cached_property
     def _number_of_beam(self) -> dict[Beam, int]:
@@ -117,8 +129,25 @@ class Grid:
         """Points and degrees of freedom of the nodes of a beam or body; (n, 2), (n, 3); m."""
         if isinstance(one, Body):
             return np.array([one.center]), self.node(one.middle).reshape(1, 3)
-        nodes = self.nodes_along(one)
+        nodes = self._nodes_of(one)
         return self.points[nodes], self.dofs[nodes]
+
+    def _nodes_of(self, beam: Beam) -> Index:
+        """Nodes of a beam, both sides of its hinges included."""
+        return np.union1d(self.nodes_of_cells[self.cells_of(beam)], self.vertices_of(beam))
+
+    def _add_hinges(self) -> None:
+        """Give each plastic hinge a second vertex, which the cell beyond it begins or ends with."""
+        places = [link.b if link.b.beyond else link.a for link in self.scene.hinges]
+        at = np.array([self.vertex(Place(p.beam, p.s)) for p in places], dtype=np.int64)
+        self._beyond = dict(zip(places, range(len(self.points), len(self.points) + len(at))))
+        self.points = np.concatenate([self.points, self.points[at]])
+        self.cells_at_hinges = np.array([self.cell(place) for place in places], dtype=np.int64)
+        for place, vertex, cell in zip(places, at, self.cells_at_hinges, strict=True):
+            at_end = place.s == 1.0
+            beyond = cell if at_end or place.s == 0.0 else cell + 1
+            self.cells[beyond, int(at_end)] = self._beyond[place]
+        self.vertices_at_hinges = at
 
     @property
     def pieces(self) -> Index:
@@ -129,8 +158,8 @@ class Grid:
 
     def nodes_along(self, beam: Beam) -> Index:
         """Vertices of a beam and nodes between them, from start to end."""
-        start, _, *between = self.nodes_of_cells[self.cells_of(beam)].T
-        return np.append(np.column_stack([start, *between]), self.vertices_of(beam)[-1])
+        vertices, inner = self.vertices_of(beam), self.nodes_of_cells[self.cells_of(beam), 2:]
+        return np.append(np.column_stack([vertices[:-1], inner]), vertices[-1])
 
     def cells_of(self, beam: Beam) -> Index:
         """Cells of a beam from start to end."""
@@ -145,7 +174,10 @@ class Grid:
         """
         cell, part = self._cell_and_part(place)
         first, *between, last = self.mesh.weights(part)
-        return self.nodes_of_cells[cell], np.array([first, last, *between])
+        nodes = self.nodes_of_cells[cell].copy()
+        if part in (0.0, 1.0):  # the side of a hinge that is attached to, not that of the cell
+            nodes[int(part)] = self.vertex(place)
+        return nodes, np.array([first, last, *between])
 
     def _cell_and_part(self, place: Place) -> tuple[int, float]:
         """The cell at a place, and the part of it that lies before the place."""
@@ -181,12 +213,19 @@ class Grid:
 
     def vertex(self, place: Place) -> int:
         """The vertex at a place that something is attached to."""
+        if place.beyond:
+            return self._beyond[place]
         cell, part = self._cell_and_part(place)
-        return int(self.cells[cell, round(part)])
+        return cell + self._index(place.beam) + round(part)
 
     def cell(self, place: Place) -> int:
         """The cell at a place; at a vertex the one before it, at the start the first one."""
         return self._cell_and_part(place)[0]
+
+    def lengths(self, cells: Index) -> Array:
+        """Lengths of some cells; (len(cells),); m."""
+        ends = self.points[self.cells[cells]]
+        return np.asarray(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
 
     def middle(self, cell: int) -> Place:
         """The place in the middle of a cell."""
@@ -195,19 +234,20 @@ class Grid:
         beam: Beam = self.scene.beams[number]
         return beam.at((s[i] + s[i + 1]) / 2)
 
+    def place_of(self, number: int) -> Place:
+        """The middle of a cell or, numbered after the cells, the place of a plastic hinge."""
+        if number < len(self.cells):
+            return self.middle(number)
+        hinge = self.scene.hinges[number - len(self.cells)]
+        return hinge.a.beam.at(hinge.a.s)
+
     def hinges(self, beam: Beam) -> list[Softening | None]:
-        """Law of the hinge in each cell of a beam."""
-        cells = self.cells_of(beam)
-        laws = [beam.section.hinge] * len(cells)
-        at = {s: self.cell(beam.at(s)) - cells[0] for s in beam.hinges}
-        if len(set(at.values())) < len(at):
-            raise SceneError(
-                f"{beam.name}: two of the hinges at s = {', '.join(f'{s:g}' for s in at)} are in "
-                "one cell; take more cells, or one hinge"
-            )
-        for s, law in beam.hinges.items():
-            laws[at[s]] = law
-        return laws
+        """Law of the hinge that may open in the middle of each cell of a beam."""
+        return [beam.section.hinge] * len(self.cells_of(beam))
+
+    def hinge_at(self, place: Place) -> Connector | None:
+        """The plastic hinge of zero length at a place, if there is one."""
+        return next((h for h in self.scene.hinges if place in (h.a, h.b)), None)
 
     def keys(self, cells: Index) -> list[tuple[int, int]]:
         """A number for the ends of the beam, and the number in the beam, of some cells."""
@@ -224,9 +264,8 @@ class Grid:
             body, component = np.argwhere(self.dofs_of_bodies == dof)[0]
             return f"{COMPONENTS[component]} of {self.scene.movers[body].name}"
         node, component = np.argwhere(self.dofs == dof)[0]
-        cell = int(np.argmax((self.nodes_of_cells == node).any(axis=1)))
         x, y = self.points[node]
-        beam: Beam = self.scene.beams[self.beam_of_cell[cell]]
+        beam = next(b for b in self.scene.beams if node in self._nodes_of(b))
         return f"{COMPONENTS[component]} of {beam.name} at ({x:g}, {y:g})"
 
     def worst(self, sizes: Array) -> dict[str, float]:
@@ -265,7 +304,8 @@ class Grid:
         kept = slots == np.arange(len(slots))
         inner = self.nodes_of_cells[:, 2:]
         position = np.arange(nodes + len(movers), dtype=np.float64)
-        position[inner] = self.cells[:, :1] + self.mesh.nodes[1:-1]
+        position[list(self._beyond.values())] = self.vertices_at_hinges
+        position[inner] = position[self.cells[:, :1]] + self.mesh.nodes[1:-1]
         ordered = (3 * np.argsort(position)[:, None] + np.arange(3)).ravel()
         order = np.concatenate([ordered[(kept & of)[ordered]] for of in (~shared, shared)])
         number = np.empty(len(slots), dtype=np.int64)
@@ -308,6 +348,8 @@ class Share:
         owner = np.full(grid.size, comm.size)
         rank_of_cell = np.searchsorted(limits, np.arange(num_cells), side="right") - 1
         np.minimum.at(owner, of_cell, rank_of_cell[:, None])
+        of_hinge, cell_of_hinge = grid.dofs[grid.vertices_at_hinges], grid.cells_at_hinges
+        np.minimum.at(owner, of_hinge, rank_of_cell[cell_of_hinge][:, None])
         of_link = grid.dofs_of_links
         rank_of_link = owner[of_link].min(axis=1, initial=comm.size) % comm.size
         np.minimum.at(owner, of_link, rank_of_link[:, None])
@@ -318,7 +360,9 @@ class Share:
         self._global[order] = np.arange(grid.size)
 
         own = np.flatnonzero(owner == comm.rank)
-        touched = np.unique(np.r_[own, of_cell[self.cells].ravel(), of_link[self.links].ravel()])
+        at_hinges = of_hinge[rank_of_cell[cell_of_hinge] == comm.rank].ravel()
+        of_links = of_link[self.links].ravel()
+        touched = np.unique(np.r_[own, of_cell[self.cells].ravel(), at_hinges, of_links])
         mine = owner[touched] == comm.rank
         self.dofs = np.concatenate([touched[mine], touched[~mine]])
         self.num_owned = int(mine.sum())
@@ -348,9 +392,7 @@ class Share:
         """
         if isinstance(anchor, Spot):
             return bool(self.owns(self.at(anchor)).all())
-        vertex = self.grid.vertex(anchor)
-        cell = int(np.argmax((self.grid.cells == vertex).any(axis=1)))
-        return bool(self.cells[0] <= cell <= self.cells[-1])
+        return bool(self.cells[0] <= self.grid.cell(anchor) <= self.cells[-1])
 
     def rotations(self) -> Index:
         """Local numbers of all rotations; int32."""
@@ -372,8 +414,7 @@ class Share:
 
     def cell_lengths(self) -> Array:
         """Lengths of the cells; m."""
-        ends = self.grid.points[self.grid.cells[self.cells]]
-        return np.asarray(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
+        return self.grid.lengths(self.cells)
 
     def lengths(self) -> Array:
         """What a strain of one is to each local degree of freedom: a cell's length, or a radian.
@@ -410,6 +451,15 @@ class Share:
         result[self._all_owned] = parts
         return result
 
+    def added(self, values: Array) -> Array:
+        """Sums over the processes of values at the local degrees of freedom."""
+        if self.comm.size == 1:
+            return values
+        sums = np.zeros(self.grid.size)
+        sums[self.dofs] = values
+        self.comm.Allreduce(MPI.IN_PLACE, sums)
+        return np.asarray(sums[self.dofs])
+
     def gather_cells(self, values: Array) -> Array:
         """Values of all cells, in the order of the grid, on every process."""
         if self.comm.size == 1:
@@ -419,3 +469,13 @@ class Share:
     def total(self, value: float) -> float:
         """Sum over the processes."""
         return value if self.comm.size == 1 else float(self.comm.allreduce(value))
+
+    def largest(self, value: float) -> float:
+        """Largest over the processes; infinite where one has no number.
+
+        MPI does not say what the largest of numbers is with one that is none, and processes that
+        learn different ones part.
+        """
+        if self.comm.size == 1:
+            return value
+        return float(self.comm.allreduce(math.inf if math.isnan(value) else value, op=MPI.MAX))

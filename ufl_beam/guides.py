@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from ufl_beam.beams import Curve
 from ufl_beam.compat import Array
 from ufl_beam.connectors import Guide
-from ufl_beam.errors import SceneError, StepFailed, shorten
+from ufl_beam.curves import REACH, nearest, parameter_step, tangent
+from ufl_beam.errors import StepFailed
 from ufl_beam.grid import Index, Share
 from ufl_beam.links import Links
 from ufl_beam.memory import Memory
@@ -17,49 +15,13 @@ from ufl_beam.responses import Setting
 from ufl_beam.schemes import Step
 from ufl_beam.sparse import Csr
 
-PROJECTIONS = 50
-"""Iterations in which the nearest point of a curve is sought."""
-
-
-def tangent(curve: Curve, s: float) -> Array:
-    """Derivative of a curve by its parameter; (2,); m."""
-    ε = 1e-6
-    return np.asarray((_on(curve, s + ε) - _on(curve, s - ε)) / (2 * ε))
-
-
-def _on(curve: Curve, s: float) -> Array:
-    """Point of a curve; (2,); m."""
-    try:
-        point = np.asarray(curve(s), dtype=np.float64)
-        if point.shape == (2,):
-            return point
-    except (TypeError, ValueError):
-        pass
-    raise SceneError(
-        f"guide curve: curve({s:g}) = {shorten(curve(s))} must be a pair (x, y); it must be one "
-        "for all s that the motion may reach"
-    )
-
-
-def nearest(curve: Curve, point: Array, s: float) -> float:
-    """Parameter of the point of a curve that is nearest to another; not a number if none is found.
-
-    Args:
-        curve: ``s -> (x, y)``; m.
-        point: Shape (2,); m.
-        s: Where to begin.
-    """
-    for _ in range(PROJECTIONS):
-        t = tangent(curve, s)
-        step = float((point - _on(curve, s)) @ t / (t @ t))
-        s += step
-        if abs(step) * math.hypot(*t) <= 1e-15 * math.hypot(*point):
-            return s
-    return s if abs(step) <= 1e-9 else math.nan
-
 
 class Guides(Links):
     """Forces across curves; those over a step are across the chord, so that they do no work.
+
+    The last digits of the curve spoil the direction of a short chord.  Where it is so short that
+    they spoil more than the curvature does, the direction in its middle takes its place: either errs
+    by the last digits to the power of two thirds at most.
 
     The motion of a guide is the distance from its curve, zero when a step is accepted.
     """
@@ -75,26 +37,44 @@ class Guides(Links):
         self._across = [A.positions(d, self._forces_at) for d in (self._x, self._y)]
         self._rows = [A.positions(self._forces_at, d) for d in (self._x, self._y)]
         self._points = np.array([link.b.point for link in self.links])
-        self._average = setting.scheme.average
+        self._over_step = np.full(len(self.links), setting.scheme.average(0.0, 1.0) != 1.0)
         n = len(self.links)
         self._s: Array = np.zeros(n)
         self._s0: Array = np.zeros(n)
         self._on0 = self._points.copy()
-        self._size = share.grid.scene.size
+        self._size = size = share.grid.scene.size
+        last_digit = np.spacing(size + np.abs(self._points).max(axis=1))
+        self._shortest = size * (24 * last_digit / size) ** (1 / 3)
+        self._steps: Array = np.array([parameter_step(law.curve, 0.0, size) for law in self._laws])
 
     # -- geometry ------------------------------------------------------------------------------
 
     def _nearest(self, p: Array) -> tuple[Array, Array]:
-        """Points of the curves nearest to ``p``, and unit tangents there; from the latest ones."""
+        """Points of the curves nearest to ``p``, and tangents there; from the latest ones."""
         curves = [law.curve for law in self._laws]
-        found = np.array([nearest(c, p[k], float(self._s[k])) for k, c in enumerate(curves)])
+        starts = zip(curves, p, self._s.tolist(), self._steps.tolist(), strict=True)
+        found = np.array([nearest(*start, self._size) for start in starts])
         if not np.isfinite(found).all():
             place = self.links[int(np.argmin(np.isfinite(found)))].b
             raise StepFailed(f"{place} is where no nearest point of its guide curve was found")
         self._s = found
-        t = np.array([tangent(curve, s) for curve, s in zip(curves, self._s, strict=True)])
-        on = np.array([_on(curve, s) for curve, s in zip(curves, self._s, strict=True)])
-        return on, t / np.linalg.norm(t, axis=1)[:, None]
+        places = zip(curves, self._s.tolist(), self._steps.tolist(), strict=True)
+        t = np.array([tangent(*place) for place in places])
+        on = np.array([curve(s) for curve, s in zip(curves, self._s, strict=True)], dtype=float)
+        return on, t
+
+    def _curvatures(self, n: Array) -> Array:
+        """Curvatures at the latest points, towards the normals ``n``; 1/m.
+
+        By second differences over 1e-4 of the scene, which leave 1e-8 of round-off.
+        """
+        found = []
+        for law, s, normal in zip(self._laws, self._s, n, strict=True):
+            on, t = np.asarray(law.curve(s)), tangent(law.curve, s)
+            ε = 1e-4 * self._size / math.hypot(*t)
+            bend = np.add(law.curve(s + ε), law.curve(s - ε)) - 2 * on
+            found.append(float(normal @ bend) / (ε**2 * float(t @ t)))
+        return np.array(found)
 
     def _at(self, q: Array) -> Array:
         return self._points + np.column_stack([q[self._x], q[self._y]])
@@ -103,23 +83,37 @@ class Guides(Links):
         """Distance, normals there and over the step, and how these change with the point."""
         p = self._at(q1)
         on, t = self._nearest(p)
+        t /= np.linalg.norm(t, axis=1)[:, None]
         n = np.column_stack([-t[:, 1], t[:, 0]])
         # In statics forces are across the curve at the end of the step, else across the chord.
         chord = on - self._on0
         length = np.linalg.norm(chord, axis=1)
-        moves = (length > 1e-8 * self._size) & (self._average(0.0, 1.0) != 1.0)
-        d = np.where(moves[:, None], chord / np.where(moves, length, 1.0)[:, None], t)
-        d *= np.sign(np.sum(d * t, axis=1))[:, None]
-        m = np.column_stack([-d[:, 1], d[:, 0]])
-        # dm = W (I - d d) t t.dp / length
-        across = t - d * np.sum(d * t, axis=1)[:, None]
-        across *= np.sign(np.sum(chord * d, axis=1))[:, None]
-        turning = (
-            np.column_stack([-across[:, 1], across[:, 0]])
-            / np.where(moves, length, np.inf)[:, None]
-        )
+        far = self._over_step & (length > self._shortest)
+        d, bend = t.copy(), np.zeros_like(t)
+        d[far] = chord[far] / length[far, None]
+        d[far] *= np.sign(np.sum(d[far] * t[far], axis=1))[:, None]
+        # d changes with the point by (I - d d) t t.dp / length
+        back = np.sign(np.sum(chord[far] * d[far], axis=1)) / length[far]
+        bend[far] = (t[far] - d[far] * np.sum(d * t, axis=1)[far, None]) * back[:, None]
+        for k in np.flatnonzero(self._over_step & ~far):
+            d[k], bend[k] = self._in_the_middle(k)
+        m, turning = (np.column_stack([-x[:, 1], x[:, 0]]) for x in (d, bend))
         distance = np.sum(n * (p - on), axis=1)
+        if not moves.all():
+            # The normal at the end turns by the curvature κ: dn = -κ t t.dp / (1 - κ distance).
+            κ = self._curvatures(n)
+            turning = np.where(moves[:, None], turning, (-κ / (1 - κ * distance))[:, None] * t)
         return distance, n, m, np.einsum("ki,kj->kij", turning, t)
+
+    def _in_the_middle(self, k: int) -> tuple[Array, Array]:
+        """Direction of a curve in the middle of a short step, and its change with the end."""
+        curve, step, s = self._laws[k].curve, self._steps[k], (self._s0[k] + self._s[k]) / 2
+        t = tangent(curve, s, step)
+        speed = np.linalg.norm(t)
+        d = t / speed
+        second = np.add(curve(s + step), curve(s - step)) - np.multiply(2, curve(s))
+        bend = second / (step * speed) ** 2
+        return d, (bend - d * (d @ bend)) / 2
 
     # -- the step ------------------------------------------------------------------------------
 
@@ -129,6 +123,10 @@ class Guides(Links):
         return self._frames(q)[0]
 
     def begin(self, step: Step) -> None:
+        """Begin at the points of the last step."""
+        self.again()
+
+    def again(self) -> None:
         """Begin at the points of the last step."""
         self._s = self._s0.copy()
 
@@ -153,10 +151,26 @@ class Guides(Links):
             for j in range(2):
                 np.add.at(data, self._stiff[2 * k + j], λ * dm[:, k, j])
 
+    def add_tangent_change(self, q1: Array, u: Array) -> None:
+        """Add the derivative of the tangent at ``q1`` along ``u``.
+
+        Only Python knows the curves, so it is a difference of fourth order, over a hundredth of
+        the scene: curvatures are known to 1e-8, which leaves 1e-6.
+        """
+        way = np.abs(u[np.r_[self._x, self._y]]).max(initial=0.0)
+        ε = 1e-2 * self._size / way if way > 0 else 1.0
+        data = self._A.data
+        before, change = data.copy(), np.zeros_like(data)
+        for k, weight in ((-2, 1), (-1, -8), (1, 8), (2, -1)):
+            data.fill(0.0)
+            self.add_tangent(q1 + k * ε * u)
+            change += weight / (12 * ε) * data
+        data[:] = before + change
+
     def demand(self) -> None:
         """None."""
 
-    def excess(self, q: Array, r: Array, force: float) -> float:
+    def excess(self, q: Array, r: Array, force: float, moved: float) -> float:
         """Largest distance, as a part of 1 % of the scene."""
         round_off = 8 * np.spacing(self._size + np.abs(self._points + self._on0).max(axis=1))
         missed = np.maximum(np.abs(r[self._forces_at]) - round_off, 0.0)
@@ -166,13 +180,30 @@ class Guides(Links):
         """Guides take no energy."""
         return 0.0
 
+    def flows(self) -> bool:
+        """None does."""
+        return False
+
+    def shown_motion(self, q: Array) -> Array:
+        """Motions of the accepted state ``q``; (num_links,); m."""
+        return self.motion(q)
+
+    def dissipated(self) -> Array:
+        """None: guides do not yield."""
+        return np.zeros(len(self.links))
+
+    def dissipation(self, q1: Array) -> float:
+        """None: guides do no work."""
+        return 0.0
+
     def effort(self, q1: Array) -> float:
         """Guides take no energy."""
         return 0.0
 
     def accept(self, q1: Array, s: Array) -> None:
         """Remember the points on the curves."""
-        self._on0, _ = self._nearest(self._at(q1))
+        self._on0, t = self._nearest(self._at(q1))
+        self._steps = REACH * self._size / np.linalg.norm(t, axis=1)
         self._s0 = self._s.copy()
 
     def freeze(self) -> None:
@@ -184,8 +215,8 @@ class Guides(Links):
         """Nothing is stored."""
 
     def remember(self, memory: Memory, q: Array) -> None:
-        """The points on the curves, and their parameters."""
-        rows = np.column_stack([self.work, self.rate, self._s, self._s0, self._on0])
-        rows = memory.rows("guides", self.numbers, rows)
-        self.work, self.rate, self._s, self._s0 = rows[:, :4].T.copy()
-        self._on0 = rows[:, 4:].copy()
+        """The points on the curves, their parameters, and the steps of these for tangents."""
+        numbers = (self.work, self.rate, self._s, self._s0, self._steps)
+        rows = memory.rows("guides", self.numbers, np.column_stack([*numbers, self._on0]))
+        self.work, self.rate, self._s, self._s0, self._steps = rows[:, :5].T.copy()
+        self._on0 = rows[:, 5:].copy()

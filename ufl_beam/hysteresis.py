@@ -61,7 +61,7 @@ def plot_moment_curvature(solution: Solution, place: Place) -> Figure:
     M, K = solution.material_at(place).forces[:, 2], solution.strains_at(place)[:, 2]
     with picture((8.0, 5.4)) as figure:
         axes = figure.add_subplot()
-        _draw_path(figure, axes, solution.times, K, M)
+        _draw_path(figure, axes, solution, K, M)
         axes.set_xlabel("curvature K (1/m)")
         axes.set_title(f"cell at {place}", loc="left", color=INK)
     return figure
@@ -75,28 +75,30 @@ def plot_hinge(solution: Solution, place: Place) -> Figure:
 
     Args:
         solution: What to show.
-        place: Where; at a vertex it is the cell before it.
+        place: Where; without a plastic hinge at the place it is that of the cell, at a vertex of
+            the cell before it.
 
     Raises:
-        SceneError: The scene is elastic, the cell has no hinge, or the beam of the place is not in
-            the scene.
+        SceneError: The scene is elastic, there is no hinge, or the beam of the place is not in the
+            scene.
     """
     kept, grid = solution.material_at(place), solution.grid
-    law = grid.hinges(place.beam)[grid.cell(place) - int(grid.cells_of(place.beam)[0])]
+    hinge = grid.hinge_at(place)
+    in_cell = grid.hinges(place.beam)[grid.cell(place) - int(grid.cells_of(place.beam)[0])]
+    law = in_cell if hinge is None else hinge.law.law
     if law is None or np.isinf(law.limit):
-        raise SceneError(f"plot_hinge: the cell at {place} has no hinge")
+        raise SceneError(f"plot_hinge: neither {place} nor the cell there has a hinge")
     M, jump, lost = kept.forces[:, 2], kept.jump, float(kept.hinge[-1])
     with picture((8.0, 5.4)) as figure:
         axes = figure.add_subplot()
         for part in _monotone(jump):
             axes.fill_between(jump[part], M[part], facecolor=(ORANGE, 0.3), linewidth=0.0, zorder=2)
-        _draw_path(figure, axes, solution.times, jump, M)
+        _draw_path(figure, axes, solution, jump, M)
         _prefix(axes, "x", jump, "jump of rotation", "rad")
-        of_all = f"{with_unit(lost, 'J')} of {with_unit(law.energy, 'J')}"
-        axes.set_title(
-            f"hinge at {place}: {of_all} dissipated, {_percent(lost / law.energy)}",
-            loc="left", color=INK,
-        )  # fmt: skip
+        spent = f"{with_unit(lost, 'J')} dissipated"
+        if math.isfinite(law.energy):
+            spent += f", {_percent(lost / law.energy)} of {with_unit(law.energy, 'J')}"
+        axes.set_title(f"hinge at {place}: {spent}", loc="left", color=INK)
     return figure
 
 
@@ -127,7 +129,7 @@ def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Fig
     # Upright frames need less; the bar and the legend have their own widths.
     across = height * float(np.divide(*np.ptp(room, axis=0)))
     with picture((min(width, max(6.0, across + 3.0)), height)) as figure:
-        axes = plane_axes(figure, f"damage at t = {solution.times[n]:.4g} s{factor}")
+        axes = plane_axes(figure, f"damage at {solution.parameter.at(solution.times[n])}{factor}")
         axes.update_datalim(room)
         draw_undeformed(axes, stage)
         draw_axes(axes, solution, points, color=INK, linewidth=2.0, zorder=2)
@@ -160,7 +162,7 @@ def plot_dissipation(solution: Solution) -> Figure:
     """
     if not solution.scene.connectors:
         _require_inelastic(solution)
-    energy, t = solution.energy, solution.times
+    energy, t = solution.energy, solution.progress
     held = energy.total
     supplied = held[0] + sum(energy.supplied.values(), np.zeros_like(t))
     start = held[0] > 1e-12 * energy.throughput
@@ -176,7 +178,7 @@ def plot_dissipation(solution: Solution) -> Figure:
         axes.plot(t, supplied, color=INK, label=label)
         axes.plot(t, held, color=BLUE, label="in the scene")
         _prefix(axes, "y", np.concatenate([supplied, held]), "energy", "J")
-        axes.set_xlabel("time t (s)")
+        axes.set_xlabel(solution.parameter.progress)
         axes.set_title(
             f"worst imbalance {_scientific(energy.worst)} of {with_unit(energy.throughput, 'J')} "
             "throughput",
@@ -254,8 +256,9 @@ def _prefix(axes: Axes, which: str, values: Array, quantity: str, unit: str) -> 
     axis.set_label_text(f"{quantity} ({prefix}{unit})")
 
 
-def _draw_path(figure: Figure, axes: Axes, times: Array, x: Array, M: Array) -> None:
+def _draw_path(figure: Figure, axes: Axes, solution: Solution, x: Array, M: Array) -> None:
     """M against x, from light to dark in time; a ring at the beginning, a dot at the end."""
+    times, named = solution.progress, solution.parameter
     from matplotlib.collections import LineCollection
 
     colors = scale("viridis_r", 0.12, 1.0, float(times[0]), float(times[-1]))
@@ -269,31 +272,30 @@ def _draw_path(figure: Figure, axes: Axes, times: Array, x: Array, M: Array) -> 
         at_zero(0.0, color=GREY, linewidth=1.0, zorder=1)
     axes.add_collection(pieces)
     for i, inside in ((0, "white"), (-1, INK)):
-        label = f"t = {times[i]:.4g} s"
+        label = named.at(solution.times[i])
         axes.plot(
             *path[i], "o", ms=8.0, mfc=inside, mec=INK, mew=1.6, zorder=5, ls="none", label=label
         )
     axes.autoscale_view()
     axes.tick_params(labelsize=12, color="#888888")
     _prefix(axes, "y", M, "bending moment M", "N m")
-    draw_bar(figure, axes, colors, "time t (s)")
+    draw_bar(figure, axes, colors, named.progress)
     figure.legend(loc="outside upper left", ncols=2)
 
 
 def _draw_hinges(figure: Figure, axes: Axes, solution: Solution, n: int, points: Array) -> None:
     """Circles at the hinges that have opened, and what their sizes mean."""
-    cells, parts = open_hinges(solution, n)
-    if not len(cells):
+    hinges = open_hinges(solution, n, points)
+    if not hinges:
         return
-    centers = points[solution.grid.cells[cells]].mean(axis=1)
 
     def circle(part: float) -> dict[str, Any]:
         inside = "white" if part >= FULLY_OPEN else BLUE
         size = 4.0 + 6.0 * math.sqrt(part)
         return {"ms": size, "mfc": inside, "mec": "white" if inside == BLUE else BLUE, "ls": "none"}
 
-    for center, part in zip(centers, parts, strict=True):
-        axes.plot(*center, "o", mew=1.8, zorder=6, **circle(part))
+    for hinge in hinges:
+        axes.plot(*hinge.at, "o", mew=1.8, zorder=6, **circle(hinge.part))
     for example, text in ((0.1, "hinge, 10 % broken"), (0.5, "50 %"), (1.0, "fully open")):
         axes.plot([], [], "o", mew=1.8, label=text, **circle(example))
     figure.legend(loc="outside upper left", ncols=3)

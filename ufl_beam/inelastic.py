@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property, partial
+
 import numpy as np
 import ufl
 
@@ -17,6 +19,7 @@ from ufl_beam.memory import Memory
 from ufl_beam.points import INPUTS, Course, Points
 from ufl_beam.schemes import Scheme, Step
 from ufl_beam.sparse import Csr
+from ufl_beam.tangent_change import CellTangent
 
 
 def inelastic_cells(grid: Grid) -> list[tuple[Layout, Index]]:
@@ -116,7 +119,8 @@ class InelasticBeams:
         w_e, dx = scheme.virtual_strain(q0, q1, w, axis), fields.dx(1)
         around = ufl.dot(b + ufl.dot(D, strain(q1, axis)), w_e) * dx
         derivative = ufl.derivative(around, q1, ufl.TrialFunction(fields.space))
-        self._q0 = q0
+        self._q0, self._q1, self._b, self._D = q0, q1, b, D
+        self._fields, self._around = fields, around
         self._force, self._tangent = (
             fields.hot_kernel(form, q1)
             for form in (ufl.dot(r, w_e) * dx, derivative)  # P(34)
@@ -170,6 +174,44 @@ class InelasticBeams:
         """Energy that cells of this process dissipate in the step to ``q1``; J."""
         self._respond(q1)
         return self.points.dissipation()
+
+    def add_tangent_change(self, q1: Array, u: Array) -> None:
+        """Add the derivative of the tangent at ``q1`` along ``u``; points go on as they answer."""
+        self._cell_tangent_at(q1).add_change(q1, u)
+
+    def tangent_works(self, q1: Array, u: Array, x: Array, y: Array) -> tuple[float, float]:
+        """Works of the tangent for the motion x on y, and of its derivative along u; J."""
+        return self._cell_tangent_at(q1).works(q1, u, x, y)
+
+    def _cell_tangent_at(self, q1: Array) -> CellTangent:
+        strains = self._strains(q1)
+        r, D = self.points.respond(strains)
+        self._latest.fill(np.nan)
+        around = r - np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), strains)
+        self._cell_tangent.put(self._b, around)
+        self._cell_tangent.put(self._D, D)
+        return self._cell_tangent
+
+    @cached_property
+    def _cell_tangent(self) -> CellTangent:
+        kernel = partial(self._fields.kernel, unknown=self._q1)
+        return CellTangent(self._around, self._q1, kernel, self._A)
+
+    # -- see openings.py -----------------------------------------------------------------------
+
+    @property
+    def excess(self) -> float:
+        """Largest excess of a held point over its limit, as a part of it."""
+        return self.points.excess
+
+    def release(self, least: float) -> None:
+        """Let held points open whose excess is so large."""
+        self.points.release(least)
+        self._latest.fill(np.nan)
+
+    def hold(self) -> None:
+        """Take back :meth:`release`."""
+        self.points.hold()
 
     def freeze(self) -> None:
         """From now on nothing yields or opens further."""

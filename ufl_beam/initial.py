@@ -67,8 +67,9 @@ def _initial_velocity(grid: Grid) -> Array:
         for beam in velocity.beams:
             points, dofs = grid.nodes_of(beam)
             new = np.array([velocity.at(x, y) for x, y in points])
-            size = np.abs(velocity.at(0, 0)[:2]).sum() + abs(velocity.angular) * grid.scene.size
-            apart = np.abs(v[dofs] - new) > 1e-9 * np.array([size, size, abs(velocity.angular)])
+            turning = abs(velocity.angular)
+            size = np.hypot(*new.T[:2]).max() + turning * grid.scene.size
+            apart = np.abs(v[dofs] - new) > 1e-9 * np.array([size, size, turning])
             if apart.any():
                 x, y = points[np.flatnonzero(apart.any(axis=1))[0]]
                 raise SceneError(
@@ -120,11 +121,12 @@ def _components(grid: Grid, dofs: set[int]) -> list[int]:
 
 def _require_held(grid: Grid, v: Array) -> None:
     """Velocities must agree with what joints hold, or they would ring for ever."""
-    fastest = np.abs(v).max() * max(grid.scene.size, 1.0)
+    size, nodes = grid.scene.size, np.vstack([grid.dofs, grid.dofs_of_bodies])
+    fastest = np.abs(v[nodes] * [1.0, 1.0, size]).max()
     for link, dofs in zip(grid.scene.links, grid.dofs_of_links, strict=True):
         a, b = v[dofs[0:6:2]], v[dofs[1:6:2]]
         rate = float(np.dot(link.rigidly().a, a) + np.dot(link.rigidly().b, b))
-        if link.law is HELD and abs(rate) > 1e-9 * fastest:
+        if link.law is HELD and abs(rate) > 1e-9 * fastest / (size if link.turns else 1.0):
             raise SceneError(
                 f"Velocity: the parts that {link} joins would move apart at {rate:.3g} m/s "
                 "or rad/s; give all that is joined a Velocity that agrees"

@@ -12,7 +12,7 @@ from ufl_beam.compat import Array
 from ufl_beam.connectors import Connector, Guide, Joint
 from ufl_beam.errors import SceneError
 from ufl_beam.grid import Grid
-from ufl_beam.guides import nearest, tangent
+from ufl_beam.curves import nearest, parameter_step, tangent
 from ufl_beam.scene import Scene
 
 if TYPE_CHECKING:
@@ -28,12 +28,14 @@ class Connection(NamedTuple):
         work: That the connector has taken since the beginning: what springs store and dissipate,
             what dampers and friction dissipate, and minus what motors supply; (n+1,); J.
         rate: Mean rate of the motion in the step that ends there; (n+1,); m/s or rad/s.
+        dissipated: Energy that yielding, softening and plastic hinges have dissipated; (n+1,); J.
     """
 
     motion: Any
     force: Any
     work: Any
     rate: Any
+    dissipated: Any
 
 
 class JointHistory(NamedTuple):
@@ -146,10 +148,11 @@ def _direction(solution: Solution, holder: Connector, turn: Array) -> Array:
         between = solution.position(holder.b) - solution.position(holder.a)
         return np.asarray(between / np.linalg.norm(between, axis=1)[:, None])
     if isinstance(holder.law, Guide):
-        s, normals = 0.0, []
+        curve, s, size, normals = holder.law.curve, 0.0, solution.scene.size, []
         for point in solution.position(holder.b):
-            s = nearest(holder.law.curve, point, s)
-            x, y = tangent(holder.law.curve, s)
+            step = parameter_step(curve, s, size)
+            s = nearest(curve, point, s, step, size)
+            x, y = tangent(curve, s, step)
             normals.append((-y, x))
         return np.asarray(normals / np.linalg.norm(normals, axis=1)[:, None])
     return turned(holder.axis, turn if holder.motion == "sliding" else np.zeros_like(turn))

@@ -59,13 +59,20 @@ class Axis:
         return f, ufl.diff(f, X) / self.h
 
 
+def frame(ψ: Expr) -> tuple[Expr, Expr]:
+    """(cos ψ - 1, sin ψ), both to the relative precision of ``ψ``, however small that is.
+
+    The difference of two numbers near one would keep no digits of a small rotation.
+    """
+    half_sin, half_cos = ufl.sin(ψ / 2), ufl.cos(ψ / 2)
+    return -2 * half_sin**2, 2 * half_sin * half_cos
+
+
 def _pull_back(a: Expr, ψ: Expr, axis: Axis) -> tuple[Expr, Expr]:
     """Components of the plane vector ``a`` in the frame (t0, n0) turned by ``ψ``: Λᵀ a."""
     along, across = ufl.dot(a, axis.t0), ufl.dot(a, axis.n0)
-    return (
-        ufl.cos(ψ) * along + ufl.sin(ψ) * across,
-        -ufl.sin(ψ) * along + ufl.cos(ψ) * across,
-    )
+    cos_1, sin = frame(ψ)
+    return along + cos_1 * along + sin * across, across + cos_1 * across - sin * along
 
 
 def turn(a: Expr) -> Expr:
@@ -92,8 +99,10 @@ def strain(q: Expr, axis: Axis) -> Expr:
         P(6), P(10), for any initial direction of the axis.
     """
     u, ψ = split(q)
-    Σ, Γ = _pull_back(axis.t0 + axis.d(u), ψ, axis)
-    return ufl.as_vector([Σ - 1, Γ, axis.d(ψ)])  # P(6)
+    Σ, Γ = _pull_back(axis.d(u), ψ, axis)
+    cos_1, sin = frame(ψ)
+    # Λᵀ t0 - e1 = (cos ψ - 1, -sin ψ): no digits of small strains are lost in a difference of ones.
+    return ufl.as_vector([Σ + cos_1, Γ - sin, axis.d(ψ)])  # P(6)
 
 
 def virtual_strain(q: Expr, w: Expr, axis: Axis) -> Expr:
@@ -157,7 +166,8 @@ def virtual_strain_over_step(q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
     a = axis.d(w_u) - turn(φ_m) * w_turn
     # The mean of both frames is cos δ times the frame of the mean rotation.
     along, across = ufl.dot(a, axis.t0), ufl.dot(a, axis.n0)
-    cos_m, sin_m = ((f(ψ0) + f(ψ1)) / 2 for f in (ufl.cos, ufl.sin))
+    (cos_0, sin_0), (cos_1, sin_1) = frame(ψ0), frame(ψ1)
+    cos_m, sin_m = 1 + (cos_0 + cos_1) / 2, (sin_0 + sin_1) / 2
     w_Σ, w_Γ = cos_m * along + sin_m * across, cos_m * across - sin_m * along
     return ufl.as_vector([w_Σ, w_Γ, w_K])  # P(82)!
 
@@ -169,7 +179,7 @@ def _turn_of_two_nodes(ψ0: Expr, ψ1: Expr, w: Expr, axis: Axis) -> tuple[Expr,
     sinc_e, cos_e = _sinc(e), ufl.cos(e)
     tan_e = e * sinc_e / cos_e
     # Of 2 δ = ψ1 - ψ0 no functions are needed but those of the frames.
-    cos_0, sin_0, cos_1, sin_1 = ufl.cos(ψ0), ufl.sin(ψ0), ufl.cos(ψ1), ufl.sin(ψ1)
+    (cos_0, sin_0), (cos_1, sin_1) = ((1 + c, s) for c, s in map(frame, (ψ0, ψ1)))
     cos_δ_2 = (1 + cos_0 * cos_1 + sin_0 * sin_1) / 2
     tan_δ = (sin_1 * cos_0 - cos_1 * sin_0) / (2 * cos_δ_2)
     shift = -tan_δ * tan_e / 2

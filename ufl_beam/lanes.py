@@ -11,11 +11,9 @@ import re
 from pathlib import Path
 from types import ModuleType
 
-import cffi
 import numpy as np
 
-from ufl_beam.compat import fem
-from ufl_beam.native import DECLARATIONS, HEADERS, compiled, text
+from ufl_beam.native import DECLARATIONS, HEADERS, CompilerError, compiled, text
 
 LANES = 4
 """Cells that are computed at once: as many as AVX has room for.  On what has less, vectors are made
@@ -60,29 +58,35 @@ def in_vectors(kernel: str) -> str:
     return f"static inline void tabulate({arguments})\n" + "\n".join(lines)
 
 
-def written(library: Path) -> str:
-    """The kernel that FFCx wrote for a cell form.
+def written(source: Path) -> str:
+    """Return the kernel that FFCx wrote for a cell form.
 
     Args:
-        library: Its module; the source is beside it.
+        source: File of its C.
 
     Raises:
-        NotInVectors: It is not in the cache any more.
+        NotInVectors: The file has none.
     """
-    source = library.with_name(library.name.split(".")[0] + ".c")
     pattern = r"^void tabulate_tensor_.*?^}(?=\s*^(?:bool|ufcx_integral) )"
     if source.exists() and (found := re.search(pattern, source.read_text(), re.M | re.S)):
         return found[0]
     raise NotInVectors(f"{source} has no kernel")
 
 
-def _loop(library: Path, sizes: dict[str, int]) -> ModuleType:
+NONE = "void *in_lanes(void) { return 0; }"
+"""C of a module without a loop, which the cache remembers like one with it."""
+
+
+def _loop(written_in: Path, sizes: dict[str, int]) -> ModuleType:
     """The module with the loop over the cells."""
     defined = [f"#define {name} {size}" for name, size in sizes.items()]
     files = [text("lanes.h"), text("lanes.c")]
 
     def source() -> str:
-        kernel = in_vectors(written(library))
+        try:
+            kernel = in_vectors(written(written_in))
+        except NotInVectors:
+            return NONE
         return "\n".join([HEADERS, DECLARATIONS, *defined, files[0], kernel, files[1]])
 
     return compiled(
@@ -90,7 +94,7 @@ def _loop(library: Path, sizes: dict[str, int]) -> ModuleType:
         "void *in_lanes(void);",
         source,
         # FFCx names what it makes by what is in it; NumPy knows what "native" means.
-        made_of=[library.name, *defined, *files, DECLARATIONS, Path(__file__).read_text(), _CPU],
+        made_of=[written_in.name, *defined, *files, DECLARATIONS, Path(__file__).read_text(), _CPU],
         flags=["-O2", "-march=native", "-fno-math-errno", "-w"],
     )
 
@@ -101,22 +105,23 @@ _CPU = repr(np.show_config(mode="dicts"))
 _modules: dict[tuple[str, int, int, int], ModuleType | None] = {}
 
 
-def in_lanes(form: fem.Form, entries: int, width: int, constants: int) -> int | None:
+def in_lanes(source: Path, entries: int, width: int, constants: int) -> int | None:
     """Address of what computes several cells of a compiled form at once; none if nothing does.
 
     Args:
-        form: A cell form.
+        source: The C that FFCx wrote for a cell form.
         entries: Of the vector or matrix of a cell.
         width: Number of its coefficients' values in a cell.
         constants: Number of its constants.
     """
-    library = Path(form.module.__file__)
-    key = (library.name, entries, width, constants)
+    key = (source.name, entries, width, constants)
     if key not in _modules:
         sizes = {"LANES": LANES, "ENTRIES": entries, "WIDTH": width, "CONSTANTS": constants}
         try:
-            _modules[key] = _loop(library, sizes)
-        except (NotInVectors, cffi.VerificationError):
+            _modules[key] = _loop(source, sizes)
+        except CompilerError:
             _modules[key] = None
     module = _modules[key]
-    return None if module is None else int(module.ffi.cast("intptr_t", module.lib.in_lanes()))
+    if module is None:
+        return None
+    return int(module.ffi.cast("intptr_t", module.lib.in_lanes())) or None

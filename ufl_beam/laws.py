@@ -140,6 +140,22 @@ class Hardening:
                 )
         require_kind(self.viscosity, (Perzyna, DuvautLions), "Hardening: viscosity")
 
+    @property
+    def opens(self) -> bool:
+        """Whether it ever flows."""
+        return bool(self.limit != np.inf)
+
+    @property
+    def energy(self) -> float:
+        """Fracture energy: infinite, as it never breaks."""
+        return np.inf
+
+    @property
+    def bounded(self) -> bool:
+        """Whether the stress never exceeds the limit."""
+        viscous = bool(np.any(self.viscosity.coefficient(np.ones(1)) > 0.0))
+        return self.modulus == self.kinematic == 0.0 and not viscous
+
 
 @dataclass(frozen=True, eq=False)
 class Bulk:
@@ -223,6 +239,11 @@ class Softening:
         require_number(self.energy, f"{type(self).__name__}: energy", positive=True)
 
     @property
+    def bounded(self) -> bool:
+        """Whether the traction never exceeds the limit."""
+        return True
+
+    @property
     def opens(self) -> bool:
         """Whether it ever opens."""
         return self.limit < np.inf
@@ -270,6 +291,22 @@ def _mean_of_decay(x: Values) -> Values:
         series = 1 - x / k * series
     safe = where(small, 1.0, x)
     return where(small, series, (1 - exp(-safe)) / safe)
+
+
+HingeLaw = Softening | Hardening
+"""Laws of a plastic hinge of zero length, which has no elasticity of its own."""
+
+
+def require_hinge_law(law: object, owner: str) -> None:
+    """Raise :class:`SceneError` naming ``owner`` unless a rigid-plastic hinge can follow a law."""
+    require_kind(law, HingeLaw.__args__, owner)
+    if isinstance(law, Hardening):
+        _require_from_zero_to_infinity(law.limit, f"{owner}: limit")
+        if isinstance(law.viscosity, DuvautLions):
+            raise SceneError(
+                f"{owner}: DuvautLions relaxes an elastic stress, and a hinge of zero length is "
+                "rigid before it flows; use Perzyna(eta)"
+            )
 
 
 # -- where the points of a cross-section are ---------------------------------------------------

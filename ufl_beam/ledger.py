@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -9,6 +10,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ufl_beam.compat import Array
+
+EXPLAINED = 0.1
+"""Part of an imbalance from which on an estimate of round-off explains it."""
 
 
 @dataclass
@@ -98,6 +102,34 @@ class Energy:
         """Largest imbalance, as a part of the energy that went through."""
         largest = float(np.max(np.abs(self.imbalance)))
         return largest / self.throughput if self.throughput > 0 else largest
+
+    def opened(self, claimed: float, round_off: float) -> str:
+        """Describe how far the ledger is open; empty if it closes as claimed.
+
+        Args:
+            claimed: Largest imbalance that the scheme and the solver claim, as a part of the
+                energy that went through.
+            round_off: Estimate of the energy that the last digits of the unknowns make; J.
+        """
+        # Squares of the least numbers have lost their digits.
+        if not self.throughput > sys.float_info.min / sys.float_info.epsilon:
+            return ""
+        if self.worst <= claimed:
+            return ""
+        part = round_off / self.throughput
+        said = (
+            f"the energy ledger is open by {self.worst:.1e} of the energy that went through, and "
+            f"the scheme claims {claimed:.0e}: "
+        )
+        if part >= EXPLAINED * self.worst:
+            return said + (
+                f"round-off is estimated at {part:.1e}, the last digits of positions times the "
+                "largest stiffness; less stiffness of what hardly deforms, or fewer cells, close it"
+            )
+        return said + (
+            f"round-off is estimated at {part:.1e} and does not explain it; a smaller rtol of "
+            "Newton may, or a force that the ledger does not know"
+        )
 
     def __str__(self) -> str:
         lines = [

@@ -32,9 +32,6 @@ APART = 1e-9
 AT_REST = 1e300
 """Length of a step in which all rates vanish; s."""
 
-SMALL = 1e-5
-"""Sizes of the scene, or radians, over which derivatives of stiffness are taken by differences."""
-
 
 class _Standstill(Static):
     """Everything is taken where it is, and there is inertia: what small motions begin with.
@@ -235,16 +232,26 @@ class SmallMotions:
     def buckling(self, n: int) -> tuple[Array, Complex]:
         """At least n factors, if there are so many, and shapes."""
         u = self._path()
-        lengths = np.full(len(u), self.scene.size)
-        lengths[self._simulation.share.rotations()] = 1.0
-        lengths[self.grid.multipliers] = np.inf
-        ε = SMALL / (np.abs(u / lengths).max() or SMALL)
-        ahead, back = (self._reduced(self._derivative(self.q + d * u, AT_REST)) for d in (ε, -ε))
-        change = (back - ahead) / (2 * ε)
-        size = self.K.shape[0]
-        factors, x = eigen.linear(self.K, change, n, most=size, definite=False)
-        there = np.abs(factors) < 1e9 * np.abs(factors).min(initial=np.inf)
-        return factors[there], x[:, there].astype(complex)
+        right, left = self._with_laws()
+        change = csr_array(left @ self._matrix(self._simulation.tangent_change(self.q, u)) @ right)
+        factors, x = eigen.linear(self.K, -change, n, most=self.K.shape[0], definite=False)
+        x = x[:, np.abs(factors) < 1e9 * np.abs(factors).min(initial=np.inf)]
+        # Among the shapes that were found, by works whose round-off is that of strains.
+        works = self._simulation.tangent_works(self.q, u, right @ x, left.T @ x)
+        factors, mix = eigen.small(works[0], -works[1])
+        return factors, (x @ mix).astype(complex)
+
+    def _with_laws(self) -> tuple[csr_array, csr_array]:
+        """Motions with the forces of laws that they bring, in columns; virtual ones, in rows.
+
+        The tangent between them is K, and its derivative between them is that of K.
+        """
+        T, laws, Z = self._derivative(self.q, AT_REST), self._laws, self._Z
+        flexibility = diags_array(1 / T.diagonal()[laws])
+        of_laws = eye_array(self.grid.size, format="csr")[:, laws]
+        right = Z - of_laws @ (flexibility @ (T[laws, :] @ Z))
+        left = Z.T - ((Z.T @ T[:, laws]) @ flexibility) @ of_laws.T
+        return csr_array(right), csr_array(left)
 
     def _path(self) -> Array:
         """Change of the configuration by the loads and motions, as if everything were linear."""

@@ -39,6 +39,12 @@ class Links:
         """Forces that resist the growth of the motions; (num_links,); N or N m."""
         return q[self._forces_at]
 
+    def again(self) -> None:
+        """Begin the step again: forget what its iterates have tried."""
+
+    def put_motions(self, q: Array, v: Array, works: Array) -> None:
+        """Put what laws of forces work on in the step ``v`` from ``q`` in the place of forces."""
+
     def take(self, q: Array) -> None:
         """Take the forces in ``q`` as those before the next step."""
         self._before[:] = self.force(q)

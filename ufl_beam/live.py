@@ -39,6 +39,7 @@ class Live:
         t: Time; s.
         q: Configuration at the local degrees of freedom.
         parts: Number of steps so far, parts of cut steps counted each.
+        reactions_known: Whether the reactions of the initial state are; in dynamics they are not.
     """
 
     scene: Scene
@@ -52,6 +53,7 @@ class Live:
     ledger: Ledger
     supports: Supports
     inertia: Inertia
+    reactions_known: bool = False
     couplings: list[Couplings | Guides]
     inelastic: list[InelasticBeams]
     _has_inelastic: bool
@@ -64,7 +66,7 @@ class Live:
         """Forces of all supports on the scene; (num_supports, 3); N, N, N m."""
         if not self.scene.supports:
             return NO_REACTIONS
-        if self.parts == 0:
+        if self.parts == 0 and not self.reactions_known:
             return np.full((len(self.scene.supports), 3), np.nan)
         return self._support_forces()
 
@@ -102,15 +104,17 @@ class Live:
         return [*self.ledger.state, *self.ledger.supplied, *self.ledger.lost]
 
     def connections(self) -> Array:
-        """Motion, force, work and rate of all links of the scene, as :class:`Connection`.
+        """The columns of :class:`Connection` for all links of the scene.
 
-        All processes call it together; (num_links, 4).
+        All processes call it together; (num_links, 5).
         """
-        here = np.zeros((len(self.scene.links), 4))
+        here = np.zeros((len(self.scene.links), len(Connection._fields)))
         for coupling in self.couplings:
             q = self.q
-            columns = (coupling.motion(q), coupling.force(q), coupling.work, coupling.rate)
-            here[coupling.numbers] = np.column_stack(columns)
+            here[coupling.numbers] = np.column_stack(
+                [coupling.shown_motion(q), coupling.force(q), coupling.work, coupling.rate,
+                 coupling.dissipated()]
+            )  # fmt: skip
         if self.share.comm.size > 1:
             self.share.comm.Allreduce(MPI.IN_PLACE, here)
         return here
@@ -147,15 +151,12 @@ class Live:
         return float(np.linalg.norm(self.connections()[numbers, 1]))
 
     def rates(self, links: Sequence[Connector]) -> Array:
-        """Rates of relative motions of this process now, by a difference; m/s or rad/s."""
+        """Rates of the relative motions of one kind of connectors now; m/s or rad/s."""
         rates = np.zeros(len(links))
         for v in self.velocities():
-            fastest = np.abs(v).max(initial=0.0) or 1.0
-            ε = 1e-5 * self.scene.size / fastest
             for coupling in self.couplings:
-                if coupling.links == list(links):
-                    ends = (coupling.motion(self.q + sign * ε * v) for sign in (1, -1))
-                    rates += np.subtract(*ends) / (2 * ε)
+                if isinstance(coupling, Couplings) and coupling.links == list(links):
+                    rates += coupling.rates(self.q, v)
         return rates
 
     def section_forces(self) -> Array:
@@ -174,6 +175,34 @@ class Live:
     def material(self) -> list[tuple[Index, Array]]:
         """Cells that can yield or break, and :attr:`Points.kept`; all processes call together."""
         return self._gather([inelastic.kept() for inelastic in self.inelastic])
+
+    def hinges(self) -> Array:
+        """The columns of :class:`Connection` for the plastic hinges of the scene; (num_hinges, 5).
+
+        All processes call it together.
+        """
+        return self.connections()[len(self.scene.links) - len(self.scene.hinges) :]
+
+    @property
+    def may_break(self) -> bool:
+        """Whether something in the scene yields, softens or has plastic hinges."""
+        return self._has_inelastic or bool(self.scene.hinges)
+
+    def damage(self) -> tuple[Array, Array]:
+        """Jump of rotation (rad) and dissipated energy (J) of each cell; both (num_cells,).
+
+        Those of plastic hinges at the ends of a cell are included; of several jumps it is the
+        largest.  All processes call it together.
+        """
+        jump, dissipated = np.zeros((2, len(self.grid.cells)))
+        for cells, rows in self.material():
+            jump[cells], dissipated[cells] = rows[:, 3], rows[:, 4] + rows[:, 5]
+        if self.scene.hinges:
+            hinges = Connection(*self.hinges().T)
+            np.add.at(dissipated, self.grid.cells_at_hinges, hinges.dissipated)
+            for cell, motion in zip(self.grid.cells_at_hinges, hinges.motion, strict=True):
+                jump[cell] = max(jump[cell], motion, key=abs)
+        return jump, dissipated
 
     def _gather(self, here: list[tuple[Index, Array]]) -> list[tuple[Index, Array]]:
         if not self._has_inelastic or self.share.comm.size == 1:

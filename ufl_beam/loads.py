@@ -28,6 +28,17 @@ def steady(t: float) -> float:
     return 1.0
 
 
+@dataclass(frozen=True)
+class Constant:
+    """The time function that has always the same value."""
+
+    value: float
+
+    def __call__(self, t: float) -> float:
+        """The value, at any time."""
+        return self.value
+
+
 def ramp(duration: float) -> TimeFunction:
     """The time function that grows linearly from 0 to 1 within ``duration`` (s) and stays."""
     require_number(duration, "ramp: duration", positive=True)

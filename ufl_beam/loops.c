@@ -183,6 +183,15 @@ double largest_size(int rows, const double *w, const double *f)
   return largest;
 }
 
+/* Largest displacement in q, and rotation times the size of the scene; w as for forces. */
+double largest_motion(int rows, const double *w, const double *q)
+{
+  double largest = 0;
+  for (int i = 0; i < rows; ++i)
+    if (w[i] > 0 && !(fabs(q[i]) <= largest * w[i])) largest = fabs(q[i]) / w[i];
+  return largest;
+}
+
 /* Whether a sum of squares has all its digits: none of them has become too small or too large. */
 int has_its_digits(double sum)
 {
@@ -193,15 +202,18 @@ int has_its_digits(double sum)
 
 /* What a point is about; the order of INPUTS in points.py. */
 enum {
-  STRAIN, GROWTH, DIRECTION, TRACTION, BEFORE, PLASTIC, ACCUMULATED, JUMP, OPENING, STIFFNESS,
-  LENGTH, THETA, WIDTH = 19
+  STRAIN, GROWTH, DIRECTION, TRACTION, BEFORE, PLASTIC, ACCUMULATED, JUMP, OPENING, FLOWS,
+  STIFFNESS, LENGTH, THETA, WIDTH = 20
 };
+
+/* Values of FLOWS: did not grow in the last step, grew in it, may open in this one; see points.py. */
+enum { CLOSED, FLOWING, RELEASED };
 
 /* What the kernel of the end of a step says; the order in points.py. */
 enum { FLOW, WORKED, BROKEN, LOST, ELASTIC, HARDENING, STRESS, RESISTANCE, SAID };
 
-/* What points know of each other in a step; the order in points.py. */
-enum { OPENED, RELIEF };
+/* Flags that all points of a scene share in a step; see Course in points.py. */
+enum { OPENED, RELIEF, HOLD, OVER };
 
 static const double unit_cell[6] = {0, 0, 0, 1, 0, 0};
 
@@ -247,11 +259,15 @@ static double growth(kernel *excess, double *w)
  * `course` notes that a point opens, and may ask for relief: then points that do not open answer
  * with their elastic stiffness. Where one opens, those around it unload, which their own tangents
  * do not tell, and Newton's method would close what it just opened, again and again.
+ *
+ * While `course` asks to hold, closed points stay closed whatever they bear, and `over` is the
+ * largest of |stress| / limit - 1 of those that bear more than their limit, else zero.
  */
 void respond(const points *p)
 {
   double s[2], *w = p->w, *r = p->r, *D = p->D;
   const double *e0 = p->e0, *e1 = p->e1;
+  *p->over = 0;
   for (int c = 0; c < p->cells; ++c, e0 += 3, e1 += 3, r += 3, D += 9) {
     memset(D, 0, 9 * sizeof *D);
     for (int k = 0; k < 3; ++k) {
@@ -263,7 +279,11 @@ void respond(const points *p)
       w[STRAIN] = b[0] * e1[0] + b[1] * e1[1] + b[2] * e1[2];
       w[GROWTH] = w[DIRECTION] = 0;
       ask(p->bulk, w, 2, s);
-      if (fabs(s[0]) > w[TRACTION]) { /* P(51) */
+      const int over = fabs(s[0]) > w[TRACTION]; /* P(51) */
+      if (over && p->course[HOLD] && w[FLOWS] == CLOSED && w[TRACTION] > 0) {
+        *p->over = fmax(*p->over, fabs(s[0]) / w[TRACTION] - 1);
+        p->course[OVER] = 1;
+      } else if (over) {
         w[DIRECTION] = s[0] < 0 ? -1 : 1;
         w[GROWTH] = growth(p->excess, w);
         ask(p->opening, w, 2, s);
@@ -276,6 +296,17 @@ void respond(const points *p)
         for (int l = 0; l < 3; ++l) D[3 * k + l] += p->weight[i] * s[1] * b[k] * b[l];
       }
     }
+  }
+}
+
+/* Let the closed points open, in this step, whose excess in the latest response is so large. */
+void release(const points *p, double least)
+{
+  double s[2], *w = p->w;
+  for (int i = 0; i < p->cells * p->of_cell; ++i, w += WIDTH) {
+    if (w[FLOWS] != CLOSED || !(w[TRACTION] < INFINITY)) continue;
+    ask(p->bulk, w, 2, s);
+    if (fabs(s[0]) > w[TRACTION] && fabs(s[0]) / w[TRACTION] - 1 >= least) w[FLOWS] = RELEASED;
   }
 }
 
@@ -340,20 +371,34 @@ void find_motions(const couplings *c, const double *q)
   for (int k = 0; k < c->number; ++k) c->e1[c->link[k]] = c->by_cell[k];
 }
 
+static void put_row(const couplings *c, int cell, const double *row)
+{
+  put_in_cell(c->work, cell, c->row, 3, row);
+  put_in_cell(c->tangent, cell, c->row_of_tangent, 3, row);
+}
+
 /* The laws of springs around their motions at q. */
-static void set_rows(const couplings *c, const double *q)
+static void set_rows_of_springs(const couplings *c)
 {
   const points *p = c->points;
-  if (!p) return;
-  find_motions(c, q);
   for (int i = 0; i < c->number; ++i) p->e1[3 * i] = c->e1[i];
   respond(p);
   for (int k = 0; k < c->number; ++k) {
     const int i = c->link[k];
     const double D = p->D[9 * i], row[3] = {-D, 1, p->r[3 * i] - D * c->e1[i]};
-    put_in_cell(c->work, k, c->row, 3, row);
-    put_in_cell(c->tangent, k, c->row_of_tangent, 3, row);
+    put_row(c, k, row);
   }
+}
+
+/* The laws of springs and rigid-plastic connectors around their motions at q. */
+static void set_rows(const couplings *c, const double *q)
+{
+  if (!c->points && !c->rigid_plastic) return;
+  find_motions(c, q);
+  if (c->points) set_rows_of_springs(c);
+  if (!c->rigid_plastic) return;
+  set_rows_of_rigid_plastic(c, q);
+  for (int k = 0; k < c->number; ++k) put_row(c, k, c->rigid_plastic->rows + 3 * c->link[k]);
 }
 
 void add_couplings_force(void *self, const double *q, double *r)
@@ -363,25 +408,28 @@ void add_couplings_force(void *self, const double *q, double *r)
   add_cells((void *)c->work, q, r);
 }
 
-/* Largest residual of a row: of motions as a part of 1 % of the scene, or of the scale of forces. */
-double missed_by_couplings(void *self, const double *q, const double *r, double scale)
+/* Largest residual of a row: of motions as a part of 1 % of the largest motion in the scene, or of 1 %
+ * of the scene if that is less; of forces as a part of the scale. What the last digits of the motions
+ * make of a row does not count; far from where it began, or after many turns, it has fewer digits. */
+double missed_by_couplings(void *self, const double *q, const double *r, double scale, double moved)
 {
   const couplings *c = self;
-  const double force = scale > 0 ? scale : 1;
   double most = 0;
   for (int k = 0; k < c->number; ++k) {
     const int i = c->link[k];
     const int32_t *dofs = c->dofs + 7 * i;
     const double *row = in_cell(c->work, k, c->row), length = c->length[i];
-    const int next = c->work->lanes;
-    const double size = fabs(row[next]) < 1 ? 0.01 * length : force * c->size / length;
-    /* Far from where it began, or after many turns, a part has fewer digits left. */
-    double moved = 0, turned = 0;
-    for (int j = 0; j < 4; ++j) moved = fmax(moved, fabs(q[dofs[j]]));
-    for (int j = 4; j < 6; ++j) turned = fmax(turned, fabs(q[dofs[j]]));
-    const double far = 1 + moved / c->size + turned;
+    const double weight = fabs(row[c->work->lanes]);
+    const double unit = c->rigid_plastic ? c->rigid_plastic->slope[i] : 1;
+    const double part = moved / c->size;
+    const double size = weight * unit < 1 - 1e-12 ? 0.01 * length * part
+                                                  : weight * scale * c->size / length;
+    double far = part;
+    for (int j = 0; j < 4; ++j) far = fmax(far, part + fabs(q[dofs[j]]) / c->size);
+    for (int j = 4; j < 6; ++j) far = fmax(far, part + fabs(q[dofs[j]]));
     const double round_off = 8 * fabs(row[0]) * length * (nextafter(far, INFINITY) - far);
-    const double missed = fmax(fabs(r[c->force[i]]) - round_off, 0) / size;
+    const double left = fabs(r[c->force[i]]) - round_off;
+    const double missed = left > 0 ? left / size : left <= 0 ? 0 : NAN;
     if (!(missed <= most)) most = missed;
   }
   return most;
@@ -409,13 +457,14 @@ double commit_couplings(const couplings *c, const double *q, double dt)
  *
  * Each cell keeps what it bears (3), the jump of its last point, and what it dissipated by plastic
  * strains and by discontinuities; sum gets what all cells dissipated so in the step, what they lost
- * numerically at theta = 1, and what they store elastically and by hardening.
+ * numerically at theta = 1, what they store elastically and by hardening, what breaking points let go
+ * of, and what mean stresses do more on plastic strains than those at the end, where these are less.
  */
 void commit(const points *p)
 {
   double s[SAID], *e0 = p->e0, *w = p->w, *kept = p->kept, *sum = p->sum;
   const double *e1 = p->e1, *rest = p->rest, *length = p->length, *weight = p->weight;
-  memset(sum, 0, 5 * sizeof *sum);
+  memset(sum, 0, 7 * sizeof *sum);
   for (int c = 0; c < p->cells; ++c, e0 += 3, e1 += 3, kept += 6) {
     double plastic = 0, broken = 0;
     for (int k = 0; k < 3; ++k) {
@@ -428,13 +477,26 @@ void commit(const points *p)
     for (int i = 0; i < p->of_cell; ++i, w += WIDTH) {
       double volume = weight[i] * length[c];
       ask(p->end, w, SAID, s);
+      const double before = w[STIFFNESS] * (w[BEFORE] - w[JUMP] / w[LENGTH] - w[PLASTIC]);
+      const double change = s[STRESS] - before;
+      const double hardened = s[LOST] - change * change / (2 * w[STIFFNESS]);
+      const double relaxed = hardened - change / 2 * s[FLOW];
+      if (relaxed > 0) sum[6] += volume * relaxed;
       w[BEFORE] = w[STRAIN];
       w[PLASTIC] += s[FLOW];
       w[ACCUMULATED] += fabs(s[FLOW]);
       w[JUMP] += w[DIRECTION] * w[GROWTH];
       w[OPENING] += w[GROWTH];
+      w[FLOWS] = w[GROWTH] > 0 ? FLOWING : CLOSED;
       w[GROWTH] = w[DIRECTION] = 0;
       if (w[TRACTION] < INFINITY) w[TRACTION] = s[RESISTANCE];
+      if (w[TRACTION] == 0) {
+        /* Broken: the mean stress of each step is zero from now on, but stresses at the ends may
+         * alternate about that. The discontinuity takes the elastic strain, which nothing holds. */
+        w[JUMP] += s[STRESS] / w[STIFFNESS] * w[LENGTH];
+        sum[5] += volume * s[ELASTIC];
+        s[STRESS] = s[ELASTIC] = 0;
+      }
       plastic += volume * s[WORKED];
       broken += weight[i] * s[BROKEN];
       sum[2] += volume * s[LOST];

@@ -72,6 +72,7 @@ double step_of_nodes(int size, int rotations, const int32_t *rotation, double *s
 double sum_of_squares(int rows, const double *w, const double *f);
 double scaled_sum_of_squares(int rows, const double *w, const double *f, double unit);
 double largest_size(int rows, const double *w, const double *f);
+double largest_motion(int rows, const double *w, const double *q);
 int has_its_digits(double sum);
 
 /* -- material points --------------------------------------------------------------------------- */
@@ -84,6 +85,7 @@ typedef struct {
   const double *B, *weight, *rest, *length;
   double theta;
   double *e0, *e1, *w, *r, *D, *kept, *sum;
+  double *over; /* largest excess of a closed point over its limit in the latest response */
 } points;
 
 /* Cells with points: forms of the strains, of the forces, which know the resultants r, and of their
@@ -96,11 +98,27 @@ typedef struct {
   double *latest; /* the unknowns that the points responded to */
 } inelastic;
 
+/* Rigid-plastic connectors, see rigid_plastic.py. */
+typedef struct {
+  int32_t *course;             /* as that of points */
+  kernel *force, *end;         /* force of a slip and its derivative; what the end of a step brings */
+  int number, width;
+  double *w;                   /* what the kernels know, `width` numbers of each connector */
+  double *limit, *back_force;  /* in the accepted state: |force - back force| up to which it is held */
+  double *dissipated;          /* by each since the beginning */
+  int32_t *slipped;            /* whether each did in the last step, or may in this one; as FLOWS */
+  const double *slope;         /* r > 0 of the equation of each, see rigid_plastic.c */
+  double *excess;              /* |force - back force| / limit - 1 of those held that bear too much */
+  int32_t *way;                /* whether, and in what direction, each slips in the present iterate */
+  double *rows;                /* of each connector, three */
+} rigid_plastic;
+
 /* Connectors of one motion as cells, with their forces as unknowns. Their laws are rows
  * a e + b f = c in the motion e and the force f; those of springs come of points. */
 typedef struct {
   const cells *work, *tangent, *motion;
-  const points *points;            /* or none: the rows stay during a step */
+  const points *points;            /* or none */
+  const rigid_plastic *rigid_plastic; /* or none; if neither, the rows stay during a step */
   int number;
   const int32_t *link, *force;     /* of each cell; where each link's force is among the unknowns */
   int row, row_of_tangent;         /* where the coefficients of work and tangent have the rows */
@@ -113,10 +131,15 @@ typedef struct {
 } couplings;
 
 void find_motions(const couplings *c, const double *q);
+void set_rows_of_rigid_plastic(const couplings *c, const double *q);
+double dissipation_of_rigid_plastic(const rigid_plastic *p, const double *e1, const double *force);
+void commit_rigid_plastic(const rigid_plastic *p, const double *e1, double *sums);
 void add_couplings_force(void *self, const double *q, double *r);
-double missed_by_couplings(void *self, const double *q, const double *r, double scale);
+double missed_by_couplings(void *self, const double *q, const double *r, double scale,
+                           double moved);
 double commit_couplings(const couplings *c, const double *q, double dt);
 void respond(const points *p);
+void release(const points *p, double least);
 void respond_at(const inelastic *m, const double *q);
 void add_inelastic_force(void *self, const double *q, double *r);
 void add_inelastic_tangent(void *self, const double *q, double *tangent);
@@ -170,9 +193,10 @@ typedef struct {
   int (*apply)(void *pc, void *b, void *x);
 } petsc;
 
-/* How far a law is missed by an iterate q and its residual r, without dimension. */
+/* How far a law is missed by an iterate q and its residual r, without dimension; scale is the size
+ * of the forces, and moved the largest motion, see largest_motion. */
 typedef struct {
-  double (*missed)(void *self, const double *q, const double *r, double scale);
+  double (*missed)(void *self, const double *q, const double *r, double scale, double moved);
   void *self;
 } demand;
 
@@ -199,6 +223,7 @@ typedef struct {
   const int32_t *diagonal;
   double *space;
   const double *lengths, *moves; /* see Solver */
+  double scene, moved; /* size of the scene; largest motion of the latest iterate, at most that size */
   int demands;
   const demand *demand; /* of connectors */
   double last, best;
@@ -216,6 +241,7 @@ void residual(equation *e, const double *q, double *r);
 void assemble(equation *e, const double *q);
 int factor_tangent(const equation *e, int *failed);
 int solve_tangent(const equation *e);
+double motion_of(const equation *e, const double *q);
 void find_last_digits(const equation *e, const double *q, double *digits);
 double size_of_forces(const equation *e, const double *f);
 int judge(equation *e, const double *q, int iteration, double residual, double scale,

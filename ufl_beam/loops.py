@@ -14,12 +14,13 @@ import numpy as np
 from ufl_beam.compat import TABULATE, Array
 from ufl_beam.native import DECLARATIONS, HEADERS, compiled, text
 
-SOURCES = ("loops", "elimination", "newton")
+SOURCES = ("loops", "rigid_plastic", "elimination", "newton")
 """Files of C beside this one; they are one translation unit."""
 
 _CALLBACKS = """
 extern "Python" void add_in_python(void *self, const double *q, double *out);
-extern "Python" double missed_in_python(void *self, const double *q, const double *r, double scale);
+extern "Python" double missed_in_python(void *self, const double *q, const double *r, double scale,
+                                        double moved);
 """
 
 

@@ -12,10 +12,21 @@ from scipy.sparse.linalg import eigsh
 from ufl_beam.beams import Beam, Point
 from ufl_beam.bodies import GROUND, Anchor, Body, Node, Spot, node
 from ufl_beam.compat import Array
-from ufl_beam.connectors import Connector, Coulomb, Damper, Function, Guide, Motor, Spring, Stop
+from ufl_beam.connectors import (
+    Connector,
+    Coulomb,
+    Damper,
+    Function,
+    Guide,
+    Motor,
+    RigidPlastic,
+    Spring,
+    Stop,
+)
 from ufl_beam.errors import SceneError
 from ufl_beam.loads import value_at
-from ufl_beam.scene import PointMass, Scene, Slot
+from ufl_beam.plastic_hinges import Slot
+from ufl_beam.scene import PointMass, Scene
 
 DENSE = 90
 """Up to this number of unknowns the null space comes from a dense decomposition."""
@@ -210,7 +221,7 @@ def _center(part: Beam | Body) -> Point:
     return (xa + xb) / 2, (ya + yb) / 2
 
 
-RESISTING = (Motor, Guide, Spring, Function)
+RESISTING = (Motor, Guide, Spring, Function, RigidPlastic)
 """Laws of connectors that resist every motion; others bear nothing, or what they are told."""
 
 

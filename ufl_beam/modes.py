@@ -20,17 +20,18 @@ from ufl_beam.errors import SceneError, require_count, require_kind, require_num
 from ufl_beam.fields import Fields
 from ufl_beam.grid import Grid, Share
 from ufl_beam.initial import mesh_of
-from ufl_beam.joints import velocity_of
+from ufl_beam.joints import Connection, velocity_of
 from ufl_beam.linearised import SmallMotions
 from ufl_beam.loads import FollowerLoad, RotatingFrame
 from ufl_beam.mechanism import require_no_mechanism
 from ufl_beam.memory import State
 from ufl_beam.plausibility import warn_of_masses
 from ufl_beam.processes import ours
-from ufl_beam.record import XDMF, on_first
+from ufl_beam.record import on_first
 from ufl_beam.scene import Scene
 from ufl_beam.solution import Solution
 from ufl_beam.terms import SectionForces
+from ufl_beam.time_series import VTKHDF, XDMF, TimeSeries
 
 AMPLITUDE = 0.1
 """Largest displacement of what is shown of a mode, as a part of the size of the scene."""
@@ -94,12 +95,12 @@ class Shapes(ABC):
         return solution
 
     def write(self, path: str | Path, *, amplitude: float = AMPLITUDE) -> None:
-        """Write an XDMF file for ParaView: the k-th shape is what it shows at time k.
+        """Write a time series for ParaView: the k-th shape is what it shows at time k.
 
         Displacements are those of the state and the shape together, N, V, M those of the shape.
 
         Args:
-            path: File, ending in ``.xdmf``; the data are beside it in ``.h5``.
+            path: File, ending in ``.xdmf`` or ``.vtkhdf``, see :class:`XDMF`, :class:`VTKHDF`.
             amplitude: Largest displacement, as a part of the size of the scene.
 
         Raises:
@@ -107,10 +108,10 @@ class Shapes(ABC):
         """
         require_number(amplitude, "write: amplitude", positive=True)
         self._require(0)
-        recorder = XDMF(path)
+        recorder = VTKHDF(path) if Path(path).suffix == VTKHDF.ending else XDMF(path)
         on_first(ours(), lambda: self._write(recorder, amplitude))
 
-    def _write(self, recorder: XDMF, amplitude: float) -> None:
+    def _write(self, recorder: TimeSeries, amplitude: float) -> None:
         recorder.require_writable()
         share = Share(self.grid, MPI.COMM_SELF)
         forces = SectionForces(Fields(share))
@@ -148,13 +149,20 @@ class _Frame:
         self.q, self.t = shapes.q + change, t
         self._forces, self._state, self._change = forces, shapes.q, change
 
+    may_break = False
+    """Whether something yields; modes are elastic."""
+
+    def velocities(self) -> list[Array]:
+        """Shapes have none."""
+        return []
+
     def material(self) -> list[Any]:
         """Nothing yields."""
         return []
 
     def connections(self) -> Array:
         """What connectors do is left out."""
-        return np.zeros((len(self.scene.links), 4))
+        return np.zeros((len(self.scene.links), len(Connection._fields)))
 
     def section_forces(self) -> Array:
         """Those of the shape alone: a derivative, by a small difference."""

@@ -1,4 +1,4 @@
-"""C compiled once for the machine, and kept in the cache of the JIT compiler.
+"""Compiled code: modules of C and forms of UFL, compiled once for the machine.
 
 FFCx needs a C compiler at run time anyway.
 """
@@ -10,8 +10,9 @@ import importlib.util
 import os
 import sys
 import sysconfig
-import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 
@@ -19,8 +20,10 @@ from petsc4py import PETSc
 
 import cffi
 import numpy as np
+import ufl
 
-from ufl_beam.compat import TABULATE, jit_directory
+from ufl_beam.cache import kept
+from ufl_beam.compat import TABULATE, compile_form, fem, form_key
 
 HEADERS = "\n".join(f"#include <{name}.h>" for name in ("float", "math", "stdint", "string"))
 
@@ -39,6 +42,23 @@ DECLARATIONS = "\n".join(
 )
 """What all files of C know of each other."""
 
+SANITIZERS = (
+    "-O1",
+    "-g1",  # line numbers
+    "-fno-omit-frame-pointer",
+    "-fno-wrapv",
+    "-fsanitize=address,undefined,bounds-strict",
+    "-fno-sanitize-recover=all",
+)
+"""Flags that make the compiler check addresses and undefined behaviour; see `make sanitize`."""
+
+EXTRA = SANITIZERS if os.environ.get("UFL_BEAM_SANITIZE", "0") != "0" else ()
+"""Flags after those of each library: the sanitizers if ``UFL_BEAM_SANITIZE=1``, else none."""
+
+
+class CompilerError(RuntimeError):
+    """The C compiler is missing, or refuses the code."""
+
 
 def compiled(
     stem: str,
@@ -48,33 +68,79 @@ def compiled(
     made_of: Sequence[str],
     flags: Sequence[str],
 ) -> ModuleType:
-    """The module of cffi with a source, from the cache or made anew.
+    """Load a module of C, compiled first if the cache has it not.
 
     Args:
         stem: Beginning of its name.
-        declarations: What Python sees of it.
+        declarations: C declarations of its functions and types for Python.
         source: Its C; called if it is not in the cache.
-        made_of: What the C depends on, and what the flags make of the machine.
+        made_of: Texts that the C, and the effect of the flags, depend on.
         flags: For the compiler.
 
     Raises:
-        cffi.VerificationError: The compiler refuses.
+        CompilerError: The compiler is missing, or refuses.
     """
-    key = "\0".join((declarations, *made_of, *flags, sys.version))
-    name = f"{stem}_{hashlib.sha256(key.encode()).hexdigest()[:16]}"
-    directory = jit_directory()
-    library = directory / (name + str(sysconfig.get_config_var("EXT_SUFFIX")))
-    if not library.exists():
+    flags = [*flags, *EXTRA]
+    name = f"{stem}_{_digest(declarations, *made_of, *flags, sys.version)}"
+
+    def build(directory: Path) -> ModuleType:
         builder = cffi.FFI()
         builder.cdef(declarations)
-        builder.set_source(name, source(), extra_compile_args=list(flags), libraries=["m"])
-        directory.mkdir(parents=True, exist_ok=True)
-        # Other processes may compile the same at the same time; the last one wins.
-        with tempfile.TemporaryDirectory(dir=directory) as scratch:
-            os.replace(builder.compile(tmpdir=scratch), library)
-    spec = importlib.util.spec_from_file_location(name, library)
-    if spec is None or spec.loader is None:
-        raise ImportError(f"cannot load {library}; remove it and try again")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+        builder.set_source(
+            name,
+            source(),
+            extra_compile_args=flags,
+            extra_link_args=list(EXTRA),
+            libraries=["m"],
+        )
+        with _explained(stem):
+            builder.compile(tmpdir=directory)
+        return load(directory)
+
+    def load(directory: Path) -> ModuleType:
+        library = directory / (name + str(sysconfig.get_config_var("EXT_SUFFIX")))
+        spec = importlib.util.spec_from_file_location(name, library)
+        if spec is None or spec.loader is None:
+            raise ImportError(f"{library} is no library of Python")
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        return module
+
+    return kept(name, build, load)[0]
+
+
+def compiled_form(form: ufl.Form) -> tuple[fem.Form, Path]:
+    """Load a form, compiled first if the cache has it not.
+
+    Returns:
+        The form, and the C that FFCx wrote for it.
+
+    Raises:
+        CompilerError: The compiler is missing, or refuses.
+    """
+
+    def build(directory: Path) -> fem.Form:
+        with _explained("a form"):
+            return compile_form(form, directory)
+
+    key = _digest(form_key(form))
+    loaded, directory = kept(f"form_{key}", build, partial(compile_form, form))
+    module = Path(loaded.module.__file__).name
+    return loaded, directory / (module.split(".")[0] + ".c")
+
+
+def _digest(*texts: str) -> str:
+    return hashlib.sha256("\0".join(texts).encode()).hexdigest()[:16]
+
+
+@contextmanager
+def _explained(code: str) -> Iterator[None]:
+    """Say what to do where the compiler fails."""
+    try:
+        yield
+    except cffi.VerificationError as error:
+        raise CompilerError(
+            f"{code} cannot be compiled: {error}. DOLFINx and ufl_beam need a C compiler when they "
+            "run: install one (Debian: gcc, conda: c-compiler), or name it in the environment "
+            "variable CC"
+        ) from error

@@ -35,7 +35,8 @@ enum { MORE = 3 };
 static int demands_met(const equation *e, const double *q, double scale)
 {
   for (int k = 0; k < e->demands; ++k)
-    if (!(e->demand[k].missed(e->demand[k].self, q, e->residual, scale) <= e->rtol)) return 0;
+    if (!(e->demand[k].missed(e->demand[k].self, q, e->residual, scale, e->moved) <= e->rtol))
+      return 0;
   return 1;
 }
 
@@ -69,12 +70,20 @@ int judge(equation *e, const double *q, int iteration, double residual, double s
   return e->slow == e->patience ? STALLED : ITERATING;
 }
 
+/* Largest motion in the scene, at most its size. */
+double motion_of(const equation *e, const double *q)
+{
+  return fmin(largest_motion(e->size, e->weight, q), e->scene);
+}
+
 /* Spacing of the numbers around displacements and rotations: the last digits of what they are part
- * of. The next number has the next pattern of bits. */
+ * of. Strains are computed from them to their own relative precision, as long as rotations are small.
+ * The next number has the next pattern of bits. */
 void find_last_digits(const equation *e, const double *q, double *digits)
 {
+  const double part = e->moved / e->scene;
   for (int i = 0; i < e->size; ++i) {
-    const double far = fabs(q[i]) + e->lengths[i];
+    const double far = fabs(q[i]) + part * e->lengths[i];
     union { double number; int64_t bits; } next = {far};
     next.bits += 1;
     digits[i] = e->moves[i] * (next.number - far);
@@ -130,6 +139,7 @@ static int verdict(equation *e, const double *q, int iteration)
   if (!isfinite(now)) return DIVERGED;
   const double scale = e->loads + size_of_forces(e, e->inner_force);
   double floor = 0;
+  if (iteration > 1 || e->demands) e->moved = motion_of(e, q);
   if (iteration > 1 && (now > e->rtol * scale || e->demands)) {
     find_last_digits(e, q, e->space);
     for (int i = 0; i < e->size; ++i) e->space[i] *= e->tangent[e->diagonal[i]];

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Protocol
 
-from mpi4py import MPI
-
 import numpy as np
 
 from ufl_beam.compat import Array
@@ -237,7 +235,8 @@ class AdaptiveSteps:
         jerk = (a - before) / between
         c2, c3 = inertia.scheme.error_weights()
         error = self._size(simulation, trial, c2 * dt**2 * a + c3 * dt**3 * jerk)
-        return trial, max(error, self._missed(dt))
+        missed = simulation.share.largest(simulation.together(self._missed, dt))
+        return trial, max(error, missed)
 
     def _size(self, simulation: Simulation, trial: Trial, error: Array) -> float:
         """Largest error of a position over the size of the scene, or of a rotation."""
@@ -249,8 +248,7 @@ class AdaptiveSteps:
         moves = np.hypot(error[self._x], error[self._y]).max(initial=0.0)
         turns = np.abs(error[self._turns]).max(initial=0.0)
         here = float(max(moves / simulation.scene.size, turns))
-        share = simulation.share
-        return share.comm.allreduce(here, op=MPI.MAX) if share.comm.size > 1 else here
+        return simulation.share.largest(here)
 
     def _missed(self, dt: float) -> float:
         """What the middle of the step misses of a load, as a part of its largest impulse."""

@@ -8,19 +8,18 @@ from __future__ import annotations
 
 from typing import Any
 
-import basix.ufl
 import numpy as np
 import ufl
 from ufl.conditional import Condition
 from ufl.core.expr import Expr
 
 from ufl_beam import laws
-from ufl_beam.compat import Array, fem, line_mesh
-from ufl_beam.forms import tabulator
+from ufl_beam.compat import Array
 from ufl_beam.grid import Index
 from ufl_beam.laws import Bulk, Layout, Softening
 from ufl_beam.ledger import Ledger
 from ufl_beam.loops import doubles, ffi, integers, lib
+from ufl_beam.pointwise import Pointwise
 from ufl_beam.schemes import Scheme
 
 laws.where.register(Condition, ufl.conditional)
@@ -32,6 +31,8 @@ INPUTS = (
     *("strain", "growth", "direction"),
     # the state at t_n: resistance, strain, plastic strain and its sum, jump and its sum
     *("traction", "before", "p", "ξ", "jump", "opening"),
+    # 1 if the opening grew in the last step, 2 if it may in this one, else 0
+    "flows",
     # numbers of the point; the order of these so far is that of loops.c
     *("C", "length", "θ", "dt", "limit", "H", "B", "eta", "softening limit", "softening energy"),
 )
@@ -40,7 +41,7 @@ INPUTS = (
 SPENT, NOTHING = 1e-6, 1e-30
 """Part of its limit below which an open hinge counts as a joint; factor of its stiffness then."""
 
-STATE = ("p", "ξ", "jump", "opening", "before", "traction")
+STATE = ("p", "ξ", "jump", "opening", "before", "traction", "flows")
 """The internal variables, and what else of an accepted state the next step depends on."""
 
 
@@ -51,7 +52,8 @@ def expect_entries(layout: Layout, scheme: Scheme, ledger: Ledger) -> None:
         ledger.lost["plastic"] += 0.0
     if layout.softening is not None:
         ledger.lost["hinges"] += 0.0
-    if scheme.loss:
+    if scheme.loss or (layout.softening is not None and scheme.theta < 1):
+        # In the middle of a step no stress is left in what has broken, but perhaps at its ends.
         ledger.lost["numerical"] += 0.0
 
 
@@ -71,10 +73,8 @@ class PointForms:
     """
 
     def __init__(self, softening: Softening | None, scheme: Scheme) -> None:
-        self._cell = line_mesh(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0, 1]]))
-        self._compiled: list[fem.Form] = []
-        x = fem.Function(self._values(len(INPUTS)))
-        at = {name: x[i] for i, name in enumerate(INPUTS)}
+        self._pointwise = pointwise = Pointwise(INPUTS)
+        at = pointwise.at
         strain, a = ufl.variable(at["strain"]), ufl.variable(at["growth"])
         s, p, ξ, length, θ, dt = (at[n] for n in ("direction", "p", "ξ", "length", "θ", "dt"))
         bulk = Bulk(at["C"], at["limit"], at["H"], at["B"], at["eta"])
@@ -84,7 +84,7 @@ class PointForms:
         e = (1 - θ) * at["before"] + θ * strain - (relieved + θ * s * a / length)  # P(30)
         dp = bulk.flow(e, p, ξ, θ, dt)
         σ = bulk.stress(e, p + θ * dp)
-        self.bulk = self._compile(σ, ufl.diff(σ, strain))
+        self.bulk = pointwise.compile(σ, ufl.diff(σ, strain))
 
         e0, e1 = at["before"] - relieved - p, strain - (relieved + s * a / length) - p - dp
         broken, traction = 0 * a, 0 * a
@@ -95,11 +95,11 @@ class PointForms:
             excess = s * σ - resistance  # P(32), its second equation
             growth_by_strain = -ufl.diff(excess, strain) / ufl.diff(excess, a)
             tangent = ufl.diff(σ, strain) + ufl.diff(σ, a) * growth_by_strain  # P(76)
-            self.opening = self._compile(σ, tangent)
-            self.excess = self._compile(excess, ufl.diff(excess, a))
+            self.opening = pointwise.compile(σ, tangent)
+            self.excess = pointwise.compile(excess, ufl.diff(excess, a))
             broken = a * law.mean_traction(at["opening"], a)
             traction = law.traction(at["opening"] + a)
-        self.end = self._compile(
+        self.end = pointwise.compile(
             dp,
             bulk.dissipation(dp, dt),
             broken,
@@ -110,32 +110,36 @@ class PointForms:
             traction,
         )
 
-    def _values(self, n: int) -> fem.FunctionSpace:
-        element = basix.ufl.quadrature_element("interval", value_shape=(n,), degree=1)
-        return fem.functionspace(self._cell, element)
 
-    def _compile(self, *outputs: Expr) -> Any:
-        z = ufl.TestFunction(self._values(len(outputs)))
-        dx = ufl.Measure("dx", domain=self._cell, metadata={"quadrature_degree": 1})
-        form = fem.form(ufl.dot(ufl.as_vector(outputs), z) * dx)
-        self._compiled.append(form)
-        return tabulator(form)
+OPENED, RELIEF, HOLD, OVER = range(4)
+"""Entries of :attr:`Course.flags`; the order in loops.c."""
+
+RELEASED = 2.0
+"""Value of "flows" of a point that may open in this step although it did not flow in the last."""
 
 
 class Course:
-    """What points know of each other in a step.
+    """Flags that all points of a scene share in a step.
 
     Attributes:
-        flags: Whether one has opened, and whether the others are to relieve it; (2,), int32.
+        flags: Of the present search for an equilibrium; (4,), int32.  OPENED: a point has opened.
+            RELIEF: points that do not open answer elastically.  HOLD: points that do not flow stay
+            closed.  OVER: one of them has borne more than its limit.
     """
 
     def __init__(self) -> None:
-        self.flags: Index = np.zeros(2, dtype=np.int32)
+        self.flags: Index = np.zeros(4, dtype=np.int32)
+        self._first: tuple[Index, Index] = (self.flags.copy(), self.flags.copy())
+        self._first[True][HOLD] = 1
 
-    def relieve(self) -> bool:
-        """Let points around those that open answer elastically, if there are any."""
-        self.flags[1] = self.flags[0]
-        return bool(self.flags[1])
+    def begin(self, hold: bool) -> None:
+        """Begin a search for an equilibrium."""
+        self.flags[:] = self._first[hold]
+
+    def relieve(self, relief: bool) -> bool:
+        """Let points around those that open answer elastically, or no more; whether there are any."""
+        self.flags[RELIEF] = relief and self.flags[OPENED]
+        return bool(self.flags[OPENED])
 
 
 class Points:
@@ -150,14 +154,17 @@ class Points:
         course: Shared by all points of a scene.
 
     Attributes:
+        softens: Whether they can open.
         strains: Of the cells at the latest response; (cells, 3); may be written to.
         r, D: The latest response, see :meth:`respond`.
         points: What the loops over the points take, see loops.h.
         kept: By cell: (N, V, M) in the accepted state, the jump of the last point, and the energy
             dissipated by plastic strains and by discontinuities; (cells, 6); N, N m, rad or m, J.
         sums: Of all cells: dissipated in the last step by plastic strains, by discontinuities,
-            lost numerically by backward Euler (θ = 1); stored elastically, and by hardening; (5,);
-            J.
+            lost numerically by backward Euler (θ = 1); stored elastically, and by hardening;
+            stored elastically in points until they broke in the last step; work of the mean of the
+            stresses at both ends on plastic strains, less that of those at the end, of points whose
+            stress relaxes; (7,); J.
     """
 
     def __init__(
@@ -172,7 +179,7 @@ class Points:
         course = course or Course()
         self._forms = PointForms(layout.softening, scheme)
         self._layout, self._storage, self._loss = layout, storage, scheme.loss
-        self._yields, self._softens = layout.yields, layout.softening is not None
+        self._yields, self.softens = layout.yields, layout.softening is not None
         self._at = {name: storage[:, :, i] for i, name in enumerate(INPUTS)}
         self._bulk = bulk = layout.bulk(keys)
         numbers = {"C": bulk.C, "limit": bulk.limit, "H": bulk.H, "B": bulk.B, "eta": bulk.eta}
@@ -191,9 +198,10 @@ class Points:
             self._resist()
 
         cells, n, _ = storage.shape
-        self.kept, self.sums = np.zeros((cells, 6)), np.zeros(5)
+        self.kept, self.sums = np.zeros((cells, 6)), np.zeros(7)
         self.r, self.D = np.zeros((cells, 3)), np.zeros((cells, 9))
         self._e0, self.strains = np.zeros((cells, 3)), np.zeros((cells, 3))
+        self._over = np.zeros(1)
         B, weights, rest = (
             np.ascontiguousarray(x, dtype=np.float64)
             for x in (layout.strains, layout.weights, layout.rest)
@@ -203,10 +211,11 @@ class Points:
             *map(doubles, (B, weights, rest, np.ascontiguousarray(length))),
             *map(doubles, (self._e0, self.strains, storage, self.r, self.D, self.kept, self.sums)),
             integers(course.flags),
+            doubles(self._over),
         ]
         self.points = c = ffi.new("points *")
         c.B, c.weight, c.rest, c.length = self._alive[:4]
-        c.e0, c.e1, c.w, c.r, c.D, c.kept, c.sum, c.course = self._alive[4:]
+        c.e0, c.e1, c.w, c.r, c.D, c.kept, c.sum, c.course, c.over = self._alive[4:]
         c.bulk, c.opening, c.excess, c.end = forms.bulk, forms.opening, forms.excess, forms.end
         c.cells, c.of_cell, c.theta = cells, n, scheme.theta
 
@@ -230,7 +239,6 @@ class Points:
 
     def begin(self, dt: float) -> None:
         """Begin a step of this length; s."""
-        self._course.flags[:] = 0
         if dt != self._dt:
             self._steps[:] = self._dt = dt
 
@@ -243,14 +251,45 @@ class Points:
         lib.respond(self.points)
         return self.r, self.D
 
+    @property
+    def excess(self) -> float:
+        """Largest ``|stress| / limit - 1`` of a point that was held closed, or zero."""
+        return float(self._over[0])
+
+    def release(self, least: float) -> None:
+        """Let held points open from now on whose excess was so large in the latest response."""
+        lib.release(self.points, least)
+
+    def hold(self) -> None:
+        """Take back :meth:`release`."""
+        flows = self["flows"]
+        flows[flows == RELEASED] = 0.0
+
+    def remaining(self, change: Array) -> Array:
+        """Part of the elastic stiffness that is left in the latest response; (cells,).
+
+        Args:
+            change: Small changes of the strains of the cells; (cells, 3).
+        """
+        layout, stiffness = self._layout, self._at["θ"][0, 0] * self._at["C"]
+        by_point = change @ layout.strains.T
+        elastic = self._at["θ"][0, 0] * change**2 @ layout.rest
+        elastic += (stiffness * by_point**2) @ layout.weights
+        now = np.einsum("ci,cij,cj->c", change, self.D.reshape(-1, 3, 3), change)
+        return np.asarray(np.divide(now, elastic, out=np.ones(len(now)), where=elastic > 0))
+
     def accept(self) -> None:
         """Take the strains of the latest response as the new state."""
         lib.commit(self.points)
 
     def change(self) -> float:
-        """Energy that :meth:`accept` would add to what is stored and dissipated; J."""
-        changes = self._sums_to_come() - [0, 0, 0, *self.sums[3:]]
-        return float(np.sum(changes[[0, 1, 3, 4]]))
+        """Energy that :meth:`accept` would add to what is stored and dissipated; J.
+
+        Where viscous stresses relax it is as the trapezoidal rule counts it: backward Euler's
+        dissipation is that of the stress at the end, and the difference is no energy.
+        """
+        changes = self._sums_to_come() - [0, 0, 0, *self.sums[3:5], 0, 0]
+        return float(np.sum(changes[[0, 1, 3, 4, 5, 6]]))
 
     def dissipation(self) -> float:
         """Energy that :meth:`accept` would add to what is dissipated; J."""
@@ -284,17 +323,19 @@ class Points:
 
     def enter_losses(self, ledger: Ledger) -> None:
         """Enter what the last step dissipated."""
-        plastic, broken, lost, _, _ = self.sums.tolist()
+        plastic, broken, lost, _, _, released, _ = self.sums.tolist()
         if self._yields:
             ledger.lost["plastic"] += plastic
-        if self._softens:
+        if self.softens:
             ledger.lost["hinges"] += broken
         if self._loss:
             ledger.lost["numerical"] += 2 * self._loss * lost
+        if released:
+            ledger.lost["numerical"] += released
 
     def enter_stored(self, ledger: Ledger) -> None:
         """Enter what the accepted state stores."""
-        _, _, _, elastic, hardening = self.sums.tolist()
+        _, _, _, elastic, hardening, *_ = self.sums.tolist()
         ledger.state["stored"] += elastic
         if self._yields:
             ledger.state["hardening"] += hardening
@@ -304,7 +345,7 @@ class Points:
     def state(self) -> Array:
         """What the accepted state consists of; (cells, k); a copy."""
         stored = np.zeros((len(self.kept), 2))
-        stored[:1] = self.sums[3:]  # of all cells together; to whom it belongs does not matter
+        stored[:1] = self.sums[3:5]  # of all cells together; to whom it belongs does not matter
         return np.hstack([*(self[name] for name in STATE), self.kept, self._e0, stored])
 
     def restore(self, cells: Index, rows: Array) -> None:
@@ -317,7 +358,7 @@ class Points:
         for name, values in zip(STATE, variables, strict=True):
             self[name][cells] = values
         self.kept[cells], self._e0[cells] = kept, e0
-        self.sums[3:] = stored.sum(axis=0)
+        self.sums[3:5] = stored.sum(axis=0)
 
     def refresh(self, strains: Array) -> None:
         """Make forces and stored energies those of a state that no step has led to."""

@@ -14,7 +14,7 @@ from typing import NamedTuple, Protocol
 import ufl
 from ufl.core.expr import Expr
 
-from ufl_beam.kinematics import split, turn
+from ufl_beam.kinematics import frame, split, turn
 
 
 class Averaging(Protocol):
@@ -51,14 +51,24 @@ class Pair(NamedTuple):
 
 def _turned(x: Expr, ψ: Expr) -> Expr:
     """Λ(ψ) x."""
-    return ufl.cos(ψ) * x + ufl.sin(ψ) * turn(x)
+    return x + _by_turning(x, ψ)
+
+
+def _by_turning(x: Expr, ψ: Expr) -> Expr:
+    """(Λ(ψ) - 1) x, to the relative precision of ``ψ``."""
+    cos_1, sin = frame(ψ)
+    return cos_1 * x + sin * turn(x)
+
+
+def _moved(q: Pair, n: Numbers) -> Expr:
+    """Displacement of point b less that of point a."""
+    (u_a, ψ_a), (u_b, ψ_b) = split(q.a), split(q.b)
+    return u_b - u_a + _by_turning(n.arm_b, ψ_b) - _by_turning(n.arm_a, ψ_a)
 
 
 def _between(q: Pair, n: Numbers) -> Expr:
     """From point a to point b."""
-    (u_a, ψ_a), (u_b, ψ_b) = split(q.a), split(q.b)
-    by_turning = _turned(n.arm_b, ψ_b) - n.arm_b - _turned(n.arm_a, ψ_a) + n.arm_a
-    return n.apart + u_b - u_a + by_turning
+    return n.apart + _moved(q, n)
 
 
 def _virtually_between(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Averaging) -> Expr:
@@ -97,7 +107,9 @@ def _length(d: Expr) -> Expr:
 
 
 def _stretching(q: Pair, n: Numbers) -> Expr:
-    return _length(_between(q, n)) - _length(n.apart)
+    # (d·d - d0·d0) / (|d| + |d0|) with d = d0 + moved; a difference of lengths would lose digits.
+    moved = _moved(q, n)
+    return ufl.dot(n.apart + n.apart + moved, moved) / (_length(_between(q, n)) + _length(n.apart))
 
 
 def _virtual_stretching(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Averaging) -> Expr:
@@ -107,7 +119,7 @@ def _virtual_stretching(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Averagi
 
 
 def _parting(q: Pair, n: Numbers) -> Expr:
-    return ufl.dot(n.axis, _between(q, n) - n.apart)
+    return ufl.dot(n.axis, _moved(q, n))
 
 
 def _virtual_parting(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Averaging) -> Expr:
@@ -115,7 +127,8 @@ def _virtual_parting(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Averaging)
 
 
 def _sliding(q: Pair, n: Numbers) -> Expr:
-    return ufl.dot(_turned(n.axis, q.a[2]), _between(q, n)) - ufl.dot(n.axis, n.apart)
+    by_turning = _by_turning(n.axis, q.a[2])
+    return ufl.dot(by_turning, _between(q, n)) + ufl.dot(n.axis, _moved(q, n))
 
 
 def _virtual_sliding(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Averaging) -> Expr:

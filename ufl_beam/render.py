@@ -30,8 +30,8 @@ from ufl_beam.symbols import FILLED, FRONT, MIDDLE, Pin, Stroke
 from ufl_beam.view import (
     RESULTANTS,
     decimal_prefix,
+    evenly,
     moved_points,
-    nearest,
     open_hinges,
     require_choice,
 )
@@ -119,9 +119,7 @@ def animate(
     path = _require_suffix(path, (".gif", ".mp4"))
     require_number(fps, "animate: fps", positive=True)
     require_number(seconds, "animate: seconds", positive=True)
-    kept = solution.times
-    count = max(1, round(fps * seconds))
-    shown = nearest(kept, np.linspace(kept[0], kept[-1], count))
+    shown = evenly(solution, max(1, round(fps * seconds)))
     if ours().rank == 0:
         with look.film(shown) as frames, _writer(path, fps) as film:
             for frame in frames:
@@ -258,7 +256,8 @@ class _Look:
             _add_strokes(pyvista, plotter, self, pose)
             _add_fittings(pyvista, plotter, self, pose)
             _add_hinges(pyvista, plotter, self, n, points)
-            _add_text(plotter, self, f"t = {self.solution.times[n]:.3f} s{scaled}", (0.02, 0.93))
+            time = self.solution.parameter.at(self.solution.times[n], ".3f")
+            _add_text(plotter, self, f"{time}{scaled}", (0.02, 0.93))
             plotter.reset_camera_clipping_range()
             plotter.suppress_rendering = False
             plotter.render()
@@ -419,11 +418,10 @@ def _cylinder(pyvista: Any, look: _Look, pin: Pin) -> Any:
 
 def _add_hinges(pyvista: Any, plotter: Any, look: _Look, n: int, points: Array) -> None:
     """Open hinges as orange pins."""
-    grid, hinges = look.solution.grid, []
-    for cell in open_hinges(look.solution, n)[0]:
-        beam = look.solution.scene.beams[grid.beam_of_cell[cell]]
-        pin = Pin(points[grid.cells[cell]].mean(axis=0), True, (beam.start,))
-        hinges.append(_cylinder(pyvista, look, pin))
+    hinges = [
+        _cylinder(pyvista, look, Pin(hinge.at, True, (hinge.beam.start,)))
+        for hinge in open_hinges(look.solution, n, points)
+    ]
     _add(pyvista, plotter, hinges, ORANGE, "hinges")
 
 

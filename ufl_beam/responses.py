@@ -29,7 +29,8 @@ from ufl_beam.errors import require_returned
 from ufl_beam.laws import Hardening, Layout
 from ufl_beam.ledger import Ledger
 from ufl_beam.loads import value_at
-from ufl_beam.points import INPUTS, Points, expect_entries
+from ufl_beam.openings import Openable
+from ufl_beam.points import INPUTS, Course, Points, expect_entries
 from ufl_beam.schemes import Scheme, Step
 
 if TYPE_CHECKING:
@@ -53,12 +54,14 @@ class Setting(NamedTuple):
         scheme: Says what acts in a step.
         ledger: Takes energies and works.
         friction_repeats: Whether places that stick may hold what is held already.
+        course: Flags that all points of the scene share.
     """
 
     simulation: Simulation
     scheme: Scheme
     ledger: Ledger
     friction_repeats: bool
+    course: Course
 
 
 class Response(Protocol):
@@ -67,12 +70,20 @@ class Response(Protocol):
     steady: bool
     """Whether the rows stay the same during a step."""
 
-    @property
-    def points(self) -> Points | None:
-        """Points whose strains are the motions and whose stresses are the forces, if there are."""
+    in_c: dict[str, Any]
+    """Data of laws that C evaluates, by their names in ``couplings`` of loops.h."""
+
+    openable: Openable | None
+    """Those that open beyond a limit, if there are."""
+
+    def motion(self, e: Array) -> Array:
+        """Motions of the accepted state as solutions show them; ``e`` are those of the nodes."""
 
     def begin(self, e0: Array, step: Step) -> None:
         """Begin a step at the motions ``e0``."""
+
+    def again(self) -> None:
+        """Begin the step again: forget what its iterates have tried."""
 
     def rows(self, e1: Array, λ: Array) -> Rows:
         """α, β, γ around an iterate."""
@@ -85,6 +96,32 @@ class Response(Protocol):
 
     def change(self, e1: Array, work: float) -> float:
         """Energy that the step stores, dissipates or gives away; J."""
+
+    def dissipation(self, e1: Array, λ: Array) -> float:
+        """Energy dissipated plastically in a step to the motions ``e1``; J."""
+
+    def flows(self) -> bool:
+        """Whether one slips plastically in the latest iterate."""
+
+    @property
+    def dissipated(self) -> Array:
+        """Energy that each connector has dissipated plastically; (num_links,); J."""
+
+    def about_force(self, rows: Array) -> Array:
+        """Factor by which rows about the force are divided, zero for rows about the motion.
+
+        Args:
+            rows: The latest ones that Python has put; (num_links, 3).
+
+        Returns:
+            Shape (num_links,).
+        """
+
+    def remaining(self) -> Array:
+        """Part of the elastic stiffness that is left in the latest iterate; (num_links,)."""
+
+    def bends(self, e1: Array) -> Array:
+        """Derivative of α by the motion, internal variables kept; (num_links,)."""
 
     def state(self) -> Array:
         """What is remembered besides motions and forces; (num_links, k)."""
@@ -109,7 +146,8 @@ class _Working:
     """What responses have in common that store nothing: the work of their forces is entered."""
 
     steady = False
-    points: Points | None = None
+    in_c: dict[str, Any] = {}  # noqa: RUF012
+    openable: Openable | None = None
     _group = "lost"
     _entry = ""
     _sign = 1.0
@@ -134,6 +172,13 @@ class _Working:
     def _note(self, step: Step) -> None:
         """What a law notes at the beginning of a step."""
 
+    def motion(self, e: Array) -> Array:
+        """Those of the nodes."""
+        return e
+
+    def again(self) -> None:
+        """Nothing depends on iterates."""
+
     def accept(self, e1: Array, work: float) -> None:
         """Enter the work."""
         if self._entry:
@@ -145,6 +190,32 @@ class _Working:
     def change(self, e1: Array, work: float) -> float:
         """The work."""
         return work
+
+    def dissipation(self, e1: Array, λ: Array) -> float:
+        """None by plastic flow."""
+        return 0.0
+
+    def flows(self) -> bool:
+        """None does."""
+        return False
+
+    @property
+    def dissipated(self) -> Array:
+        """None by plastic flow."""
+        return np.zeros(len(self._links))
+
+    def about_force(self, rows: Array) -> Array:
+        """Factors of one, but for those that are held in the iterate."""
+        about_motion = np.array([link.holds for link in self._links]) & (rows[:, 1] != 1.0)
+        return np.where(about_motion, 0.0, 1.0)
+
+    def remaining(self) -> Array:
+        """All of it: nothing yields."""
+        return np.ones(len(self._links))
+
+    def bends(self, e1: Array) -> Array:
+        """The law is linear."""
+        return np.zeros(len(self._links))
 
     def state(self) -> Array:
         """Nothing is remembered."""
@@ -210,15 +281,16 @@ class _Pushed(_Working):
 
     def _note(self, step: Step) -> None:
         wanted = -np.array([self._wanted(link, step) for link in self._links])
-        self._force = self._reached + step.toward * (wanted - self._reached)
+        self._end = self._reached + step.toward * (wanted - self._reached)
+        self._force = self._reached + step.at * (self._end - self._reached)
 
     def accept(self, e1: Array, work: float) -> None:
         """Enter the work."""
         super().accept(e1, work)
-        self._reached = self._force
+        self._reached = self._end
 
     def state(self) -> Array:
-        """The forces of the last step."""
+        """The forces at the end of the last step."""
         return self._reached[:, None]
 
     def restore(self, rows: Array) -> None:
@@ -281,6 +353,17 @@ class _Asked(_Working):
         slope: Array = (self._forces(e1 + ε) - self._forces(e1 - ε)) / (2 * ε)
         return -slope, 1.0, force - slope * e1
 
+    def bends(self, e1: Array) -> Array:
+        """Of the slope of a function that only Python knows: the difference of fourth order.
+
+        Over a thousandth of the scene, or of a radian, it leaves 1e-10 of round-off, and less of
+        the sixth derivative of a law that bends over a thirtieth of the scene or more.
+        """
+        ε = self._small
+        stencil = ((-2, -1), (-1, 16), (0, -30), (1, 16), (2, -1))
+        bends: Array = sum(weight * self._forces(e1 + k * ε) for k, weight in stencil)
+        return np.asarray(-bends / (12 * ε**2))
+
 
 def _given(link: Connector, force: Any, motion: Any, rate: Any) -> float:
     """Evaluate the force of a :class:`Function`; its owner is named if it is no number."""
@@ -300,17 +383,18 @@ class _Rubbing(_Working):
     def _prepare(self) -> None:
         size = self._setting.simulation.scene.size
         self._slip: Array = np.zeros(len(self._links))
+        self._accepted: Array = self._slip
         lengths = np.where([c.turns for c in self._links], 1.0, size)
         self._tiny = 1e-14 * lengths
         self._softness = (CREEP if self._setting.friction_repeats else 0.0) * lengths
 
     def state(self) -> Array:
         """Which way each slips."""
-        return self._slip[:, None]
+        return self._accepted[:, None]
 
     def restore(self, rows: Array) -> None:
         """Take over :meth:`state`."""
-        self._slip = rows[:, 0].copy()
+        self._slip = self._accepted = rows[:, 0].copy()
 
     def _note(self, step: Step) -> None:
         simulation = self._setting.simulation
@@ -318,7 +402,17 @@ class _Rubbing(_Working):
         self._creep = self._softness / np.where(limit > 0, limit, np.inf)
         # With this way the velocity at the end is zero; with none, that before would come back.
         self._way = self._setting.scheme.way_to_rest(step.dt) * simulation.rates(self._links)
+        self.again()
+
+    def again(self) -> None:
+        """Slip as before the step; an attempt that failed tells nothing."""
+        self._slip = self._accepted
         self._against = np.zeros(len(self._links), dtype=bool)
+
+    def accept(self, e1: Array, work: float) -> None:
+        """Enter the work, and take which way each slips."""
+        super().accept(e1, work)
+        self._accepted = self._slip
 
     def rows(self, e1: Array, λ: Array) -> Rows:
         """What sticks comes to rest until it bears too much; what slips goes on until it turns."""
@@ -386,10 +480,16 @@ class _Sprung:
         number = len(links)
         keys = [(0, i) for i in range(number)]
         storage = np.zeros((number, 1, len(INPUTS)))
-        self.points = Points(layout, keys, np.ones(number), setting.scheme, storage)
+        self.points = Points(layout, keys, np.ones(number), setting.scheme, storage, setting.course)
         self._ledger = setting.ledger
         expect_entries(layout, setting.scheme, setting.ledger)
         self._strains = np.zeros((number, 3))
+        self.in_c = {"points": self.points.points}
+        self.openable = self.points if self.points.softens else None
+
+    def motion(self, e: Array) -> Array:
+        """Those of the nodes."""
+        return e
 
     def _at(self, e: Array) -> Array:
         self._strains[:, 0] = e
@@ -403,6 +503,13 @@ class _Sprung:
         """The force around the iterate."""
         r, D = self.points.respond(self._at(e1))
         return -D[:, 0], 1.0, r[:, 0] - D[:, 0] * e1
+
+    def again(self) -> None:
+        """Points answer each iterate anew."""
+
+    def about_force(self, rows: Array) -> Array:
+        """Factors of one."""
+        return np.ones(len(self._strains))
 
     def accept(self, e1: Array, work: float) -> None:
         """Commit the internal variables."""
@@ -418,6 +525,28 @@ class _Sprung:
         """Energy stored and dissipated in the step; J."""
         self.points.respond(self._at(e1))
         return self.points.change()
+
+    def dissipation(self, e1: Array, λ: Array) -> float:
+        """Energy dissipated in the step; J."""
+        self.points.respond(self._at(e1))
+        return self.points.dissipation()
+
+    def flows(self) -> bool:
+        """Their motions tell."""
+        return False
+
+    @property
+    def dissipated(self) -> Array:
+        """Energy that each spring has dissipated; (num_links,); J."""
+        return np.asarray(self.points.kept[:, 4:].sum(axis=1))
+
+    def remaining(self) -> Array:
+        """Part of the elastic stiffness that is left in the latest iterate; (num_links,)."""
+        return self.points.remaining(np.eye(1, 3).repeat(len(self._strains), axis=0))
+
+    def bends(self, e1: Array) -> Array:
+        """Nothing bends until something yields."""
+        return np.zeros(len(e1))
 
     def state(self) -> Array:
         """Internal variables."""

@@ -74,12 +74,14 @@ class FrameForces:
     def begin(self, step: Step) -> None:
         """Remember the beginning, and how much of the forces acts."""
         self._q0, self._dt = step.q0, step.dt
-        self._growth = self._grown + step.toward * (1.0 - self._grown)
+        growth = step.toward * (1.0 - self._grown)
+        self._growth, self._growth_at_end = self._grown + step.at * growth, self._grown + growth
 
-    def carry_on(self, t: float, q: Array) -> None:
-        """Take the state ``q`` as one that is in equilibrium with the forces."""
+    def carry_on(self, t: float, q: Array) -> Array:
+        """The forces at ``q``; take that state as one that is in equilibrium with them."""
         self._grown = 1.0
         self.force = self._before = self._pull(self._from_centre + q)
+        return self.force
 
     def loops(self) -> None:
         """None."""
@@ -99,7 +101,7 @@ class FrameForces:
     def accept(self, q1: Array, s: Array) -> None:
         """Work of the centrifugal forces."""
         self._ledger.supplied["loads"] += float(self._acting(self._before, self.force) @ s)
-        self._before, self._grown = self.force, self._growth
+        self._before, self._grown = self.force, self._growth_at_end
 
     def add_state(self, q: Array) -> None:
         """Loads hold no energy; what a potential would hold is in their work."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
+from contextlib import ExitStack
 
 from mpi4py import MPI
 
@@ -12,18 +13,12 @@ from tqdm import tqdm
 
 from ufl_beam.checkpoint import Checkpoint, Keeper, digest_of, kinds_of, require_continuable
 from ufl_beam.discretisation import Mesh
-from ufl_beam.errors import (
-    SceneError,
-    require_count,
-    require_kind,
-    require_number,
-    require_sequence,
-    require_switch,
-)
+from ufl_beam.errors import SceneError, require_count, require_kind, require_number, require_switch
 from ufl_beam.initial import mesh_of
+from ufl_beam.outputs import take
 from ufl_beam.pacing import Adaptive, AdaptiveSteps, EqualSteps, Pace
 from ufl_beam.processes import communicator, in_study, ours
-from ufl_beam.record import UNLIMITED, Recorder, on_first
+from ufl_beam.record import UNLIMITED, Recorder, close_all, recorders_of
 from ufl_beam.scene import Scene
 from ufl_beam.schemes import Scheme, has_inertia
 from ufl_beam.simulation import SMALLEST_PART, Simulation
@@ -83,14 +78,13 @@ def simulate(
     _require_step(dt, scheme, (t0, t1))
     require_count(every, "simulate: every")
     require_count(most, "simulate: most")
-    recorders = (record,) if isinstance(record, Recorder) else require_sequence(record, "record")
-    for i, recorder in enumerate(recorders):
-        require_kind(recorder, Recorder, f"simulate: record[{i}]")
-        on_first(comm, recorder.require_writable)
+    if checkpoint is not None:
+        require_kind(checkpoint, Checkpoint, "simulate: checkpoint")
+    kept = [] if checkpoint is None else [("checkpoint", checkpoint.files)]
+    recorders, outputs = recorders_of(record, comm, "simulate", *kept)
     begin = time.perf_counter()
     keeper: Keeper | None = None
     if checkpoint is not None:
-        require_kind(checkpoint, Checkpoint, "simulate: checkpoint")
         step = None if isinstance(dt, Adaptive) else EqualSteps(t0, t1, dt).dt
         call = {
             "scene": scene, "scheme": scheme, "t[0]": t0, "dt": dt, "every": every, "most": most,
@@ -100,49 +94,65 @@ def simulate(
         for recorder in recorders:
             require_continuable(recorder)
         keeper = Keeper(checkpoint, call, step, comm)
-    simulation = Simulation(scene, scheme, t0=t0, start=start, newton=newton, mesh=mesh, comm=comm)
-    pace: Pace = (
-        AdaptiveSteps(simulation, t1, dt)
-        if isinstance(dt, Adaptive)
-        else EqualSteps(simulation.t, t1, dt)
-    )
+    with ExitStack() as stack:
+        if keeper is not None:
+            stack.callback(keeper.close)
+        simulation = Simulation(
+            scene, scheme, t0=t0, start=start, newton=newton, mesh=mesh, comm=comm
+        )
+        pace: Pace = (
+            AdaptiveSteps(simulation, t1, dt)
+            if isinstance(dt, Adaptive)
+            else EqualSteps(simulation.t, t1, dt)
+        )
+        stack.pop_all()  # the run closes it
     solution = simulation.solution
+    release = take(outputs)
+
+    def after_step() -> None:
+        if pace.steps % solution.every == 0 or pace.finished:
+            solution.keep(simulation)
+            if len(solution) > most + 1 and not pace.finished:
+                solution.thin()
+                solution.every *= 2
+        for recorder in recorders:
+            recorder.write(simulation)
+        if keeper is not None:
+            keeper.note(simulation, pace, recorders)
+
     try:
         solution.every = every
         if keeper is not None and keeper.found:
-            keeper.resume(simulation, pace, recorders, t1)
+            simulation.together(keeper.resume, simulation, pace, recorders, t1)
             say(f"checkpoint {keeper.path}: the run goes on from t = {simulation.t:.9g} s")
             begin -= solution.seconds
         else:
             for recorder in recorders:
-                recorder.open(simulation)
+                simulation.together(recorder.open, simulation)
             solution.keep(simulation)
         quiet = None if progress and comm.rank == 0 and not in_study() else True
         with tqdm(total=1.0, bar_format=BAR, disable=quiet, mininterval=0.5) as bar:
             while not pace.finished:
                 pace.advance(simulation)
-                if pace.steps % solution.every == 0 or pace.finished:
-                    solution.keep(simulation)
-                    if len(solution) > most + 1 and not pace.finished:
-                        solution.thin()
-                        solution.every *= 2
-                for recorder in recorders:
-                    recorder.write(simulation)
-                if keeper is not None:
-                    keeper.note(simulation, pace, recorders)
+                simulation.together(after_step)
                 bar.update(pace.progress - bar.n)
         simulation.end()
+        simulation.check_ledger()
     except BaseException as error:
         # Whatever stops a run, an interrupt or a user's function, what was reached is not lost.
-        if simulation.comm.size == 1:
-            simulation.end()  # several processes may not all be here
+        if simulation.share.comm.size == 1 or error is simulation.together.raised:
+            simulation.end()  # else the processes may not all be here
         error.__dict__["solution"] = solution
         raise
     finally:
-        for recorder in recorders:
-            recorder.close()
+        release()
+        close_all(recorders)
         simulation.close()
+        if keeper is not None:
+            keeper.close()
         solution.seconds = time.perf_counter() - begin
+    if comm.rank == 0:
+        solution.opened.warn(scheme, solution.times)
     return solution
 
 

@@ -7,12 +7,13 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, singledispatch
 
+import numpy as np
+
 from ufl_beam.beams import Beam, Place, Point
 from ufl_beam.bodies import (
     GROUND,
     Anchor,
     Body,
-    Node,
     Spot,
     carries,
     ground,
@@ -20,6 +21,7 @@ from ufl_beam.bodies import (
     require_anchor,
 )
 from ufl_beam.connectors import Actuator, Bearing, Connector, Coulomb, Joint, Motor
+from ufl_beam.curves import enclosing_diameter
 from ufl_beam.errors import (
     SceneError,
     clip,
@@ -29,6 +31,7 @@ from ufl_beam.errors import (
     require_vector,
 )
 from ufl_beam.loads import (
+    Constant,
     FollowerLoad,
     Gravity,
     LineLoad,
@@ -39,10 +42,10 @@ from ufl_beam.loads import (
     require_time_function,
     value_at,
 )
+from ufl_beam.plastic_hinges import Slot, merged, plastic_hinges, shared_by_joints
 from ufl_beam.viscous import Damping, KelvinVoigt, Rayleigh
 
 COMPONENTS = ("u", "v", "psi")
-Slot = tuple[Node, int]
 
 
 # -- supports ----------------------------------------------------------------------------------
@@ -129,7 +132,7 @@ def Prescribed(
 
 def _constant(value: float, place: Anchor, component: int) -> TimeFunction:
     require_number(value, f"Prescribed at {place}: {COMPONENTS[component]}")
-    return still if value == 0 else lambda t: float(value)
+    return still if value == 0 else Constant(float(value))
 
 
 # -- masses and initial motion -----------------------------------------------------------------
@@ -258,21 +261,67 @@ class Scene:
                 self._require_pressing(connector, connector.law.joint)
         self._require_single_supports()
 
+    def __getitem__(self, name: str) -> Beam | Body:
+        """The beam or body of a name, as in ``scene["left"].end``.
+
+        Raises:
+            SceneError: There is none, or more than one.
+        """
+        everything: tuple[Beam | Body, ...] = (*self.beams, *self.bodies)
+        found = [one for one in everything if one.name == name]
+        if len(found) != 1:
+            there = ", ".join(dict.fromkeys(str(one.name) for one in everything))
+            raise SceneError(
+                f"Scene: {len(found) or 'no'} beams and bodies are called {name!r}; "
+                f"there is {there}; scene.beams[i] and scene.bodies[i] are those of a number"
+            )
+        return found[0]
+
     @cached_property
     def size(self) -> float:
-        """Diagonal of the box around the undeformed scene; m."""
+        """Diameter of the smallest circle around the undeformed scene; m.
+
+        It is the same in all axes.  A single point is as large as its radius of gyration.
+        """
         points = [b.curve(s) for b in self.beams for s in b.vertices(())]
         points += [body.center for body in self.bodies]
         points += [place.point for _, place in self.attachments() if isinstance(place, Spot)]
-        xs, ys = zip(*points, strict=True)
-        return math.hypot(max(xs) - min(xs), max(ys) - min(ys)) or 1.0
+        gyration = [math.sqrt(b.inertia / b.mass) for b in self.bodies if b.mass > 0]
+        return enclosing_diameter(np.array(points)) or max(gyration, default=0.0) or 1.0
 
     @cached_property
     def links(self) -> tuple[Connector, ...]:
-        """All connectors: those that hold joints, those of the scene, and off-centre loads."""
+        """All connectors: of joints, of the scene, of off-centre loads, and plastic hinges."""
+        return (*self._links_but_hinges, *self.hinges)
+
+    @cached_property
+    def _links_but_hinges(self) -> tuple[Connector, ...]:
         held = [holder for joint in self.joints for holder in joint.holders]
         loads = [push for load in self.loads for push in _off_center(load)]
         return (*held, *self.connectors, *loads)
+
+    @cached_property
+    def hinges(self) -> tuple[Connector, ...]:
+        """Plastic hinges of zero length: those of beams, and at ends whose section has a hinge."""
+        return plastic_hinges(self.beams, self.joints, self._bearing_moments())
+
+    def _bearing_moments(self) -> Iterator[Anchor]:
+        """Places where supports, connectors, loads or masses bear a moment."""
+        for support in self.supports:
+            if 2 in support.held:
+                yield support.place
+        for link in self._links_but_hinges:
+            by_a, by_b = link.rigidly()
+            if by_a[2] or link.motion == "sliding":
+                yield link.a
+            if by_b[2]:
+                yield link.b
+        for load in self.loads:
+            if isinstance(load, PointLoad | FollowerLoad) and load.moment:
+                yield load.place
+        for mass in self.masses:
+            if mass.inertia:
+                yield mass.place
 
     @cached_property
     def movers(self) -> tuple[Body, ...]:
@@ -323,7 +372,7 @@ class Scene:
     @cached_property
     def attached(self) -> dict[Beam, list[float]]:
         """Parameters of the places of each beam that must be vertices."""
-        found: dict[Beam, list[float]] = {beam: [] for beam in self.beams}
+        found: dict[Beam, list[float]] = {beam: list(beam.hinges) for beam in self.beams}
         for _, place in self.attachments():
             if isinstance(place, Place):
                 found[place.beam].append(place.s)
@@ -357,7 +406,7 @@ class Scene:
             if joint.meets and gap > 1e-9 * self.size:
                 raise SceneError(
                     f"{joint.kind}: joint ends lie {gap:.6g} m apart: {here} and {other}; "
-                    "RigidLink and Link join places that are apart"
+                    f"{joint.advice}"
                 )
 
     def _require_pressing(self, connector: Connector, pressing: Bearing) -> None:
@@ -381,22 +430,8 @@ class Scene:
     @cached_property
     def representatives(self) -> dict[Slot, Slot]:
         """Which component of a node stands for it, for all components that joints share."""
-        parent: dict[Slot, Slot] = {}
-
-        def root(slot: Slot) -> Slot:
-            while slot in parent:
-                slot = parent[slot]
-            return slot
-
-        for joint in self.joints:
-            for component in joint.shared:
-                alike = joint.places if component == 2 else joint.carriers
-                nodes = [node(place) for place in alike]
-                for other in nodes[1:]:
-                    first, second = root((nodes[0], component)), root((other, component))
-                    if first != second:
-                        parent[second] = first
-        return {slot: root(slot) for slot in parent}
+        hinges = ([(link.a, c), (link.b, c)] for link in self.hinges for c in (0, 1))
+        return merged([*shared_by_joints(self.joints), *hinges])
 
     def _require_single_supports(self) -> None:
         same = self.representatives

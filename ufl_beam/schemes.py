@@ -35,6 +35,8 @@ class Step(NamedTuple):
         load_time: Time at which loads are taken; s.
         motion_time: Time at which prescribed motions are taken; s.
         toward: How far the step goes from the loads and motions before it to these; 1: there.
+        at: Part of the way from the loads at the beginning to those at the end of the step at which
+            they are in its equation; 1: at the end.
     """
 
     t0: float
@@ -43,6 +45,7 @@ class Step(NamedTuple):
     load_time: float
     motion_time: float
     toward: float
+    at: float = 1.0
 
     @property
     def dt(self) -> float:

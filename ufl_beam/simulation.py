@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import math
+import warnings
+from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple, NoReturn
 
 from mpi4py import MPI
 
 import numpy as np
 
+from ufl_beam.agreement import Agreement
 from ufl_beam.applied import DeadLoads, FollowerLoads
 from ufl_beam.compat import Array
-from ufl_beam.connectors import Controller, Coulomb
-from ufl_beam.couplings import couplings
+from ufl_beam.connectors import Connector, Controller, Coulomb
+from ufl_beam.couplings import Couplings, couplings
 from ufl_beam.dampers import damping_forces
+from ufl_beam.diagnosis import singularity
 from ufl_beam.differences import numerical_forces
 from ufl_beam.discretisation import Mesh
 from ufl_beam.equation import Equation
 from ufl_beam.errors import (
     ConvergenceError,
+    ModelWarning,
     SceneError,
     StepFailed,
     require_kind,
@@ -42,6 +48,7 @@ from ufl_beam.mechanism import (
     require_no_mechanism,
 )
 from ufl_beam.memory import NOWHERE, Memory, Restoring, Saving, State
+from ufl_beam.openings import Openable, Openings
 from ufl_beam.path import StaticPath
 from ufl_beam.plausibility import (
     warn_of_far_points,
@@ -74,6 +81,21 @@ times as fast at 6 000; see benchmarks/README.md.
 
 LARGEST_TURN = 0.75 * math.pi
 """A step that turns a node further is cut; the algorithmic strains end at π."""
+
+APPLYING = 1 / 8
+"""Part of the first step in which loads that are there from the start are applied."""
+
+APPLYING_TURN = 0.02
+"""Largest turn of a node meanwhile in a part; rad.
+
+Over a part a moment is in error by a quarter of the square: some 1e-4 of it.
+"""
+
+SHORT_PART = 512
+"""So many times shorter parts may turn nodes further: their oscillations do not become smaller."""
+
+ROOM = 10.0
+"""Largest imbalance of an exact ledger over the tolerance of the solver."""
 
 FIRST = 1 / 16
 """Part of the first step after which accelerations are taken for those at the beginning.
@@ -117,6 +139,7 @@ class Simulation(Live):
         ledger: Energies of this process.
         solution: The motion so far.
         parts: Number of parts that steps were cut into, those not cut included.
+        together: Calls that raise on all processes of a shared scene what they raise on one.
         last_dt: Length of the last accepted step; s.
     """
 
@@ -157,6 +180,7 @@ class Simulation(Live):
             warn_of_touching(self.grid)
         together = len(self.grid.cells) >= comm.size * SMALLEST_SHARE
         self.share = Share(self.grid, comm if together else MPI.COMM_SELF)
+        self.together = Agreement(self.share.comm)
         q, v, internal = initial_state(self.grid, start)
         self.fields = Fields(self.share)
         self._A = self.fields.matrix()
@@ -170,8 +194,9 @@ class Simulation(Live):
         self._numerical: list[Term] = []
         self._make_beams()
         self.force = np.zeros(self.share.size)
-        setting = Setting(self, scheme, self.ledger, friction_repeats(scene))
+        setting = Setting(self, scheme, self.ledger, friction_repeats(scene), self._course)
         self.couplings = couplings(self.share, setting, self._A)
+        self._openings = Openings.of(self._course, self._openable(), self.share.comm)
         self.loads = self._make_loads()
         self._others: list[Term] = [*self.loads, *self._numerical]
         if has_inertia(scheme):
@@ -187,9 +212,9 @@ class Simulation(Live):
         self.supports = Supports(self.share, scheme, self.ledger, self._A)
         if has_inertia(scheme):
             self.supports.stop(self.inertia.v)
+        loaded: list[Array] = []
         if start is not None or (has_inertia(scheme) and scheme.kept):
-            for load in self.loads:
-                load.carry_on(self.t, self.q)
+            loaded = [load.carry_on(self.t, self.q) for load in self.loads]
         if start is not None:
             memory = Restoring(self.share, internal)
             for one in (*self.inelastic, *self.couplings):
@@ -201,11 +226,11 @@ class Simulation(Live):
                 known = sum(name in internal for name in scheme.kept)
                 self.inertia.carry_on(memory, known)
         self._q_before: Array = self.q
-        self.last_dt = math.inf
+        self.last_dt: float = math.inf
         self._asking = [
             (link, link.law) for link in scene.links if isinstance(link.law, Controller | Coulomb)
         ]
-        self.asked = dict.fromkeys((link for link, _ in self._asking), 0.0)
+        self.asked: dict[Connector, float] = dict.fromkeys((link for link, _ in self._asking), 0.0)
         self._rotations = self.share.rotations()
         self._multipliers = as_slice(self.share.multipliers())
         for term in self.terms:
@@ -213,10 +238,12 @@ class Simulation(Live):
         if has_inertia(scheme) and (scene.links or scene.supports):
             motions = self.connections()[:, 0]
             warn_of_jumps(self.grid, t0, q, motions)
+        self._continues = start is not None
         self._path: StaticPath | None = None
         if not scheme.dynamic:
             parts = (self.beams, self.couplings)
             self._path = StaticPath(self.share, scheme, *parts, self.ledger, self.q, t0)
+            self._bear(self._path, loaded)
         equation = None
         if self.share.comm.size == 1 and not self.supports.turned:
             terms = (self.beams, self.couplings, self._others)
@@ -231,10 +258,12 @@ class Simulation(Live):
             forces=self.force,
             excess=self._excess,
             relieve=self._relieve,
+            working=self._working,
             held=self.supports.dofs,
             newton=newton,
+            agreement=self.together,
         )
-        self.solution = Solution(scene, self.grid)
+        self.solution: Solution = Solution(scene, self.grid)
         give_back_memory()
 
     # -- building ------------------------------------------------------------------------------
@@ -261,6 +290,12 @@ class Simulation(Live):
             self.beams.append(ElasticBeams(fields, self.scheme, self._A, self.ledger))
             self._numerical = numerical_forces(self.scheme, fields, self._A, self.ledger)
 
+    def _openable(self) -> list[Openable]:
+        """What may open on this process: hinges and cracks of cells, springs that soften."""
+        cells: list[Openable] = [one for one in self.inelastic if one.points.softens]
+        groups = [one.response.openable for one in self.couplings if isinstance(one, Couplings)]
+        return [*cells, *(places for places in groups if places is not None)]
+
     def _make_loads(self) -> list[DeadLoads | FollowerLoads | FrameForces]:
         followers = [load for load in self.scene.loads if isinstance(load, FollowerLoad)]
         frames = [load for load in self.scene.loads if isinstance(load, RotatingFrame)]
@@ -274,6 +309,19 @@ class Simulation(Live):
             loads.append(FollowerLoads(followers, self.share, self.scheme, self.ledger, self._A))
         return loads
 
+    def _bear(self, path: StaticPath, loads: list[Array]) -> None:
+        """Set the reactions to those of the initial state of a static run.
+
+        Args:
+            path: Knows the internal forces of that state.
+            loads: The loads that it is in equilibrium with; none if nothing acts yet.
+        """
+        r = path.force - sum(loads)
+        self.supports.enter(r)
+        self.supports.hold(self.share.added(r))
+        self.supports.take()
+        self.reactions_known = True
+
     # -- the equation of a step ----------------------------------------------------------------
 
     def _residual(self, x: Array, r: Array) -> None:
@@ -286,18 +334,26 @@ class Simulation(Live):
             term.add_residual(q1, r)
         self.supports.enter(r)
 
-    def _relieve(self) -> bool:
-        """Whether another try with relieved points makes sense."""
-        here = self._course.relieve()
+    def _relieve(self, relief: bool) -> bool:
+        """Begin again with relieved points, or end that; whether it makes a difference."""
+        here = self._course.relieve(relief)
+        if relief:
+            for coupling in self.couplings:
+                coupling.again()
         return self.share.comm.allreduce(here, op=MPI.LOR) if self.share.comm.size > 1 else here
 
-    def _excess(self, x: Array, r: Array, scale: float) -> float:
+    def _excess(self, x: Array, r: Array, scale: float, moved: float) -> float:
         """How far the laws of connectors are missed."""
         q1 = self.supports.in_plane(x)
-        here = max((c.excess(q1, r, scale) for c in self.couplings), default=0.0)
-        if self.share.comm.size > 1:
-            return self.share.comm.allreduce(here, op=MPI.MAX) if self.scene.links else 0.0
-        return here
+        here = max((c.excess(q1, r, scale, moved) for c in self.couplings), default=0.0)
+        return self.share.largest(here) if self.scene.links else 0.0
+
+    def _working(self, x: Array, y: Array) -> Array:
+        """What residuals work on in the step ``y`` from ``x``: laws of connectors on motions."""
+        q, v, works = self.supports.in_plane(x), self.supports.in_plane(y), y.copy()
+        for coupling in self.couplings:
+            coupling.put_motions(q, v, works)
+        return works
 
     def _tangent(self, x: Array) -> None:
         self._assemble(self.supports.in_plane(x))
@@ -314,6 +370,11 @@ class Simulation(Live):
             self.supports.enter(forces)
             r += forces
         self.supports.hold_matrix(self._A.data)
+        return self._A
+
+    @property
+    def tangent(self) -> Csr:
+        """Local part of the latest tangent; what is held has nothing but a diagonal entry."""
         return self._A
 
     def _assemble(self, q1: Array) -> None:
@@ -345,6 +406,46 @@ class Simulation(Live):
                 term.add_tangent(q)
         return r, self._A.data.copy()
 
+    def tangent_change(self, q: Array, u: Array) -> Array:
+        """Derivative of the tangent of :meth:`linearise` along ``u``; entries of the matrix.
+
+        Args:
+            q: Configuration at the local degrees of freedom, which was linearised about last.
+            u: Direction, forces of connectors included.
+        """
+        self._A.data.fill(0.0)
+        for one in self._inner:
+            one.add_tangent_change(q, u)
+        return self._A.data.copy()
+
+    def tangent_works(self, q: Array, u: Array, X: Array, Y: Array) -> tuple[Array, Array]:
+        """Works of the tangent for the motions X on Y, and of its derivative along u; J.
+
+        Args:
+            q: See :meth:`tangent_change`.
+            u: Direction, forces of connectors included.
+            X: Motions, in columns.
+            Y: Virtual motions, in columns.
+
+        Returns:
+            Two symmetric matrices.
+        """
+        works = np.zeros((2, X.shape[1], Y.shape[1]))
+        for i, j in zip(*np.triu_indices(X.shape[1]), strict=True):
+            x, y = (np.ascontiguousarray(one) for one in (X[:, i], Y[:, j]))
+            works[:, i, j] = np.sum([b.tangent_works(q, u, x, y) for b in self.beams], axis=0)
+        for k, work in enumerate(works):
+            self._A.data.fill(0.0)
+            for one in self.couplings:
+                if k == 0:
+                    one.add_tangent(q)
+                else:
+                    one.add_tangent_change(q, u)
+            times = Product(self._A)
+            work += np.triu([times(np.ascontiguousarray(x)) @ Y for x in X.T])
+            work += np.triu(work, 1).T
+        return works[0], works[1]
+
     # -- stepping ------------------------------------------------------------------------------
 
     def step_to(self, t1: float) -> None:
@@ -354,6 +455,42 @@ class Simulation(Live):
             ConvergenceError: Even the smallest part failed; the state is that of the last part that
                 was accepted, which the solution of the error ends with.
         """
+        if self.parts == 0 and self._begins_loaded():
+            begin = self.t
+            self._in_parts(
+                begin + APPLYING * (t1 - begin),
+                lambda part, end: self._attempt_loads(begin, part, end),
+            )
+        self._in_parts(t1, self.attempt)
+
+    def _begins_loaded(self) -> bool:
+        """Whether the loads at the beginning are to be applied before the first step.
+
+        Where forces act over the step, a step that turns a node far does not end in equilibrium.
+        So the loads are applied in parts that turn nodes little, and the rest of the step has
+        nothing left to do but to follow them.
+        """
+        over_step = self.scheme.average(0.0, 1.0) != 1.0
+        if self.scheme.dynamic or not over_step or self._continues:
+            return False
+        frames = any(isinstance(load, RotatingFrame) for load in self.scene.loads)
+        return frames or any(f(self.t) != 0 for _, f in self.scene.time_functions())
+
+    def _attempt_loads(self, begin: float, t1: float, end: float) -> Trial:
+        """Solve a part of the application of the loads at the time ``begin``; it lasts to ``end``.
+
+        Raises:
+            StepFailed: There is no equilibrium; or a node turns far, and shorter parts may help.
+        """
+        step = self.scheme.step(self.t, t1, end, self.q)
+        trial = self._attempt(step._replace(load_time=begin, motion_time=begin))
+        turn = self.share.largest(np.abs(trial.q1 - self.q)[self._rotations].max(initial=0.0))
+        if turn > APPLYING_TURN and SHORT_PART * step.dt > end - begin:
+            raise StepFailed("a node turns too far while the loads at the beginning are applied")
+        return trial
+
+    def _in_parts(self, t1: float, attempt: Callable[[float, float], Trial]) -> None:
+        """Go to the time ``t1`` by attempts of the whole way or of parts of it."""
         t0, done, part = self.t, 0, SMALLEST_PART
         while done < SMALLEST_PART:
             end = (
@@ -362,7 +499,7 @@ class Simulation(Live):
                 else t0 + (t1 - t0) * (done + part) / SMALLEST_PART
             )
             try:
-                self.accept(self.attempt(end, t1))
+                self.accept(attempt(end, t1))
             except StepFailed as failure:
                 if part == 1:
                     self.give_up(failure, end)
@@ -384,30 +521,53 @@ class Simulation(Live):
             StepFailed: There is no equilibrium, or it is too far away.
         """
         if self._path is None and not self.inertia.ready:
-            first = self._attempt(self.t + FIRST * (t1 - self.t), t1)
+            t = self.t + FIRST * (t1 - self.t)
+            first = self._attempt(self.scheme.step(self.t, t, t1, self.q))
             self.inertia.prepare(first.s)
             self.supports.take()
             for coupling in self.couplings:
                 coupling.take(first.q1)
-        return self._attempt(t1, end)
+        return self._attempt(self.scheme.step(self.t, t1, t1 if end is None else end, self.q))
 
-    def _attempt(self, t1: float, end: float | None) -> Trial:
-        """See :meth:`attempt`."""
-        step = self.scheme.step(self.t, t1, t1 if end is None else end, self.q)
-        self.ask()
-        for term in self.terms:
-            term.begin(step)
+    def _attempt(self, step: Step) -> Trial:
+        """Solve a step; see :meth:`attempt`."""
+        guess = self.together(self._begin, step)
+        try:
+            like_last = self.scheme.dynamic and math.isclose(step.dt, self.last_dt, rel_tol=1e-6)
+            loads = self._loads()
+            if self._openings is None:
+                q1 = self._solver.solve(guess, loads, like_last)
+            else:
+                solve = partial(self._solver.solve, loads=loads, like_last=like_last)
+                q1 = self._openings.solve(guess, solve, partial(self._begin_terms, step))
+        except StepFailed:
+            try:
+                self.together(self._require_numbers, step)
+            except StepFailed as better:
+                raise better from None
+            raise
+        return self._trial(step, q1)
+
+    def _begin(self, step: Step) -> Array:
+        """Begin a step; return a guess of its end, in the axes of the supports."""
+        self._ask_and_begin(step)
         guess = extrapolated(self.q, self._q_before, step.dt / self.last_dt)
         self.supports.enter(guess)
         self.supports.move(guess, self.supports.in_axes(self.q), step)
-        try:
-            like_last = self.scheme.dynamic and math.isclose(step.dt, self.last_dt, rel_tol=1e-6)
-            q1 = self._solver.solve(guess, [load.force for load in self.loads], like_last)
-        except StepFailed:
-            if said := no_number(self.scene, (step.load_time, step.motion_time)):
-                raise StepFailed(said) from None
-            raise
-        return self._trial(step, q1)
+        return guess
+
+    def _ask_and_begin(self, step: Step) -> None:
+        self.ask()
+        self._begin_terms(step)
+
+    def _begin_terms(self, step: Step) -> None:
+        for term in self.terms:
+            term.begin(step)
+
+    def _require_numbers(self, step: Step) -> None:
+        """Raise :class:`StepFailed` if a time function is no finite number in a step."""
+        if said := no_number(self.scene, (step.load_time, step.motion_time)):
+            raise StepFailed(said)
 
     def attempt_along(self, step: Step, guess: Array, border: Border) -> Trial:
         """Solve the next step together with the load factor; :meth:`accept` may take it.
@@ -420,11 +580,20 @@ class Simulation(Live):
         Raises:
             StepFailed: There is no equilibrium, or it is too far away.
         """
-        self.ask()
-        for term in self.terms:
-            term.begin(step)
-        loads = [load.force for load in self.loads]
-        return self._trial(step, self._solver.solve_along(guess, loads, border))
+        self.together(self._ask_and_begin, step)
+        loads, t = self._loads(), border.t
+        solve = partial(self._solver.solve_along, loads=loads, border=border)
+
+        def again() -> None:
+            self._begin_terms(step)
+            border.t = t
+
+        if self._openings is None:
+            return self._trial(step, solve(guess))
+        return self._trial(step, self._openings.solve(guess, solve, again))
+
+    def _loads(self) -> list[Array]:
+        return [load.force for load in self.loads]
 
     def _trial(self, step: Step, q1: Array) -> Trial:
         """What a step came to, ``q1`` in the axes of the supports, if it was followed."""
@@ -439,6 +608,10 @@ class Simulation(Live):
 
     def accept(self, trial: Trial) -> None:
         """Go where the latest :meth:`attempt` went."""
+        self.together(self._accept, trial)
+
+    def _accept(self, trial: Trial) -> None:
+        """See :meth:`accept`."""
         step, q1, s = trial
         if self._path is not None:
             self._path.accept(self.force)
@@ -462,8 +635,7 @@ class Simulation(Live):
 
     def _require_small(self, turn: float) -> None:
         """Raise if a node of any process turns too far in the step."""
-        if self.share.comm.size > 1:
-            turn = self.share.comm.allreduce(turn, op=MPI.MAX)
+        turn = self.share.largest(turn)
         if not turn <= LARGEST_TURN:
             raise StepFailed(
                 f"a node turns by {turn:.3g} rad in the step, and |Δψ| must stay below π; reduce dt"
@@ -476,16 +648,22 @@ class Simulation(Live):
             ConvergenceError: With the solution so far.
         """
         self.end()
-        dt, forces = end - self.t, self._forces_by_kind()
+        dt, forces, named = end - self.t, self._forces_by_kind(), self.solution.parameter
         sizes = ", ".join(f"{kind} {size:.1e} N" for kind, size in forces.items())
+        where = f"at {named.at(self.t, '.9g')}"
+        if dt != 0:
+            where = f"after {named.at(self.t, '.9g')}, even with {named.over(dt)}"
+        why = singularity(self, self.supports.in_plane(self._solver.iterate()))
+        said = f"{failure} ({sizes})" if sizes else str(failure)
         raise ConvergenceError(
-            f"no equilibrium after t = {self.t:.9g} s, even with dt = {dt:.3g} s: {failure} "
-            f"({sizes}). {advice or self.scheme.advice}",
+            f"no equilibrium {where}: {why}{'; ' if why else ''}{said}. "
+            f"{advice or self.scheme.advice}",
             time=self.t,
             dt=dt,
             solution=self.solution,
             residuals=failure.residuals,
             forces=forces,
+            reason=failure.reason,
         ) from failure
 
     def _forces_by_kind(self) -> dict[str, float]:
@@ -495,7 +673,7 @@ class Simulation(Live):
         for term in self.terms:
             try:
                 term.add_residual(q1, forces[term.kind])
-            except StepFailed:
+            except Exception:
                 forces[term.kind].fill(np.nan)  # it is why the step has failed
         sizes = {kind: self._solver.size(force) for kind, force in forces.items()}
         return {kind: size for kind, size in sizes.items() if size}
@@ -558,6 +736,26 @@ class Simulation(Live):
         self.supports.remember(memory, self.q)
         if self._path is not None:
             self._path.remember(memory, self.q)
+
+    def check_ledger(self) -> None:
+        """Warn, and note in the solution, if a ledger is open that the scheme claims to close.
+
+        All processes call it together, at the end of a run.
+
+        Warns:
+            ModelWarning: It is open, perhaps by round-off.
+        """
+        if not getattr(self.scheme, "exact_ledger", False) or len(self.solution) < 2:
+            return
+        energy, claimed = self.solution.energy, ROOM * self._solver.rtol
+        if not energy.opened(claimed, 0.0):
+            return
+        # Errors of steps are independent: their squares add up.
+        steps = np.sqrt(np.sum(np.diff(self.solution.q, axis=0) ** 2, axis=0))[self.share.dofs]
+        round_off = self._solver.random_work(steps)
+        self.solution.open_ledger = energy.opened(claimed, round_off)
+        if self.comm.rank == 0:
+            warnings.warn(self.solution.open_ledger, ModelWarning, stacklevel=3)
 
     def close(self) -> None:
         """Give back what PETSc holds."""

@@ -4,26 +4,37 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.beams import Beam, Place
+from ufl_beam.archive import read, write
+from ufl_beam.beams import Beam, Curve, Place
 from ufl_beam.bodies import Anchor, Spot
 from ufl_beam.compat import Array
-from ufl_beam.connectors import Connector, Joint
+from ufl_beam.connectors import Connector, Controller, Function, Guide, Joint
 from ufl_beam.errors import SceneError
 from ufl_beam.fields import Fields
 from ufl_beam.grid import Grid, Index, Share
+from ufl_beam.guides import nearest
 from ufl_beam.inelastic import Strains
 from ufl_beam.joints import Connection, JointHistory, links_of, motion_of, of_joint, velocity_of
 from ufl_beam.ledger import Energy
 from ufl_beam.memory import State
+from ufl_beam.opened import Opened, cells_in_words
+from ufl_beam.outputs import require_path
+from ufl_beam.parameter import TIME
+from ufl_beam.processes import ours
+from ufl_beam.record import on_first
+from ufl_beam.saved_functions import SavedCurve, SavedFunction
+from ufl_beam.saved_scene import from_data, lost, to_data
 from ufl_beam.scene import Scene, Support
 from ufl_beam.sparse import Product
 from ufl_beam.terms import SectionForces, mass_matrix
+from ufl_beam.version import version
 
 if TYPE_CHECKING:
     from ufl_beam.simulation import Simulation
@@ -49,8 +60,20 @@ class Material(NamedTuple):
     hinge: Array
 
 
+KINDS: dict[str, type[Solution]] = {}
+"""Classes of solutions, by name."""
+
+TIME_FUNCTIONS = ("time", "held", "motion", "force")
+"""Fields that are functions of time, but for the forces of controllers and functions."""
+
+FORMAT = "solution of ufl_beam, 1"
+"""To be counted up whenever files of before mean something else."""
+
+
 class Solution:
     """The motion of a scene at the times that were kept; the same on every process.
+
+    It can be saved, see :meth:`save`, and pickled, with what a file has.
 
     Attributes:
         scene: What was modelled.
@@ -61,8 +84,12 @@ class Solution:
             of the size of the scene, rad; NaN if nobody did.
         seconds: Wall time of the run, building the scene included; s.
         every: Steps from one that was kept to the next.
+        parameter: Words for :attr:`times`, which are load factors in a path.
+        open_ledger: How far the energy ledger is open, in words; empty if it closes as claimed.
         internal: What cells and connectors remember at the end of the run.
     """
+
+    parameter = TIME
 
     def __init__(self, scene: Scene, grid: Grid) -> None:
         self.scene, self.grid = scene, grid
@@ -71,6 +98,7 @@ class Solution:
         self.time_error = math.nan
         self.seconds = 0.0
         self.every = 1
+        self.open_ledger = ""
         self._times: list[float] = []
         self._q: list[Array] = []
         self._v: list[Array] = []
@@ -104,7 +132,7 @@ class Solution:
             "connections": np.array(self._connections),
             "every": np.array([self.every]),
         }
-        if self._material[0]:
+        if self._material and self._material[0]:
             # Groups are those of laws and processes.
             tables = [np.concatenate([np.c_[group] for group in one]) for one in self._material]
             history["material"] = np.array([table[np.argsort(table[:, 0])] for table in tables])
@@ -138,6 +166,85 @@ class Solution:
             for n in range(len(self._times))
         ]
 
+    # -- files ---------------------------------------------------------------------------------
+
+    def save(self, path: str | Path) -> None:
+        """Write an HDF5 file, which :func:`load` reads; all processes call it together.
+
+        It has all results and the scene with all its numbers.  Functions of a user cannot be
+        saved: those of time have their values at the kept times, curves those at many points,
+        others, such as controllers, their names.  Results and pictures need no more.
+
+        Args:
+            path: File; one that is there is replaced once the new one is complete.
+
+        Raises:
+            SceneError: The file cannot be written, or the scene has records of another package.
+            OSError: There is no space for it.
+        """
+        file = require_path(path, "save")
+        on_first(ours(), lambda: write(file, FORMAT, *self._content()))
+
+    def _content(self) -> tuple[dict[str, Any], State]:
+        """All that is saved: text and arrays."""
+        text = {
+            "kind": type(self).__name__,
+            "version": version(),
+            "scene": to_data(self.scene, self._sampled),
+            "mesh": to_data(self.grid.mesh),
+            "numbering": self.grid.checksum(),
+            "seconds": self.seconds,
+            "time_error": self.time_error,
+        }
+        return text, self._arrays()
+
+    def _arrays(self) -> State:
+        counts = {"counts": np.array([self.parts, self.iterations])}
+        history = {f"history/{name}": values for name, values in self.history().items()}
+        internal = {f"internal/{name}": values for name, values in self.internal.items()}
+        return {**counts, **history, **internal}
+
+    def _take(self, text: dict[str, Any], arrays: State) -> None:
+        """Take over what :meth:`_content` gave."""
+
+        def below(prefix: str) -> State:
+            found = ((name, values) for name, values in arrays.items() if name.startswith(prefix))
+            return {name.removeprefix(prefix): values for name, values in found}
+
+        self.resume(below("history/"))
+        self.internal = below("internal/")
+        self.parts, self.iterations = (int(n) for n in arrays["counts"])
+        self.seconds, self.time_error = text["seconds"], text["time_error"]
+
+    def _sampled(self, owner: Any, field: str, function: Any) -> Any:
+        """What is saved of a function of a user."""
+        if field == "curve" and isinstance(owner, Beam):
+            return SavedCurve.of(function, 0.0, 1.0, self.grid.parameters(owner))
+        if field == "curve":
+            return self._used_curve(function)
+        if field in TIME_FUNCTIONS and not isinstance(owner, Controller | Function):
+            return SavedFunction.of(function, self._times)
+        return lost(owner, field, function)
+
+    def _used_curve(self, curve: Curve) -> SavedCurve:
+        """The part of a guide curve that was used, and a tenth more."""
+        used = [0.0]
+        for link in self.scene.links:
+            if isinstance(link.law, Guide) and link.law.curve is curve:
+                s = 0.0
+                for point in self.position(link.b):
+                    s = nearest(curve, point, s)
+                    used.append(s)
+        first, last = float(np.nanmin(used)), float(np.nanmax(used))
+        more = 0.1 * (last - first) or 1e-3
+        return SavedCurve.of(curve, first - more, last + more, (0.0,))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return restored, self._content()
+
+    def __init_subclass__(cls) -> None:
+        KINDS[cls.__name__] = cls
+
     def __len__(self) -> int:
         """Number of kept states."""
         return len(self._times)
@@ -156,6 +263,11 @@ class Solution:
     def times(self) -> Array:
         """Times that were kept, n after the initial one; (n+1,); s."""
         return np.array(self._times)
+
+    @property
+    def progress(self) -> Array:
+        """How far each kept state is from the first one, never falling; here the time; (n+1,)."""
+        return self.times
 
     @property
     def q(self) -> Array:
@@ -224,8 +336,12 @@ class Solution:
     def reaction(self, support: Support) -> Array:
         """Force and moment of a support on the scene; (n+1, 3); N, N, N m.
 
+        In statics the first row is what the initial state bears: nothing where the run begins with
+        the undeformed scene, for loads act from the first step on; and the reactions of that
+        equilibrium where it begins with ``start=``.
+
         In dynamics they are those that act during the step that ends at each time; the first row is
-        NaN where no step came before.
+        NaN, for no step came before.
 
         Raises:
             SceneError: The support is not in the scene.
@@ -301,15 +417,38 @@ class Solution:
     def material_at(self, place: Place) -> Material:
         """The same in the cell at a place at all kept times; the arrays begin with (n+1,).
 
+        Where a plastic hinge is at the place, M, the jump and the energy are those of the hinge; M
+        is the moment during the step that ends at each time.
+
         Raises:
             SceneError: The scene is elastic, or the beam of the place is not in it.
         """
         cell = self.grid.cell(place)
         kept = [self._of_material(n, cell) for n in range(len(self._times))]
-        return Material(*(np.array(field) for field in zip(*kept, strict=True)))
+        forces, jump, plastic, energy = (np.array(field) for field in zip(*kept, strict=True))
+        hinge = self.grid.hinge_at(place)
+        if hinge is not None:
+            of_hinge = self.connector(hinge)
+            forces[:, 2], jump, energy = of_hinge.force, of_hinge.motion, of_hinge.dissipated
+        return Material(forces, jump, plastic, energy)
+
+    @property
+    def opened(self) -> Opened:
+        """The cells whose embedded hinge or cracks opened in the run."""
+        return Opened(self.grid, self._material)
+
+    def hinge_place_error(self) -> dict[Beam, float]:
+        """Largest part of its limit by which the place of an embedded hinge shifts it, by beam.
+
+        A hinge of ``Section(hinge=)`` is in the middle of its cell of length h and opens where the
+        moment there reaches the limit; at the ends of the cell the moment differs by |V| h/2.  The
+        number is |V| h / (2 limit), V being that of the last kept time before the opening.  Beams
+        without embedded hinges that opened in the run are left out.
+        """
+        return {one.beam: one.error for one in self.opened.hinges()}
 
     def _of_material(self, n: int, cells: Index | int) -> Material:
-        if not self._material[n]:
+        if not self._material[n] and not self.scene.hinges:
             raise SceneError("material: nothing in the scene yields or breaks; it is elastic")
         everything = np.zeros((len(self.grid.cells), 6))
         everything[:, :3] = self._forces(n)
@@ -359,13 +498,62 @@ class Solution:
             "beam": len(scene.beams), "cell": len(self.grid.cells),
             "bod": len(scene.bodies), "link": len(scene.links),
         }  # fmt: skip
+        span = f"{self._times[0]:g} to {self._times[-1]:g}"
         endings = {"bod": ("y", "ies")}
         parts = [
             f"{n} {name}{endings.get(name, ('', 's'))[n != 1]}" for name, n in counts.items() if n
         ]
         return (
             f"{', '.join(parts)}, {self.grid.size} degrees of freedom\n"
-            f"t = {self._times[0]:g} to {self._times[-1]:g} s in {self.parts} steps, "
+            f"{self.parameter.value.format(span)} in {self.parts} steps, "
             f"{self.iterations / max(self.parts, 1):.2f} Newton iterations each, "
-            f"{self.seconds:.2f} s of wall time\n{self.energy}"
+            f"{self.seconds:.2f} s of wall time\n{self._about_hinges()}{self.energy}"
+            + (f"\n{self.open_ledger}" if self.open_ledger else "")
         )
+
+    def _about_hinges(self) -> str:
+        """A line about embedded hinges that opened, if there are any."""
+        hinges = self.opened.hinges()
+        if not hinges:
+            return ""
+        number, worst = sum(one.number for one in hinges), max(hinges, key=lambda one: one.error)
+        return (
+            f"embedded hinges opened in {cells_in_words(number)}; their place within the cell "
+            f"shifts the limit by at most {100 * worst.error:.2g} % ({worst.beam.name}, cell at "
+            f"s = {worst.place.s:.3g})\n"
+        )
+
+
+KINDS["Solution"] = Solution
+
+
+def load(path: str | Path) -> Solution:
+    """Read a solution that :meth:`Solution.save` wrote.
+
+    Its places are those of its own scene: ``loaded.displacement(loaded.scene["left"].end)``.
+
+    Raises:
+        SceneError: There is no such file, or it holds no solution, or is damaged, or is of a
+            version that numbers degrees of freedom otherwise.
+    """
+    file = require_path(path, "load")
+    text, arrays = read(file, FORMAT)
+    try:
+        return restored(text, arrays)
+    except SceneError as error:
+        raise SceneError(f"solution {file}: {error}") from None
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise SceneError(f"solution {file}: the file is damaged: {error!r}") from None
+
+
+def restored(text: dict[str, Any], arrays: State) -> Solution:
+    """Make a solution from what was saved of it."""
+    grid = Grid(from_data(text["scene"]), from_data(text["mesh"]))
+    if grid.checksum() != text["numbering"]:
+        raise SceneError(
+            f"it was written by version {text['version']} of ufl_beam, which numbers degrees of "
+            f"freedom otherwise than this one, {version()}; load it with that version"
+        )
+    solution = KINDS[text["kind"]](grid.scene, grid)
+    solution._take(text, arrays)
+    return solution

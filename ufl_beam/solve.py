@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Protocol
 
-from mpi4py import MPI
 from petsc4py import PETSc
 
 import numpy as np
 
+from ufl_beam.agreement import Agreement
 from ufl_beam.compat import Array
 from ufl_beam.equation import Demand, Equation
 from ufl_beam.errors import (
@@ -25,24 +26,27 @@ from ufl_beam.errors import (
 )
 from ufl_beam.factors import Bordered, ChainsFirst
 from ufl_beam.grid import Index, Share
+from ufl_beam.line_search import SearchingNewton
 from ufl_beam.loops import doubles, ffi, integers, lib
 from ufl_beam.sparse import Csr
 
 FULL_STEPS = {"snes_linesearch_type": "basic"}
 """A norm in a line search would add forces and moments, and each search costs a residual."""
 
-TO_NO_WORK = {
-    "snes_linesearch_type": "cp",
-    "snes_linesearch_max_it": 4,
-    "snes_linesearch_atol": 0.0,
-    "snes_linesearch_rtol": 0.5,
-    "snes_linesearch_maxstep": 1.0,
-}
-"""Steps to where the residual does no work on them: for points that flow to and fro.
+PATIENCE = 10
+"""Iterations in a row without half the least residual that are one too many.
 
-Forces that grow in an S, as in a point that yields one way or the other, send full steps from one
-branch to the other and back for ever.
+Those that wander longer find a solution by luck: the last digits of the data would decide.
 """
+
+REASONS = {
+    lib.SINGULAR: "found a singular tangent",
+    lib.TOO_MANY: "did not converge",
+    lib.STALLED: "came no closer to an equilibrium",
+    lib.DIVERGED: "met a force that is not a finite number",
+    -4: "met a force that is not a finite number",  # PETSc's name for it changed in 3.24
+}
+"""Reasons for which Newton's method stops, in words; by values of SNESConvergedReason."""
 
 PREFIX = "ub_"
 """Prefix of the PETSc options of the solver, as in ``-ub_snes_monitor``."""
@@ -78,7 +82,13 @@ class Newton:
 
 
 class Border(Protocol):
-    """One more unknown on which the residual depends, and one more equation."""
+    """One more unknown on which the residual depends, and one more equation.
+
+    Attributes:
+        t: The unknown.
+    """
+
+    t: float
 
     def arrive(self, x: Array) -> None:
         """Take note of an iterate; the residual that follows is at the unknown found so far."""
@@ -108,12 +118,17 @@ class Solver:
         complete: Called with the summed residual; removes what supports carry.
         tangent: Fills ``A`` at x: ``tangent(x)``.
         forces: Internal forces in the latest residual; with the loads, the scale of convergence.
-        excess: Of an iterate, its residual and the scale of forces: how far what connectors demand
-            is missed, as a number without dimension that must reach the tolerance too.
+        excess: Of an iterate, its residual, the scale of forces and the largest motion: how far
+            what connectors demand is missed, as a number without dimension that must reach the
+            tolerance too.
         equation: ``residual``, ``complete`` and ``tangent`` in C, on one process.
         held: Local degrees of freedom that supports hold; what stands for them in A means nothing.
-        relieve: Makes tangents stiffer where that may help; says whether it can.
+        relieve: Begins again with tangents that are stiffer where that may help, or ends that; says
+            whether they differ: ``relieve(relief)``.
+        working: Of an iterate and a step from it: what the residual works on, see
+            :class:`SearchingNewton`; new arrays.
         newton: Tolerances.
+        agreement: Raises on all processes what one has raised.
     """
 
     def __init__(
@@ -125,15 +140,18 @@ class Solver:
         complete: Callable[[Array], None],
         tangent: Callable[[Array], None],
         forces: Array,
-        excess: Callable[[Array, Array, float], float],
-        relieve: Callable[[], bool],
+        excess: Callable[[Array, Array, float, float], float],
+        relieve: Callable[[bool], bool],
+        working: Callable[[Array, Array], Array],
         held: Index,
         newton: Newton,
+        agreement: Agreement,
         equation: Equation | None = None,
     ) -> None:
         self._share, self._A, self._newton = share, A, newton
         self._residual, self._complete, self._tangent = residual, complete, tangent
-        self._excess, self._relieve = excess, relieve
+        self._excess, self._relieve, self._working = excess, relieve, working
+        self._agreement = agreement
         self._at_forces = doubles(forces)
         self._parallel = share.comm.size > 1
         self._views: dict[int, Array] = {}
@@ -171,6 +189,7 @@ class Solver:
         ]
         c.weight, c.residual, c.diagonal = self._norm[1], self._at_r, self._at_diagonal
         c.lengths, c.moves, c.space = self._at_sizes
+        c.scene = self._share.grid.scene.size
         c.x = ffi.cast("void *", self._x.handle)
         self._at_correction = doubles(self._correction)
         c.change, c.most = self._at_correction, self._newton.max_iterations
@@ -182,6 +201,17 @@ class Solver:
 
     def _note(self, error: BaseException) -> None:
         self._error = self._error or error
+
+    @contextmanager
+    def _noted(self) -> Iterator[None]:
+        """Note exceptions, which must not pass through PETSc while other processes go on.
+
+        From then on the residual is no number, so that all processes stop together.
+        """
+        try:
+            yield
+        except BaseException as error:
+            self._note(error)
 
     # -- vectors and the matrix ----------------------------------------------------------------
 
@@ -220,9 +250,10 @@ class Solver:
         return matrix
 
     def _make_factors(self) -> ChainsFirst:
-        # What is held makes zeros on the diagonal, and PETSc does not exchange rows.
-        holds = any(link.holds for link in self._share.grid.scene.links)
-        return ChainsFirst(self._share, self._A, "klu" if holds else "petsc")
+        # A connector alone may hold a part whose own stiffness leaves zeros, or nothing but
+        # round-off, on the diagonal; PETSc's factorisation does not exchange rows, KLU's does.
+        connected = len(self._share.grid.multipliers) > 0
+        return ChainsFirst(self._share, self._A, "klu" if connected else "petsc")
 
     def _make_ksp(self) -> PETSc.KSP:
         ksp = PETSc.KSP().create(self._x.comm)
@@ -264,8 +295,28 @@ class Solver:
         return snes
 
     @cached_property
-    def _careful(self) -> PETSc.SNES:
-        return self._make_snes(TO_NO_WORK)
+    def _careful(self) -> SearchingNewton:
+        return SearchingNewton(
+            self._snes,
+            self._ksp,
+            x=self._x,
+            f=self._f,
+            y=self._vector(),
+            w=self._vector(),
+            matrix=self._matrix,
+            test=lambda iteration: self._test(self._snes, iteration, ()),
+            near=lambda: bool(self._course.near),
+            work=self._work_on,
+            most=self._newton.max_iterations,
+        )
+
+    def _work_on(self, y: PETSc.Vec) -> Callable[[], float]:
+        """Work of the latest residual on a step from the present iterate; J."""
+        for vector in (self._x, y):
+            self._update_ghosts(vector)
+        number = len(self._weights)
+        step = self._working(self._view(self._x), self._view(y))[:number]
+        return lambda: self._share.total(float(self._r[:number] @ step))
 
     # -- with a border -------------------------------------------------------------------------
 
@@ -286,14 +337,16 @@ class Solver:
 
     def _function_along(self, snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
         self._update_ghosts(x)
-        self._border.arrive(self._view(x))
+        with self._noted():
+            self._border.arrive(self._view(x))
         self._function(snes, x, f)
 
     def _jacobian_along(self, snes: PETSc.SNES, x: PETSc.Vec, J: PETSc.Mat, P: PETSc.Mat) -> None:
         self._update_ghosts(x)
         rate = self._view(self._rate, writable=True)
         rate.fill(0.0)
-        self._border.tangent(self._view(x), rate)
+        with self._noted():
+            self._border.tangent(self._view(x), rate)
         P.stateIncrease()
         if self._parallel:
             self._rate.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
@@ -305,7 +358,8 @@ class Solver:
         self._update_ghosts(self._y)
         self._update_ghosts(z)
         corrected = self._view(self._y, writable=True)
-        self._border.correct(corrected, self._view(z))
+        with self._noted():
+            self._border.correct(corrected, self._view(z))
         y.array_w[:] = corrected[: len(self._weights)]
 
     def _test_along(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, ...]) -> int:
@@ -331,11 +385,10 @@ class Solver:
     def _function(self, snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
         self._update_ghosts(x)
         r = self._view(f, writable=True)
-        try:
+        with self._noted():
             self._residual(self._view(x), r)
-        except Exception as error:
+        if self._error is not None:
             # It may have failed on this process alone; by the sum all give up together.
-            self._error = error
             r.fill(np.nan)
         if self._parallel:
             f.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
@@ -346,7 +399,8 @@ class Solver:
         if self._course.near:
             return
         self._update_ghosts(x)
-        self._tangent(self._view(x))
+        with self._noted():
+            self._tangent(self._view(x))
         P.stateIncrease()
 
     # -- convergence ---------------------------------------------------------------------------
@@ -366,17 +420,20 @@ class Solver:
         square = self._share.total(lib.sum_of_squares(*self._norm, forces))
         if lib.has_its_digits(square):
             return math.sqrt(square)
-        largest = self._share.comm.allreduce(lib.largest_size(*self._norm, forces), op=MPI.MAX)
+        if math.isnan(square):
+            return square
+        largest = self._share.largest(lib.largest_size(*self._norm, forces))
         if largest == 0.0 or not math.isfinite(largest):
-            return float(largest)
+            return largest
         scaled = lib.scaled_sum_of_squares(*self._norm, forces, largest)
-        return float(largest) * math.sqrt(self._share.total(scaled))
+        return largest * math.sqrt(self._share.total(scaled))
 
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, ...]) -> int:
         residual = self._size(self._at_r)
         if not math.isfinite(residual):
             return int(lib.DIVERGED)
         scale = self._loads + self._size(self._at_forces)
+        self._find_motion()
         floor = 8 * self._round_off() if iteration > 1 else 0.0
         x = doubles(self._view(self._x))
         return int(lib.judge(self._course, x, iteration, residual, scale, floor))
@@ -384,10 +441,16 @@ class Solver:
     def _round_off(self) -> float:
         """Residual that the last digit of displacements, strains and rotations makes; N.
 
-        A strain is the difference of two numbers near one, so stiff or finely divided beams cannot
-        be solved any better, however small the forces are.
+        Stiff or finely divided beams cannot be solved any better, however small the forces are.
         """
         return self._size(doubles(self._A.data[self._diagonal] * self._last_digits()))
+
+    def _find_motion(self) -> None:
+        """Note the largest motion of the iterate in any process, at most the size of the scene."""
+        largest = lib.largest_motion(*self._norm, doubles(self._view(self._x)))
+        if self._parallel:
+            largest = self._share.comm.allreduce(largest, op=MPI.MAX)
+        self._course.moved = min(largest, self._course.scene)
 
     def _last_digits(self) -> Array:
         digits = np.empty(self._share.size)
@@ -396,8 +459,15 @@ class Solver:
 
     def least_work(self, s: Array) -> float:
         """Work in a step ``s`` of what the last digit of displacements makes; less is none; J."""
+        self._find_motion()
         works = self._A.data[self._diagonal] * self._last_digits() * np.abs(s)
         return self._share.total(float(works[: len(self._weights)].sum()))
+
+    def random_work(self, s: Array) -> float:
+        """Work of the last digits as :meth:`least_work`, were they independent of each other; J."""
+        self._find_motion()
+        works = self._A.data[self._diagonal] * self._last_digits() * s
+        return math.sqrt(self._share.total(float(np.sum(works[: len(self._weights)] ** 2))))
 
     # -- the call ------------------------------------------------------------------------------
 
@@ -417,18 +487,32 @@ class Solver:
         reason = self._iterate(self._snes, 2)
         self._keeps = False
         if reason == lib.STALLED:
-            reason = self._iterate(self._careful, 10)
-        if reason <= 0 and self._relieve():
+            reason = self._iterate(self._careful, PATIENCE)
+        if reason <= 0 and self._may_go_on() and self._relieve(True):
             x[:] = guess
             self._x.stateIncrease()
-            reason = self._iterate(self._snes, self._newton.max_iterations)
+            reason = self._relieved()
         if reason <= 0:
             raise self._failure(reason)
         self._update_ghosts(self._x)
         return x.copy()
 
+    def _relieved(self) -> int:
+        """Iterate with stiffer tangents, which come near but slowly, then with true ones."""
+        slow = self._iterate(self._snes, PATIENCE)
+        self._relieve(False)
+        if slow != lib.TOO_MANY and slow <= 0:
+            return slow
+        near = self._view(self._x).copy()
+        exact = self._iterate(self._snes, 2)
+        if exact <= 0:
+            self._view(self._x)[:] = near
+            self._x.stateIncrease()
+        return exact if exact > 0 else slow
+
     def _start(self, guess: Array, loads: list[Array]) -> Array:
-        if list(map(id, loads)) != list(map(id, self._last_loads)):
+        # On several processes they may change on some only.
+        if self._parallel or list(map(id, loads)) != list(map(id, self._last_loads)):
             self._last_loads = loads
             self._loads = self._course.loads = sum(self._size(doubles(load)) for load in loads)
         x = self._view(self._x)
@@ -436,7 +520,7 @@ class Solver:
         self._x.stateIncrease()
         return x
 
-    def _iterate(self, snes: PETSc.SNES, patience: int) -> int:
+    def _iterate(self, snes: PETSc.SNES | SearchingNewton, patience: int) -> int:
         """Solve; give up after so many iterations in a row without half the least residual."""
         course = self._course
         course.last = course.best = math.inf
@@ -458,25 +542,34 @@ class Solver:
         self.iterations += self._done
         return reason
 
+    def _may_go_on(self) -> bool:
+        """Return True; raise what a function of the user has raised on any process."""
+        error = self._error
+        self._agreement.settle(None if isinstance(error, StepFailed) else error)
+        return True
+
     def _failure(self, reason: int) -> StepFailed:
-        errors = [e for e in self._share.comm.allgather(self._error) if e is not None]
-        if errors and not isinstance(errors[0], StepFailed):
-            raise errors[0]  # what a function of the user has raised
-        if errors:
-            return StepFailed(str(errors[0]))
+        self._agreement.settle(self._error)
         names = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int)}
         scale = self._loads + self._size(self._at_forces)
         weighted = np.zeros(self._share.size)
         weighted[: len(self._weights)] = np.abs(self._r[: len(self._weights)]) * self._weights
         residuals = self._share.grid.worst(self._share.gather(weighted))
         places = [f"{size:.1e} N in {place}" for place, size in [*residuals.items()][:3]]
+        largest = ", ".join(places) or "nowhere"
         failure = StepFailed(
-            f"SNES {names.get(reason, reason)} after {self._done} iterations; "
-            f"residual {self._size(self._at_r):.3e} N, largest: {', '.join(places) or 'nowhere'}; "
+            f"Newton's method {REASONS.get(reason, 'was stopped by PETSc')} after {self._done} "
+            f"iterations; residual {self._size(self._at_r):.3e} N, largest: {largest}; "
             f"forces in the scene {scale:.3e} N"
         )
         failure.residuals = residuals
+        failure.reason = str(names.get(reason, reason))
         return failure
+
+    @property
+    def rtol(self) -> float:
+        """Residual to be reached, as a part of the forces in the scene."""
+        return self._newton.rtol
 
     def iterate(self) -> Array:
         """The latest configuration, converged or not; local values, ghosts included."""

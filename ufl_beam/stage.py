@@ -1,9 +1,10 @@
-"""Where everything is at a time that pictures show, and how large its symbols are."""
+"""Positions of what pictures show, in a solution or before any run, and sizes of symbols."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,14 +14,106 @@ from ufl_beam.beams import Curve
 from ufl_beam.bodies import GROUND, Anchor, Body, Spot
 from ufl_beam.compat import Array
 from ufl_beam.connectors import Connector, Guide
-from ufl_beam.guides import nearest, tangent
+from ufl_beam.curves import nearest, parameter_step, tangent
 from ufl_beam.joints import motion_of, turned
+from ufl_beam.scene import Scene
 from ufl_beam.skeleton import spots_of
 from ufl_beam.solution import Solution
 
 
+class Setting(ABC):
+    """Scene that is drawn, and the size of its symbols.
+
+    Attributes:
+        unit: Half the size of a symbol of a support; m.
+        magnify: Factor on the displacements.
+    """
+
+    unit: float
+    magnify: float
+
+    @property
+    @abstractmethod
+    def scene(self) -> Scene:
+        """The scene."""
+
+    @property
+    @abstractmethod
+    def travels(self) -> Mapping[Connector, tuple[float, float]]:
+        """From where to where each guided and sliding thing moved since it was made.
+
+        Along the rail from its place, m; or the parameter of the guide curve.
+        """
+
+    @property
+    def undeformed(self) -> Pose:
+        """Where everything was made."""
+        return Pose(self, lambda anchor: np.zeros(3))
+
+    @cached_property
+    def spots(self) -> dict[Body, list[Spot]]:
+        """Points of bodies and of the ground that something is attached to."""
+        return spots_of(self.scene)
+
+    @cached_property
+    def outlines(self) -> dict[Body, Array]:
+        """Around the centre and the points of each body, in the undeformed scene; (n, 2); m."""
+        return {
+            body: _around([body.center, *(s.point for s in self.spots[body])], self.unit)
+            for body in self.scene.bodies
+        }
+
+    @cached_property
+    def lanes(self) -> dict[Connector, float]:
+        """How far aside each connector is drawn that shares its line, or its pin, with others."""
+        alike: dict[tuple[bool, frozenset[object]], list[Connector | None]] = {}
+        for joint in self.scene.joints:
+            if joint.kind in ("Prismatic", "RigidLink", "Link"):
+                alike[False, frozenset(joint.places)] = [None]
+        for c in self.scene.connectors:
+            ends: tuple[object, ...] = (c.b.point,) if c.turns else (c.a, c.b)
+            alike.setdefault((c.turns, frozenset(ends)), []).append(c)
+        lanes = {}
+        for (turns, _), group in alike.items():
+            for k, connector in enumerate(group):
+                if connector is not None:
+                    lanes[connector] = _lane(k, len(group), group[0] is None, turns)
+        return lanes
+
+
 @dataclass(frozen=True, eq=False)
-class Stage:
+class Model(Setting):
+    """A scene before any run.
+
+    Attributes:
+        made: The scene.
+        unit: Half the size of a symbol of a support; m.
+        magnify: Without effect, as nothing has moved.
+    """
+
+    made: Scene
+    unit: float
+    magnify: float = 1.0
+
+    @property
+    def scene(self) -> Scene:
+        """The scene."""
+        return self.made
+
+    @cached_property
+    def travels(self) -> dict[Connector, tuple[float, float]]:
+        """Rails as long as the slider, and some of the guide curves."""
+        return {holder: self._start(holder) for holder in _sliding(self.scene)}
+
+    def _start(self, holder: Connector) -> tuple[float, float]:
+        if isinstance(holder.law, Guide):
+            return _used(holder.law.curve, np.empty((0, 2)), (), 3.0 * self.unit)
+        start = float(np.dot(_along(holder), holder.apart))
+        return start, start
+
+
+@dataclass(frozen=True, eq=False)
+class Stage(Setting):
     """A solution, and how large its symbols are.
 
     Attributes:
@@ -35,56 +128,20 @@ class Stage:
     unit: float
     shown: Sequence[int] | None = None
 
+    @property
+    def scene(self) -> Scene:
+        """The scene of the solution."""
+        return self.solution.scene
+
     def pose(self, n: int) -> Pose:
         """The n-th kept time."""
-        return Pose(self, self.solution.q[n])
-
-    @property
-    def undeformed(self) -> Pose:
-        """Where everything was made."""
-        return Pose(self, np.zeros(self.solution.grid.size))
-
-    @cached_property
-    def spots(self) -> dict[Body, list[Spot]]:
-        """Points of bodies and of the ground that something is attached to."""
-        return spots_of(self.solution.scene)
-
-    @cached_property
-    def outlines(self) -> dict[Body, Array]:
-        """Around the centre and the points of each body, in the undeformed scene; (n, 2); m."""
-        return {
-            body: _around([body.center, *(s.point for s in self.spots[body])], self.unit)
-            for body in self.solution.scene.bodies
-        }
+        grid, q = self.solution.grid, self.solution.q[n]
+        return Pose(self, lambda anchor: np.asarray(motion_of(grid, anchor, [q])[0]))
 
     @cached_property
     def travels(self) -> dict[Connector, tuple[float, float]]:
-        """From where to where each guided and sliding thing moved since it was made.
-
-        Along the rail from its place, m; or the parameter of the guide curve.
-        """
-        return {
-            joint.holders[0]: _travel(self, joint.holders[0])
-            for joint in self.solution.scene.joints
-            if joint.kind in ("Prismatic", "Guided")
-        }
-
-    @cached_property
-    def lanes(self) -> dict[Connector, float]:
-        """How far aside each connector is drawn that shares its line, or its pin, with others."""
-        alike: dict[tuple[bool, frozenset[object]], list[Connector | None]] = {}
-        for joint in self.solution.scene.joints:
-            if joint.kind in ("Prismatic", "RigidLink", "Link"):
-                alike[False, frozenset(joint.places)] = [None]
-        for c in self.solution.scene.connectors:
-            ends: tuple[object, ...] = (c.b.point,) if c.turns else (c.a, c.b)
-            alike.setdefault((c.turns, frozenset(ends)), []).append(c)
-        lanes = {}
-        for (turns, _), group in alike.items():
-            for k, connector in enumerate(group):
-                if connector is not None:
-                    lanes[connector] = _lane(k, len(group), group[0] is None, turns)
-        return lanes
+        """See :attr:`Setting.travels`."""
+        return {holder: _travel(self, holder) for holder in _sliding(self.scene)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,22 +150,19 @@ class Pose:
 
     Attributes:
         stage: What is shown.
-        q: Configuration, all degrees of freedom in the order of the grid.
+        motion: Displacement and rotation of an anchor, not magnified; (3,); m, m, rad.
     """
 
-    stage: Stage
-    q: Array
+    stage: Setting
+    motion: Callable[[Anchor], Array]
 
     def at(self, anchor: Anchor) -> Array:
         """Coordinates of an anchor; (2,); m."""
-        return np.asarray(anchor.point + self.stage.magnify * self._motion(anchor)[:2])
-
-    def _motion(self, anchor: Anchor) -> Array:
-        return np.asarray(motion_of(self.stage.solution.grid, anchor, [self.q])[0])
+        return np.asarray(anchor.point + self.stage.magnify * self.motion(anchor)[:2])
 
     def turn(self, anchor: Anchor) -> float:
         """Rotation of an anchor; rad."""
-        return float(self._motion(anchor)[2])
+        return float(self.motion(anchor)[2])
 
     def turned(self, x: tuple[float, float], anchor: Anchor) -> Array:
         """A vector that turns with an anchor; (2,)."""
@@ -122,7 +176,7 @@ class Pose:
 
     def of_body(self, body: Body, points: Array) -> Array:
         """Points of a body of the undeformed scene, moved with it; (n, 2); m."""
-        u, v, ψ = self._motion(body.middle)
+        u, v, ψ = self.motion(body.middle)
         arms = points - body.center
         moved = turned(arms, np.full(len(arms), ψ)) - arms + (u, v)
         return np.asarray(points + self.stage.magnify * moved)
@@ -140,14 +194,25 @@ def _lane(k: int, count: int, joint: bool, turns: bool) -> float:
     return 1.6 * (k - (count - 1) / 2)
 
 
+def _sliding(scene: Scene) -> list[Connector]:
+    """Connectors that hold what slides on a rail or a guide curve."""
+    return [j.holders[0] for j in scene.joints if j.kind in ("Prismatic", "Guided")]
+
+
+def _along(holder: Connector) -> tuple[float, float]:
+    """Direction of a rail, whose holder holds across it."""
+    return holder.axis[1], -holder.axis[0]
+
+
 def _travel(stage: Stage, holder: Connector) -> tuple[float, float]:
-    """See :attr:`Stage.travels`."""
+    """See :attr:`Setting.travels`."""
     solution = stage.solution
     shown = range(len(solution.times)) if stage.shown is None else stage.shown
     points = solution.position(holder.b)
     if isinstance(holder.law, Guide):
-        return _used(holder.law.curve, points, shown, 3.0 * stage.unit)
-    along = holder.axis[1], -holder.axis[0]  # the axis that is held is across the rail
+        size = stage.scene.size
+        return _used(holder.law.curve, points, shown, 3.0 * stage.unit, size)
+    along = _along(holder)
     ahead = turned(along, solution.displacement(holder.a)[:, 2])
     way = np.sum((points - solution.position(holder.a)) * ahead, axis=1)[list(shown)]
     start = float(np.dot(along, holder.apart))
@@ -155,15 +220,18 @@ def _travel(stage: Stage, holder: Connector) -> tuple[float, float]:
     return min(start, float(way.min())), max(start, float(way.max()))
 
 
-def _used(curve: Curve, points: Array, shown: Sequence[int], more: float) -> tuple[float, float]:
+def _used(
+    curve: Curve, points: Array, shown: Sequence[int], more: float, size: float
+) -> tuple[float, float]:
     """Parameters between which a guide curve was used, and a length more if it goes on."""
     found = [0.0]
     for point in points:
-        found.append(nearest(curve, point, found[-1]))
+        step = parameter_step(curve, found[-1], size)
+        found.append(nearest(curve, point, found[-1], step, size))
     used = [0.0, *(found[1:][n] for n in shown)]
 
     def beyond(s: float, sign: float) -> float:
-        there = s + sign * more / math.hypot(*tangent(curve, s))
+        there = s + sign * more / math.hypot(*tangent(curve, s, parameter_step(curve, s, size)))
         try:
             goes_on = bool(np.isfinite(curve(there)).all())
         except (ValueError, ArithmeticError):

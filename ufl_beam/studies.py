@@ -19,8 +19,9 @@ from mpi4py.futures import MPICommExecutor
 
 from tqdm import tqdm
 
-from ufl_beam.errors import SceneError, require_path, require_sequence, require_switch, shorten
+from ufl_beam.errors import SceneError, require_sequence, require_switch, shorten
 from ufl_beam.gathered import Outcome, Study, numbers_of, text_of
+from ufl_beam.outputs import require_apart, require_path, take
 from ufl_beam.processes import alone, communicator
 from ufl_beam.record import on_first
 from ufl_beam.running import say
@@ -72,9 +73,8 @@ def study(
     comm = communicator(comm, "study: comm")
     require_switch(anew, "study: anew")
     require_switch(progress, "study: progress")
-    if path is not None:
-        require_path(path, "study: path")
     name = getattr(member, "__name__", type(member).__name__)
+    outputs = [] if path is None else [("study", _files_of(require_path(path, "study")))]
     todo: dict[str, Case] = {}
     records: dict[str, tuple[Outcome, float]] = {}
     result: Study | None = None
@@ -89,6 +89,7 @@ def study(
             todo[key] = case
         if not todo:
             raise SceneError("study: cases is empty")
+        require_apart(outputs, "study")
         if path is not None and Path(path).exists():
             old = Study.load(path)
             if old.member != name and not anew:
@@ -133,14 +134,23 @@ def study(
             say(result)
 
     on_first(comm, prepare)
-    if comm.rank > 0:
-        for _ in _outcomes(comm, member, {}):
-            pass  # this process serves until the first one has everything
-    on_first(comm, gather)
+    release = take(outputs)
+    try:
+        if comm.rank > 0:
+            for _ in _outcomes(comm, member, {}):
+                pass  # this process serves until the first one has everything
+        on_first(comm, gather)
+    finally:
+        release()
     if comm.size > 1:
         result = comm.bcast(result)
     assert result is not None
     return result
+
+
+def _files_of(path: Path) -> tuple[Path, ...]:
+    """The file of a study, and the one that takes its place."""
+    return path, path.parent / f"{path.name}.part"
 
 
 def _outcomes(

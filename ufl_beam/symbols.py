@@ -112,7 +112,7 @@ def centres(pose: Pose) -> Iterator[Stroke]:
     angle = np.linspace(0.0, math.pi / 2, 13)
     arc = 0.45 * pose.stage.unit * np.column_stack([np.cos(angle), np.sin(angle)])
     quarter = np.vstack([(0.0, 0.0), arc, (0.0, 0.0)])
-    for body in pose.stage.solution.scene.bodies:
+    for body in pose.stage.scene.bodies:
         at, ψ = pose.at(body.middle), pose.turn(body.middle)
         for k, fill in enumerate((EDGE, WHITE, EDGE, WHITE)):
             angles = np.full(len(quarter), ψ + k * math.pi / 2)
@@ -124,7 +124,7 @@ def centres(pose: Pose) -> Iterator[Stroke]:
 
 def rods(pose: Pose) -> Iterator[Stroke]:
     """Rigid links, thick, and links, thin."""
-    for joint in pose.stage.solution.scene.joints:
+    for joint in pose.stage.scene.joints:
         if joint.kind in ("RigidLink", "Link"):
             weight = 6.0 if joint.kind == "RigidLink" else 2.6
             ends = np.array([pose.at(place) for place in joint.places])
@@ -133,13 +133,13 @@ def rods(pose: Pose) -> Iterator[Stroke]:
 
 def pins(pose: Pose) -> Iterator[Pin]:
     """Circles where joints turn, squares where they do not."""
-    for joint in pose.stage.solution.scene.joints:
+    for joint in pose.stage.scene.joints:
         yield from _PINS[joint.kind](pose, joint)
 
 
 def rails(pose: Pose) -> Iterator[Stroke]:
     """Rails, guide curves, and the blocks on them."""
-    for joint in pose.stage.solution.scene.joints:
+    for joint in pose.stage.scene.joints:
         if joint.kind in _RAILS:
             yield from _RAILS[joint.kind](pose, joint)
 
@@ -149,7 +149,7 @@ def rails(pose: Pose) -> Iterator[Stroke]:
 
 def connectors(pose: Pose) -> Iterator[Stroke]:
     """Springs, dampers, motors and their like."""
-    for connector in pose.stage.solution.scene.connectors:
+    for connector in pose.stage.scene.connectors:
         draw = _around if connector.turns else _straight
         yield from draw(pose, connector)
 
@@ -197,7 +197,7 @@ def _around(pose: Pose, connector: Connector) -> Iterator[Stroke]:
 
 def footings(pose: Pose) -> Iterator[Footing]:
     """Symbols of supports, and of the points of the ground that hold something."""
-    for support in pose.stage.solution.scene.supports:
+    for support in pose.stage.scene.supports:
         angle = support_direction(support, pose.turn(support.place))
         color = ORANGE if support.moving else "#808080"
         symbol = support_symbol(support)
@@ -221,7 +221,7 @@ def _grounds(pose: Pose) -> dict[Spot, tuple[float, bool]]:
 
 
 def _held(pose: Pose) -> Iterator[tuple[Sequence[Anchor], bool]]:
-    scene = pose.stage.solution.scene
+    scene = pose.stage.scene
     for joint in scene.joints:
         if joint.kind not in ("Prismatic", "Guided"):
             yield joint.places, 2 not in joint.shared and not _holds_turning(joint)

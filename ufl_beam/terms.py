@@ -8,6 +8,7 @@ what several processes add to one degree of freedom is summed by the solver.
 from __future__ import annotations
 
 import math
+from functools import cached_property, partial
 from typing import Protocol
 
 import numpy as np
@@ -22,6 +23,7 @@ from ufl_beam.loops import Loop, doubles, ffi, lib, loop
 from ufl_beam.memory import Memory
 from ufl_beam.schemes import DynamicScheme, Scheme, Step
 from ufl_beam.sparse import Csr, StepProduct
+from ufl_beam.tangent_change import CellTangent
 
 KINDS = ("beams", "connectors", "loads", "inertia", "damping")
 """Kinds of forces."""
@@ -63,6 +65,12 @@ class Beams(Term, Protocol):
 
     def change(self, q1: Array) -> float:
         """Energy that cells of this process store and dissipate in the step to ``q1``; J."""
+
+    def add_tangent_change(self, q1: Array, u: Array) -> None:
+        """Add the derivative of the tangent at ``q1`` along ``u``; no internal variable changes."""
+
+    def tangent_works(self, q1: Array, u: Array, x: Array, y: Array) -> tuple[float, float]:
+        """Works of the tangent for the motion x on y, and of its derivative along u; J."""
 
 
 class OfForms:
@@ -119,8 +127,9 @@ class ElasticBeams(OfForms):
         stored = sum(C[i] * e1[i] ** 2 / 2 for i in range(3)) * dx  # P(9)
         losses = [d * dx for d in scheme.losses(C, e0, e1, fields.constant)]
 
-        self._q0 = q0
-        self._force, self._tangent = fields.force_and_tangent(ufl.dot(r, w_e) * dx, q1, A)  # P(12)
+        self._q0, self._q1, self._fields = q0, q1, fields
+        self._work = ufl.dot(r, w_e) * dx
+        self._force, self._tangent = fields.force_and_tangent(self._work, q1, A)  # P(12)
         self._stored, *self._losses = (fields.hot_kernel(f, q1) for f in (stored, *losses))
         self._first: Kernel | None = None
         self._tangents = ffi.new("first_cells *", {"then": self._tangent.cells})
@@ -173,6 +182,19 @@ class ElasticBeams(OfForms):
     def change(self, q1: Array) -> float:
         """Energy that cells of this process store in the step to ``q1``; J."""
         return self._stored.value(q1) - self._held
+
+    def add_tangent_change(self, q1: Array, u: Array) -> None:
+        """Add the derivative of the tangent at ``q1`` along ``u``."""
+        self._cell_tangent.add_change(q1, u)
+
+    def tangent_works(self, q1: Array, u: Array, x: Array, y: Array) -> tuple[float, float]:
+        """Works of the tangent for the motion x on y, and of its derivative along u; J."""
+        return self._cell_tangent.works(q1, u, x, y)
+
+    @cached_property
+    def _cell_tangent(self) -> CellTangent:
+        kernel = partial(self._fields.kernel, unknown=self._q1)
+        return CellTangent(self._work, self._q1, kernel, self._A)
 
 
 class SectionForces:

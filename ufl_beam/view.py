@@ -10,16 +10,18 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import cycle, groupby, islice
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ufl_beam import symbols
+from ufl_beam.beams import Beam
 from ufl_beam.bodies import Anchor
 from ufl_beam.compat import Array
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.glyphs import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY
 from ufl_beam.grid import Index
+from ufl_beam.laws import HingeLaw
 from ufl_beam.processes import ours
 from ufl_beam.solution import Solution
 from ufl_beam.stage import Pose, Stage
@@ -82,7 +84,7 @@ def plot(solution: Solution, what: str = "shape", *, n: int = -1, magnify: float
     name = f"{RESULTANTS[what][0]} {what}" if what in RESULTANTS else "shape"
     factor = f", displacements × {magnify:g}" if magnify != 1 else ""
     with picture(plane_size(solution.grid.points, points, pose.points())) as figure:
-        axes = plane_axes(figure, f"{name} at t = {solution.times[n]:.4g} s{factor}")
+        axes = plane_axes(figure, f"{name} at {solution.parameter.at(solution.times[n])}{factor}")
         draw_undeformed(axes, stage)
         if what in RESULTANTS:
             index = list(RESULTANTS).index(what)
@@ -101,12 +103,13 @@ def plot_shapes(
     count: int = 8,
     magnify: float = 1.0,
 ) -> Figure:
-    """Successive shapes in one picture, coloured by time.
+    """Successive shapes in one picture, coloured by time, or by the load factor of a path.
 
     Args:
         solution: What to show.
-        times: The times, each replaced by the nearest that was kept; s.  Without, ``count`` of
-            them from the first to the last.
+        times: The times, or the load factors of a path, each replaced by the nearest that was
+            kept; s.  Without, ``count`` of them from the first to the last, evenly spaced in time,
+            or along the path.
         count: How many, if no times are given.
         magnify: Factor on the displacements.
 
@@ -121,14 +124,14 @@ def plot_shapes(
             f"say count={times!r}"
         )
     kept = solution.times
-    chosen = nearest(kept, times if len(times) else np.linspace(kept[0], kept[-1], int(count)))
+    chosen = nearest(kept, times) if len(times) else evenly(solution, int(count))
     shapes = [moved_points(solution, n, magnify) for n in chosen]
     factor = f"displacements × {magnify:g}" if magnify != 1 else ""
     stage = plane_stage(solution, chosen, magnify)
     poses = [stage.pose(n) for n in chosen]
     everything = (solution.grid.points, *shapes, *(pose.points() for pose in poses))
     with picture(plane_size(*everything)) as figure:
-        of_time = scale("viridis", 0.0, 0.88, kept[chosen[0]], kept[chosen[-1]])
+        of_time = scale("viridis", 0.0, 0.88, kept[chosen].min(), kept[chosen].max())
         axes = plane_axes(figure, factor)
         draw_undeformed(axes, stage)
         for n, points, pose in zip(chosen, shapes, poses, strict=True):
@@ -137,7 +140,7 @@ def plot_shapes(
             draw_axes(axes, solution, points, color=color, linewidth=2.2, zorder=3)
             _draw_masses(axes, pose, color)
         _draw_fixings(axes, poses[-1])
-        draw_bar(figure, axes, of_time, "time t (s)")
+        draw_bar(figure, axes, of_time, solution.parameter.name)
     return figure
 
 
@@ -167,18 +170,19 @@ def plot_history(
             values = motion(place)[:, number % 3]
             axes.plot(solution.times, values, color=color, label=str(place))
         axes.set_ylabel(f"{quantity} {component.replace('psi', 'ψ')} ({unit})")
-        axes.set_xlabel("time t (s)")
+        axes.set_xlabel(solution.parameter.name)
         figure.legend(loc="outside upper left", ncols=2)
     return figure
 
 
 def plot_energy(solution: Solution) -> Figure:
-    """The ledger over time, and below it what it does not explain.
+    """The ledger over time, or along a path, and below it what it does not explain.
 
     Above: energy in the scene, solid; supplied, dashed; lost, dotted.  Below: the imbalance as a
     part of the energy that went through, with the machine precision for comparison.
     """
     energy, precision = solution.energy, float(np.finfo(np.float64).eps)
+    along = solution.progress
     entries = [
         (name, values, line)
         for group, line in ((energy.state, "-"), (energy.supplied, "--"), (energy.lost, ":"))
@@ -187,13 +191,13 @@ def plot_energy(solution: Solution) -> Figure:
     with picture((8.0, 6.0)) as figure:
         ledger, check = figure.subplots(2, 1, sharex=True, height_ratios=(2.4, 1))
         for (name, values, line), color in zip(entries, _cycle(len(entries)), strict=True):
-            ledger.plot(solution.times, values, line, color=color, label=name)
+            ledger.plot(along, values, line, color=color, label=name)
         time_axes(ledger, solution).set_ylabel("energy (J)")
-        ledger.plot(solution.times, energy.total, color=INK, linewidth=1.2, label="in the scene")
+        ledger.plot(along, energy.total, color=INK, linewidth=1.2, label="in the scene")
         figure.legend(loc="outside upper left", ncols=5)
         part = np.abs(energy.imbalance) / (energy.throughput or 1.0)
         # Where the balance is exact, the logarithm is not: such points stand at the lower edge.
-        check.semilogy(solution.times, np.maximum(part, 1e-2 * precision), color=RED, linewidth=1.2)
+        check.semilogy(along, np.maximum(part, 1e-2 * precision), color=RED, linewidth=1.2)
         check.axhline(precision, color=GREY, linewidth=1.0, zorder=1)
         check.annotate(
             "machine precision", (1.0, precision), (0, -3), va="top", ha="right", fontsize=11,
@@ -201,7 +205,7 @@ def plot_energy(solution: Solution) -> Figure:
         )  # fmt: skip
         check.set_ylim(1e-2 * precision, 10 * max(float(part.max()), 10 * precision))
         time_axes(check, solution).set_ylabel("imbalance\nper throughput")
-        check.set_xlabel("time t (s)")
+        check.set_xlabel(solution.parameter.progress)
     return figure
 
 
@@ -222,24 +226,55 @@ def moved_points(solution: Solution, n: int, magnify: float) -> Array:
     return np.asarray(grid.points + magnify * solution.q[n][grid.dofs[:, :2]])
 
 
-def open_hinges(solution: Solution, n: int) -> tuple[Index, Array]:
-    """Cells whose hinge has opened at the n-th kept time, and the broken part of its energy.
+class OpenHinge(NamedTuple):
+    """A hinge that has opened.
 
-    Returns:
-        Numbers of the cells, and parts from 0 (closed) to 1 (a joint); both (num_open,).
+    Attributes:
+        beam: Its beam.
+        at: Where it is now; (2,); m.
+        part: Part of its fracture energy that is spent, from 0 (closed) to 1 (a joint); 0 if it
+            hardens.
     """
-    cells, parts = [], []
+
+    beam: Beam
+    at: Array
+    part: float
+
+
+def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
+    """Hinges that have opened at the n-th kept time: in cells, and of zero length.
+
+    Args:
+        points: Where the nodes of the grid are; (num_nodes, 2); m.
+    """
+    grid, found = solution.grid, []
     for beam in solution.scene.beams:
-        numbers, laws = solution.grid.cells_of(beam), solution.grid.hinges(beam)
+        laws = grid.hinges(beam)
         if all(law is None or math.isinf(law.limit) for law in laws):
             continue
         state = solution.material(beam, n)
-        for cell, law, jump, lost in zip(numbers, laws, state.jump, state.hinge, strict=True):
+        rows = zip(grid.cells_of(beam), laws, state.jump, state.hinge, strict=True)
+        for cell, law, jump, lost in rows:
             if law is not None and (jump != 0.0 or lost > 0.0):
-                cells.append(int(cell))
-                # What never resisted is a joint from the beginning.
-                parts.append(min(lost / law.energy, 1.0) if law.limit > 0.0 else 1.0)
-    return np.array(cells, dtype=np.int64), np.array(parts)
+                at = points[grid.cells[cell]].mean(axis=0)
+                found.append(OpenHinge(beam, at, _spent(law, lost)))
+    for hinge, vertex in zip(solution.scene.hinges, grid.vertices_at_hinges, strict=True):
+        state = solution.connector(hinge)
+        if state.motion[n] != 0.0 or state.dissipated[n] > 0.0:
+            law, lost = hinge.law.law, float(state.dissipated[n])
+            found.append(OpenHinge(hinge.a.beam, points[vertex], _spent(law, lost)))
+    return found
+
+
+def _spent(law: HingeLaw, dissipated: float) -> float:
+    """Part of the fracture energy that is spent; a hinge that never resisted is a joint."""
+    return min(dissipated / law.energy, 1.0) if law.limit > 0.0 else 1.0
+
+
+def evenly(solution: Solution, count: int) -> list[int]:
+    """Numbers of so many kept states, evenly spaced in time or along a path."""
+    progress = solution.progress
+    return nearest(progress, np.linspace(progress[0], progress[-1], count))
 
 
 def nearest(kept: Array, times: Sequence[float] | Array) -> list[int]:
@@ -470,7 +505,7 @@ def draw_strokes(axes: Axes, strokes: Iterable[Stroke], color: Any = None) -> No
 
 
 def _draw_masses(axes: Axes, pose: Pose, color: Any) -> None:
-    for mass in pose.stage.solution.scene.masses:
+    for mass in pose.stage.scene.masses:
         axes.plot(*pose.at(mass.place), "o", ms=10.0, color=color, zorder=5)
 
 

@@ -21,6 +21,9 @@ FARTHEST = 30
 BEGUN = 1e-6
 """Part of a step that tells what dissipates when it begins."""
 
+HALVINGS = 40
+"""Bisections in which the state is sought in which something begins to dissipate."""
+
 MET = 1e-9
 """Part of a step by which its end may miss what the control demands."""
 
@@ -48,7 +51,7 @@ class Walk:
         self.t = simulation.t
         self.dissipates = False
         self._driven: list[Term] = [*simulation.loads, *simulation.couplings]
-        self.direction = Direction(np.zeros(self.share.size), 0.0)
+        self.direction: Direction = Direction(np.zeros(self.share.size), 0.0)
         self.sought = self.direction
 
     # -- measures ------------------------------------------------------------------------------
@@ -61,9 +64,14 @@ class Walk:
         """Of a direction; without dimension."""
         return math.sqrt(self.product(way, way, factor))
 
+    def size(self, way: Direction) -> float:
+        """Of the configuration's part of a direction; without dimension."""
+        return self.length(Direction(way.q, 0.0), 1.0)
+
     def dissipation(self, q: Array) -> float:
-        """What beams dissipate in the step to ``q``; J."""
-        return self.share.total(sum(one.dissipation(q) for one in self.simulation.inelastic))
+        """Energy that beams and springs dissipate in the step to ``q``; J."""
+        terms = (*self.simulation.inelastic, *self.simulation.couplings)
+        return self.share.total(sum(one.dissipation(q) for one in terms))
 
     def aim(self, reach: float) -> Direction:
         """A way along which so much is dissipated, if nothing gives way; ``reach`` in J.
@@ -73,16 +81,41 @@ class Walk:
         Raises:
             StepFailed: Nothing dissipates.
         """
-        simulation, way = self.simulation, self.direction
+        way = self.direction
         self.begin()
         gone = Direction(np.zeros(self.share.size), 0.0)
         if not self.dissipates:
             gone = self._until(BEGUN * reach, gone, way)
-            self.t = simulation.t + gone.t
-            way = self.flow(self.look(simulation.q + gone.q))
-            if self.side(simulation.q + gone.q, way) < 0:
-                way = Direction(-way.q, -way.t)
+            way = self._bent(gone)
         return self._until(reach, gone, way)
+
+    def bend(self, length: float) -> tuple[Direction, Direction] | None:
+        """Where something begins to dissipate in the direction of the path, and the way from there.
+
+        Args:
+            length: How far along the direction.
+
+        Returns:
+            From the accepted state to the bend, and the direction of the path beyond it; None if
+            nothing begins to dissipate.
+        """
+        way, q = self.direction, self.simulation.q
+        self.begin()
+        if self.dissipates or not self.dissipation(q + length * way.q) > 0:
+            return None
+        low, high = 0.0, length
+        for _ in range(HALVINGS):
+            middle = (low + high) / 2
+            begun = self.dissipation(q + middle * way.q) > 0
+            low, high = (low, middle) if begun else (middle, high)
+        gone = Direction(high * way.q, high * way.t)
+        return gone, self._bent(gone)
+
+    def _bent(self, gone: Direction) -> Direction:
+        """Direction of the path where something has just begun to dissipate."""
+        self.t, q = self.simulation.t + gone.t, self.simulation.q + gone.q
+        way = self.flow(self.look(q))
+        return Direction(-way.q, -way.t) if self.side(q, way) < 0 else way
 
     def _until(self, reach: float, gone: Direction, way: Direction) -> Direction:
         """What has gone and as much more along a way as dissipates ``reach``."""
@@ -104,8 +137,9 @@ class Walk:
 
     def side(self, q: Array, way: Direction) -> float:
         """Positive where more dissipates along a way from ``q``, negative where against it."""
-        now, size = self.dissipation(q), self.length(Direction(way.q, 0.0), 1.0)
-        for doubled in range(FARTHEST if now > 0 and size > 0 else 0):
+        now, size = self.dissipation(q), self.size(way)
+        flows = self.share.total(float(any(one.flows() for one in self.simulation.couplings)))
+        for doubled in range(FARTHEST if (now > 0 or flows) and size > 0 else 0):
             δ = 1e-9 * 2**doubled / size
             more = self.dissipation(q + δ * way.q) - self.dissipation(q - δ * way.q)
             if abs(more) > now:
@@ -186,22 +220,24 @@ class Walk:
         self.t = simulation.t + length * way.t
         step, guess = self.step_at(self.t), simulation.q + length * way.q
         simulation.supports.enter(guess)
-        simulation.supports.move(guess, guess, step)
+        simulation.together(simulation.supports.move, guess, guess, step)
         trial = simulation.attempt_along(step, guess, self)
         return trial._replace(step=self.step_at(self.t))
 
     def begin(self) -> None:
         """Let all terms begin a step at the present state and load factor."""
-        self._give(self.step_at(self.simulation.t), self.simulation.terms)
+        simulation = self.simulation
+        simulation.together(self._give, self.step_at(simulation.t), simulation.terms)
 
     def look(self, q: Array) -> Stiffness:
         """The stiffness at a state."""
         supports = self.simulation.supports
         x = supports.in_axes(q)
         # The first tangent of a step is that of the forces before it, and may not yet be taken.
-        self.tangent(x, np.zeros(self.share.size))
+        together = self.simulation.together
+        together(self.tangent, x, np.zeros(self.share.size))
         rate = np.zeros(self.share.size)
-        self.tangent(x, rate)
+        together(self.tangent, x, rate)
         return Stiffness(self.share, self._A, supports.dofs, rate)
 
     def flow(self, stiffness: Stiffness) -> Direction:
@@ -210,7 +246,7 @@ class Walk:
         self.simulation.supports.leave(q)
         way = Direction(q, 1.0)
         size = self.length(way, self.factor)
-        if not math.isfinite(size) or not self.length(Direction(q, 0.0), 1.0) > 0:
+        if not math.isfinite(size) or not self.size(way) > 0:
             raise StepFailed(
                 "nothing moves with the load factor here; let a load or a motion go on to change, "
                 "as with time=lambda t: t"

@@ -6,7 +6,6 @@ As a script: ``python3 restarted.py FOLDER`` runs or goes on, and writes the sol
 import sys
 from pathlib import Path
 
-import h5py
 import numpy as np
 
 import ufl_beam as ub
@@ -99,16 +98,6 @@ def arrays_of(solution):
     return {**solution.history(), **counts, **{f"end {n}": x for n, x in solution.internal.items()}}
 
 
-def series(path):
-    """The data of an XDMF file, by name."""
-    data = {}
-    with h5py.File(path.with_suffix(".h5")) as file:
-        file.visititems(
-            lambda name, item: data.update({name: item[()]} if hasattr(item, "shape") else {})
-        )
-    return data
-
-
 def run(folder, *, steps=60, every=2, record=()):
     """Go on, or begin; with files."""
     scene = machine()
@@ -117,6 +106,7 @@ def run(folder, *, steps=60, every=2, record=()):
         ub.History(folder / "run.csv", [beam.end], scene.connectors),
         ub.History(folder / "few.csv", [beam.end], most=10),
         ub.XDMF(folder / "run.xdmf", every=7),
+        ub.VTKHDF(folder / "run.vtkhdf", every=5),
     ]
     checkpoint = ub.Checkpoint(folder / "run.checkpoint", every=every)
     return ub.simulate(

@@ -54,7 +54,7 @@ class Frame:
         for i in range(3):
             ends = [CORNERS[i], CORNERS[i + 1]]
             hinges = {0.7: self._softening(ub.LinearSoftening, 4.0, 3.0)} if i == 1 else {}
-            hinges = hinges if kind == "hinges" else {}
+            hinges = {0.0: None, **hinges, 1.0: None} if kind == "hinges" else {}
             if i in self._reverse:
                 ends, hinges = ends[::-1], {1 - s: law for s, law in hinges.items()}
             section = self._section(kind, i)
@@ -67,7 +67,8 @@ class Frame:
             self._beams[i] = pieces = [
                 ub.Beam(
                     self._point(a), self._point(b), section, cells=cells // k, name=f"beam{i}",
-                    hinges={(s - s0) * k: law for s, law in hinges.items() if 0 < (s - s0) * k < 1},
+                    hinges={(s - s0) * k: law for s, law in hinges.items() if 0 < (s - s0) * k < 1}
+                    | ({0.0: None, 1.0: None} if kind == "hinges" else {}),
                 )
                 for a, b, s0 in halves
             ]  # fmt: skip

@@ -122,7 +122,7 @@ def damages():
     yield (
         "format",
         lambda data: data.__setitem__(version, b"9"),
-        "is a checkpoint of ufl_beam, 9, and this version of ufl_beam reads number 1",
+        "is a checkpoint of ufl_beam, 9, and this version of ufl_beam reads number 2",
     )
 
 

@@ -1,5 +1,6 @@
 """Paths of static equilibria: controls, critical points, branches, what is refused, what fails."""
 
+import itertools
 import math
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 import ufl_beam as ub
 from ufl_beam.processes import ours
+from ufl_beam.view import evenly
 
 EA, WIDTH, HEIGHT = 1e6, 4.0, 1.0  # N, m, m: half a truss
 
@@ -163,6 +165,253 @@ def test_recorders_write_paths(tmp_path):
     if file:
         rows = np.loadtxt(file, delimiter=",", skiprows=1)
         np.testing.assert_array_equal(rows[:, 0], path.factor)
+
+
+# -- joints whose forces hold what would float --------------------------------------------------
+
+
+def lee_frame(*, measured, angle=0.0, length=1.0, force=1.0):
+    """Lee's frame with 10 cells a beam; turned, and in other units of length and force."""
+    EA, EI, nu = 43.2e6, 1440.0, 0.3
+    section = ub.Section(EA=EA * force, GA=EA / (2 * (1 + nu)) * force, EI=EI * force * length**2)
+    c, s = math.cos(angle), math.sin(angle)
+
+    def at(x, y):
+        return length * (c * x - s * y), length * (s * x + c * y)
+
+    foot, corner, end = at(0, 0), at(0, 1.2), at(1.2, 1.2)
+    column = ub.Beam(foot, corner, section, cells=10, name="column")
+    girder = ub.Beam(corner, end, section, cells=10, name="girder")
+    place, size = girder.at(0.2), 1e3 * force
+    load = ub.PointLoad(place, force=(size * s, -size * c), time=growing)
+    stiff = ub.Rigid(column.end, girder.start, measured=measured)
+    if not measured:
+        supports = [ub.Pinned(column.start), ub.Pinned(girder.end)]
+        return ub.Scene([column, girder], joints=[stiff], supports=supports, loads=[load])
+    pins = [
+        ub.Revolute(ub.ground(*where), place, measured=True)
+        for where, place in ((foot, column.start), (end, girder.end))
+    ]
+    return ub.Scene([column, girder], joints=[stiff, *pins], loads=[load])
+
+
+LEE = (18.7923, -9.86194)
+"""Limit loads with 10 cells a beam and no joint that measures; the digits that are printed."""
+
+
+@pytest.mark.parametrize("measured", [False, True])
+@pytest.mark.parametrize(
+    "other", [{}, {"length": 1e3, "force": 1e-6}, {"length": 1e-6, "force": 1e9}, {"angle": 0.7}]
+)
+def test_limit_points_do_not_depend_on_joints_axes_and_units(measured, other):
+    """No beam is held by anything but forces of joints where they are measured.
+
+    A limit load is located to 1e-7 of a step, where it is flat; half a unit of the last digit.
+    """
+    scene = lee_frame(measured=measured, **other)
+    two = ub.follow(
+        scene, ub.ArcLength(0.08, factor=10), until=lambda now: len(now.solution.critical) == 2
+    ).critical
+    assert [point.kind for point in two] == ["limit", "limit"]
+    np.testing.assert_allclose([point.factor for point in two], LEE, rtol=0, atol=6e-5)
+
+
+def frame(corner):
+    """A right angle whose corner is made by a function of both ends."""
+    section = ub.Section(EA=1e6, GA=1e6, EI=1e3)
+    column = ub.Beam((0, 0), (0, 3), section, cells=4)
+    girder = ub.Beam((0, 3), (3, 3), section, cells=4)
+    load = ub.PointLoad(column.end, force=(10.0, -5.0), time=growing)
+    return ub.Scene(
+        [column, girder],
+        joints=[corner(column.end, girder.start)],
+        supports=[ub.Clamped(column.start), ub.Clamped(girder.end)],
+        loads=[load],
+    )
+
+
+@pytest.mark.parametrize("free", ["N", "V", "M", "NM", "VM"])
+def test_releases(free):
+    """An elastic frame under small loads has no critical point; Newton's method takes few steps."""
+    scene = frame(lambda a, b: ub.Release(a, b, free=free))
+    path = ub.follow(scene, ub.Load(1.0), steps=10)
+    assert path.factor[-1] == pytest.approx(10, rel=1e-12)
+    assert path.critical == []
+    assert path.iterations <= 40
+
+
+def test_a_cantilever_held_by_measured_forces():
+    """It has no critical points, and takes as many iterations as one that is clamped, 2.0 a step.
+
+    With noise for a direction most steps fail.
+    """
+    section = ub.Section(EA=1e6, GA=1e6, EI=1e3)
+    beam = ub.Beam((0, 0), (0, 3), section, cells=4)
+    load = ub.PointLoad(beam.end, force=(10.0, 0), time=growing)
+    clamp = ub.Rigid(ub.ground(0, 0), beam.start, measured=True)
+    path = ub.follow(ub.Scene([beam], joints=[clamp], loads=[load]), ub.Load(0.5), steps=20)
+    assert path.factor[-1] == pytest.approx(10, rel=1e-12)
+    assert path.critical == []
+    assert path.iterations <= 3 * 20
+
+
+def test_springs_of_all_slopes():
+    """[closed] A column on springs of 5, -1 and 0 N m at its foot leans at P l = 4 N m.
+
+    The column itself bends by P l²/3EI = 1.3e-6 of that; located to 1e-7 of a step.
+    """
+    section = ub.Section(EA=1e7, GA=1e7, EI=1e6)
+    column = ub.Beam((0, 0), (0, 1), section, cells=4)
+    foot = ub.ground(0, 0)
+    springs = [
+        ub.Turn(foot, column.start, ub.Function(lambda angle, rate, k=k: k * angle))
+        for k in (5.0, -1.0, 0.0)
+    ]
+    scene = ub.Scene(
+        [column],
+        joints=[ub.Revolute(foot, column.start, measured=True)],
+        connectors=springs,
+        loads=[ub.PointLoad(column.end, force=(0, -1.0), time=growing)],
+    )
+    path = ub.follow(scene, ub.Load(0.7), steps=10)
+    (point,) = path.critical
+    assert point.kind == "bifurcation"
+    assert point.factor == pytest.approx(4.0, rel=3e-6)
+
+
+# -- springs that soften ------------------------------------------------------------------------
+
+
+def softening_row(number, stronger=0.0):
+    """Columns on softening springs, linked at their tops; limit moments 300 kN m and more."""
+    EI, M, G = 63e6, 300e3, 40e3  # N m², N m, J
+    section = ub.Section(EA=40 * EI, GA=8 * EI, EI=EI)
+    columns = [ub.Beam((3.0 * i, 0), (3.0 * i, 3), section, cells=4) for i in range(number)]
+    feet = [ub.ground(*column.a) for column in columns]
+    springs = [
+        ub.Spring(1e5 * EI, softening=ub.Softening(M * (1 + stronger * i), G))
+        for i in range(number)
+    ]
+    scene = ub.Scene(
+        columns,
+        joints=[
+            *(ub.Revolute(foot, c.start) for foot, c in zip(feet, columns, strict=True)),
+            *(ub.Link(a.end, b.end) for a, b in itertools.pairwise(columns)),
+        ],
+        connectors=[
+            ub.Turn(foot, c.start, spring)
+            for foot, c, spring in zip(feet, columns, springs, strict=True)
+        ],
+        loads=[ub.PointLoad(columns[0].end, force=(1e3, 0), time=growing)],
+    )
+    return columns[0].end, scene
+
+
+@pytest.mark.parametrize(("number", "stronger"), [(1, 0.0), (2, 0.0), (2, 0.02), (3, 0.0)])
+@pytest.mark.parametrize("control", ["displacement", "arc length"])
+def test_springs_that_soften_together(number, stronger, control):
+    """The peak is one limit point, however many springs open in it.
+
+    [closed] Springs that are alike open at M/3 m each; the slope of the columns, 0.005 rad, adds
+    1e-5 of it.  Others open one after the other, the stronger ones later.
+    """
+    top, scene = softening_row(number, stronger)
+    along = {
+        "displacement": ub.Displacement(top, "u", 0.02),
+        "arc length": ub.ArcLength(5e-3, factor=2e4),
+    }[control]
+    path = ub.follow(scene, along, until=lambda now: now.displacement(top)[0] > 0.15)
+    assert path.displacement(top)[-1, 0] > 0.15
+    (peak,) = path.critical
+    assert peak.kind == "limit"
+    assert peak.factor == path.factor.max()
+    assert path.factor[-1] < 0.9 * peak.factor
+    lowest, highest = (100.0 * sum(1 + k * stronger * i for i in range(number)) for k in (0, 1))
+    assert lowest <= peak.factor <= highest * (1 + 3e-5)
+
+
+def test_displacement_control_in_any_unit_of_the_load():
+    """Whether the load is 1 N or 1 kN, what turns at a limit point is the load."""
+    for unit in (1e3, 1.0, 1e-3):
+        apex, scene = truss()
+        load = ub.PointLoad(apex, force=(0, -unit), time=growing)
+        scene = ub.Scene(scene.beams, joints=scene.joints, supports=scene.supports, loads=[load])
+        path = ub.follow(scene, ub.Displacement(apex, "v", -0.125), steps=18)
+        assert [point.kind for point in path.critical] == ["limit", "limit"]
+        factors = [point.factor * unit / 1e3 for point in path.critical]
+        # Located to 1e-7 of a step, where the load is flat.
+        np.testing.assert_allclose(factors, [force(s * LIMIT - HEIGHT) for s in (1, -1)], rtol=1e-9)
+
+
+def test_load_control_says_what_turns():
+    """At the opening of a spring the load factor turns, and nothing else is said of it."""
+    _, scene = softening_row(1)
+    with pytest.raises(ub.ConvergenceError, match="the load factor turns back") as failure:
+        ub.follow(scene, ub.Load(7.0))
+    text = str(failure.value)
+    assert "no equilibrium after load factor 100.00" in text
+    assert "a change of the load factor by" in text
+    assert " s," not in text
+    assert "dt =" not in text
+
+
+# -- words and pictures -------------------------------------------------------------------------
+
+
+def test_load_factors_are_not_called_times(tmp_path):
+    """In what is printed, in events, tables and pictures."""
+    top, scene = softening_row(1)
+    events = ub.Events()
+    table = tmp_path / "path.csv"
+    record = [events, ub.History(table, [top])] if ours().size == 1 else [events]
+    path = ub.follow(scene, ub.ArcLength(5e-3, factor=2e4), steps=6, record=record)
+    assert "load factor 0 to" in str(path)
+    assert "t =" not in str(path)
+    if ours().size == 1:
+        assert table.read_text().startswith("load factor,")
+    for figure in (ub.plot_history(path, top), ub.plot_energy(path), ub.plot(path)):
+        texts = [a.get_xlabel() + a.get_title(loc="left") for a in figure.axes]
+        assert any("load factor" in text or "along the path" in text for text in texts)
+        assert not any("time" in text or "t =" in text for text in texts)
+
+
+@pytest.mark.parametrize("law", [ub.Softening, ub.LinearSoftening])
+def test_events_of_a_path(law):
+    """A hinge opens at a load factor."""
+    section = ub.Section(EA=1e6, GA=1e6, EI=1e3)
+    beam = ub.Beam((0, 0), (1, 0), section, cells=4, hinges={0.0: law(10.0, 5.0)})
+    load = ub.PointLoad(beam.end, force=(0, 10.0), time=growing)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    events = ub.Events()
+    ub.follow(scene, ub.Dissipation(0.5), steps=30, record=events)
+    assert events.found
+    assert str(events.found[0]).startswith("load factor 1.")
+
+
+def test_shapes_of_a_path_are_spaced_along_it():
+    """Of 8 shapes of a snap-through, under loads that come again, none is near to another.
+
+    Apart by a seventh of the path, to half a step on either side.
+    """
+    apex, scene = truss()
+    path = ub.follow(scene, ub.ArcLength(0.05, factor=4.0), until=down_to(apex, -2.2 * HEIGHT))
+    figure = ub.plot_shapes(path)
+    (bar,) = (axes for axes in figure.axes if "load factor" in axes.get_ylabel())
+    assert bar.get_ylim() == pytest.approx((path.factor.min(), path.factor.max()), rel=0.3)
+    axes = figure.axes[0]
+    heights = sorted(
+        {
+            round(float(max(line.get_ydata())), 6)
+            for line in axes.lines
+            if len(line.get_xdata()) == 2 and line.get_linewidth() > 2
+        }
+    )
+    v = path.displacement(apex)[evenly(path, 8), 1]
+    assert len(heights) >= 4
+    steps = -np.diff(v)
+    whole = -path.displacement(apex)[-1, 1]
+    largest = np.abs(np.diff(path.displacement(apex)[:, 1])).max()
+    assert np.abs(steps - whole / 7).max() <= largest * (1 + 1e-9)
 
 
 # -- what is refused ---------------------------------------------------------------------------

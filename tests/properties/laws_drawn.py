@@ -1,0 +1,214 @@
+"""Random laws of sections and connectors, written as Python source; see any_scene.py."""
+
+import math
+
+
+class Laws:
+    """The part of the writer of random scenes that draws laws."""
+
+    def _hardening(self, limit, stiffness, dimensions):
+        """A law that yields.
+
+        Args:
+            limit: Text.
+            stiffness: In SI.
+            dimensions: Those of the stiffness, and of the viscosity.
+        """
+        say, (of_stiffness, of_viscosity) = self._say, dimensions
+        modulus, kinematic = (stiffness * self._size(-2, -0.5) for _ in range(2))
+        time = self._end * self._size(-1, 1)
+        kind = self._one(["", "modulus", "kinematic", "both"])
+        viscous = self._one(["", "", "Perzyna", "DuvautLions"])
+        more = [f"limit={limit}"]
+        if kind in ("modulus", "both"):
+            more.append(f"modulus={say.number(modulus, of_stiffness)}")
+        if kind in ("kinematic", "both"):
+            more.append(f"kinematic={say.number(kinematic, of_stiffness)}")
+        if viscous == "Perzyna":
+            more.append(f"viscosity=ub.Perzyna({say.number(time * stiffness, of_viscosity)})")
+        if viscous == "DuvautLions":
+            more.append(f"viscosity=ub.DuvautLions({say.number(time, 's')})")
+        return f"ub.Hardening({', '.join(more)})"
+
+    def _softening(self, limit, energy, dimensions):
+        """A law that breaks; limit and energy in SI, and their dimensions."""
+        kind = self._one(["Softening", "LinearSoftening"])
+        limit, energy = map(self._say.number, (limit, energy), dimensions)
+        return f"ub.{kind}(limit={limit}, energy={energy})"
+
+    # -- sections ------------------------------------------------------------------------------
+
+    def _section(self, i):
+        """Kind of a section, and hinges of its beam: laws by places."""
+        stiff, heavy = self._size(-0.5, 0.5), self._size(-0.5, 0.5)
+        EA, EI, rhoA = self._EA * stiff, self._EI * stiff, self._rhoA * heavy
+        limit = self._M * stiff * self._size(-1.5, 0)
+        kinds = ["resultants", "hinge", "both", "fibres", "fibres", "placed", "elastic"]
+        drawn = self._one(kinds)
+        kind = "elastic" if self._elastic else drawn
+        self._asymmetric = False
+        hinges = {}
+        if kind in ("fibres", "placed"):
+            self._of_fibres(i, kind, EA, EI, rhoA, limit)
+        elif kind == "elastic" and self._chance(0.5):
+            self._of_shape(i, EA, EI, rhoA)
+        else:
+            hinges = self._of_resultants(i, kind, EA, EI, rhoA, limit)
+        return kind, hinges
+
+    def _of_resultants(self, i, kind, EA, EI, rhoA, limit):
+        say = self._say
+        more = [
+            f"EA={say.number(EA, 'N')}", f"GA={say.number(EA * self._some(0.1, 0.5), 'N')}",
+            f"EI={say.number(EI, 'N m2')}", f"rhoA={say.number(rhoA, 'kg/m')}",
+            f"rhoI={say.number(self._one([0.0, rhoA * EI / EA]), 'kg m')}",
+        ]  # fmt: skip
+        hinges = {}
+        if kind in ("resultants", "both"):
+            law = self._hardening(say.number(limit, "N m"), EI, ("N m2", "N m2 s"))
+            more.append(f"bending={law}")
+            force = limit / self._L * self._size(0, 1)
+            law = self._hardening(say.number(force, "N"), EA, ("N", "N s"))
+            more += [f"axial={law}"] if self._chance(0.3) else []
+            law = self._hardening(say.number(force, "N"), EA, ("N", "N s"))
+            more += [f"shear={law}"] if self._chance(0.3) else []
+        if kind in ("hinge", "both"):
+            size = limit * self._size(0, 0.5)
+            laws = [
+                self._softening(size, size * self._size(-0.5, 1), ("N m", "J")) for _ in range(2)
+            ]
+            if self._chance(0.6):
+                more.append(f"hinge={laws[0]}")
+            # Not at vertices, where the hinge is in the cell before it.
+            hinges = self._one([{}, {0.0: laws[1]}, {0.43: laws[1]}, {1.0: laws[1]}])
+        self._lines.append(f"section{i} = ub.Section({', '.join(more)})")
+        return hinges
+
+    def _of_shape(self, i, EA, EI, rhoA):
+        h = math.sqrt(12 * EI / EA)
+        say, E, rho = self._say, EA / h**2, rhoA / h**2
+        wall = say.number(h / 10, "m")
+        h = say.number(h, "m")
+        shape = self._one([
+            f"rectangle({h}, {h}", f"circle({h}", f"tube({h}, {wall}",
+            f"i_shape({h}, {h}, {wall}, {wall}",
+        ])  # fmt: skip
+        self._lines.append(
+            f"section{i} = ub.Section.{shape}, E={say.number(E, 'Pa')}, nu=0.3, "
+            f"rho={say.number(rho, 'kg/m3')})"
+        )
+
+    def _of_fibres(self, i, kind, EA, EI, rhoA, limit):
+        """Layers of a shape, or fibres that are placed to one side."""
+        say, h = self._say, math.sqrt(12 * EI / EA)
+        E, strength = EA / h**2, 6 * limit / h**3
+        law = self._hardening(say.number(strength, "Pa"), E, ("Pa", "Pa s"))
+        size = strength * self._size(0, 0.5)
+        crack = self._softening(size, size * h * self._size(-1, 0.5), ("Pa", "N/m"))
+        crack = f", softening={crack}" if self._chance(0.4) else ""
+        shape = self._one(["rectangle", "circle"])
+        number = self._one([4, 6])
+        stiff = f"E={say.number(E, 'Pa')}, nu=0.2, rho={say.number(rhoA / h**2, 'kg/m3')}"
+        text = say.number(h, "m")
+        if kind == "fibres":
+            size = f"{text}, {text}" if shape == "rectangle" else text
+            self._lines.append(
+                f"section{i} = ub.Section.{shape}({size}, {stiff}, "
+                f"fibres=ub.Fibres({law}, number={number}{crack}))"
+            )
+            return
+        self._asymmetric = True
+        y = [h * (k + self._some(-0.3, 0.3)) / number for k in range(number)]
+        A = [h**2 / number * self._some(0.5, 1.5) for _ in range(number)]
+        areas = ", ".join(say.number(a, "m2") for a in A)
+        up = [say.number(x, "m") for x in y]
+        for name, places in (
+            ("", up),
+            ("_upside_down", [x[1:] if x[0] == "-" else f"-{x}" for x in up]),
+        ):
+            self._lines.append(
+                f"section{i}{name} = ub.Section.of_fibres([{', '.join(places)}], [{areas}], "
+                f"{stiff}, fibres=ub.Fibres({law}{crack}))"
+            )
+
+    # -- connectors ----------------------------------------------------------------------------
+
+    def _laws(self, stiffness, way, force, dimensions, joint=None):
+        """Laws that connectors may have, by name.
+
+        Args:
+            stiffness, way, force: Their sizes in SI.
+            dimensions: Of stiffness, motion, force and viscosity.
+            joint: One that presses.
+        """
+        say, (of_k, of_e, of_f, of_c) = self._say, dimensions
+        k, f = stiffness * self._size(-1.5, 1), force * self._size(-1.5, 0)
+        c = stiffness * self._T * self._size(-2, 0)
+        high, low = way * self._size(-2.5, -1), way * self._size(-2.5, -1)
+        cubic = f"{of_k[:-1]}m3" if of_k == "N/m" else of_k
+        yields = self._hardening(say.number(f, of_f), k, (of_k, of_c))
+        breaks = self._softening(f, f**2 / k * self._size(0.3, 1.5), (of_f, "J"))
+        ω = say.number(self._some(1, 6) / self._end, "1/s")
+        self._last_limits = (low, high)
+        text, of = say.number(k, of_k), say.number(f, of_f)
+        laws = {
+            "Spring": f"ub.Spring({text})",
+            "yields": f"ub.Spring({text}, law={yields})",
+            "breaks": f"ub.Spring({text}, softening={breaks})",
+            "Function": f"ub.Function(lambda e, rate: {text} * e + "
+            f"{say.number(k / way**2, cubic)} * e**3 + "
+            f"{say.number(0.0 if self._static else c, of_c)} * rate)",
+            "Stop": f"ub.Stop({text}, low={say.number(-low, of_e)}, high={say.number(high, of_e)})",
+            "Damper": f"ub.Damper({say.number(c, of_c)})",
+            "Actuator": f"ub.Actuator(lambda t: {of} * math.sin({ω} * t))",
+            "Controller": f"ub.Controller(lambda simulation: {of} * math.sin({ω} * simulation.t))",
+            "Coulomb": f"ub.Coulomb({of})",
+            "Motor": f"ub.Motor(lambda t: {say.number(high, of_e)} * (1.0 - math.cos({ω} * t)))",
+        }
+        if joint is not None:
+            size = say.number(self._L * 0.1 if of_e == "1" else 0.3, "m" if of_e == "1" else "1")
+            laws["Coulomb"] = f"ub.Coulomb({of}, coefficient={size}, joint={joint})"
+        return laws
+
+    def _kinds(self, *more):
+        kinds = ["Spring", "yields", "breaks", "Function", *more]
+        if not self._static:
+            kinds += ["Stop", "Damper", "Actuator", "Controller"]
+            kinds += ["Coulomb", "Coulomb"] if self._rubs else []
+        return kinds
+
+    def _turn(self, a, b, joint):
+        """Something that resists or drives a rotation."""
+        laws = self._laws(self._M, 3.0, self._M, ("N m", "1", "N m", "N m s"), joint)
+        kind = self._one(self._kinds(*(["Motor"] if self._may_hold else [])))
+        if self._static and kind in ("breaks", "yields"):
+            kind = "Spring"
+        self._lists["connectors"].append(f"ub.Turn({a}, {b}, {laws[kind]})")
+
+    def _slide(self, a, b, along, joint):
+        """Something that resists or drives a sliding along an axis."""
+        dimensions = ("N/m", "m", "N", "N s/m")
+        laws = self._laws(self._F / self._L, self._L, self._F, dimensions, joint)
+        kind = self._one(self._kinds(*(["Motor"] if self._may_hold else [])))
+        if self._static and kind in ("breaks", "yields"):
+            kind = "Spring"
+        self._lists["connectors"].append(f"ub.Slide({a}, {b}, {laws[kind]}, axis={along})")
+
+    def _connector(self):
+        """Something between two parts, or a part and the ground."""
+        a, b = self._one(self._anchors), self._one(self._anchors)
+        far = tuple(p + d for p, d in zip(b.point, self._polar(0.7 * self._L), strict=True))
+        grounded = self._chance(0.4) or a.part == b.part
+        first = f"ub.ground(*{self._say.point(far)})" if grounded else str(a)
+        apart = math.dist(far if grounded else a.point, b.point)
+        along = self._say.vector(self._polar(1.0))
+        dimensions = ("N/m", "m", "N", "N s/m")
+        laws = self._laws(self._F / self._L, self._L, self._F, dimensions)
+        kind, stretch = self._one(self._kinds()), self._chance(0.6)
+        if stretch and apart > 0.2 * self._L:
+            both = [first, str(b)]
+            self._shuffle(both)
+            text = f"ub.Stretch({both[0]}, {both[1]}, {laws[kind]})"
+        else:
+            text = f"ub.Slide({first}, {b}, {laws[kind]}, axis={along})"
+        self._lists["connectors"].append(text)

@@ -1,0 +1,92 @@
+"""A random scene in several statements: runs, and differences of their motions."""
+
+import warnings
+
+import numpy as np
+from any_scene import script
+from statements import AS_GIVEN, Statement, changed_statements
+
+import ufl_beam as ub
+
+PLACES = (0.0, 0.25, 0.5, 0.8, 1.0)
+"""Where motions of beams are compared; those between vertices are interpolated."""
+
+
+class Run:
+    """A statement of a scene, and its solution.
+
+    Attributes:
+        source: The script.
+        scene, solution: The scene, and what became of it; up to a failure if there is one.
+        failure: Why it ended early; None otherwise.
+        warnings: Messages of `ModelWarning`s of the run.
+    """
+
+    def __init__(self, seed, statement=AS_GIVEN, source=script):
+        self.statement = statement
+        self.source = source(seed, statement)
+        names = {}
+        self.failure = None
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            exec(self.source, names)
+            self.scene = names["scene"]
+            try:
+                self.solution = ub.simulate(
+                    self.scene, names["scheme"], t=names["times"], dt=names["dt"],
+                    mesh=names["mesh"], progress=False,
+                )  # fmt: skip
+            except ub.ConvergenceError as error:
+                self.solution, self.failure = error.solution, str(error)
+        self.warnings = [str(w.message) for w in caught]
+        self.seconds = statement.unit("s")
+
+    def motion(self):
+        """Times, s; (u, v, ψ) of places of all parts in SI and the axes of the first statement."""
+        rows = {}
+        for beam in self.scene.beams:
+            for s in PLACES:
+                there = 1 - s if self.is_backwards(beam) else s
+                rows[beam.name, s] = self.statement.motion(
+                    self.solution.displacement(beam.at(there))
+                )
+        for body in self.scene.bodies:
+            rows[body.name, 0.0] = self.statement.motion(self.solution.displacement(body.middle))
+        values = np.array([rows[key] for key in sorted(rows)])
+        return self.solution.times / self.seconds, values
+
+    def is_backwards(self, beam):
+        return f"# {beam.name} runs backwards" in self.source
+
+
+def difference(one, other):
+    """Largest difference of two motions at common times, as parts of the scene or in rad.
+
+    A rotation of many turns has the digits of its size.
+    """
+    (t, x), (s, y) = one.motion(), other.motion()
+    if len(t) == len(s) and not (one.failure or other.failure):
+        # Each step with its own length, if steps are adaptive
+        common = [(i, i) for i in range(len(t))]
+    else:
+        common = [(i, j) for i, j in _common(t, s, 1e-12 * max(t[-1], s[-1]))]
+    a, b = (np.array(k) for k in zip(*common, strict=True))
+    size = one.scene.size / one.statement.unit("m")
+    x, y = (z[:, k] / [size, size, 1.0] for z, k in ((x, a), (y, b)))
+    return float(np.abs(x - y).max() / max(1.0, np.abs(x).max()))
+
+
+def _common(t, s, near):
+    j = np.searchsorted(s, t - near)
+    for i, k in enumerate(j):
+        if k < len(s) and abs(s[k] - t[i]) <= near:
+            yield i, int(k)
+
+
+def perturbed(statement, number):
+    """The same statement with other last digits."""
+    return Statement(**{**vars(statement), "name": f"{statement.name}, digits {number}",
+                        "digits": number})  # fmt: skip
+
+
+__all__ = ["Run", "changed_statements", "difference", "perturbed"]

@@ -1,0 +1,247 @@
+"""Functions of a user that raise on one process or on all; run by test_agreement.py.
+
+`mpirun -n 2 python3 raising.py` prints a line for each case: its name, the exceptions of all
+processes; `mpirun -n 2 python3 raising.py CASE RANK` lets one process fail where nobody agrees.
+"""
+
+import math
+import sys
+from pathlib import Path
+
+from mpi4py import MPI
+
+import ufl_beam as ub
+from ufl_beam import agreement, simulation
+
+WORLD = MPI.COMM_WORLD
+ALL = -1
+simulation.SMALLEST_SHARE = 1
+
+SECTION = ub.Section(EA=1e6, GA=1e6, EI=1e2, rhoA=1.0, rhoI=1e-3)
+BEAM = ub.Beam((0, 0), (1, 0), SECTION, cells=8)
+
+
+class Unportable(Exception):
+    """Other processes cannot make one from its message."""
+
+    def __init__(self, number, text):
+        super().__init__(f"{text} {number}")
+
+
+class Watch(ub.Recorder):
+    def __init__(self, at, action):
+        self.at, self.action = at, action
+
+    def require_writable(self):
+        pass
+
+    def open(self, sim):
+        if self.at == "open":
+            self.action()
+
+    def write(self, sim):
+        if self.at == "write" and sim.t > 0.02:
+            self.action()
+
+    def close(self):
+        pass
+
+
+class Remembers:
+    """A time function whose state cannot be told later."""
+
+    def __init__(self, action):
+        self.action = action
+
+    def __call__(self, t):
+        return 1.0
+
+    def state(self):
+        return self.action()
+
+    def restore(self, state):
+        pass
+
+
+def failure(rank, make):
+    """A function of anything that fails on a process, or on all."""
+
+    def fail(*_):
+        if rank in (ALL, WORLD.rank):
+            raise make()
+        return 0.0
+
+    return fail
+
+
+def run(scene, **more):
+    more = {"t": (0, 0.05), "dt": 0.01, "progress": False, **more}
+    return ub.simulate(scene, more.pop("scheme", ub.Midpoint()), **more)
+
+
+def scene(time=lambda t: 1.0, **more):
+    more.setdefault("loads", [ub.PointLoad(BEAM.end, force=(0, -1.0), time=time)])
+    more.setdefault("supports", [ub.Clamped(BEAM.start)])
+    return ub.Scene([BEAM], **more)
+
+
+def late(function):
+    return lambda t: function() if t > 0.025 else 0.0
+
+
+def load(fail):
+    run(scene(late(fail)))
+
+
+def load_in_statics(fail):
+    run(scene(late(fail)), scheme=ub.Static())
+
+
+def follower(fail):
+    run(scene(loads=[ub.FollowerLoad(BEAM.end, force=(0, 1.0), time=late(fail))]))
+
+
+def gravity(fail):
+    run(scene(loads=[ub.Gravity(time=late(fail))]), dt=ub.Adaptive(1e-3))
+
+
+def prescribed(fail):
+    run(scene(supports=[ub.Clamped(BEAM.start), ub.Prescribed(BEAM.end, v=late(fail))]))
+
+
+def connected(law):
+    run(scene(connectors=[ub.Stretch(ub.ground(1, 1), BEAM.end, law)]))
+
+
+def motor(fail):
+    connected(ub.Motor(late(fail)))
+
+
+def actuator(fail):
+    connected(ub.Actuator(late(fail)))
+
+
+def controller(fail):
+    connected(ub.Controller(lambda sim: fail() if sim.t > 0.02 else 0.0))
+
+
+def function(fail):
+    connected(ub.Function(lambda motion, rate: fail() if abs(motion) > 1e-5 else 0.0))
+
+
+def guide(fail):
+    def curve(s):
+        if abs(s) > 1e-5:
+            fail()
+        return 1.0 + 0.1 * s, -s
+
+    run(scene(joints=[ub.Guided(BEAM.end, curve)]))
+
+
+def recorder(fail):
+    run(scene(), record=Watch("write", fail))
+
+
+def beginning(fail):
+    run(scene(), record=Watch("open", fail))
+
+
+def events(fail):
+    stop = ub.Stretch(ub.ground(1, 1), BEAM.end, ub.Stop(low=-1e-9, high=1e-9, stiffness=1.0))
+    run(scene(connectors=[stop]), record=ub.Events(tell=fail))
+
+
+def checkpoint(fail):
+    asked, file = [], Path(sys.argv[-1])
+    if WORLD.rank == 0:
+        file.unlink(missing_ok=True)
+
+    def state():
+        asked.append(0)
+        return fail() if len(asked) > 1 else 0.0
+
+    run(scene(Remembers(state)), checkpoint=ub.Checkpoint(file, every=2))
+
+
+def path(fail):
+    moves = ub.Prescribed(BEAM.end, v=lambda t: fail() if t > 0.3 else 0.1 * t)
+    ub.follow(scene(loads=[], supports=[ub.Clamped(BEAM.start), moves]), ub.Load(0.1))
+
+
+EVERYWHERE = [load, load_in_statics, gravity, controller, recorder, beginning, checkpoint]
+"""Cases whose function is called on all processes."""
+
+SOMEWHERE = [follower, prescribed, motor, actuator, function, guide, events, path]
+"""Cases whose function is called where the object is."""
+
+
+def outcomes(case, rank, make):
+    """The exceptions of all processes, as text."""
+    try:
+        case(failure(rank, make))
+    except BaseException as error:
+        mine = f"{type(error).__name__}: {error}"
+    else:
+        mine = "nothing"
+    return WORLD.allgather(mine)
+
+
+def nothing_but_numbers(rank):
+    """A load that is no number on one process."""
+    value = math.nan if rank in (ALL, WORLD.rank) else 1.0
+    return outcomes(lambda fail: load(lambda: value), ALL, Exception)
+
+
+def together():
+    def user():
+        return RuntimeError("user")
+
+    for case in EVERYWHERE:
+        for rank in (ALL, 0, 1):
+            ub.say(case.__name__, rank, outcomes(case, rank, user), sep="|")
+    for case in SOMEWHERE:
+        ub.say(case.__name__, ALL, outcomes(case, ALL, user), sep="|")
+    for kind in (KeyboardInterrupt, lambda: Unportable(7, "number"), lambda: SystemExit("exit")):
+        ub.say("kind", 1, outcomes(load, 1, kind), sep="|")
+    for rank in (ALL, 0, 1):
+        ub.say("nan", rank, nothing_but_numbers(rank), sep="|")
+    ub.say("end")
+
+
+# -- where the processes cannot agree --------------------------------------------------------------
+
+
+def alone(fail):
+    """Outside of any run."""
+    fail()
+    WORLD.barrier()
+
+
+def asked(fail):
+    """The others ask for what all have to ask for together."""
+
+    def force(sim):
+        fail()
+        return 1e-3 * sim.displacement(BEAM.end)[0]
+
+    connected(ub.Controller(force))
+
+
+def own(fail):
+    """A small scene, which each process computes for itself."""
+    simulation.SMALLEST_SHARE = 10**6
+    load(fail)
+
+
+def building(fail):
+    """Before the processes share anything."""
+    run(scene(time=fail), start=run(scene()))
+
+
+if __name__ == "__main__":
+    if len(sys.argv) <= 2:
+        together()
+    else:
+        agreement.GRACE = 0.5
+        name, rank = sys.argv[1:]
+        globals()[name](failure(int(rank), lambda: RuntimeError(f"user, {name}")))

@@ -1,0 +1,130 @@
+"""Exceptions in functions of the user under `mpirun`: raised by all processes, or the end of all."""
+
+import os
+import pickle
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from mpi4py import MPI
+
+import pytest
+
+from ufl_beam.agreement import Agreement, portable
+from ufl_beam.errors import StepFailed
+
+COMM = MPI.COMM_WORLD
+SCRIPT = Path(__file__).with_name("raising.py")
+
+MPIRUN = {
+    "OMPI_ALLOW_RUN_AS_ROOT": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+    "OMPI_MCA_mpi_yield_when_idle": "1",
+    "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
+}
+"""Root may run it, on any number of cores."""
+
+needs_mpirun = pytest.mark.skipif(shutil.which("mpirun") is None, reason="there is no mpirun")
+
+
+def on_two(*arguments, timeout):
+    """Output and status of the script on two processes; a hang is a failure."""
+    command = ["mpirun", "-n", "2", sys.executable, str(SCRIPT), *map(str, arguments)]
+    return subprocess.run(
+        command,
+        env={**os.environ, **MPIRUN},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=timeout,
+        check=False,
+    )
+
+
+@pytest.mark.serial
+@needs_mpirun
+def test_all_processes_raise_together(tmp_path):
+    """Each function of a user, on all processes and on each alone; then the same script goes on."""
+    run = on_two(tmp_path / "run.h5", timeout=120)
+    assert run.returncode == 0, run.stderr
+    *lines, end = run.stdout.splitlines()
+    assert end == "end"
+    found = [line.split("|") for line in lines]
+    assert len(found) == 3 * 7 + 8 + 3 + 3
+    for name, rank, outcomes in found:
+        first, second = eval(outcomes)
+        if name == "nan":
+            assert first == second
+            assert first.startswith("ConvergenceError: no equilibrium after t = ")
+            assert "the time function is nan" in first
+        elif name == "kind":
+            message = first.partition(": ")[2]
+            assert message in ("", "Unportable: number 7", "exit")
+            assert first == second or second == "Unportable: number 7"
+        else:
+            assert [first, second] == 2 * ["RuntimeError: user"], (name, rank)
+
+
+@pytest.mark.serial
+@needs_mpirun
+@pytest.mark.parametrize(("case", "rank"), [("alone", 1), ("asked", 0), ("own", 1)])
+def test_a_process_that_fails_alone_ends_all(case, rank):
+    begin = time.perf_counter()
+    run = on_two(case, rank, timeout=30)
+    assert time.perf_counter() - begin < 10
+    assert run.returncode != 0
+    assert f"RuntimeError: user, {case}" in run.stderr
+    assert f"process {rank} of 2 failed" in run.stderr
+
+
+@pytest.mark.serial
+@needs_mpirun
+def test_processes_that_fail_alike_end_without_an_abort():
+    run = on_two("alone", -1, timeout=30)
+    assert run.returncode != 0
+    assert run.stderr.count("RuntimeError: user, alone") == 2
+    assert "are ended" not in run.stderr
+    assert "ABORT" not in run.stderr
+
+
+# -- in this process -------------------------------------------------------------------------------
+
+
+def test_calls_return_what_the_function_does():
+    agreement = Agreement(COMM)
+    assert agreement(divmod, 7, 2) == (3, 1)
+    agreement.settle(None)
+
+
+@pytest.mark.parametrize("rank", range(COMM.size))
+def test_one_process_raises_for_all(rank):
+    agreement = Agreement(COMM)
+    mine = ValueError("mine") if COMM.rank == rank else None
+    with pytest.raises(ValueError, match="mine") as raised:
+        agreement.settle(mine)
+    assert mine is None or raised.value is mine
+    assert COMM.size == 1 or agreement.raised is raised.value
+
+
+def test_other_exceptions_go_before_failed_steps():
+    """A step that fails on one process may not be cut when the run ends on another."""
+    agreement = Agreement(COMM)
+    last = COMM.rank == COMM.size - 1
+    with pytest.raises(ValueError, match="of a user"):
+        agreement.settle(ValueError("of a user") if last else StepFailed("no equilibrium"))
+
+
+class Unreadable(Exception):
+    def __init__(self, one, two):
+        super().__init__(one)
+
+
+def test_what_cannot_be_sent_is_sent_as_text():
+    plain = ValueError("plain")
+    assert portable(plain) is plain
+    assert portable(None) is None
+    for odd in (Unreadable("a", "b"), ValueError(lambda: None)):
+        sent = pickle.loads(pickle.dumps(portable(odd)))
+        assert type(odd).__name__ in str(sent)

@@ -1,0 +1,406 @@
+"""The cache of compiled code: damage, kills, other users, directories that cannot be written to."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from ufl_beam import cache, lanes, native
+from ufl_beam.cache import CHECKSUMS, intact, kept
+
+ENTRY = "numbers_1234"
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    """An empty cache."""
+    directory = tmp_path / "cache"
+    directory.mkdir(mode=0o700)
+    monkeypatch.setattr(cache, "_place", lambda: directory)
+    return directory
+
+
+class Builds:
+    """An entry with a source and a library; counts how often it is built."""
+
+    def __init__(self, number=1):
+        self.number, self.count = number, 0
+
+    def build(self, directory):
+        self.count += 1
+        (directory / "source.c").write_text(f"int n = {self.number};")
+        (directory / "library.so").write_bytes(bytes([self.number]) * 20_000)
+        return self.load(directory)
+
+    def load(self, directory):
+        if not (directory / "library.so").read_bytes() == bytes([self.number]) * 20_000:
+            pytest.fail("a damaged library was loaded")  # which would be a SIGSEGV
+        return self.number
+
+    def __call__(self, name=ENTRY):
+        value, directory = kept(name, self.build, self.load)
+        assert value == self.number
+        assert (directory / "source.c").exists()
+        return self.count
+
+
+def cut(entry):
+    os.truncate(entry / "library.so", 1000)
+
+
+def empty(entry):
+    os.truncate(entry / "library.so", 0)
+
+
+def zeros(entry):
+    content = (entry / "library.so").read_bytes()
+    (entry / "library.so").write_bytes(content[:8192] + bytes(len(content) - 8192))
+
+
+def words(entry):
+    (entry / "library.so").write_text("hello\n")
+
+
+def gone(entry):
+    (entry / "library.so").unlink()
+
+
+def a_directory(entry):
+    gone(entry)
+    (entry / "library.so").mkdir()
+
+
+def no_source(entry):
+    (entry / "source.c").unlink()
+
+
+def an_empty_source(entry):
+    os.truncate(entry / "source.c", 0)
+
+
+def no_checksums(entry):
+    (entry / CHECKSUMS).unlink()
+
+
+def binary_checksums(entry):
+    (entry / CHECKSUMS).write_bytes(b"\xff\xfe\x00")
+
+
+def exchanged(entry):
+    Builds(2)("numbers_other")
+    shutil.copy(entry.parent / "numbers_other" / "library.so", entry / "library.so")
+
+
+def another_entry(entry):
+    Builds(2)("numbers_other")
+    shutil.rmtree(entry)
+    shutil.copytree(entry.parent / "numbers_other", entry)
+
+
+def a_file(entry):
+    shutil.rmtree(entry)
+    entry.write_text("")
+
+
+def a_link(entry):
+    elsewhere = entry.parent / "elsewhere.so"
+    (entry / "library.so").rename(elsewhere)
+    (entry / "library.so").symlink_to(elsewhere)
+
+
+DAMAGES = [
+    *(cut, empty, zeros, words, gone, a_directory, no_source, an_empty_source),
+    *(no_checksums, binary_checksums, exchanged, another_entry, a_file, a_link),
+]
+
+
+@pytest.mark.parametrize("damage", DAMAGES, ids=lambda damage: damage.__name__)
+def test_what_is_damaged_is_built_again_and_not_loaded(place, damage):
+    builds = Builds()
+    assert [builds(), builds()] == [1, 1]
+    damage(place / ENTRY)
+    assert not intact(place / ENTRY)
+    assert [builds(), builds()] == [2, 2]
+    assert not list(place.glob("*.part"))
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root gives files away")
+@pytest.mark.parametrize("file", ["library.so", CHECKSUMS])
+def test_what_another_user_owns_is_built_again(place, file):
+    builds = Builds()
+    builds()
+    os.chown(place / ENTRY / file, 1234, 1234)
+    assert [builds(), builds()] == [2, 2]
+
+
+def test_a_library_of_another_system_is_built_again(place):
+    builds = Builds()
+    builds()
+
+    def load(directory):
+        raise ImportError("undefined symbol")
+
+    assert kept(ENTRY, builds.build, load)[0] == 1
+    assert builds.count == 2
+
+
+@pytest.mark.parametrize("stop", [KeyboardInterrupt, RuntimeError])
+def test_a_build_that_is_stopped_leaves_nothing(place, stop):
+    def build(directory):
+        (directory / "library.so").write_text("half")
+        raise stop
+
+    with pytest.raises(stop):
+        kept(ENTRY, build, build)
+    assert [path.name for path in place.iterdir()] == [f"{ENTRY}.lock"]
+    assert Builds()() == 1
+
+
+def test_damaged_c_is_compiled_again(place):
+    """On a real library: loaded as it is, it would end this process."""
+
+    def answer():
+        module = native.compiled(
+            *("ufl_beam_test", "int answer(void);", lambda: "int answer(void) { return 42; }"),
+            **{"made_of": [], "flags": []},
+        )
+        return module.lib.answer()
+
+    assert answer() == 42
+    (entry,) = (path for path in place.iterdir() if path.is_dir())
+    (library,) = entry.glob("*.so")
+    content = library.read_bytes()
+    library.unlink()  # this process has mapped it
+    library.write_bytes(content[:1000])
+    assert answer() == 42
+    assert len(library.read_bytes()) == len(content)
+    assert intact(entry)
+
+
+# -- several processes ---------------------------------------------------------------------------
+
+BUILD = """
+import sys, time
+from pathlib import Path
+from ufl_beam import cache
+place = Path(sys.argv[1])
+cache._place = lambda: place
+def build(directory):
+    (directory / "begun").write_text("")
+    with open(place.parent / "log", "a") as file:
+        file.write("built\\n")
+    time.sleep(float(sys.argv[2]))
+cache.kept("slow", build, lambda directory: None)
+"""
+
+
+def begun(place):
+    """Wait until a build has begun."""
+    for _ in range(4000):
+        if list(place.glob("slow.*.part/new/begun")):
+            return
+        time.sleep(0.005)
+    pytest.fail("no build has begun")
+
+
+def start(place, seconds):
+    return subprocess.Popen([sys.executable, "-c", BUILD, str(place), str(seconds)])
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("by", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
+def test_a_killed_build_is_in_nobodys_way(place, by):
+    process = start(place, 100)
+    begun(place)
+    process.send_signal(by)
+    assert process.wait(20) != 0
+    before = time.perf_counter()
+    builds = Builds()
+    assert builds("slow") == 1
+    assert time.perf_counter() - before < 5  # FFCx waits 10 s
+    assert sorted(path.name for path in place.iterdir()) == ["slow", "slow.lock"]
+
+
+@pytest.mark.serial
+def test_two_processes_build_the_same_once_and_different_entries_at_once(place):
+    processes = [start(place, 1.5)]
+    begun(place)
+    processes.append(start(place, 0.0))
+    assert Builds()() == 1  # another entry does not wait
+    assert processes[0].poll() is None
+    assert [process.wait(30) for process in processes] == [0, 0]
+    assert (place.parent / "log").read_text() == "built\n"
+
+
+FORM = """
+import sys
+from pathlib import Path
+from ufl_beam import cache, native
+from ufl_beam.compat import fem, line_mesh
+import numpy as np, ufl
+place = Path(sys.argv[1])
+cache._place = lambda: place
+mesh = line_mesh(np.array([[0.0, 0], [1, 0]]), np.array([[0, 1]]))
+v = ufl.TestFunction(fem.functionspace(mesh, ("DG", 0)))
+form = 7.0 * v * ufl.dx(domain=mesh, metadata={"quadrature_degree": 0})
+print(native.compiled_form(form)[1].exists())
+"""
+
+
+@pytest.mark.serial
+def test_a_kill_while_ffcx_compiles(place):
+    command = [sys.executable, "-c", FORM, str(place)]
+    process = subprocess.Popen(command)
+    for _ in range(4000):
+        if list(place.glob("form_*.part/new/libffcx*.c")):
+            break
+        time.sleep(0.005)
+    process.kill()
+    process.wait()
+    assert not list(place.glob("form_*[0-9a-f]/" + CHECKSUMS))
+    again = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert again.stdout == "True\n", again.stderr
+    assert not list(place.glob("*.part"))
+
+
+# -- directories ---------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def home(tmp_path, monkeypatch):
+    """The directory in which the cache is to be, and another one for temporary files."""
+    (tmp_path / "tmp").mkdir(mode=0o700)
+    monkeypatch.setattr(cache.tempfile, "tempdir", str(tmp_path / "tmp"))
+    monkeypatch.setattr(cache, "_temporary", cache._temporary.__wrapped__)
+    monkeypatch.setattr(cache, "jit_directory", lambda: tmp_path / "home" / "fenics")
+    return tmp_path / "home" / "fenics"
+
+
+def chosen():
+    return cache._place.__wrapped__()
+
+
+first_rank_says = pytest.mark.skipif(
+    cache.MPI.COMM_WORLD.rank > 0, reason="only the first process says so"
+)
+
+
+def test_the_directory_is_private(home):
+    assert chosen() == home / "ufl_beam"
+    assert (home / "ufl_beam").stat().st_mode & 0o777 == 0o700
+
+
+def open_to_all(home):
+    (home / "ufl_beam").mkdir(parents=True)
+    (home / "ufl_beam").chmod(0o777)
+
+
+def open_to_the_group(home):
+    (home / "ufl_beam").mkdir(parents=True)
+    (home / "ufl_beam").chmod(0o770)
+
+
+def open_above(home):
+    home.mkdir(parents=True)
+    home.chmod(0o777)
+
+
+def not_a_directory(home):
+    home.parent.mkdir()
+    home.write_text("")
+
+
+def a_file_above(home):
+    home.parent.write_text("")
+
+
+def a_link_elsewhere(home):
+    home.mkdir(parents=True)
+    (home / "ufl_beam").symlink_to(home.parent)
+
+
+@first_rank_says
+@pytest.mark.parametrize(
+    ("make", "why"),
+    [
+        (open_to_all, "others may write to it"),
+        (open_to_the_group, "others may write to it"),
+        (open_above, "others may write to .*fenics"),
+        (not_a_directory, "Not a directory"),
+        (a_file_above, "Not a directory"),
+        (a_link_elsewhere, "it is no directory"),
+    ],
+    ids=lambda one: getattr(one, "__name__", ""),
+)
+def test_directories_that_cannot_be_trusted_or_made(home, make, why):
+    make(home)
+    with pytest.warns(RuntimeWarning, match=f"cannot be used: {why}.*XDG_CACHE_HOME"):
+        place = chosen()
+    assert place == Path(cache.tempfile.tempdir) / f"ufl_beam-{os.geteuid()}"
+    assert place.stat().st_mode & 0o777 == 0o700
+
+
+@first_rank_says
+def test_a_cache_that_cannot_be_written_to_is_read(place, home, monkeypatch):
+    builds = Builds()
+    builds()
+    monkeypatch.setattr(cache.os, "access", lambda *_: False)  # for root everything is writable
+    assert builds() == 1
+    with pytest.warns(RuntimeWarning, match="cannot be written to.*ufl_beam-"):
+        assert Builds(3)("another") == 1
+    assert [path.name for path in place.iterdir() if path.is_dir()] == [ENTRY]
+
+
+@first_rank_says
+def test_a_directory_of_another_in_the_place_of_temporary_files(home):
+    open_to_all(home)
+    other = Path(cache.tempfile.tempdir) / f"ufl_beam-{os.geteuid()}"
+    other.mkdir()
+    other.chmod(0o777)
+    with pytest.warns(RuntimeWarning, match="others may write"):
+        place = chosen()
+    assert place.parent == other.parent
+    assert place != other
+
+
+WARNS = "import ufl_beam, warnings; warnings.warn('is it seen?', RuntimeWarning)"
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("before", ["", "import dolfinx; "])
+def test_warnings_are_seen(before):
+    """FFCx has all of them logged, which without a handler is nowhere."""
+    command = [sys.executable, "-c", before + WARNS]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    assert "RuntimeWarning: is it seen?" in run.stderr
+
+
+@pytest.mark.serial
+def test_warnings_are_logged_where_the_user_has_a_log():
+    log = "import logging; logging.basicConfig(format='log: %(message)s'); "
+    command = [sys.executable, "-c", log + WARNS]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    assert run.stderr.startswith("log: <string>:1: RuntimeWarning: is it seen?")
+
+
+# -- compilers -----------------------------------------------------------------------------------
+
+
+def test_without_a_compiler_there_are_words(place, monkeypatch):
+    monkeypatch.setenv("CC", "no-such-compiler")
+    with pytest.raises(native.CompilerError, match=r"no-such-compiler.*need a C compiler.*gcc"):
+        native.compiled("ufl_beam_test", "", lambda: "", made_of=[], flags=[])
+
+
+def test_a_kernel_without_vectors_is_remembered(place, tmp_path):
+    source = tmp_path / "libffcx_forms_0.c"
+    source.write_text("nothing")
+    for _ in range(2):
+        lanes._modules.clear()
+        assert lanes.in_lanes(source, 1, 1, 0) is None
+    assert len([path for path in place.iterdir() if path.is_dir()]) == 1

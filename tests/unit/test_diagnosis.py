@@ -1,0 +1,101 @@
+"""Words for what fails: what nothing holds, what gives way, why Newton's method stopped."""
+
+import numpy as np
+import pytest
+from scipy.sparse import csc_array, diags_array
+
+import ufl_beam as ub
+from ufl_beam import diagnosis
+from ufl_beam.diagnosis import null_vector
+
+CODES = ("DIVERGED", "SNES", "dt = 0 s")
+
+
+def failure(scene, scheme=None, **more):
+    """The error of a static run, whose message has no codes."""
+    arguments = {"t": (0, 7), "dt": 0.5, "progress": False} | more
+    with pytest.raises(ub.ConvergenceError) as caught:
+        ub.simulate(scene, scheme or ub.Static(), **arguments)
+    assert not any(code in str(caught.value) for code in CODES)
+    return caught.value
+
+
+def spring():
+    return ub.Spring(1e8, law=ub.Hardening(1.0))
+
+
+def test_a_massless_body_between_two_hinges():
+    """Both yield at the same moment, and the body between them turns freely."""
+    section = ub.Section(EA=1e7, GA=1e7, EI=1e4)
+    left = ub.Beam((0, 0), (1, 0), section, cells=2, name="left")
+    right = ub.Beam((1, 0), (2, 0), section, cells=2, name="right")
+    node = ub.Body((1, 0), name="node")
+    turns = [ub.Turn(left.end, node.middle, spring()), ub.Turn(node.middle, right.start, spring())]
+    scene = ub.Scene(
+        [left, right],
+        bodies=[node],
+        supports=[ub.Clamped(left.start), ub.Clamped(right.end)],
+        joints=[ub.Revolute(node.middle, left.end, right.start)],
+        connectors=turns,
+        loads=[ub.PointLoad(left.end, force=(0, -1), time=lambda t: t)],
+    )
+    error = failure(scene)
+    assert "singular: the rotation of node is held by nothing" in str(error)
+    assert all(str(turn) in str(error) for turn in turns)
+    assert "give way together" in str(error)
+    assert error.reason == "DIVERGED_LINEAR_SOLVE"
+
+
+def test_a_beam_on_a_spring_that_breaks():
+    """A cantilever that one spring holds falls when that has lost its strength."""
+    section = ub.Section(EA=1e7, GA=1e7, EI=1e4)
+    beam = ub.Beam((0, 0), (1, 0), section, cells=2, name="arm")
+    turn = ub.Turn(ub.ground(0, 0), beam.start, spring())
+    scene = ub.Scene(
+        [beam],
+        joints=[ub.Revolute(ub.ground(0, 0), beam.start)],
+        connectors=[turn],
+        loads=[ub.PointLoad(beam.end, force=(0, -1), time=lambda t: t)],
+    )
+    message = str(failure(scene))
+    # A limit of 1 N m at 1 m: the load 1 N is reached at t = 1
+    assert "no equilibrium after t = 1" in message
+    assert "of arm" in message
+    assert str(turn) in message
+    assert "gives way" in message
+
+
+def test_a_plastic_mechanism_names_the_cell():
+    law = ub.Hardening(limit=1.0)
+    section = ub.Section(EA=1e7, GA=1e7, EI=1e4, bending=law)
+    beam = ub.Beam((0, 0), (1, 0), section, cells=4, name="arm")
+    load = ub.PointLoad(beam.end, force=(0, -1), time=lambda t: t)
+    message = str(failure(ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])))
+    assert "arm at (0.125, 0) gives way" in message  # the first of four cells
+
+
+def test_too_few_iterations_in_words():
+    beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e7, GA=1e7, EI=1e4), cells=2)
+    load = ub.PointLoad(beam.end, force=(0, -1e4), time=lambda t: t)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    error = failure(scene, newton=ub.Newton(max_iterations=1, rtol=1e-14))
+    assert "Newton's method did not converge after 1 iterations; residual" in str(error)
+    assert "singular" not in str(error)
+    assert error.reason == "DIVERGED_MAX_IT"
+
+
+@pytest.mark.parametrize("size", [40, 400])
+def test_null_vectors_in_any_units(monkeypatch, size):
+    """A chain of springs that nothing holds moves as a whole, whatever units its unknowns have."""
+    monkeypatch.setattr(diagnosis, "DENSE", 100)  # so that one is found by each method
+    ones = np.ones(size - 1)
+    chain = diags_array([-ones, np.r_[1, 2 * ones[1:], 1], -ones], offsets=[-1, 0, 1])
+    units = 10.0 ** np.random.default_rng(0).uniform(-6, 6, size)
+    scale = diags_array(1 / units)
+    smallest, vector = null_vector(csc_array(scale @ chain @ scale))
+    assert smallest < diagnosis.SINGULAR
+    whole = vector / units
+    assert whole / whole[0] == pytest.approx(np.ones(size), rel=1e-6)
+    held = csc_array(scale @ (chain + diags_array(np.eye(1, size)[0])) @ scale)
+    # The smallest singular value of a chain that is held at one end is some (π / (2 size))².
+    assert null_vector(held)[0] > 1e-7

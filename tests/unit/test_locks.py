@@ -1,0 +1,109 @@
+"""Two runs on one checkpoint: the second one is refused and touches nothing."""
+
+import subprocess
+import sys
+
+import pytest
+
+import ufl_beam as ub
+from ufl_beam.locks import Lock
+
+SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
+BEAM = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
+LOAD = ub.PointLoad(BEAM.end, force=(0.0, -1.0))
+SCENE = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)], loads=[LOAD])
+
+
+def run(folder, *more, t1=0.05):
+    return ub.simulate(
+        *(SCENE, ub.Midpoint()),
+        t=(0, t1),
+        dt=0.01,
+        record=[ub.History(folder / "run.csv", [BEAM.end]), *more],
+        checkpoint=ub.Checkpoint(folder / "run.h5", every=1),
+        progress=False,
+    )
+
+
+class Within(ub.Recorder):
+    """Does something at the third step."""
+
+    def __init__(self, action):
+        self.action, self.steps = action, 0
+
+    def require_writable(self):
+        pass
+
+    def open(self, simulation):
+        pass
+
+    def write(self, simulation):
+        self.steps += 1
+        if self.steps == 3:
+            self.action()
+
+    def close(self):
+        pass
+
+    def state(self):
+        return {}
+
+    def resume(self, simulation, state):
+        pass
+
+
+def test_a_second_run_is_refused_before_it_touches_a_file(shared_path):
+    def contents():
+        return {path.name: path.read_bytes() for path in shared_path.iterdir()}
+
+    def second():
+        before = contents()
+        with pytest.raises(ub.SceneError, match=r"run\.h5 is in use: process \d+ on .* writes it"):
+            run(shared_path)
+        assert contents() == before
+
+    within = Within(second)
+    run(shared_path, within)
+    assert within.steps == 5
+    assert not (shared_path / "run.h5.lock").exists()
+
+
+@pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
+def test_a_run_that_fails_lets_go(shared_path, error):
+    def fail():
+        raise error
+
+    with pytest.raises(error):
+        run(shared_path, Within(fail))
+    assert not (shared_path / "run.h5.lock").exists()
+    run(shared_path, Within(lambda: None))
+
+
+def test_a_run_that_is_refused_lets_go(shared_path):
+    run(shared_path)
+    with pytest.raises(ub.SceneError, match="beyond the end"):
+        run(shared_path, t1=0.03)
+    with pytest.raises(ub.SceneError, match="of another run"):
+        run(shared_path, Within(lambda: None))
+    assert not (shared_path / "run.h5.lock").exists()
+    run(shared_path)
+
+
+@pytest.mark.serial
+def test_the_lock_ends_with_its_process(tmp_path):
+    """Its file may stay behind."""
+    script = (
+        "import sys; from pathlib import Path; from ufl_beam.locks import Lock; "
+        "lock = Lock(Path(sys.argv[1])); print(repr(lock.take()), flush=True); sys.stdin.read()"
+    )
+    command = [sys.executable, "-c", script, str(tmp_path / "run.h5")]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, **pipes) as process:
+        assert process.stdout.readline() == "''\n"
+        lock = Lock(tmp_path / "run.h5")
+        assert lock.take().startswith(f"process {process.pid} on ")
+        process.kill()
+    assert lock.path.exists()
+    assert lock.take() == ""
+    lock.release()
+    assert not lock.path.exists()

@@ -1,0 +1,121 @@
+"""C of the package: no warnings, and sanitizers that see what they are to see."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from ufl_beam import loops, native
+
+pytestmark = pytest.mark.serial  # nothing here depends on the number of processes
+
+WARNINGS = [
+    "-Wall",
+    "-Wextra",
+    "-Wconversion",
+    "-Wshadow",
+    "-Wstrict-prototypes",
+    "-Wpointer-arith",
+    "-Wvla",
+    "-Werror",
+    # PETSc and the table of terms prescribe the arguments of functions that they call.
+    "-Wno-unused-parameter",
+    # Sizes are int in loops.h and size_t in memset.
+    "-Wno-sign-conversion",
+]
+
+KERNEL = """
+static inline void tabulate(lanes *restrict A, const lanes *restrict w, const lanes *restrict c,
+                            const lanes *restrict x)
+{
+  A[0] += PICK(w[0] < x[0], lanes_sin(w[0]) + lanes_cos(x[0]), lanes_fabs(c[0]));
+  A[0] += lanes_sqrt(w[0]) * lanes_pow(w[0], -2);
+}
+"""
+
+
+def gcc(*arguments, **options):
+    """Run the compiler; skip the test where it is not GCC."""
+    try:
+        return subprocess.run(["gcc", *arguments], capture_output=True, text=True, **options)
+    except FileNotFoundError:
+        pytest.skip("needs gcc")
+
+
+def lanes_source():
+    """The loop of lanes.c with a kernel that asks for every function of lanes.h."""
+    sizes = {"LANES": 4, "ENTRIES": 1, "WIDTH": 1, "CONSTANTS": 1}
+    defined = [f"#define {name} {size}" for name, size in sizes.items()]
+    head = [native.HEADERS, native.DECLARATIONS, *defined, native.text("lanes.h")]
+    # The only function that other files call is declared in no header: cffi reads it as text.
+    return "\n".join([*head, KERNEL, "void *in_lanes(void);", native.text("lanes.c")])
+
+
+@pytest.mark.parametrize(
+    ("source", "flags"),
+    [(lambda: loops._SOURCE, ["-O3"]), (lanes_source, ["-O2", "-march=native"])],
+    ids=["loops", "lanes"],
+)
+def test_no_warnings(tmp_path, source, flags):
+    """The compiler finds nothing to warn of, at the level of optimisation of each library."""
+    file = tmp_path / "source.c"
+    file.write_text(source())
+    ran = gcc(*flags, *WARNINGS, "-c", str(file), "-o", str(tmp_path / "source.o"))
+    assert ran.returncode == 0, ran.stderr
+
+
+@pytest.mark.parametrize(
+    ("fault", "report"),
+    [
+        ("double *volatile x = malloc(8 * n); y = x[n];", "heap-buffer-overflow"),
+        ("double *x = malloc(8 * n); free(x); y = x[0];", "heap-use-after-free"),
+        ("double x[4] = {1}; y = x[n];", "index 4 out of bounds"),
+        ("double x[4] = {1}, *volatile at = x; y = at[n];", "stack-buffer-overflow"),
+        ("y = INT_MAX - 3 + n;", "signed integer overflow"),
+        ("y = 1 << (8 * n);", "shift exponent 32 is too large"),
+        ("double *x = n == 4 ? 0 : &y; y = *x;", "null pointer"),
+    ],
+)
+def test_sanitizers_report(tmp_path, fault, report):
+    """A small program with a fault ends with a report."""
+    source, program = tmp_path / "fault.c", tmp_path / "fault"
+    source.write_text(
+        "#include <limits.h>\n#include <stdio.h>\n#include <stdlib.h>\n"
+        "int main(int n, char **names) { (void)names; volatile double y = 0; "
+        f'{fault} printf("%g\\n", y); return 0; }}\n'
+    )
+    # As Python's own flags do, which come before those of the package.
+    built = gcc("-w", "-fwrapv", *native.SANITIZERS, str(source), "-o", str(program))
+    if "cannot find" in built.stderr:
+        pytest.skip("gcc is there without libasan and libubsan")
+    assert built.returncode == 0, built.stderr
+    environment = {k: v for k, v in os.environ.items() if k != "LD_PRELOAD"}
+    environment["ASAN_OPTIONS"] = "detect_leaks=0"
+    ran = subprocess.run(  # four arguments: n is 4, which the compiler cannot know
+        [program, "2", "3", "4"], capture_output=True, text=True, env=environment
+    )
+    assert ran.returncode != 0
+    assert report in ran.stderr
+
+
+@pytest.mark.skipif(not native.EXTRA, reason="for `make sanitize`")
+def test_this_run_is_sanitized():
+    """A library that is compiled and loaded as those of the package ends this kind of run."""
+    program = """if True:
+        import numpy as np
+        from ufl_beam import native
+        source = "double get(const double *x, int n) { return x[n]; }"
+        m = native.compiled(
+            "sanitizer_probe", "double get(const double *x, int n);", lambda: source,
+            made_of=[source], flags=["-O3"],
+        )
+        x = m.ffi.from_buffer("double[]", np.ones(1000))
+        print("last", m.lib.get(x, 999), flush=True)
+        print("beyond", m.lib.get(x, 1000), flush=True)
+    """
+    ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert "last 1.0" in ran.stdout
+    assert "beyond" not in ran.stdout
+    assert "heap-buffer-overflow" in ran.stderr
+    assert ran.returncode != 0

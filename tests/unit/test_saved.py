@@ -1,0 +1,391 @@
+"""Solutions in files: what was computed is there again, to the last bit, with its scene."""
+
+import copy
+import json
+import math
+import pickle
+import re
+import subprocess
+import sys
+from fractions import Fraction
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import ufl_beam as ub
+from ufl_beam.connectors import HELD
+from ufl_beam.saved_scene import RECORDS, from_data, to_data
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "properties"))
+from restarted import bend, machine
+
+STEEL = {"EA": 1e4, "GA": 1e4, "EI": 100.0, "rhoA": 1.0, "rhoI": 0.1}
+
+
+def cantilever(**more):
+    beam = ub.Beam((0, 0), (1, 0), ub.Section(**STEEL), cells=2, name="left")
+    load = ub.PointLoad(beam.end, force=(0, -3), time=lambda t: math.sin(3 * t))
+    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load], **more)
+
+
+def swing(scene=None, **more):
+    return ub.simulate(
+        cantilever() if scene is None else scene,
+        ub.Midpoint(), t=(0, 0.5), dt=0.1, progress=False, **more,
+    )  # fmt: skip
+
+
+def saved(solution, folder):
+    solution.save(folder / "a.h5")
+    return ub.load(folder / "a.h5")
+
+
+def same(one, other):
+    """Equal to the last bit, and not a number where the other is not."""
+    one, other = np.asarray(one), np.asarray(other)
+    return (
+        one.dtype == other.dtype and one.shape == other.shape and one.tobytes() == other.tobytes()
+    )
+
+
+def places(scene):
+    """Some places of a scene, in its order."""
+    found = [place for beam in scene.beams for place in (beam.start, beam.at(0.3), beam.end)]
+    return [*found, *(body.middle for body in scene.bodies), *(b.at(0.3, 1) for b in scene.bodies)]
+
+
+def require_same(one, other):
+    """All that solutions offer."""
+    assert type(one) is type(other)
+    assert one.scene is not other.scene
+    assert str(one) == str(other)
+    assert (one.parts, one.iterations, one.seconds) == (
+        other.parts,
+        other.iterations,
+        other.seconds,
+    )
+    assert one.every == other.every
+    for name in ("times", "q", "v"):
+        assert same(getattr(one, name), getattr(other, name)), name
+    for a, b in zip(places(one.scene), places(other.scene), strict=True):
+        assert str(a) == str(b)
+        assert same(one.displacement(a), other.displacement(b))
+        assert same(one.position(a), other.position(b))
+        if len(one.v):
+            assert same(one.velocity(a), other.velocity(b))
+    if len(one.v):
+        assert same(one.momentum(), other.momentum())
+    for a, b in zip(one.scene.supports, other.scene.supports, strict=True):
+        assert same(one.reaction(a), other.reaction(b))
+    for a, b in zip(one.scene.links, other.scene.links, strict=True):
+        assert str(a) == str(b)
+        for x, y in zip(one.connector(a), other.connector(b), strict=True):
+            assert same(x, y)
+    for a, b in zip(one.scene.beams, other.scene.beams, strict=True):
+        assert same(one.shape(a), other.shape(b))
+        assert same(one.section_forces(a, 1), other.section_forces(b, 1))
+        assert same(one.section_forces_at(a.end), other.section_forces_at(b.end))
+        assert same(one.strains(a), other.strains(b))
+        if one._material[0]:
+            for x, y in zip(one.material(a), other.material(b), strict=True):
+                assert same(x, y)
+    for kind in ("state", "supplied", "lost"):
+        here, there = getattr(one.energy, kind), getattr(other.energy, kind)
+        assert list(here) == list(there)
+        assert all(same(here[name], there[name]) for name in here)
+    assert list(one.internal) == list(other.internal)
+    assert all(same(one.internal[name], other.internal[name]) for name in one.internal)
+
+
+# -- solutions -------------------------------------------------------------------------------------
+
+
+def test_a_machine_of_everything(shared_path):
+    """Beams that yield and break, fibres, bodies, joints, each law, each load, damping."""
+    solution = ub.simulate(
+        machine(), ub.Midpoint(0.05, 0.02), t=(0, 0.1), dt=0.005, every=3, progress=False
+    )
+    loaded = saved(solution, shared_path)
+    require_same(loaded, solution)
+    for a, b in zip(solution.scene.joints, loaded.scene.joints, strict=True):
+        try:
+            expected = solution.joint(a)
+        except ub.SceneError as error:
+            with pytest.raises(ub.SceneError, match=re.escape(str(error))):
+                loaded.joint(b)
+            continue
+        for x, y in zip(expected, loaded.joint(b), strict=True):
+            # Directions of a guide curve come from samples, a thousandth of its length apart
+            np.testing.assert_allclose(x, y, rtol=0, atol=1e-9 * np.nan_to_num(np.abs(x)).max())
+    # What is one object in the scene is one in the other
+    (friction,) = (c.law for c in loaded.scene.connectors if isinstance(c.law, ub.Coulomb))
+    assert friction.joint in loaded.scene.joints
+    held = [link.law is HELD for link in solution.scene.links]
+    assert [link.law is HELD for link in loaded.scene.links] == held
+    for picture in (
+        lambda s: ub.plot(s, "M"),
+        ub.plot_shapes,
+        ub.plot_energy,
+        lambda s: ub.plot_history(s, [s.scene["right"].end]),
+        ub.plot_damage,
+        ub.plot_dissipation,
+        lambda s: ub.plot_moment_curvature(s, s.scene["right"].at(0.1)),
+    ):
+        picture(loaded)
+
+
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.ExactStatic()])
+def test_statics(scheme, shared_path):
+    solution = ub.simulate(bend(), scheme, t=(0, 5), dt=0.1, progress=False)
+    require_same(saved(solution, shared_path), solution)
+
+
+def test_a_path_with_its_critical_points(shared_path):
+    """Euler's column, from which a branch is followed after it was loaded."""
+    beam = ub.Beam((0, 0), (0, 1), ub.Section(EA=1e6, GA=1e6, EI=1.0), cells=4, name="column")
+    scene = ub.Scene(
+        [beam],
+        supports=[ub.Clamped(beam.start)],
+        loads=[ub.PointLoad(beam.end, force=(0, -1), time=lambda t: t)],
+    )
+    path = ub.follow(scene, ub.Load(0.5), steps=8)
+    loaded = saved(path, shared_path)
+    require_same(loaded, path)
+    assert same(loaded.factor, path.factor)
+    assert (
+        [str(point) for point in loaded.critical] == [str(point) for point in path.critical] != []
+    )
+    for one, other in zip(loaded.critical, path.critical, strict=True):
+        assert (one.kind, one.factor, one.n) == (other.kind, other.factor, other.n)
+        assert same(one.mode, other.mode)
+        assert same(one.state.q, other.state.q)
+        assert all(same(one.state.internal[n], other.state.internal[n]) for n in one.state.internal)
+    pickled = pickle.loads(pickle.dumps(path))
+    assert same(pickled.critical[0].mode, path.critical[0].mode)
+
+
+def test_curves_and_meshes(shared_path):
+    section = ub.Section(**STEEL)
+    arc = ub.Beam.arc((0, 0), 1.0, (0, 1.5), section, cells=3, name="arc")
+    line = ub.Beam.polyline([(0, 0), (1, 2), (3, 3)], section, cells=5, name="line")
+    wave = ub.Beam.along(lambda s: (s, math.sin(s)), section, cells=3, name="wave")
+    beams = [arc, line, wave]
+    scene = ub.Scene(beams, supports=[ub.Clamped(b.start) for b in beams], loads=[ub.Gravity()])
+    mesh = ub.Mesh(refine=Fraction(2), degree=2)
+    solution = ub.simulate(scene, ub.Midpoint(), t=(0, 0.1), dt=0.05, mesh=mesh, progress=False)
+    loaded = saved(solution, shared_path)
+    require_same(loaded, solution)
+    assert loaded.grid.mesh == mesh
+    for s in (0.1, 0.123, 0.9):
+        for beam in beams[:2]:
+            assert loaded.scene[beam.name].at(s).point == beam.at(s).point
+        # Cubic between samples of 1e-3: its error is a 1e-12th of the fourth derivative
+        assert loaded.scene["wave"].at(s).point == pytest.approx(wave.at(s).point, abs=1e-12)
+
+
+def test_runs_and_modes_go_on_from_a_loaded_solution(shared_path):
+    """With a scene whose functions are records the run goes on as from the solution itself."""
+    body = ub.Body((1.5, 0), mass=1.0, inertia=0.1)
+    base = cantilever()
+    beam = base.beams[0]
+    scene = ub.Scene(
+        base.beams, bodies=[body], supports=base.supports, loads=[ub.Gravity(time=ub.ramp(0.2))],
+        joints=[ub.Link(beam.end, body.middle)],
+    )  # fmt: skip
+    solution = swing(scene)
+    loaded = saved(solution, shared_path)
+    runs = [
+        ub.simulate(one.scene, ub.Midpoint(), t=(0.5, 0.8), dt=0.1, start=one, progress=False)
+        for one in (solution, loaded)
+    ]
+    assert same(runs[0].q, runs[1].q)
+    assert same(*(ub.modes(one.scene, 2, at=one).omega for one in (solution, loaded)))
+
+
+def test_solutions_can_be_pickled_and_copied():
+    solution = swing()
+    require_same(pickle.loads(pickle.dumps(solution)), solution)
+    require_same(copy.deepcopy(solution), solution)
+
+
+def test_shapes_that_are_no_runs(shared_path):
+    motion = ub.modes(cantilever(), 1).motion(0, count=4)
+    loaded = saved(motion, shared_path)
+    assert same(loaded.q, motion.q)
+    assert same(loaded.times, motion.times)
+
+
+# -- functions -------------------------------------------------------------------------------------
+
+
+def test_functions_are_known_at_the_times_that_were_kept(shared_path):
+    solution = swing()
+    load = saved(solution, shared_path).scene.loads[0]
+    for t in solution.times:
+        assert load.time(t) == math.sin(3 * t)
+    with pytest.raises(ub.SceneError, match=r"<lambda> is not known at t = 0\.07: a file"):
+        load.time(0.07)
+
+
+def test_controllers_are_not_saved(shared_path):
+    base = cantilever()
+    turn = ub.Turn(ub.ground(0, 0), base.beams[0].end, ub.Controller(lambda now: 0.1 * now.t))
+    spring = ub.Turn(ub.ground(0, 0), base.beams[0].end, ub.Function(lambda e, rate: 2 * e))
+    scene = ub.Scene(base.beams, supports=base.supports, connectors=[turn, spring])
+    solution = swing(scene)
+    loaded = saved(solution, shared_path)
+    require_same(loaded, solution)
+    with pytest.raises(ub.SceneError, match="<lambda> is not in the file of the solution"):
+        swing(loaded.scene)
+
+
+# -- names -----------------------------------------------------------------------------------------
+
+
+def test_beams_and_bodies_by_name():
+    scene = machine()
+    assert scene["left"] is scene.beams[1]
+    assert scene["b"] is scene.bodies[1]
+    with pytest.raises(ub.SceneError, match="no beams and bodies are called 'roof'; there is"):
+        scene["roof"]
+    two = [ub.Beam((0, k), (1, k), ub.Section(**STEEL)) for k in (0, 1)]
+    with pytest.raises(ub.SceneError, match="2 beams and bodies are called 'beam'"):
+        ub.Scene(two)["beam"]
+
+
+# -- what is in the scene --------------------------------------------------------------------------
+
+
+def test_numbers_are_exact():
+    law = ub.Hardening(limit=math.inf, modulus=0.1, kinematic=1 / 3, viscosity=ub.Perzyna(1e-300))
+    spring = ub.Spring(math.nextafter(1, 2), law, ub.LinearSoftening(0.1, 1e22))
+    assert from_data(json.loads(json.dumps(to_data(spring)))) == spring
+    stop = ub.Stop(2, low=-math.inf, high=0.0)
+    assert from_data(json.loads(json.dumps(to_data(stop)))) == stop
+    random = ub.TruncatedNormal(1.0, 0.1, seed=7)
+    assert from_data(to_data(random)) == random
+
+
+def test_each_record_of_the_package_can_be_saved():
+    assert {"Beam", "Body", "Connector", "Joint", "Scene", "Support", "Table"} <= set(RECORDS)
+    assert all(kind.__module__.startswith("ufl_beam.") for kind in RECORDS.values())
+
+
+class Odd(ub.Hardening):
+    """A law of a user."""
+
+
+def test_records_of_others_are_refused(shared_path):
+    section = ub.Section(**STEEL, bending=Odd(limit=1e9))
+    beam = ub.Beam((0, 0), (1, 0), section, cells=2)
+    solution = swing(ub.Scene([beam], supports=[ub.Clamped(beam.start)]))
+    with pytest.raises(ub.SceneError, match="cannot be saved: Odd is no record of ufl_beam"):
+        solution.save(shared_path / "a.h5")
+    assert not (shared_path / "a.h5").exists()
+
+
+# -- files -----------------------------------------------------------------------------------------
+
+
+def test_others_can_read_it(shared_path, on_first_rank):
+    solution = swing()
+    solution.save(shared_path / "a.h5")
+
+    def motion():
+        with h5py.File(shared_path / "a.h5") as file:
+            return file["history/q"][()]
+
+    assert same(on_first_rank(motion), solution.q)
+    assert on_first_rank(lambda: [path.name for path in shared_path.iterdir()]) == ["a.h5"]
+
+
+def test_a_second_file_replaces_the_first(shared_path):
+    swing().save(shared_path / "a.h5")
+    solution = swing(every=2)
+    require_same(saved(solution, shared_path), solution)
+
+
+def spoil(change):
+    def do(path):
+        with h5py.File(path, "r+") as file:
+            change(file)
+
+    return do
+
+
+def renamed(file):
+    text = json.loads(file["text"][()])
+    text["scene"]["records"][-1]["odd"] = 1
+    del file["text"]
+    file["text"] = json.dumps(text)
+
+
+def renumbered(file):
+    text = json.loads(file["text"][()])
+    text["numbering"] += 1
+    del file["text"]
+    file["text"] = json.dumps(text)
+
+
+SPOILT = {
+    "nothing": (lambda path: path.unlink(), "there is no such file"),
+    "text": (lambda path: path.write_text("hello"), "holds no solution of ufl_beam, or is damaged"),
+    "empty": (lambda path: path.write_bytes(b""), "holds no solution of ufl_beam, or is damaged"),
+    "half": (
+        lambda path: path.write_bytes(path.read_bytes()[:5000]),
+        "holds no solution of ufl_beam, or is damaged",
+    ),
+    "HDF5": (lambda path: h5py.File(path, "w").close(), "the file holds no solution of ufl_beam$"),
+    "later": (
+        spoil(lambda file: file.attrs.modify("format", "solution of ufl_beam, 9")),
+        "is a solution of ufl_beam, 9, and this version of ufl_beam reads number 1",
+    ),
+    "array": (spoil(lambda file: file.__delitem__("history/q")), "or is damaged"),
+    "record": (spoil(renamed), "the file is damaged: .*odd"),
+    "numbering": (spoil(renumbered), "which numbers degrees of freedom otherwise than this one"),
+}
+
+
+@pytest.mark.parametrize("kind", SPOILT)
+def test_other_files_are_refused(kind, shared_path, on_first_rank):
+    change, message = SPOILT[kind]
+    swing().save(shared_path / "a.h5")
+    on_first_rank(lambda: change(shared_path / "a.h5"))
+    with pytest.raises(ub.SceneError, match=message) as refused:
+        ub.load(shared_path / "a.h5")
+    assert str(shared_path / "a.h5") in str(refused.value)
+
+
+def test_paths_that_cannot_be_written(shared_path):
+    solution = swing()
+    with pytest.raises(ub.SceneError, match="there is no directory"):
+        solution.save(shared_path / "nowhere" / "a.h5")
+    with pytest.raises(ub.SceneError, match="save: path = 3 must be the name of a file"):
+        solution.save(3)
+
+
+# -- version ---------------------------------------------------------------------------------------
+
+
+def test_version():
+    project = (Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8")
+    (stated,) = re.findall(r'^version = "([^"]+)"', project, re.MULTILINE)
+    assert ub.__version__ == stated
+
+
+@pytest.mark.serial
+def test_version_of_an_installed_package(tmp_path, monkeypatch):
+    """Without a source tree around it the package asks its metadata."""
+    (tmp_path / "ufl_beam-9.8.7.dist-info").mkdir()
+    text = "Metadata-Version: 2.1\nName: ufl_beam\nVersion: 9.8.7\n"
+    (tmp_path / "ufl_beam-9.8.7.dist-info" / "METADATA").write_text(text)
+    source = Path(__file__).parents[2] / "ufl_beam" / "version.py"
+    (tmp_path / "ufl_beam").mkdir()
+    (tmp_path / "ufl_beam" / "version.py").write_text(source.read_text())
+    code = "from ufl_beam.version import version; print(version())"
+    command = [sys.executable, "-c", code]
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert done.stdout == "9.8.7\n"

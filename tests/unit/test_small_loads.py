@@ -1,0 +1,105 @@
+"""Loads of any size and units of any size: runs end, and answers are those of unit loads."""
+
+from mpi4py import MPI
+
+import numpy as np
+import pytest
+
+import ufl_beam as ub
+
+E = 1e9  # stiffness of a beam of 3 m that a spring of 2e9 N m/rad holds, and loads of 1 N
+
+
+def braced(force, unit=1.0, *, time=lambda t: t, rhoA=0.0):
+    """An inclined cantilever on a spring, and a second beam that a measured joint carries."""
+    section = ub.Section(EA=2.5 * E * unit, GA=0.5 * E * unit, EI=0.06 * E * unit, rhoA=rhoA * unit)
+    post = ub.Beam((0, 0), (1, 3), section, cells=4)
+    arm = ub.Beam((1, 3), (3, 3), section, cells=2)
+    ground = ub.ground(0, 0)
+    return ub.Scene(
+        [post, arm],
+        joints=[ub.Revolute(ground, post.start), ub.Rigid(post.end, arm.start, measured=True)],
+        connectors=[
+            ub.Turn(ground, post.start, ub.Spring(2 * E * unit)),
+            ub.Stretch(ub.ground(2, 0), arm.end, ub.Spring(0.01 * E * unit)),
+        ],
+        loads=[ub.PointLoad(arm.end, force=(force * unit, 0), time=time)],
+    )
+
+
+def ends(scene, scheme):
+    run = ub.simulate(scene, scheme, t=(0, 1), dt=0.25, progress=False)
+    assert run.parts == 4
+    return run.displacement(scene.beams[1].end)[-1]
+
+
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.ExactStatic(), ub.ExactStatic(0.5)], ids=str)
+def test_static_loads_down_to_nothing(scheme):
+    """Displacements are in proportion to loads from 1e-6 N, u/L of some 1e-14, to 1e-290 N.
+
+    So they are to the digits of a linear problem, some 1e-9 after its conditioning; a load of
+    1e-6 N strains no beam by more than 1e-14, so nothing is nonlinear.
+    """
+    unit = ends(braced(1e-6), scheme) / 1e-6
+    assert np.abs(unit).max() > 1e-10
+    for force in (1e-12, 1e-157, 1e-290):
+        found = ends(braced(force), scheme) / force
+        assert found == pytest.approx(unit, rel=1e-7)
+    # Displacements of some 1e-318 m have five digits, those below 5e-324 m are zero.
+    assert ends(braced(1e-308), scheme) / 1e-308 == pytest.approx(unit, rel=1e-3, abs=1e-12)
+    for force in (1e-322, 0.0):
+        assert np.isfinite(ends(braced(force), scheme)).all()
+
+
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.ExactStatic()], ids=str)
+def test_units_of_any_size(scheme):
+    """Stiffness and loads of any unit: the same motion, to the digits of its factors."""
+    unit = ends(braced(1e4), scheme)
+    # On several processes PETSc's own Newton method squares the residual.
+    power = 280 if MPI.COMM_WORLD.size == 1 else 140
+    for size in (10.0**power, 10.0**-power):
+        assert ends(braced(1e4, size), scheme) == pytest.approx(unit, rel=1e-7)
+
+
+def test_an_elastic_strain_keeps_its_digits():
+    """The axial strain of an inclined bar, N/EA, for forces far below the last digit of one."""
+    along = np.array([3.0, 4.0]) / 5
+    bar = ub.Beam((0, 0), (3, 4), ub.Section(EA=E, GA=E, EI=E), cells=3)
+    for force in (1.0, 1e-12, 1e-100):
+        load = ub.PointLoad(bar.end, force=tuple(force * along))
+        scene = ub.Scene([bar], supports=[ub.Clamped(bar.start)], loads=[load])
+        run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1, progress=False)
+        # Linear but for strains of 1e-9
+        assert run.section_forces(bar)[:, 0] == pytest.approx([force] * 3, rel=1e-8)
+
+
+def test_a_motion_comes_to_rest():
+    """A beam on a spring loses its motion: it goes through 1e-157 m, whose square is nothing, to
+    less than 1e-300 m, in steps without a cut."""
+    scene = braced(1e4, time=lambda t: float(t < 0.1), rhoA=100.0)
+    run = ub.simulate(scene, ub.Midpoint(0.45, 0.45), t=(0, 12), dt=0.01, progress=False)
+    assert run.parts == 1200
+    largest = np.abs(run.displacement(scene.beams[1].end)).max(axis=1)
+    assert np.isfinite(largest).all()
+    assert largest[-1] < 1e-300
+    assert ((largest > 1e-200) & (largest < 1e-157)).any()
+
+
+def test_small_motions_of_a_drive():
+    """A motor of 1e-20 rad is followed, not taken for none, and so is a distance of 1e-20 m."""
+    section = ub.Section(EA=E, GA=E, EI=E)
+    for size in (1e-3, 1e-20, 1e-200):
+        beam = ub.Beam((0, 0), (2, 1), section, cells=2)
+        ground = ub.ground(0, 0)
+        motor = ub.Turn(ground, beam.start, ub.Motor(lambda t, size=size: size * t))
+        scene = ub.Scene([beam], joints=[ub.Revolute(ground, beam.start)], connectors=[motor])
+        run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, progress=False)
+        assert run.displacement(beam.end)[-1, 2] == pytest.approx(size, rel=1e-9)
+
+        beam = ub.Beam((0, 0), (2, 1), section, cells=2)
+        jack = ub.Stretch(ub.ground(2, 0), beam.end, ub.Motor(lambda t, size=size: size * t))
+        scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], connectors=[jack])
+        run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, progress=False)
+        # The jack stands upright; turning it matters to the square of the motion over its length.
+        assert run.connector(jack).motion[-1] == pytest.approx(size, rel=1e-9)
+        assert run.displacement(beam.end)[-1, 1] == pytest.approx(size, rel=1e-2)

@@ -1,0 +1,173 @@
+"""Static runs: loads that are there from the start, relaxation, first reactions, broken springs."""
+
+import numpy as np
+import pytest
+
+import ufl_beam as ub
+
+
+def cantilever(*loads, supports=(), **section):
+    """A cantilever of 1 m with L/r = 1000, or what `section` says; loads are made of the beam."""
+    numbers = {"EA": 1e6, "GA": 1e6 / 3, "EI": 1.0} | section
+    beam = ub.Beam((0, 0), (1, 0), ub.Section(**numbers), cells=4)
+    clamp = ub.Clamped(beam.start)
+    return beam, ub.Scene(
+        [beam],
+        supports=[clamp, *(make(beam) for make in supports)],
+        loads=[make(beam) for make in loads],
+    )
+
+
+def run(scene, scheme, t=(0, 1), dt=0.1, **more):
+    return ub.simulate(scene, scheme, t=t, dt=dt, progress=False, **more)
+
+
+# -- loads that are there from the start ---------------------------------------------------------
+
+STEADY = {
+    "dead": lambda b: ub.PointLoad(b.end, force=(0, -1.0)),
+    "strong": lambda b: ub.PointLoad(b.end, force=(0, -10.0)),
+    "follower": lambda b: ub.FollowerLoad(b.end, force=(0, -5.0)),
+    "line": lambda b: ub.LineLoad(b, force=(0, -10.0)),
+}
+
+
+@pytest.mark.parametrize("load", STEADY.values(), ids=STEADY)
+@pytest.mark.parametrize("theta", [0.5, 0.75, 1.0])
+def test_steady_loads(load, theta):
+    """`ExactStatic` arrives where `Static` does, in the first step, with an exact ledger.
+
+    The loads are applied in parts that turn no node by more than 0.02 rad: forces are in error by
+    (Δψ/2)² = 1e-4 at θ = 1/2.  At θ > 1/2 they are of first order in the last of these parts, of
+    which the rest of the step leaves a hundredth, and later steps nothing.
+    """
+    beam, scene = cantilever(load)
+    expected = run(scene, ub.Static()).displacement(beam.end)[-1]
+    found = run(scene, ub.ExactStatic(theta))
+    ends = found.displacement(beam.end)
+    assert (ends[0] == 0).all()
+    assert ends[1] == pytest.approx(expected, rel=2e-3, abs=2e-3)
+    assert ends[-1] == pytest.approx(expected, rel=1e-3, abs=1e-3)
+    assert found.energy.worst < 1e-9
+    # All of the work of the load is counted: at θ = 1/2 it is what is stored.
+    assert found.energy["loads"][1] > 0
+    if theta == 0.5:
+        assert found.energy["stored"] == pytest.approx(found.energy["loads"], rel=1e-9)
+
+
+def test_a_steady_motion_and_a_steady_actuator():
+    """A support and a force that are there from the start are applied in parts as well."""
+    lifted = [lambda b: ub.Prescribed(b.end, v=0.6)]
+    beam, scene = cantilever(supports=lifted)
+    ends = [
+        run(scene, scheme).displacement(beam.end)[-1] for scheme in (ub.Static(), ub.ExactStatic())
+    ]
+    assert ends[1] == pytest.approx(ends[0], rel=1e-6)
+
+    beam, scene = cantilever()
+    jack = ub.Stretch(ub.ground(1, -2), beam.end, ub.Actuator(lambda t: 2.0))
+    scene = ub.Scene([beam], supports=scene.supports, connectors=[jack])
+    ends = [
+        run(scene, scheme).displacement(beam.end)[-1] for scheme in (ub.Static(), ub.ExactStatic())
+    ]
+    assert np.abs(ends[0][1]) > 0.1
+    assert ends[1] == pytest.approx(ends[0], rel=1e-6)
+
+
+def test_loads_that_grow_are_not_applied_before():
+    """Nothing precedes the first step where loads begin at zero, nor in a run that goes on."""
+    _, scene = cantilever(lambda b: ub.PointLoad(b.end, force=(0, -1.0), time=lambda t: t))
+    first = run(scene, ub.ExactStatic())
+    assert first.parts == 10
+    again = run(scene, ub.ExactStatic(), t=(1, 2), start=first)
+    assert again.parts == 10
+
+
+# -- relaxation ------------------------------------------------------------------------------------
+
+
+def test_relaxation_is_not_cut():
+    """A beam that was bent in one second relaxes for five, with steps up to the relaxation time:
+    one step each, by either scheme; what it bears is of first order in the step."""
+    law = ub.Hardening(limit=5.0, modulus=10.0, viscosity=ub.DuvautLions(0.5))
+    _, scene = cantilever(
+        supports=[lambda b: ub.Prescribed(b.end, v=lambda t: 0.1 * min(t, 1.0))],
+        EI=100.0,
+        bending=law,
+    )
+    bent = run(scene, ub.Static())
+
+    def relaxed(scheme, dt):
+        rest = run(scene, scheme, t=(1, 6), dt=dt, start=bent)
+        assert rest.parts == round(5 / dt)
+        return rest.reaction(scene.supports[1])[-1, 1]
+
+    for scheme in (ub.Static(), ub.ExactStatic()):
+        coarse, middle, fine = (relaxed(scheme, dt) for dt in (0.5, 0.25, 0.125))
+        assert coarse == pytest.approx(fine, rel=0.02)
+        assert 1.5 < (coarse - middle) / (middle - fine) < 2.5
+
+
+# -- the first reaction ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.ExactStatic()], ids=str)
+def test_the_first_reaction(scheme):
+    """Zero in the undeformed scene; that of the equilibrium with which a run begins."""
+    growing = {"time": lambda t: min(t, 1.0)}
+    _, scene = cantilever(
+        lambda b: ub.PointLoad(b.end, force=(0, -0.2), **growing),
+        lambda b: ub.LineLoad(b, force=(0, -0.4), **growing),
+    )
+    clamp = scene.supports[0]
+    first = run(scene, scheme)
+    assert (first.reaction(clamp)[0] == 0).all()
+    assert np.isfinite(first.reaction(clamp)).all()
+    assert first.reaction(clamp)[-1, 1] == pytest.approx(0.6, rel=1e-9)
+    again = run(scene, scheme, t=(1, 2), start=first)
+    # The forces are those of the same equilibrium, a part of them right on the support; at the end
+    # of the run before, the exact scheme knows those over the step.
+    assert again.reaction(clamp)[0, 1:] == pytest.approx(first.reaction(clamp)[-1, 1:], rel=1e-4)
+    assert again.reaction(clamp)[0, 1:] == pytest.approx(again.reaction(clamp)[-1, 1:], rel=1e-3)
+
+
+# -- what has broken -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.ExactStatic(0.5), ub.ExactStatic()], ids=str)
+@pytest.mark.parametrize("dt", [0.1, 0.01])
+def test_a_broken_spring_stores_nothing(scheme, dt):
+    """It has dissipated its fracture energy, and the ledger is closed."""
+    limit, energy = 100.0, 50.0
+    body = ub.Body((1, 0), mass=1.0, inertia=1.0)
+    spring = ub.Spring(1e4, softening=ub.LinearSoftening(limit, energy))
+    stretch = ub.Stretch(ub.ground(0, 0), body.middle, spring)
+    pulled = ub.Prescribed(body.middle, u=lambda t: 2.0 * t, v=0, psi=0)
+    scene = ub.Scene([], bodies=[body], supports=[pulled], connectors=[stretch])
+    found = run(scene, scheme, dt=dt)
+    assert found.energy["stored"][-1] == 0.0
+    assert found.connector(stretch).force[-1] == 0.0
+    assert found.energy["hinges"][-1] == pytest.approx(energy, rel=1e-9)
+    if not isinstance(scheme, ub.Static):
+        assert found.energy.worst < 1e-9
+
+
+# -- orders ----------------------------------------------------------------------------------------
+
+
+def test_the_order_of_the_work_of_inelastic_laws():
+    """Of first order with θ = 1, of second with θ = 1/2; docs/schemes.md has the errors."""
+
+    def work(scheme, steps):
+        law = ub.Hardening(limit=5.0, viscosity=ub.DuvautLions(0.5))
+        _, scene = cantilever(
+            supports=[lambda b: ub.Prescribed(b.end, v=lambda t: 0.1 * min(t, 1.0))],
+            EI=100.0,
+            bending=law,
+        )
+        return run(scene, scheme, t=(0, 2), dt=1 / steps).energy["supports"][-1]
+
+    exact = work(ub.ExactStatic(0.5), 512)
+    for scheme, least, most in ((ub.ExactStatic(), 0.8, 1.2), (ub.ExactStatic(0.5), 1.5, 4.0)):
+        errors = [abs(work(scheme, steps) - exact) for steps in (16, 32)]
+        assert least < np.log2(errors[0] / errors[1]) < most

@@ -1,0 +1,386 @@
+"""Plastic hinges of zero length: plastic theory, closed forms, and the joints that they become."""
+
+import math
+
+import numpy as np
+import pytest
+
+import ufl_beam as ub
+
+EI, LENGTH, LIMIT = 1000.0, 2.0, 10.0  # N m², m, N m
+ELASTIC = ub.Section(EA=1e8, GA=1e8, EI=EI)
+MOVING = ub.Section(EA=1e5, GA=1e5, EI=100.0, rhoA=1.0, rhoI=1e-3)
+LAWS = [
+    ub.Softening(LIMIT, 5.0),
+    ub.LinearSoftening(LIMIT, 5.0),
+    ub.Hardening(LIMIT, modulus=30.0, kinematic=20.0),
+    ub.Hardening(LIMIT, modulus=30.0, viscosity=ub.Perzyna(2.0)),
+]
+EXACT = [ub.ExactStatic(0.5), ub.ExactStatic(), ub.Midpoint(), ub.Midpoint(0.1, 0.05)]
+
+
+def growing(t):
+    return t
+
+
+# -- plastic theory ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("by", ["section", "beam"])
+@pytest.mark.parametrize("cells", [4, 8])
+def test_collapse_of_a_portal(by, cells):
+    """[plastic theory] 4 M_p / h = 150 kN to 0.2 %, whatever the cells.
+
+    The rigid-plastic load is exceeded by the little that axial forces and large sways make of it:
+    second-order terms of a sway of 0.12 m in 4 m, 0.1 %.
+    """
+    steel = {"E": 210e9, "nu": 0.3, "rho": 7850.0}
+    height, width = 4.0, 6.0
+    law = ub.Softening(limit=150e3, energy=1e9)  # perfectly plastic to six digits
+    everywhere, ends = (law, {}) if by == "section" else (None, {0.0: law, 1.0: law})
+    column = ub.Section.i_shape(0.2, 0.2, 0.009, 0.015, **steel, hinge=everywhere)
+    girder = ub.Section.i_shape(0.5, 0.3, 0.02, 0.03, **steel)
+    left = ub.Beam((0, 0), (0, height), column, cells=cells, name="left", hinges=ends)
+    roof = ub.Beam((0, height), (width, height), girder, cells=8, name="roof")
+    right = ub.Beam((width, height), (width, 0), column, cells=cells, name="right", hinges=ends)
+    scene = ub.Scene(
+        beams=[left, roof, right],
+        joints=[ub.Rigid(left.end, roof.start), ub.Rigid(roof.end, right.start)],
+        supports=[ub.Clamped(left.start), ub.Clamped(right.end)],
+        loads=[ub.PointLoad(left.end, force=(1e3, 0), time=growing)],
+    )
+    assert len(scene.hinges) == 4
+    path = ub.follow(
+        scene, ub.Displacement(left.end, "u", 0.01), until=lambda now: now.displacement(left.end)[0] > 0.12
+    )  # fmt: skip
+    assert path.factor[-1] == pytest.approx(150.0, rel=2e-3)
+    assert all(abs(path.connector(hinge).motion[-1]) > 0.01 for hinge in scene.hinges)
+
+
+@pytest.mark.parametrize("law", [ub.Softening(LIMIT, 1e6), ub.Hardening(LIMIT)])
+def test_collapse_of_a_fixed_ended_beam(law):
+    """[plastic theory] 16 M/L² under a line load, hinges at both ends and at mid-span; 0.2 %."""
+    beam = ub.Beam((0, 0), (LENGTH, 0), ELASTIC, cells=8, hinges={0.0: law, 0.5: law, 1.0: law})
+    scene = ub.Scene(
+        [beam],
+        supports=[ub.Clamped(beam.start), ub.Prescribed(beam.end, v=0, psi=0)],
+        loads=[ub.LineLoad(beam, force=(0.0, -1.0), time=growing)],
+    )
+    middle = beam.at(0.5)
+    path = ub.follow(
+        scene, ub.Displacement(middle, "v", -1e-3), until=lambda now: now.displacement(middle)[1] < -0.02
+    )  # fmt: skip
+    assert path.factor[-1] == pytest.approx(16 * LIMIT / LENGTH**2, rel=2e-3)
+
+
+# -- the law at the place ------------------------------------------------------------------------
+
+
+def turned(law, motion, scheme, *, dt, end=1.0, s=0.0, rho=0.0, cells=2):
+    """Beam clamped at its start, whose end is turned as given: one moment along all of it."""
+    section = ub.Section(EA=1e6, GA=1e6, EI=EI, rhoA=rho, rhoI=1e-3 * rho)
+    beam = ub.Beam((0, 0), (LENGTH, 0), section, cells=cells, hinges={s: law})
+    scene = ub.Scene(
+        [beam], supports=[ub.Clamped(beam.start), ub.Prescribed(beam.end, psi=motion)]
+    )
+    return scene, ub.simulate(scene, scheme, t=(0, end), dt=dt, progress=False)
+
+
+def resistance(law, slip, rate=0.0):
+    """[closed] Moment after a slip one way, at a rate."""
+    if isinstance(law, ub.LinearSoftening):
+        return max(law.limit - law.limit**2 / (2 * law.energy) * slip, 0.0)
+    if isinstance(law, ub.Softening):
+        return law.limit * math.exp(-law.limit / law.energy * slip)
+    return law.limit + (law.modulus + law.kinematic) * slip + law.viscosity.eta * rate
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("s", [0.0, 0.3, 1.0])
+def test_moment_of_a_hinge(law, s):
+    """[closed] θ = M(α) L/EI + α: the moment on the law to 1e-9, the jump closed before exactly."""
+    dt, θ = 0.01, 0.3
+    scene, solution = turned(law, lambda t: θ * t, ub.Static(), dt=dt, s=s)
+    (hinge,) = scene.hinges
+    α, M, *_ = solution.connector(hinge)
+    ψ = θ * solution.times
+    closed = ψ * EI / LENGTH <= LIMIT
+    np.testing.assert_array_equal(α[closed], 0.0)
+    assert (np.diff(α[~closed]) > 0).all()
+    rate = np.diff(α, prepend=0.0) / dt
+    expected = [resistance(law, *slip) for slip in zip(α[~closed], rate[~closed], strict=True)]
+    np.testing.assert_allclose(M[~closed], expected, rtol=1e-9)
+    np.testing.assert_allclose(M * LENGTH / EI + α, ψ, rtol=1e-9, atol=1e-12)
+    at = solution.material_at(scene.beams[0].at(s))
+    np.testing.assert_array_equal(at.jump, α)
+    np.testing.assert_array_equal(at.forces[:, 2], M)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("scheme", EXACT)
+@pytest.mark.parametrize("dt", [0.1, 0.013])
+def test_ledger_of_cycles(law, scheme, dt):
+    """To and fro at any step: the ledger closes to 1e-9, nothing dissipated is given back."""
+    swing = ub.Table([0, 1, 2, 3], [0.0, 0.1, -0.15, 0.2])
+    rho = 0.01 if scheme.dynamic else 0.0
+    scene, solution = turned(law, swing, scheme, dt=dt, end=3.0, rho=rho)
+    energy = solution.energy
+    assert energy.worst < 1e-9
+    (hinge,) = scene.hinges
+    history = solution.connector(hinge)
+    assert history.motion.min() < 0 < history.motion.max()
+    assert np.diff(energy.lost["hinges"]).min() >= -1e-12 * energy.throughput
+    np.testing.assert_allclose(history.dissipated, energy.lost["hinges"], rtol=1e-12)
+    if isinstance(law, ub.Softening):
+        assert history.dissipated[-1] <= law.energy * (1 + 1e-12)
+        if not scheme.dynamic and scheme.theta == 0.5:
+            np.testing.assert_allclose(history.work, history.dissipated, rtol=1e-9, atol=1e-12)
+
+
+def test_kinematic_hardening_remembers_its_direction():
+    """[closed] Turned back, the moment flows at 2 limit below the one at the turn (Bauschinger)."""
+    law = ub.Hardening(LIMIT, kinematic=50.0)
+    there_and_back = ub.Table([0, 1, 2], [0.0, 0.2, 0.0])
+    scene, solution = turned(law, there_and_back, ub.Static(), dt=1 / 200, end=2.0)
+    α, M, *_ = solution.connector(scene.hinges[0])
+    top = np.argmax(α)
+    flows_back = top + np.flatnonzero(np.diff(α[top:]) < 0)[0] + 1
+    expected = M[top] - 2 * LIMIT + 50.0 * (α[flows_back] - α[top])
+    assert M[flows_back] == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("law", LAWS[:3])
+def test_a_limit_that_is_not_reached_changes_nothing(law):
+    """A thousandth above the largest moment the motion is that of the beam without a hinge.
+
+    To 1e-10: the multiplier of the hinge is one more unknown, and the solver's tolerance is 1e-10.
+    """
+
+    def cantilever(hinges):
+        beam = ub.Beam((0, 0), (LENGTH, 0), MOVING, cells=4, hinges=hinges)
+        return beam, ub.Scene(
+            [beam],
+            supports=[ub.Clamped(beam.start)],
+            loads=[ub.PointLoad(beam.end, force=(0.0, -1.0))],
+        )
+
+    beam, scene = cantilever({})
+    run = {"t": (0.0, 1.0), "dt": 0.01, "progress": False}
+    plain = ub.simulate(scene, ub.Midpoint(), **run)
+    moment = np.abs(plain.reaction(scene.supports[0])[1:, 2]).max()
+    factor = 1.001 * moment / LIMIT
+    same = type(law)(**{name: getattr(law, name) * factor for name in ("limit",)}, **{
+        name: value for name, value in vars(law).items() if name != "limit"
+    })  # fmt: skip
+    hinged, scene = cantilever({0.0: same})
+    solution = ub.simulate(scene, ub.Midpoint(), **run)
+    np.testing.assert_array_equal(solution.material_at(hinged.start).jump, 0.0)
+    there, here = plain.displacement(beam.end), solution.displacement(hinged.end)
+    np.testing.assert_allclose(here, there, rtol=0, atol=1e-10)
+
+
+# -- what a hinge becomes ------------------------------------------------------------------------
+
+
+def falling(hinge, scheme):
+    """Two metres of beam falling about a pin, with a hinge half-way, or a revolute joint."""
+    if hinge is None:
+        upper = ub.Beam((0, 0), (1, 0), MOVING, cells=4)
+        lower = ub.Beam((1, 0), (2, 0), MOVING, cells=4)
+        beams, joints = [upper, lower], [ub.Revolute(upper.end, lower.start)]
+    else:
+        beams, joints = [ub.Beam((0, 0), (2, 0), MOVING, cells=8, hinges={0.5: hinge})], []
+    scene = ub.Scene(
+        beams, joints=joints, supports=[ub.Pinned(beams[0].start)], loads=[ub.Gravity()]
+    )
+    solution = ub.simulate(scene, scheme, t=(0, 0.5), dt=0.01, progress=False)
+    assert solution.energy.worst < 1e-9
+    return solution.displacement(beams[-1].end)
+
+
+@pytest.mark.parametrize("scheme", [ub.Midpoint(), ub.Midpoint(0.05, 0.05), ub.DecayingMidpoint()])
+@pytest.mark.parametrize("law", [ub.Softening, ub.LinearSoftening])
+def test_without_a_limit_it_is_a_revolute_joint(law, scheme):
+    """The same motion, to what a tolerance of 1e-10 leaves after 50 steps of large rotations."""
+    joint = falling(None, scheme)
+    np.testing.assert_allclose(falling(law(0.0, 1.0), scheme), joint, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(falling(law(1e-12, 1e-12), scheme), joint, rtol=0, atol=1e-9)
+
+
+def test_vibration_of_what_a_broken_hinge_leaves():
+    """A hinge without a limit has the frequencies of two beams in a revolute joint, to round-off."""
+    section = ub.Section(EA=1e6, GA=1e6, EI=EI, rhoA=1.0, rhoI=1e-3)
+    hinged = ub.Beam((0, 0), (2, 0), section, cells=8, hinges={0.5: ub.Softening(0.0, 1.0)})
+    one, two = (ub.Beam((x, 0), (x + 1, 0), section, cells=4) for x in (0, 1))
+    whole = ub.Scene([hinged], supports=[ub.Clamped(hinged.start), ub.Pinned(hinged.end)])
+    parts = ub.Scene(
+        [one, two], joints=[ub.Revolute(one.end, two.start)],
+        supports=[ub.Clamped(one.start), ub.Pinned(two.end)],
+    )  # fmt: skip
+    np.testing.assert_allclose(ub.modes(whole, 3).omega, ub.modes(parts, 3).omega, rtol=1e-7)
+
+
+# -- where hinges are ----------------------------------------------------------------------------
+
+
+def corner(*laws, joint=ub.Rigid, **more):
+    """Beams that meet at the origin, each with a hinge there, clamped at their other ends."""
+    beams = [
+        ub.Beam((0, 0), (math.cos(a), math.sin(a)), ELASTIC, cells=2, hinges={} if law is None else {0.0: law})
+        for a, law in enumerate(laws)
+    ]  # fmt: skip
+    supports = [ub.Clamped(beam.end) for beam in beams]
+    more = {name: make(beams) for name, make in more.items()}
+    joints = [joint(*(beam.start for beam in beams))]
+    return ub.Scene(beams, joints=joints, supports=supports, **more)
+
+
+WEAK, STRONG = ub.Softening(1.0, 1.0), ub.Softening(2.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("laws", "hinged"),
+    [
+        ((STRONG, WEAK), [1]),
+        ((WEAK, STRONG), [0]),
+        ((WEAK, WEAK), [0]),
+        ((WEAK, None), [0]),
+        ((ub.Hardening(1.0), STRONG), [0]),
+        ((ub.Hardening(1.0, modulus=1.0), STRONG), [0, 1]),  # it may exceed the other limit
+        ((WEAK, WEAK, WEAK), [0, 1, 2]),
+        ((ub.Softening(math.inf, 1.0), STRONG), [1]),
+    ],
+)
+def test_hinges_where_members_meet(laws, hinged):
+    """Two members have the same moment: the weaker one has the hinge; of three all have one."""
+    scene = corner(*laws)
+    assert [scene.beams.index(hinge.a.beam) for hinge in scene.hinges] == hinged
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"loads": lambda beams: [ub.PointLoad(beams[0].start, moment=1.0)]},
+        {"masses": lambda beams: [ub.PointMass(beams[1].start, 1.0, inertia=1.0)]},
+        {"connectors": lambda beams: [
+            ub.Turn(ub.ground(0, 0), beams[0].start, ub.Spring(1.0))
+        ]},
+    ],
+)  # fmt: skip
+def test_what_bears_a_moment_leaves_both_hinges(more):
+    """A moment, rotary inertia or a spring at the joint makes the moments differ."""
+    assert len(corner(WEAK, STRONG, **more).hinges) == 2
+
+
+def test_no_hinge_where_no_moment_is():
+    """Free and pinned ends, revolute joints: nothing of a hinge, though the section has one."""
+    section = ub.Section(EA=1e6, GA=1e6, EI=EI, hinge=WEAK)
+    free, pinned = (ub.Beam((0, y), (1, y), section, cells=2) for y in (0, 1))
+    scene = ub.Scene(
+        [free, pinned], supports=[ub.Clamped(free.start), ub.Pinned(pinned.start), ub.Roller(pinned.end)]
+    )  # fmt: skip
+    assert [str(hinge.a) for hinge in scene.hinges] == [str(free.start)]
+    assert corner(WEAK, WEAK, joint=ub.Revolute).hinges == ()
+
+
+# -- properties ----------------------------------------------------------------------------------
+
+
+def frame(angle=0.0, length=1.0, force=1.0, reverse=False):
+    """A two-bar frame whose hinges open and close; in other units and directions, reversed."""
+
+    def at(x, y):
+        c, s = math.cos(angle), math.sin(angle)
+        return length * (c * x - s * y), length * (s * x + c * y)
+
+    section = ub.Section(
+        EA=1e5 * force, GA=1e5 * force, EI=100.0 * force * length**2,
+        rhoA=force / length**2, rhoI=1e-3 * force,
+    )  # fmt: skip
+    moment = force * length
+    soft = ub.Softening(2.0 * moment, 0.5 * moment)
+    hard = ub.Hardening(3.0 * moment, modulus=5.0 * moment, kinematic=2.0 * moment)
+    post = ub.Beam(at(0, 0), at(0, 1), section, cells=4, hinges={0.0: soft})
+    ends = [at(0, 1), at(1.5, 1)]
+    hinges = {0.25: hard, 1.0: soft}
+    if reverse:
+        ends.reverse()
+        hinges = {1 - s: law for s, law in hinges.items()}
+    arm = ub.Beam(*ends, section, cells=8, hinges=hinges)
+    near, far = (arm.end, arm.start) if reverse else (arm.start, arm.end)
+    push = ub.Table([0, 0.2, 0.4, 0.6], [0, 1, -1, 0.5])
+    x, y = at(2.0 * force / length, -6.0 * force / length)
+    scene = ub.Scene(
+        [post, arm],
+        joints=[ub.Rigid(post.end, near)],
+        supports=[ub.Clamped(post.start), ub.Prescribed(far, psi=0)],
+        loads=[ub.PointLoad(far, force=(x, y), time=push)],
+    )
+    solution = ub.simulate(scene, ub.Midpoint(0.02, 0.02), t=(0, 0.8), dt=0.005, progress=False)
+    u = solution.displacement(far)[:, :2] / length
+    c, s = math.cos(angle), math.sin(angle)
+    lost = solution.energy.lost["hinges"] / moment
+    jumps = [solution.connector(hinge).motion for hinge in scene.hinges]
+    return np.column_stack([c * u[:, 0] + s * u[:, 1], -s * u[:, 0] + c * u[:, 1], lost]), jumps
+
+
+def test_the_frame_opens_closes_and_turns_back():
+    """All three hinges move, one of them both ways."""
+    _, jumps = frame()
+    assert all(np.abs(jump).max() > 1e-3 for jump in jumps)
+    assert any(np.diff(jump).min() < 0 < np.diff(jump).max() for jump in jumps)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"angle": 2.3}, {"length": 1e3, "force": 1e-6}, {"reverse": True}],
+    ids=["rotated", "units", "reversed"],
+)
+def test_invariance(change):
+    """Turned, in other units, with a beam given from its other end: the same motion.
+
+    To 1e-8 of the motion: 160 steps of a tolerance of 1e-10.
+    """
+    np.testing.assert_allclose(frame(**change)[0], frame()[0], rtol=0, atol=1e-8)
+
+
+# -- rigid-plastic connectors --------------------------------------------------------------------
+
+
+def test_a_block_that_slips():
+    """[closed] F(t) = 3 t on m = 2 against 1 + H x: at rest until t = 1/3, then x'' = (3 t - 1 - H x)/m.
+
+    With ω² = H/m: x = (3/H) (τ - sin(ω τ)/ω), τ = t - 1/3; second order in the step.
+    """
+    m, H = 2.0, 8.0
+    block = ub.Body((1, 0), mass=m, inertia=1.0)
+    law = ub.RigidPlastic(ub.Hardening(1.0, modulus=H))
+    scene = ub.Scene(
+        bodies=[block],
+        joints=[ub.Prismatic(ub.ground(0, 0), block.middle)],
+        connectors=[ub.Slide(ub.ground(0, 0), block.middle, law)],
+        loads=[ub.PointLoad(block.middle, force=(3.0, 0.0), time=growing)],
+    )
+    ω, errors = math.sqrt(H / m), []
+    for n in (60, 120, 240):
+        solution = ub.simulate(scene, ub.Midpoint(), t=(0, 1.0), dt=1 / n, progress=False)
+        τ = np.maximum(solution.times - 1 / 3, 0.0)
+        x = 3 / H * (τ - np.sin(ω * τ) / ω)
+        errors.append(np.abs(solution.displacement(block.middle)[:, 0] - x).max())
+        assert solution.energy.worst < 1e-9
+    assert errors[0] < 1e-3
+    assert np.log2(errors[0] / errors[1]) > 1.8
+    assert np.log2(errors[1] / errors[2]) > 1.8
+
+
+@pytest.mark.parametrize(
+    ("law", "words"),
+    [
+        (3.0, "RigidPlastic: law = 3.0"),
+        (ub.Hardening(1.0, viscosity=ub.DuvautLions(1.0)), "DuvautLions relaxes an elastic stress"),
+    ],
+)
+def test_bad_laws_are_refused(law, words):
+    """A hinge of zero length has no elasticity."""
+    with pytest.raises(ub.SceneError, match=words):
+        ub.RigidPlastic(law)

@@ -1,0 +1,233 @@
+"""Diagnosis of singular tangents: the motion that meets no force, and what gives way in it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from mpi4py import MPI
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import coo_array, csc_array, diags_array, eye_array
+from scipy.sparse.linalg import splu
+
+from ufl_beam.compat import Array
+from ufl_beam.couplings import Couplings
+from ufl_beam.grid import Grid, Index
+
+if TYPE_CHECKING:
+    from ufl_beam.simulation import Simulation
+
+DENSE = 300
+"""Up to this number of unknowns the null vector comes from a singular value decomposition."""
+
+SINGULAR = 1e-12
+"""Singular values of an equilibrated matrix up to this part of its entries count as zero."""
+
+SHARE = 0.1
+"""Part of the largest motion from which on a motion or a deformation is named."""
+
+SOFT = 1e-3
+"""Part of its elastic stiffness up to which a connector or a cell gives way."""
+
+NAMED = 3
+"""Largest number of names in a list."""
+
+
+class Softest(NamedTuple):
+    """The motion that meets least resistance.
+
+    Attributes:
+        x: It, at all degrees of freedom; largest where one is a radian or the size of the scene.
+        motions: Sizes of its parts, those of forces zero; (grid.size,).
+        links: Sizes of the motions of connectors; (num_links,).
+        cells: Sizes of the strains of cells, see :func:`_strains`; (num_cells,).
+        yielding: Connectors, and cells, that have lost their stiffness in this motion.
+    """
+
+    x: Array
+    motions: Array
+    links: Array
+    cells: Array
+    yielding: tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]
+
+
+def singularity(simulation: Simulation, q: Array) -> str:
+    """Describe why the latest tangent of a simulation is singular, or nearly so; else empty.
+
+    All processes call it together, after a step has failed.
+
+    Args:
+        simulation: Holds the tangent.
+        q: The latest iterate at the local degrees of freedom, in the axes of the plane.
+    """
+    K, free = _free_matrix(simulation)
+    if not len(free) or not np.isfinite(K.data).all():
+        return ""
+    try:
+        size, vector = null_vector(K)
+    except (np.linalg.LinAlgError, RuntimeError):
+        return ""
+    x = np.zeros(simulation.grid.size)
+    x[free] = vector
+    grid, scene = simulation.grid, simulation.scene
+    motions: Array = np.abs(x)
+    turns = np.zeros(grid.size, dtype=bool)
+    turns[[*grid.dofs[:, 2], *grid.dofs_of_bodies[:, 2]]] = True
+    motions[~turns] /= scene.size
+    motions[grid.multipliers] = 0.0
+    largest = float(motions.max())
+    if not np.isfinite(largest):
+        return ""
+    if largest == 0.0:
+        forces = np.abs(x[grid.multipliers])
+        names = [str(scene.links[i]) for i in _named(forces / forces.max())]
+        said = f"the tangent stiffness is singular: {_list(names)} hold the same motion twice"
+        return said if size <= SINGULAR else ""
+    found = _softest(simulation, q, *map(np.asarray, (x / largest, motions / largest)))
+    mechanism = not (_deforms(found, 1) | _deforms(found, 0)) and any(
+        part.any() for part in found.yielding
+    )
+    if size <= SINGULAR:
+        return f"the tangent stiffness is singular: {_describe(simulation, found)}"
+    return f"a mechanism has formed: {_describe(simulation, found)}" if mechanism else ""
+
+
+def _softest(simulation: Simulation, q: Array, x: Array, motions: Array) -> Softest:
+    """What a motion deforms, and what has lost its stiffness there."""
+    grid, scene, share = simulation.grid, simulation.scene, simulation.share
+    here, ε = x[share.dofs], 1e-6
+    links, left = np.zeros(len(scene.links)), np.ones(len(scene.links))
+    for one in simulation.couplings:
+        change = (one.motion(q + ε * here) - one.motion(q - ε * here)) / (2 * ε)
+        links[one.numbers] = np.abs(change)
+        if isinstance(one, Couplings):
+            left[one.numbers] = one.response.remaining()
+    links /= np.where([link.turns for link in scene.links], 1.0, scene.size)
+    strains, left_of_cells = _strains(grid, share.gather(q), x), np.ones(len(grid.cells))
+    for inelastic in simulation.inelastic:
+        cells, _ = inelastic.kept()
+        left_of_cells[cells] = inelastic.points.remaining(strains[cells])
+    if share.comm.size > 1:
+        share.comm.Allreduce(MPI.IN_PLACE, links)
+        share.comm.Allreduce(MPI.IN_PLACE, left, op=MPI.MIN)
+        share.comm.Allreduce(MPI.IN_PLACE, left_of_cells, op=MPI.MIN)
+    strains[:, :2] /= scene.size
+    sizes = np.abs(strains).max(axis=1, initial=0.0)
+    yielding = (left <= SOFT) & (links >= SHARE), (left_of_cells <= SOFT) & (sizes >= SHARE)
+    return Softest(x, motions, links, sizes, yielding)
+
+
+def _deforms(found: Softest, of: int) -> bool:
+    """Whether connectors (0) or cells (1) deform that have their stiffness."""
+    sizes = (found.links, found.cells)[of]
+    return bool((sizes[~found.yielding[of]] >= SHARE).any())
+
+
+def _free_matrix(simulation: Simulation) -> tuple[csc_array, Index]:
+    """The tangent of the whole scene at what supports leave free; and these degrees of freedom."""
+    share, A, held = simulation.share, simulation.tangent, simulation.supports.dofs
+    here = (share.dofs[A.rows()], share.dofs[A.indices], A.data, share.dofs[held])
+    parts = share.comm.allgather(here) if share.comm.size > 1 else [here]
+    rows, columns, data, of_all = (np.concatenate(x) for x in zip(*parts, strict=True))
+    n = share.grid.size
+    free = np.setdiff1d(np.arange(n), of_all)
+    K = coo_array((data, (rows, columns)), shape=(n, n)).tocsc()
+    return csc_array(K[:, free][free]), free
+
+
+def null_vector(K: csc_array) -> tuple[float, Array]:
+    """The vector that a matrix makes least of, when its rows and columns are scaled to size one.
+
+    Returns:
+        How much it makes of it, without dimension; and the vector, in the units of the unknowns.
+    """
+    scaled, factors = _equilibrated(K)
+    n = scaled.shape[0]
+    if n <= DENSE:
+        _, sizes, vectors = np.linalg.svd(scaled.toarray())
+        return float(sizes[-1]), factors * vectors[-1]
+    # A shift far below the entries makes the factors those of a regular matrix.
+    shifted = splu(csc_array(scaled + SINGULAR * eye_array(n)))
+    y: Array = np.random.default_rng(0).normal(size=n)
+    for _ in range(20):
+        y = shifted.solve(shifted.solve(y / np.linalg.norm(y), trans="T"))
+    y /= np.linalg.norm(y)
+    return float(np.linalg.norm(scaled @ y)), factors * y
+
+
+def _equilibrated(K: csc_array) -> tuple[csc_array, Array]:
+    """A matrix whose rows and columns have largest entries of about one; factors of the columns."""
+    n = K.shape[0]
+    columns = np.ones(n)
+    for _ in range(10):
+        sizes = abs(K)
+        by_row, by_column = (np.asarray(sizes.max(axis=k).todense()).ravel() for k in (1, 0))
+        r, c = (1 / np.sqrt(np.where(x > 0, x, 1.0)) for x in (by_row, by_column))
+        K = csc_array(diags_array(r) @ K @ diags_array(c))
+        columns *= c
+    return K, columns
+
+
+def _describe(simulation: Simulation, found: Softest) -> str:
+    """Words for a motion that meets no force."""
+    grid, scene = simulation.grid, simulation.scene
+    moving = np.where(found.motions >= 1 / 2, found.motions, 0.0)
+    parts = [_component(words) for words in grid.worst(moving)]
+    elastic = np.where(found.yielding[1], 0.0, found.cells)
+    if elastic.max(initial=0.0) >= SHARE:
+        return (
+            f"the forces no longer resist a motion that is largest in {_list(parts)}, as at a "
+            "limit load or a bifurcation"
+        )
+    said = f"{_list(parts)} {'is' if len(parts) == 1 else 'are'} held by nothing"
+    ways = [str(scene.links[i]) for i in _named(np.where(found.yielding[0], found.links, 0.0))]
+    ways += [_cell(grid, i) for i in _named(np.where(found.yielding[1], found.cells, 0.0))]
+    if ways:
+        give = "gives way" if len(ways) == 1 else "give way together"
+        said += f"; {_list(ways)} {give} at no further force"
+    return said
+
+
+def _strains(grid: Grid, q: Array, x: Array) -> Array:
+    """Strains times the lengths of the cells that a small motion ``x`` makes; (num_cells, 3).
+
+    Elongation and shear of the chord in m, bending in rad.
+    """
+    first, last = grid.cells[:, 0], grid.cells[:, 1]
+    position, motion = grid.points + q[grid.dofs[:, :2]], x[grid.dofs]
+    d = position[last] - position[first]
+    across = np.column_stack([-d[:, 1], d[:, 0]])
+    change = motion[last] - motion[first]
+    ψ = (motion[first, 2] + motion[last, 2]) / 2
+    apart = change[:, :2] - ψ[:, None] * across
+    length = np.linalg.norm(d, axis=1)
+    along, shear = (np.sum(apart * axis, axis=1) / length for axis in (d, across))
+    return np.column_stack([along, shear, change[:, 2]])
+
+
+def _named(sizes: Array) -> Index:
+    """The largest of those that are large enough to be named."""
+    order = np.argsort(-sizes, kind="stable")
+    return order[sizes[order] >= SHARE]
+
+
+def _component(words: str) -> str:
+    """A degree of freedom as :meth:`Grid.describe` says it, with a noun."""
+    component, _, place = words.partition(" of ")
+    return f"the {'rotation' if component == 'psi' else f'displacement {component}'} of {place}"
+
+
+def _cell(grid: Grid, number: int) -> str:
+    """A cell in words: its beam and its middle."""
+    beam = grid.scene.beams[grid.beam_of_cell[number]]
+    x, y = grid.points[grid.cells[number]].mean(axis=0)
+    return f"{beam.name} at ({x:g}, {y:g})"
+
+
+def _list(names: list[str]) -> str:
+    """Names in a sentence, the first ones of many."""
+    names, more = names[:NAMED], len(names) - NAMED
+    if more > 0:
+        return f"{', '.join(names)} and {more} more"
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
