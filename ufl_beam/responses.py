@@ -360,9 +360,9 @@ class _Asked(_Working):
         the sixth derivative of a law that bends over a thirtieth of the scene or more.
         """
         ε = self._small
-        stencil = ((-2, -1), (-1, 16), (0, -30), (1, 16), (2, -1))
-        bends: Array = sum(weight * self._forces(e1 + k * ε) for k, weight in stencil)
-        return np.asarray(-bends / (12 * ε**2))
+        weights = np.array([-1.0, 16.0, -30.0, 16.0, -1.0])
+        forces = np.array([self._forces(e1 + k * ε) for k in range(-2, 3)])
+        return np.asarray(-(weights @ forces) / (12 * ε**2))
 
 
 def _given(link: Connector, force: Any, motion: Any, rate: Any) -> float:

@@ -67,7 +67,7 @@ from ufl_beam.solution import Solution
 from ufl_beam.solve import Border, Newton, Solver
 from ufl_beam.sparse import Csr, Product, as_slice
 from ufl_beam.supports import Supports
-from ufl_beam.terms import KINDS, Beams, ElasticBeams, Inertia, Term
+from ufl_beam.terms import KINDS, Beams, Cells, ElasticBeams, Inertia, Term
 
 SMALLEST_PART = 2**12
 """A step is cut into at most this number of parts."""
@@ -189,7 +189,7 @@ class Simulation(Live):
         self.ledger = Ledger()
         self.parts = 0
 
-        self.beams: list[Beams] = []
+        self.beams: list[Cells] = []
         self.inelastic: list[InelasticBeams] = []
         self._numerical: list[Term] = []
         self._make_beams()

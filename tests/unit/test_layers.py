@@ -140,8 +140,9 @@ def test_records_need_no_machinery(module):
 
 
 PETSC = {
-    "compat", "eigen", "equation", "factorisation", "factors", "native", "solve", "sparse",
-}  # fmt: skip
+    *{"compat", "eigen", "equation", "factorisation", "factors"},
+    *{"line_search", "native", "solve", "sparse"},
+}
 
 
 def test_only_what_solves_imports_petsc():

@@ -3,6 +3,8 @@
 import subprocess
 import sys
 
+from mpi4py import MPI
+
 import pytest
 
 import ufl_beam as ub
@@ -23,6 +25,12 @@ def run(folder, *more, t1=0.05):
         checkpoint=ub.Checkpoint(folder / "run.h5", every=1),
         progress=False,
     )
+
+
+def is_free(folder):
+    """Whether no lock is left, once all processes are here."""
+    MPI.COMM_WORLD.barrier()
+    return not (folder / "run.h5.lock").exists()
 
 
 class Within(ub.Recorder):
@@ -61,11 +69,12 @@ def test_a_second_run_is_refused_before_it_touches_a_file(shared_path):
         with pytest.raises(ub.SceneError, match=r"run\.h5 is in use: process \d+ on .* writes it"):
             run(shared_path)
         assert contents() == before
+        MPI.COMM_WORLD.barrier()  # before one of them goes on to write
 
     within = Within(second)
     run(shared_path, within)
     assert within.steps == 5
-    assert not (shared_path / "run.h5.lock").exists()
+    assert is_free(shared_path)
 
 
 @pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
@@ -75,7 +84,7 @@ def test_a_run_that_fails_lets_go(shared_path, error):
 
     with pytest.raises(error):
         run(shared_path, Within(fail))
-    assert not (shared_path / "run.h5.lock").exists()
+    assert is_free(shared_path)
     run(shared_path, Within(lambda: None))
 
 
@@ -85,7 +94,7 @@ def test_a_run_that_is_refused_lets_go(shared_path):
         run(shared_path, t1=0.03)
     with pytest.raises(ub.SceneError, match="of another run"):
         run(shared_path, Within(lambda: None))
-    assert not (shared_path / "run.h5.lock").exists()
+    assert is_free(shared_path)
     run(shared_path)
 
 
