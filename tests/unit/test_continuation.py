@@ -19,7 +19,7 @@ def growing(t):
 
 def truss(*, time=growing, moved=False):
     """Two bars from their pins up to the apex, which a load of 1 kN pushes down."""
-    section = ub.Section(EA=EA, GA=EA, EI=1e9)
+    section = ub.Section(EA=EA, GA=EA, EI=1e9, depth=0.1)
     left = ub.Beam((-WIDTH, 0), (0, HEIGHT), section, cells=1, name="left")
     right = ub.Beam((0, HEIGHT), (WIDTH, 0), section, cells=1, name="right")
     push = ub.Prescribed(left.end, v=lambda t: -t)
