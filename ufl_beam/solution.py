@@ -16,10 +16,10 @@ from ufl_beam.beams import Beam, Curve, Place
 from ufl_beam.bodies import Anchor, Spot
 from ufl_beam.compat import Array
 from ufl_beam.connectors import Connector, Controller, Function, Guide, Joint
+from ufl_beam.curves import nearest, parameter_step
 from ufl_beam.errors import SceneError
 from ufl_beam.fields import Fields
 from ufl_beam.grid import Grid, Index, Share
-from ufl_beam.curves import nearest, parameter_step
 from ufl_beam.inelastic import Strains
 from ufl_beam.joints import Connection, JointHistory, links_of, motion_of, of_joint, velocity_of
 from ufl_beam.ledger import Energy
