@@ -25,7 +25,7 @@ SHEAR = 1e-5
 
 GA = EI / (SHEAR * LENGTH**2)
 pytestmark = pytest.mark.filterwarnings("ignore:.*the hinge of the section:ufl_beam.ModelWarning")
-"""Here the place of a hinge in the middle of its cell, however long that is, is part of the answer."""
+"""The middle of the cell, however long that is, is part of the answers here."""
 
 LAWS = [ub.Softening, ub.LinearSoftening]
 
