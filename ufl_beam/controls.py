@@ -42,16 +42,11 @@ class Plane:
         walk: What steps.
         normal: In the space of configurations and load factors.
         reach: How far.
-        gone: Where this is measured from, seen from the accepted state; from there without it.
     """
 
-    def __init__(
-        self, walk: Walk, normal: Direction, reach: float, gone: Direction | None = None
-    ) -> None:
+    def __init__(self, walk: Walk, normal: Direction, reach: float) -> None:
         self._total, self._normal, self._reach = walk.share.total, normal, reach
         self._q0, self._t0 = walk.simulation.q, walk.simulation.t
-        if gone is not None:
-            self._q0, self._t0 = self._q0 + gone.q, self._t0 + gone.t
 
     def miss(self, q: Array, t: float) -> float:
         """Part of the reach."""
@@ -134,12 +129,23 @@ def _across(walk: Walk, normal: Direction, reach: float, what: str) -> Trial:
             more = f"{failure}; perhaps {what} turns back here, where this control cannot follow"
             raise failure.saying(f"{more}: take ArcLength") from None
     gone, way = bend
-    return walk.attempt(_joined(gone, way, length(reach - along(gone), way)), 1.0, plane)
+    return _beyond(walk, gone, way, length(reach - along(gone), way))
 
 
-def _joined(gone: Direction, way: Direction, length: float) -> Direction:
-    """A direction, and so far along another one from its end."""
-    return Direction(gone.q + length * way.q, gone.t + length * way.t)
+def _beyond(walk: Walk, gone: Direction, way: Direction, length: float) -> Trial:
+    """Solve for a state beyond a bend of the path, about so far along ``way`` from its end.
+
+    The state is where as much is dissipated as there.  A plane may also be met by elastic
+    unloading, which begins in nearly the same direction.
+
+    Raises:
+        StepFailed: There is none.
+    """
+    whole = Direction(gone.q + length * way.q, gone.t + length * way.t)
+    reach = walk.dissipation(walk.simulation.q + whole.q)
+    if not reach > 0:
+        raise StepFailed("nothing dissipates beyond the state in which something opens")
+    return walk.attempt(whole, 1.0, Dissipated(walk, reach))
 
 
 # -- controls ----------------------------------------------------------------------------------
@@ -222,8 +228,7 @@ class ArcLength:
                 raise
         gone, unit = bend[0], self._unit(walk, bend[1])
         rest = max(reach - walk.length(gone, self.factor), SHORTEST * reach)
-        plane = Plane(walk, self._across(walk, unit), rest, gone)
-        return walk.attempt(_joined(gone, unit, rest), 1.0, plane)
+        return _beyond(walk, gone, unit, rest)
 
     def _unit(self, walk: Walk, way: Direction) -> Direction:
         """A direction of length one."""
