@@ -436,9 +436,7 @@ class Solver:
 
     def _find_motion(self) -> None:
         """Note the largest motion of the iterate in any process, at most the size of the scene."""
-        largest = lib.largest_motion(*self._norm, doubles(self._view(self._x)))
-        if self._parallel:
-            largest = self._share.comm.allreduce(largest, op=MPI.MAX)
+        largest = self._share.largest(lib.largest_motion(*self._norm, doubles(self._view(self._x))))
         self._course.moved = min(largest, self._course.scene)
 
     def _last_digits(self) -> Array:
