@@ -84,7 +84,9 @@ def singularity(simulation: Simulation, q: Array) -> str:
         names = [str(scene.links[i]) for i in _named(forces / forces.max())]
         said = f"the tangent stiffness is singular: {_list(names)} hold the same motion twice"
         return said if size <= SINGULAR else ""
-    found = _softest(simulation, q, *map(np.asarray, (x / largest, motions / largest)))
+    x /= largest
+    motions /= largest
+    found = _softest(simulation, q, x, motions)
     mechanism = not (_deforms(found, 1) | _deforms(found, 0)) and any(
         part.any() for part in found.yielding
     )

@@ -201,6 +201,15 @@ class Equation:
         _PETSC.SNESShellSetSolve(at, _in_c("snes_newton"))
 
 
+def unlock(vector: PETSc.Vec) -> None:
+    """Let a vector be written again that PETSc keeps locked after a linear solve has failed."""
+    at, state = ctypes.c_void_p(vector.handle), np.zeros(1, dtype=PETSc.IntType)
+    at_state = ctypes.c_void_p(state.ctypes.data)
+    _PETSC.VecLockGet(at, at_state)
+    for _ in range(max(0, int(state[0]))):
+        _PETSC.VecLockReadPop(at)
+
+
 def _address(function: str) -> int | None:
     """Where a function of PETSc is."""
     return ctypes.cast(getattr(_PETSC, function), ctypes.c_void_p).value

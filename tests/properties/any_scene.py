@@ -4,6 +4,9 @@
 draws are those of the seed; the statement decides only how the scene is stated.  Sizes follow from
 what the first beam makes natural: its length L, EI/L², its period.  They make motions that are
 large and yet regular: a scene whose motion depends on its last digits would show nothing.
+
+Scattered limits depend on where beams begin and end, to the last digit.  Scenes that have them can
+be compared in another order only.
 """
 
 import math
@@ -49,18 +52,18 @@ class _Writer(Laws):
 
     def __init__(self, seed, statement):
         self._random = np.random.default_rng(seed)
-        self._say = Numbers(statement)
+        self._scattered = self._chance(0.1)
+        self._say = Numbers(statement, places_stay=self._scattered)
         self._lists = {name: [] for name in PARTS}
         self._lines = [
-            f"# seed {seed}, {statement.name}", "import math", "import ufl_beam as ub", ""
+            f"# {'scattered, ' * self._scattered}seed {seed}, {statement.name}", "import math", "import ufl_beam as ub", ""
         ]  # fmt: skip
         self._statement, self._parts, self._anchors = statement, [], []
         self._flips = np.random.default_rng(statement.backwards)
         self._order = np.random.default_rng(statement.shuffled)
-        self._random_limits = False
         self._scales()
         self._scheme()
-        self._elastic = self._chance(0.3)
+        self._elastic = self._chance(0.3) and not self._scattered
         self._beam(None)
         for _ in range(self._integer(0, 3)):
             self._part()
