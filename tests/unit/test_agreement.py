@@ -1,4 +1,4 @@
-"""Exceptions in functions of the user under `mpirun`: raised by all processes, or the end of all."""
+"""Exceptions in functions of users under `mpirun`: raised by all processes, or the end of all."""
 
 import os
 import pickle
