@@ -18,6 +18,7 @@ PACKAGE = ROOT / "ufl_beam"
 MODULES = sorted(path.stem for path in PACKAGE.glob("*.py"))
 
 RECORDS = [
+    "axis_curves",
     "beams",
     "bodies",
     "connectors",
