@@ -134,7 +134,9 @@ def _across(walk: Walk, normal: Direction, reach: float, what: str) -> Trial:
             more = f"{failure}; perhaps {what} turns back here, where this control cannot follow"
             raise failure.saying(f"{more}: take ArcLength") from None
     gone, way = bend
-    return walk.attempt(_joined(gone, way, length(reach - along(gone), way)), 1.0, plane, hold=False)
+    return walk.attempt(
+        _joined(gone, way, length(reach - along(gone), way)), 1.0, plane, hold=False
+    )
 
 
 def _joined(gone: Direction, way: Direction, length: float) -> Direction:
