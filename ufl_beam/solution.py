@@ -195,6 +195,7 @@ class Solution:
             "numbering": self.grid.checksum(),
             "seconds": self.seconds,
             "time_error": self.time_error,
+            "open_ledger": self.open_ledger,
         }
         return text, self._arrays()
 
@@ -214,7 +215,8 @@ class Solution:
         self.resume(below("history/"))
         self.internal = below("internal/")
         self.parts, self.iterations = (int(n) for n in arrays["counts"])
-        self.seconds, self.time_error = text["seconds"], text["time_error"]
+        for name in ("seconds", "time_error", "open_ledger"):
+            setattr(self, name, text[name])
 
     def _sampled(self, owner: Any, field: str, function: Any) -> Any:
         """What is saved of a function of a user."""
@@ -227,7 +229,7 @@ class Solution:
         return lost(owner, field, function)
 
     def _used_curve(self, curve: Curve) -> SavedCurve:
-        """The part of a guide curve that was used, and a tenth more."""
+        """The part of a guide curve that was used, a tenth more, and what tangents need."""
         used = [0.0]
         for link in self.scene.links:
             if isinstance(link.law, Guide) and link.law.curve is curve:
@@ -237,7 +239,8 @@ class Solution:
                     s = nearest(curve, point, s, step, self.scene.size)
                     used.append(s)
         first, last = float(np.nanmin(used)), float(np.nanmax(used))
-        more = 0.1 * (last - first) or 1e-3
+        steps = (parameter_step(curve, s, self.scene.size) for s in (first, last))
+        more = 0.1 * (last - first) + 8 * max(steps)
         return SavedCurve.of(curve, first - more, last + more, (0.0,))
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -182,8 +182,8 @@ def test_names_with_odd_characters(name, shared_path, on_first_rank):
 def test_a_step_costs_the_same_at_any_time(recorder, tmp_path):
     """The whole recorder, of 8 cells: less than a millisecond, the thousandth step as the first.
 
-    Time of the processor, the best of twenty times fifty, since the machine has other work; a factor
-    of 3 for that as well.  A file that grew with the steps took 30 ms for the thousandth.
+    Time of the processor, the best of twenty times fifty, since the machine has other work; a
+    factor of 3 for that as well.  A file that grew with the steps took 30 ms for the thousandth.
     """
     beam = ub.Beam((0, 0), (4, 0), SECTION, cells=8)
     simulation = ub.Simulation(ub.Scene([beam], supports=[ub.Clamped(beam.start)]), ub.Midpoint())
