@@ -8,6 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ufl_beam.compat import Array
+from ufl_beam.grid import Index
 
 SCALINGS = 6
 """Passes of the scaling; each one takes the square root of the range of sizes."""
@@ -94,7 +95,7 @@ class Factorisation:
         return x
 
 
-def _scale(A: csr_array, rows: Array) -> Array:
+def _scale(A: csr_array, rows: Index) -> Array:
     """Powers of two by which rows and columns are multiplied: Ruiz's iteration."""
     scale = np.ones(A.shape[0])
     sizes = np.abs(A.data)

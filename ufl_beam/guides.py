@@ -15,6 +15,7 @@ from ufl_beam.responses import Setting
 from ufl_beam.schemes import Step
 from ufl_beam.sparse import Csr
 
+
 class Guides(Links):
     """Forces across curves; those over a step are across the chord, so that they do no work.
 
@@ -63,16 +64,12 @@ class Guides(Links):
         return on, t
 
     def _curvatures(self, n: Array) -> Array:
-        """Curvatures at the latest points, towards the normals ``n``; 1/m.
-
-        By second differences over 1e-4 of the scene, which leave 1e-8 of round-off.
-        """
+        """Curvatures at the latest points, towards the normals ``n``, by second differences; 1/m."""
         found = []
-        for law, s, normal in zip(self._laws, self._s, n, strict=True):
-            on, t = np.asarray(law.curve(s)), tangent(law.curve, s)
-            ε = 1e-4 * self._size / math.hypot(*t)
-            bend = np.add(law.curve(s + ε), law.curve(s - ε)) - 2 * on
-            found.append(float(normal @ bend) / (ε**2 * float(t @ t)))
+        for law, s, normal, step in zip(self._laws, self._s, n, self._steps, strict=True):
+            t = tangent(law.curve, s, step)
+            bend = np.add(law.curve(s + step), law.curve(s - step)) - np.multiply(2, law.curve(s))
+            found.append(float(normal @ bend) / (step**2 * float(t @ t)))
         return np.array(found)
 
     def _at(self, q: Array) -> Array:
@@ -98,10 +95,10 @@ class Guides(Links):
             d[k], bend[k] = self._in_the_middle(k)
         m, turning = (np.column_stack([-x[:, 1], x[:, 0]]) for x in (d, bend))
         distance = np.sum(n * (p - on), axis=1)
-        if not moves.all():
+        if not self._over_step.any():
             # The normal at the end turns by the curvature κ: dn = -κ t t.dp / (1 - κ distance).
             κ = self._curvatures(n)
-            turning = np.where(moves[:, None], turning, (-κ / (1 - κ * distance))[:, None] * t)
+            turning = (-κ / (1 - κ * distance))[:, None] * t
         return distance, n, m, np.einsum("ki,kj->kij", turning, t)
 
     def _in_the_middle(self, k: int) -> tuple[Array, Array]:

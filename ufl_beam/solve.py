@@ -16,7 +16,14 @@ import numpy as np
 from ufl_beam.agreement import Agreement
 from ufl_beam.compat import Array
 from ufl_beam.equation import Demand, Equation, unlock
-from ufl_beam.errors import SceneError, StepFailed, require_number
+from ufl_beam.errors import (
+    StepFailed,
+    require_count,
+    require_kind,
+    require_number,
+    require_switch,
+    require_text,
+)
 from ufl_beam.factors import Bordered, ChainsFirst
 from ufl_beam.grid import Index, Share
 from ufl_beam.line_search import SearchingNewton
@@ -56,7 +63,8 @@ class Newton:
             is saved grows with the number of cells; solutions end closer to ``rtol``.
         petsc: PETSc options without their prefix, such as ``{"snes_monitor": None}``; in
             ``PETSC_OPTIONS`` they have the prefix ``ub_``.  With any of them Newton's method is
-            that of PETSc, else one in C that does the same, faster where cells are few.
+            that of PETSc, else one in C that does the same, faster where cells are few.  A
+            ``snes_linesearch_type`` takes the place of the search that follows full steps.
     """
 
     rtol: float = 1e-10
@@ -66,8 +74,12 @@ class Newton:
 
     def __post_init__(self) -> None:
         require_number(self.rtol, "Newton: rtol", positive=True)
-        if self.max_iterations < 1:
-            raise SceneError(f"Newton: max_iterations = {self.max_iterations} must be at least 1")
+        require_count(self.max_iterations, "Newton: max_iterations")
+        object.__setattr__(self, "max_iterations", int(self.max_iterations))
+        require_switch(self.modified, "Newton: modified")
+        require_kind(self.petsc, dict, "Newton: petsc")
+        for option in self.petsc:
+            require_text(option, "Newton: petsc, an option")
 
 
 class Border(Protocol):
@@ -284,7 +296,10 @@ class Solver:
         return snes
 
     @cached_property
-    def _careful(self) -> SearchingNewton:
+    def _careful(self) -> PETSc.SNES | SearchingNewton:
+        chosen = {**PETSc.Options(PREFIX).getAll(), **self._newton.petsc}
+        if "snes_linesearch_type" in chosen:
+            return self._snes
         return SearchingNewton(
             self._snes,
             self._ksp,

@@ -69,6 +69,10 @@ class Beams(Term, Protocol):
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """Add the derivative of the tangent at ``q1`` along ``u``; no internal variable changes."""
 
+
+class Cells(Beams, Protocol):
+    """Beams whose tangent is known by its works, too, summed over cells from strains."""
+
     def tangent_works(self, q1: Array, u: Array, x: Array, y: Array) -> tuple[float, float]:
         """Works of the tangent for the motion x on y, and of its derivative along u; J."""
 

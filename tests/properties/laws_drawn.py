@@ -44,6 +44,7 @@ class Laws:
         EA, EI, rhoA = self._EA * stiff, self._EI * stiff, self._rhoA * heavy
         limit = self._M * stiff * self._size(-1.5, 0)
         kinds = ["resultants", "hinge", "both", "fibres", "fibres", "placed", "elastic"]
+        kinds = ["fibres", "placed"] if self._scattered else kinds
         drawn = self._one(kinds)
         kind = "elastic" if self._elastic else drawn
         self._asymmetric = False
@@ -102,7 +103,12 @@ class Laws:
         """Layers of a shape, or fibres that are placed to one side."""
         say, h = self._say, math.sqrt(12 * EI / EA)
         E, strength = EA / h**2, 6 * limit / h**3
-        law = self._hardening(say.number(strength, "Pa"), E, ("Pa", "Pa s"))
+        mean, scatter = say.number(strength, "Pa"), say.number(strength / 4, "Pa")
+        drawn = self._one([
+            f"ub.Normal({mean}, {scatter}, seed={i})", f"ub.Lognormal({mean}, {scatter}, seed={i})",
+            f"ub.TruncatedNormal({mean}, {scatter}, seed={i})", f"ub.Weibull({mean}, 3.0, seed={i})",
+        ])  # fmt: skip
+        law = self._hardening(drawn if self._scattered else mean, E, ("Pa", "Pa s"))
         size = strength * self._size(0, 0.5)
         crack = self._softening(size, size * h * self._size(-1, 0.5), ("Pa", "N/m"))
         crack = f", softening={crack}" if self._chance(0.4) else ""

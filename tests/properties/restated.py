@@ -19,6 +19,7 @@ class Run:
         source: The script.
         scene, solution: The scene, and what became of it; up to a failure if there is one.
         failure: Why it ended early; None otherwise.
+        scattered: Whether limits depend on the last digits of places.
         warnings: Messages of `ModelWarning`s of the run.
     """
 
@@ -39,6 +40,7 @@ class Run:
             except ub.ConvergenceError as error:
                 self.solution, self.failure = error.solution, str(error)
         self.warnings = [str(w.message) for w in caught]
+        self.scattered = self.source.startswith("# scattered")
         self.seconds = statement.unit("s")
 
     def motion(self):

@@ -49,9 +49,7 @@ class Statement:
 
     def unit(self, dimension):
         """What the unit of SI is in those of the statement."""
-        return math.prod(
-            u**p for u, p in zip(self.units, DIMENSIONS[dimension], strict=True)
-        )
+        return math.prod(u**p for u, p in zip(self.units, DIMENSIONS[dimension], strict=True))
 
     def turned(self, x, y):
         """A vector in the axes of the statement."""
@@ -94,27 +92,28 @@ class Numbers:
     Args:
         statement: How the scene is stated.
         change: Units of the last place by which numbers change where the statement says so.
+        places_stay: Whether the digits of places do not change in any case.
     """
 
-    def __init__(self, statement, change=4):
-        self.statement = statement
+    def __init__(self, statement, change=4, places_stay=False):
+        self.statement, self._places_stay = statement, places_stay
         self._signs = None if statement.digits is None else np.random.default_rng(statement.digits)
         self._change = change
 
-    def _text(self, x):
-        if self._signs is not None:
+    def _text(self, x, place=False):
+        if self._signs is not None and not (place and self._places_stay):
             x *= 1 + self._change * EPS * self._signs.choice([-1, 1])
         return "math.inf" if math.isinf(x) else repr(float(x))
 
     def number(self, x, dimension="1"):
         """A number of a dimension, given in SI."""
-        return self._text(x * self.statement.unit(dimension))
+        return self._text(x * self.statement.unit(dimension), place=dimension == "m")
 
     def point(self, xy):
         """A point, given in m."""
         x, y = self.statement.point(*xy)
         metre = self.statement.unit("m")
-        return f"({self._text(x * metre)}, {self._text(y * metre)})"
+        return f"({self._text(x * metre, place=True)}, {self._text(y * metre, place=True)})"
 
     def vector(self, xy, dimension="1"):
         """A vector of a dimension, given in SI."""
@@ -124,4 +123,4 @@ class Numbers:
 
     def direction(self, angle):
         """An angle from the first axis; rad."""
-        return self._text(angle + self.statement.angle)
+        return self._text(angle + self.statement.angle, place=True)

@@ -47,9 +47,9 @@ def state(simulation):
 @pytest.mark.parametrize("kind", LAWS)
 @pytest.mark.parametrize("scheme", [ub.ExactStatic(), ub.Midpoint(0.1, 0.1)], ids=str)
 def test_a_cut_step_is_its_parts(kind, scheme):
-    """Two failures cut a step into quarters: the same, to the last digit, as quarters from there.
+    """Two failures cut a step into quarters: the same as quarters from there.
 
-    Steps have the same ends, 1/64 s and its parts, so that even round-off is the same.
+    To the last digit in dynamics: steps have the same ends, 1/64 s and its parts.
     """
     scene = cantilever(kind)
     cut, fine = CutSteps(scene, scheme), ub.Simulation(scene, scheme)
@@ -63,8 +63,10 @@ def test_a_cut_step_is_its_parts(kind, scheme):
         for end in ends:
             fine.step_to(end / 64)
         assert cut.parts == fine.parts
+        # Parts of a static step take their motions between its ends, which is round-off here.
+        digits = 0.0 if scheme.dynamic else 1e-10
         for one, two in zip(state(cut), state(fine), strict=True):
-            assert (one == two).all()
+            np.testing.assert_allclose(one, two, rtol=digits, atol=digits)
     _, _, lost = cut.entries()  # of all processes, each of which has some of the cells
     assert lost["plastic"] > 0
     assert ("hinges" in lost) == (kind == "softening")
@@ -130,7 +132,7 @@ def test_one_hinge_among_fifty_cells():
     assert "hardening" not in solution.energy.state
     # [closed] The moment is uniform, of the hinge and of the curvature: M/EI L + jump = 1 rad
     M, jump = material.forces[-1, 2], material.jump[-1]
-    assert M == pytest.approx(5 * math.exp(-5 / 10 * jump), rel=1e-9)
+    assert pytest.approx(5 * math.exp(-5 / 10 * jump), rel=1e-9) == M
     np.testing.assert_allclose(solution.section_forces(beam)[:, 2], M, rtol=1e-9)
     assert M / 100 + jump == pytest.approx(1, rel=1e-9)
     assert solution.energy["hinges"][-1] == pytest.approx(10 * (1 - M / 5), rel=1e-9)

@@ -9,6 +9,7 @@ import pytest
 from time_series import read_vtkhdf, read_xdmf
 
 import ufl_beam as ub
+from ufl_beam.linearised import AT_REST, SmallMotions
 
 SECTION = ub.Section(EA=1e4, GA=4e3, EI=20.0, rhoA=0.5, rhoI=1e-3)
 
@@ -269,6 +270,67 @@ def test_pictures(tmp_path):
     assert (tmp_path / "modes.png").stat().st_size > (tmp_path / "one.png").stat().st_size > 1000
     assert "mode 0: " in str(found)
     assert "Hz" in found.titles[0]
+
+
+# -- the change of stiffness -----------------------------------------------------------------------
+
+
+def mixed():
+    """Beams elastic and not, a support at an angle, and connectors of all kinds that store."""
+    yielding = ub.Section(EA=1e3, GA=4e2, EI=10.0, bending=ub.Hardening(30.0, 0.2))
+    elastic = ub.Section(EA=1e3, GA=4e2, EI=10.0)
+    a = ub.Beam((0, 0), (0.3, 1), elastic, cells=2, name="a")
+    b = ub.Beam((0.3, 1), (1.5, 1.2), yielding, cells=3, name="b")
+    c = ub.Beam((1.5, 1.2), (2, 0), elastic, cells=2, name="c")
+    d = ub.Beam((0, 2), (1, 2.5), elastic, cells=2, name="d")
+    body = ub.Body((1, 2.7), mass=1.0, inertia=1.0, name="body")
+    return ub.Scene(
+        [a, b, c, d],
+        bodies=[body],
+        supports=[ub.Clamped(a.start), ub.Roller(c.end, along=(0.3, 1.0))],
+        joints=[
+            ub.Rigid(a.end, b.start, measured=True),
+            ub.Revolute(b.end, c.start),
+            ub.Revolute(d.end, body.at(1, 2.5), measured=True),
+            ub.Guided(d.start, lambda s: (s, 2 + 0.3 * s * s)),
+        ],
+        connectors=[
+            ub.Turn(b.end, c.start, ub.Spring(7.0)),
+            ub.Stretch(b.end, d.end, ub.Function(lambda x, v: 5 * x + 30 * x**2 + 20 * x**3)),
+            ub.Turn(body.middle, d.end, ub.Function(lambda x, v: 5 * x + 3 * x**2)),
+            ub.Turn(ub.ground(1, 2.7), body.middle, ub.Spring(3.0)),
+            ub.Stretch(a.at(0.5), d.start, ub.Spring(11.0)),
+        ],
+        loads=[ub.PointLoad(b.end, force=(0.1, -0.3), time=lambda t: t)],
+    )
+
+
+@pytest.mark.serial
+def test_change_of_stiffness_is_its_derivative():
+    """Against differences of fourth order of the stiffness itself, in any direction.
+
+    They leave 1e-8 of derivatives of 140 N or so, and the guide's curvature as much; works of the
+    change between motions are those of its matrix, to round-off.
+    """
+    scene = mixed()
+    loaded = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, progress=False)
+    small = SmallMotions(scene, loaded, 2.0)
+    simulation, random = small._simulation, np.random.default_rng(0)
+    along = small._path()
+    for u in (along, random.normal(size=len(along))):
+        derived = small._matrix(simulation.tangent_change(small.q, u)).toarray()
+        h = 1e-2 / np.abs(u).max()
+        stencil = ((-2, 1), (-1, -8), (1, 8), (2, -1))
+        stiff = {k: small._derivative(small.q + k * h * u, AT_REST).toarray() for k, _ in stencil}
+        difference = sum(weight * stiff[k] for k, weight in stencil) / (12 * h)
+        assert np.abs(derived - difference).max() <= 1e-8 * np.abs(derived).max()
+        right, left = small._with_laws()
+        x = random.normal(size=(right.shape[1], 3))
+        X, Y = right @ x, left.T @ x
+        stiffness, change = simulation.tangent_works(small.q, u, X, Y)
+        np.testing.assert_allclose(stiffness, x.T @ small.K @ x, rtol=0, atol=1e-9)
+        digits = 1e-11 * np.abs(change).max()
+        np.testing.assert_allclose(change, Y.T @ derived @ X, rtol=0, atol=digits)
 
 
 # -- wrong calls ---------------------------------------------------------------------------------

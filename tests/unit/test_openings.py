@@ -57,7 +57,7 @@ def largest_moment(scheme, dt):
 
 @each_scheme
 @pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("dt", [0.1, 0.005])
+@pytest.mark.parametrize("dt", [0.1, 0.02])
 @pytest.mark.parametrize("energy", [1e-4, 1e-2, 100.0])
 def test_a_limit_just_above_the_largest_moment_stays_closed(scheme, law, dt, energy):
     """By 0.1 %; runs are the same to 1e-10.  Iterates exceed the limit, by some per cent.
@@ -74,7 +74,7 @@ def test_a_limit_just_above_the_largest_moment_stays_closed(scheme, law, dt, ene
 @jumps
 @each_scheme
 @pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("dt", [0.1, 0.005])
+@pytest.mark.parametrize("dt", [0.1, 0.02])
 @pytest.mark.parametrize("energy", [1e-4, 100.0])
 def test_a_limit_just_below_the_largest_moment_opens(scheme, law, dt, energy):
     """By 0.1 %: in dynamics, and in ``Static()`` unless it snaps back."""
@@ -82,7 +82,7 @@ def test_a_limit_just_below_the_largest_moment_opens(scheme, law, dt, energy):
     if energy < 1.0 and scheme == ub.Static():
         with pytest.raises(ub.ConvergenceError) as failure:
             run(scene, scheme, dt)
-        assert failure.value.time == pytest.approx(0.5, abs=2e-3)
+        assert failure.value.time == pytest.approx(0.5, abs=3e-3)
         return
     solution = run(scene, scheme, dt)
     assert solution.energy.lost["hinges"][-1] > 0.0
