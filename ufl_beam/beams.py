@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from itertools import pairwise
 
+import numpy as np
+
 from ufl_beam.axis_curves import Arc, Polyline, Straight
 from ufl_beam.axis_curves import Point as Point
 from ufl_beam.curves import tangent_within
@@ -237,7 +239,7 @@ class Place:
             for low, high in pairwise(edges)
             if low <= self.s <= high
         ]
-        x, y = sum(side / math.hypot(*side) for side in sides)
+        x, y = sum((side / math.hypot(*side) for side in sides), np.zeros(2))
         length = math.hypot(x, y)
         return float(x / length), float(y / length)
 

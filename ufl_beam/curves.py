@@ -82,8 +82,8 @@ def nearest(curve: Curve, point: Array, s: float, step: float, length: float) ->
 def enclosing_diameter(points: Array) -> float:
     """Diameter of the smallest circle around points; (n, 2) or more rows; m.
 
-    It is the same in all axes.  The circle goes through two or three points; those that are farthest
-    outside are taken in, one after the other.
+    It is the same in all axes.  The circle goes through two or three points; those that are
+    farthest outside are taken in, one after the other.
     """
     points = points - points.mean(axis=0)
     held = [int(np.argmax(np.hypot(*points.T)))]

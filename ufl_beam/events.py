@@ -13,6 +13,7 @@ from ufl_beam.connectors import Connector, Coulomb, Stop
 from ufl_beam.errors import require_function
 from ufl_beam.memory import State
 from ufl_beam.parameter import TIME, Parameter
+from ufl_beam.plastic_hinges import law_of
 from ufl_beam.record import Recorder, on_first
 
 if TYPE_CHECKING:
@@ -88,7 +89,7 @@ class Events(Recorder):
         """What may happen in a scene, and what has."""
         grid = simulation.grid
         in_cells = [law for beam in simulation.scene.beams for law in grid.hinges(beam)]
-        laws = [*in_cells, *(hinge.law.law for hinge in simulation.scene.hinges)]
+        laws = [*in_cells, *(law_of(hinge) for hinge in simulation.scene.hinges)]
         breaking = [law is not None and law.limit > 0 for law in laws]
         energies = np.array([law.energy if law is not None else np.inf for law in laws])
         self._enough = np.where(breaking, FREE * energies, np.inf)

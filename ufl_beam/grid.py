@@ -26,6 +26,7 @@ from ufl_beam.connectors import Connector
 from ufl_beam.discretisation import Mesh
 from ufl_beam.errors import SceneError, require_kind
 from ufl_beam.laws import Softening
+from ufl_beam.plastic_hinges import place_of
 from ufl_beam.scene import COMPONENTS, Scene
 
 Index = npt.NDArray[Any]
@@ -138,15 +139,17 @@ class Grid:
 
     def _add_hinges(self) -> None:
         """Give each plastic hinge a second vertex, which the cell beyond it begins or ends with."""
-        places = [link.b if link.b.beyond else link.a for link in self.scene.hinges]
-        at = np.array([self.vertex(Place(p.beam, p.s)) for p in places], dtype=np.int64)
-        self._beyond = dict(zip(places, range(len(self.points), len(self.points) + len(at))))
+        places = [place_of(hinge) for hinge in self.scene.hinges]
+        at = np.array([self.vertex(place) for place in places], dtype=np.int64)
+        numbers = range(len(self.points), len(self.points) + len(at))
+        beyond = [Place(place.beam, place.s, beyond=True) for place in places]
+        self._beyond = dict(zip(beyond, numbers, strict=True))
         self.points = np.concatenate([self.points, self.points[at]])
         self.cells_at_hinges = np.array([self.cell(place) for place in places], dtype=np.int64)
-        for place, vertex, cell in zip(places, at, self.cells_at_hinges, strict=True):
+        for place, number, cell in zip(places, numbers, self.cells_at_hinges, strict=True):
             at_end = place.s == 1.0
-            beyond = cell if at_end or place.s == 0.0 else cell + 1
-            self.cells[beyond, int(at_end)] = self._beyond[place]
+            cell_beyond = cell if at_end or place.s == 0.0 else cell + 1
+            self.cells[cell_beyond, int(at_end)] = number
         self.vertices_at_hinges = at
 
     @property
@@ -238,8 +241,7 @@ class Grid:
         """The middle of a cell or, numbered after the cells, the place of a plastic hinge."""
         if number < len(self.cells):
             return self.middle(number)
-        hinge = self.scene.hinges[number - len(self.cells)]
-        return hinge.a.beam.at(hinge.a.s)
+        return place_of(self.scene.hinges[number - len(self.cells)])
 
     def hinges(self, beam: Beam) -> list[Softening | None]:
         """Law of the hinge that may open in the middle of each cell of a beam."""

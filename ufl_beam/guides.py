@@ -20,8 +20,8 @@ class Guides(Links):
     """Forces across curves; those over a step are across the chord, so that they do no work.
 
     The last digits of the curve spoil the direction of a short chord.  Where it is so short that
-    they spoil more than the curvature does, the direction in its middle takes its place: either errs
-    by the last digits to the power of two thirds at most.
+    they spoil more than the curvature does, the direction in its middle takes its place: either
+    errs by the last digits to the power of two thirds at most.
 
     The motion of a guide is the distance from its curve, zero when a step is accepted.
     """
@@ -51,20 +51,21 @@ class Guides(Links):
 
     def _nearest(self, p: Array) -> tuple[Array, Array]:
         """Points of the curves nearest to ``p``, and tangents there; from the latest ones."""
-        curves = [law.curve for law in self._laws]
-        starts = zip(curves, p, self._s.tolist(), self._steps.tolist(), strict=True)
-        found = np.array([nearest(*start, self._size) for start in starts])
+        curves, steps = [law.curve for law in self._laws], [float(step) for step in self._steps]
+        found = np.array([
+            nearest(curve, p[k], float(self._s[k]), steps[k], self._size)
+            for k, curve in enumerate(curves)
+        ])  # fmt: skip
         if not np.isfinite(found).all():
             place = self.links[int(np.argmin(np.isfinite(found)))].b
             raise StepFailed(f"{place} is where no nearest point of its guide curve was found")
         self._s = found
-        places = zip(curves, self._s.tolist(), self._steps.tolist(), strict=True)
-        t = np.array([tangent(*place) for place in places])
+        t = np.array([tangent(c, float(found[k]), steps[k]) for k, c in enumerate(curves)])
         on = np.array([curve(s) for curve, s in zip(curves, self._s, strict=True)], dtype=float)
         return on, t
 
     def _curvatures(self, n: Array) -> Array:
-        """Curvatures at the latest points, towards the normals ``n``, by second differences; 1/m."""
+        """Curvatures at the latest points towards the normals ``n``, by second differences; 1/m."""
         found = []
         for law, s, normal, step in zip(self._laws, self._s, n, self._steps, strict=True):
             t = tangent(law.curve, s, step)

@@ -15,6 +15,7 @@ from ufl_beam.beams import Place
 from ufl_beam.compat import Array
 from ufl_beam.errors import SceneError
 from ufl_beam.glyphs import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY
+from ufl_beam.plastic_hinges import law_of
 from ufl_beam.solution import Solution
 from ufl_beam.view import (
     decimal_prefix,
@@ -85,7 +86,7 @@ def plot_hinge(solution: Solution, place: Place) -> Figure:
     kept, grid = solution.material_at(place), solution.grid
     hinge = grid.hinge_at(place)
     in_cell = grid.hinges(place.beam)[grid.cell(place) - int(grid.cells_of(place.beam)[0])]
-    law = in_cell if hinge is None else hinge.law.law
+    law = in_cell if hinge is None else law_of(hinge)
     if law is None or np.isinf(law.limit):
         raise SceneError(f"plot_hinge: neither {place} nor the cell there has a hinge")
     M, jump, lost = kept.forces[:, 2], kept.jump, float(kept.hinge[-1])

@@ -15,7 +15,6 @@ from ufl_beam.beams import Beam, Place
 from ufl_beam.bodies import Anchor, Body
 from ufl_beam.captions import hinge_in_words, law_in_words, names_of
 from ufl_beam.compat import Array
-from ufl_beam.connectors import RigidPlastic
 from ufl_beam.glyphs import GREY, INK, ORANGE, WHITE
 from ufl_beam.labels import Label, Spot
 from ufl_beam.load_symbols import (
@@ -29,6 +28,7 @@ from ufl_beam.load_symbols import (
     velocity_symbol,
 )
 from ufl_beam.loads import FollowerLoad, LineLoad, PointLoad
+from ufl_beam.plastic_hinges import law_of, place_of
 from ufl_beam.scene import Scene
 from ufl_beam.stage import Model, Pose
 from ufl_beam.symbols import Footing, Stroke
@@ -182,14 +182,14 @@ def _draw_hinges(drawing: Drawing, subject: Subject, unit: float, scale: float) 
     """Plastic hinges, beside what is at the end of the beam; sizes of chosen ones."""
     r = 0.25 * unit
     for hinge in subject.scene.hinges:
-        if isinstance(hinge.a, Place) and isinstance(hinge.law, RigidPlastic):
-            axis, s = subject.axes[hinge.a.beam], hinge.a.s
-            at = np.array(hinge.a.point)
-            if s in (0.0, 1.0):
-                at = at + 0.7 * unit * _direction(*(axis[:2] if s == 0.0 else axis[:-3:-1]))
-            label = Label(hinge_in_words(hinge.law.law), HINGE, CAPTIONS, around(at, r / scale))
-            chosen = [label] if s in hinge.a.beam.hinges else []
-            drawing.add("hinges", [_disc(at, r, HINGE, HINGE, 5.2)], chosen)
+        place = place_of(hinge)
+        axis, s = subject.axes[place.beam], place.s
+        at = np.array(place.point)
+        if s in (0.0, 1.0):
+            at = at + 0.7 * unit * _direction(*(axis[:2] if s == 0.0 else axis[:-3:-1]))
+        label = Label(hinge_in_words(law_of(hinge)), HINGE, CAPTIONS, around(at, r / scale))
+        chosen = [label] if s in place.beam.hinges else []
+        drawing.add("hinges", [_disc(at, r, HINGE, HINGE, 5.2)], chosen)
 
 
 def _between_cells(axis: Array, scale: float) -> Iterator[Stroke]:

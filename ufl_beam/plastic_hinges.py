@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from ufl_beam.beams import Beam, Place
 from ufl_beam.bodies import Anchor, Node, node
 from ufl_beam.connectors import Connector, Joint, RigidPlastic
+from ufl_beam.errors import SceneError
 from ufl_beam.laws import HingeLaw
 
 Slot = tuple[Node, int]
@@ -70,6 +71,28 @@ def plastic_hinges(
         return slot in borne or (len(others) > 0 and not _outlasts(place, others, laws))
 
     return tuple(_hinge(place, law) for place, law in laws.items() if stays(place))
+
+
+def law_of(link: Connector) -> HingeLaw:
+    """Return the law of a plastic hinge, or of another rigid-plastic connector.
+
+    Raises:
+        SceneError: The connector follows another law.
+    """
+    if not isinstance(link.law, RigidPlastic):
+        raise SceneError(f"{link}: its law is not rigid-plastic")
+    return link.law.law
+
+
+def place_of(hinge: Connector) -> Place:
+    """Return the place of a plastic hinge, on the side that joints and loads are attached to.
+
+    Raises:
+        SceneError: The connector does not act between places of beams.
+    """
+    if not isinstance(hinge.a, Place):
+        raise SceneError(f"{hinge}: it is not a plastic hinge of a beam")
+    return hinge.a.beam.at(hinge.a.s)
 
 
 def _laws(beam: Beam) -> dict[Place, HingeLaw]:

@@ -73,8 +73,9 @@ class Response(Protocol):
     in_c: dict[str, Any]
     """Data of laws that C evaluates, by their names in ``couplings`` of loops.h."""
 
-    openable: Openable | None
-    """Those that open beyond a limit, if there are."""
+    @property
+    def openable(self) -> Openable | None:
+        """Those that open beyond a limit, if there are."""
 
     def motion(self, e: Array) -> Array:
         """Motions of the accepted state as solutions show them; ``e`` are those of the nodes."""

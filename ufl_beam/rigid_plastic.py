@@ -11,14 +11,16 @@ from functools import singledispatch
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.compat import Array
 from ufl_beam.connectors import Connector, RigidPlastic
-from ufl_beam.laws import Bulk, Hardening, HingeLaw, Softening
+from ufl_beam.laws import Bulk, Hardening, Softening
 from ufl_beam.loops import doubles, ffi, integers, lib
 from ufl_beam.openings import Openable
+from ufl_beam.plastic_hinges import law_of
 from ufl_beam.points import NOTHING, RELEASED, SPENT
 from ufl_beam.pointwise import Pointwise
 from ufl_beam.responses import Rows, Setting
@@ -29,7 +31,8 @@ INPUTS = (
     *("θ", "dt", "limit", "energy", "H", "B", "eta"),
 )
 """Inputs of the compiled laws: the slip of the step and its direction (1 or -1); accumulated slip
-and motion at t_n; numbers of the scheme and the law.  The first four are those of rigid_plastic.c."""
+and motion at t_n; numbers of the scheme and the law.  The first four are those of rigid_plastic.c.
+"""
 
 
 class Slip(NamedTuple):
@@ -108,7 +111,7 @@ def _slope(link: Connector, size: float) -> float:
 
     It is above the steepest softening, so that an open branch is found open.
     """
-    law: HingeLaw = link.law.law  # type: ignore[union-attr]
+    law = law_of(link)
     if not 0.0 < law.limit < np.inf:
         return 1.0
     return 2 * law.limit**2 / law.energy + law.limit / (EARLY * (1.0 if link.turns else size))
@@ -148,7 +151,7 @@ class RigidPlasticResponse:
         self._storage = np.zeros((n, len(INPUTS)))
         self._at = {name: self._storage[:, i] for i, name in enumerate(INPUTS)}
         for i, link in enumerate(links):
-            for name, value in numbers_of(link.law.law).items():  # type: ignore[union-attr]
+            for name, value in numbers_of(law_of(link)).items():
                 self._at[name][i] = value
         self._at["θ"][:], self._at["dt"][:] = setting.scheme.theta, 1.0
         self._limit, self._back_force = self._at["limit"].copy(), np.zeros(n)
@@ -268,7 +271,7 @@ class RigidPlasticResponse:
         self._stored = float(stored.sum())
 
     @property
-    def _variables(self) -> tuple[Array, ...]:
+    def _variables(self) -> tuple[npt.NDArray[Any], ...]:
         at = self._at["slipped"], self._at["start"]
         return (*at, self._limit, self._back_force, self.dissipated, self._way_before)
 

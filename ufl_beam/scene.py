@@ -430,7 +430,7 @@ class Scene:
     @cached_property
     def representatives(self) -> dict[Slot, Slot]:
         """Which component of a node stands for it, for all components that joints share."""
-        hinges = ([(link.a, c), (link.b, c)] for link in self.hinges for c in (0, 1))
+        hinges = ([(node(link.a), c), (node(link.b), c)] for link in self.hinges for c in (0, 1))
         return merged([*shared_by_joints(self.joints), *hinges])
 
     def _require_single_supports(self) -> None:

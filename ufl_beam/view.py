@@ -21,6 +21,7 @@ from ufl_beam.compat import Array
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.glyphs import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY
 from ufl_beam.laws import HingeLaw
+from ufl_beam.plastic_hinges import law_of, place_of
 from ufl_beam.processes import ours
 from ufl_beam.solution import Solution
 from ufl_beam.stage import Pose, Stage
@@ -244,6 +245,8 @@ def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
     """Hinges that have opened at the n-th kept time: in cells, and of zero length.
 
     Args:
+        solution: What to show.
+        n: Number of the kept time.
         points: Where the nodes of the grid are; (num_nodes, 2); m.
     """
     grid, found = solution.grid, []
@@ -258,10 +261,10 @@ def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
                 at = points[grid.cells[cell]].mean(axis=0)
                 found.append(OpenHinge(beam, at, _spent(law, lost)))
     for hinge, vertex in zip(solution.scene.hinges, grid.vertices_at_hinges, strict=True):
-        state = solution.connector(hinge)
-        if state.motion[n] != 0.0 or state.dissipated[n] > 0.0:
-            law, lost = hinge.law.law, float(state.dissipated[n])
-            found.append(OpenHinge(hinge.a.beam, points[vertex], _spent(law, lost)))
+        kept = solution.connector(hinge)
+        if kept.motion[n] != 0.0 or kept.dissipated[n] > 0.0:
+            part = _spent(law_of(hinge), float(kept.dissipated[n]))
+            found.append(OpenHinge(place_of(hinge).beam, points[vertex], part))
     return found
 
 

@@ -42,7 +42,7 @@ def section(rho=0.0):
 
 
 class Hinged:
-    """Two metres along x, with a hinge embedded in the first cell, of length ``h`` if that is shorter.
+    """Two metres along x, a hinge embedded in the first cell, of length ``h`` if that is shorter.
 
     Attributes:
         first: The beam of that cell, without hinges at its ends.

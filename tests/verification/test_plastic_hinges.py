@@ -51,8 +51,10 @@ def test_collapse_of_a_portal(by, cells):
     )
     assert len(scene.hinges) == 4
     path = ub.follow(
-        scene, ub.Displacement(left.end, "u", 0.01), until=lambda now: now.displacement(left.end)[0] > 0.12
-    )  # fmt: skip
+        scene,
+        ub.Displacement(left.end, "u", 0.01),
+        until=lambda now: now.displacement(left.end)[0] > 0.12,
+    )
     assert path.factor[-1] == pytest.approx(150.0, rel=2e-3)
     assert all(abs(path.connector(hinge).motion[-1]) > 0.01 for hinge in scene.hinges)
 
@@ -68,8 +70,10 @@ def test_collapse_of_a_fixed_ended_beam(law):
     )
     middle = beam.at(0.5)
     path = ub.follow(
-        scene, ub.Displacement(middle, "v", -1e-3), until=lambda now: now.displacement(middle)[1] < -0.02
-    )  # fmt: skip
+        scene,
+        ub.Displacement(middle, "v", -1e-3),
+        until=lambda now: now.displacement(middle)[1] < -0.02,
+    )
     assert path.factor[-1] == pytest.approx(16 * LIMIT / LENGTH**2, rel=2e-3)
 
 
@@ -206,7 +210,7 @@ def test_without_a_limit_it_is_a_revolute_joint(law, scheme):
 
 
 def test_vibration_of_what_a_broken_hinge_leaves():
-    """A hinge without a limit has the frequencies of two beams in a revolute joint, to round-off."""
+    """A hinge without a limit has the frequencies of two beams in a revolute joint."""
     section = ub.Section(EA=1e6, GA=1e6, EI=EI, rhoA=1.0, rhoI=1e-3)
     hinged = ub.Beam((0, 0), (2, 0), section, cells=8, hinges={0.5: ub.Softening(0.0, 1.0)})
     one, two = (ub.Beam((x, 0), (x + 1, 0), section, cells=4) for x in (0, 1))
@@ -223,10 +227,11 @@ def test_vibration_of_what_a_broken_hinge_leaves():
 
 def corner(*laws, joint=ub.Rigid, **more):
     """Beams that meet at the origin, each with a hinge there, clamped at their other ends."""
-    beams = [
-        ub.Beam((0, 0), (math.cos(a), math.sin(a)), ELASTIC, cells=2, hinges={} if law is None else {0.0: law})
-        for a, law in enumerate(laws)
-    ]  # fmt: skip
+    beams = []
+    for a, law in enumerate(laws):
+        hinges = {} if law is None else {0.0: law}
+        end = (math.cos(a), math.sin(a))
+        beams.append(ub.Beam((0, 0), end, ELASTIC, cells=2, hinges=hinges))
     supports = [ub.Clamped(beam.end) for beam in beams]
     more = {name: make(beams) for name, make in more.items()}
     joints = [joint(*(beam.start for beam in beams))]
@@ -275,8 +280,9 @@ def test_no_hinge_where_no_moment_is():
     section = ub.Section(EA=1e6, GA=1e6, EI=EI, hinge=WEAK)
     free, pinned = (ub.Beam((0, y), (1, y), section, cells=2) for y in (0, 1))
     scene = ub.Scene(
-        [free, pinned], supports=[ub.Clamped(free.start), ub.Pinned(pinned.start), ub.Roller(pinned.end)]
-    )  # fmt: skip
+        [free, pinned],
+        supports=[ub.Clamped(free.start), ub.Pinned(pinned.start), ub.Roller(pinned.end)],
+    )
     assert [str(hinge.a) for hinge in scene.hinges] == [str(free.start)]
     assert corner(WEAK, WEAK, joint=ub.Revolute).hinges == ()
 
@@ -346,7 +352,7 @@ def test_invariance(change):
 
 
 def test_a_block_that_slips():
-    """[closed] F(t) = 3 t on m = 2 against 1 + H x: at rest until t = 1/3, then x'' = (3 t - 1 - H x)/m.
+    """[closed] F(t) = 3 t on m = 2 against 1 + H x: at rest until 1/3, then m x'' = 3 t - 1 - H x.
 
     With ω² = H/m: x = (3/H) (τ - sin(ω τ)/ω), τ = t - 1/3; second order in the step.
     """
