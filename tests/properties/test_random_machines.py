@@ -35,6 +35,9 @@ BY_TRAPEZES = 0.1
 HANG = 300
 """Seconds after which a machine counts as one that hangs; those here need a tenth of it."""
 
+pytestmark = pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")
+"""Machines are drawn blindly: many deserve a warning."""
+
 CLEAR = ("no equilibrium after t", "zero length", "constraints repeat", "free to move")
 """What an error must say, one of these."""
 
