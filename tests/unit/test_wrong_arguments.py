@@ -108,8 +108,9 @@ TABLE = {
     # sections and materials
     "Section": call(
         ub.Section,
-        EA=V(1.0, POSITIVE), GA=V(1.0, POSITIVE), EI=V(1.0, POSITIVE), rhoA=V(0.0, optional(FROM_ZERO)),
-        rhoI=V(0.0, FROM_ZERO), depth=V(0.0, FROM_ZERO), axial=V(None, optional(OBJECT)),
+        EA=V(1.0, POSITIVE), GA=V(1.0, POSITIVE), EI=V(1.0, POSITIVE),
+        rhoA=V(0.0, optional(FROM_ZERO)), rhoI=V(0.0, FROM_ZERO),
+        depth=V(0.0, FROM_ZERO), axial=V(None, optional(OBJECT)),
         shear=V(None, optional(OBJECT)), bending=V(None, optional(OBJECT)),
         hinge=V(None, optional(OBJECT)), fibres=V(None, optional(OBJECT)),
     ),
