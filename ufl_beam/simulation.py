@@ -578,13 +578,16 @@ class Simulation(Live):
         if said := no_number(self.scene, (step.load_time, step.motion_time)):
             raise StepFailed(said)
 
-    def attempt_along(self, step: Step, guess: Array, border: Border) -> Trial:
+    def attempt_along(
+        self, step: Step, guess: Array, border: Border, *, hold: bool = True
+    ) -> Trial:
         """Solve the next step together with the load factor; :meth:`accept` may take it.
 
         Args:
             step: Where it begins; its times are those of the guess.
             guess: Configuration, in the axes of the supports.
             border: The equation of the factor.
+            hold: Whether what does not flow stays closed if it can, see openings.py.
 
         Raises:
             StepFailed: There is no equilibrium, or it is too far away.
@@ -597,7 +600,7 @@ class Simulation(Live):
             self._begin_terms(step)
             border.t = t
 
-        if self._openings is None:
+        if self._openings is None or not hold:
             return self._trial(step, solve(guess))
         return self._trial(step, self._openings.solve(guess, solve, again))
 
