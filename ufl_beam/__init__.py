@@ -47,7 +47,13 @@ from ufl_beam.decay import (
 from ufl_beam.discretisation import Mesh
 from ufl_beam.distributions import Lognormal, Normal, TruncatedNormal, Weibull
 from ufl_beam.envelopes import plot_cycles, plot_extremes
-from ufl_beam.errors import ConvergenceError, ModelWarning, SceneError, TradeoffError
+from ufl_beam.errors import (
+    ConvergenceError,
+    CopiesDiffer,
+    ModelWarning,
+    SceneError,
+    TradeoffError,
+)
 from ufl_beam.events import Event, Events
 from ufl_beam.exact_schemes import DecayingMidpoint, ExactStatic, Midpoint, PrintedMidpoint
 from ufl_beam.extremes import Extent, Extremes
@@ -118,6 +124,7 @@ __all__ = [
     "Connector",
     "Controller",
     "ConvergenceError",
+    "CopiesDiffer",
     "Coulomb",
     "CriticalPoint",
     "Cycles",

@@ -43,7 +43,7 @@ class Agreement:
     """
 
     def __init__(self, comm: MPI.Intracomm) -> None:
-        self._comm = _duplicate(comm) if comm.size > 1 else None
+        self._comm = duplicate(comm) if comm.size > 1 else None
         self.raised: BaseException | None = None
 
     def __call__(self, function: Callable[..., T], *arguments: Any) -> T:
@@ -86,14 +86,14 @@ class Agreement:
 _DUPLICATE = MPI.Comm.Create_keyval()
 
 
-def _duplicate(comm: MPI.Intracomm) -> MPI.Intracomm:
+def duplicate(comm: MPI.Intracomm) -> MPI.Intracomm:
     """Communicator of the same processes for agreements only; made once and kept with ``comm``."""
     known: Any = comm.Get_attr(_DUPLICATE)
     if known is None:
         known = comm.Dup()
         comm.Set_attr(_DUPLICATE, known)
-    duplicate: MPI.Intracomm = known
-    return duplicate
+    found: MPI.Intracomm = known
+    return found
 
 
 def portable(error: BaseException | None) -> BaseException | None:

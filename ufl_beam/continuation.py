@@ -414,6 +414,8 @@ def follow(
     release = take(outputs)
 
     def after_step() -> bool:
+        if recorders:
+            simulation.settle()  # before anything is written
         path.keep(simulation)
         for recorder in recorders:
             recorder.write(simulation)
@@ -430,6 +432,7 @@ def follow(
                 break
         simulation.end()
     except BaseException as error:
+        simulation.leave()
         if simulation.share.comm.size == 1 or error is simulation.together.raised:
             simulation.end()  # else the processes may not all be here
         error.__dict__["solution"] = path

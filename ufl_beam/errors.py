@@ -94,6 +94,10 @@ class ConvergenceError(RuntimeError):
         self.reason = reason
 
 
+class CopiesDiffer(RuntimeError):
+    """Processes that compute copies of one small scene have found different motions."""
+
+
 class TradeoffError(RuntimeError):
     """No setting can be recommended: the runs do not converge, or it would take too long.
 

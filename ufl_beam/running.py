@@ -110,6 +110,8 @@ def simulate(
     release = take(outputs)
 
     def after_step() -> None:
+        if recorders or keeper is not None:
+            simulation.settle()  # before anything is written
         if pace.steps % solution.every == 0 or pace.finished:
             solution.keep(simulation)
             if len(solution) > most + 1 and not pace.finished:
@@ -140,6 +142,7 @@ def simulate(
         simulation.check_ledger()
     except BaseException as error:
         # Whatever stops a run, an interrupt or a user's function, what was reached is not lost.
+        simulation.leave()
         if simulation.share.comm.size == 1 or error is simulation.together.raised:
             simulation.end()  # else the processes may not all be here
         error.__dict__["solution"] = solution

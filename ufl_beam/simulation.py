@@ -16,6 +16,7 @@ from ufl_beam.agreement import Agreement
 from ufl_beam.applied import DeadLoads, FollowerLoads
 from ufl_beam.compat import Array
 from ufl_beam.connectors import Connector, Controller, Coulomb
+from ufl_beam.copies import Copies
 from ufl_beam.couplings import Couplings, couplings
 from ufl_beam.dampers import damping_forces
 from ufl_beam.diagnosis import singularity
@@ -181,6 +182,7 @@ class Simulation(Live):
         together = len(self.grid.cells) >= comm.size * SMALLEST_SHARE
         self.share = Share(self.grid, comm if together else MPI.COMM_SELF)
         self.together = Agreement(self.share.comm)
+        self._copies = None if together or comm.size == 1 else Copies(comm, self._scales())
         q, v, internal = initial_state(self.grid, start)
         self.fields = Fields(self.share)
         self._A = self.fields.matrix()
@@ -265,6 +267,13 @@ class Simulation(Live):
         )
         self.solution: Solution = Solution(scene, self.grid)
         give_back_memory()
+
+    def _scales(self) -> Array:
+        """What a displacement or rotation counts beside others; 1/m, 1, zero for forces."""
+        scales: Array = np.full(self.share.size, 1 / self.scene.size)
+        scales[self.share.rotations()] = 1.0
+        scales[self.share.multipliers()] = 0.0
+        return scales
 
     # -- building ------------------------------------------------------------------------------
 
@@ -622,6 +631,8 @@ class Simulation(Live):
     def accept(self, trial: Trial) -> None:
         """Go where the latest :meth:`attempt` went."""
         self.together(self._accept, trial)
+        if self._copies is not None:
+            self._copies.note(self.t, self.q)
 
     def _accept(self, trial: Trial) -> None:
         """See :meth:`accept`."""
@@ -660,6 +671,7 @@ class Simulation(Live):
         Raises:
             ConvergenceError: With the solution so far.
         """
+        self.leave()
         self.end()
         dt, forces, named = end - self.t, self._forces_by_kind(), self.solution.parameter
         sizes = ", ".join(f"{kind} {size:.1e} N" for kind, size in forces.items())
@@ -691,6 +703,20 @@ class Simulation(Live):
         sizes = {kind: self._solver.size(force) for kind, force in forces.items()}
         return {kind: size for kind, size in sizes.items() if size}
 
+    def settle(self) -> None:
+        """Compare the states so far where each process computes a copy of the scene.
+
+        Raises:
+            CopiesDiffer: They are not the same.
+        """
+        if self._copies is not None:
+            self._copies.settle()
+
+    def leave(self) -> None:
+        """Tell processes that compute copies of the scene that this one does not go on."""
+        if self._copies is not None:
+            self._copies.leave()
+
     # -- the end, and going on -----------------------------------------------------------------
 
     @property
@@ -700,12 +726,14 @@ class Simulation(Live):
 
     def end(self) -> None:
         """Let the solution have the last state, and what another run that starts there needs."""
+        self.settle()
         if self.t not in self.solution.times[-1:]:
             self.solution.keep(self)
         self._remember(self.solution)
 
     def snapshot(self) -> Solution:
         """The state now, as a solution that other runs may start with; all processes call it."""
+        self.settle()
         now = Solution(self.scene, self.grid)
         now.keep(self)
         self._remember(now)
