@@ -18,6 +18,7 @@ from ufl_beam.errors import (
     require_memory,
     require_number,
     require_sequence,
+    require_switch,
     require_text,
     require_vector,
     shorten,
@@ -219,6 +220,7 @@ class Place:
         require_number(self.s, f"{self.beam.name}.at(s): s")
         if not 0.0 <= self.s <= 1.0:
             raise SceneError(f"{self.beam.name}.at({self.s:g}): s must lie between 0 and 1")
+        require_switch(self.beyond, f"{self.beam.name}.at({self.s:g}): beyond")
 
     @property
     def point(self) -> Point:

@@ -27,8 +27,15 @@ SINGULAR = 1e-12
 SHARE = 0.1
 """Part of the largest motion from which on a motion or a deformation is named."""
 
+ROUNDS = 40
+"""Largest number of times that rows and columns are scaled."""
+
 SOFT = 1e-3
 """Part of its elastic stiffness up to which a connector or a cell gives way."""
+
+NEAR = 1e-3
+"""Motion from the state before a step, of the size of the scene or a radian, that tells what yields
+as the step begins."""
 
 NAMED = 3
 """Largest number of names in a list."""
@@ -53,14 +60,31 @@ class Softest(NamedTuple):
 
 
 def singularity(simulation: Simulation, q: Array) -> str:
-    """Describe why the latest tangent of a simulation is singular, or nearly so; else empty.
+    """Describe why the tangent of a failed step is singular, or nearly so; else empty.
 
-    All processes call it together, after a step has failed.
+    All processes call it together.  Where the latest tangent says nothing, Newton's method may have
+    been sent far away by a tangent before it.  Then the one where it set out tells.
 
     Args:
-        simulation: Holds the tangent.
+        simulation: Holds the latest tangent, and the state before the step.
         q: The latest iterate at the local degrees of freedom, in the axes of the plane.
     """
+    if said := _singularity_at(simulation, q):
+        return said
+    share, before = simulation.share, simulation.q
+    way = np.abs(q - before)
+    way[share.multipliers()] = 0.0
+    turns = share.rotations()
+    way[turns] *= simulation.scene.size
+    far = share.largest(float(way.max(initial=0.0))) / simulation.scene.size
+    if not 0 < far < np.inf:
+        return ""
+    near = before + min(1.0, NEAR / far) * (q - before)
+    return _singularity_at(simulation, near) if simulation.respond_at(near) else ""
+
+
+def _singularity_at(simulation: Simulation, q: Array) -> str:
+    """Describe why the latest tangent, which is that at ``q``, is singular; empty if it is not."""
     K, free = _free_matrix(simulation)
     if not len(free) or not np.isfinite(K.data).all():
         return ""
@@ -162,9 +186,12 @@ def _equilibrated(K: csc_array) -> tuple[csc_array, Array]:
     """A matrix whose rows and columns have largest entries of about one; factors of the columns."""
     n = K.shape[0]
     columns = np.ones(n)
-    for _ in range(10):
+    for _ in range(ROUNDS):
         sizes = abs(K)
         by_row, by_column = (np.asarray(sizes.max(axis=k).todense()).ravel() for k in (1, 0))
+        both = np.concatenate([by_row, by_column])
+        if np.all((both == 0) | ((both > 0.5) & (both < 2))):
+            break
         r, c = (1 / np.sqrt(np.where(x > 0, x, 1.0)) for x in (by_row, by_column))
         K = csc_array(diags_array(r) @ K @ diags_array(c))
         columns *= c

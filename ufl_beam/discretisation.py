@@ -9,20 +9,13 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
-from numbers import Rational
+from numbers import Rational, Real
 
 import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.beams import Beam
-from ufl_beam.errors import (
-    SceneError,
-    require_count,
-    require_kind,
-    require_memory,
-    require_number,
-    shorten,
-)
+from ufl_beam.errors import SceneError, require_kind, require_memory, require_number, shorten
 
 
 @dataclass(frozen=True)
@@ -53,10 +46,9 @@ class Mesh:
             )
         require_number(self.refine, "Mesh: refine")
         object.__setattr__(self, "refine", Fraction(self.refine))
-        degree = require_count(self.degree, "Mesh: degree")
-        if degree > 3:
+        if not isinstance(self.degree, Real) or self.degree not in (1, 2, 3):
             raise SceneError(f"Mesh: degree = {shorten(self.degree)} must be 1, 2 or 3")
-        object.__setattr__(self, "degree", degree)
+        object.__setattr__(self, "degree", int(self.degree))
         require_kind(self.lumped, bool, "Mesh: lumped")
 
     @cached_property

@@ -174,6 +174,9 @@ class AdaptiveSteps:
         self._fresh = True
         share = simulation.share
         self._turns, (self._x, self._y) = share.rotations(), share.translations()
+        M = simulation.inertia.M
+        bears = np.bincount(M.rows(), weights=np.abs(M.data), minlength=share.size)
+        self._massless = np.flatnonzero(bears == 0.0)
         self.steps = self.rejected = 0
         self.error = 0.0
 
@@ -244,6 +247,8 @@ class AdaptiveSteps:
         supports = simulation.supports
         supports.enter(error)
         error[supports.dofs] = 0.0
+        # Rotations without inertia follow the others, at once where a load jumps.
+        error[self._massless] = 0.0
         supports.leave(error)
         moves = np.hypot(error[self._x], error[self._y]).max(initial=0.0)
         turns = np.abs(error[self._turns]).max(initial=0.0)

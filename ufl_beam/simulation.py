@@ -377,6 +377,16 @@ class Simulation(Live):
         """Local part of the latest tangent; what is held has nothing but a diagonal entry."""
         return self._A
 
+    def respond_at(self, q1: Array) -> bool:
+        """Evaluate forces and tangent of the present step at ``q1``; false if a process cannot."""
+        x, failed = self.supports.in_axes(q1), 0.0
+        try:
+            self._residual(x, np.zeros(self.share.size))
+            self._tangent(x)
+        except StepFailed:
+            failed = 1.0
+        return self.share.largest(failed) == 0.0
+
     def _assemble(self, q1: Array) -> None:
         self._A.data.fill(0.0)
         for term in self.terms:

@@ -38,10 +38,11 @@ class _Anchor:
         text: As it is written.
         point: Where it is in the first statement; m.
         part: Of which beam, body or the ground it is.
+        is_end: Whether it is an end of a beam.
     """
 
-    def __init__(self, text, point, part):
-        self.text, self.point, self.part = text, point, part
+    def __init__(self, text, point, part, is_end=False):
+        self.text, self.point, self.part, self.is_end = text, point, part, is_end
 
     def __str__(self):
         return self.text
@@ -133,7 +134,7 @@ class _Writer(Laws):
         self._step = self._say.number(self._dt, "s")
         if adapts:
             stops = ", ".join(self._say.number(self._end * k / 4, "s") for k in (1, 2, 3))
-            self._step = f"ub.Adaptive({self._size(-5, -3):.3g}, stops=[{stops}])"
+            self._step = f"ub.Adaptive({self._size(-4, -2.5):.3g}, stops=[{stops}])"
 
     def _time(self):
         """A function of time, at most some ones large."""
@@ -176,7 +177,7 @@ class _Writer(Laws):
 
         def at(s):
             place = f"{name}.at({1 - s if backwards else s!r})"
-            return _Anchor(place, axis(s), name)
+            return _Anchor(place, axis(s), name, is_end=s in (0.0, 1.0))
 
         if parent is not None:
             self._join(joint, parent, at(0.0))
@@ -402,6 +403,8 @@ class _Writer(Laws):
         force, moment = say.vector(self._polar(size), "N"), self._some(-1, 1) * size * self._L
         line, more = self._polar(size / self._L), self._some(-0.3, 0.3) * size
         weight, time = self._polar(size / self._rhoA / self._L), self._time()
+        if place.is_end and not self._elastic:
+            moment = 0.0  # it would turn what lies beyond a hinge there, which nothing resists
         moment = say.number(moment, "N m")
         at = f"{place}, force={force}, moment={moment}, time={time}"
         kinds = [

@@ -83,7 +83,7 @@ TIMED = {"moment": V(1.0, NUMBER), "time": V(lambda t: t, [*TIME, None])}
 SHAPE = {
     "E": V(1.0, POSITIVE),
     "nu": V(0.3, [*NUMBER, 0.6, -1.0]),
-    "rho": V(1.0, FROM_ZERO),
+    "rho": V(1.0, optional(FROM_ZERO)),
     "shear_factor": V(0.8, POSITIVE),
     "fibres": V(None, optional(OBJECT)),
 }
@@ -108,7 +108,7 @@ TABLE = {
     # sections and materials
     "Section": call(
         ub.Section,
-        EA=V(1.0, POSITIVE), GA=V(1.0, POSITIVE), EI=V(1.0, POSITIVE), rhoA=V(0.0, FROM_ZERO),
+        EA=V(1.0, POSITIVE), GA=V(1.0, POSITIVE), EI=V(1.0, POSITIVE), rhoA=V(0.0, optional(FROM_ZERO)),
         rhoI=V(0.0, FROM_ZERO), depth=V(0.0, FROM_ZERO), axial=V(None, optional(OBJECT)),
         shear=V(None, optional(OBJECT)), bending=V(None, optional(OBJECT)),
         hinge=V(None, optional(OBJECT)), fibres=V(None, optional(OBJECT)),
@@ -131,7 +131,7 @@ TABLE = {
         ub.Section.of_fibres,
         y=V([0.0, 1.0], [None, 1.0, "ab", [0.0], [0.0, NAN], [0.0, 1j], [0.0, "1"], [0.0, HUGE]]),
         A=V([1.0, 1.0], [None, 1.0, "ab", [1.0], [1.0, NAN], [1.0, -1.0], [1.0, 1j], [1.0, "1"]]),
-        E=V(1.0, POSITIVE), nu=V(0.3, [*NUMBER, 0.6]), rho=V(0.0, FROM_ZERO),
+        E=V(1.0, POSITIVE), nu=V(0.3, [*NUMBER, 0.6]), rho=V(0.0, optional(FROM_ZERO)),
         shear_factor=V(0.8, POSITIVE), fibres=V(ub.Fibres(LAW), OBJECT),
     ),
     "Fibres": call(
@@ -177,7 +177,10 @@ TABLE = {
         name=V("girder", TEXT),
     ),
     "Beam.at": call(BEAM.at, s=V(0.5, [*NUMBER, -0.1, 1.1])),
-    "Place": call(ub.Place, beam=V(BEAM, OBJECT), s=V(0.5, [*NUMBER, -0.1, 1.1])),
+    "Place": call(
+        ub.Place,
+        beam=V(BEAM, OBJECT), s=V(0.5, [*NUMBER, -0.1, 1.1]), beyond=V(False, SWITCH),
+    ),
     "Body": call(
         ub.Body,
         center=V((0, 0), VECTOR), mass=V(1.0, FROM_ZERO), inertia=V(1.0, FROM_ZERO),
@@ -231,6 +234,7 @@ TABLE = {
         ub.Coulomb,
         force=V(1.0, FROM_ZERO), coefficient=V(1.0, FROM_ZERO), joint=V(JOINT, OBJECT),
     ),
+    "RigidPlastic": call(ub.RigidPlastic, law=V(LAW, OBJECT)),
     "Function": call(ub.Function, force=V(lambda e, rate: e, FUNCTION)),
     "Controller": call(ub.Controller, force=V(lambda simulation: 1.0, FUNCTION)),
     "Motor": call(ub.Motor, motion=V(lambda t: t, [*TIME, None])),
@@ -356,6 +360,8 @@ TABLE = {
     ),
     # files
     "XDMF": call(ub.XDMF, path=V("run.xdmf", [*PATH, "run.h5"]), every=V(1, COUNT)),
+    "VTKHDF": call(ub.VTKHDF, path=V("run.vtkhdf", [*PATH, "run.h5"]), every=V(1, COUNT)),
+    "load": call(ub.load, path=V("run.h5", PATH)),
     "History": call(
         ub.History,
         path=V("run.csv", PATH), places=V((), LIST), connectors=V((), LIST), every=V(1, COUNT),
