@@ -64,13 +64,10 @@ def require_same(one, other):
     """All that solutions offer."""
     assert type(one) is type(other)
     assert one.scene is not other.scene
-    assert str(one) == str(other)
-    assert (one.parts, one.iterations, one.seconds) == (
-        other.parts,
-        other.iterations,
-        other.seconds,
-    )
-    assert one.every == other.every
+    # Names of the ledger may have another order on another process than the first
+    assert sorted(str(one).split("\n")) == sorted(str(other).split("\n"))
+    for name in ("parts", "iterations", "seconds", "every", "open_ledger"):
+        assert getattr(one, name) == getattr(other, name), name
     for name in ("times", "q", "v"):
         assert same(getattr(one, name), getattr(other, name)), name
     for a, b in zip(places(one.scene), places(other.scene), strict=True):
