@@ -8,7 +8,7 @@
 #
 # This demo emphasises
 #
-# * a hinge that softens, P(49)-P(53), in one chosen cell of a moving beam,
+# * a hinge that softens, P(49)-P(53), at a chosen place of a moving beam,
 # * the transition from a rigid joint to a revolute one without a change of the model,
 # * the ledger: what the drive supplied and where it went.
 #
@@ -29,9 +29,9 @@ output.mkdir(exist_ok=True)
 # %% [markdown]
 # ## Scene
 #
-# The hub turns as prescribed: up to speed within 0.3 s, on until 0.5 s, then the brake.  The flange
-# is the first cell, 20 mm long; the breaking joint sits in it.  It opens at M_u = 300 N m, twice
-# what the drive needs, and takes G_f = 20 J to break, half the energy in motion.
+# The hub turns as prescribed: up to speed within 0.3 s, on until 0.5 s, then the brake.  The breaking
+# joint is in the middle of the flange, 10 mm from the hub.  It opens at M_u = 300 N m, twice what the
+# drive needs, and takes G_f = 20 J to break, half the energy in motion.
 
 # %%
 L, payload = 1.5, 2.0  # m, kg

@@ -195,7 +195,7 @@ assert 3.8 < spread[100] / spread[200] < 4.2
 # %% [markdown]
 # ## Softening
 #
-# A cell of 20 cm in the middle is weaker: at M_u = 8 kN cm a hinge opens in it, with the traction
+# The middle is weaker: at M_u = 8 kN cm a hinge opens there, with the traction
 # M_u exp(-M_u a/G_f) at the jump a, P(52).  While it opens the beam around it unloads, and as the
 # rotation of the end is imposed, that is stable if the hinge softens more slowly than the beam
 # springs back: M_u²/G_f < EI/L.  The fracture energy is printed as 10·10³ kJ, which would lift
@@ -212,7 +212,7 @@ kappa_p = (M_u - M_y) / (K * I)
 
 
 def soften(others, rate, eta, steps, record=()):
-    """The beam with a hinge in a cell of 20 cm in the middle, and ``others`` cells beside it."""
+    """The beam with a hinge in the middle of 20 cm in two cells, and ``others`` cells beside."""
     sides = np.linspace(0.0, 0.4, others // 2 + 1)[1:]
     beam = ub.Beam(
         (0, 0), (L, 0), section(hardening(ub.DuvautLions(eta / (E + K)))), name="cantilever",

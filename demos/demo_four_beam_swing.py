@@ -38,7 +38,9 @@ output.mkdir(exist_ok=True)
 # %%
 E, nu, rho = 73e9, 0.3, 2700.0  # Pa, -, kg/m^3
 flexible = ub.Section.rectangle(b=5e-3, h=1e-3, E=E, nu=nu, rho=rho)  # m
-rigid = ub.Section(EA=1e4 * flexible.EA, GA=1e4 * flexible.GA, EI=1e4 * flexible.EI, depth=3e-3)
+rigid = ub.Section(
+    EA=1e4 * flexible.EA, GA=1e4 * flexible.GA, EI=1e4 * flexible.EI, rhoA=0.0, depth=3e-3
+)
 
 beam = ub.Beam((0, -0.36), (0.72, -0.36), flexible, cells=4, name="beam")  # m
 left = ub.Beam((0, 0), (0, -0.36), rigid, cells=1, name="left link")

@@ -83,7 +83,7 @@ class Manipulator:
             parts = {"beams": [self.flexible], "bodies": [rigid]}
             self.shoulder, self.elbow = rigid.middle, rigid.at(*elbow)
         else:
-            stiff = ub.Section(stiffer * EA, stiffer * GA, stiffer * EI, depth=section.depth)
+            stiff = ub.Section(stiffer * EA, stiffer * GA, stiffer * EI, 0.0, depth=section.depth)
             rigid = ub.Beam(shoulder, elbow, stiff, cells=1, name="rigid arm")
             parts = {"beams": [rigid, self.flexible]}
             self.shoulder, self.elbow = rigid.start, rigid.end

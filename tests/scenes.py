@@ -127,7 +127,7 @@ def swing(*, cells=4, rigidity=1e4):
     """
     EA, GA, EI = 3.65e5, 1.17e5, 0.0304166667
     flexible = ub.Section(EA=EA, GA=GA, EI=EI, rhoA=0.0135, rhoI=1.125e-9)
-    stiff = ub.Section(EA=rigidity * EA, GA=rigidity * GA, EI=rigidity * EI)
+    stiff = ub.Section(EA=rigidity * EA, GA=rigidity * GA, EI=rigidity * EI, rhoA=0.0)
     beam = ub.Beam((0, -0.36), (0.72, -0.36), flexible, cells=cells)
     left = ub.Beam((0, 0), (0, -0.36), stiff, cells=1, name="left")
     right = ub.Beam((1.08, 0), (0.72, -0.36), stiff, cells=1, name="right")

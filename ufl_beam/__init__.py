@@ -1,5 +1,9 @@
 """Planar flexible multibody dynamics with geometrically exact beams.  Units are SI."""
 
+from ufl_beam import compat  # noqa: F401 - first, because it explains what is not installed
+
+# isort: split
+
 from ufl_beam.beams import Beam, Place
 from ufl_beam.bodies import Body, Spot, ground
 from ufl_beam.checkpoint import Checkpoint

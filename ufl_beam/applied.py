@@ -13,7 +13,7 @@ from ufl_beam.bodies import carries
 from ufl_beam.compat import Array
 from ufl_beam.grid import Share
 from ufl_beam.ledger import Ledger
-from ufl_beam.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, TimeFunction
+from ufl_beam.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, value_at
 from ufl_beam.loops import Loop, doubles, ffi, loop
 from ufl_beam.memory import Memory
 from ufl_beam.schemes import Scheme, Step
@@ -37,9 +37,9 @@ class DeadLoads:
 
     def __init__(self, loads: Sequence[Load], share: Share, scheme: Scheme, ledger: Ledger) -> None:
         # Loads of one time function are one vector; functions need not be hashable.
-        vectors: dict[int, tuple[TimeFunction, Array]] = {}
+        vectors: dict[int, tuple[Load, Array]] = {}
         for load in loads:
-            _, vector = vectors.setdefault(id(load.time), (load.time, np.zeros(share.size)))
+            _, vector = vectors.setdefault(id(load.time), (load, np.zeros(share.size)))
             vector += _forces(load, share)
         self._vectors = list(vectors.values())
         self._acting, self._ledger = scheme.acting, ledger
@@ -52,7 +52,7 @@ class DeadLoads:
 
     def begin(self, step: Step) -> None:
         """The loads of the step; nothing is to do for those that stay."""
-        factors = [time(step.load_time) for time, _ in self._vectors]
+        factors = self._factors_at(step.load_time)
         if factors == self._factors and step.toward == step.at == 1:
             return
         self.force = self._end = self._times(factors)
@@ -70,8 +70,12 @@ class DeadLoads:
 
     def carry_on(self, t: float, q: Array) -> Array:
         """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them."""
-        self._before = self._times([time(t) for time, _ in self._vectors])
+        self._before = self._times(self._factors_at(t))
         return self._before
+
+    def _factors_at(self, t: float) -> list[float]:
+        """Factors of the vectors; a vector belongs to its first load for messages."""
+        return [value_at(load.time, t, load) for load, _ in self._vectors]
 
     def _times(self, factors: list[float]) -> Array:
         (_, vector), *others = self._vectors
@@ -131,7 +135,7 @@ class FollowerLoads:
         dofs = np.array([share.local(share.at(load.place)) for load in mine], dtype=np.int64)
         self._dofs = dofs.reshape(-1, 3)
         self._forces = np.array([[*load.force, load.moment] for load in mine]).reshape(-1, 3)
-        self._times = [load.time for load in mine]
+        self._loads = mine
         x, y, turn = self._dofs.T
         self._entries = np.array([A.positions(x, turn), A.positions(y, turn)])
         self._A = A
@@ -157,7 +161,7 @@ class FollowerLoads:
         return self.force
 
     def _sizes_at(self, t: float) -> Array:
-        factors = np.array([time(t) for time in self._times])
+        factors = np.array([value_at(load.time, t, load) for load in self._loads])
         return np.asarray(self._forces * factors.reshape(-1, 1))
 
     def _in_plane(self, q: Array) -> Array:

@@ -13,9 +13,16 @@ from ufl_beam.curves import tangent_within
 from ufl_beam.errors import (
     SceneError,
     require_count,
+    require_function,
     require_kind,
+    require_memory,
     require_number,
+    require_sequence,
+    require_switch,
+    require_text,
     require_vector,
+    shorten,
+    warn,
 )
 from ufl_beam.laws import HingeLaw, require_hinge_law
 from ufl_beam.sections import Section
@@ -61,22 +68,25 @@ class Beam:
     hinges: Mapping[float, HingeLaw | None] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        require_text(self.name, "Beam: name")
         a, b = (require_vector(x, f"{self.name}: end") for x in (self.a, self.b))
         object.__setattr__(self, "a", a)
         object.__setattr__(self, "b", b)
         if not isinstance(self.section, Section):
-            raise SceneError(f"{self.name}: section = {self.section!r} is not a Section")
-        require_count(self.cells, f"{self.name}: cells")
-        object.__setattr__(self, "cells", int(self.cells))
+            raise SceneError(f"{self.name}: section = {shorten(self.section)} is not a Section")
+        object.__setattr__(self, "cells", require_count(self.cells, f"{self.name}: cells"))
+        require_memory(self.cells, f"{self.name}: cells = {self.cells}")
         if self.curve is None:
             if a == b:
                 raise SceneError(f"{self.name}: zero length, both ends are at {a}")
             object.__setattr__(self, "curve", Straight(a, b))
         for s, end in ((0.0, a), (1.0, b)):
-            there = require_vector(self.curve(s), f"{self.name}: curve({s:g})")
+            there = point_of(self.curve, s, f"{self.name}: curve")
             if math.dist(there, end) > 1e-9 * max(math.hypot(*there), math.hypot(*end)):
                 raise SceneError(f"{self.name}: curve({s:g}) = {there} is not the end {end}")
-        for s in self.corners:
+        corners = require_sequence(self.corners, f"{self.name}: corners")
+        object.__setattr__(self, "corners", corners)
+        for s in corners:
             require_number(s, f"{self.name}: corner")
             if not 0.0 < s < 1.0:
                 raise SceneError(f"{self.name}: corner s = {s:g} must lie between 0 and 1")
@@ -96,8 +106,19 @@ class Beam:
             raise SceneError(
                 f"{self.name}: hinges are for resultants; here the fibres of the section soften"
             )
-        for s in (*self.corners, *(i / self.cells for i in range(self.cells + 1))):
-            require_vector(self.curve(s), f"{self.name}: curve({s:g})")
+        at = sorted({*self.corners, *(i / self.cells for i in range(self.cells + 1))})
+        points = [point_of(self.curve, s, f"{self.name}: curve") for s in at]
+        self._warn_of_thickness(sum(math.dist(p, q) for p, q in pairwise(points)))
+
+    def _warn_of_thickness(self, length: float) -> None:
+        """Warn if the radius of gyration of a section is larger than the beam is long."""
+        depth = self.section.depth
+        if depth > math.sqrt(12) * length > 0.0:
+            warn(
+                f"{self.name}: its section is {depth:.3g} m deep (sqrt(12 EI/EA) where no depth is "
+                f"given), but it is only {length:.3g} m long. Are sizes of the section in mm? "
+                "Units are SI: m, N, N m². If EI is large on purpose, give the section its depth"
+            )
 
     @classmethod
     def arc(
@@ -125,6 +146,7 @@ class Beam:
         cls, points: Sequence[Point], section: Section, *, cells: int = 8, name: str = "beam"
     ) -> Beam:
         """Straight pieces through ``points``, rigidly joined; ``s`` is the part of the length."""
+        points = require_sequence(points, f"{name}: points")
         xy = [require_vector(p, f"{name}: point {i}") for i, p in enumerate(points)]
         if len(xy) < 2:
             raise SceneError(f"{name}: a polyline needs at least two points, not {len(xy)}")
@@ -142,8 +164,7 @@ class Beam:
     @classmethod
     def along(cls, curve: Curve, section: Section, *, cells: int = 8, name: str = "beam") -> Beam:
         """Any curve ``s -> (x, y)``, ``s`` from 0 to 1; m."""
-        a = require_vector(curve(0.0), f"{name}: curve(0)")
-        b = require_vector(curve(1.0), f"{name}: curve(1)")
+        a, b = (point_of(curve, s, f"{name}: curve") for s in (0.0, 1.0))
         return cls(a, b, section, cells=cells, name=name, curve=curve)
 
     def at(self, s: float) -> Place:
@@ -195,10 +216,11 @@ class Place:
 
     def __post_init__(self) -> None:
         if not isinstance(self.beam, Beam):
-            raise SceneError(f"Place: {self.beam!r} is not a Beam")
+            raise SceneError(f"Place: {shorten(self.beam)} is not a Beam")
         require_number(self.s, f"{self.beam.name}.at(s): s")
         if not 0.0 <= self.s <= 1.0:
             raise SceneError(f"{self.beam.name}.at({self.s:g}): s must lie between 0 and 1")
+        require_switch(self.beyond, f"{self.beam.name}.at({self.s:g}): beyond")
 
     @property
     def point(self) -> Point:
@@ -224,3 +246,17 @@ class Place:
         x, y = self.point
         name = f"{self.beam.name}.{ends.get(self.s, f'at({self.s:g})')} ({x:g}, {y:g})"
         return f"{name} beyond the hinge" if self.beyond else name
+
+
+def point_of(curve: Curve, s: float, what: str) -> Point:
+    """Evaluate a curve of a user.
+
+    Raises:
+        SceneError: It fails there, or returns no pair of finite numbers; the message has ``what``.
+    """
+    require_function(curve, what, "s that returns (x, y)")
+    try:
+        point = curve(s)
+    except Exception as error:
+        raise SceneError(f"{what}({s:g}) fails: {shorten(error)}") from error
+    return require_vector(point, f"{what}({s:g})")

@@ -6,7 +6,14 @@ import math
 from dataclasses import KW_ONLY, dataclass
 
 from ufl_beam.beams import Place, Point
-from ufl_beam.errors import SceneError, require_kind, require_number, require_vector
+from ufl_beam.errors import (
+    SceneError,
+    require_kind,
+    require_number,
+    require_text,
+    require_vector,
+    shorten,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +37,7 @@ class Body:
     name: str = "body"
 
     def __post_init__(self) -> None:
+        require_text(self.name, "Body: name")
         object.__setattr__(self, "center", require_vector(self.center, f"{self.name}: center"))
         require_number(self.mass, f"{self.name}: mass", at_least=0.0)
         require_number(self.inertia, f"{self.name}: inertia", at_least=0.0)
@@ -108,6 +116,6 @@ def require_anchor(anchor: object, owner: str) -> None:
     """Raise :class:`SceneError` naming ``owner`` unless something can be attached there."""
     if not isinstance(anchor, Place | Spot):
         raise SceneError(
-            f"{owner}: {anchor!r} is not a place; use beam.start, .end or .at(s), "
+            f"{owner}: {shorten(anchor)} is not a place; use beam.start, .end or .at(s), "
             "body.at(x, y) or ground(x, y)"
         )

@@ -9,8 +9,8 @@ from functools import singledispatch
 
 from ufl_beam.beams import Beam
 from ufl_beam.bodies import Body
-from ufl_beam.connectors import Coulomb, Damper, Law, Spring, Stop
-from ufl_beam.laws import Softening
+from ufl_beam.connectors import Coulomb, Damper, Law, RigidPlastic, Spring, Stop
+from ufl_beam.laws import HingeLaw
 from ufl_beam.scene import Scene
 from ufl_beam.view import with_unit
 from ufl_beam.viscous import Damping, KelvinVoigt, Rayleigh
@@ -58,9 +58,14 @@ def _(law: Coulomb, turns: bool) -> str:
     return f"friction {' + '.join([*limit, *rate])}"
 
 
-def hinge_in_words(law: Softening) -> str:
+@law_in_words.register
+def _(law: RigidPlastic, turns: bool) -> str:
+    return f"rigid up to {with_unit(float(law.law.limit), 'N m' if turns else 'N')}"
+
+
+def hinge_in_words(law: HingeLaw) -> str:
     """The moment at which a hinge opens."""
-    return f"hinge {with_unit(law.limit, 'N m')}" if law.opens else "hinge, never opens"
+    return f"hinge {with_unit(float(law.limit), 'N m')}"
 
 
 @singledispatch

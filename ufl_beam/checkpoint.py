@@ -24,7 +24,7 @@ import numpy as np
 
 from ufl_beam.compat import Array
 from ufl_beam.describe import CODE, Description, difference, has_state, kind_of
-from ufl_beam.errors import SceneError, require_count, require_number, require_sequence
+from ufl_beam.errors import SceneError, require_count, require_number, require_sequence, shorten
 from ufl_beam.locks import Lock
 from ufl_beam.outputs import require_path
 from ufl_beam.pacing import Pace
@@ -78,8 +78,8 @@ class Checkpoint:
         for i, one in enumerate(self.also):
             if not has_state(one):
                 raise SceneError(
-                    f"{what}: also[{i}] = {one!r} has no state; give a random generator of NumPy, "
-                    "or an object with methods state() and restore(state)"
+                    f"{what}: also[{i}] = {shorten(one)} has no state; give a random generator of "
+                    "NumPy, or an object with methods state() and restore(state)"
                 )
 
     @property

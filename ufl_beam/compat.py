@@ -7,12 +7,13 @@ import sysconfig
 from pathlib import Path
 from typing import Any
 
-from mpi4py import MPI
-
 import numpy as np
 import numpy.typing as npt
 
 try:
+    import petsc4py  # noqa: F401 - solvers need it
+    from mpi4py import MPI
+
     import basix.ufl
     import dolfinx
     import ffcx
@@ -20,8 +21,8 @@ try:
     from dolfinx import cpp, fem, io, jit, mesh
 except ImportError as error:  # pragma: no cover - depends on the machine
     raise ImportError(
-        "ufl_beam needs DOLFINx 0.9 or newer, which is not on PyPI. "
-        "Run through ./env of the source tree, or see docs/installation.md."
+        "ufl_beam needs DOLFINx 0.9 or newer with PETSc, which is not on PyPI "
+        f"({error}). Run through ./env of the source tree, or see docs/installation.md."
     ) from error
 
 Array = npt.NDArray[np.float64]

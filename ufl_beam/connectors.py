@@ -5,11 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass, field
+from numbers import Real
 from typing import TYPE_CHECKING, NamedTuple
 
-from ufl_beam.beams import Curve, Place, Point
+from ufl_beam.beams import Curve, Place, Point, point_of
 from ufl_beam.bodies import Anchor, arm, carries, ground, require_anchor
-from ufl_beam.errors import SceneError, require_kind, require_number, require_vector
+from ufl_beam.errors import (
+    SceneError,
+    require_function,
+    require_kind,
+    require_number,
+    require_returned,
+    require_switch,
+    require_text,
+    require_vector,
+)
 from ufl_beam.laws import Hardening, HingeLaw, Softening, require_hinge_law
 from ufl_beam.loads import TimeFunction, require_time_function
 
@@ -59,12 +69,12 @@ class Controller:
     force: Callable[[Simulation], float]
 
     def __post_init__(self) -> None:
-        if not callable(self.force):
-            raise SceneError(f"Controller: {self.force!r} must be a function of the simulation")
+        require_function(self.force, "Controller: force", "the simulation")
 
-    def ask(self, simulation: Simulation) -> float:
-        """The force of the next step; all processes ask together."""
-        return float(self.force(simulation))
+    def ask(self, simulation: Simulation, link: Connector) -> float:
+        """Evaluate the force of ``link`` in the next step; all processes call it together."""
+        at = f"t = {simulation.t:.9g} s"
+        return require_returned(self.force(simulation), f"{link}: the controller", at)
 
 
 @dataclass(frozen=True)
@@ -125,6 +135,9 @@ class Stop:
 
     def __post_init__(self) -> None:
         require_number(self.stiffness, "Stop: stiffness", positive=True)
+        for name, end in (("low", self.low), ("high", self.high)):
+            if not isinstance(end, Real) or abs(end) != math.inf:
+                require_number(end, f"Stop: {name}")
         if not self.low <= 0.0 <= self.high or (math.isinf(self.low) and math.isinf(self.high)):
             raise SceneError(
                 f"Stop: the interval from low = {self.low:g} to high = {self.high:g} must contain "
@@ -145,8 +158,11 @@ class Function:
     force: Callable[[float, float], float]
 
     def __post_init__(self) -> None:
-        if not callable(self.force):
-            raise SceneError(f"Function: {self.force!r} must be a function of motion and rate")
+        require_function(self.force, "Function: force", "(motion, rate)")
+
+
+class Bearing:
+    """Base of joints and supports: their force may press on places that rub."""
 
 
 @dataclass(frozen=True)
@@ -159,7 +175,8 @@ class Coulomb:
     Args:
         force: Limit whatever the joint bears; N or N m.
         coefficient: Coefficient of friction; for rotations times the radius of the pin; 1 or m.
-        joint: The joint whose force presses.
+        joint: The joint or support whose force presses.  Joints must be ``measured``, or hold
+            their places with forces anyway, as :func:`Prismatic` and :func:`Link` do.
 
     Raises:
         SceneError: No limit, or a coefficient without a joint.
@@ -168,7 +185,7 @@ class Coulomb:
     force: float = 0.0
     _: KW_ONLY
     coefficient: float = 0.0
-    joint: object = None
+    joint: Bearing | None = None
 
     def __post_init__(self) -> None:
         require_number(self.force, "Coulomb: force", at_least=0.0)
@@ -177,12 +194,14 @@ class Coulomb:
             raise SceneError("Coulomb: force and coefficient are both zero; leave it out")
         if (self.coefficient > 0) != (self.joint is not None):
             raise SceneError("Coulomb: give coefficient and joint together")
+        if self.joint is not None:
+            require_kind(self.joint, Bearing, "Coulomb: joint")
 
-    def ask(self, simulation: Simulation) -> float:
-        """The limit of the next step; all processes ask together."""
-        if not isinstance(self.joint, Joint):
+    def ask(self, simulation: Simulation, link: Connector) -> float:
+        """Return the limit of the next step; all processes call it together."""
+        if self.joint is None:
             return self.force
-        return self.force + self.coefficient * simulation.press(self.joint)
+        return self.force + self.coefficient * simulation.press(self.joint)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
@@ -217,8 +236,7 @@ class Guide:
     curve: Curve
 
     def __post_init__(self) -> None:
-        if not callable(self.curve):
-            raise SceneError(f"Guide: {self.curve!r} must be a function of s, giving (x, y)")
+        require_function(self.curve, "Guide: curve", "s that returns (x, y)")
 
 
 Law = (
@@ -379,7 +397,7 @@ def _require_apart(connector: Connector) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class Joint:
+class Joint(Bearing):
     """Anchors that share components of motion, or are held by connectors; see :func:`Rigid`.
 
     Attributes:
@@ -409,6 +427,12 @@ class Joint:
         return f"{self.kind}({', '.join(map(str, self.places))})"
 
     @property
+    def sameness(self) -> object:
+        """Key that joints share if they hold the same motions of the same places."""
+        held = [(link.motion, link.axis, id(link.law)) for link in self.holders]
+        return self.kind, frozenset(self.places), tuple(held)
+
+    @property
     def carriers(self) -> tuple[Anchor, ...]:
         """The anchors whose displacement is that of their node."""
         return tuple(place for place in self.places if carries(place))
@@ -420,6 +444,7 @@ def _joined(
     """A joint at one point: what is measured, and what nodes do not carry, connectors hold."""
     for place in places:
         require_anchor(place, kind)
+    require_switch(measured, f"{kind}: measured")
     carriers = [place for place in places if carries(place) and not measured]
     first = (carriers or list(places))[:1]
     others = [place for place in places if place not in (*carriers, *first)]
@@ -470,6 +495,7 @@ def Prismatic(
     Raises:
         SceneError: An axis of zero length.
     """
+    require_switch(turning, "Prismatic: turning")
     x, y = _axis(rail, slider, axis, "Prismatic")
     across = Connector("Prismatic", "sliding", rail, slider, HELD, (-y, x))
     return Joint("Prismatic", (rail, slider), () if turning else (2,), (across,))
@@ -518,8 +544,8 @@ def Guided(place: Anchor, curve: Curve) -> Joint:
     if not carries(place):
         raise SceneError(f"Guided({place}): it must be the centre of the body")
     law = Guide(curve)
-    x, y = require_vector(curve(0.0), f"Guided({place}): curve(0)")
-    (x0, y0), (x1, y1) = curve(-1e-6), curve(1e-6)
+    x, y = point_of(curve, 0.0, f"Guided({place}): curve")
+    (x0, y0), (x1, y1) = (point_of(curve, s, f"Guided({place}): curve") for s in (-1e-6, 1e-6))
     length = math.hypot(x1 - x0, y1 - y0)
     if length == 0.0:
         raise SceneError(f"Guided({place}): the curve stands still at s = 0")
@@ -529,24 +555,31 @@ def Guided(place: Anchor, curve: Curve) -> Joint:
     return Joint("Guided", (base, place), (), (holder,), meets=True, advice=advice)
 
 
-def Release(a: Place, b: Anchor, *, free: str) -> Joint:
+def Release(a: Place, b: Anchor, *, free: str, measured: bool = False) -> Joint:
     """Joint at one point that transmits all but some resultants of the beam of ``a``.
 
     Args:
         a: The place on a beam whose axis says what is axial.
         b: What it is joined to there.
         free: What is not transmitted: letters of "NVM".
+        measured: As in :func:`Rigid`.
 
     Raises:
         SceneError: Other letters, or none.
     """
     require_kind(a, Place, "Release: a")
+    require_anchor(b, "Release: b")
+    require_text(free, f"Release({a}, {b}): free")
+    require_switch(measured, f"Release({a}, {b}): measured")
     if not free or set(free) - set("NVM"):
         raise SceneError(f"Release({a}, {b}): free = {free!r} must be letters of 'NVM'")
     shared = () if "M" in free else (2,)
     if not set(free) & set("NV"):
-        return _joined("Release", (a, b), (0, 1, *shared))
+        return _joined("Release", (a, b), (0, 1, *shared), measured)
     x, y = a.direction
     held = [axis for name, axis in (("N", (x, y)), ("V", (-y, x))) if name not in free]
-    holders = tuple(Connector("Release", "sliding", a, b, HELD, axis) for axis in held)
-    return Joint("Release", (a, b), shared, holders, meets=True)
+    holders = [Connector("Release", "sliding", a, b, HELD, axis) for axis in held]
+    if shared and measured:
+        holders.append(Connector("Release", "turning", a, b, HELD))
+        shared = ()
+    return Joint("Release", (a, b), shared, tuple(holders), meets=True)

@@ -16,12 +16,12 @@ from ufl_beam.connectors import Actuator, Controller, Motor
 from ufl_beam.controls import Control, Given
 from ufl_beam.critical import Branch, CriticalPoint, Direction, Stiffness
 from ufl_beam.discretisation import Mesh
-from ufl_beam.errors import SceneError, StepFailed, require_count, require_kind
+from ufl_beam.errors import SceneError, StepFailed, require_count, require_function, require_kind
 from ufl_beam.loads import TimeFunction
 from ufl_beam.memory import State
 from ufl_beam.outputs import take
 from ufl_beam.parameter import FACTOR
-from ufl_beam.processes import ours
+from ufl_beam.processes import communicator
 from ufl_beam.record import Recorder, close_all, recorders_of
 from ufl_beam.scene import Scene
 from ufl_beam.simulation import Simulation, Trial
@@ -387,7 +387,9 @@ def follow(
         SceneError: The call or the scene is wrong; nothing was computed.
         ConvergenceError: A step failed; it carries the path so far.
     """
-    comm = ours() if comm is None else comm
+    comm = communicator(comm, "follow: comm")
+    if until is not None:
+        require_function(until, "follow: until", "the Simulation")
     require_kind(scene, Scene, "scene")
     if not isinstance(control, Control) or isinstance(control, type):
         raise SceneError(

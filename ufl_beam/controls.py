@@ -134,7 +134,9 @@ def _across(walk: Walk, normal: Direction, reach: float, what: str) -> Trial:
             more = f"{failure}; perhaps {what} turns back here, where this control cannot follow"
             raise failure.saying(f"{more}: take ArcLength") from None
     gone, way = bend
-    return walk.attempt(_joined(gone, way, length(reach - along(gone), way)), 1.0, plane)
+    return walk.attempt(
+        _joined(gone, way, length(reach - along(gone), way)), 1.0, plane, hold=False
+    )
 
 
 def _joined(gone: Direction, way: Direction, length: float) -> Direction:
@@ -223,7 +225,7 @@ class ArcLength:
         gone, unit = bend[0], self._unit(walk, bend[1])
         rest = max(reach - walk.length(gone, self.factor), SHORTEST * reach)
         plane = Plane(walk, self._across(walk, unit), rest, gone)
-        return walk.attempt(_joined(gone, unit, rest), 1.0, plane)
+        return walk.attempt(_joined(gone, unit, rest), 1.0, plane, hold=False)
 
     def _unit(self, walk: Walk, way: Direction) -> Direction:
         """A direction of length one."""
@@ -381,4 +383,4 @@ class Dissipation:
 
     def _spend(self, walk: Walk, part: float) -> Trial:
         reach = self.step * part
-        return walk.attempt(walk.aim(reach), 1.0, Dissipated(walk, reach))
+        return walk.attempt(walk.aim(reach), 1.0, Dissipated(walk, reach), hold=False)

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ufl_beam.errors import SceneError, require_number
+from ufl_beam.errors import SceneError, is_infinite, require_function, require_number
+from ufl_beam.numeric import require_row
 
 Array = npt.NDArray[np.float64]
 
@@ -102,14 +103,13 @@ class SNCurve:
         for name in ("range", "cycles", "slope", "slope_beyond"):
             require_number(getattr(self, name), f"SNCurve: {name}", positive=True)
         for name in ("knee", "limit"):
-            if not getattr(self, name) > 0:
-                raise SceneError(f"SNCurve: {name} = {getattr(self, name)} must be positive")
+            if not is_infinite(getattr(self, name)):
+                require_number(getattr(self, name), f"SNCurve: {name}", positive=True)
         if self.limit < self.knee < math.inf:
             raise SceneError(
                 f"SNCurve: limit = {self.limit:g} cycles lies before the knee, {self.knee:g}"
             )
-        if not callable(self.mean):
-            raise SceneError(f"SNCurve: mean = {self.mean!r} is not a function of range and mean")
+        require_function(self.mean, "SNCurve: mean", "(range, mean)")
 
     @classmethod
     def eurocode(cls, category: float) -> SNCurve:
@@ -118,6 +118,7 @@ class SNCurve:
         Args:
             category: Detail category, the range that is borne for 2e6 cycles; Pa: 71e6.
         """
+        require_number(category, "SNCurve.eurocode: category", positive=True)
         return cls(range=category, cycles=2e6, slope=3.0, knee=5e6, slope_beyond=5.0, limit=1e8)
 
     def endurance(self, range: npt.ArrayLike, mean: npt.ArrayLike = 0.0) -> Array:
@@ -174,9 +175,7 @@ def rainflow(series: npt.ArrayLike) -> Cycles:
         SceneError: It is not one row of finite numbers.
         ImportError: The package is missing.
     """
-    values = np.asarray(series, dtype=float)
-    if values.ndim != 1 or not np.isfinite(values).all():
-        raise SceneError("rainflow: the series must be one row of finite numbers")
+    values = require_row(series, "rainflow: series")
     counts: defaultdict[Ends, float] = defaultdict(float)
     waiting = _count([float(x) for x in values], counts)
     return _cycles(counts, waiting, 1.0)

@@ -9,6 +9,7 @@ import numpy.typing as npt
 import scipy  # its parts are loaded when they are used
 
 from ufl_beam.errors import SceneError, require_number
+from ufl_beam.numeric import require_array, require_row
 
 Array = npt.NDArray[np.float64]
 
@@ -166,7 +167,7 @@ def logarithmic_decrement(amplitudes: npt.ArrayLike) -> tuple[float, Array]:
     Raises:
         SceneError: Less than two amplitudes, or some are not positive.
     """
-    Φ = _row("logarithmic_decrement", amplitudes, "amplitudes")
+    Φ = require_row(amplitudes, "logarithmic_decrement: amplitudes")
     n = len(Φ) - 1
     if n < 1:
         raise SceneError(f"logarithmic_decrement: amplitudes given: {n + 1}, needed: 2")
@@ -181,7 +182,7 @@ def logarithmic_decrement(amplitudes: npt.ArrayLike) -> tuple[float, Array]:
 
 def damping_ratio(decrement: npt.ArrayLike) -> Array:
     """Damping ratio ζ of logarithmic decrements δ of any shape; negative where vibrations grow."""
-    δ = np.asarray(decrement, dtype=float)
+    δ = require_array(decrement, "damping_ratio: decrement")
     ζ: Array = δ / np.hypot(δ, 2 * np.pi)  # P(62)
     return ζ
 
@@ -244,22 +245,9 @@ def _gradient(t: Array, initial: float, rate: float) -> Array:
     return np.stack([e, -initial * t * e], axis=1)
 
 
-def _row(call: str, values: npt.ArrayLike, what: str) -> Array:
-    """``values`` as one row of finite numbers, or :class:`SceneError`."""
-    try:
-        row = np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise SceneError(f"{call}: {what} must be numbers") from None
-    if row.ndim != 1:
-        raise SceneError(f"{call}: {what} has shape {row.shape}; give one row of numbers")
-    for i in np.flatnonzero(~np.isfinite(row)):
-        raise SceneError(f"{call}: {what}[{i}] = {row[i]} is not finite")
-    return row
-
-
 def _series(call: str, t: npt.ArrayLike, x: npt.ArrayLike, what: str) -> tuple[Array, Array]:
     """Increasing times and as many values, or :class:`SceneError`."""
-    times, values = _row(call, t, "t"), _row(call, x, what)
+    times, values = require_row(t, f"{call}: t"), require_row(x, f"{call}: {what}")
     if len(times) != len(values):
         raise SceneError(f"{call}: {len(times)} t and {len(values)} {what}; give as many of each")
     for i in np.flatnonzero(np.diff(times) <= 0):

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
-from numbers import Rational
+from numbers import Rational, Real
 
 import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.beams import Beam
-from ufl_beam.errors import SceneError, require_kind
+from ufl_beam.errors import SceneError, require_kind, require_memory, require_number, shorten
 
 
 @dataclass(frozen=True)
@@ -41,11 +41,13 @@ class Mesh:
     def __post_init__(self) -> None:
         if not isinstance(self.refine, Rational) or self.refine <= 0:
             raise SceneError(
-                f"Mesh: refine = {self.refine!r} must be a positive whole number or Fraction(p, q)"
+                f"Mesh: refine = {shorten(self.refine)} must be a positive whole number or "
+                "Fraction(p, q)"
             )
+        require_number(self.refine, "Mesh: refine")
         object.__setattr__(self, "refine", Fraction(self.refine))
-        if self.degree not in (1, 2, 3):
-            raise SceneError(f"Mesh: degree = {self.degree!r} must be 1, 2 or 3")
+        if not isinstance(self.degree, Real) or self.degree not in (1, 2, 3):
+            raise SceneError(f"Mesh: degree = {shorten(self.degree)} must be 1, 2 or 3")
         object.__setattr__(self, "degree", int(self.degree))
         require_kind(self.lumped, bool, "Mesh: lumped")
 
@@ -97,6 +99,7 @@ class Mesh:
                     f"must be vertices; {beam.name} can take multiples of {least}"
                 )
         number = int((len(given) - 1) * self.refine)
+        require_memory(number, f"Mesh: refine = {self.refine} of {beam.name}, {number} cells,")
         return [_between(given, i / Fraction(self.refine)) for i in range(number + 1)]
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy  # its parts are loaded when they are used
 
-from ufl_beam.errors import SceneError, require_number
+from ufl_beam.errors import SceneError, require_number, shorten
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,9 @@ class Distribution(ABC):
     def __post_init__(self) -> None:
         name = type(self).__name__
         if isinstance(self.seed, bool) or not isinstance(self.seed, Integral) or self.seed < 0:
-            raise SceneError(f"{name}: seed = {self.seed!r} must be a whole number, 0 or more")
+            raise SceneError(
+                f"{name}: seed = {shorten(self.seed)} must be a whole number, 0 or more"
+            )
         for parameter in self.__match_args__:
             require_number(getattr(self, parameter), f"{name}: {parameter}", positive=True)
 

@@ -1,9 +1,22 @@
-"""What can go wrong, and the checks of numbers that all records share."""
+"""Errors and warnings of the package, and the checks of arguments that all records share."""
 
 from __future__ import annotations
 
 import math
+import numbers
+import os
+import sys
+import warnings
 from typing import Any
+
+LONGEST = 80
+"""Characters that a message shows of a value."""
+
+BYTES_PER_CELL = 400
+"""Least memory of a cell on each process: its vertices and the numbers of its unknowns."""
+
+PACKAGE = os.path.join(os.path.dirname(__file__), "")
+"""The directory of this package."""
 
 
 class SceneError(ValueError):
@@ -93,50 +106,173 @@ class TradeoffError(RuntimeError):
         self.runs = runs
 
 
-def require_number(
-    value: float, what: str, *, positive: bool = False, at_least: float = -math.inf
-) -> None:
-    """Raise :class:`SceneError` naming ``what`` unless ``value`` is a finite number in range."""
+def warn(message: str) -> None:
+    """Issue a :class:`ModelWarning` that points at the line of the user's script."""
+    level, frame = 1, sys._getframe()
+    while frame.f_back is not None and _is_library(frame.f_code.co_filename):
+        level, frame = level + 1, frame.f_back
+    warnings.warn(message, ModelWarning, stacklevel=level)
+
+
+def _is_library(file: str) -> bool:
+    """Return true for the files of this package, and for methods that ``dataclass`` writes."""
+    return file.startswith((PACKAGE, "<string>"))
+
+
+def shorten(value: object) -> str:
+    """Format a value for a message: its ``repr`` in one line, cut to a readable length."""
     try:
-        number = float(value)
+        text = " ".join(repr(value).split())
+    except Exception:  # of a class of the user, or of an integer with too many digits
+        text = f"<{type(value).__name__}>"
+    return clip(text)
+
+
+def clip(text: str) -> str:
+    """Cut a text in the middle to a readable length."""
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 20]} ... {text[-15:]}"
+
+
+def as_float(value: object) -> float:
+    """Convert a real number, also one of NumPy, to ``float``; text and arrays are refused.
+
+    Raises:
+        TypeError, ValueError: Not a real number; the message says what it is.
+        OverflowError: An integer beyond the range of ``float``.
+    """
+    scalar: Any = value
+    if getattr(scalar, "ndim", None) == 0:
+        scalar = scalar.item()
+    if isinstance(scalar, str | bytes | bytearray) or hasattr(scalar, "__len__"):
+        raise TypeError("not a number")
+    return float(scalar)
+
+
+def require_number(
+    value: Any, what: str, *, positive: bool = False, at_least: float = -math.inf
+) -> float:
+    """Return ``value`` as a finite float in range, or raise :class:`SceneError` naming ``what``."""
+    try:
+        number = as_float(value)
     except (TypeError, ValueError):
-        raise SceneError(f"{what} = {value!r} is not a number") from None
+        raise SceneError(f"{what} = {shorten(value)} is not a number") from None
+    except OverflowError:
+        raise SceneError(f"{what} = {shorten(value)} is too large for a number") from None
     if not math.isfinite(number):
         raise SceneError(f"{what} = {number} is not finite")
     if positive and number <= 0:
         raise SceneError(f"{what} = {number:g} must be positive")
     if number < at_least:
         raise SceneError(f"{what} = {number:g} must be at least {at_least:g}")
+    return number
 
 
-def require_count(value: Any, what: str) -> None:
-    """Raise :class:`SceneError` naming ``what`` unless ``value`` is a whole number, at least 1."""
-    require_number(value, what)
-    if value != int(value) or value < 1:
-        raise SceneError(f"{what} = {value} must be a whole number, at least 1")
+def require_returned(value: object, function: str, at: str) -> float:
+    """Return what a function of a user returned as a float.
+
+    Args:
+        value: The returned value; NaN and infinity pass.
+        function: Whose function it is, for the message.
+        at: Where it was evaluated, for the message.
+
+    Raises:
+        SceneError: Not a real number.
+    """
+    try:
+        return as_float(value)
+    except (TypeError, ValueError, OverflowError):
+        raise SceneError(
+            f"{function} returned {shorten(value)} at {at}; it must return a number"
+        ) from None
+
+
+def is_infinite(value: object) -> bool:
+    """Return true for positive infinity, which some parameters take for "never"."""
+    return isinstance(value, numbers.Real) and value == math.inf
+
+
+def require_count(value: Any, what: str) -> int:
+    """Return ``value`` as a whole number from 1 on, or raise :class:`SceneError`."""
+    number = require_number(value, what)
+    if number != int(number) or number < 1:
+        raise SceneError(f"{what} = {shorten(value)} must be a whole number, at least 1")
+    return int(value)
 
 
 def require_sequence(value: Any, what: str) -> tuple[Any, ...]:
-    """``value`` as a tuple, or :class:`SceneError` naming ``what``."""
-    try:
-        return tuple(value)
-    except TypeError:
-        raise SceneError(f"{what} = {value!r} must be a list") from None
+    """Return ``value`` as a tuple, or raise :class:`SceneError` naming ``what``."""
+    if not isinstance(value, str | bytes):
+        try:
+            return tuple(value)
+        except TypeError:
+            pass
+    raise SceneError(f"{what} = {shorten(value)} must be a list")
 
 
 def require_kind(value: Any, kind: type | tuple[type, ...], what: str) -> None:
-    """Raise :class:`SceneError` naming ``what`` unless ``value`` is of a kind."""
+    """Raise :class:`SceneError` naming ``what`` unless ``value`` is an instance of ``kind``."""
     if not isinstance(value, kind):
         kinds = kind if isinstance(kind, tuple) else (kind,)
-        raise SceneError(f"{what} = {value!r} is not a {' or '.join(k.__name__ for k in kinds)}")
+        names = " or ".join(k.__name__ for k in kinds)
+        raise SceneError(f"{what} = {shorten(value)} is not a {names}")
+
+
+def require_text(value: Any, what: str) -> None:
+    """Raise :class:`SceneError` naming ``what`` unless ``value`` is text."""
+    if not isinstance(value, str):
+        raise SceneError(f"{what} = {shorten(value)} must be text")
+
+
+def require_switch(value: Any, what: str) -> None:
+    """Raise :class:`SceneError` naming ``what`` unless ``value`` is True or False."""
+    if type(value).__name__ not in ("bool", "bool_"):
+        raise SceneError(f"{what} = {shorten(value)} must be True or False")
+
+
+def require_function(value: Any, what: str, of: str) -> None:
+    """Raise :class:`SceneError` naming ``what`` unless ``value`` can be called.
+
+    Args:
+        value: The function of a user.
+        what: Its owner and name.
+        of: Its arguments and its value, for the message.
+    """
+    if not callable(value):
+        raise SceneError(f"{what} = {shorten(value)} must be a function of {of}")
+
+
+def require_memory(cells: int, what: str) -> None:
+    """Raise :class:`SceneError` naming ``what`` if so many cells cannot be held in memory.
+
+    Each process has the numbering of the whole scene.
+    """
+    needed, there = cells * BYTES_PER_CELL, _physical_memory()
+    if needed > there:
+        raise SceneError(
+            f"{what} would take {needed / 1e9:.3g} GB of memory; this machine has "
+            f"{there / 1e9:.3g} GB. Take fewer cells"
+        )
+    if 3 * cells >= 2**31:
+        raise SceneError(
+            f"{what} has more degrees of freedom than the 32-bit indices of PETSc can number. "
+            "Take fewer cells"
+        )
+
+
+def _physical_memory() -> float:
+    """Return the memory of the machine in bytes; infinity where the system does not tell."""
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, OSError, ValueError):
+        return math.inf
 
 
 def require_vector(value: Any, what: str) -> tuple[float, float]:
-    """``value`` as a pair of finite floats, or :class:`SceneError` naming ``what``."""
+    """Return ``value`` as a pair of finite floats, or raise :class:`SceneError`."""
     try:
+        if isinstance(value, str | bytes):
+            raise TypeError
         x, y = value
     except (TypeError, ValueError):
-        raise SceneError(f"{what} = {value!r} must be a pair (x, y)") from None
-    require_number(x, f"{what}[0]")
-    require_number(y, f"{what}[1]")
-    return float(x), float(y)
+        raise SceneError(f"{what} = {shorten(value)} must be a pair (x, y)") from None
+    return require_number(x, f"{what}[0]"), require_number(y, f"{what}[1]")

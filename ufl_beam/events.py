@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from ufl_beam.beams import Place
 from ufl_beam.connectors import Connector, Coulomb, Stop
+from ufl_beam.errors import require_function
 from ufl_beam.memory import State
 from ufl_beam.parameter import TIME, Parameter
 from ufl_beam.record import Recorder, on_first
@@ -69,6 +70,8 @@ class Events(Recorder):
     """
 
     def __init__(self, tell: Callable[[Event], object] | None = None) -> None:
+        if tell is not None:
+            require_function(tell, "Events: tell", "an Event")
         self._tell = tell
         self.found: list[Event] = []
         self._rows: list[Row] = []

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from ufl_beam.errors import SceneError, require_count, require_kind
 from ufl_beam.laws import Hardening, Layout, Softening
+from ufl_beam.numeric import require_array
 
 Array = npt.NDArray[np.float64]
 
@@ -63,16 +64,15 @@ class PlacedFibres:
     @classmethod
     def at(cls, fibres: Fibres, E: float, y: Sequence[float], A: Sequence[float]) -> PlacedFibres:
         """Fibres of a user; ``y`` from any line, the axis will run through their centroid."""
-        try:
-            y_, A_ = np.array(y, dtype=np.float64), np.array(A, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise SceneError(f"Section.of_fibres: y = {y!r}, A = {A!r} are no numbers") from None
+        y_, A_ = (
+            require_array(x, f"Section.of_fibres: {name}") for name, x in (("y", y), ("A", A))
+        )
         if y_.ndim != 1 or y_.shape != A_.shape or not len(y_):
             raise SceneError(
                 f"Section.of_fibres: y and A must be lists of one length, not {y_.shape} and "
                 f"{A_.shape}"
             )
-        if not (np.isfinite(y_).all() and np.isfinite(A_).all() and (A_ > 0).all()):
+        if not (A_ > 0).all():
             raise SceneError("Section.of_fibres: y must be finite, and all A positive")
         if np.ptp(y_) == 0.0:
             raise SceneError(

@@ -19,6 +19,7 @@ from ufl_beam.connectors import (
     Damper,
     Function,
     Motor,
+    RigidPlastic,
     Spring,
     Stop,
 )
@@ -108,6 +109,11 @@ STRAIGHT: dict[type, list[Piece]] = {
         _box(-0.8, 0.8, 0.6, WHITE),
         Piece([(-0.55, -0.35), (-0.25, -0.27), (0.25, 0.27), (0.55, 0.35)], inside=True),
     ],
+    RigidPlastic: [  # nothing below a limit, flow at it
+        *_LEADS,
+        _box(-0.8, 0.8, 0.6, WHITE),
+        Piece([(-0.55, -0.35), (0.0, -0.35), (0.0, 0.35), (0.55, 0.35)], inside=True),
+    ],
 }
 """Along a line; what drives is orange, filled if its motion is given."""
 
@@ -130,7 +136,7 @@ def _turning(fill: str, *more: Piece, tail: float = -2.0) -> Glyph:
 
 AROUND: dict[type, Glyph] = {
     Spring: Glyph([Piece([(2.0, CENTRE), (2.0, -2.1), (-2.0, 0.0)])], sweep=4.3 * math.pi),
-    **{law: _bent(law) for law in (Damper, Stop, Coulomb, Function)},
+    **{law: _bent(law) for law in (Damper, Stop, Coulomb, Function, RigidPlastic)},
     Motor: _turning(ORANGE),
     Actuator: _turning(WHITE),
     Controller: _turning(WHITE, _box(-2.0, -1.4, 0.5, WHITE), tail=-1.4),

@@ -57,8 +57,9 @@ class Grid:
     """
 
     def __init__(self, scene: Scene, mesh: Mesh | None = None) -> None:
-        require_kind(mesh or Mesh(), Mesh, "mesh")
-        self.scene, self.mesh = scene, mesh or Mesh()
+        mesh = Mesh() if mesh is None else mesh
+        require_kind(mesh, Mesh, "mesh")
+        self.scene, self.mesh = scene, mesh
         self._parameters = [np.array(self.mesh.vertices(b, scene.attached[b])) for b in scene.beams]
         counts = np.array([len(p) for p in self._parameters], dtype=np.int64)
         self._first = np.concatenate([[0], np.cumsum(counts)])
@@ -107,6 +108,17 @@ class Grid:
         if beam not in self._number_of_beam:
             raise SceneError(f"{beam.name} is not in the scene")
         return self._number_of_beam[beam]
+
+    @property
+    def first_vertices(self) -> Index:
+        """First vertex of each beam, and the number of all vertices; (num_beams + 1,)."""
+        return self._first
+
+    def place(self, vertex: int) -> Place:
+        """Place of a vertex."""
+        number = int(np.searchsorted(self._first, vertex, side="right")) - 1
+        beam: Beam = self.scene.beams[number]
+        return beam.at(float(self._parameters[number][vertex - self._first[number]]))
 
     def vertices_of(self, beam: Beam) -> Index:
         """Vertices of a beam from start to end."""

@@ -15,6 +15,7 @@ from ufl_beam.responses import Setting
 from ufl_beam.schemes import Step
 from ufl_beam.sparse import Csr
 
+
 class Guides(Links):
     """Forces across curves; those over a step are across the chord, so that they do no work.
 

@@ -10,9 +10,9 @@ import numpy as np
 from ufl_beam.bodies import GROUND, Anchor, Spot, arm, node
 from ufl_beam.compat import Array
 from ufl_beam.connectors import Connector, Guide, Joint
+from ufl_beam.curves import nearest, parameter_step, tangent
 from ufl_beam.errors import SceneError
 from ufl_beam.grid import Grid
-from ufl_beam.curves import nearest, parameter_step, tangent
 from ufl_beam.scene import Scene
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ufl_beam.errors import SceneError, require_kind, require_number
+from ufl_beam.errors import SceneError, is_infinite, require_kind, require_number
 
 Values = Any
 """Array of real or complex numbers, or a UFL expression."""
@@ -52,8 +52,8 @@ def positive(x: Values) -> Values:
 
 
 def _require_from_zero_to_infinity(value: float, what: str) -> None:
-    """A non-negative number or infinity."""
-    if value != float("inf"):
+    """Raise :class:`SceneError` unless ``value`` is a non-negative number or infinity."""
+    if not is_infinite(value):
         require_number(value, what, at_least=0.0)
 
 

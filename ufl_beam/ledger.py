@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -41,6 +42,20 @@ class Ledger:
             self.state[name] = 0.0
 
 
+class Entries(dict[str, Array]):
+    """Entries of a part of the ledger by name; a missing one is explained."""
+
+    def __init__(self, entries: dict[str, Array], known: Sequence[str]) -> None:
+        super().__init__(entries)
+        self._known = tuple(known)
+
+    def __missing__(self, name: str) -> Array:
+        raise KeyError(
+            f"the ledger has no entry {name!r} here: the scene has nothing that makes it. "
+            f"Entries: {', '.join(map(repr, self._known)) or 'none'}"
+        )
+
+
 @dataclass(frozen=True)
 class Energy:
     """The ledger of a run.
@@ -55,9 +70,15 @@ class Energy:
     supplied: dict[str, Array]
     lost: dict[str, Array]
 
+    def __post_init__(self) -> None:
+        names = [*self.state, *self.supplied, *self.lost]
+        for part in ("state", "supplied", "lost"):
+            object.__setattr__(self, part, Entries(getattr(self, part), names))
+
     def __getitem__(self, name: str) -> Array:
-        """The entry ``name``; (n+1,); J.  Entries of effects that the scene lacks do not exist."""
-        return {**self.state, **self.supplied, **self.lost}[name]
+        """Entry ``name``; (n+1,); J.  Entries of effects that the scene lacks do not exist."""
+        parts = (self.state, self.supplied, self.lost)
+        return next((part for part in parts if name in part), self.state)[name]
 
     @property
     def total(self) -> Array:

@@ -115,5 +115,3 @@ class SearchingNewton:
         """Residual at a part of the step."""
         self._w.waxpy(-part, self._y, self._x)
         self._snes.computeFunction(self._w, self._f)
-
-

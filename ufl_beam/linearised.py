@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from functools import partial
 
 from mpi4py import MPI
@@ -17,7 +18,7 @@ from ufl_beam.classical import Static
 from ufl_beam.compat import Array
 from ufl_beam.discretisation import Mesh
 from ufl_beam.eigen import ROUND_OFF, SHIFT, ZERO, Complex
-from ufl_beam.errors import SceneError
+from ufl_beam.errors import ModelWarning, SceneError
 from ufl_beam.grid import Index
 from ufl_beam.scene import Scene
 from ufl_beam.schemes import Rates, Step
@@ -89,9 +90,11 @@ class SmallMotions:
     ) -> None:
         time = 0.0 if at is None else float(at.times[-1])
         # Each process does the same: no answer depends on their number.
-        simulation = Simulation(
-            scene, _Standstill(), t0=time, start=at, mesh=mesh, comm=MPI.COMM_SELF
-        )
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ModelWarning)  # they are about runs
+            simulation = Simulation(
+                scene, _Standstill(), t0=time, start=at, mesh=mesh, comm=MPI.COMM_SELF
+            )
         if t is not None:
             simulation.t = t
         self.scene, self._simulation = scene, simulation

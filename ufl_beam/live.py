@@ -19,7 +19,7 @@ from ufl_beam.guides import Guides
 from ufl_beam.inelastic import InelasticBeams
 from ufl_beam.joints import Connection, links_of, motion_of, velocity_of
 from ufl_beam.ledger import Ledger
-from ufl_beam.scene import Scene
+from ufl_beam.scene import Scene, Support
 from ufl_beam.schemes import Scheme
 from ufl_beam.supports import Supports
 from ufl_beam.terms import Inertia, SectionForces
@@ -68,6 +68,10 @@ class Live:
             return NO_REACTIONS
         if self.parts == 0 and not self.reactions_known:
             return np.full((len(self.scene.supports), 3), np.nan)
+        return self._support_forces()
+
+    def _support_forces(self) -> Array:
+        """Forces of all supports in the latest residual; (num_supports, 3); N, N, N m."""
         dofs, mine = self._support_dofs
         here = np.where(mine, self.supports.all_reactions(self.share.size)[dofs], 0.0)
         if self.share.comm.size > 1:
@@ -133,12 +137,15 @@ class Live:
         q, v = self.share.gather(self.q), self.share.gather(self.velocities()[0])
         return np.asarray(velocity_of(self.grid, place, [q], [v])[0])
 
-    def press(self, joint: Joint) -> float:
-        """Size of the force that connectors hold a joint with at the end of the last step; N.
+    def press(self, joint: Joint | Support) -> float:
+        """Size of the force of a joint or a support at the end of the last step; N.
 
         Raises:
             SceneError: The joint shares its displacement; make it with ``measured=True``.
         """
+        if isinstance(joint, Support):
+            force = self._support_forces()[self.scene.supports.index(joint)]
+            return float(np.linalg.norm(force[:2]))
         links = self.scene.links
         numbers = [n for n in links_of(self.scene, joint) if not links[n].turns]
         return float(np.linalg.norm(self.connections()[numbers, 1]))

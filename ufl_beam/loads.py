@@ -11,7 +11,14 @@ import numpy as np
 
 from ufl_beam.beams import Beam
 from ufl_beam.bodies import Anchor, carries, require_anchor
-from ufl_beam.errors import SceneError, require_number, require_sequence, require_vector
+from ufl_beam.errors import (
+    SceneError,
+    require_number,
+    require_returned,
+    require_sequence,
+    require_vector,
+    shorten,
+)
 
 TimeFunction = Callable[[float], float]
 
@@ -84,13 +91,28 @@ class Table:
 def require_time_function(function: TimeFunction, what: str) -> None:
     """Raise :class:`SceneError` naming ``what`` unless ``function`` gives a number at t = 0."""
     if not callable(function):
-        raise SceneError(f"{what}: time = {function!r} must be a function of t, such as ub.Table")
+        raise SceneError(
+            f"{what}: time = {shorten(function)} must be a function of t, such as ub.Table"
+        )
     try:
-        value = float(function(0.0))
+        value = function(0.0)
     except Exception as error:
-        raise SceneError(f"{what}: the time function fails at t = 0: {error!r}") from error
-    if not math.isfinite(value):
-        raise SceneError(f"{what}: the time function is {value} at t = 0")
+        raise SceneError(f"{what}: the time function fails at t = 0: {shorten(error)}") from error
+    number = require_returned(value, f"{what}: the time function", "t = 0")
+    if not math.isfinite(number):
+        raise SceneError(f"{what}: the time function is {number} at t = 0")
+
+
+def value_at(function: TimeFunction, t: float, owner: object) -> float:
+    """Evaluate a time function of a user.
+
+    Raises:
+        SceneError: It returns no number; the message names ``owner``.
+    """
+    value = function(t)
+    if type(value) is float:
+        return value
+    return require_returned(value, f"{owner}: the time function", f"t = {t:.9g} s")
 
 
 @dataclass(frozen=True, eq=False)

@@ -421,12 +421,12 @@ double missed_by_couplings(void *self, const double *q, const double *r, double 
     const double *row = in_cell(c->work, k, c->row), length = c->length[i];
     const double weight = fabs(row[c->work->lanes]);
     const double unit = c->rigid_plastic ? c->rigid_plastic->slope[i] : 1;
-    const double part = moved / c->size;
-    const double size = weight * unit < 1 - 1e-12 ? 0.01 * length * part
+    const double amplitude = moved / c->size;
+    const double size = weight * unit < 1 - 1e-12 ? 0.01 * length * amplitude
                                                   : weight * scale * c->size / length;
-    double far = part;
-    for (int j = 0; j < 4; ++j) far = fmax(far, part + fabs(q[dofs[j]]) / c->size);
-    for (int j = 4; j < 6; ++j) far = fmax(far, part + fabs(q[dofs[j]]));
+    double far = amplitude;
+    for (int j = 0; j < 4; ++j) far = fmax(far, amplitude + fabs(q[dofs[j]]) / c->size);
+    for (int j = 4; j < 6; ++j) far = fmax(far, amplitude + fabs(q[dofs[j]]));
     const double round_off = 8 * fabs(row[0]) * length * (nextafter(far, INFINITY) - far);
     const double left = fabs(r[c->force[i]]) - round_off;
     const double missed = left > 0 ? left / size : left <= 0 ? 0 : NAN;
@@ -479,9 +479,9 @@ void commit(const points *p)
       ask(p->end, w, SAID, s);
       const double before = w[STIFFNESS] * (w[BEFORE] - w[JUMP] / w[LENGTH] - w[PLASTIC]);
       const double change = s[STRESS] - before;
-      const double hardened = s[LOST] - change * change / (2 * w[STIFFNESS]);
+      const double hardened = s[LOST] - change / w[STIFFNESS] * change / 2;
       const double relaxed = hardened - change / 2 * s[FLOW];
-      if (relaxed > 0) sum[6] += volume * relaxed;
+      if (s[FLOW] != 0 && relaxed > 0) sum[6] += volume * relaxed;
       w[BEFORE] = w[STRAIN];
       w[PLASTIC] += s[FLOW];
       w[ACCUMULATED] += fabs(s[FLOW]);

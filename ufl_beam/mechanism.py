@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -12,9 +12,21 @@ from scipy.sparse.linalg import eigsh
 from ufl_beam.beams import Beam, Point
 from ufl_beam.bodies import GROUND, Anchor, Body, Node, Spot, node
 from ufl_beam.compat import Array
-from ufl_beam.connectors import Connector, Coulomb, Function, Guide, Motor, RigidPlastic, Spring
+from ufl_beam.connectors import (
+    Connector,
+    Coulomb,
+    Damper,
+    Function,
+    Guide,
+    Motor,
+    RigidPlastic,
+    Spring,
+    Stop,
+)
 from ufl_beam.errors import SceneError
-from ufl_beam.scene import Scene, Slot
+from ufl_beam.loads import value_at
+from ufl_beam.plastic_hinges import Slot
+from ufl_beam.scene import PointMass, Scene
 
 DENSE = 90
 """Up to this number of unknowns the null space comes from a dense decomposition."""
@@ -39,11 +51,59 @@ def require_masses(scene: Scene) -> None:
                 )
 
 
+def require_inertia(scene: Scene) -> None:
+    """Raise :class:`SceneError` if a part of the scene has no mass and nothing determines it.
+
+    Its rigid motions must be held, by stiffness, damping or constraints, or have inertia: else the
+    equations of motion are singular.
+    """
+    loose = _without_inertia(scene)
+    if not loose:
+        return
+    masses = [(one.place, c) for one in scene.masses for c in range(3) if _weighs(one, c)]
+    rows = _constraints(scene, _determines, masses)
+    free = _null_space(csr_array(rows[:, loose]))
+    if free.shape[1] == 0:
+        return
+    mode = np.zeros(rows.shape[1])
+    mode[loose] = free[:, 0] / np.abs(free[:, 0]).max()
+    mode = mode.reshape(-1, 3)
+    moving = [i for i in range(len(mode)) if np.abs(mode[i]).max() > 1e-6]
+    parts = "; ".join(_describe(scene, i, mode[i]) for i in moving[:4])
+    raise SceneError(
+        f"dynamics needs mass or something that holds: {parts}, without mass (rhoA or mass = "
+        "0), and nothing determines this motion. Give it mass (a section rho or rhoA), or hold or "
+        "join it"
+    )
+
+
+def _without_inertia(scene: Scene) -> list[int]:
+    """Numbers of the rigid motions (u, v, size ψ) of parts that have no inertia of their own."""
+    beams = [(one.section.rhoA, one.section.rhoA or one.section.rhoI) for one in scene.beams]
+    bodies = [(one.mass, one.inertia) for one in scene.bodies]
+    loose: list[int] = []
+    for i, (mass, inertia) in enumerate((*beams, *bodies)):
+        loose += [3 * i, 3 * i + 1] * (mass == 0.0) + [3 * i + 2] * (inertia == 0.0)
+    return loose
+
+
+def _weighs(mass: PointMass, component: int) -> bool:
+    """Return true if a point mass has inertia in a component of motion."""
+    return bool(mass.inertia if component == 2 else mass.mass)
+
+
+def _determines(link: Connector) -> bool:
+    """Return true if a connector determines its motion where nothing has mass."""
+    if isinstance(link.law, Stop):
+        return link.law.low == 0.0 or link.law.high == 0.0
+    return isinstance(link.law, (*RESISTING, Damper, Coulomb))
+
+
 def no_number(scene: Scene, times: Iterable[float]) -> str:
     """What has a time function that is no finite number at one of the times; empty if nothing."""
     for t in times:
         for owner, function in scene.time_functions():
-            if not math.isfinite(value := float(function(t))):
+            if not math.isfinite(value := value_at(function, t, owner)):
                 return f"{owner}: the time function is {value} at t = {t:.9g} s"
     return ""
 
@@ -165,8 +225,25 @@ RESISTING = (Motor, Guide, Spring, Function, RigidPlastic)
 """Laws of connectors that resist every motion; others bear nothing, or what they are told."""
 
 
-def _constraints(scene: Scene) -> csr_array:
-    """What joints and supports demand of (u, v, size ψ) of all parts; (constraints, 3 parts)."""
+def _resists(link: Connector) -> bool:
+    return isinstance(link.law, RESISTING)
+
+
+def _constraints(
+    scene: Scene,
+    acts: Callable[[Connector], bool] = _resists,
+    also: Iterable[tuple[Anchor, int]] = (),
+) -> csr_array:
+    """Rows that joints, supports and connectors make of (u, v, size ψ) of all parts.
+
+    Args:
+        scene: What is modelled.
+        acts: Whether a connector makes a row.
+        also: More places with a component of motion that makes a row.
+
+    Returns:
+        A matrix of shape (constraints, 3 parts).
+    """
     number = {part: i for i, part in enumerate(_parts(scene))}
     entries: list[tuple[int, int, float]] = []
     row = 0
@@ -191,7 +268,7 @@ def _constraints(scene: Scene) -> csr_array:
                 add(place, np.eye(3)[component])
                 row += 1
     for link in scene.links:
-        if isinstance(link.law, RESISTING):
+        if acts(link):
             unit = np.array([1.0, 1.0, 1.0 if link.turns else 1 / scene.size])
             for anchor, factors in zip((link.a, link.b), link.rigidly(), strict=True):
                 add(anchor, factors * unit)
@@ -202,6 +279,9 @@ def _constraints(scene: Scene) -> csr_array:
         for component in support.held:
             add(support.place, turned[component])
             row += 1
+    for place, component in also:
+        add(place, np.eye(3)[component])
+        row += 1
     return _sparse(entries, (max(row, 1), 3 * len(number)))
 
 

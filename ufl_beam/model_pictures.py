@@ -38,8 +38,11 @@ WIDTH, HEIGHT = (5.5, 9.0), (3.0, 6.8)
 LEFT, RIGHT, BELOW, ABOVE, NOTE = 66.0, 14.0, 46.0, 34.0, 16.0
 """Room for what is around the axes, and for a line of notes; points."""
 
-LABEL_SIZE = 11.0
-"""Size of labels; points."""
+LABEL_SIZE, TITLE_SIZE = 11.0, 14.0
+"""Sizes of labels and of the title; points."""
+
+BADGE = 60.0
+"""Room for the symbol of a load on the whole scene, and between two of them; points."""
 
 
 class Plan(NamedTuple):
@@ -60,15 +63,18 @@ def plot_model(scene: Scene) -> Figure:
     """Draw the undeformed model with all that is in it; see :func:`ufl_beam.plot`."""
     subject = Subject.of(scene)
     skeleton = _skeleton(subject)
-    notes = _notes(scene)
+    notes = notes_of(scene)
     with picture((WIDTH[1], HEIGHT[1])) as figure:
+        figure.set_layout_engine("none")
         plan = _first_plan(skeleton, scene.size)
         measure = _Measure(figure)
+        least = _width_of_words(subject, notes, measure)
         # What stands around the beams has a size in points: with the second plan it fits.
         for again in (False, True):
             drawing = draw(subject, plan.scale)
             placed = _arrange(drawing, plan.scale, measure, plan.frame if again else None)
-            plan = _plan(skeleton, plan.scale, _box(drawing, placed, plan.scale), len(notes))
+            box = _box(drawing, placed, plan.scale)
+            plan = _plan(skeleton, plan.scale, box, len(notes), least)
         drawing = draw(subject, plan.scale)
         placed = _arrange(drawing, plan.scale, measure, plan.frame)
         axes = _axes(figure, plan, _title(subject), notes)
@@ -90,13 +96,13 @@ def _title(subject: Subject) -> str:
     return "model: " + ", ".join(parts)
 
 
-def _notes(scene: Scene) -> list[str]:
+def notes_of(scene: Scene) -> list[str]:
     """What acts on the whole scene, and what symbols mean that explain themselves less."""
     notes = [damping_in_words(damping) for damping in scene.damping]
     laws = {b.section.hinge for b in scene.beams if b.section.hinge and b.section.hinge.opens}
     if laws:
         limits = sorted({with_unit(law.limit, "N m") for law in laws})
-        notes.append(f"dots: a hinge may form in each cell, from {', '.join(limits[:4])}")
+        notes.append(f"dots: hinges may form, from {', '.join(limits[:4])}")
     return notes
 
 
@@ -165,12 +171,20 @@ def _box(drawing: Drawing, placed: list[Placed], scale: float) -> Array:
     return np.array([*everything.min(axis=0), *everything.max(axis=0)])
 
 
+def _width_of_words(subject: Subject, notes: list[str], measure: _Measure) -> float:
+    """Width of the words above the axes; points."""
+    badges = [found[0] for load in subject.scene.loads if (found := badge(load)) is not None]
+    first = TITLE_SIZE / LABEL_SIZE * 2 * measure(_title(subject))[0]
+    first += sum(2 * measure(text)[0] + BADGE for text in badges)
+    return float(max([first, *(2 * measure(note)[0] for note in notes)]))
+
+
 def _first_plan(skeleton: Array, size: float) -> Plan:
     width, height = np.ptp(skeleton, axis=0)
     return Plan(max(width / 400.0, height / 250.0, size / 500.0), np.empty(4), (0.0, 0.0))
 
 
-def _plan(skeleton: Array, scale: float, box: Array, notes: int) -> Plan:
+def _plan(skeleton: Array, scale: float, box: Array, notes: int, words: float) -> Plan:
     """The largest scale at which everything fits, and the frame around it.
 
     Args:
@@ -178,6 +192,7 @@ def _plan(skeleton: Array, scale: float, box: Array, notes: int) -> Plan:
         scale: At which the box was found; m.
         box: Corners of everything; (4,); points.
         notes: Number of lines of notes.
+        words: Width of the words above the axes; points.
     """
     low, high = skeleton.min(axis=0), skeleton.max(axis=0)
     # What stands out beyond the skeleton has a size in points.
@@ -186,6 +201,7 @@ def _plan(skeleton: Array, scale: float, box: Array, notes: int) -> Plan:
     least, most = (
         np.array(side) * POINTS - around_axes for side in zip(WIDTH, HEIGHT, strict=True)
     )
+    least[0] = min(max(least[0], words), most[0])
     room = np.maximum(most - below - beyond, 0.3 * most)
     largest = float(np.max((high - low) / room))
     scale = largest if largest > 0.0 else scale
@@ -201,11 +217,16 @@ def _plan(skeleton: Array, scale: float, box: Array, notes: int) -> Plan:
 
 def _axes(figure: Figure, plan: Plan, title: str, notes: list[str]) -> Axes:
     """The axes, and the words above them."""
+    from matplotlib.ticker import MaxNLocator
+
     x0, y0, x1, y1 = plan.frame
     left, (width, height) = LEFT, (POINTS * side for side in plan.size)
     axes = figure.add_axes((0.1, 0.1, 0.8, 0.8))
     axes.set(xlim=(x0 * plan.scale, x1 * plan.scale), ylim=(y0 * plan.scale, y1 * plan.scale))
     axes.set(xlabel="x (m)", ylabel="y (m)")
+    for line, length, each in ((axes.xaxis, x1 - x0, 60.0), (axes.yaxis, y1 - y0, 32.0)):
+        number = min(max(int(length / each), 2), 9)
+        line.set_major_locator(MaxNLocator(number, steps=[1, 2, 2.5, 5, 10]))
     axes.tick_params(labelsize=12, color="#888888")
     for _ in range(2):  # the second time with as much room as the numbers at the axis take
         figure.set_size_inches(width / POINTS, height / POINTS)
@@ -215,7 +236,7 @@ def _axes(figure: Figure, plan: Plan, title: str, notes: list[str]) -> Axes:
         more = beyond * POINTS / figure.dpi + 8.0 - left
         left, width = left + more, width + more
     axes.set_aspect("equal")
-    axes.set_title(title, loc="left", color=INK, pad=8.0 + NOTE * len(notes))
+    axes.set_title(title, loc="left", color=INK, fontsize=TITLE_SIZE, pad=8.0 + NOTE * len(notes))
     for k, note in enumerate(reversed(notes)):
         axes.annotate(
             note, (0.0, 1.0), (0.0, 6.0 + NOTE * k), xycoords="axes fraction",
@@ -273,7 +294,7 @@ def _badges(axes: Axes, scene: Scene, plan: Plan, measure: _Measure) -> None:
             text, (x, y), xycoords="axes points", ha="right", va="center", color=RED,
             fontsize=LABEL_SIZE, gid="badges", annotation_clip=False,
         )  # fmt: skip
-        x -= 2 * float(measure(text)[0]) + 18.0
+        x -= 2 * float(measure(text)[0]) + 0.35 * BADGE
         if isinstance(sense, tuple) and math.hypot(*sense) > 0.0:
             way = 12.0 * np.array(sense) / math.hypot(*sense)
             axes.annotate(
@@ -283,5 +304,5 @@ def _badges(axes: Axes, scene: Scene, plan: Plan, measure: _Measure) -> None:
                     "color": RED, "arrowstyle": "-|>", "lw": 2.0, "shrinkA": 0, "shrinkB": 0,
                 },
             )  # fmt: skip
-        x -= 30.0
+        x -= 0.65 * BADGE
     measure.finish()

@@ -15,6 +15,7 @@ from ufl_beam.beams import Beam, Place
 from ufl_beam.bodies import Anchor, Body
 from ufl_beam.captions import hinge_in_words, law_in_words, names_of
 from ufl_beam.compat import Array
+from ufl_beam.connectors import RigidPlastic
 from ufl_beam.glyphs import GREY, INK, ORANGE, WHITE
 from ufl_beam.labels import Label, Spot
 from ufl_beam.load_symbols import (
@@ -114,6 +115,7 @@ def draw(subject: Subject, scale: float) -> Drawing:
     bench = Bench(outside, 1 / scale, subject.axes, subject.ways, subject.largest, {})
     drawing = Drawing()
     _draw_beams(drawing, subject, unit, scale)
+    _draw_hinges(drawing, subject, unit, scale)
     _draw_bodies(drawing, pose, subject.names, scale)
     _draw_joints(drawing, pose, min(unit / 3, 0.1 * typical * scale))
     _draw_connectors(drawing, pose, scale)
@@ -158,7 +160,7 @@ def _support(footing: Footing, unit: float) -> Iterator[Stroke]:
 
 
 def _draw_beams(drawing: Drawing, subject: Subject, unit: float, scale: float) -> None:
-    """Axes, marks between cells where they are few, hinges, names."""
+    """Axes, marks between cells and where hinges may form if these are few, names."""
     weight = 2.8 * unit / scale / SYMBOL
     drawing.add("beams", (Stroke(x, INK, weight, layer=4.0) for x in subject.axes.values()))
     if subject.cells <= MOST_CELLS:
@@ -169,16 +171,25 @@ def _draw_beams(drawing: Drawing, subject: Subject, unit: float, scale: float) -
                 middles = (axis[1:] + axis[:-1]) / 2
                 r = 0.14 * unit
                 drawing.add("hinges", (_disc(at, r, HINGE, HINGE, 4.1) for at in middles))
-    for beam in subject.scene.beams:
-        for s, law in beam.hinges.items():
-            at, r = np.array(beam.at(s).point), 0.3 * unit
-            label = Label(hinge_in_words(law), HINGE, CAPTIONS, around(at, r / scale))
-            drawing.add("hinges", [_disc(at, r, HINGE, HINGE, 5.2)], [label])
     if len(subject.axes) <= MOST_LABELS:
         drawing.labels += [
             Label(subject.names[beam], TEXT, NAMES, along_axis(axis, 2.5))
             for beam, axis in subject.axes.items()
         ]
+
+
+def _draw_hinges(drawing: Drawing, subject: Subject, unit: float, scale: float) -> None:
+    """Plastic hinges, beside what is at the end of the beam; sizes of chosen ones."""
+    r = 0.25 * unit
+    for hinge in subject.scene.hinges:
+        if isinstance(hinge.a, Place) and isinstance(hinge.law, RigidPlastic):
+            axis, s = subject.axes[hinge.a.beam], hinge.a.s
+            at = np.array(hinge.a.point)
+            if s in (0.0, 1.0):
+                at = at + 0.7 * unit * _direction(*(axis[:2] if s == 0.0 else axis[:-3:-1]))
+            label = Label(hinge_in_words(hinge.law.law), HINGE, CAPTIONS, around(at, r / scale))
+            chosen = [label] if s in hinge.a.beam.hinges else []
+            drawing.add("hinges", [_disc(at, r, HINGE, HINGE, 5.2)], chosen)
 
 
 def _between_cells(axis: Array, scale: float) -> Iterator[Stroke]:

@@ -25,6 +25,7 @@ from ufl_beam.linearised import SmallMotions
 from ufl_beam.loads import FollowerLoad, RotatingFrame
 from ufl_beam.mechanism import require_no_mechanism
 from ufl_beam.memory import State
+from ufl_beam.plausibility import warn_of_masses
 from ufl_beam.processes import ours
 from ufl_beam.record import on_first
 from ufl_beam.scene import Scene
@@ -266,6 +267,7 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
     small = SmallMotions(scene, at, mesh=mesh)
     if not small.M.data.any():
         raise SceneError("modes: nothing that can move has mass; give sections rho or rhoA")
+    warn_of_masses(scene)
     exponents, x = small.exponents(int(n))
     order = np.argsort(np.abs(exponents), kind="stable")[: int(n)]
     return Modes(small.scene, small.grid, small.q, small.shapes(x[:, order]), exponents[order])

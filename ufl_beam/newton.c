@@ -81,9 +81,9 @@ double motion_of(const equation *e, const double *q)
  * The next number has the next pattern of bits. */
 void find_last_digits(const equation *e, const double *q, double *digits)
 {
-  const double part = e->moved / e->scene;
+  const double amplitude = e->moved / e->scene;
   for (int i = 0; i < e->size; ++i) {
-    const double far = fabs(q[i]) + part * e->lengths[i];
+    const double far = fabs(q[i]) + amplitude * e->lengths[i];
     union { double number; int64_t bits; } next = {far};
     next.bits += 1;
     digits[i] = e->moves[i] * (next.number - far);

@@ -128,7 +128,7 @@ class Opened:
                     f"{beam.name}: the hinge of the section opened in {cells_in_words(number)}, "
                     "in the middle of a cell. At the ends of the cell at "
                     f"s = {place.s:.3g} the moment differs from that in its middle by "
-                    f"{100 * error:.2g} % of the limit, so the load at which the hinge opens is "
+                    f"{percent(error)} of the limit, so the load at which the hinge opens is "
                     "uncertain by as much. Put a hinge exactly where it belongs, "
                     "Beam(hinges={s: law}), or use shorter cells"
                 )
@@ -137,6 +137,11 @@ class Opened:
 def cells_in_words(number: int) -> str:
     """A number of cells in words: "1 cell", "2 cells"."""
     return f"{number} cell{'s'[: number != 1]}"
+
+
+def percent(part: float) -> str:
+    """A part in words: "12 %", or "more than 100 %" where the limit is next to nothing."""
+    return f"{100 * part:.2g} %" if part <= 1 else "more than 100 %"
 
 
 def _warn(message: str) -> None:

@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
-from ufl_beam.errors import SceneError
+from ufl_beam.errors import SceneError, shorten
 
 Output = tuple[str, tuple[Path, ...]]
 """Name of a writer in messages, and the files that it writes."""
@@ -24,10 +24,9 @@ _in_use: list[Output] = []
 
 def require_path(path: str | Path, what: str) -> Path:
     """Return ``path`` as a :class:`Path`, or raise :class:`SceneError` naming ``what``."""
-    try:
-        return Path(path)
-    except TypeError:
-        raise SceneError(f"{what}: path = {path!r} must be the name of a file") from None
+    if not isinstance(path, str | os.PathLike) or not os.fspath(path):
+        raise SceneError(f"{what}: path = {shorten(path)} must be the name of a file")
+    return Path(path)
 
 
 def require_writable(path: Path) -> None:

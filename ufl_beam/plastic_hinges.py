@@ -53,7 +53,9 @@ def plastic_hinges(
         bearing: Places where supports, connectors, loads or masses bear a moment.
     """
     laws = {place: law for beam in beams for place, law in _laws(beam).items() if law.opens}
-    same = merged([(node(place), 2) for place in joint.places] for joint in joints if 2 in joint.shared)
+    same = merged(
+        [(node(place), 2) for place in joint.places] for joint in joints if 2 in joint.shared
+    )
     members: dict[Slot, list[Node]] = {}
     for slot in {*same, *same.values()}:
         members.setdefault(same.get(slot, slot), []).append(slot[0])

@@ -6,8 +6,6 @@ theorem where a discontinuity opens, FFCx compiles them, and a loop in C goes ov
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import ufl
 from ufl.conditional import Condition

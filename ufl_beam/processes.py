@@ -10,12 +10,27 @@ from contextvars import ContextVar
 
 from mpi4py import MPI
 
+from ufl_beam.errors import SceneError, shorten
+
 _OURS: ContextVar[MPI.Intracomm] = ContextVar("processes of a scene", default=MPI.COMM_WORLD)
 
 
 def ours() -> MPI.Intracomm:
     """The processes that a scene is computed by, unless a call says others."""
     return _OURS.get()
+
+
+def communicator(comm: MPI.Intracomm | None, what: str) -> MPI.Intracomm:
+    """Return the processes of a call: those that it names, or by default :func:`ours`.
+
+    Raises:
+        SceneError: Not a communicator of mpi4py.
+    """
+    if comm is None:
+        return ours()
+    if not isinstance(comm, MPI.Intracomm) or comm == MPI.COMM_NULL:
+        raise SceneError(f"{what} = {shorten(comm)} must be a communicator, such as MPI.COMM_SELF")
+    return comm
 
 
 @contextmanager

@@ -16,7 +16,7 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.agreement import portable
-from ufl_beam.bodies import Anchor
+from ufl_beam.bodies import Anchor, require_anchor
 from ufl_beam.connectors import Connector, Joint
 from ufl_beam.errors import SceneError, require_count, require_kind, require_sequence
 from ufl_beam.joints import links_of, motion_of
@@ -174,8 +174,13 @@ class History(Recorder):
         require_count(every, f"History {path}: every")
         require_count(most, f"History {path}: most")
         self._first_every, self._most = every, most
-        self._path, self._places = require_path(path, "History"), tuple(places)
-        self._connectors = tuple(connectors)
+        self._path = require_path(path, "History")
+        self._places = require_sequence(places, f"History {path}: places")
+        self._connectors = require_sequence(connectors, f"History {path}: connectors")
+        for i, place in enumerate(self._places):
+            require_anchor(place, f"History {path}: places[{i}]")
+        for i, one in enumerate(self._connectors):
+            require_kind(one, (Connector, Joint), f"History {path}: connectors[{i}]")
         self._files: list[OutputFile] = []
 
     @property

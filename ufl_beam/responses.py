@@ -25,8 +25,10 @@ from ufl_beam.connectors import (
     Spring,
     Stop,
 )
+from ufl_beam.errors import require_returned
 from ufl_beam.laws import Hardening, Layout
 from ufl_beam.ledger import Ledger
+from ufl_beam.loads import value_at
 from ufl_beam.openings import Openable
 from ufl_beam.points import INPUTS, Course, Points, expect_entries
 from ufl_beam.schemes import Scheme, Step
@@ -248,8 +250,12 @@ class _Driven(_Working):
     steady = True
     _group, _entry, _sign = "supplied", "motors", -1.0
 
+    def _prepare(self) -> None:
+        self._motors: list[Any] = list(self._links)
+
     def _note(self, step: Step) -> None:
-        wanted = np.array([law.motion(step.motion_time) for law in self._laws])
+        t = step.motion_time
+        wanted = np.array([value_at(link.law.motion, t, link) for link in self._motors])
         self._target = self._e0 + step.toward * (wanted - self._e0)
 
     def rows(self, e1: Array, λ: Array) -> Rows:
@@ -292,7 +298,7 @@ class _Pushed(_Working):
         self._reached = rows[:, 0].copy()
 
     def _wanted(self, link: Any, step: Step) -> float:
-        return float(link.law.force(step.load_time))
+        return value_at(link.law.force, step.load_time, link)
 
     def rows(self, e1: Array, λ: Array) -> Rows:
         """The force is given."""
@@ -337,9 +343,8 @@ class _Asked(_Working):
     def _forces(self, e1: Array) -> Array:
         middle: Array = self._setting.scheme.average(self._e0, e1)
         rate = (e1 - self._e0) / self._dt
-        return np.array(
-            [float(law.force(m, r)) for law, m, r in zip(self._laws, middle, rate, strict=True)]
-        )
+        each = zip(self._links, self._laws, middle, rate, strict=True)
+        return np.array([_given(link, law.force, m, r) for link, law, m, r in each])
 
     def rows(self, e1: Array, λ: Array) -> Rows:
         """The force around the iterate; its derivative by central differences."""
@@ -358,6 +363,15 @@ class _Asked(_Working):
         weights = np.array([-1.0, 16.0, -30.0, 16.0, -1.0])
         forces = np.array([self._forces(e1 + k * ε) for k in range(-2, 3)])
         return np.asarray(-(weights @ forces) / (12 * ε**2))
+
+
+def _given(link: Connector, force: Any, motion: Any, rate: Any) -> float:
+    """Evaluate the force of a :class:`Function`; its owner is named if it is no number."""
+    value = force(motion, rate)
+    if isinstance(value, float):
+        return value
+    at = f"motion = {motion:.6g}, rate = {rate:.6g}"
+    return require_returned(value, f"{link}: the function", at)
 
 
 @respond.register(Coulomb)

@@ -135,9 +135,7 @@ class RigidPlasticResponse:
 
     steady = False
 
-    def __init__(
-        self, law: RigidPlastic, links: Sequence[Connector], setting: Setting
-    ) -> None:
+    def __init__(self, law: RigidPlastic, links: Sequence[Connector], setting: Setting) -> None:
         n, ledger = len(links), setting.ledger
         self._ledger, self._scheme = ledger, setting.scheme
         ledger.lost["hinges"] += 0.0

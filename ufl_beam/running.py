@@ -13,16 +13,11 @@ from tqdm import tqdm
 
 from ufl_beam.checkpoint import Checkpoint, Keeper, digest_of, kinds_of, require_continuable
 from ufl_beam.discretisation import Mesh
-from ufl_beam.errors import (
-    SceneError,
-    require_count,
-    require_kind,
-    require_number,
-)
+from ufl_beam.errors import SceneError, require_count, require_kind, require_number, require_switch
 from ufl_beam.initial import mesh_of
 from ufl_beam.outputs import take
 from ufl_beam.pacing import Adaptive, AdaptiveSteps, EqualSteps, Pace
-from ufl_beam.processes import in_study, ours
+from ufl_beam.processes import communicator, in_study, ours
 from ufl_beam.record import UNLIMITED, Recorder, close_all, recorders_of
 from ufl_beam.scene import Scene
 from ufl_beam.schemes import Scheme, has_inertia
@@ -77,7 +72,8 @@ def simulate(
         SceneError: The call or the scene is wrong; nothing was computed.
         ConvergenceError: A step failed; it carries the solution so far, and files are complete.
     """
-    comm = ours() if comm is None else comm
+    comm = communicator(comm, "simulate: comm")
+    require_switch(progress, "simulate: progress")
     t0, t1 = _require_times(t)
     _require_step(dt, scheme, (t0, t1))
     require_count(every, "simulate: every")

@@ -20,10 +20,11 @@ from ufl_beam.bodies import (
     node,
     require_anchor,
 )
-from ufl_beam.connectors import Actuator, Connector, Joint, Motor
+from ufl_beam.connectors import Actuator, Bearing, Connector, Coulomb, Joint, Motor
 from ufl_beam.curves import enclosing_diameter
 from ufl_beam.errors import (
     SceneError,
+    clip,
     require_kind,
     require_number,
     require_sequence,
@@ -39,6 +40,7 @@ from ufl_beam.loads import (
     RotatingFrame,
     TimeFunction,
     require_time_function,
+    value_at,
 )
 from ufl_beam.plastic_hinges import Slot, merged, plastic_hinges, shared_by_joints
 from ufl_beam.viscous import Damping, KelvinVoigt, Rayleigh
@@ -50,7 +52,7 @@ COMPONENTS = ("u", "v", "psi")
 
 
 @dataclass(frozen=True, eq=False)
-class Support:
+class Support(Bearing):
     """Components of motion of a place that are given; made by :func:`Clamped` and its siblings.
 
     Attributes:
@@ -164,13 +166,13 @@ class Velocity:
         beams: The beams and bodies that move so.
         linear: Velocity of the point ``about``; m/s.
         angular: Angular velocity; rad/s.
-        about: Point of the undeformed scene; m.
+        about: Point of the undeformed scene, by default the origin; m.
     """
 
     beams: tuple[Beam | Body, ...]
     linear: tuple[float, float] = (0.0, 0.0)
     angular: float = 0.0
-    about: Point = (0.0, 0.0)
+    about: Point | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "beams", require_sequence(self.beams, "Velocity: beams"))
@@ -178,13 +180,15 @@ class Velocity:
             require_kind(beam, (Beam, Body), f"Velocity: beams[{i}]")
         require_vector(self.linear, "Velocity: linear")
         require_number(self.angular, "Velocity: angular")
-        require_vector(self.about, "Velocity: about")
+        if self.about is not None:
+            require_vector(self.about, "Velocity: about")
 
     def at(self, x: float, y: float) -> tuple[float, float, float]:
         """(du/dt, dv/dt, dψ/dt) of the point (x, y); m/s, m/s, rad/s."""
+        about_x, about_y = self.about or (0.0, 0.0)
         return (
-            self.linear[0] - self.angular * (y - self.about[1]),
-            self.linear[1] + self.angular * (x - self.about[0]),
+            self.linear[0] - self.angular * (y - about_y),
+            self.linear[1] + self.angular * (x - about_x),
             self.angular,
         )
 
@@ -242,16 +246,19 @@ class Scene:
                     raise SceneError(
                         f"Scene: {one.name} is in the scene twice, as {first} and {part}[{i}]"
                     )
-        for owner, place in self._attachments():
+        for owner, place in self.attachments():
             one = place.beam if isinstance(place, Place) else place.body
             if one not in known:
                 part = "beams" if isinstance(one, Beam) else "bodies"
                 raise SceneError(f"{owner}: {one.name} is not in the scene; add it to {part}")
+        self._require_once()
         for joint in self.joints:
             self._require_together(joint)
         for connector in self.links:
             if node(connector.a) == node(connector.b):
                 raise SceneError(f"{connector}: both ends are at the same body or cross-section")
+            if isinstance(connector.law, Coulomb) and connector.law.joint is not None:
+                self._require_pressing(connector, connector.law.joint)
         self._require_single_supports()
 
     def __getitem__(self, name: str) -> Beam | Body:
@@ -278,7 +285,7 @@ class Scene:
         """
         points = [b.curve(s) for b in self.beams for s in b.vertices(())]
         points += [body.center for body in self.bodies]
-        points += [place.point for _, place in self._attachments() if isinstance(place, Spot)]
+        points += [place.point for _, place in self.attachments() if isinstance(place, Spot)]
         gyration = [math.sqrt(b.inertia / b.mass) for b in self.bodies if b.mass > 0]
         return enclosing_diameter(np.array(points)) or max(gyration, default=0.0) or 1.0
 
@@ -319,7 +326,7 @@ class Scene:
     @cached_property
     def movers(self) -> tuple[Body, ...]:
         """The bodies, and the ground if something is attached to it."""
-        attached = [place for _, place in self._attachments()]
+        attached = [place for _, place in self.attachments()]
         attached += [link.a for link in self.links]
         return (*self.bodies, *((GROUND,) if any(node(p) is GROUND for p in attached) else ()))
 
@@ -337,8 +344,8 @@ class Scene:
             if isinstance(link.law, Actuator):
                 yield link, link.law.force
 
-    def _attachments(self) -> Iterator[tuple[object, Anchor]]:
-        """Everything with a place, and its place."""
+    def attachments(self) -> Iterator[tuple[object, Anchor]]:
+        """Iterate over all that has a place, and its place."""
         for joint in self.joints:
             for place in joint.places:
                 yield joint, place
@@ -366,10 +373,29 @@ class Scene:
     def attached(self) -> dict[Beam, list[float]]:
         """Parameters of the places of each beam that must be vertices."""
         found: dict[Beam, list[float]] = {beam: list(beam.hinges) for beam in self.beams}
-        for _, place in self._attachments():
+        for _, place in self.attachments():
             if isinstance(place, Place):
                 found[place.beam].append(place.s)
         return found
+
+    def _require_once(self) -> None:
+        """Raise if a record is in a list twice, or if two joints are the same."""
+        for part in ("joints", "connectors", "loads", "masses", "initial", "damping"):
+            first: dict[int, int] = {}
+            for i, record in enumerate(getattr(self, part)):
+                j = first.setdefault(id(record), i)
+                if i != j:
+                    raise SceneError(
+                        f"Scene: {clip(str(record))} is there twice, as {part}[{j}] and "
+                        f"{part}[{i}]; remove one, or make two of them"
+                    )
+        seen: dict[object, int] = {}
+        for i, joint in enumerate(self.joints):
+            j = seen.setdefault(joint.sameness, i)
+            if i != j:
+                raise SceneError(
+                    f"Scene: {joint} is there twice, as joints[{j}] and joints[{i}]; remove one"
+                )
 
     def _require_together(self, joint: Joint) -> None:
         here, *others = joint.places
@@ -382,6 +408,24 @@ class Scene:
                     f"{joint.kind}: joint ends lie {gap:.6g} m apart: {here} and {other}; "
                     f"{joint.advice}"
                 )
+
+    def _require_pressing(self, connector: Connector, pressing: Bearing) -> None:
+        """Raise unless the force of what presses on friction can be known."""
+        if pressing not in (*self.joints, *self.supports):
+            raise SceneError(
+                f"{connector}: {pressing}, which presses on its friction, is not in the scene; add "
+                "it to joints or supports"
+            )
+        if isinstance(pressing, Support) and not pressing.held.keys() & {0, 1}:
+            raise SceneError(
+                f"{connector}: {pressing}, which presses on its friction, holds no displacement "
+                "and bears no force; name another support or joint"
+            )
+        if isinstance(pressing, Joint) and all(holder.turns for holder in pressing.holders):
+            raise SceneError(
+                f"{connector}: {pressing}, which presses on its friction, shares unknowns, so that "
+                "its force is not known; make it with measured=True"
+            )
 
     @cached_property
     def representatives(self) -> dict[Slot, Slot]:
@@ -422,7 +466,7 @@ def _(load: PointLoad) -> tuple[Connector, ...]:
         return ()
 
     def push(motion: str, size: float, axis: Point = (1.0, 0.0)) -> Connector:
-        law = Actuator(lambda t: size * load.time(t))
+        law = Actuator(lambda t: size * value_at(load.time, t, load))
         return Connector("PointLoad", motion, ground(*load.place.point), load.place, law, axis)
 
     (x, y), moment = load.force, load.moment

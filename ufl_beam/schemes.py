@@ -171,6 +171,5 @@ def scaled(C: Expr, e: Expr) -> Expr:
 
 def require_between(what: str, value: float, low: float, high: float) -> None:
     """Raise :class:`SceneError` if a number of a scheme lies outside its range."""
-    require_number(value, what, at_least=low)
-    if value > high:
+    if require_number(value, what, at_least=low) > high:
         raise SceneError(f"{what} = {value:g} must lie between {low:g} and {high:g}")

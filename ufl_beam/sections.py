@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -28,10 +28,11 @@ class Section:
         EA: Axial stiffness; N.
         GA: Shear stiffness, shear factor included; N.
         EI: Bending stiffness; N m².
-        rhoA: Mass per length; kg/m.  Zero is a beam without mass.
+        rhoA: Mass per length; kg/m.  Zero, the default, is a beam without mass; state it where
+            other beams of a scene in motion have mass.
         rhoI: Rotary inertia per length; kg m.  Zero leaves rotary inertia out.
         depth: Depth in the plane of motion, for pictures; m.  By default that of the rectangle
-            with the same EI/EA.
+            with the same EI/EA.  Beams that are much shorter are warned of.
         axial: Law of the axial force N, if it can yield; N.
         shear: Law of the shear force V, if it can yield; N.
         bending: Law of the bending moment M, if it can yield; N m.
@@ -48,7 +49,7 @@ class Section:
     EA: float
     GA: float
     EI: float
-    rhoA: float = 0.0
+    rhoA: float = field(default=None)  # type: ignore[assignment]
     rhoI: float = 0.0
     depth: float = 0.0
     _: KW_ONLY
@@ -57,14 +58,20 @@ class Section:
     bending: Hardening | None = None
     hinge: Softening | None = None
     fibres: PlacedFibres | None = None
+    massless_by_default: bool = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "massless_by_default", self.rhoA is None)
+        if self.rhoA is None:
+            object.__setattr__(self, "rhoA", 0.0)
         for name in ("EA", "GA", "EI"):
             require_number(getattr(self, name), f"Section: {name}", positive=True)
         for name in ("rhoA", "rhoI", "depth"):
             require_number(getattr(self, name), f"Section: {name}", at_least=0.0)
         if self.depth == 0.0:
             object.__setattr__(self, "depth", math.sqrt(12 * self.EI / self.EA))
+        if self.fibres is not None:
+            require_kind(self.fibres, PlacedFibres, "Section: fibres")
         laws = {name: getattr(self, name) for name in ("axial", "shear", "bending", "hinge")}
         for name, law in laws.items():
             if law is not None:
@@ -107,7 +114,7 @@ class Section:
         I: float,
         E: float,
         nu: float,
-        rho: float,
+        rho: float | None,
         shear_factor: float,
         depth: float,
         fibres: PlacedFibres | None = None,
@@ -126,14 +133,20 @@ class Section:
             fibres: Fibres; their sums are then EA and EI.
             laws: ``axial``, ``shear``, ``bending`` and ``hinge`` of :class:`Section`.
         """
-        if not -1.0 < nu <= 0.5:
+        for name, value in (("A", A), ("I", I), ("E", E), ("shear_factor", shear_factor)):
+            require_number(value, f"Section: {name}", positive=True)
+        require_number(depth, "Section: depth", at_least=0.0)
+        if rho is not None:
+            require_number(rho, "Section: rho", at_least=0.0)
+        if not -1.0 < require_number(nu, "Section: nu") <= 0.5:
             raise SceneError(f"Section: nu = {nu} must lie in (-1, 0.5]")
-        require_number(E, "Section: E", positive=True)
+        if fibres is not None:
+            require_kind(fibres, PlacedFibres, "Section: fibres")
         GA = shear_factor * A * E / (2 * (1 + nu))
         EA, EI = (E * A, E * I) if fibres is None else (fibres.EA, fibres.EI)
-        return cls(
-            EA=EA, GA=GA, EI=EI, rhoA=rho * A, rhoI=rho * I, depth=depth, fibres=fibres, **laws
-        )
+        if rho is not None:
+            laws |= {"rhoA": rho * A, "rhoI": rho * I}
+        return cls(EA=EA, GA=GA, EI=EI, depth=depth, fibres=fibres, **laws)
 
     @classmethod
     def of_fibres(
@@ -144,7 +157,7 @@ class Section:
         E: float,
         nu: float,
         fibres: Fibres,
-        rho: float = 0.0,
+        rho: float | None = None,
         shear_factor: float = 5 / 6,
     ) -> Section:
         """Fibres of areas ``A`` (m²) at distances ``y`` (m) from any line along the beam.
@@ -155,6 +168,7 @@ class Section:
             SceneError: The lists do not fit, or all fibres lie at one y.
         """
         require_kind(fibres, Fibres, "Section.of_fibres: fibres")
+        require_number(E, "Section: E", positive=True)
         placed = PlacedFibres.at(fibres, E, y, A)
         total, depth = float(placed.A.sum()), float(np.ptp(placed.y))
         return cls.of_shape(
@@ -170,7 +184,7 @@ class Section:
         *,
         E: float,
         nu: float,
-        rho: float = 0.0,
+        rho: float | None = None,
         shear_factor: float = 5 / 6,
         fibres: Fibres | None = None,
         **laws: Any,
@@ -190,7 +204,7 @@ class Section:
         *,
         E: float,
         nu: float,
-        rho: float = 0.0,
+        rho: float | None = None,
         shear_factor: float = 9 / 10,
         fibres: Fibres | None = None,
         **laws: Any,
@@ -211,7 +225,7 @@ class Section:
         *,
         E: float,
         nu: float,
-        rho: float = 0.0,
+        rho: float | None = None,
         shear_factor: float = 1 / 2,
         fibres: Fibres | None = None,
         **laws: Any,
@@ -242,7 +256,7 @@ class Section:
         *,
         E: float,
         nu: float,
-        rho: float = 0.0,
+        rho: float | None = None,
         fibres: Fibres | None = None,
         **laws: Any,
     ) -> Section:
@@ -310,6 +324,7 @@ def _place(
     if fibres is None:
         return None
     require_kind(fibres, Fibres, "Section: fibres")
+    require_number(E, "Section: E", positive=True)
     return PlacedFibres.layers(fibres, E, h, area, first_moment, edges)
 
 

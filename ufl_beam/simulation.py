@@ -28,6 +28,8 @@ from ufl_beam.errors import (
     SceneError,
     StepFailed,
     require_kind,
+    require_number,
+    shorten,
 )
 from ufl_beam.fields import Fields
 from ufl_beam.grid import Grid, Share
@@ -41,14 +43,22 @@ from ufl_beam.mechanism import (
     friction_repeats,
     no_number,
     require_independent,
+    require_inertia,
     require_masses,
     require_no_mechanism,
 )
 from ufl_beam.memory import NOWHERE, Memory, Restoring, Saving, State
 from ufl_beam.openings import Openable, Openings
 from ufl_beam.path import StaticPath
+from ufl_beam.plausibility import (
+    warn_of_far_points,
+    warn_of_jumps,
+    warn_of_masses,
+    warn_of_origin,
+    warn_of_touching,
+)
 from ufl_beam.points import Course, expect_entries
-from ufl_beam.processes import give_back_memory, ours
+from ufl_beam.processes import communicator, give_back_memory
 from ufl_beam.responses import Setting
 from ufl_beam.rotating import FrameForces
 from ufl_beam.scene import Scene
@@ -144,25 +154,34 @@ class Simulation(Live):
         mesh: Mesh | None = None,
         comm: MPI.Intracomm | None = None,
     ) -> None:
-        comm = ours() if comm is None else comm
+        comm = communicator(comm, "comm")
         require_kind(scene, Scene, "scene")
         if not isinstance(scheme, Scheme) or isinstance(scheme, type):
             raise SceneError(
-                f"scheme = {scheme!r} must be a scheme, such as Static() or Midpoint()"
+                f"scheme = {shorten(scheme)} must be a scheme, such as Static() or Midpoint()"
             )
-        require_kind(newton or Newton(), Newton, "newton")
+        require_number(t0, "t0")
+        newton = Newton() if newton is None else newton
+        require_kind(newton, Newton, "newton")
         if has_inertia(scheme):
             require_masses(scene)
+            require_inertia(scene)
+            warn_of_masses(scene)
+            if scene.initial:
+                warn_of_origin(scene)
             scheme.require(scene)
         else:
             require_no_mechanism(scene)
         require_independent(scene)
         self.scene, self.scheme, self.comm = scene, scheme, comm
+        warn_of_far_points(scene)
         self.grid = Grid(scene, mesh_of(start, mesh))
+        if has_inertia(scheme):
+            warn_of_touching(self.grid)
         together = len(self.grid.cells) >= comm.size * SMALLEST_SHARE
         self.share = Share(self.grid, comm if together else MPI.COMM_SELF)
         self.together = Agreement(self.share.comm)
-        q, v = initial_state(self.grid, start)
+        q, v, internal = initial_state(self.grid, start)
         self.fields = Fields(self.share)
         self._A = self.fields.matrix()
         self.t = t0
@@ -197,14 +216,14 @@ class Simulation(Live):
         if start is not None or (has_inertia(scheme) and scheme.kept):
             loaded = [load.carry_on(self.t, self.q) for load in self.loads]
         if start is not None:
-            memory = Restoring(self.share, start.internal)
+            memory = Restoring(self.share, internal)
             for one in (*self.inelastic, *self.couplings):
                 one.remember(memory, NOWHERE)
-            if "reactions" in start.internal:
+            if "reactions" in internal:
                 self.supports.carry_on(memory, self.q)
             if has_inertia(scheme) and start.scene is scene and start.times[-1] == t0:
                 # No force has changed since: accelerations are still what they were.
-                known = sum(name in start.internal for name in scheme.kept)
+                known = sum(name in internal for name in scheme.kept)
                 self.inertia.carry_on(memory, known)
         self._q_before: Array = self.q
         self.last_dt: float = math.inf
@@ -216,6 +235,9 @@ class Simulation(Live):
         self._multipliers = as_slice(self.share.multipliers())
         for term in self.terms:
             term.add_state(self.q)
+        if has_inertia(scheme) and (scene.links or scene.supports):
+            motions = self.connections()[:, 0]
+            warn_of_jumps(self.grid, t0, q, motions)
         self._continues = start is not None
         self._path: StaticPath | None = None
         if not scheme.dynamic:
@@ -238,7 +260,7 @@ class Simulation(Live):
             relieve=self._relieve,
             working=self._working,
             held=self.supports.dofs,
-            newton=newton or Newton(),
+            newton=newton,
             agreement=self.together,
         )
         self.solution: Solution = Solution(scene, self.grid)
@@ -547,13 +569,16 @@ class Simulation(Live):
         if said := no_number(self.scene, (step.load_time, step.motion_time)):
             raise StepFailed(said)
 
-    def attempt_along(self, step: Step, guess: Array, border: Border) -> Trial:
+    def attempt_along(
+        self, step: Step, guess: Array, border: Border, *, hold: bool = True
+    ) -> Trial:
         """Solve the next step together with the load factor; :meth:`accept` may take it.
 
         Args:
             step: Where it begins; its times are those of the guess.
             guess: Configuration, in the axes of the supports.
             border: The equation of the factor.
+            hold: Whether what does not flow stays closed if it can, see openings.py.
 
         Raises:
             StepFailed: There is no equilibrium, or it is too far away.
@@ -566,7 +591,7 @@ class Simulation(Live):
             self._begin_terms(step)
             border.t = t
 
-        if self._openings is None:
+        if self._openings is None or not hold:
             return self._trial(step, solve(guess))
         return self._trial(step, self._openings.solve(guess, solve, again))
 
@@ -609,7 +634,7 @@ class Simulation(Live):
 
         All processes ask together, whoever computes the connector.
         """
-        self.asked = {link: law.ask(self) for link, law in self._asking}
+        self.asked = {link: law.ask(self, link) for link, law in self._asking}
 
     def _require_small(self, turn: float) -> None:
         """Raise if a node of any process turns too far in the step."""
@@ -680,7 +705,7 @@ class Simulation(Live):
         memory = Saving(self.share)
         for one in (*self.inelastic, *self.couplings):
             one.remember(memory, self.q)
-        if self.supports.work:
+        if self.supports.work or any(isinstance(law, Coulomb) for _, law in self._asking):
             self.supports.carry_on(memory, self.q)
         if self._path is None:
             self.inertia.carry_on(memory, len(self.inertia.more))

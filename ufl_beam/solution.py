@@ -16,15 +16,15 @@ from ufl_beam.beams import Beam, Curve, Place
 from ufl_beam.bodies import Anchor, Spot
 from ufl_beam.compat import Array
 from ufl_beam.connectors import Connector, Controller, Function, Guide, Joint
+from ufl_beam.curves import nearest, parameter_step
 from ufl_beam.errors import SceneError
 from ufl_beam.fields import Fields
 from ufl_beam.grid import Grid, Index, Share
-from ufl_beam.guides import nearest
 from ufl_beam.inelastic import Strains
 from ufl_beam.joints import Connection, JointHistory, links_of, motion_of, of_joint, velocity_of
 from ufl_beam.ledger import Energy
 from ufl_beam.memory import State
-from ufl_beam.opened import Opened, cells_in_words
+from ufl_beam.opened import Opened, cells_in_words, percent
 from ufl_beam.outputs import require_path
 from ufl_beam.parameter import TIME
 from ufl_beam.processes import ours
@@ -195,6 +195,7 @@ class Solution:
             "numbering": self.grid.checksum(),
             "seconds": self.seconds,
             "time_error": self.time_error,
+            "open_ledger": self.open_ledger,
         }
         return text, self._arrays()
 
@@ -214,7 +215,8 @@ class Solution:
         self.resume(below("history/"))
         self.internal = below("internal/")
         self.parts, self.iterations = (int(n) for n in arrays["counts"])
-        self.seconds, self.time_error = text["seconds"], text["time_error"]
+        for name in ("seconds", "time_error", "open_ledger"):
+            setattr(self, name, text[name])
 
     def _sampled(self, owner: Any, field: str, function: Any) -> Any:
         """What is saved of a function of a user."""
@@ -227,16 +229,18 @@ class Solution:
         return lost(owner, field, function)
 
     def _used_curve(self, curve: Curve) -> SavedCurve:
-        """The part of a guide curve that was used, and a tenth more."""
+        """The part of a guide curve that was used, a tenth more, and what tangents need."""
         used = [0.0]
         for link in self.scene.links:
             if isinstance(link.law, Guide) and link.law.curve is curve:
                 s = 0.0
                 for point in self.position(link.b):
-                    s = nearest(curve, point, s)
+                    step = parameter_step(curve, s, self.scene.size)
+                    s = nearest(curve, point, s, step, self.scene.size)
                     used.append(s)
         first, last = float(np.nanmin(used)), float(np.nanmax(used))
-        more = 0.1 * (last - first) or 1e-3
+        steps = (parameter_step(curve, s, self.scene.size) for s in (first, last))
+        more = 0.1 * (last - first) + 8 * max(steps)
         return SavedCurve.of(curve, first - more, last + more, (0.0,))
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -519,7 +523,7 @@ class Solution:
         number, worst = sum(one.number for one in hinges), max(hinges, key=lambda one: one.error)
         return (
             f"embedded hinges opened in {cells_in_words(number)}; their place within the cell "
-            f"shifts the limit by at most {100 * worst.error:.2g} % ({worst.beam.name}, cell at "
+            f"shifts the limit by at most {percent(worst.error)} ({worst.beam.name}, cell at "
             f"s = {worst.place.s:.3g})\n"
         )
 

@@ -16,7 +16,14 @@ import numpy as np
 from ufl_beam.agreement import Agreement
 from ufl_beam.compat import Array
 from ufl_beam.equation import Demand, Equation, unlock
-from ufl_beam.errors import SceneError, StepFailed, require_number
+from ufl_beam.errors import (
+    StepFailed,
+    require_count,
+    require_kind,
+    require_number,
+    require_switch,
+    require_text,
+)
 from ufl_beam.factors import Bordered, ChainsFirst
 from ufl_beam.grid import Index, Share
 from ufl_beam.line_search import SearchingNewton
@@ -67,8 +74,12 @@ class Newton:
 
     def __post_init__(self) -> None:
         require_number(self.rtol, "Newton: rtol", positive=True)
-        if self.max_iterations < 1:
-            raise SceneError(f"Newton: max_iterations = {self.max_iterations} must be at least 1")
+        require_count(self.max_iterations, "Newton: max_iterations")
+        object.__setattr__(self, "max_iterations", int(self.max_iterations))
+        require_switch(self.modified, "Newton: modified")
+        require_kind(self.petsc, dict, "Newton: petsc")
+        for option in self.petsc:
+            require_text(option, "Newton: petsc, an option")
 
 
 class Border(Protocol):
@@ -441,9 +452,7 @@ class Solver:
     def _find_motion(self) -> None:
         """Note the largest motion of the iterate in any process, at most the size of the scene."""
         largest = lib.largest_motion(*self._norm, doubles(self._view(self._x)))
-        if self._parallel:
-            largest = self._share.comm.allreduce(largest, op=MPI.MAX)
-        self._course.moved = min(largest, self._course.scene)
+        self._course.moved = min(self._share.largest(largest), self._course.scene)
 
     def _last_digits(self) -> Array:
         digits = np.empty(self._share.size)

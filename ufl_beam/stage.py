@@ -107,7 +107,8 @@ class Model(Setting):
 
     def _start(self, holder: Connector) -> tuple[float, float]:
         if isinstance(holder.law, Guide):
-            return _used(holder.law.curve, np.empty((0, 2)), (), 3.0 * self.unit)
+            more, size = 3.0 * self.unit, self.made.size
+            return _used(holder.law.curve, np.empty((0, 2)), (), more, size)
         start = float(np.dot(_along(holder), holder.apart))
         return start, start
 

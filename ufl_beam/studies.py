@@ -19,10 +19,10 @@ from mpi4py.futures import MPICommExecutor
 
 from tqdm import tqdm
 
-from ufl_beam.errors import SceneError, require_sequence
+from ufl_beam.errors import SceneError, require_sequence, require_switch, shorten
 from ufl_beam.gathered import Outcome, Study, numbers_of, text_of
 from ufl_beam.outputs import require_apart, require_path, take
-from ufl_beam.processes import alone, ours
+from ufl_beam.processes import alone, communicator
 from ufl_beam.record import on_first
 from ufl_beam.running import say
 
@@ -70,7 +70,9 @@ def study(
             and arrays, or not the names and shapes of the others; the file has those before.
         RuntimeError: All members failed.
     """
-    comm = ours() if comm is None else comm
+    comm = communicator(comm, "study: comm")
+    require_switch(anew, "study: anew")
+    require_switch(progress, "study: progress")
     name = getattr(member, "__name__", type(member).__name__)
     outputs = [] if path is None else [("study", _files_of(require_path(path, "study")))]
     todo: dict[str, Case] = {}
@@ -79,7 +81,7 @@ def study(
 
     def prepare() -> None:
         if not callable(member):
-            raise SceneError(f"study: member = {member!r} cannot be called; give a function")
+            raise SceneError(f"study: member = {shorten(member)} cannot be called; give a function")
         for i, case in enumerate(require_sequence(cases, "study: cases")):
             key = text_of(case, f"study: cases[{i}]")
             if key in todo:

@@ -10,8 +10,9 @@ from ufl_beam.bodies import GROUND
 from ufl_beam.compat import Array
 from ufl_beam.grid import Index, Share
 from ufl_beam.ledger import Ledger
-from ufl_beam.loads import TimeFunction
+from ufl_beam.loads import TimeFunction, value_at
 from ufl_beam.memory import Memory
+from ufl_beam.scene import Support
 from ufl_beam.schemes import Scheme, Step
 from ufl_beam.sparse import Csr, as_slice
 
@@ -62,7 +63,7 @@ class Supports:
     def __init__(self, share: Share, scheme: Scheme, ledger: Ledger, A: Csr) -> None:
         self._turned: list[TurnedAxes] = []
         held: list[int] = []
-        self._motions: list[tuple[int, TimeFunction]] = []
+        self._motions: list[tuple[int, TimeFunction, Support]] = []
         if GROUND in share.grid.scene.movers:
             held.extend(share.local(share.at(GROUND.middle)))
         for support in share.grid.scene.supports:
@@ -72,9 +73,11 @@ class Supports:
             for component, motion in support.held.items():
                 held.extend(share.local(dofs[[component]]))
                 if component in support.moving:
-                    self._motions.extend((d, motion) for d in share.local(dofs[[component]]))
+                    self._motions.extend(
+                        (d, motion, support) for d in share.local(dofs[[component]])
+                    )
         self.dofs = np.array(sorted(held), dtype=np.int64)
-        self.moving = np.array([dof for dof, _ in self._motions], dtype=np.int64)
+        self.moving = np.array([dof for dof, *_ in self._motions], dtype=np.int64)
         self._held = as_slice(self.dofs)
         rows, columns = A.rows(), A.indices
         zero = np.isin(rows, self.dofs) | np.isin(columns, self.dofs)
@@ -123,8 +126,9 @@ class Supports:
 
     def move(self, x: Array, x0: Array, step: Step) -> None:
         """Set in ``x`` what is prescribed for the step that begins at ``x0``."""
-        for dof, motion in self._motions:
-            x[dof] = x0[dof] + step.toward * (motion(step.motion_time) - x0[dof])
+        for dof, motion, support in self._motions:
+            target = value_at(motion, step.motion_time, support)
+            x[dof] = x0[dof] + step.toward * (target - x0[dof])
 
     def hold(self, r: Array) -> None:
         """Note the reactions in a residual that is complete, and remove them from it."""

@@ -11,12 +11,19 @@ from mpi4py import MPI
 
 from ufl_beam.climbing import CAREFUL, Climb
 from ufl_beam.discretisation import Mesh
-from ufl_beam.errors import SceneError, TradeoffError, require_kind, require_number
+from ufl_beam.errors import (
+    SceneError,
+    TradeoffError,
+    require_kind,
+    require_number,
+    require_text,
+    shorten,
+)
 from ufl_beam.goals import Budget, Found, Goal, Tolerance
 from ufl_beam.ladders import Dials, Ladder, Quantity, Run
 from ufl_beam.pacing import Adaptive
 from ufl_beam.precision import Tradeoff
-from ufl_beam.processes import ours
+from ufl_beam.processes import communicator
 from ufl_beam.richardson import size
 from ufl_beam.scene import Scene
 from ufl_beam.schemes import Scheme
@@ -77,15 +84,18 @@ def tradeoff(
     """
     goal = _goal(quantities, tolerance, budget)
     require_number(most, "tradeoff: most", positive=True)
-    meshes = _several(Mesh() if mesh is None else mesh, "mesh")
-    newtons = _several(Newton() if newton is None else newton, "newton")
-    steps: tuple[float | Adaptive, ...] = _several(dt, "dt")
-    families = [
-        Dials(*one, newtons[0]) for one in product(_several(scheme, "scheme"), steps, meshes)
-    ]
+    comm = communicator(comm, "tradeoff: comm")
+    meshes = _several(Mesh() if mesh is None else mesh, Mesh, "mesh")
+    newtons = _several(Newton() if newton is None else newton, Newton, "newton")
+    schemes = _several(scheme, Scheme, "scheme")
+    steps: tuple[float | Adaptive, ...] = _several(dt, object, "dt")
+    for i, step in enumerate(steps):
+        if not isinstance(step, Adaptive):
+            require_number(step, f"tradeoff: dt[{i}]" if len(steps) > 1 else "tradeoff: dt")
+    families = [Dials(*one, newtons[0]) for one in product(schemes, steps, meshes)]
     ladder = Ladder(
         scene, quantities, t=t, families=families, newtons=newtons, most=most,
-        comm=ours() if comm is None else comm,
+        comm=comm,
     )  # fmt: skip
     found: list[Found] = []
     notes: list[str] = []
@@ -159,10 +169,11 @@ def _goal(
     if not quantities:
         raise SceneError("tradeoff: quantities is empty; name what is to be accurate")
     for name, quantity in quantities.items():
+        require_text(name, "tradeoff: the name of a quantity")
         if not callable(quantity):
             raise SceneError(
-                f"tradeoff: quantity {name!r} = {quantity!r} cannot be called; give a function "
-                "of a Solution"
+                f"tradeoff: quantity {name!r} = {shorten(quantity)} cannot be called; give a "
+                "function of a Solution"
             )
     if (tolerance is None) == (budget is None):
         raise SceneError("tradeoff: give either a tolerance or a budget")
@@ -182,10 +193,13 @@ def _goal(
     return Tolerance(tolerance, 0.0)
 
 
-def _several(values: One | Sequence[One], what: str) -> tuple[One, ...]:
-    """One or several as several."""
-    if not isinstance(values, Sequence):
-        return (values,)
+def _several(values: One | Sequence[One], kind: type, what: str) -> tuple[One, ...]:
+    """Return one value, or a sequence of them, as a tuple of values of a kind."""
+    if not isinstance(values, Sequence) or isinstance(values, str | bytes):
+        require_kind(values, kind, f"tradeoff: {what}")
+        return (values,)  # type: ignore[return-value]
     if not values:
         raise SceneError(f"tradeoff: {what} is empty")
+    for i, value in enumerate(values):
+        require_kind(value, kind, f"tradeoff: {what}[{i}]")
     return tuple(values)

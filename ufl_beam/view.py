@@ -20,7 +20,6 @@ from ufl_beam.bodies import Anchor
 from ufl_beam.compat import Array
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.glyphs import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY
-from ufl_beam.grid import Index
 from ufl_beam.laws import HingeLaw
 from ufl_beam.processes import ours
 from ufl_beam.solution import Solution

@@ -131,10 +131,12 @@ class VtkhdfWriter:
         firsts = [(kind, *next(iter(f.items()))) for kind, f in zip(KINDS, fields, strict=True)]
         self._counts = [len(values) for *_, values in firsts]
         names = [f"{kind}Offsets/{name}" for kind, name, _ in firsts]
-        names += ["PartOffsets", "CellOffsets", "NumberOfParts", "Values"]
+        names += ["PartOffsets", "CellOffsets", "NumberOfParts"]
         self._growing += [(steps[name].id, (1, *steps[name].shape[1:])) for name in names]
+        self._times = steps["Values"].id
         self._room = INDEX + sum(
-            8 * math.prod(dataset.get_create_plist().get_chunk()) for dataset, _ in self._growing
+            8 * math.prod(dataset.get_create_plist().get_chunk())
+            for dataset in (self._times, *(dataset for dataset, _ in self._growing))
         )
 
     # -- steps ---------------------------------------------------------------------------------
@@ -142,13 +144,16 @@ class VtkhdfWriter:
     def write(self, t: float, fields: LineFields) -> None:
         """Append a step."""
         n = self.steps
-        numbers = (*(n * count for count in self._counts), 0, 0, 1, t)
+        numbers = (*(n * count for count in self._counts), 0, 0, 1)
         rows: list[Any] = [*(values for by_name in fields for values in by_name.values()), *numbers]
         self._allocate()
         for (dataset, shape), values in zip(self._growing, rows, strict=True):
             self._put(dataset, n, np.broadcast_to(values, shape))
         self._file.flush()
-        self._count(n + 1)
+        # All that the step has is in the file; that it is there comes last, and at once.
+        self._put(self._times, n, np.array([t]))
+        self._attributes.modify("NSteps", np.int64(n + 1))
+        self._file.flush()
         self.steps = n + 1
 
     def _allocate(self) -> None:
@@ -172,14 +177,15 @@ class VtkhdfWriter:
         there = self._h5s.create_simple(values.shape)
         dataset.write(there, space, np.ascontiguousarray(values, dtype=dtype))
 
-    def _count(self, steps: int) -> None:
-        """Say how many steps there are, when all that they have is in the file."""
-        self._attributes.modify("NSteps", np.int64(steps))
-        self._file.flush()
-
     def _cut(self) -> None:
-        """Cut off what is behind the last complete step."""
-        self._count(self.steps)
+        """Cut off what is behind the last complete step.
+
+        VTK 9.3 dies of more times than steps, so times go first.
+        """
+        self._times.set_extent((self.steps,))
+        self._file.flush()
+        self._attributes.modify("NSteps", np.int64(self.steps))
+        self._file.flush()
         for dataset, (rows, *components) in self._growing:
             dataset.set_extent((self.steps * rows, *components))
         self._file.flush()
@@ -215,6 +221,7 @@ def _empty_file(mesh: Mapping[str, Array], constant: list[str], fields: LineFiel
         for name, values in mesh.items():
             root[name] = values
         steps = root.create_group("Steps")
+        # HDF5 writes in the order of addresses: the number of steps comes before their times.
         steps.attrs["NSteps"] = np.int64(0)
         _series(steps, "Values", (), np.float64)
         _series(steps, "NumberOfParts", (), np.int64)

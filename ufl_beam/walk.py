@@ -208,8 +208,17 @@ class Walk:
 
     # -- a step --------------------------------------------------------------------------------
 
-    def attempt(self, way: Direction, length: float, constraint: Constraint) -> Trial:
+    def attempt(
+        self, way: Direction, length: float, constraint: Constraint, *, hold: bool = True
+    ) -> Trial:
         """Solve, beginning so far along a way.
+
+        Args:
+            way: The direction.
+            length: How far.
+            constraint: Demanded besides equilibrium.
+            hold: Whether what does not flow stays closed if it can, see openings.py; not on a way
+                along which it opens.
 
         Raises:
             StepFailed: There is no equilibrium.
@@ -221,7 +230,7 @@ class Walk:
         step, guess = self.step_at(self.t), simulation.q + length * way.q
         simulation.supports.enter(guess)
         simulation.together(simulation.supports.move, guess, guess, step)
-        trial = simulation.attempt_along(step, guess, self)
+        trial = simulation.attempt_along(step, guess, self, hold=hold)
         return trial._replace(step=self.step_at(self.t))
 
     def begin(self) -> None:

@@ -72,7 +72,7 @@ def pendulum():
 def swing():
     EA, GA, EI = 3.65e5, 1.17e5, 0.0304166667
     flexible = ub.Section(EA=EA, GA=GA, EI=EI, rhoA=0.0135, rhoI=1.125e-9)
-    stiff = ub.Section(EA=1e4 * EA, GA=1e4 * GA, EI=1e4 * EI)
+    stiff = ub.Section(EA=1e4 * EA, GA=1e4 * GA, EI=1e4 * EI, rhoA=0.0)
     beam = ub.Beam((0, -0.36), (0.72, -0.36), flexible, cells=4)
     left = ub.Beam((0, 0), (0, -0.36), stiff, cells=1, name="left")
     right = ub.Beam((1.08, 0), (0.72, -0.36), stiff, cells=1, name="right")

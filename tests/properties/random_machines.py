@@ -292,7 +292,7 @@ class _Writer:
                 self._initial.append(
                     f"ub.Velocity([{', '.join(self._velocities)}], "
                     f"linear={self._vector(self._L / self._T)}, "
-                    f"angular={self._some(-3, 3) / self._T:.6g})"
+                    f"angular={self._some(-3, 3) / self._T:.6g}, about=(0.0, 0.0))"
                 )
             return
         root = "beam0.at(0.0)"

@@ -193,7 +193,10 @@ class Built:
             linear, angular = draw.throw
             initial.append(
                 ub.Velocity(
-                    pieces, linear=self._turn(linear, metre / second), angular=angular / second
+                    pieces,
+                    linear=self._turn(linear, metre / second),
+                    angular=angular / second,
+                    about=(0.0, 0.0),
                 )
             )
         self.scene = ub.Scene(

@@ -49,9 +49,7 @@ class Statement:
 
     def unit(self, dimension):
         """What the unit of SI is in those of the statement."""
-        return math.prod(
-            u**p for u, p in zip(self.units, DIMENSIONS[dimension], strict=True)
-        )
+        return math.prod(u**p for u, p in zip(self.units, DIMENSIONS[dimension], strict=True))
 
     def turned(self, x, y):
         """A vector in the axes of the statement."""

@@ -311,8 +311,8 @@ def test_it_can_be_read():
         ([0, 1, 2], [0, np.nan, 0], ("x[1] = nan is not finite",)),
         ([0, 1, np.inf], [0, 1, 0], ("t[2] = inf is not finite",)),
         ([0, 1, 2], [[0, 1, 0]], ("x has shape (1, 3)",)),
-        ([0, 1, 2], ["a", 1, 0], ("x must be numbers",)),
-        ([0, 1, 2], None, ("x has shape ()",)),
+        ([0, 1, 2], ["a", 1, 0], ("peaks: x = ['a', 1, 0] must be numbers",)),
+        ([0, 1, 2], None, ("peaks: x = None must be numbers",)),
     ],
 )
 def test_bad_histories(t, x, says):

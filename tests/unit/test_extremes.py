@@ -38,6 +38,7 @@ def test_load_that_is_no_number_is_named():
     assert np.isfinite(solution.q).all()
 
 
+@pytest.mark.filterwarnings("ignore:Prescribed at beam.start .* psi jumps:ufl_beam.ModelWarning")
 def test_motion_that_is_no_number_is_named():
     def hold(place):
         return ub.Prescribed(place, u=0, v=0, psi=late(math.inf))

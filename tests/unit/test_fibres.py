@@ -7,6 +7,9 @@ import pytest
 
 import ufl_beam as ub
 
+# Cells of 1 mm stand for cross-sections; no beam is meant.
+pytestmark = pytest.mark.filterwarnings("ignore:beam. its section is:ufl_beam.ModelWarning")
+
 STEEL = {"E": 210e9, "nu": 0.3, "rho": 7850.0}
 ELASTIC = ub.Hardening(limit=math.inf)
 SHAPES = {

@@ -143,7 +143,7 @@ def kernels(term):
     for name, value in vars(term).items():
         if isinstance(value, Kernel):
             found[name] = value
-        elif hasattr(value, "kernel"):
+        elif isinstance(getattr(value, "kernel", None), Kernel):
             found[name] = value.kernel
     found.update({f"_losses {i}": k for i, k in enumerate(getattr(term, "_losses", ()))})
     return found

@@ -18,6 +18,7 @@ PACKAGE = ROOT / "ufl_beam"
 MODULES = sorted(path.stem for path in PACKAGE.glob("*.py"))
 
 RECORDS = [
+    "axis_curves",
     "beams",
     "bodies",
     "connectors",
@@ -28,6 +29,7 @@ RECORDS = [
     "fibres",
     "laws",
     "loads",
+    "numeric",
     "plastic_hinges",
     "scene",
     "sections",
@@ -139,12 +141,13 @@ def test_records_need_no_machinery(module):
 
 
 PETSC = {
-    *{"eigen", "equation", "factorisation", "factors"},
+    *{"compat", "eigen", "equation", "factorisation", "factors"},
     *{"line_search", "native", "solve", "sparse"},
 }
 
 
 def test_only_what_solves_imports_petsc():
+    """And `compat`, which explains what is not installed."""
     assert {m for m in MODULES if "petsc4py" in outside(m)} <= PETSC
 
 

@@ -30,7 +30,9 @@ def run(folder, *more, t1=0.05):
 def is_free(folder):
     """Whether no lock is left, once all processes are here."""
     MPI.COMM_WORLD.barrier()
-    return not (folder / "run.h5.lock").exists()
+    free = not (folder / "run.h5.lock").exists()
+    MPI.COMM_WORLD.barrier()  # before one of them runs again
+    return free
 
 
 class Within(ub.Recorder):
@@ -61,20 +63,25 @@ class Within(ub.Recorder):
 
 
 def test_a_second_run_is_refused_before_it_touches_a_file(shared_path):
+    """Of another process, which its lock stands for."""
+
     def contents():
         return {path.name: path.read_bytes() for path in shared_path.iterdir()}
 
-    def second():
-        before = contents()
+    run(shared_path)
+    first = Lock(shared_path / "run.h5")
+    if MPI.COMM_WORLD.rank == 0:
+        assert first.take() == ""
+    MPI.COMM_WORLD.barrier()
+    before = contents()
+    for t1 in (0.05, 0.1):
         with pytest.raises(ub.SceneError, match=r"run\.h5 is in use: process \d+ on .* writes it"):
-            run(shared_path)
+            run(shared_path, t1=t1)
         assert contents() == before
-        MPI.COMM_WORLD.barrier()  # before one of them goes on to write
-
-    within = Within(second)
-    run(shared_path, within)
-    assert within.steps == 5
+    MPI.COMM_WORLD.barrier()
+    first.release()
     assert is_free(shared_path)
+    run(shared_path, t1=0.1)
 
 
 @pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
@@ -86,6 +93,7 @@ def test_a_run_that_fails_lets_go(shared_path, error):
         run(shared_path, Within(fail))
     assert is_free(shared_path)
     run(shared_path, Within(lambda: None))
+    assert is_free(shared_path)
 
 
 def test_a_run_that_is_refused_lets_go(shared_path):

@@ -18,7 +18,7 @@ def test_script_of_the_readme_runs(tmp_path, monkeypatch, capsys):
     assert solution.times[-1] == pytest.approx(0.4)
     # Midpoint claims a closed ledger; the tolerance of Newton's method is 1e-10 of the forces.
     assert solution.energy.worst < 1e-9
-    for name in ("portal.xdmf", "portal.xdmf.bin", "portal.csv", "portal.png"):
+    for name in ("portal.xdmf", "portal.xdmf.bin", "portal.csv", "portal.png", "model.png"):
         assert (tmp_path / name).stat().st_size > 0
     assert "imbalance" in capsys.readouterr().out
 

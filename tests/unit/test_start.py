@@ -89,7 +89,8 @@ def test_what_is_held_does_not_move(scheme):
     throw = ub.Velocity([beam], linear=(1, 2))
     supports = [ub.Pinned(beam.start), ub.Roller(beam.end, along=(1, 1))]
     scene = ub.Scene([beam], supports=supports, initial=[throw])
-    solution = ub.simulate(scene, scheme, t=(0, 0.1), dt=0.05)
+    with pytest.warns(ub.ModelWarning, match="Pinned at beam.start .* holds u, v there"):
+        solution = ub.simulate(scene, scheme, t=(0, 0.1), dt=0.05)
     assert np.abs(solution.velocity(beam.start)[:, :2]).max() == 0
     # On the roller the part along it stays: (1, 2) on (1, 1)/√2 is (1.5, 1.5)
     assert solution.velocity(beam.end)[0] == pytest.approx([1.5, 1.5, 0], rel=1e-14, abs=1e-14)
@@ -107,6 +108,74 @@ def test_other_supports_and_loads_may_follow():
     # Nothing comes in and nothing goes out
     assert np.ptp(solution.energy.total) < 1e-9 * solution.energy.total[0]
     assert solution.energy["kinetic"].max() > 0.5 * solution.energy.total[0]
+
+
+def pair(*, joint=None, **more):
+    """Two beams in a row, the first one clamped, with a spring to the ground at the far end."""
+    a = more.pop("a", None) or ub.Beam((0, 0), (1, 0), SECTION, cells=2, name="a")
+    b = more.pop("b", None) or ub.Beam((1, 0), (2, 0), SECTION, cells=2, name="b")
+    joints = [joint(a.end, b.start)] if joint else []
+    spring = ub.Stretch(ub.ground(2, 3), b.end, ub.Spring(10.0, law=ub.Hardening(1.0)))
+    return a, b, ub.Scene([a, b], joints, [ub.Clamped(a.start)], connectors=[spring], **more)
+
+
+@pytest.mark.filterwarnings("ignore:.* touch:ufl_beam.ModelWarning")
+@pytest.mark.parametrize("scheme", [ub.Midpoint(), ub.Newmark()], ids=str)
+def test_a_joint_may_be_removed(scheme):
+    """A coupling opens: both beams go on from where they are, each on its own.
+
+    The joint shared unknowns or was held by forces; what follows is the same, to what Newton's
+    method leaves, and nothing comes in.
+    """
+    ends = []
+    for joint in (ub.Rigid, lambda *places: ub.Rigid(*places, measured=True)):
+        a, b, _ = pair()
+        push = ub.PointLoad(b.end, force=(0.0, -30.0), time=lambda t: t)
+        _, _, whole = pair(a=a, b=b, joint=joint, loads=[push])
+        bent = ub.simulate(whole, ub.Static(), t=(0, 1), dt=0.125)
+        assert bent.connector(whole.connectors[0]).work[-1] > 0
+        _, _, parted = pair(a=a, b=b)
+        solution = ub.simulate(parted, scheme, t=(1, 1.5), dt=0.02, start=bent)
+        for place in (a.at(0.5), a.end, b.start, b.end):
+            before, after = bent.displacement(place)[-1], solution.displacement(place)[0]
+            np.testing.assert_array_equal(after, before)
+        # The springs of the connectors remember that they have yielded: nothing is stored anew
+        stored = bent.energy["stored"][-1]
+        assert solution.energy["stored"][0] == pytest.approx(stored, rel=1e-12)
+        if scheme == ub.Midpoint():
+            assert solution.energy.worst < 1e-9
+        gap = solution.displacement(b.start)[-1] - solution.displacement(a.end)[-1]
+        assert np.abs(gap[:2]).max() > 0.01
+        ends.append(np.concatenate([solution.displacement(x)[-1] for x in (a.end, b.start)]))
+    np.testing.assert_allclose(ends[1], ends[0], atol=1e-6)
+
+
+@pytest.mark.filterwarnings("ignore:.* touch:ufl_beam.ModelWarning")
+def test_a_joint_may_be_added_where_places_are_together():
+    """A body on a spring is caught by a hinge while it passes; bodies and connectors stay known."""
+    hub = ub.Body((0, 0), mass=1.0, inertia=1.0, name="hub")
+    other = ub.Body((3, 0), mass=1.0, inertia=1.0, name="other")
+    springs = [ub.Stretch(ub.ground(0, 1), x.middle, ub.Spring(9.0)) for x in (hub, other)]
+    bar = ub.Beam((0, 0), (0, -1), SECTION, cells=2, name="bar")
+    first = ub.Scene(
+        [bar], bodies=[hub, other], connectors=springs, joints=[ub.Rigid(bar.start, hub.middle)],
+        loads=[ub.Gravity()],
+    )  # fmt: skip
+    fallen = ub.simulate(first, ub.Midpoint(), t=(0, 0.3), dt=0.01)
+    second = ub.Scene(
+        [bar], bodies=[other, hub], connectors=springs[::-1], loads=[ub.Gravity()],
+        joints=[ub.Rigid(bar.start, hub.middle)],
+    )  # fmt: skip
+    whole = ub.simulate(first, ub.Midpoint(), t=(0.3, 0.5), dt=0.01, start=fallen)
+    solution = ub.simulate(second, ub.Midpoint(), t=(0.3, 0.5), dt=0.01, start=fallen)
+    for place in (hub.middle, other.middle, bar.end):
+        np.testing.assert_allclose(
+            solution.displacement(place), whole.displacement(place), atol=1e-9
+        )
+    for spring in springs:
+        np.testing.assert_allclose(
+            solution.connector(spring).force[1:], whole.connector(spring).force[1:], atol=1e-7
+        )
 
 
 def test_velocity_gives_kinetic_energy_and_momentum():

@@ -10,7 +10,7 @@ import ufl_beam as ub
 
 # Numbers of one magnitude, so that an error in any term shows in the largest entry.
 SECTION = ub.Section(EA=60.0, GA=40.0, EI=30.0, rhoA=2.0, rhoI=1.0)
-OTHER = ub.Section(EA=30.0, GA=50.0, EI=20.0)
+OTHER = ub.Section(EA=30.0, GA=50.0, EI=20.0, rhoA=0.0)
 """Without inertia."""
 
 
@@ -32,7 +32,7 @@ def scene(kind):
     if "masses" in kind:
         masses += [ub.PointMass(c.start, 3.0, 2.0), ub.PointMass(b.end, 1.0)]
     if "moved" in kind:
-        supports[0] = ub.Prescribed(a.start, u=0.1, v=0, psi=lambda t: 0.3 * t)
+        supports[0] = ub.Prescribed(a.start, u=lambda t: 0.1 * t, v=0, psi=lambda t: 0.3 * t)
     return ub.Scene([a, b, c], joints=joints, supports=supports, loads=loads, masses=masses)
 
 

@@ -234,8 +234,8 @@ def test_coarse_steps_that_fail_are_left_out(law):
         ({"budget": 1.0, "scheme": ()}, ("scheme = ",)),
         ({"budget": 1.0, "dt": []}, ("dt is empty",)),
         ({"budget": 1.0, "dt": -1.0}, ("dt = -1 must be positive",)),
-        ({"budget": 1.0, "newton": [1]}, ("newton = 1 is not a Newton",)),
-        ({"budget": 1.0, "mesh": [2]}, ("mesh = 2 is not a Mesh",)),
+        ({"budget": 1.0, "newton": [1]}, ("newton[0] = 1 is not a Newton",)),
+        ({"budget": 1.0, "mesh": [2]}, ("mesh[0] = 2 is not a Mesh",)),
     ],
 )
 def test_calls(call, says):

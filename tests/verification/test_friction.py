@@ -15,6 +15,7 @@ OMEGA = math.sqrt(STIFFNESS / MASS)  # rad/s
 PERIOD = 2 * math.pi / OMEGA  # s
 DEAD = LIMIT / STIFFNESS  # m: half the zone in which the mass may stay
 G = 9.81  # m/s²
+ROD = ub.Section(EA=1e6, GA=1e6, EI=1e2, rhoA=1.0, rhoI=1e-3)
 
 
 def run(scene, end, dt, **more):
@@ -207,6 +208,36 @@ def test_bearing():
     assert energy["friction"][-1] == pytest.approx(inertia * ω0**2 / 2, rel=1e-3)
     assert np.diff(energy["friction"]).min() >= 0.0
     assert energy.worst < 1e-9
+
+
+@pytest.mark.parametrize("scheme", [ub.Midpoint(), ub.Midpoint(0.1, 0.1)])
+def test_a_support_presses_as_a_measured_joint_does(scheme):
+    """The same pin, once a support and once a joint to the ground; also if the run goes on.
+
+    Both forces are those of the same equilibrium; Newton's tolerance is 1e-10 of the forces.
+    """
+    motions, works = [], []
+    for how in ("support", "joint", "in two runs"):
+        rod = ub.Beam((0, 0), (1, 0), ROD, cells=2)
+        pin = ub.Revolute(ub.ground(0, 0), rod.start, measured=True)
+        held = {"joints": [pin]}
+        if how != "joint":
+            pin = ub.Pinned(rod.start)
+            held = {"supports": [pin]}
+        rub = ub.Turn(ub.ground(0, 0), rod.start, ub.Coulomb(coefficient=0.1, joint=pin))
+        scene = ub.Scene([rod], connectors=[rub], loads=[ub.Gravity()], **held)
+        start, begin = None, 0.0
+        for end in (0.05, 0.1) if how == "in two runs" else (0.1,):
+            t = begin, end
+            start = ub.simulate(scene, scheme, t=t, dt=0.01, start=start, progress=False)
+            begin = end
+        motions.append(start.displacement(rod.end)[-1])
+        works.append(start.energy.lost["friction"][-1])
+    np.testing.assert_allclose(motions[1], motions[0], rtol=1e-8)
+    np.testing.assert_allclose(motions[2], motions[0], rtol=1e-8)
+    # μ F over a turn of 0.07 rad, with F between zero and the weight of 9.81 N
+    assert 0.1 * 0.07 * 9.81 / 5 < works[0] < 0.1 * 0.07 * 9.81
+    assert works[1] == pytest.approx(works[0], rel=1e-8)
 
 
 # -- friction that holds what is held already ----------------------------------------------------

@@ -80,9 +80,7 @@ def turned(law, motion, scheme, *, dt, end=1.0, s=0.0, rho=0.0, cells=2):
     """Beam clamped at its start, whose end is turned as given: one moment along all of it."""
     section = ub.Section(EA=1e6, GA=1e6, EI=EI, rhoA=rho, rhoI=1e-3 * rho)
     beam = ub.Beam((0, 0), (LENGTH, 0), section, cells=cells, hinges={s: law})
-    scene = ub.Scene(
-        [beam], supports=[ub.Clamped(beam.start), ub.Prescribed(beam.end, psi=motion)]
-    )
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), ub.Prescribed(beam.end, psi=motion)])
     return scene, ub.simulate(scene, scheme, t=(0, end), dt=dt, progress=False)
 
 

@@ -236,7 +236,7 @@ def with_arm(ratio):
         joint = ub.RigidLink(beam.end, plate.middle)
         loads = [ub.PointLoad(plate.middle, **load)]
     else:
-        stiff = ub.Section(EA=ratio * 1e3, GA=ratio * 1e3, EI=ratio * 100.0)
+        stiff = ub.Section(EA=ratio * 1e3, GA=ratio * 1e3, EI=ratio * 100.0, rhoA=0.0)
         arm = ub.Beam((1, 0), (1, 0.5), stiff, cells=1, name="arm")
         beams, bodies, masses = [beam, arm], [], [ub.PointMass(arm.end, 1.0, 0.1)]
         joint = ub.Rigid(beam.end, arm.start)

@@ -1,0 +1,47 @@
+"""Pictures of random machines: no failure, and every object leaves something."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from random_machines import script
+
+import ufl_beam as ub
+from ufl_beam.load_symbols import badge
+from ufl_beam.model_pictures import notes_of
+from ufl_beam.model_symbols import Subject, draw
+
+PARTS = ("joints", "supports", "loads", "masses", "initial", "damping", "connectors")
+
+
+def machine(seed):
+    names = {}
+    exec(script(seed), names)
+    return names["scene"]
+
+
+def amount(scene):
+    """Number of strokes, labels and words of a picture; and whether all numbers are finite."""
+    drawing = draw(Subject.of(scene), scene.size / 300.0)
+    strokes = list(drawing.everything())
+    assert all(np.isfinite(stroke.points).all() for stroke in strokes)
+    badges = [load for load in scene.loads if badge(load) is not None]
+    return len(strokes) + len(drawing.labels) + len(badges) + len(notes_of(scene))
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_every_object_leaves_something(seed):
+    scene = machine(seed)
+    everything = amount(scene)
+    for part in PARTS:
+        objects = getattr(scene, part)
+        for one in objects:
+            others = [other for other in objects if other is not one]
+            assert amount(dataclasses.replace(scene, **{part: others})) < everything, one
+
+
+@pytest.mark.parametrize("seed", range(100, 104))
+def test_random_machines_are_drawn(seed):
+    figure = ub.plot(machine(seed))
+    figure.draw_without_rendering()
+    assert figure.axes[0].collections

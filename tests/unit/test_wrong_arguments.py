@@ -1,0 +1,579 @@
+"""Every parameter of every public callable refuses what it cannot take, by name, before any mesh.
+
+The table below has a valid call of each public callable and the kind of each of its parameters.  A
+kind is a list of values that the parameter must refuse.
+"""
+
+import inspect
+import math
+
+from mpi4py import MPI
+
+import numpy as np
+import pytest
+
+import ufl_beam as ub
+from ufl_beam import simulation
+
+NAN, INF, HUGE = math.nan, math.inf, 10**400
+ARRAY = np.array([1.0, 2.0])
+
+SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
+BEAM = ub.Beam((0, 0), (1, 0), SECTION, cells=2, name="girder")
+OTHER = ub.Beam((1, 0), (2, 0), SECTION, cells=2, name="other")
+BODY = ub.Body((2, 0), mass=1.0, inertia=1.0, name="hub")
+SCENE = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)])
+STEEL = {"E": 210e9, "nu": 0.3}
+LAW = ub.Hardening(1.0)
+SPRING = ub.Spring(1.0)
+JOINT = ub.Revolute(BEAM.end, OTHER.start, measured=True)
+
+# -- kinds of parameters: what each of them must refuse ------------------------------------------
+
+NONE = [None]
+NO_NUMBER = ["1e-3", "x", b"1", 1j, np.complex128(1), [1.0], ARRAY, np.array([1.0]), (), {}, HUGE]
+NUMBER = [*NO_NUMBER, None, NAN, INF, -INF]
+FROM_ZERO = [*NUMBER, -1.0]
+POSITIVE = [*FROM_ZERO, 0.0]
+COUNT = [*POSITIVE, 1.5, "2"]
+SEED = [*(v for v in NO_NUMBER if v is not HUGE), None, NAN, -1, 1.5]
+LIMIT = [*NO_NUMBER, None, NAN, -1.0]
+"""From zero to infinity."""
+VECTOR = [
+    "ab", None, 1.0, (), (1,), (1, 2, 3), (1, "2"), (1, None), (1, NAN), (INF, 0), (1j, 0),
+    (HUGE, 0), (ARRAY, ARRAY),
+]  # fmt: skip
+OBJECT = [None, "x", 1.0, (0, 0), ARRAY, object(), int]
+"""In the place of any object of this package."""
+LIST = [None, 1.0, "ab", [None], ["x"], [1.0], object()]
+"""In the place of a list of objects of this package."""
+TEXT = [None, 1.0, b"x", ["x"]]
+SWITCH = [None, "yes", 2, 1.5, [], ARRAY]
+PATH = [None, 1.0, "", b"x", ["x"], object()]
+FUNCTION = [None, "x", 1.0, ARRAY]
+TIME = [
+    "x", 1.0, ARRAY, lambda: 1.0, lambda t: None, lambda t: "1", lambda t: 1j,
+    lambda t: np.complex128(1), lambda t: np.zeros(2), lambda t: np.zeros(1), lambda t: [1.0],
+    lambda t: NAN, lambda t: INF, lambda t: HUGE, lambda t: 1 / 0,
+]  # fmt: skip
+CURVE = [
+    "x", 1.0, lambda s: None, lambda s: s, lambda s: "ab", lambda s: (s, 1j), lambda s: (s, NAN),
+    lambda s: (s, s, s), lambda s: (s, "0"), lambda: (0, 0), lambda s: 1 / 0,
+]  # fmt: skip
+OPTIONAL_NUMBER = [*NO_NUMBER, NAN, INF]
+
+
+def optional(kind):
+    """The same where None is allowed."""
+    return [value for value in kind if value is not None]
+
+
+def call(of, **parameters):
+    """A row: a callable, a valid value and a kind of each of its parameters."""
+    return of, parameters
+
+
+def V(value, kind):
+    """A valid value, and what is refused in its place."""
+    return value, kind
+
+
+PLACE = V(BEAM.end, OBJECT)
+TIMED = {"moment": V(1.0, NUMBER), "time": V(lambda t: t, [*TIME, None])}
+SHAPE = {
+    "E": V(1.0, POSITIVE),
+    "nu": V(0.3, [*NUMBER, 0.6, -1.0]),
+    "rho": V(1.0, optional(FROM_ZERO)),
+    "shear_factor": V(0.8, POSITIVE),
+    "fibres": V(None, optional(OBJECT)),
+}
+SOFTENING = {"limit": V(1.0, LIMIT), "energy": V(1.0, POSITIVE)}
+NORMAL = {"mean": V(1.0, POSITIVE), "deviation": V(0.1, POSITIVE), "seed": V(1, SEED)}
+MESH = {"mesh": V(None, optional(OBJECT))}
+RUN = {"newton": V(None, optional(OBJECT)), **MESH, "comm": V(None, optional(OBJECT))}
+ALONG = {"record": V((), LIST), "start": V(None, optional(OBJECT)), **RUN}
+
+
+def fixed_call(of, fixed, **parameters):
+    """A row whose callable has arguments that are not tried."""
+
+    def called(**values):
+        return of(**fixed, **values)
+
+    called.of = of
+    return called, parameters
+
+
+TABLE = {
+    # sections and materials
+    "Section": call(
+        ub.Section,
+        EA=V(1.0, POSITIVE), GA=V(1.0, POSITIVE), EI=V(1.0, POSITIVE), rhoA=V(0.0, optional(FROM_ZERO)),
+        rhoI=V(0.0, FROM_ZERO), depth=V(0.0, FROM_ZERO), axial=V(None, optional(OBJECT)),
+        shear=V(None, optional(OBJECT)), bending=V(None, optional(OBJECT)),
+        hinge=V(None, optional(OBJECT)), fibres=V(None, optional(OBJECT)),
+    ),
+    "Section.of_shape": call(
+        ub.Section.of_shape,
+        A=V(1.0, POSITIVE), I=V(1.0, POSITIVE), depth=V(1.0, FROM_ZERO), **SHAPE,
+    ),
+    "Section.rectangle": call(
+        ub.Section.rectangle, b=V(1.0, POSITIVE), h=V(1.0, POSITIVE), **SHAPE
+    ),
+    "Section.circle": call(ub.Section.circle, d=V(1.0, POSITIVE), **SHAPE),
+    "Section.tube": call(ub.Section.tube, d=V(1.0, POSITIVE), t=V(0.1, POSITIVE), **SHAPE),
+    "Section.i_shape": call(
+        ub.Section.i_shape,
+        h=V(0.4, POSITIVE), b=V(0.2, POSITIVE), tw=V(0.01, POSITIVE), tf=V(0.02, POSITIVE),
+        **{name: kind for name, kind in SHAPE.items() if name != "shear_factor"},
+    ),
+    "Section.of_fibres": call(
+        ub.Section.of_fibres,
+        y=V([0.0, 1.0], [None, 1.0, "ab", [0.0], [0.0, NAN], [0.0, 1j], [0.0, "1"], [0.0, HUGE]]),
+        A=V([1.0, 1.0], [None, 1.0, "ab", [1.0], [1.0, NAN], [1.0, -1.0], [1.0, 1j], [1.0, "1"]]),
+        E=V(1.0, POSITIVE), nu=V(0.3, [*NUMBER, 0.6]), rho=V(0.0, optional(FROM_ZERO)),
+        shear_factor=V(0.8, POSITIVE), fibres=V(ub.Fibres(LAW), OBJECT),
+    ),
+    "Fibres": call(
+        ub.Fibres, law=V(LAW, OBJECT), number=V(5, COUNT), softening=V(None, optional(OBJECT))
+    ),
+    "Hardening": call(
+        ub.Hardening,
+        limit=V(1.0, LIMIT), modulus=V(0.0, FROM_ZERO), kinematic=V(0.0, FROM_ZERO),
+        viscosity=V(ub.Perzyna(0.0), OBJECT),
+    ),
+    "Perzyna": call(ub.Perzyna, eta=V(1.0, LIMIT)),
+    "DuvautLions": call(ub.DuvautLions, tau=V(1.0, LIMIT)),
+    "Softening": call(ub.Softening, **SOFTENING),
+    "LinearSoftening": call(ub.LinearSoftening, **SOFTENING),
+    "Normal": call(ub.Normal, **NORMAL),
+    "TruncatedNormal": call(ub.TruncatedNormal, **NORMAL),
+    "Lognormal": call(ub.Lognormal, **NORMAL),
+    "Weibull": call(
+        ub.Weibull, scale=V(1.0, POSITIVE), shape=V(1.0, POSITIVE), seed=V(1, SEED)
+    ),
+    "KelvinVoigt": call(ub.KelvinVoigt, time=V(1.0, POSITIVE), beams=V(None, optional(LIST))),
+    "Rayleigh": call(ub.Rayleigh, mass=V(1.0, FROM_ZERO), stiffness=V(1.0, FROM_ZERO)),
+    # beams, bodies, places
+    "Beam": call(
+        ub.Beam,
+        a=V((0, 0), VECTOR), b=V((1, 0), VECTOR), section=V(SECTION, OBJECT), cells=V(2, COUNT),
+        name=V("girder", TEXT), curve=V(None, CURVE), hinges=V({}, [None, 1.0, "x", [], {0.5: 1}]),
+        corners=V((), [None, 1.0, "ab", [None], ["0.5"], [NAN], [1j], [1.5], [ARRAY]]),
+    ),
+    "Beam.arc": call(
+        ub.Beam.arc,
+        center=V((0, 0), VECTOR), radius=V(1.0, POSITIVE), angles=V((0, 1), VECTOR),
+        section=V(SECTION, OBJECT), cells=V(2, COUNT), name=V("girder", TEXT),
+    ),
+    "Beam.polyline": call(
+        ub.Beam.polyline,
+        points=V([(0, 0), (1, 0)], [None, 1.0, "ab", [(0, 0)], [(0, 0), None], [(0, 0), (1, NAN)]]),
+        section=V(SECTION, OBJECT), cells=V(2, COUNT), name=V("girder", TEXT),
+    ),
+    "Beam.along": call(
+        ub.Beam.along,
+        curve=V(lambda s: (s, 0), [*CURVE, None]), section=V(SECTION, OBJECT), cells=V(2, COUNT),
+        name=V("girder", TEXT),
+    ),
+    "Beam.at": call(BEAM.at, s=V(0.5, [*NUMBER, -0.1, 1.1])),
+    "Place": call(
+        ub.Place,
+        beam=V(BEAM, OBJECT), s=V(0.5, [*NUMBER, -0.1, 1.1]), beyond=V(False, SWITCH),
+    ),
+    "Body": call(
+        ub.Body,
+        center=V((0, 0), VECTOR), mass=V(1.0, FROM_ZERO), inertia=V(1.0, FROM_ZERO),
+        name=V("hub", TEXT),
+    ),
+    "Body.at": call(BODY.at, x=V(0.0, NUMBER), y=V(0.0, NUMBER)),
+    "Spot": call(ub.Spot, body=V(BODY, OBJECT), point=V((0, 0), VECTOR)),
+    "ground": call(ub.ground, x=V(0.0, NUMBER), y=V(0.0, NUMBER)),
+    # joints, connectors and their laws
+    "Rigid": call(
+        lambda a, b, measured: ub.Rigid(a, b, measured=measured),
+        a=PLACE, b=V(OTHER.start, OBJECT), measured=V(False, SWITCH),
+    ),
+    "Revolute": call(
+        lambda a, b, measured: ub.Revolute(a, b, measured=measured),
+        a=PLACE, b=V(OTHER.start, OBJECT), measured=V(False, SWITCH),
+    ),
+    "Release": call(
+        ub.Release,
+        a=PLACE, b=V(OTHER.start, OBJECT), free=V("M", [*TEXT, "", "X", "MX"]),
+        measured=V(False, SWITCH),
+    ),
+    "Prismatic": call(
+        ub.Prismatic,
+        rail=PLACE, slider=V(OTHER.end, OBJECT), axis=V(None, optional(VECTOR)),
+        turning=V(False, SWITCH),
+    ),
+    "RigidLink": call(ub.RigidLink, a=PLACE, b=V(OTHER.end, OBJECT)),
+    "Link": call(ub.Link, a=PLACE, b=V(OTHER.end, OBJECT)),
+    "Guided": call(
+        ub.Guided, place=V(BEAM.end, OBJECT), curve=V(lambda s: (1 + s, 0), [*CURVE, None])
+    ),
+    "Turn": call(ub.Turn, a=PLACE, b=V(OTHER.end, OBJECT), law=V(SPRING, OBJECT)),
+    "Stretch": call(ub.Stretch, a=PLACE, b=V(OTHER.end, OBJECT), law=V(SPRING, OBJECT)),
+    "Slide": call(
+        ub.Slide,
+        a=PLACE, b=V(OTHER.end, OBJECT), law=V(SPRING, OBJECT), axis=V(None, optional(VECTOR)),
+    ),
+    "Spring": call(
+        ub.Spring,
+        stiffness=V(1.0, POSITIVE), law=V(None, optional(OBJECT)),
+        softening=V(None, optional(OBJECT)),
+    ),
+    "Damper": call(ub.Damper, viscosity=V(1.0, POSITIVE)),
+    "Stop": call(
+        ub.Stop,
+        stiffness=V(1.0, POSITIVE), low=V(-1.0, [*NO_NUMBER, None, NAN, 1.0]),
+        high=V(1.0, [*NO_NUMBER, None, NAN, -1.0]),
+    ),
+    "Coulomb": call(
+        ub.Coulomb,
+        force=V(1.0, FROM_ZERO), coefficient=V(1.0, FROM_ZERO), joint=V(JOINT, OBJECT),
+    ),
+    "RigidPlastic": call(ub.RigidPlastic, law=V(LAW, OBJECT)),
+    "Function": call(ub.Function, force=V(lambda e, rate: e, FUNCTION)),
+    "Controller": call(ub.Controller, force=V(lambda simulation: 1.0, FUNCTION)),
+    "Motor": call(ub.Motor, motion=V(lambda t: t, [*TIME, None])),
+    "Actuator": call(ub.Actuator, force=V(lambda t: t, [*TIME, None])),
+    # loads, supports, masses
+    "PointLoad": call(ub.PointLoad, place=PLACE, force=V((1, 0), VECTOR), **TIMED),
+    "FollowerLoad": call(ub.FollowerLoad, place=PLACE, force=V((1, 0), VECTOR), **TIMED),
+    "LineLoad": call(ub.LineLoad, beam=V(BEAM, OBJECT), force=V((1, 0), VECTOR), **TIMED),
+    "Gravity": call(
+        ub.Gravity, acceleration=V((0, -9.81), VECTOR), time=V(lambda t: t, [*TIME, None])
+    ),
+    "RotatingFrame": call(ub.RotatingFrame, rate=V(1.0, NUMBER), about=V((0, 0), VECTOR)),
+    "Table": call(
+        ub.Table,
+        times=V([0, 1], [None, 1.0, "01", [1, 0], [0, NAN], [0, "1"], [0, 1j], [0, HUGE], [0]]),
+        values=V([0, 1], [None, 1.0, "01", [0, NAN], [0, "1"], [0, 1j], [0, HUGE], [0]]),
+    ),
+    "ramp": call(ub.ramp, duration=V(1.0, POSITIVE)),
+    "Clamped": call(ub.Clamped, place=PLACE),
+    "Pinned": call(ub.Pinned, place=PLACE),
+    "Roller": call(ub.Roller, place=PLACE, along=V((1, 0), [*VECTOR, (0, 0)])),
+    "Prescribed": call(
+        ub.Prescribed,
+        place=PLACE,
+        **{
+            name: V(0.0, [*(v for v in OPTIONAL_NUMBER), *(f for f in TIME if callable(f))])
+            for name in ("u", "v", "psi")
+        },
+    ),
+    "PointMass": call(
+        ub.PointMass, place=PLACE, mass=V(1.0, FROM_ZERO), inertia=V(0.0, FROM_ZERO)
+    ),
+    "Velocity": call(
+        ub.Velocity,
+        beams=V([BEAM], LIST), linear=V((0, 0), VECTOR), angular=V(1.0, NUMBER),
+        about=V((0, 0), optional(VECTOR)),
+    ),
+    "Scene": call(
+        ub.Scene,
+        beams=V([BEAM], LIST),
+        **{
+            name: V((), LIST)
+            for name in (
+                "joints", "supports", "loads", "masses", "initial", "damping", "bodies",
+                "connectors",
+            )
+        },
+    ),
+    # schemes, discretisation, solver, steps
+    "Midpoint": call(
+        ub.Midpoint, alpha=V(0.0, [*FROM_ZERO, 0.6]), beta=V(0.0, [*FROM_ZERO, 0.6])
+    ),
+    "DecayingMidpoint": call(ub.DecayingMidpoint, rho_inf=V(0.5, [*NUMBER, 0.1, 1.1])),
+    "Newmark": call(ub.Newmark, gamma=V(0.5, [*NUMBER, 0.4]), beta=V(0.25, [*NUMBER, 0.1])),
+    "GeneralizedAlpha": call(ub.GeneralizedAlpha, rho_inf=V(0.8, [*NUMBER, -0.1, 1.1])),
+    "ExactStatic": call(ub.ExactStatic, theta=V(1.0, [*NUMBER, 0.4, 1.1])),
+    "Mesh": call(
+        ub.Mesh,
+        refine=V(1, [*POSITIVE, 1.5]), degree=V(1, [*COUNT, 4]), lumped=V(False, SWITCH),
+    ),
+    "Newton": call(
+        ub.Newton,
+        rtol=V(1e-8, POSITIVE), max_iterations=V(10, COUNT), modified=V(False, SWITCH),
+        petsc=V({}, [None, 1.0, "x", [], {1: None}]),
+    ),
+    "Adaptive": call(
+        ub.Adaptive,
+        tolerance=V(1.0, POSITIVE), first=V(None, optional(POSITIVE)),
+        longest=V(None, optional(POSITIVE)), shortest=V(None, optional(POSITIVE)),
+        stops=V((), [None, 1.0, "ab", [None], ["1"], [NAN], [1j], [HUGE]]),
+    ),
+    # runs
+    "simulate": call(
+        ub.simulate,
+        scene=V(SCENE, OBJECT), scheme=V(ub.Static(), [*OBJECT, ub.Static]),
+        t=V((0, 1), [*VECTOR, (1, 0)]), dt=V(0.5, POSITIVE), every=V(1, COUNT), most=V(10, COUNT),
+        checkpoint=V(None, optional(OBJECT)), progress=V(False, SWITCH), **ALONG,
+    ),
+    "Simulation": call(
+        ub.Simulation,
+        scene=V(SCENE, OBJECT), scheme=V(ub.Static(), [*OBJECT, ub.Static]), t0=V(0.0, NUMBER),
+        start=V(None, optional(OBJECT)), **RUN,
+    ),
+    "follow": call(
+        ub.follow,
+        scene=V(SCENE, OBJECT), control=V(ub.Load(1.0), [*OBJECT, ub.Load]),
+        until=V(None, optional(FUNCTION)), steps=V(1, COUNT), **ALONG,
+    ),
+    "ArcLength": call(ub.ArcLength, step=V(1.0, [*NUMBER, 0.0]), factor=V(1.0, POSITIVE)),
+    "Load": call(ub.Load, step=V(1.0, [*NUMBER, 0.0])),
+    "Displacement": call(
+        ub.Displacement,
+        place=PLACE, component=V("u", [*TEXT, "w", "", "uv"]), step=V(1.0, [*NUMBER, 0.0]),
+    ),
+    "Dissipation": call(
+        ub.Dissipation, step=V(1.0, POSITIVE), otherwise=V(ub.ArcLength(1.0), OBJECT)
+    ),
+    "modes": call(
+        ub.modes, scene=V(SCENE, OBJECT), n=V(1, COUNT), at=V(None, optional(OBJECT)), **MESH
+    ),
+    "buckling": call(
+        ub.buckling,
+        scene=V(SCENE, OBJECT), n=V(1, COUNT), t=V(1.0, NUMBER), at=V(None, optional(OBJECT)),
+        **MESH,
+    ),
+    "study": call(
+        ub.study,
+        member=V(lambda: {"x": 1.0}, FUNCTION), cases=V([{}], [None, 1.0, "ab", [None], ["x"], []]),
+        path=V(None, optional(PATH)), anew=V(False, SWITCH), progress=V(False, SWITCH),
+        comm=V(None, optional(OBJECT)),
+    ),
+    "tradeoff": call(
+        ub.tradeoff,
+        scene=V(SCENE, OBJECT),
+        quantities=V(
+            {"u": lambda s: s.displacement(BEAM.end)},
+            [None, 1.0, "x", {}, {"u": None}, {"u": 1.0}, {1: lambda s: s}],
+        ),
+        scheme=V(ub.Midpoint(), [*OBJECT, ub.Midpoint]), t=V((0, 1), [*VECTOR, (1, 0)]),
+        dt=V(0.5, [*(v for v in POSITIVE if not isinstance(v, list)), []]),
+        tolerance=V(1e-3, optional(POSITIVE)),
+        budget=V(None, optional(POSITIVE)), most=V(1.0, POSITIVE), **RUN,
+    ),
+    # files
+    "XDMF": call(ub.XDMF, path=V("run.xdmf", [*PATH, "run.h5"]), every=V(1, COUNT)),
+    "VTKHDF": call(ub.VTKHDF, path=V("run.vtkhdf", [*PATH, "run.h5"]), every=V(1, COUNT)),
+    "load": call(ub.load, path=V("run.h5", PATH)),
+    "History": call(
+        ub.History,
+        path=V("run.csv", PATH), places=V((), LIST), connectors=V((), LIST), every=V(1, COUNT),
+        most=V(10, COUNT),
+    ),
+    "Checkpoint": call(
+        ub.Checkpoint,
+        path=V("run.h5", PATH), every=V(1, optional(COUNT)), minutes=V(None, optional(FROM_ZERO)),
+        also=V((), [None, 1.0, "ab"]),
+    ),
+    "Events": call(ub.Events, tell=V(None, optional(FUNCTION))),
+    # fatigue
+    "Fatigue": call(
+        ub.Fatigue,
+        spots=V(ub.HotSpot.fibre(BEAM.end, y=0.1, E=1.0), LIST),
+        curve=V(ub.SNCurve(range=1.0), OBJECT), resolution=V(0.0, FROM_ZERO),
+    ),
+    "HotSpot": call(ub.HotSpot, place=PLACE, stress=V(lambda N, V, M: N, FUNCTION)),
+    "HotSpot.fibre": call(
+        ub.HotSpot.fibre,
+        place=PLACE, y=V(0.1, NUMBER), E=V(1.0, POSITIVE), factor=V(1.0, POSITIVE),
+    ),
+    "SNCurve": call(
+        ub.SNCurve,
+        range=V(1.0, POSITIVE), cycles=V(1e6, POSITIVE), slope=V(3.0, POSITIVE),
+        knee=V(INF, [*NO_NUMBER, None, NAN, -1.0, 0.0]), slope_beyond=V(5.0, POSITIVE),
+        limit=V(INF, [*NO_NUMBER, None, NAN, -1.0, 0.0]),
+        mean=V(lambda range, mean: range, FUNCTION),
+    ),
+    "SNCurve.eurocode": call(ub.SNCurve.eurocode, category=V(71.0, POSITIVE)),
+    "Goodman": call(ub.Goodman, ultimate=V(1.0, POSITIVE)),
+    "Gerber": call(ub.Gerber, ultimate=V(1.0, POSITIVE)),
+}  # fmt: skip
+
+SERIES = [None, "ab", 1.0, ["1", "2", "3"], [0.0, NAN, 1.0], [0, 1j, 2], [[0.0, 1.0]], [0, HUGE]]
+T, X = np.linspace(0, 10, 400), np.exp(-0.05 * np.linspace(0, 10, 400))
+X = X * np.cos(6 * T)
+OF_PEAKS = {
+    "t": V(T, SERIES), "x": V(X, SERIES), "about": V(0.0, NUMBER),
+    "prominence": V(0.05, FROM_ZERO),
+}  # fmt: skip
+TABLE |= {
+    "peaks": call(ub.peaks, **OF_PEAKS),
+    "damping": call(ub.damping, **OF_PEAKS),
+    "logarithmic_decrement": call(
+        ub.logarithmic_decrement, amplitudes=V([3.0, 2.0, 1.0], [*SERIES, [1.0], [1.0, -1.0]])
+    ),
+    "fit_decay": call(
+        ub.fit_decay,
+        t=V([0.0, 1.0, 2.0, 3.0], SERIES),
+        amplitudes=V([3.0, 2.2, 1.5, 1.1], SERIES),
+    ),
+    "damping_ratio": call(ub.damping_ratio, decrement=V(0.1, ["x", None, 1j, NAN, HUGE])),
+    "rainflow": call(ub.rainflow, series=V([0.0, 1.0, 0.0], SERIES)),
+}
+
+RECORDS_OF_RUNS = {
+    "Branch", "Buckling", "Connector", "CriticalPoint", "Cycles", "Decay", "Energy", "Envelope",
+    "Event", "Extent", "Joint", "Modes", "Path", "Solution", "Study", "Support", "Tradeoff",
+}  # fmt: skip
+"""Made by runs and by functions of the package, not by users."""
+
+WITHOUT_PARAMETERS = {"Static", "PrintedMidpoint", "Extremes", "Recorder", "say"}
+
+OF_SOLUTIONS = {
+    "animate", "picture", "plot", "plot_cycles", "plot_damage", "plot_dissipation", "plot_energy",
+    "plot_extremes", "plot_hinge", "plot_history", "plot_modes", "plot_moment_curvature",
+    "plot_shapes", "plot_tradeoff", "render",
+}  # fmt: skip
+"""Pictures, whose tests are in test_view.py."""
+
+
+def test_every_public_callable_is_in_the_table():
+    errors = {
+        n
+        for n in ub.__all__
+        if inspect.isclass(o := getattr(ub, n)) and issubclass(o, BaseException)
+    }
+    known = {name.split(".")[0] for name in TABLE}
+    missing = set(ub.__all__) - errors - known - RECORDS_OF_RUNS - WITHOUT_PARAMETERS - OF_SOLUTIONS
+    assert missing == set()
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_every_parameter_is_in_the_table(name):
+    of, parameters = TABLE[name]
+    names = {
+        p.name for p in inspect.signature(of).parameters.values() if p.kind is not p.VAR_KEYWORD
+    }
+    assert names - set(parameters) == set()
+
+
+def _wrong(name):
+    _, parameters = TABLE[name]
+    good = {parameter: value for parameter, (value, _) in parameters.items()}
+    for parameter, (_, kind) in parameters.items():
+        for value in kind:
+            yield parameter, value, {**good, parameter: value}
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_wrong_values_are_refused_by_name(name, monkeypatch):
+    """Each wrong value of each parameter gives one of the errors that are meant, with a name."""
+
+    def no_mesh(*_, **__):
+        raise AssertionError("a mesh was made")
+
+    monkeypatch.setattr(simulation, "Fields", no_mesh)
+    of, _ = TABLE[name]
+    faults = []
+    for parameter, value, values in _wrong(name):
+        try:
+            of(**values)
+        except (ub.SceneError, TypeError) as error:
+            said = str(error)
+            if not isinstance(error, ub.SceneError):
+                faults.append(f"{parameter} = {value!r:.60}: {error!r:.100}")
+            elif len(said) > 350:
+                faults.append(f"{parameter} = {value!r:.60}: {len(said)} characters")
+            elif not any(part in said for part in (name.split(".")[0], parameter, "girder", "hub")):
+                faults.append(f"{parameter} = {value!r:.60}: no name in {said!r}")
+        except Exception as error:
+            faults.append(f"{parameter} = {value!r:.60}: {error!r:.100}")
+        else:
+            faults.append(f"{parameter} = {value!r:.60}: no error")
+    assert not faults, "\n".join(faults)
+
+
+# -- functions of users, in the middle of a run ---------------------------------------------------
+
+
+def late(value):
+    """A function of time that is good until 0.2 s."""
+    return lambda t: 1e-3 * t if t < 0.25 else value
+
+
+def shaken(**parts):
+    one = ub.Beam((0, 0), (1, 0), SECTION, cells=2, name="girder")
+    made = {name: [make(one)] for name, make in parts.items()}
+    held = () if "supports" in made else [ub.Clamped(one.start)]
+    return ub.Scene([one], **{"supports": held, **made})
+
+
+OWNERS = {
+    "PointLoad at girder.end": lambda v: shaken(
+        loads=lambda b: ub.PointLoad(b.end, force=(1, 0), time=late(v))
+    ),
+    "FollowerLoad at girder.end": lambda v: shaken(
+        loads=lambda b: ub.FollowerLoad(b.end, force=(1, 0), time=late(v))
+    ),
+    "LineLoad on girder": lambda v: shaken(
+        loads=lambda b: ub.LineLoad(b, force=(1, 0), time=late(v))
+    ),
+    "Gravity": lambda v: shaken(loads=lambda b: ub.Gravity(time=late(v))),
+    "Prescribed at girder.start": lambda v: shaken(
+        supports=lambda b: ub.Prescribed(b.start, u=0, v=late(v), psi=0)
+    ),
+    "Turn(ground (1, 0), girder.end (1, 0))": lambda v: shaken(
+        connectors=lambda b: ub.Turn(ub.ground(1, 0), b.end, ub.Motor(late(v)))
+    ),
+    "Slide(ground (1, 0), girder.end (1, 0))": lambda v: shaken(
+        connectors=lambda b: ub.Slide(ub.ground(1, 0), b.end, ub.Actuator(late(v)), axis=(1, 0))
+    ),
+    "Turn(ground (0, 0), girder.end (1, 0))": lambda v: shaken(
+        connectors=lambda b: ub.Turn(
+            ub.ground(0, 0), b.end, ub.Controller(lambda simulation: late(v)(simulation.t))
+        )
+    ),
+    "Turn(ground (2, 0), girder.end (1, 0))": lambda v: shaken(
+        connectors=lambda b: ub.Turn(ub.ground(2, 0), b.end, ub.Function(lambda e, rate: v))
+    ),
+}
+
+
+@pytest.mark.parametrize("owner", OWNERS)
+@pytest.mark.parametrize("value", [None, "1.0", 1j, np.zeros(2), np.zeros(1), HUGE])
+def test_functions_that_return_no_number_later(owner, value):
+    """The message names the owner; before, most of them were bare errors of NumPy, or silent."""
+    scene = OWNERS[owner](value)
+    with pytest.raises(ub.SceneError) as failure:
+        ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.1, progress=False, comm=MPI.COMM_SELF)
+    assert owner in str(failure.value)
+    assert "must return a number" in str(failure.value)
+
+
+def test_numbers_of_numpy_are_numbers():
+    """Scalars, and arrays without dimension, are as good as floats."""
+    one = ub.Beam((np.int64(0), np.array(0.0)), (np.float32(1), 0), SECTION, cells=np.int64(2))
+    push = ub.PointLoad(one.end, force=np.array([1.0, 0.0]), time=lambda t: np.array(t))
+    scene = ub.Scene([one], supports=[ub.Clamped(one.start)], loads=[push])
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=np.float64(1), comm=MPI.COMM_SELF)
+    # F L / EA, the beam being straight
+    assert solution.displacement(one.end)[-1, 0] == pytest.approx(1e-4, rel=1e-9)
+
+
+# -- messages -------------------------------------------------------------------------------------
+
+
+def test_messages_show_the_beginning_of_long_values():
+    records = [ub.Clamped(BEAM.start) for _ in range(40)]
+    with pytest.raises(ub.SceneError, match="joints") as failure:
+        ub.Scene([BEAM], joints=BEAM)
+    assert len(str(failure.value)) < 150
+    with pytest.raises(ub.SceneError, match="is not a Joint") as failure:
+        ub.Scene([BEAM], joints=records)
+    assert len(str(failure.value)) < 150
+
+
+def test_entries_that_the_ledger_lacks():
+    solution = ub.simulate(SCENE, ub.Static(), t=(0, 1), dt=1, comm=MPI.COMM_SELF)
+    for ask in (lambda e: e.lost["hinges"], lambda e: e["hinges"]):
+        with pytest.raises(KeyError, match=r"no entry 'hinges'.*scene has nothing.*'stored'"):
+            ask(solution.energy)
+    assert solution.energy.lost.get("hinges") is None
+    assert "hinges" not in solution.energy.lost
