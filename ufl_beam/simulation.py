@@ -197,7 +197,7 @@ class Simulation(Live):
         self._make_beams()
         self.force = np.zeros(self.share.size)
         setting = Setting(self, scheme, self.ledger, friction_repeats(scene), self._course)
-        self.couplings = couplings(self.share, setting, self._A)
+        self.couplings = self.together(couplings, self.share, setting, self._A)
         self._openings = Openings.of(self._course, self._openable(), self.share.comm)
         self.loads = self._make_loads()
         self._others: list[Term] = [*self.loads, *self._numerical]
@@ -216,7 +216,7 @@ class Simulation(Live):
             self.supports.stop(self.inertia.v)
         loaded: list[Array] = []
         if start is not None or (has_inertia(scheme) and scheme.kept):
-            loaded = [load.carry_on(self.t, self.q) for load in self.loads]
+            loaded = self.together(self._carry_on)
         if start is not None:
             memory = Restoring(self.share, internal)
             for one in (*self.inelastic, *self.couplings):
@@ -239,12 +239,13 @@ class Simulation(Live):
             term.add_state(self.q)
         if has_inertia(scheme) and (scene.links or scene.supports):
             motions = self.connections()[:, 0]
-            warn_of_jumps(self.grid, t0, q, motions)
+            self.together(warn_of_jumps, self.grid, t0, q, motions)
         self._continues = start is not None
         self._path: StaticPath | None = None
         if not scheme.dynamic:
             parts = (self.beams, self.couplings)
-            self._path = StaticPath(self.share, scheme, *parts, self.ledger, self.q, t0)
+            path = (self.share, scheme, *parts, self.ledger, self.q, t0)
+            self._path = self.together(StaticPath, *path)
             self._bear(self._path, loaded)
         equation = None
         if self.share.comm.size == 1 and not self.supports.turned:
@@ -304,6 +305,10 @@ class Simulation(Live):
         cells: list[Openable] = [one for one in self.inelastic if one.points.softens]
         groups = [one.response.openable for one in self.couplings if isinstance(one, Couplings)]
         return [*cells, *(places for places in groups if places is not None)]
+
+    def _carry_on(self) -> list[Array]:
+        """Take the initial state as one in equilibrium with the loads; return their forces."""
+        return [load.carry_on(self.t, self.q) for load in self.loads]
 
     def _make_loads(self) -> list[DeadLoads | FollowerLoads | FrameForces]:
         followers = [load for load in self.scene.loads if isinstance(load, FollowerLoad)]
