@@ -126,6 +126,7 @@ def abort(comm: MPI.Intracomm, error: BaseException | None = None) -> None:
     )
     sys.stdout.flush()
     sys.stderr.flush()
+    time.sleep(0.3)  # mpirun forwards what was printed, but not after an abort
     comm.Abort(1)
 
 
