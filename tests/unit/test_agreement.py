@@ -76,7 +76,8 @@ def test_a_process_that_fails_alone_ends_all(case, rank):
     assert time.perf_counter() - begin < 60  # 3 s alone; a hang would be for ever
     assert run.returncode != 0
     assert f"RuntimeError: user, {case}" in run.stderr
-    assert f"process {rank} of 2 failed" in run.stderr
+    if case != "own":  # small scenes on each process are compared, so that the other one ends, too
+        assert f"process {rank} of 2 failed" in run.stderr
 
 
 @pytest.mark.serial
