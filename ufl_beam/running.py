@@ -57,7 +57,8 @@ def simulate(
         every: Keep every so many steps in the solution; the last one always.
         most: States, besides the initial and the last one, that the solution may have.  When there
             are more, every other one goes, and only half as many steps are kept from then on.
-        start: Solution of the same beams whose last state is the initial state.
+        start: Solution of the same beams whose last state is the initial state.  Joints may be
+            removed, or added where places are together.
         newton: Tolerances and PETSc options.
         mesh: How finely it is discretised; as ``start``, or with the cells of the beams.
         checkpoint: File from which the run goes on if it is run again after whatever stopped it.

@@ -129,7 +129,8 @@ class Simulation(Live):
         scene: What is modelled.
         scheme: :class:`Static`, :class:`Midpoint` or another one, see docs/schemes.md.
         t0: Time of the initial state; s.
-        start: Solution of the same beams whose last state is the initial state.
+        start: Solution of the same beams whose last state is the initial state.  Joints may be
+            removed, or added where places are together.
         newton: Tolerances and PETSc options.
         mesh: How finely it is discretised; as ``start``, or with the cells of the beams.
         comm: Processes that share the scene; all of them, or in a :func:`study` this one alone.
