@@ -82,7 +82,7 @@ def nearest(curve: Curve, point: Array, s: float, step: float, length: float) ->
 def enclosing_diameter(points: Array) -> float:
     """Diameter of the smallest circle around points; (n, 2) or more rows; m.
 
-    It is the same in all axes.  The circle goes through two or three points; those that are farthest
+    It is the same in all axes.  The circle goes through two or three points; those farthest
     outside are taken in, one after the other.
     """
     points = points - points.mean(axis=0)

@@ -19,9 +19,9 @@ from ufl_beam.sparse import Csr
 class Guides(Links):
     """Forces across curves; those over a step are across the chord, so that they do no work.
 
-    The last digits of the curve spoil the direction of a short chord.  Where it is so short that
-    they spoil more than the curvature does, the direction in its middle takes its place: either errs
-    by the last digits to the power of two thirds at most.
+    The last digits of the curve spoil the direction of a short chord.  Where they spoil more than
+    the curvature does, the direction in its middle takes its place: either errs by the last digits
+    to the power of two thirds at most.
 
     The motion of a guide is the distance from its curve, zero when a step is accepted.
     """
@@ -64,7 +64,7 @@ class Guides(Links):
         return on, t
 
     def _curvatures(self, n: Array) -> Array:
-        """Curvatures at the latest points, towards the normals ``n``, by second differences; 1/m."""
+        """Curvatures at the latest points towards the normals ``n``, by differences; 1/m."""
         found = []
         for law, s, normal, step in zip(self._laws, self._s, n, self._steps, strict=True):
             t = tangent(law.curve, s, step)

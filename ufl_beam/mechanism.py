@@ -83,7 +83,7 @@ def _without_inertia(scene: Scene) -> list[int]:
     bodies = [(one.mass, one.inertia) for one in scene.bodies]
     loose: list[int] = []
     for i, (mass, inertia) in enumerate((*beams, *bodies)):
-        loose += [3 * i, 3 * i + 1] * (mass == 0.0) + [3 * i + 2] * (inertia == 0.0)
+        loose += [3 * i, 3 * i + 1] * int(mass == 0.0) + [3 * i + 2] * int(inertia == 0.0)
     return loose
 
 

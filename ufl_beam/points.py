@@ -135,7 +135,7 @@ class Course:
         self.flags[:] = self._first[hold]
 
     def relieve(self, relief: bool) -> bool:
-        """Let points around those that open answer elastically, or no more; whether there are any."""
+        """Let points around those that open answer elastically, or no more; if there are any."""
         self.flags[RELIEF] = relief and self.flags[OPENED]
         return bool(self.flags[OPENED])
 

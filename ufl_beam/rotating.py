@@ -117,7 +117,7 @@ def _positions(fields: Fields, about: tuple[float, float]) -> Array:
     share = fields.share
     grid, x = share.grid, np.zeros(share.grid.size)
     centers = np.array([body.center for body in grid.scene.movers]).reshape(-1, 2)
-    # Beams last: those joined to the ground share its displacement, but not the place of its centre.
+    # Beams last: those joined to the ground share its displacement, not the place of its centre.
     points = np.concatenate([centers, grid.points]) - about
     x[np.concatenate([grid.dofs_of_bodies, grid.dofs])[:, :2]] = points
     return np.asarray(x[share.dofs])

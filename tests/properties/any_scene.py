@@ -10,6 +10,7 @@ be compared in another order only.
 """
 
 import math
+from itertools import pairwise
 
 import numpy as np
 from laws_drawn import Laws
@@ -57,7 +58,8 @@ class _Writer(Laws):
         self._say = Numbers(statement, places_stay=self._scattered)
         self._lists = {name: [] for name in PARTS}
         self._lines = [
-            f"# {'scattered, ' * self._scattered}seed {seed}, {statement.name}", "import math", "import ufl_beam as ub", ""
+            f"# {'scattered, ' * self._scattered}seed {seed}, {statement.name}",
+            "import math", "import ufl_beam as ub", "",
         ]  # fmt: skip
         self._statement, self._parts, self._anchors = statement, [], []
         self._flips = np.random.default_rng(statement.backwards)
@@ -155,8 +157,8 @@ class _Writer(Laws):
     def _beam(self, parent):
         """A beam, joined to an anchor if there is one."""
         i = sum(part.startswith("beam") for part in self._parts)
-        name, say = f"beam{i}", self._say
-        kind, hinges = self._section(i)
+        name = f"beam{i}"
+        _, hinges = self._section(i)
         joint, gap = self._kind_of_joint(parent)
         start = (0.0, 0.0) if parent is None else tuple(np.add(parent.point, gap))
         L, cells = self._L * self._some(0.5, 1.5), self._integer(1, 6)
@@ -215,7 +217,7 @@ class _Writer(Laws):
             angle += self._some(-1.5, 1.5)
             way = L / 2 * np.array([math.cos(angle), math.sin(angle)])
             points.append(tuple(np.add(points[-1], way * self._some(0.4, 1))))
-        lengths = [math.dist(p, q) for p, q in zip(points, points[1:], strict=False)]
+        lengths = [math.dist(p, q) for p, q in pairwise(points)]
         at = np.concatenate([[0], np.cumsum(lengths)]) / sum(lengths)
 
         def axis(s):
@@ -333,7 +335,8 @@ class _Writer(Laws):
         ground = f"ub.ground(*{say.point(place.point)})"
         far = tuple(np.add(place.point, self._polar(self._L / 3)))
         turn, along = self._some(0.1, 1.5), self._some(-math.pi, math.pi)
-        way = f"lambda t: {{}} * (1.0 - math.cos({say.number(self._some(1, 6) / self._end, '1/s')} * t))"
+        ω = say.number(self._some(1, 6) / self._end, "1/s")
+        way = f"lambda t: {{}} * (1.0 - math.cos({ω} * t))"
         to = tuple(float(v) for v in self._statement.turned(x, y))
         u, v = (way.format(repr(c * self._statement.unit("m"))) for c in to)
         psi = f"psi={way.format(repr(turn))}"

@@ -129,7 +129,7 @@ def _from_curve(solution, holder):
 
 
 def _distance(curve, s, point, way):
-    """Distance from the line through a curve near s, which Brent's method finds to half of digits."""
+    """Distance from the line through a curve near s, which is known to half of the digits."""
     ε = 1e-5 * way
     (ax, ay), (bx, by), (cx, cy) = curve(s - ε), curve(s + ε), curve(s)
     tx, ty = (bx - ax), (by - ay)

@@ -106,7 +106,8 @@ class Laws:
         mean, scatter = say.number(strength, "Pa"), say.number(strength / 4, "Pa")
         drawn = self._one([
             f"ub.Normal({mean}, {scatter}, seed={i})", f"ub.Lognormal({mean}, {scatter}, seed={i})",
-            f"ub.TruncatedNormal({mean}, {scatter}, seed={i})", f"ub.Weibull({mean}, 3.0, seed={i})",
+            f"ub.TruncatedNormal({mean}, {scatter}, seed={i})",
+            f"ub.Weibull({mean}, 3.0, seed={i})",
         ])  # fmt: skip
         law = self._hardening(drawn if self._scattered else mean, E, ("Pa", "Pa s"))
         size = strength * self._size(0, 0.5)

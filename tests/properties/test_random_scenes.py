@@ -1,9 +1,9 @@
 """200 random scenes, each stated in six ways: one motion, constraints kept, a ledger that closes.
 
-`any_scene.py` draws the scenes, `statements.py` states them as given, turned, with beams that run the
-other way, a kilometre away, in mm, t and ms, and in another order.  A scene that fails prints the
-script of the statement as given; `python3 tests/properties/test_random_scenes.py SEED` prints all of
-them with their differences.
+`any_scene.py` draws the scenes, `statements.py` states them as given, turned, with beams that run
+the other way, a kilometre away, in mm, t and ms, and in another order.  A scene that fails prints
+the script of the statement as given; `python3 tests/properties/test_random_scenes.py SEED` prints
+all of them with their differences.
 """
 
 import math
