@@ -134,10 +134,14 @@ class Course:
         """Begin a search for an equilibrium."""
         self.flags[:] = self._first[hold]
 
-    def relieve(self, relief: bool) -> bool:
-        """Let points around those that open answer elastically, or no more; return if any open."""
-        self.flags[RELIEF] = relief and self.flags[OPENED]
+    @property
+    def opened(self) -> bool:
+        """Whether a point of this process has opened."""
         return bool(self.flags[OPENED])
+
+    def relieve(self, relief: bool) -> None:
+        """Let points that do not open answer elastically, or no more."""
+        self.flags[RELIEF] = relief
 
 
 class Points:

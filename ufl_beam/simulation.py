@@ -350,12 +350,13 @@ class Simulation(Live):
         self.supports.enter(r)
 
     def _relieve(self, relief: bool) -> bool:
-        """Begin again with relieved points, or end that; whether it makes a difference."""
-        here = self._course.relieve(relief)
+        """Begin again with relieved points, or end that; return if it makes a difference."""
+        opened = bool(self.share.largest(float(self._course.opened)))
+        self._course.relieve(relief and opened)
         if relief:
             for coupling in self.couplings:
                 coupling.again()
-        return self.share.comm.allreduce(here, op=MPI.LOR) if self.share.comm.size > 1 else here
+        return opened
 
     def _excess(self, x: Array, r: Array, scale: float, moved: float) -> float:
         """How far the laws of connectors are missed."""
