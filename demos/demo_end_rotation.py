@@ -246,15 +246,15 @@ for name, (psi, at_hinge, solution) in named.items():
 
 # %% [markdown]
 # The work that the bulk dissipates until M_u is M_y κ_p L, the hinge dissipates the closed form for
-# its jump to round-off.  The moment at the end of a step is the mean traction over it, so it lags
-# half a step behind the closed form, by up to 3 % of M_u where it falls fastest; and a part of a
-# step is missing at the peak.
+# its jump to round-off.  The moment of the hinge in a step is the mean traction over it, which is
+# compared with the closed form in the middle of the step: 2 % of M_u, of the first step.
 
 # %%
 for psi, at_hinge, solution in slow.values():
     M = at_hinge.forces[:, 2]
     assert abs(M.max() / M_u - 1) < 5e-3
-    assert np.max(np.abs(M - np.interp(psi, psi_closed, M_closed))) < 3e-2 * M_u
+    middle = (psi[1:] + psi[:-1]) / 2
+    assert np.max(np.abs(M[1:] - np.interp(middle, psi_closed, M_closed))) < 2e-2 * M_u
     assert abs(solution.energy["plastic"][-1] / (M_y * kappa_p * L) - 1) < 5e-3
 for _, at_hinge, _ in named.values():
     closed_hinge = G_f * (1 - np.exp(-M_u / G_f * at_hinge.jump[-1]))
