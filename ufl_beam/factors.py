@@ -103,7 +103,7 @@ class ChainsFirst:
         self._factors.apply(self._rhs, self._solution)
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, x: PETSc.Vec) -> None:
-        """Solve; PETSc asks even after a failure, and an error would leave its objects as they are."""
+        """Solve; nothing after a failure, where an error would leave objects of PETSc half done."""
         if not self._good:
             x.array_w[:] = 0.0
             return
