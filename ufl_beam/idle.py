@@ -73,9 +73,9 @@ class IdleMotions:
             _, vector = null_vector(K)
         except (np.linalg.LinAlgError, RuntimeError):
             return False
-        motion = np.zeros(share.grid.size)
-        motion[free] = np.abs(vector)
-        motion = np.where(self._moves, motion[share.dofs], 0.0)
+        everywhere = np.zeros(share.grid.size)
+        everywhere[free] = np.abs(vector)
+        motion: Array = np.where(self._moves, everywhere[share.dofs], 0.0)
         motion[~self._turns] /= share.grid.scene.size
         largest = share.largest(float(motion.max(initial=0.0)))
         if not 0.0 < largest < np.inf:
