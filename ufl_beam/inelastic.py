@@ -179,9 +179,13 @@ class InelasticBeams:
         """Add the derivative of the tangent at ``q1`` along ``u``; points go on as they answer."""
         self._cell_tangent_at(q1).add_change(q1, u)
 
-    def tangent_works(self, q1: Array, u: Array, x: Array, y: Array) -> tuple[float, float]:
-        """Works of the tangent for the motion x on y, and of its derivative along u; J."""
-        return self._cell_tangent_at(q1).works(q1, u, x, y)
+    def tangent_work(self, q1: Array, x: Array, y: Array) -> float:
+        """Return the work of the tangent for the motion x on y; J."""
+        return self._cell_tangent_at(q1).work(q1, x, y)
+
+    def work_of_change(self, q1: Array, u: Array, x: Array, y: Array) -> float:
+        """Return the work of the derivative of the tangent along u, for x on y; J."""
+        return self._cell_tangent_at(q1).work_of_change(q1, u, x, y)
 
     def _cell_tangent_at(self, q1: Array) -> CellTangent:
         strains = self._strains(q1)

@@ -173,7 +173,7 @@ class SmallMotions:
             values, x = solve(shift=-first / 2)
             zero = self._unresisted(x)
         if abs(C).max() <= nothing * τ and symmetric:
-            values = np.sum(x * (K @ x), axis=0) / np.sum(x * (M @ x), axis=0)
+            values = self._works(x) / np.sum(x * (M @ x), axis=0)
             values[zero] = 0.0
             s, motions = np.sqrt((-values).astype(complex)), x.astype(complex)
         else:
@@ -181,9 +181,14 @@ class SmallMotions:
         finite = (np.abs(s) ** 2 <= 1e3 * highest) & (s.imag >= 0)
         return s[finite], motions[:, finite]
 
+    def _works(self, x: Array) -> Array:
+        """Works of the stiffness on motions, in columns, with no more round-off than strains; J."""
+        right, left = self._with_laws()
+        return self._simulation.stiffness_works(self.q, right @ x, left.T @ x)
+
     def _unresisted(self, x: Array) -> npt.NDArray[np.bool_]:
         """Which motions no stiffness resists, up to round-off; (n,)."""
-        work = np.abs(np.sum(x * (self.K @ x), axis=0))
+        work = np.abs(self._works(x))
         sizes = np.sum(np.abs(x) * (abs(self.K) @ np.abs(x)), axis=0)
         return np.asarray(work <= ZERO * sizes)
 

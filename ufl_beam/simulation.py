@@ -444,6 +444,24 @@ class Simulation(Live):
             one.add_tangent_change(q, u)
         return self._A.data.copy()
 
+    def stiffness_works(self, q: Array, X: Array, Y: Array) -> Array:
+        """Works of the tangent of :meth:`linearise` for the motions X, each on its own of Y; J.
+
+        Args:
+            q: Configuration at the local degrees of freedom, which was linearised about last.
+            X: Motions, in columns.
+            Y: Virtual motions, in columns.
+        """
+        self._A.data.fill(0.0)
+        for term in self.terms:
+            if not (isinstance(term, Inertia) or term in self.beams):
+                term.add_tangent(q)
+        times, works = Product(self._A), np.zeros(X.shape[1])
+        for i, (x, y) in enumerate(zip(*map(np.ascontiguousarray, (X.T, Y.T)), strict=True)):
+            of_beams = sum(one.tangent_work(q, x, y) for one in self.beams)
+            works[i] = of_beams + times(x) @ y
+        return works
+
     def tangent_works(self, q: Array, u: Array, X: Array, Y: Array) -> tuple[Array, Array]:
         """Works of the tangent for the motions X on Y, and of its derivative along u; J.
 
@@ -459,7 +477,8 @@ class Simulation(Live):
         works = np.zeros((2, X.shape[1], Y.shape[1]))
         for i, j in zip(*np.triu_indices(X.shape[1]), strict=True):
             x, y = (np.ascontiguousarray(one) for one in (X[:, i], Y[:, j]))
-            works[:, i, j] = np.sum([b.tangent_works(q, u, x, y) for b in self.beams], axis=0)
+            works[0, i, j] = sum(one.tangent_work(q, x, y) for one in self.beams)
+            works[1, i, j] = sum(one.work_of_change(q, u, x, y) for one in self.beams)
         for k, work in enumerate(works):
             self._A.data.fill(0.0)
             for one in self.couplings:

@@ -73,11 +73,17 @@ class CellTangent:
         tangent = ufl.derivative(self._work, self._q1, dq)
         return TangentChange(tangent, self._q1, self._compile, self._A)
 
+    @property
+    def _action(self) -> ufl.Form:
+        return ufl.action(ufl.derivative(self._work, self._q1, self._x), self._y)
+
     @cached_property
-    def _works(self) -> tuple[Kernel, Kernel]:
-        tangent = ufl.action(ufl.derivative(self._work, self._q1, self._x), self._y)
-        change = ufl.derivative(tangent, self._q1, self._u)
-        return self._compile(tangent), self._compile(change)
+    def _of_tangent(self) -> Kernel:
+        return self._compile(self._action)
+
+    @cached_property
+    def _of_change(self) -> Kernel:
+        return self._compile(ufl.derivative(self._action, self._q1, self._u))
 
     def put(self, function: fem.Function, values: Array) -> None:
         """Give a coefficient values in the cells."""
@@ -89,14 +95,19 @@ class CellTangent:
             self._matrix.put(function, values)
         self._matrix.add(q1, u)
 
-    def works(self, q1: Array, u: Array, x: Array, y: Array) -> tuple[float, float]:
-        """Works of the tangent at ``q1`` for the motion x on y, and of its derivative along u."""
-        of_tangent, of_change = self._works
-        for kernel in self._works:
-            for function, values in self._values.items():
-                if kernel.uses(function):
-                    kernel.put(function, values)
-            kernel.set(self._x, x)
-            kernel.set(self._y, y)
-        of_change.set(self._u, u)
-        return of_tangent.value(q1), of_change.value(q1)
+    def work(self, q1: Array, x: Array, y: Array) -> float:
+        """Work of the tangent at ``q1`` for the motion x on y; J."""
+        return self._value(self._of_tangent, q1, x, y)
+
+    def work_of_change(self, q1: Array, u: Array, x: Array, y: Array) -> float:
+        """Work of the derivative of the tangent at ``q1`` along u, for the motion x on y; J."""
+        self._of_change.set(self._u, u)
+        return self._value(self._of_change, q1, x, y)
+
+    def _value(self, kernel: Kernel, q1: Array, x: Array, y: Array) -> float:
+        for function, values in self._values.items():
+            if kernel.uses(function):
+                kernel.put(function, values)
+        kernel.set(self._x, x)
+        kernel.set(self._y, y)
+        return kernel.value(q1)

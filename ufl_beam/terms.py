@@ -73,8 +73,11 @@ class Beams(Term, Protocol):
 class Cells(Beams, Protocol):
     """Beams whose tangent is known by its works, too, summed over cells from strains."""
 
-    def tangent_works(self, q1: Array, u: Array, x: Array, y: Array) -> tuple[float, float]:
-        """Works of the tangent for the motion x on y, and of its derivative along u; J."""
+    def tangent_work(self, q1: Array, x: Array, y: Array) -> float:
+        """Return the work of the tangent for the motion x on y; J."""
+
+    def work_of_change(self, q1: Array, u: Array, x: Array, y: Array) -> float:
+        """Return the work of the derivative of the tangent along u, for x on y; J."""
 
 
 class OfForms:
@@ -191,9 +194,13 @@ class ElasticBeams(OfForms):
         """Add the derivative of the tangent at ``q1`` along ``u``."""
         self._cell_tangent.add_change(q1, u)
 
-    def tangent_works(self, q1: Array, u: Array, x: Array, y: Array) -> tuple[float, float]:
-        """Works of the tangent for the motion x on y, and of its derivative along u; J."""
-        return self._cell_tangent.works(q1, u, x, y)
+    def tangent_work(self, q1: Array, x: Array, y: Array) -> float:
+        """Return the work of the tangent for the motion x on y; J."""
+        return self._cell_tangent.work(q1, x, y)
+
+    def work_of_change(self, q1: Array, u: Array, x: Array, y: Array) -> float:
+        """Return the work of the derivative of the tangent along u, for x on y; J."""
+        return self._cell_tangent.work_of_change(q1, u, x, y)
 
     @cached_property
     def _cell_tangent(self) -> CellTangent:
