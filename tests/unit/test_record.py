@@ -86,7 +86,7 @@ def test_xdmf_has_one_grid_with_all_fields_at_each_time(shared_path, on_first_ra
     for grid in grids:
         names = {one.attrib["Name"] for one in grid.findall("Attribute")}
         assert {"displacement", "rotation", "N", "V", "M", "part"} <= names
-        # meshio knows the type by this spelling only
+        # Spelled as readers know it
         assert grid.find("Topology").attrib["TopologyType"] == "Polyline"
 
 
