@@ -161,11 +161,11 @@ def documented_orders():
     """Orders of the work of a viscous law by scheme, from the table in docs/schemes.md."""
     lines = (Path(__file__).parents[2] / "docs" / "schemes.md").read_text().splitlines()
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
-    column = next(row for row in rows if "viscous yielding: work" in row).index(
-        "viscous yielding: work"
-    )
+    name = "viscous yielding: work"
+    columns = {row.index(name) for row in rows if name in row}
     return {
         row[0].strip("`"): row[column].partition(" (")[0]
+        for column in columns
         for row in rows
         if len(row) == 5 and row[0].startswith("`ExactStatic")
     }
