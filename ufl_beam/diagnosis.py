@@ -8,28 +8,18 @@ from mpi4py import MPI
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import coo_array, csc_array, diags_array, eye_array
-from scipy.sparse.linalg import splu
 
 from ufl_beam.compat import Array
 from ufl_beam.couplings import Couplings
 from ufl_beam.errors import StepFailed
 from ufl_beam.grid import Grid, Index
+from ufl_beam.null_vectors import SINGULAR, free_matrix, null_vector
 
 if TYPE_CHECKING:
     from ufl_beam.simulation import Simulation
 
-DENSE = 300
-"""Up to this number of unknowns the null vector comes from a singular value decomposition."""
-
-SINGULAR = 1e-12
-"""Singular values of an equilibrated matrix up to this part of its entries count as zero."""
-
 SHARE = 0.1
 """Part of the largest motion from which on a motion or a deformation is named."""
-
-ROUNDS = 40
-"""Largest number of times that rows and columns are scaled."""
 
 SOFT = 1e-3
 """Part of its elastic stiffness up to which a connector or a cell gives way."""
@@ -86,7 +76,7 @@ def singularity(simulation: Simulation, q: Array) -> str:
 
 def _singularity_at(simulation: Simulation, q: Array) -> str:
     """Describe why the latest tangent, which is that at ``q``, is singular; empty if it is not."""
-    K, free = _free_matrix(simulation)
+    K, free = free_matrix(simulation.share, simulation.tangent, simulation.supports.dofs)
     if not len(free) or not np.isfinite(K.data).all():
         return ""
     try:
@@ -152,54 +142,6 @@ def _deforms(found: Softest, of: int) -> bool:
     """Whether connectors (0) or cells (1) deform that have their stiffness."""
     sizes = (found.links, found.cells)[of]
     return bool((sizes[~found.yielding[of]] >= SHARE).any())
-
-
-def _free_matrix(simulation: Simulation) -> tuple[csc_array, Index]:
-    """The tangent of the whole scene at what supports leave free; and these degrees of freedom."""
-    share, A, held = simulation.share, simulation.tangent, simulation.supports.dofs
-    here = (share.dofs[A.rows()], share.dofs[A.indices], A.data, share.dofs[held])
-    parts = share.comm.allgather(here) if share.comm.size > 1 else [here]
-    rows, columns, data, of_all = (np.concatenate(x) for x in zip(*parts, strict=True))
-    n = share.grid.size
-    free = np.setdiff1d(np.arange(n), of_all)
-    K = coo_array((data, (rows, columns)), shape=(n, n)).tocsc()
-    return csc_array(K[:, free][free]), free
-
-
-def null_vector(K: csc_array) -> tuple[float, Array]:
-    """The vector that a matrix makes least of, when its rows and columns are scaled to size one.
-
-    Returns:
-        How much it makes of it, without dimension; and the vector, in the units of the unknowns.
-    """
-    scaled, factors = _equilibrated(K)
-    n = scaled.shape[0]
-    if n <= DENSE:
-        _, sizes, vectors = np.linalg.svd(scaled.toarray())
-        return float(sizes[-1]), factors * vectors[-1]
-    # A shift far below the entries makes the factors those of a regular matrix.
-    shifted = splu(csc_array(scaled + SINGULAR * eye_array(n)))
-    y: Array = np.random.default_rng(0).normal(size=n)
-    for _ in range(20):
-        y = shifted.solve(shifted.solve(y / np.linalg.norm(y), trans="T"))
-    y /= np.linalg.norm(y)
-    return float(np.linalg.norm(scaled @ y)), factors * y
-
-
-def _equilibrated(K: csc_array) -> tuple[csc_array, Array]:
-    """A matrix whose rows and columns have largest entries of about one; factors of the columns."""
-    n = K.shape[0]
-    columns = np.ones(n)
-    for _ in range(ROUNDS):
-        sizes = abs(K)
-        by_row, by_column = (np.asarray(sizes.max(axis=k).todense()).ravel() for k in (1, 0))
-        both = np.concatenate([by_row, by_column])
-        if np.all((both == 0) | ((both > 0.5) & (both < 2))):
-            break
-        r, c = (1 / np.sqrt(np.where(x > 0, x, 1.0)) for x in (by_row, by_column))
-        K = csc_array(diags_array(r) @ K @ diags_array(c))
-        columns *= c
-    return K, columns
 
 
 def _describe(simulation: Simulation, found: Softest) -> str:

@@ -60,6 +60,7 @@ class ChainsFirst:
 
     def __init__(self, share: Share, A: Csr, package: str) -> None:
         self._elimination = left = Elimination(share, A)
+        self._good = False
         arrays = (left.indptr.astype(PETSc.IntType), left.indices.astype(PETSc.IntType), left.data)
         self._matrix = PETSc.Mat().createAIJWithArrays(left.size, arrays, comm=PETSc.COMM_SELF)
         self._matrix.assemble()
@@ -85,7 +86,8 @@ class ChainsFirst:
 
     def setUp(self, pc: PETSc.PC) -> None:
         """Factor; PETSc asks for it where the matrix has changed."""
-        pc.setFailedReason(GOOD if self._elimination.factor() and self._factor() else BAD_PIVOT)
+        self._good = self._elimination.factor() and self._factor()
+        pc.setFailedReason(GOOD if self._good else BAD_PIVOT)
 
     def _factor(self) -> bool:
         self._matrix.stateIncrease()
@@ -101,7 +103,10 @@ class ChainsFirst:
         self._factors.apply(self._rhs, self._solution)
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, x: PETSc.Vec) -> None:
-        """Solve."""
+        """Solve; nothing after a failure, where an error would leave objects of PETSc half done."""
+        if not self._good:
+            x.array_w[:] = 0.0
+            return
         self._elimination.reduce(b.array_r)
         self._solve()
         self._elimination.expand(self._solution.array_r, x.array_w)

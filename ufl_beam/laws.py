@@ -217,6 +217,12 @@ class Bulk:
 
 # -- softening ---------------------------------------------------------------------------------
 
+BROKEN = 70.0
+"""Exponent of the decay of a traction from which on it is zero, some 1e-30 of the limit.
+
+Far below round-off; but numbers that underflow would be forces and stiffnesses made of noise.
+"""
+
 
 @dataclass(frozen=True)
 class Softening:
@@ -257,7 +263,8 @@ class Softening:
 
     def traction(self, ξ: Values) -> Values:
         """Resistance after the accumulated opening ξ."""
-        return self.limit * exp(-self.limit / self.energy * ξ)  # P(52)!
+        decay = self.limit / self.energy * ξ
+        return where(below(decay, BROKEN), self.limit * exp(-decay), 0.0)  # P(52)!
 
     def mean_traction(self, ξ: Values, a: Values) -> Values:
         """Mean resistance while the opening grows from ξ by a; its product with a is dissipated."""

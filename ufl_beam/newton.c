@@ -27,6 +27,7 @@ void assemble(equation *e, const double *q)
     if (e->tangent[e->pivot[k]] != 0) e->pivots[k] = e->tangent[e->pivot[k]];
   for (int k = 0; k < e->zeros; ++k) e->tangent[e->zero[k]] = 0;
   for (int k = 0; k < e->held; ++k) e->tangent[e->pivot[k]] = e->pivots[k];
+  for (int k = 0; k < e->idle; ++k) e->tangent[e->idle_entry[k]] += e->idle_stiffness[k];
 }
 
 /* Iterations that a tangent may still cost if it is kept: making one costs as much as two. */

@@ -773,7 +773,7 @@ class Simulation(Live):
         self.t = memory.number("t", self.t)
         self.last_dt = memory.number("last dt", self.last_dt)
         self.parts = int(memory.number("parts", self.parts))
-        self._solver.iterations = int(memory.number("iterations", self.iterations))
+        self._solver.remember(memory)
         self.q = memory.at_dofs("q", self.q)
         self._q_before = memory.at_dofs("q before", self._q_before)
         for kind, entries in (("supplied", self.ledger.supplied), ("lost", self.ledger.lost)):

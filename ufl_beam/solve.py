@@ -26,8 +26,10 @@ from ufl_beam.errors import (
 )
 from ufl_beam.factors import Bordered, ChainsFirst
 from ufl_beam.grid import Index, Share
+from ufl_beam.idle import IdleMotions
 from ufl_beam.line_search import SearchingNewton
 from ufl_beam.loops import doubles, ffi, integers, lib
+from ufl_beam.memory import Memory
 from ufl_beam.sparse import Csr
 
 FULL_STEPS = {"snes_linesearch_type": "basic"}
@@ -161,6 +163,7 @@ class Solver:
         self._moves = np.ones(share.size)
         self._moves[held] = 0.0
         self._diagonal = np.flatnonzero(A.rows() == A.indices)
+        self._idle = IdleMotions(share, A, self._diagonal, held)
         self._x = self._vector()
         self._view(self._x, writable=True)
         self._matrix = self._make_matrix()
@@ -405,6 +408,8 @@ class Solver:
         self._update_ghosts(x)
         with self._noted():
             self._tangent(self._view(x))
+            entries, stiffness = self._idle.entries
+            self._A.data[entries] += stiffness
         P.stateIncrease()
 
     # -- convergence ---------------------------------------------------------------------------
@@ -432,11 +437,21 @@ class Solver:
         scaled = lib.scaled_sum_of_squares(*self._norm, forces, largest)
         return largest * math.sqrt(self._share.total(scaled))
 
+    def _scale(self) -> float:
+        """Size of the loads and of the internal forces in the latest residual; N."""
+        return self._loads + self._size(self._at_forces)
+
+    def _residuals(self) -> Array:
+        """Sizes of the latest residual, moments over the size of the scene, ghosts zero; N."""
+        sizes = np.zeros(self._share.size)
+        sizes[: len(self._weights)] = np.abs(self._r[: len(self._weights)]) * self._weights
+        return sizes
+
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, ...]) -> int:
         residual = self._size(self._at_r)
         if not math.isfinite(residual):
             return int(lib.DIVERGED)
-        scale = self._loads + self._size(self._at_forces)
+        scale = self._scale()
         self._find_motion()
         floor = 8 * self._round_off() if iteration > 1 else 0.0
         x = doubles(self._view(self._x))
@@ -488,6 +503,8 @@ class Solver:
         self._keeps = like_last
         reason = self._iterate(self._snes, 2)
         self._keeps = False
+        if reason == lib.SINGULAR and self._may_go_on():
+            reason = self._hold_idle(guess)
         if reason == lib.STALLED:
             reason = self._iterate(self._careful, PATIENCE)
         if reason <= 0 and self._may_go_on() and self._relieve(True):
@@ -498,6 +515,30 @@ class Solver:
             raise self._failure(reason)
         self._update_ghosts(self._x)
         return x.copy()
+
+    def _hold_idle(self, guess: Array) -> int:
+        """Iterate with one idle motion held after the other; without any if that does not help."""
+        reason = int(lib.SINGULAR)
+
+        def again() -> int:
+            self._put_idle()
+            self._view(self._x)[:] = guess
+            self._x.stateIncrease()
+            return self._iterate(self._snes, 2)
+
+        reason = int(lib.SINGULAR)
+        while reason == lib.SINGULAR and self._idle.find(self._residuals(), self._scale()):
+            reason = again()
+        if reason <= 0 and self._idle.forget():
+            reason = again()
+        return reason
+
+    def _put_idle(self) -> None:
+        """Let C add the stiffnesses against idle motions."""
+        entries, stiffnesses = self._idle.entries
+        self._at_idle = integers(entries), doubles(stiffnesses)
+        c = self._course
+        c.idle, (c.idle_entry, c.idle_stiffness) = len(entries), self._at_idle
 
     def _relieved(self) -> int:
         """Iterate with stiffer tangents, which come near but slowly, then with true ones."""
@@ -555,10 +596,8 @@ class Solver:
     def _failure(self, reason: int) -> StepFailed:
         self._agreement.settle(self._error)
         names = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int)}
-        scale = self._loads + self._size(self._at_forces)
-        weighted = np.zeros(self._share.size)
-        weighted[: len(self._weights)] = np.abs(self._r[: len(self._weights)]) * self._weights
-        residuals = self._share.grid.worst(self._share.gather(weighted))
+        scale = self._scale()
+        residuals = self._share.grid.worst(self._share.gather(self._residuals()))
         places = [f"{size:.1e} N in {place}" for place, size in [*residuals.items()][:3]]
         largest = ", ".join(places) or "nowhere"
         failure = StepFailed(
@@ -582,6 +621,12 @@ class Solver:
     def size(self, forces: Array) -> float:
         """Euclidean norm over the scene of forces, and moments over its size; N."""
         return self._size(doubles(forces))
+
+    def remember(self, memory: Memory) -> None:
+        """Pass on the number of iterations, and motions found to be idle."""
+        self.iterations = int(memory.number("iterations", self.iterations))
+        self._idle.remember(memory)
+        self._put_idle()
 
     def destroy(self) -> None:
         """Give back what PETSc holds."""

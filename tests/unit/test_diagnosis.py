@@ -5,8 +5,8 @@ import pytest
 from scipy.sparse import csc_array, diags_array
 
 import ufl_beam as ub
-from ufl_beam import diagnosis
-from ufl_beam.diagnosis import null_vector
+from ufl_beam import null_vectors
+from ufl_beam.null_vectors import null_vector
 
 CODES = ("DIVERGED", "SNES", "dt = 0 s")
 
@@ -24,26 +24,50 @@ def spring():
     return ub.Spring(1e8, law=ub.Hardening(1.0))
 
 
-def test_a_massless_body_between_two_hinges():
-    """Both yield at the same moment, and the body between them turns freely."""
+def node_between_hinges(*more):
+    """Two clamped members, and between them a node on springs that yield at the same moment."""
     section = ub.Section(EA=1e7, GA=1e7, EI=1e4)
     left = ub.Beam((0, 0), (1, 0), section, cells=2, name="left")
     right = ub.Beam((1, 0), (2, 0), section, cells=2, name="right")
     node = ub.Body((1, 0), name="node")
     turns = [ub.Turn(left.end, node.middle, spring()), ub.Turn(node.middle, right.start, spring())]
-    scene = ub.Scene(
+    growing = {"time": lambda t: t}
+    loads = [ub.PointLoad(left.end, force=(0, -1), **growing)]
+    loads += [ub.PointLoad(node.middle, moment=moment, **growing) for moment in more]
+    return turns, ub.Scene(
         [left, right],
         bodies=[node],
         supports=[ub.Clamped(left.start), ub.Clamped(right.end)],
         joints=[ub.Revolute(node.middle, left.end, right.start)],
         connectors=turns,
-        loads=[ub.PointLoad(left.end, force=(0, -1), time=lambda t: t)],
+        loads=loads,
     )
+
+
+def test_a_massless_body_between_two_hinges():
+    """Both have yielded, and a moment turns the body between them."""
+    turns, scene = node_between_hinges(0.3)
     error = failure(scene)
     assert "singular: the rotation of node is held by nothing" in str(error)
     assert all(str(turn) in str(error) for turn in turns)
     assert "give way together" in str(error)
     assert error.reason == "DIVERGED_LINEAR_SOLVE"
+
+
+def test_a_massless_body_between_two_hinges_that_nothing_turns():
+    """It stays where it is while both hinges yield, and the members bear the load.
+
+    Once the hinges yield, the members are cantilevers with the moment 1 N m at their ends, each
+    under half of the load; n linear cells err by 1/(4 n²) of the bending that the load makes.
+    Rotations of 1e-4 make a nonlinearity far below the tolerance.
+    """
+    _, scene = node_between_hinges()
+    solution = ub.simulate(scene, ub.Static(), t=(0, 7), dt=0.5, progress=False)
+    (left, _), node = scene.beams, scene.bodies[0]
+    load, moment = 3.5, 1.0  # N, N m
+    expected = -load * ((1 - 1 / 16) / (3 * 1e4) + 1 / 1e7) + moment / (2 * 1e4)
+    assert solution.displacement(left.end)[-1, 1] == pytest.approx(expected, rel=1e-5)
+    assert solution.displacement(node.middle)[-1, 2] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_beam_on_a_spring_that_breaks():
@@ -95,13 +119,13 @@ def test_too_few_iterations_in_words():
 @pytest.mark.parametrize("size", [40, 400])
 def test_null_vectors_in_any_units(monkeypatch, size):
     """A chain of springs that nothing holds moves as a whole, whatever units its unknowns have."""
-    monkeypatch.setattr(diagnosis, "DENSE", 100)  # so that one is found by each method
+    monkeypatch.setattr(null_vectors, "DENSE", 100)  # so that one is found by each method
     ones = np.ones(size - 1)
     chain = diags_array([-ones, np.r_[1, 2 * ones[1:], 1], -ones], offsets=[-1, 0, 1])
     units = 10.0 ** np.random.default_rng(0).uniform(-6, 6, size)
     scale = diags_array(1 / units)
     smallest, vector = null_vector(csc_array(scale @ chain @ scale))
-    assert smallest < diagnosis.SINGULAR
+    assert smallest < null_vectors.SINGULAR
     whole = vector / units
     assert whole / whole[0] == pytest.approx(np.ones(size), rel=1e-6)
     held = csc_array(scale @ (chain + diags_array(np.eye(1, size)[0])) @ scale)
