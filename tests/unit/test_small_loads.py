@@ -85,8 +85,8 @@ def test_a_motion_comes_to_rest():
     assert ((largest > 1e-200) & (largest < 1e-157)).any()
 
 
-@pytest.mark.parametrize("force", [1e4, 0.1, 1e-200])
-@pytest.mark.parametrize("how", [ub.Static(), ub.ExactStatic(), ub.Load(0.125)], ids=str)
+@pytest.mark.parametrize("force", [1e4, 2.0, 1e-6, 1e-200])
+@pytest.mark.parametrize("how", [ub.Static(), ub.ExactStatic(), ub.Load(0.1)], ids=str)
 def test_a_small_load_on_a_post_that_a_spring_holds(force, how):
     """[closed] F (h³/3EI (1 - 1/4n²) + h/GA + h²/k); moments in the middles of n cells bend them.
 
@@ -98,14 +98,14 @@ def test_a_small_load_on_a_post_that_a_spring_holds(force, how):
         [post],
         joints=[ub.Revolute(foot, post.start)],
         connectors=[ub.Turn(foot, post.start, ub.Spring(k))],
-        loads=[ub.PointLoad(post.end, force=(force, 0), time=lambda t: t)],
+        loads=[ub.PointLoad(post.end, force=(force, 0), time=lambda t: t / 20)],
     )
     if isinstance(how, ub.Load):
-        solution = ub.follow(scene, how, steps=8)
+        solution = ub.follow(scene, how, steps=200)
         assert solution.critical == []
     else:
-        solution = ub.simulate(scene, how, t=(0, 1), dt=0.125, progress=False)
-    assert solution.times[-1] == 1.0
+        solution = ub.simulate(scene, how, t=(0, 20), dt=0.1, progress=False)
+    assert solution.times[-1] == pytest.approx(20.0)
     bending = h**3 / (3 * EI) * (1 - 1 / (4 * 4**2))  # n = 4
     exact = force * (bending + h / GA + h**2 / k)
     assert solution.displacement(post.end)[-1, 0] == pytest.approx(exact, rel=1e-4)
