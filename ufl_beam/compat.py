@@ -51,8 +51,13 @@ if VERSION < (0, 9):  # pragma: no cover - depends on the machine
         "run through ./env of the source tree, or see docs/installation.md"
     )
 
-if not (logging.getLogger().handlers or logging.getLogger("py.warnings").handlers):
-    # FFCx sends all warnings of Python to the log, where without a handler nobody sees them.
+if all(
+    isinstance(handler, logging.NullHandler)
+    for name in (None, "py.warnings")
+    for handler in logging.getLogger(name).handlers
+):
+    # FFCx sends all warnings of Python to the log, where without a handler nobody sees them. The
+    # log gets a handler that shows nothing if a warning comes before this line, as with -W always.
     logging.captureWarnings(False)
 
 

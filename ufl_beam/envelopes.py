@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ufl_beam.compat import Array
+from ufl_beam.diagrams import draw_diagrams, finish
 from ufl_beam.errors import SceneError
 from ufl_beam.extremes import Extremes
 from ufl_beam.fatigue import Fatigue, HotSpot
@@ -19,9 +20,7 @@ from ufl_beam.view import (
     RESULTANTS,
     draw_axes,
     draw_bar,
-    draw_diagrams,
     draw_symbols,
-    make_room,
     picture,
     plane_axes,
     plane_size,
@@ -53,16 +52,20 @@ def plot_extremes(solution: Solution, extremes: Extremes, what: str = "M") -> Fi
     require_choice(what, RESULTANTS, "plot_extremes: what")
     index, points = list(RESULTANTS).index(what), solution.grid.points
     reached = [extremes.section_forces(beam) for beam in solution.scene.beams]
-    diagrams = [[e.high[:, index] for e in reached], [e.low[:, index] for e in reached]]
+    # Constant in each cell
+    diagrams = [
+        [np.repeat(values[:, index, None], 2, axis=1) for values in one]
+        for one in ([e.high for e in reached], [e.low for e in reached])
+    ]
     stage = plane_stage(solution, [0], 1.0)
     pose = stage.pose(0)
     with picture(plane_size(points, pose.points())) as figure:
         until = solution.parameter.at(solution.times[-1])
         axes = plane_axes(figure, f"extremes of the {RESULTANTS[what][0]} {what} until {until}")
-        draw_diagrams(axes, solution, what, diagrams, points)
+        found = draw_diagrams(axes, solution, what, diagrams, points)
         draw_axes(axes, solution, points, color=INK, linewidth=2.6, zorder=4)
         draw_symbols(axes, pose)
-        make_room(figure, axes)
+        finish(figure, axes, found)
     return figure
 
 

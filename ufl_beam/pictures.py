@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import singledispatch
 from typing import TYPE_CHECKING
 
-from ufl_beam import view
+from ufl_beam import diagrams
 from ufl_beam.errors import SceneError
 from ufl_beam.mechanism import require_independent
 from ufl_beam.model_pictures import plot_model
@@ -29,7 +29,8 @@ def plot(
 
     Of a :class:`Solution` it draws the frame at the n-th kept time, with the diagram of a section
     force if ``what`` names one: M on the side in tension, positive N and V to the left of the way
-    from start to end, positive values red, negative ones blue.
+    from start to end, positive values red, negative ones blue.  N and V are constant in each cell;
+    M is linear between the moments at its ends.
 
     What is orange drives: filled if it gives the motion, hollow if it gives the force.
 
@@ -50,7 +51,7 @@ def plot(
 
 @plot.register(Solution)
 def _(shown: Solution, what: str = "shape", *, n: int = -1, magnify: float = 1.0) -> Figure:
-    return view.plot(shown, what, n=n, magnify=magnify)
+    return diagrams.plot(shown, what, n=n, magnify=magnify)
 
 
 @plot.register(Scene)

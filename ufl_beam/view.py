@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from itertools import cycle, groupby, islice
+from itertools import cycle, islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -56,44 +56,6 @@ STYLE = {
 
 
 # -- what users call ---------------------------------------------------------------------------
-
-
-def plot(solution: Solution, what: str = "shape", *, n: int = -1, magnify: float = 1.0) -> Figure:
-    """The frame at the n-th kept time, with the diagram of a section force if ``what`` says so.
-
-    Diagrams are constant in each cell, like the section forces, and stand on the deformed axis:
-    M on the side in tension, positive N and V to the left of the way from start to end.  Positive
-    values are red, negative ones blue; the extreme values are written beside them.
-
-    Bodies are outlined around their centre, a quartered circle, and all points where something is
-    attached.  What is orange drives: filled if it gives the motion, hollow if it gives the force.
-
-    Args:
-        solution: What to show.
-        what: "shape", "N", "V" or "M".
-        n: Number of the kept time; negative from the end.
-        magnify: Factor on the displacements.
-
-    Raises:
-        SceneError: Unknown ``what``, no such time, or ``magnify`` is not positive.
-    """
-    require_choice(what, ("shape", *RESULTANTS), "plot: what")
-    points = moved_points(solution, n, magnify)
-    stage = plane_stage(solution, [n], magnify)
-    pose = stage.pose(n)
-    name = f"{RESULTANTS[what][0]} {what}" if what in RESULTANTS else "shape"
-    factor = f", displacements × {magnify:g}" if magnify != 1 else ""
-    with picture(plane_size(solution.grid.points, points, pose.points())) as figure:
-        axes = plane_axes(figure, f"{name} at {solution.parameter.at(solution.times[n])}{factor}")
-        draw_undeformed(axes, stage)
-        if what in RESULTANTS:
-            index = list(RESULTANTS).index(what)
-            forces = [solution.section_forces(b, n)[:, index] for b in solution.scene.beams]
-            draw_diagrams(axes, solution, what, [forces], points)
-        draw_axes(axes, solution, points, color=INK, linewidth=2.6, zorder=4)
-        draw_symbols(axes, pose)
-        make_room(figure, axes)
-    return figure
 
 
 def plot_shapes(
@@ -405,70 +367,6 @@ def draw_undeformed(axes: Axes, stage: Stage) -> None:
     draw_axes(axes, solution, solution.grid.points, color=GREY, linewidth=1.2, zorder=1)
     for stroke in (*symbols.bodies(pose), *symbols.rods(pose)):
         axes.plot(*stroke.points.T, color=GREY, linewidth=1.2, zorder=1)
-
-
-def draw_diagrams(
-    axes: Axes, solution: Solution, what: str, diagrams: Sequence[Sequence[Array]], points: Array
-) -> None:
-    """Diagrams of a section force on the frame, to one scale.
-
-    Args:
-        axes: Where to draw.
-        solution: Of the frame.
-        what: "N", "V" or "M".
-        diagrams: Each a list of the values in the cells of all beams, (num_cells,) each; N, N m.
-        points: Nodes of all beams; (num_nodes, 2); m.
-    """
-    index, side = list(RESULTANTS).index(what), -1.0 if what == "M" else 1.0
-    beams = solution.scene.beams
-    # A strain of 1e-10 is what rounding and the tolerance of the iteration leave behind.
-    limits = [(b.section.EA, b.section.GA, b.section.EI / b.section.depth)[index] for b in beams]
-    if all(
-        np.all(np.abs(f) <= 1e-10 * limit)
-        for forces in diagrams
-        for f, limit in zip(forces, limits, strict=True)
-    ):
-        return
-    largest = max(float(np.max(np.abs(f))) for forces in diagrams for f in forces)
-    scale = 0.13 * side * math.hypot(*np.ptp(points, axis=0)) / largest
-    every, tips, outward = [], [], []
-    for forces in diagrams:
-        for beam, values in zip(beams, forces, strict=True):
-            chain = points[solution.grid.vertices_of(beam)]
-            along = np.diff(chain, axis=0)
-            left = along[:, ::-1] * (-1.0, 1.0) / np.linalg.norm(along, axis=1)[:, None]
-            ordinates = scale * values[:, None] * left
-            _draw_steps(axes, chain, values, ordinates)
-            every.append(values)
-            tips.append((chain[1:] + chain[:-1]) / 2 + ordinates)
-            outward.append(side * np.sign(values)[:, None] * left)
-    found = np.concatenate(every)
-    for cell, sign, color in ((np.argmax(found), 1, RED), (np.argmin(found), -1, BLUE)):
-        if sign * found[cell] > 0:
-            text = with_unit(found[cell], RESULTANTS[what][1])
-            _annotate(axes, text, color, np.concatenate(tips)[cell], np.concatenate(outward)[cell])
-
-
-def _draw_steps(axes: Axes, chain: Array, values: Array, ordinates: Array) -> None:
-    """The diagram of a beam: one area for each run of cells with the same sign."""
-    for positive, run in groupby(range(len(values)), lambda cell: bool(values[cell] > 0)):
-        cells = list(run)
-        axis = chain[cells[0] : cells[-1] + 2]
-        steps = np.repeat(axis, 2, axis=0)[1:-1] + np.repeat(ordinates[cells], 2, axis=0)
-        outline = np.concatenate([axis[:1], steps, axis[:0:-1]])
-        color = RED if positive else BLUE
-        axes.fill(*outline.T, facecolor=(color, 0.28), edgecolor=color, linewidth=1.0, zorder=2)
-
-
-def _annotate(axes: Axes, text: str, color: str, tip: Array, outward: Array) -> None:
-    x, y = outward
-    # The middle of the text, half a text and a gap away from the diagram; points.
-    offset = (x * (8 + 4.5 * len(text)), y * 17)
-    axes.annotate(
-        text, (tip[0], tip[1]), offset, textcoords="offset points", ha="center", va="center",
-        color=color, weight="bold", zorder=6,
-        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0},
-    )  # fmt: skip
 
 
 def make_room(figure: Figure, axes: Axes) -> None:

@@ -61,8 +61,14 @@ class Walk:
         return self.share.total(float((self.weights * a.q) @ b.q)) + a.t * b.t / factor**2
 
     def length(self, way: Direction, factor: float) -> float:
-        """Of a direction; without dimension."""
-        return math.sqrt(self.product(way, way, factor))
+        """Of a direction, however small; without dimension."""
+        along = abs(way.t) / factor
+        largest = max(self.share.largest(float(np.abs(way.q).max(initial=0.0))), along)
+        if largest == 0.0 or not math.isfinite(largest):
+            return largest
+        # Squares of what is below 1e-154 would be nothing.
+        unit = Direction(np.asarray(way.q / largest, dtype=np.float64), way.t / largest)
+        return largest * math.sqrt(self.product(unit, unit, factor))
 
     def size(self, way: Direction) -> float:
         """Of the configuration's part of a direction; without dimension."""

@@ -182,6 +182,20 @@ def test_damaged_c_is_compiled_again(place):
     assert intact(entry)
 
 
+def test_files_are_on_the_disk_before_the_entry_has_its_name(place, monkeypatch):
+    """So that a crash of the machine leaves no empty library under a name that is loaded."""
+    synced, fsync = [], os.fsync
+
+    def note(descriptor):
+        synced.append((os.readlink(f"/proc/self/fd/{descriptor}"), (place / ENTRY).exists()))
+        fsync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", note)
+    Builds()()
+    before = {Path(name).name for name, complete in synced if not complete}
+    assert {"source.c", "library.so", CHECKSUMS} <= before
+
+
 # -- several processes ---------------------------------------------------------------------------
 
 BUILD = """
@@ -346,6 +360,16 @@ def test_directories_that_cannot_be_trusted_or_made(home, make, why):
 
 
 @first_rank_says
+def test_a_home_that_cannot_be_written_to(home, monkeypatch):
+    """Nobody, not even root, makes directories in /sys; `import ufl_beam` used to be enough."""
+    if not Path("/sys").is_dir():
+        pytest.skip("there is no /sys")
+    monkeypatch.setattr(cache, "jit_directory", lambda: Path("/sys/.cache/fenics"))
+    with pytest.warns(RuntimeWarning, match="the cache /sys/.* cannot be used: .*XDG_CACHE_HOME"):
+        assert chosen().parent == Path(cache.tempfile.tempdir)
+
+
+@first_rank_says
 def test_a_cache_that_cannot_be_written_to_is_read(place, home, monkeypatch):
     builds = Builds()
     builds()
@@ -373,9 +397,14 @@ WARNS = "import ufl_beam, warnings; warnings.warn('is it seen?', RuntimeWarning)
 
 @pytest.mark.serial
 @pytest.mark.parametrize("before", ["", "import dolfinx; "])
-def test_warnings_are_seen(before):
-    """FFCx has all of them logged, which without a handler is nowhere."""
-    command = [sys.executable, "-c", before + WARNS]
+@pytest.mark.parametrize("options", [[], ["-W", "always"]], ids=["", "always"])
+def test_warnings_are_seen(before, options):
+    """FFCx has all of them logged, which without a handler is nowhere.
+
+    With ``-W always`` some come before FFCx is there, for which Python adds a handler that shows
+    nothing.
+    """
+    command = [sys.executable, *options, "-c", before + WARNS]
     run = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
     assert "RuntimeWarning: is it seen?" in run.stderr
 

@@ -39,6 +39,7 @@ RECORDS = [
 
 PICTURES = [
     "captions",
+    "diagrams",
     "envelopes",
     "hysteresis",
     "load_symbols",

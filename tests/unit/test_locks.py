@@ -1,7 +1,9 @@
 """Two runs on one checkpoint: the second one is refused and touches nothing."""
 
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 from mpi4py import MPI
 
@@ -124,3 +126,31 @@ def test_the_lock_ends_with_its_process(tmp_path):
     assert lock.take() == ""
     lock.release()
     assert not lock.path.exists()
+
+
+SECOND = """
+import sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[2])
+import test_locks
+test_locks.run(Path(sys.argv[1]), test_locks.Within(lambda: None))
+"""
+
+
+@pytest.mark.serial
+def test_a_script_that_is_started_again_while_it_runs(tmp_path):
+    """The second process is refused in the middle of the first; the table of the first is whole."""
+    found = []
+
+    def start_again():
+        before = (tmp_path / "run.csv").read_bytes()
+        command = [sys.executable, "-c", SECOND, str(tmp_path), str(Path(__file__).parent)]
+        found.append(subprocess.run(command, capture_output=True, text=True, timeout=60))
+        assert (tmp_path / "run.csv").read_bytes() == before
+
+    run(tmp_path, Within(start_again))
+    (second,) = found
+    assert second.returncode != 0
+    assert re.search(r"run\.h5 is in use: process \d+ on .* writes it", second.stderr)
+    # A line for the names, one for the initial state and each of the five steps
+    assert len((tmp_path / "run.csv").read_text().splitlines()) == 1 + 6

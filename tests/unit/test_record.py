@@ -1,6 +1,7 @@
 """Files of a run: their contents are the solution, on any number of ranks."""
 
 import csv
+import xml.etree.ElementTree as ET
 
 from mpi4py import MPI
 
@@ -73,6 +74,20 @@ def test_time_series_hold_the_solution(series):
             # The same kernel on other meshes: round-off of EA
             assert np.abs(found.of(name)[n] - forces[:, component]).max() < 1e-16 * 1e4 * 10
         assert (found.of("part")[n] == 0).all()
+
+
+def test_xdmf_has_one_grid_with_all_fields_at_each_time(shared_path, on_first_rank):
+    """Readers make a data set of each grid, and of several grids pieces without common fields."""
+    run(scene(), ub.XDMF(shared_path / "run.xdmf"))
+    root = on_first_rank(lambda: ET.parse(shared_path / "run.xdmf").getroot())
+    (collection,) = root.findall("Domain/Grid")
+    grids = collection.findall("Grid")
+    assert len(grids) == 7
+    for grid in grids:
+        names = {one.attrib["Name"] for one in grid.findall("Attribute")}
+        assert {"displacement", "rotation", "N", "V", "M", "part"} <= names
+        # Spelled as readers know it
+        assert grid.find("Topology").attrib["TopologyType"] == "Polyline"
 
 
 def test_statics_have_no_velocity(series):

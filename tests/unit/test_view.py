@@ -13,6 +13,7 @@ import scenes
 
 import ufl_beam as ub
 from ufl_beam import symbols
+from ufl_beam.diagrams import moments_at_ends
 from ufl_beam.glyphs import AROUND, STRAIGHT
 from ufl_beam.stage import Stage
 from ufl_beam.symbols import EDGE, FILLED, support_direction
@@ -35,6 +36,13 @@ def swing():
 
 def forces(solution, what):
     return [solution.section_forces(b)[:, INDEX[what]] for b in solution.scene.beams]
+
+
+def ends(solution, what):
+    """What diagrams show at both ends of the cells of each beam."""
+    if what == "M":
+        return [moments_at_ends(solution, beam) for beam in solution.scene.beams]
+    return [np.column_stack([f, f]) for f in forces(solution, what)]
 
 
 def crank():
@@ -92,7 +100,7 @@ def test_shape_draws_the_frame_where_it_is(swing):
 
 @pytest.mark.parametrize("what", ["N", "V", "M"])
 def test_extreme_values_are_those_of_the_solution(portal, what):
-    values = np.concatenate(forces(portal, what))
+    values = np.concatenate(ends(portal, what))
     expected = {with_unit(values.max(), UNIT[what])} if values.max() > 0 else set()
     expected |= {with_unit(values.min(), UNIT[what])} if values.min() < 0 else set()
     figure = ub.plot(portal, what)
@@ -102,7 +110,7 @@ def test_extreme_values_are_those_of_the_solution(portal, what):
 
 @pytest.mark.parametrize("what", ["N", "V", "M"])
 def test_an_area_for_each_run_of_one_sign(portal, what):
-    runs = sum(1 + np.count_nonzero(np.diff(f > 0)) for f in forces(portal, what))
+    runs = sum(1 + np.count_nonzero(np.diff(f.ravel() > 0)) for f in ends(portal, what))
     assert len(ub.plot(portal, what).axes[0].patches) == runs
 
 
@@ -129,6 +137,103 @@ def test_moments_stand_on_the_side_in_tension():
         solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1)
         (area,) = ub.plot(solution, "M").axes[0].patches
         assert area.get_xy()[:, 1].max() > 0.05  # the upper fibre of a cantilever pulled down
+
+
+def simple_beam(cells, length=6.0, load=10e3, direction=0.0):
+    """A beam on two supports under a line load across it; turned by an angle."""
+    along = np.array([math.cos(direction), math.sin(direction)])
+    section = ub.Section(EA=1e10, GA=1e10, EI=1e9)
+    beam = ub.Beam((0, 0), tuple(length * along), section, cells=cells)
+    across = load * np.array([along[1], -along[0]])
+    scene = ub.Scene(
+        [beam],
+        supports=[ub.Pinned(beam.start), ub.Roller(beam.end, along=tuple(along))],
+        loads=[ub.LineLoad(beam, force=tuple(across), time=lambda t: t)],
+    )
+    return ub.simulate(scene, ub.Static(), t=(0, 1), dt=1, progress=False)
+
+
+@pytest.mark.parametrize("direction", [0.0, 2.0])
+def test_moments_under_a_line_load(direction):
+    """[closed] w x (l - x)/2 at the ends of all cells, w l²/8 = 45 kN m among them.
+
+    Loads are at the nodes, so that moments there are exact but for the deflection, 2e-5 of l.
+    """
+    solution = simple_beam(8, direction=direction)
+    figure = ub.plot(solution, "M")
+    assert texts(figure) == {"45 kN m"}
+    # No steps: cells meet in one point of the outline, but for the angle between them
+    (area,) = figure.axes[0].patches
+    tips = area.get_xy()[1:17]
+    np.testing.assert_allclose(tips[1:-1:2], tips[2::2], atol=1e-4)
+    (found,) = ends(solution, "M")
+    x = np.linspace(0, 6, 9)
+    exact = 10e3 * x * (6 - x) / 2
+    np.testing.assert_allclose(found, np.column_stack([exact[:-1], exact[1:]]), atol=1e-4 * 45e3)
+
+
+def test_moments_at_ends_are_in_equilibrium_when_beams_turn():
+    """A cantilever that bends by a right angle: M = P (x_end - x), with displaced points.
+
+    The tolerance is that of the solver, 1e-10 of the forces.
+    """
+    beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e3, GA=1e3, EI=1.0), cells=6)
+    push = ub.PointLoad(beam.end, force=(0.0, 8.0), time=lambda t: t)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, progress=False)
+    x = solution.shape(beam)[:, 0]
+    exact = 8.0 * (x[-1] - x)
+    expected = np.column_stack([exact[:-1], exact[1:]])
+    np.testing.assert_allclose(moments_at_ends(solution, beam), expected, atol=1e-8)
+
+
+@pytest.mark.parametrize("what", ["N", "V", "M"])
+@pytest.mark.parametrize("name", ["portal", "beam", "upright"])
+def test_extreme_values_cover_nothing(portal, name, what):
+    """Neither areas of the diagram, nor beams, nor each other; all of them are in the picture."""
+    solution = {
+        "portal": lambda: portal,
+        "beam": lambda: simple_beam(8),
+        "upright": lambda: simple_beam(8, direction=math.pi / 2),
+    }[name]()
+    figure = ub.plot(solution, what)
+    figure.draw_without_rendering()
+    axes = figure.axes[0]
+    boxes = [text.get_window_extent().frozen() for text in axes.texts]
+    whole = figure.bbox
+    for number, box in enumerate(boxes):
+        assert whole.x0 <= box.x0 and box.x1 <= whole.x1  # noqa: PT018
+        assert whole.y0 <= box.y0 and box.y1 <= whole.y1  # noqa: PT018
+        assert not any(box.overlaps(other) for other in boxes[:number])
+        inside = np.stack(
+            np.meshgrid(np.linspace(box.x0, box.x1, 20), np.linspace(box.y0, box.y1, 10)), axis=-1
+        ).reshape(-1, 2)
+        for patch in axes.patches:
+            outline = patch.get_path().transformed(patch.get_transform())
+            assert not outline.contains_points(inside).any()
+        for line in axes.lines[: 2 * len(solution.scene.beams)]:
+            drawn = line.get_path().transformed(line.get_transform())
+            assert not drawn.intersects_bbox(box, filled=False)
+
+
+@pytest.mark.parametrize(("width", "height"), [(1.0, 1.0), (1.0, 3.0), (4.0, 1.0), (1.0, 1.6)])
+def test_no_blank_margins(width, height):
+    """The axes fill the figure but for words and numbers: an inch or so in each direction."""
+    section = ub.Section(EA=1e9, GA=1e9, EI=1e7)
+    post = ub.Beam((0, 0), (0, height), section, cells=4)
+    roof = ub.Beam((0, height), (width, height), section, cells=4)
+    scene = ub.Scene(
+        [post, roof],
+        joints=[ub.Rigid(post.end, roof.start)],
+        supports=[ub.Clamped(post.start)],
+        loads=[ub.PointLoad(roof.end, force=(0, -1e3), time=lambda t: t)],
+    )
+    figure = ub.plot(ub.simulate(scene, ub.Static(), t=(0, 1), dt=1, progress=False), "M")
+    figure.draw_without_rendering()
+    inches = figure.get_size_inches()
+    blank = inches * (1 - figure.axes[0].get_position().size)
+    assert inches.max() <= 9.0
+    assert (blank < 1.5).all()
 
 
 def test_no_diagram_where_there_is_no_force(swing):
