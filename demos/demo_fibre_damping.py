@@ -59,11 +59,13 @@ PERIODS = 15
 def bar(section, damping=()):
     """The bar with the mass, moving."""
     rod = ub.Beam((0, 0), (length, 0), section, cells=1, name="bar")
+    block = ub.Body((length, 0), mass=mass, name="block")
     return ub.Scene(
         beams=[rod],
+        bodies=[block],
+        joints=[ub.Rigid(rod.end, block.middle)],
         supports=[ub.Clamped(rod.start), ub.Prescribed(rod.end, v=0.0, psi=0.0)],
-        masses=[ub.PointMass(rod.end, mass)],
-        initial=[ub.Velocity([rod], linear=(speed, 0))],
+        initial=[ub.Velocity([block], linear=(speed, 0))],
         damping=damping,
     )
 
@@ -98,7 +100,7 @@ ub.say(f"τ = {deviations[-1]} MPa\n{runs[deviations[-1]]}\n")
 # %%
 def decay_of(solution):
     """Decay of the swings of the mass."""
-    t, u = solution.times, solution.displacement(solution.scene.masses[0].place)[:, 0]
+    t, u = solution.times, solution.displacement(solution.scene.beams[0].end)[:, 0]
     (times, highest), (_, lowest) = (ub.peaks(t, x, prominence=0.02) for x in (u, -u))
     n = PERIODS + 1
     return ub.fit_decay(times[:n], (highest[:n] + lowest[:n]) / 2)
@@ -150,7 +152,7 @@ colors = dict(zip(deviations, (BLUE, "#8FA9BC", "#D9A98A", RED), strict=True))
 
 def draw_history(ax, solution, decay, law, color, label):
     """Displacement in periods, and the law between its peaks."""
-    n, u = solution.times / decay.period, solution.displacement(solution.scene.masses[0].place)
+    n, u = solution.times / decay.period, solution.displacement(solution.scene.beams[0].end)
     ax.plot(n, 1e6 * u[:, 0], color=color, lw=1.2)
     t = decay.times - decay.times[0]
     A = {
@@ -200,7 +202,7 @@ with ub.picture((9, 4.8)) as loops:
         loops.subplots(1, 2, sharey=True), (0.01, 1.06), (BLUE, RED), strict=True
     ):
         solution = runs[τ]
-        place = solution.scene.masses[0].place
+        place = solution.scene.beams[0].end
         ends = np.stack(
             [
                 solution.displacement(place)[:, 0] / length,

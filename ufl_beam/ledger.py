@@ -15,6 +15,10 @@ EXPLAINED = 0.1
 """Part of an imbalance from which on an estimate of round-off explains it."""
 
 
+NOTHING_HELD = 1e-3
+"""Part of the works up to which what the scene held and lost shows that they were round-off."""
+
+
 @dataclass
 class Ledger:
     """Energies of one process at one time; terms write into it when a step is accepted.
@@ -117,6 +121,9 @@ class Energy:
         if self.worst <= claimed:
             return ""
         part = round_off / self.throughput
+        held = float(np.max(self.total)) + sum(float(lost[-1]) for lost in self.lost.values())
+        if part >= 1.0 and held <= NOTHING_HELD * self.throughput:
+            return ""  # all works are round-off, as where supports turn a scene as a whole
         said = (
             f"the energy ledger is open by {self.worst:.1e} of the energy that went through, and "
             f"the scheme claims {claimed:.0e}: "

@@ -818,10 +818,11 @@ class Simulation(Live):
         if not energy.opened(claimed, 0.0):
             return
         # Errors of steps are independent: their squares add up.
-        steps = np.sqrt(np.sum(np.diff(self.solution.q, axis=0) ** 2, axis=0))[self.share.dofs]
-        round_off = self._solver.random_work(steps)
+        q = self.solution.q[:, self.share.dofs]
+        steps = np.sqrt(np.sum(np.diff(q, axis=0) ** 2, axis=0))
+        round_off = self._solver.random_work(np.abs(q).max(axis=0), steps)
         self.solution.open_ledger = energy.opened(claimed, round_off)
-        if self.comm.rank == 0:
+        if self.solution.open_ledger and self.comm.rank == 0:
             warnings.warn(self.solution.open_ledger, ModelWarning, stacklevel=3)
 
     def close(self) -> None:

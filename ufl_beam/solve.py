@@ -462,28 +462,32 @@ class Solver:
 
         Stiff or finely divided beams cannot be solved any better, however small the forces are.
         """
-        return self._size(doubles(self._A.data[self._diagonal] * self._last_digits()))
+        digits = self._last_digits(self._view(self._x))
+        return self._size(doubles(self._A.data[self._diagonal] * digits))
 
     def _find_motion(self) -> None:
         """Note the largest motion of the iterate in any process, at most the size of the scene."""
-        largest = lib.largest_motion(*self._norm, doubles(self._view(self._x)))
+        self._note_motion(self._view(self._x))
+
+    def _note_motion(self, x: Array) -> None:
+        largest = lib.largest_motion(*self._norm, doubles(x))
         self._course.moved = min(self._share.largest(largest), self._course.scene)
 
-    def _last_digits(self) -> Array:
+    def _last_digits(self, x: Array) -> Array:
         digits = np.empty(self._share.size)
-        lib.find_last_digits(self._course, doubles(self._view(self._x)), doubles(digits))
+        lib.find_last_digits(self._course, doubles(x), doubles(digits))
         return digits
 
     def least_work(self, s: Array) -> float:
         """Work in a step ``s`` of what the last digit of displacements makes; less is none; J."""
         self._find_motion()
-        works = self._A.data[self._diagonal] * self._last_digits() * np.abs(s)
+        works = self._A.data[self._diagonal] * self._last_digits(self._view(self._x)) * np.abs(s)
         return self._share.total(float(works[: len(self._weights)].sum()))
 
-    def random_work(self, s: Array) -> float:
-        """Work of the last digits as :meth:`least_work`, were they independent of each other; J."""
-        self._find_motion()
-        works = self._A.data[self._diagonal] * self._last_digits() * s
+    def random_work(self, x: Array, s: Array) -> float:
+        """Work in a step ``s`` of the last digits at ``x``, were they independent; J."""
+        self._note_motion(x)
+        works = self._A.data[self._diagonal] * self._last_digits(x) * s
         return math.sqrt(self._share.total(float(np.sum(works[: len(self._weights)] ** 2))))
 
     # -- the call ------------------------------------------------------------------------------

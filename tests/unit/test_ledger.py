@@ -1,5 +1,6 @@
 """The ledger: its arithmetic, and that it closes in every scheme, at every step size."""
 
+import math
 import warnings
 from itertools import pairwise
 
@@ -229,6 +230,16 @@ def test_a_run_says_when_its_tolerance_opens_the_ledger():
     assert "does not explain it" in energies.opened(1e-9, 1e-13)
     assert "last digits of positions" in energies.opened(1e-9, 1.0)
     assert energies.opened(1.0, 0.0) == ""
+
+
+def test_a_scene_that_turns_as_a_whole_has_no_energy_to_balance():
+    """It goes where it came from; what its supports work on the way is round-off, and no news."""
+    beam = ub.Beam((0, 0), (2, 0), SECTION, cells=4)
+    turn = ub.Prescribed(beam.end, psi=lambda t: math.sin(math.pi * t))
+    scene = ub.Scene([beam], supports=[ub.Pinned(beam.start), turn])
+    solution = ub.simulate(scene, ub.ExactStatic(), t=(0, 1), dt=0.01, progress=False)
+    assert solution.energy.throughput < 1e-9
+    assert solution.open_ledger == ""
 
 
 @pytest.mark.parametrize("scheme", [ub.Newmark(), ub.PrintedMidpoint(), ub.Static()], ids=str)

@@ -63,4 +63,4 @@ total = hashlib.sha256((directory / "run.csv").read_bytes())
 energy = solution.energy
 for values in (solution.q, solution.v, solution.times, energy.total, energy.imbalance):
     total.update(np.ascontiguousarray(values).tobytes())
-print("checksum", total.hexdigest(), flush=True)
+print(f"stepped for {solution.seconds:.3f} s, checksum {total.hexdigest()}", flush=True)

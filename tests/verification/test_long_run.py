@@ -86,10 +86,12 @@ def test_very_many_steps(tmp_path):
     assert np.all(np.diff(hinges[:-1]) > 0)
     assert hinges[-1] < 2 * 1.0 * STEPS
     # The energy that they dissipated softened them, P(52)
-    rest = 1 - solution.material(left).hinge / STEPS
+    rest = 1 - solution.material_at(left.at(0.25)).hinge / STEPS
     # The limit holds within steps; at their ends moments alternate about it by the order of a step,
     # 8 rad/s 0.01 s of the amplitude, which is up to twice the limit
-    assert 6e3 < extremes.section_forces(left).high[0, 2] < 6e3 * (1 + 2 * 0.08)
+    moments = np.abs(solution.connector(scene.hinges[0]).force)
+    assert 0.5 * 6e3 < moments.max() < 6e3 * (1 + 2 * 0.08)
+    assert extremes.section_forces(left).high[0, 2] > moments.max()  # nearer to the clamp
     assert 0.0 < rest.min() < 0.9
     assert len(solution) <= 202
     assert len(table.read_text().splitlines()) <= 202
