@@ -73,7 +73,7 @@ def test_all_processes_raise_together(tmp_path):
 def test_a_process_that_fails_alone_ends_all(case, rank):
     begin = time.perf_counter()
     run = on_two(case, rank, timeout=100)
-    assert time.perf_counter() - begin < 60  # 3 s alone; a hang would be for ever
+    assert time.perf_counter() - begin < 10  # 2 s on two idle cores; a hang would be for ever
     assert run.returncode != 0
     assert f"RuntimeError: user, {case}" in run.stderr
     if case != "own":  # small scenes on each process are compared, so that the other one ends, too
