@@ -9,11 +9,12 @@ makes its equation solvable.  Residuals, hence forces, energies and solutions, k
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg import qr
 
 from ufl_beam.compat import Array
 from ufl_beam.grid import Index, Share
 from ufl_beam.memory import Memory
-from ufl_beam.null_vectors import free_matrix, null_vector
+from ufl_beam.null_vectors import free_matrix, null_vectors
 from ufl_beam.sparse import Csr
 
 STIFFNESS = 0.01
@@ -44,8 +45,12 @@ class IdleMotions:
         self._share, self._A, self._diagonal, self._held = share, A, diagonal, held
         self._turns = np.zeros(share.size, dtype=bool)
         self._turns[share.rotations()] = True
-        self._moves = np.arange(share.size) < share.num_owned
-        self._moves[share.multipliers()] = False
+        self._owned = np.arange(share.size) < share.num_owned
+        self._owned[share.multipliers()] = False
+        grid = share.grid
+        self._radians = np.full(grid.size, 1 / grid.scene.size)
+        self._radians[np.r_[grid.dofs[:, 2], grid.dofs_of_bodies[:, 2]]] = 1.0
+        self._radians[grid.multipliers] = 0.0
         self.stiffness: Array = np.zeros(share.size)
 
     @property
@@ -55,7 +60,7 @@ class IdleMotions:
         return self._diagonal[here].astype(np.int32), self.stiffness[here]
 
     def find(self, forces: Array, scale: float) -> bool:
-        """Look for one more idle motion of the latest tangent; all processes call it together.
+        """Look for idle motions of the latest tangent; all processes call it together.
 
         Args:
             forces: Sizes of the latest residual at the local degrees of freedom, moments over the
@@ -63,29 +68,30 @@ class IdleMotions:
             scale: Size of the forces in the scene; N.
 
         Returns:
-            Whether there is one.
+            Whether there are any; not if a motion that meets no force is driven.
         """
         share = self._share
         K, free = free_matrix(share, self._A, self._held)
         if not len(free) or not np.isfinite(K.data).all():
             return False
         try:
-            _, vector = null_vector(K)
+            _, vectors = null_vectors(K)
         except (np.linalg.LinAlgError, RuntimeError):
             return False
-        everywhere = np.zeros(share.grid.size)
-        everywhere[free] = np.abs(vector)
-        motion: Array = np.where(self._moves, everywhere[share.dofs], 0.0)
-        motion[~self._turns] /= share.grid.scene.size
-        largest = share.largest(float(motion.max(initial=0.0)))
-        if not 0.0 < largest < np.inf:
+        motions = self._radians[free, None] * vectors
+        # One degree of freedom of each motion, such that these motions are independent there.
+        pivots = qr(motions.T, mode="r", pivoting=True)[1][: vectors.shape[1]]
+        found = free[pivots[np.abs(motions[pivots]).max(axis=1) > 0.0]]
+        here = np.isin(share.dofs, found)
+        new = here & (self.stiffness == 0.0)
+        driven = here & (forces > DRIVEN * scale)
+        if not share.total(float(new.any())) or share.total(float(driven.any())):
             return False
-        idle = (motion == largest) & (self.stiffness == 0.0) & (forces <= DRIVEN * scale)
         diagonal = np.abs(self._A.data[self._diagonal])
         for alike in (self._turns, ~self._turns):
-            stiffest = share.largest(float(diagonal[alike & self._moves].max(initial=0.0)))
-            self.stiffness[idle & alike] = STIFFNESS * stiffest
-        return share.total(float(idle.any())) > 0.0
+            stiffest = share.largest(float(diagonal[alike & self._owned].max(initial=0.0)))
+            self.stiffness[new & alike & self._owned] = STIFFNESS * stiffest
+        return True
 
     def forget(self) -> bool:
         """Take all stiffnesses away; return whether there were any, on any process."""

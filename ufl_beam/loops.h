@@ -222,7 +222,7 @@ typedef struct {
                                               /* tangent, its factors, two vectors */
   double *residual, *change;                  /* at an iterate, and what it is changed by */
   const double *found, *weight;               /* entries of left_x; see Solver */
-  int most;                                    /* iterations */
+  int least, most;                             /* iterations */
   const int32_t *diagonal;
   double *space;
   const double *lengths, *moves; /* see Solver */

@@ -46,18 +46,30 @@ def null_vector(K: csc_array) -> tuple[float, Array]:
     Returns:
         How much it makes of it, without dimension; and the vector, in the units of the unknowns.
     """
+    sizes, vectors = null_vectors(K)
+    return float(sizes[-1]), vectors[:, -1]
+
+
+def null_vectors(K: csc_array) -> tuple[Array, Array]:
+    """Compute vectors that a matrix, its rows and columns scaled to size one, makes nothing of.
+
+    Returns:
+        How much it makes of them, without dimension, the least last; and the vectors in columns, in
+        the units of the unknowns.  One at least; of large matrices one only.
+    """
     scaled, factors = _equilibrated(K)
     n = scaled.shape[0]
     if n <= DENSE:
         _, sizes, vectors = np.linalg.svd(scaled.toarray())
-        return float(sizes[-1]), factors * vectors[-1]
+        number = max(1, int(np.count_nonzero(sizes <= SINGULAR)))
+        return sizes[-number:], factors[:, None] * vectors[-number:].T
     # A shift far below the entries makes the factors those of a regular matrix.
     shifted = splu(csc_array(scaled + SINGULAR * eye_array(n)))
     y: Array = np.random.default_rng(0).normal(size=n)
     for _ in range(20):
         y = shifted.solve(shifted.solve(y / np.linalg.norm(y), trans="T"))
     y /= np.linalg.norm(y)
-    return float(np.linalg.norm(scaled @ y)), factors * y
+    return np.array([np.linalg.norm(scaled @ y)]), (factors * y)[:, None]
 
 
 def _equilibrated(K: csc_array) -> tuple[csc_array, Array]:

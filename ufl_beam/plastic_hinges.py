@@ -40,18 +40,24 @@ def shared_by_joints(joints: Iterable[Joint]) -> Iterator[list[Slot]]:
 
 
 def plastic_hinges(
-    beams: Sequence[Beam], joints: Sequence[Joint], bearing: Iterable[Anchor]
+    beams: Sequence[Beam],
+    joints: Sequence[Joint],
+    bearing: Iterable[Anchor],
+    loaded: Iterable[Anchor],
 ) -> tuple[Connector, ...]:
     """Plastic hinges of zero length, as connectors of both sides.
 
     A beam has those of its ``hinges``, and one at each end if its section has a hinge.  There is
-    none at an end that bears no moment.  Where two members meet and nothing else bears a moment,
-    both have the same moment; then only the weaker one has a hinge, as the other one never opens.
+    none at an end that bears no moment, nor at one where nothing but a load is: the load acts on
+    the member, as nothing beyond a hinge could bear it.  Where two members meet and nothing else
+    bears a moment, both have the same moment; then only the weaker one has a hinge, as the other
+    one never opens.
 
     Args:
         beams: The beams of the scene.
         joints: Its joints.
-        bearing: Places where supports, connectors, loads or masses bear a moment.
+        bearing: Places where supports, connectors or masses bear a moment.
+        loaded: Places where loads are moments.
     """
     laws = {place: law for beam in beams for place, law in _laws(beam).items() if law.opens}
     same = merged(
@@ -60,7 +66,11 @@ def plastic_hinges(
     members: dict[Slot, list[Node]] = {}
     for slot in {*same, *same.values()}:
         members.setdefault(same.get(slot, slot), []).append(slot[0])
-    borne = {same.get(slot, slot) for slot in ((node(place), 2) for place in bearing)}
+
+    def at(places: Iterable[Anchor]) -> set[Slot]:
+        return {same.get(slot, slot) for slot in ((node(place), 2) for place in places)}
+
+    borne, acted = at(bearing), at(loaded)
 
     def stays(place: Place) -> bool:
         if 0.0 < place.s < 1.0:
@@ -68,7 +78,8 @@ def plastic_hinges(
         slot: Slot = (place, 2)
         slot = same.get(slot, slot)
         others = [other for other in members.get(slot, ()) if other != place]
-        return slot in borne or (len(others) > 0 and not _outlasts(place, others, laws))
+        between = len(others) > 0 and (slot in acted or not _outlasts(place, others, laws))
+        return slot in borne or between
 
     return tuple(_hinge(place, law) for place, law in laws.items() if stays(place))
 

@@ -10,12 +10,14 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
+from ufl_beam.beams import Place
 from ufl_beam.bodies import GROUND, Spot, carries
 from ufl_beam.compat import Array
 from ufl_beam.connectors import HELD, Motor
 from ufl_beam.errors import warn
 from ufl_beam.grid import Grid, Index
-from ufl_beam.loads import value_at
+from ufl_beam.loads import FollowerLoad, PointLoad, value_at
+from ufl_beam.plastic_hinges import place_of
 from ufl_beam.scene import COMPONENTS, Scene
 
 TOUCHING = 1e-3
@@ -48,6 +50,23 @@ def warn_of_masses(scene: Scene) -> None:
             "nothing else in the scene has mass, so that dynamics has no inertia. Give it, or use "
             "Static()"
         )
+
+
+# -- hinges --------------------------------------------------------------------------------------
+
+
+def warn_of_free_hinges(scene: Scene) -> None:
+    """Warn of hinges given at free ends where a load is a moment, which acts on the member."""
+    there = {place_of(hinge) for hinge in scene.hinges if isinstance(hinge.a, Place)}
+    for load in scene.loads:
+        if not (isinstance(load, PointLoad | FollowerLoad) and load.moment):
+            continue
+        place = load.place
+        if isinstance(place, Place) and place.s in place.beam.hinges and place not in there:
+            warn(
+                f"{place.beam.name}: the hinge at s = {place.s:g} has nothing beyond it but "
+                f"{load}, so that the load acts on the member, and the hinge is left out"
+            )
 
 
 # -- places that touch ---------------------------------------------------------------------------

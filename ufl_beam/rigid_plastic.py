@@ -15,6 +15,7 @@ import numpy.typing as npt
 import ufl
 from ufl.core.expr import Expr
 
+from ufl_beam.beams import Place
 from ufl_beam.compat import Array
 from ufl_beam.connectors import Connector, RigidPlastic
 from ufl_beam.laws import Bulk, Hardening, Softening
@@ -109,12 +110,20 @@ connector slips in an iterate; solutions do not depend on it."""
 def _slope(link: Connector, size: float) -> float:
     """Factor of motions beside forces in the equation of a connector, see rigid_plastic.c.
 
-    It is above the steepest softening, so that an open branch is found open.
+    It is above the steepest softening, so that an open branch is found open; and so large that
+    motions, not the round-off of forces, say in which direction a weak hinge slips.
     """
     law = law_of(link)
     if not 0.0 < law.limit < np.inf:
         return 1.0
-    return 2 * law.limit**2 / law.energy + law.limit / (EARLY * (1.0 if link.turns else size))
+    steepest = law.limit * (law.limit / law.energy)
+    early = law.limit / (EARLY * (1.0 if link.turns else size))
+    least = WEAK * link.a.beam.section.EI / size if isinstance(link.a, Place) else 0.0
+    return max(early, least) + (2 * steepest if steepest < np.inf else 0.0)
+
+
+WEAK = 1e-9
+"""Factor of motions at least, as a part of EI of the member over the size of the scene."""
 
 
 class SlipForms:

@@ -303,10 +303,15 @@ class Scene:
     @cached_property
     def hinges(self) -> tuple[Connector, ...]:
         """Plastic hinges of zero length: those of beams, and at ends whose section has a hinge."""
-        return plastic_hinges(self.beams, self.joints, self._bearing_moments())
+        loaded = (
+            load.place
+            for load in self.loads
+            if isinstance(load, PointLoad | FollowerLoad) and load.moment
+        )
+        return plastic_hinges(self.beams, self.joints, self._bearing_moments(), loaded)
 
     def _bearing_moments(self) -> Iterator[Anchor]:
-        """Places where supports, connectors, loads or masses bear a moment."""
+        """Places where supports, connectors or masses bear a moment."""
         for support in self.supports:
             if 2 in support.held:
                 yield support.place
@@ -316,9 +321,6 @@ class Scene:
                 yield link.a
             if by_b[2]:
                 yield link.b
-        for load in self.loads:
-            if isinstance(load, PointLoad | FollowerLoad) and load.moment:
-                yield load.place
         for mass in self.masses:
             if mass.inertia:
                 yield mass.place

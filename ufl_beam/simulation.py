@@ -53,6 +53,7 @@ from ufl_beam.openings import Openable, Openings
 from ufl_beam.path import StaticPath
 from ufl_beam.plausibility import (
     warn_of_far_points,
+    warn_of_free_hinges,
     warn_of_jumps,
     warn_of_masses,
     warn_of_origin,
@@ -94,6 +95,13 @@ Over a part a moment is in error by a quarter of the square: some 1e-4 of it.
 
 SHORT_PART = 512
 """So many times shorter parts may turn nodes further: their oscillations do not become smaller."""
+
+LEAST_AT_REST, LEAST_IN_MOTION = 2, 1
+"""Iterations at least in statics and dynamics, unless a residual is far below its tolerance.
+
+A column that nearly buckles magnifies a load that is hardly larger than the tolerance.  In motion
+its inertia holds it meanwhile.
+"""
 
 ROOM = 10.0
 """Largest imbalance of an exact ledger over the tolerance of the solver."""
@@ -177,6 +185,7 @@ class Simulation(Live):
         require_independent(scene)
         self.scene, self.scheme, self.comm = scene, scheme, comm
         warn_of_far_points(scene)
+        warn_of_free_hinges(scene)
         self.grid = Grid(scene, mesh_of(start, mesh))
         if has_inertia(scheme):
             warn_of_touching(self.grid)
@@ -265,6 +274,7 @@ class Simulation(Live):
             working=self._working,
             held=self.supports.dofs,
             newton=newton,
+            least=LEAST_IN_MOTION if scheme.dynamic else LEAST_AT_REST,
             agreement=self.together,
         )
         self.solution: Solution = Solution(scene, self.grid)

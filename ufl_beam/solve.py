@@ -131,6 +131,7 @@ class Solver:
         working: Of an iterate and a step from it: what the residual works on, see
             :class:`SearchingNewton`; new arrays.
         newton: Tolerances.
+        least: Iterations at least, unless a residual is far below its tolerance.
         agreement: Raises on all processes what one has raised.
     """
 
@@ -148,10 +149,11 @@ class Solver:
         working: Callable[[Array, Array], Array],
         held: Index,
         newton: Newton,
+        least: int,
         agreement: Agreement,
         equation: Equation | None = None,
     ) -> None:
-        self._share, self._A, self._newton = share, A, newton
+        self._share, self._A, self._newton, self._least = share, A, newton, least
         self._residual, self._complete, self._tangent = residual, complete, tangent
         self._excess, self._relieve, self._working = excess, relieve, working
         self._agreement = agreement
@@ -197,6 +199,7 @@ class Solver:
         c.x = ffi.cast("void *", self._x.handle)
         self._at_correction = doubles(self._correction)
         c.change, c.most = self._at_correction, self._newton.max_iterations
+        c.least = self._least
         if self._equation is None:
             self._demand = Demand(self._excess, self._share.size, self._note)
             self._demands = ffi.new("demand[]", [self._demand.loop])
