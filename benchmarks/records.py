@@ -6,7 +6,7 @@ import subprocess
 from functools import cache
 from pathlib import Path
 
-from ufl_beam.compat import dolfinx
+from ufl_beam.dolfinx_compat import dolfinx
 
 RESULTS = Path(__file__).parent / "results"
 

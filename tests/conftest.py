@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 import pytest
 
-from ufl_beam import simulation
+from ufl_beam.simulation import simulation
 
 sys.path.insert(0, str(Path(__file__).parent))
 

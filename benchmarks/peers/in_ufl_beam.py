@@ -5,7 +5,7 @@ from problems import PROBLEMS
 from stopwatch import Stopwatch
 
 import ufl_beam as ub
-from ufl_beam.compat import dolfinx
+from ufl_beam.dolfinx_compat import dolfinx
 
 VERSION = f"DOLFINx {dolfinx.__version__}"
 

@@ -5,9 +5,9 @@ import math
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from ufl_beam.bodies import GROUND, Body, Spot
-from ufl_beam.connectors import Guide, Motor
-from ufl_beam.scene import still
+from ufl_beam.model.bodies import GROUND, Body, Spot
+from ufl_beam.model.connectors import Guide, Motor
+from ufl_beam.model.scene import still
 
 COUPLES = {
     # kind of a joint -> whether it keeps the point, and the rotation

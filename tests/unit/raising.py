@@ -11,7 +11,8 @@ from pathlib import Path
 from mpi4py import MPI
 
 import ufl_beam as ub
-from ufl_beam import agreement, simulation
+from ufl_beam import collective_errors
+from ufl_beam.simulation import simulation
 
 WORLD = MPI.COMM_WORLD
 ALL = -1
@@ -242,6 +243,6 @@ if __name__ == "__main__":
     if len(sys.argv) <= 2:
         together()
     else:
-        agreement.GRACE = 0.5
+        collective_errors.GRACE = 0.5
         name, rank = sys.argv[1:]
         globals()[name](failure(int(rank), lambda: RuntimeError(f"user, {name}")))

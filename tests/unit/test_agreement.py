@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 import pytest
 
-from ufl_beam.agreement import Agreement, portable
+from ufl_beam.collective_errors import Agreement, portable
 from ufl_beam.errors import StepFailed
 
 COMM = MPI.COMM_WORLD

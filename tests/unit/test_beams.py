@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.grid import Grid
+from ufl_beam.discretization.dof_numbering import Grid
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0)
 

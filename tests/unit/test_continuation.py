@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.processes import ours
-from ufl_beam.view import evenly
+from ufl_beam.parallel import ours
+from ufl_beam.plotting.plots import evenly
 
 EA, WIDTH, HEIGHT = 1e6, 4.0, 1.0  # N, m, m: half a truss
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.loops import lib
-from ufl_beam.supports import Supports
+from ufl_beam.compiled.c_library import lib
+from ufl_beam.terms.supports import Supports
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
 

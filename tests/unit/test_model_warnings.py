@@ -225,8 +225,8 @@ def test_beams_that_cross_or_are_apart():
 
 def test_touching_places_of_large_scenes_are_found_fast():
     """20 000 beams in a row, one joint forgotten: 0.3 s on a desk, beside seconds for the scene."""
-    from ufl_beam.grid import Grid
-    from ufl_beam.plausibility import warn_of_touching
+    from ufl_beam.discretization.dof_numbering import Grid
+    from ufl_beam.discretization.model_warnings import warn_of_touching
 
     number, forgotten = 20_000, 12_345
     row = [beam((i, 0), (i + 1, 0), name=f"b{i}", cells=1) for i in range(number)]

@@ -10,8 +10,8 @@ import pytest
 
 import ufl_beam as ub
 from ufl_beam.errors import StepFailed
-from ufl_beam.openings import Openings
-from ufl_beam.points import OVER, Course
+from ufl_beam.terms.material_points import OVER, Course
+from ufl_beam.terms.openings import Openings
 
 LENGTH, EI, STIFF = 2.0, 1000.0, 1e6  # m, N m², N
 LAWS = [ub.Softening, ub.LinearSoftening]

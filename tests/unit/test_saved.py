@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.connectors import HELD
-from ufl_beam.saved_scene import RECORDS, from_data, to_data
+from ufl_beam.model.connectors import HELD
+from ufl_beam.output.saved_scene import RECORDS, from_data, to_data
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "properties"))
 from restarted import bend, machine

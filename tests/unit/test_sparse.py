@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ufl_beam.sparse import coupling
+from ufl_beam.compiled.csr import coupling
 
 
 @pytest.mark.parametrize("number", [1, 255, 256, 257])

@@ -12,12 +12,12 @@ import pytest
 import scenes
 
 import ufl_beam as ub
-from ufl_beam import symbols
-from ufl_beam.diagrams import moments_at_ends
-from ufl_beam.glyphs import AROUND, STRAIGHT
-from ufl_beam.stage import Stage
-from ufl_beam.symbols import EDGE, FILLED, support_direction
-from ufl_beam.view import with_unit
+from ufl_beam.plotting import symbols
+from ufl_beam.plotting.connector_glyphs import AROUND, STRAIGHT
+from ufl_beam.plotting.diagrams import moments_at_ends
+from ufl_beam.plotting.plots import with_unit
+from ufl_beam.plotting.scene_layout import Stage
+from ufl_beam.plotting.symbols import EDGE, FILLED, support_direction
 
 FIRST = MPI.COMM_WORLD.rank == 0
 INDEX = {"N": 0, "V": 1, "M": 2}

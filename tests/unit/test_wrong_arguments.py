@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam import simulation
+from ufl_beam.simulation import simulation
 
 NAN, INF, HUGE = math.nan, math.inf, 10**400
 ARRAY = np.array([1.0, 2.0])

@@ -1,0 +1,1 @@
+"""Modes, buckling, static paths, studies, and the trade of speed for accuracy."""

@@ -1,0 +1,1 @@
+"""Compilation of C and of UFL forms, the code in C, and matrices that it fills."""

@@ -1,0 +1,1 @@
+"""Numbering of unknowns, function spaces, compiled forms, transfer of states."""

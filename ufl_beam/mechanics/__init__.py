@@ -1,0 +1,1 @@
+"""The mechanics of the paper in UFL: strains, relative motions, time schemes."""

@@ -1,0 +1,1 @@
+"""What a user describes: beams, bodies, sections, laws, joints, supports, loads, scenes."""

@@ -1,0 +1,1 @@
+"""Files, recorders, and what they ask of a run."""

@@ -1,0 +1,1 @@
+"""Solution of the equation of a step: Newton's method, factorization, eigenvalues."""

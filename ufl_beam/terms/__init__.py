@@ -1,0 +1,1 @@
+"""Virtual works, one class each: what a scene contributes to the equation of a step."""
