@@ -4,35 +4,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import KW_ONLY, dataclass, field
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from ufl_beam.analysis.critical_points import Direction
+from ufl_beam.analysis.path_corrector import Walk
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, StepFailed, require_kind, require_number
 from ufl_beam.model.beams import Place
 from ufl_beam.model.scene import COMPONENTS, Scene
 from ufl_beam.simulation.simulation import Trial
 
-if TYPE_CHECKING:
-    from ufl_beam.analysis.path_corrector import Walk
-
 SHORTEST = 1e-3
 """Part of a step of arc length that is gone at least beyond a bend."""
 
 
 # -- equations of steps --------------------------------------------------------------------------
-
-
-class Constraint(Protocol):
-    """What a step must fulfil besides equilibrium; numbers without dimension."""
-
-    def miss(self, q: Array, t: float) -> float:
-        """What is missing in a state."""
-
-    def slope(self, q: Array, way: Direction) -> float:
-        """Its derivative along a way from there."""
 
 
 class Plane:

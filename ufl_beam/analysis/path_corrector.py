@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 
 from ufl_beam.analysis.critical_points import Direction, Stiffness, metric
-from ufl_beam.analysis.path_controls import Constraint
 from ufl_beam.arrays import Array
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Step
@@ -26,6 +26,16 @@ HALVINGS = 40
 
 MET = 1e-9
 """Part of a step by which its end may miss what the control demands."""
+
+
+class Constraint(Protocol):
+    """What a step must fulfil besides equilibrium; numbers without dimension."""
+
+    def miss(self, q: Array, t: float) -> float:
+        """What is missing in a state."""
+
+    def slope(self, q: Array, way: Direction) -> float:
+        """Its derivative along a way from there."""
 
 
 class Walk:

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.analysis.parameter_study import study
-from ufl_beam.analysis.richardson import Array
+from ufl_beam.arrays import Array
 from ufl_beam.errors import ConvergenceError, SceneError, TradeoffError
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.mesh_options import Mesh

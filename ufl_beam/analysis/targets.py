@@ -10,7 +10,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from ufl_beam.analysis.refinement_runs import Run
-from ufl_beam.analysis.richardson import Array, Cost, Cross, size
+from ufl_beam.analysis.richardson import Cost, Cross, size
+from ufl_beam.arrays import Array
 
 FINE = 16
 """Choices of steps from one level to the next."""

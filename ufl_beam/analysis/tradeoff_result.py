@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from ufl_beam.analysis.refinement_runs import Run, keywords
-from ufl_beam.analysis.richardson import Array, Cross, pareto, size
+from ufl_beam.analysis.richardson import Cross, pareto, size
 from ufl_beam.analysis.targets import Goal
+from ufl_beam.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass, field
 from numbers import Real
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from ufl_beam.errors import (
     SceneError,
@@ -22,9 +22,6 @@ from ufl_beam.model.beams import Curve, Place, Point, point_of
 from ufl_beam.model.bodies import Anchor, arm, carries, ground, require_anchor
 from ufl_beam.model.loads import TimeFunction, require_time_function
 from ufl_beam.model.material_laws import Hardening, HingeLaw, Softening, require_hinge_law
-
-if TYPE_CHECKING:
-    from ufl_beam.simulation.simulation import Simulation
 
 # -- laws --------------------------------------------------------------------------------------
 
@@ -57,6 +54,19 @@ class Actuator:
         require_time_function(self.force, "Actuator")
 
 
+class Running(Protocol):
+    """A simulation between two steps, as far as laws of connectors ask it.
+
+    Attributes:
+        t: Time; s.
+    """
+
+    t: float
+
+    def press(self, joint: Joint) -> float:
+        """Return the force that a joint or support bears across its motion; N."""
+
+
 @dataclass(frozen=True)
 class Controller:
     """The force is what a function says at the beginning of each step, and constant during it.
@@ -66,12 +76,12 @@ class Controller:
             the simulation for its time, motions, velocities and the forces of joints.
     """
 
-    force: Callable[[Simulation], float]
+    force: Callable[[Any], float]
 
     def __post_init__(self) -> None:
         require_function(self.force, "Controller: force", "the simulation")
 
-    def ask(self, simulation: Simulation, link: Connector) -> float:
+    def ask(self, simulation: Running, link: Connector) -> float:
         """Evaluate the force of ``link`` in the next step; all processes call it together."""
         at = f"t = {simulation.t:.9g} s"
         return require_returned(self.force(simulation), f"{link}: the controller", at)
@@ -197,7 +207,7 @@ class Coulomb:
         if self.joint is not None:
             require_kind(self.joint, Bearing, "Coulomb: joint")
 
-    def ask(self, simulation: Simulation, link: Connector) -> float:
+    def ask(self, simulation: Running, link: Connector) -> float:
         """Return the limit of the next step; all processes call it together."""
         if self.joint is None:
             return self.force

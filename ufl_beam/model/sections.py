@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_kind, require_number
-from ufl_beam.model.fibres import Array, Fibres, PlacedFibres
+from ufl_beam.model.fibres import Fibres, PlacedFibres
 from ufl_beam.model.material_laws import Hardening, Layout, Softening
 
 Integral = Callable[[Array], Array]

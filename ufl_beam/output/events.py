@@ -17,7 +17,7 @@ from ufl_beam.output.recorders import Recorder, on_first
 from ufl_beam.parameter import TIME, Parameter
 
 if TYPE_CHECKING:
-    from ufl_beam.simulation.simulation import Simulation
+    from ufl_beam.output.state_view import StateView
 
 Flags = npt.NDArray[np.bool_]
 
@@ -80,12 +80,12 @@ class Events(Recorder):
     def require_writable(self) -> None:
         """Nothing is written."""
 
-    def open(self, simulation: Simulation) -> None:
+    def open(self, simulation: StateView) -> None:
         """Take note of the initial state."""
         self.found, self._rows = [], []
         self._watch(simulation)
 
-    def _watch(self, simulation: Simulation) -> None:
+    def _watch(self, simulation: StateView) -> None:
         """What may happen in a scene, and what has."""
         grid = simulation.grid
         in_cells = [law for beam in simulation.scene.beams for law in grid.hinges(beam)]
@@ -98,7 +98,7 @@ class Events(Recorder):
         self._links = [i for i, link in enumerate(links) if type(link.law) in BETWEEN]
         self._flags = self._look(simulation)
 
-    def _look(self, simulation: Simulation) -> tuple[Flags, list[bool]]:
+    def _look(self, simulation: StateView) -> tuple[Flags, list[bool]]:
         """What has happened in each cell and hinge; what goes on in each connector watched."""
         in_cells = np.zeros((len(self._enough), len(IN_CELLS)), dtype=bool)
         for cells, rows in simulation.material():
@@ -116,12 +116,12 @@ class Events(Recorder):
         limits = [self._limit(simulation, link) for link in self._links]
         return in_cells, [bool(goes_on) for goes_on in forces > limits]
 
-    def _limit(self, simulation: Simulation, link: int) -> float:
+    def _limit(self, simulation: StateView, link: int) -> float:
         """Force of a connector above which it touches, or slides; N or N m."""
         # A force at the limit of friction is known to some digits.
         return (1 - 1e-9) * simulation.asked.get(simulation.scene.links[link], 0.0)
 
-    def write(self, simulation: Simulation) -> None:
+    def write(self, simulation: StateView) -> None:
         """Note what has changed in the step."""
         flags = self._look(simulation)
         (cells, goes_on), (cells_before, went_on) = flags, self._flags
@@ -142,9 +142,9 @@ class Events(Recorder):
             if self._tell is not None:
                 self._tell(event)
 
-    def _add(self, simulation: Simulation, rows: list[Row]) -> list[Event]:
+    def _add(self, simulation: StateView, rows: list[Row]) -> list[Event]:
         links, grid = simulation.scene.links, simulation.grid
-        named = simulation.solution.parameter
+        named = simulation.parameter
         events = [
             Event(t, grid.place_of(number) if what in IN_CELLS else links[number], what, named)
             for t, number, what in rows
@@ -160,7 +160,7 @@ class Events(Recorder):
         """The events so far: time, number of the cell or connector, and what."""
         return {"events": np.array([(t, n, ALL.index(what)) for t, n, what in self._rows])}
 
-    def resume(self, simulation: Simulation, state: State) -> None:
+    def resume(self, simulation: StateView, state: State) -> None:
         """Go on after those events."""
         self.found, self._rows = [], []
         self._add(simulation, [(float(t), int(n), ALL[int(k)]) for t, n, k in state["events"]])

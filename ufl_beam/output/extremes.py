@@ -15,7 +15,7 @@ from ufl_beam.output.recorders import Recorder
 
 if TYPE_CHECKING:
     from ufl_beam.discretization.dof_numbering import Grid
-    from ufl_beam.simulation.simulation import Simulation
+    from ufl_beam.output.state_view import StateView
 
 
 class Extent(NamedTuple):
@@ -62,12 +62,12 @@ class Extremes(Recorder):
     def require_writable(self) -> None:
         """Nothing is written."""
 
-    def open(self, simulation: Simulation) -> None:
+    def open(self, simulation: StateView) -> None:
         """Begin with the initial state."""
         self._grid: Grid = simulation.grid
         self._forces, self._q = (Extent.around(x, simulation.t) for x in _state(simulation))
 
-    def write(self, simulation: Simulation) -> None:
+    def write(self, simulation: StateView) -> None:
         """Take in the state."""
         for extent, values in zip((self._forces, self._q), _state(simulation), strict=True):
             extent.widen(values, simulation.t)
@@ -83,7 +83,7 @@ class Extremes(Recorder):
             **{f"q {name}": values for name, values in zip(names, self._q, strict=True)},
         }
 
-    def resume(self, simulation: Simulation, state: State) -> None:
+    def resume(self, simulation: StateView, state: State) -> None:
         """Go on after a :meth:`state`."""
         self._grid = simulation.grid
         self._forces, self._q = (
@@ -121,6 +121,6 @@ class Extremes(Recorder):
         return self._q.of(dofs)
 
 
-def _state(simulation: Simulation) -> tuple[Array, Array]:
+def _state(simulation: StateView) -> tuple[Array, Array]:
     """Section forces of all cells, and the configuration, the same on every process."""
     return simulation.section_forces(), simulation.share.gather(simulation.q)

@@ -18,7 +18,7 @@ from ufl_beam.output.recorders import Recorder
 
 if TYPE_CHECKING:
     from ufl_beam.discretization.dof_numbering import Grid
-    from ufl_beam.simulation.simulation import Simulation
+    from ufl_beam.output.state_view import StateView
 
 BLOCK = 1000
 """Steps that are collected before their cycles are counted."""
@@ -102,7 +102,7 @@ class Fatigue(Recorder):
     def require_writable(self) -> None:
         """Nothing is written."""
 
-    def open(self, simulation: Simulation) -> None:
+    def open(self, simulation: StateView) -> None:
         """Begin to count, with the initial state."""
         self._prepare(simulation.grid)
         self._begin = simulation.t
@@ -115,7 +115,7 @@ class Fatigue(Recorder):
         self._counters = {spot: RainflowCounter(self._resolution) for spot in self.spots}
         self._block, self._filled = np.empty((len(self.spots), 3, BLOCK)), 0
 
-    def write(self, simulation: Simulation) -> None:
+    def write(self, simulation: StateView) -> None:
         """Note the section forces, and count now and then."""
         self._block[..., self._filled] = simulation.section_forces()[self._cells]
         self._filled += 1
@@ -145,7 +145,7 @@ class Fatigue(Recorder):
             state[f"counted {i}"], state[f"waiting {i}"] = counter.state()
         return state
 
-    def resume(self, simulation: Simulation, state: State) -> None:
+    def resume(self, simulation: StateView, state: State) -> None:
         """Go on after a :meth:`state`."""
         self._prepare(simulation.grid)
         self._begin, self._end = map(float, state["duration"])

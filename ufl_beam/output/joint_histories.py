@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -15,8 +15,26 @@ from ufl_beam.model.connectors import Connector, Guide, Joint
 from ufl_beam.model.plane_curves import nearest, parameter_step, tangent
 from ufl_beam.model.scene import Scene
 
-if TYPE_CHECKING:
-    from ufl_beam.simulation.solution import Solution
+
+class Motion(Protocol):
+    """The motion of a scene at some times.
+
+    Attributes:
+        scene: What moves.
+        times: Times; (n+1,); s.
+    """
+
+    scene: Scene
+
+    @property
+    def times(self) -> Array:
+        """Times; (n+1,); s."""
+
+    def displacement(self, place: Anchor) -> Array:
+        """Return (u, v, ψ) of a place; (n+1, 3); m, m, rad."""
+
+    def position(self, place: Anchor) -> Array:
+        """Return (x, y) of a place; (n+1, 2); m."""
 
 
 class Connection(NamedTuple):
@@ -114,7 +132,7 @@ def _of_node(grid: Grid, place: Anchor, states: Sequence[Array]) -> Array:
     return np.array([weights @ x[dofs] for x in states])
 
 
-def of_joint(solution: Solution, joint: Joint, forces: Array) -> JointHistory:
+def of_joint(solution: Motion, joint: Joint, forces: Array) -> JointHistory:
     """History of a joint, from the forces of all links of the scene; (n+1, num_links)."""
     scene = solution.scene
     a, b, *_ = joint.places
@@ -142,7 +160,7 @@ def of_joint(solution: Solution, joint: Joint, forces: Array) -> JointHistory:
     return JointHistory(motion, force, turned(force, -turns[0]), turned(force, -turns[1]), moment)
 
 
-def _direction(solution: Solution, holder: Connector, turn: Array) -> Array:
+def _direction(solution: Motion, holder: Connector, turn: Array) -> Array:
     """Unit vectors in the plane along which a motion grows; (n+1, 2)."""
     if holder.motion == "stretching":
         between = solution.position(holder.b) - solution.position(holder.a)

@@ -12,7 +12,7 @@ from ufl_beam.output.joint_histories import turned
 from ufl_beam.output.wireframe import BEAM, rods_of
 
 if TYPE_CHECKING:
-    from ufl_beam.simulation.simulation import Simulation
+    from ufl_beam.output.state_view import StateView
 
 LineFields = tuple[dict[str, Array], dict[str, Array]]
 """Fields at points, (n,) or (n, 3), and in cells, (m,), by name."""
@@ -34,7 +34,7 @@ class LineData:
         parts: 0 in beams, 1 in bodies, 2 in joints and connectors; (m,).
     """
 
-    def __init__(self, simulation: Simulation) -> None:
+    def __init__(self, simulation: StateView) -> None:
         grid, rods = simulation.grid, rods_of(simulation.scene)
         ends = [anchor for rod in rods for anchor in (rod.a, rod.b)]
         corners = np.reshape([anchor.point for anchor in ends], (-1, 2))
@@ -52,7 +52,7 @@ class LineData:
         self._pieces_of_cell, self._num_rods = grid.mesh.degree, len(rods)
         self._inelastic = simulation.may_break
 
-    def fields(self, simulation: Simulation) -> LineFields:
+    def fields(self, simulation: StateView) -> LineFields:
         """Fields of the present state; all processes that share the scene call it together.
 
         Returns:
@@ -72,7 +72,7 @@ class LineData:
             at_points |= {"velocity": velocity, "angular velocity": v[:, 2]}
         return at_points, self._in_cells(simulation)
 
-    def _in_cells(self, simulation: Simulation) -> dict[str, Array]:
+    def _in_cells(self, simulation: StateView) -> dict[str, Array]:
         forces = simulation.section_forces()
         in_cells: dict[str, Array] = {name: forces[:, k] for k, name in enumerate("NVM")}
         if self._inelastic:

@@ -31,7 +31,7 @@ from ufl_beam.output.output_files import (
 )
 
 if TYPE_CHECKING:
-    from ufl_beam.simulation.simulation import Simulation
+    from ufl_beam.output.state_view import StateView
 
 
 UNLIMITED = sys.maxsize
@@ -61,11 +61,11 @@ class Recorder(ABC):
         """Raise :class:`SceneError` if the output cannot be written; the first process asks."""
 
     @abstractmethod
-    def open(self, simulation: Simulation) -> None:
+    def open(self, simulation: StateView) -> None:
         """Begin, with the initial state."""
 
     @abstractmethod
-    def write(self, simulation: Simulation) -> None:
+    def write(self, simulation: StateView) -> None:
         """Record the state after a step."""
 
     @abstractmethod
@@ -83,7 +83,7 @@ class Recorder(ABC):
             "state() and resume(simulation, state), or run without a checkpoint"
         )
 
-    def resume(self, simulation: Simulation, state: State) -> None:
+    def resume(self, simulation: StateView, state: State) -> None:
         """Go on from a :meth:`state`, in the place of :meth:`open`; nothing is recorded yet.
 
         Raises:
@@ -203,14 +203,14 @@ class History(Recorder):
         """Raise :class:`SceneError` if the file cannot be written."""
         require_writable(self._path)
 
-    def open(self, simulation: Simulation) -> None:
+    def open(self, simulation: StateView) -> None:
         """Write the header and the initial state."""
         self._prepare(simulation)
         row = self._row(simulation)
         self._every, self._steps, self._rows = self._first_every, 0, 0
         on_first(simulation.comm, lambda: self._begin(row))
 
-    def _prepare(self, simulation: Simulation) -> None:
+    def _prepare(self, simulation: StateView) -> None:
         """Note what is followed, and the header."""
         self._comm = simulation.comm
         self._links = {
@@ -223,7 +223,7 @@ class History(Recorder):
             units = ROTATION if simulation.scene.links[link].turns else TRANSLATION
             names += [f"{c} {name} [{unit}]" for c, unit in units]
         energies = (f"{name} [J]" for name in simulation.ledger_names())
-        self._header = _line([simulation.solution.parameter.column, *names, *energies])
+        self._header = _line([simulation.parameter.column, *names, *energies])
 
     def _begin(self, row: bytes) -> None:
         self.close()
@@ -236,7 +236,7 @@ class History(Recorder):
         self._files[0].put(self._length, line)
         self._length += len(line)
 
-    def write(self, simulation: Simulation) -> None:
+    def write(self, simulation: StateView) -> None:
         """Write the row of the state, every so many steps."""
         self._steps += 1
         if self._steps % self._every:
@@ -259,7 +259,7 @@ class History(Recorder):
         self._append(self._header + b"".join(rows[::2]))
         self._files[0].rename(self._path)
 
-    def _row(self, simulation: Simulation) -> bytes:
+    def _row(self, simulation: StateView) -> bytes:
         q = simulation.share.gather(simulation.q)
         motion = [motion_of(simulation.grid, place, [q])[0] for place in self._places]
         links = list(self._links)
@@ -284,7 +284,7 @@ class History(Recorder):
         for file in self._files:
             file.sync()
 
-    def resume(self, simulation: Simulation, state: State) -> None:
+    def resume(self, simulation: StateView, state: State) -> None:
         """Cut off what was written after the state, and append."""
         self._prepare(simulation)
         self._every, self._steps, self._rows, length = map(int, state["counts"])

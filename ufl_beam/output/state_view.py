@@ -17,6 +17,7 @@ from ufl_beam.model.bodies import Anchor
 from ufl_beam.model.connectors import Connector, Joint
 from ufl_beam.model.scene import Scene, Support
 from ufl_beam.output.joint_histories import Connection, links_of, motion_of, velocity_of
+from ufl_beam.parameter import Parameter
 from ufl_beam.terms.beams import Inertia, SectionForces
 from ufl_beam.terms.connectors import Couplings
 from ufl_beam.terms.energy_ledger import Ledger
@@ -27,13 +28,15 @@ from ufl_beam.terms.supports import Supports
 NO_REACTIONS = np.zeros((0, 3))
 
 
-class Live:
+class StateView:
     """The state of a scene in words of the scene.
 
     Unless they say otherwise all processes call these together.
 
     Attributes:
         scene: What is modelled.
+        comm: All processes of the run.
+        asked: Forces of controllers, and limits of friction, in the step; N or N m.
         grid: Its vertices, cells and numbering.
         share: The degrees of freedom of this process.
         t: Time; s.
@@ -43,6 +46,8 @@ class Live:
     """
 
     scene: Scene
+    comm: MPI.Intracomm
+    asked: dict[Connector, float]
     scheme: Scheme
     grid: Grid
     share: Share
@@ -57,6 +62,16 @@ class Live:
     couplings: list[Couplings | Guides]
     inelastic: list[InelasticBeams]
     _has_inelastic: bool
+
+    @property
+    def parameter(self) -> Parameter:
+        """Time, or the load factor of a path."""
+        raise NotImplementedError
+
+    @property
+    def iterations(self) -> int:
+        """Newton iterations so far."""
+        raise NotImplementedError
 
     def velocities(self) -> list[Array]:
         """Velocities at the local degrees of freedom; none in statics."""

@@ -19,7 +19,7 @@ from ufl_beam.output.vtkhdf import VtkhdfWriter
 from ufl_beam.output.xdmf import Complete, XdmfWriter, data_path
 
 if TYPE_CHECKING:
-    from ufl_beam.simulation.simulation import Simulation
+    from ufl_beam.output.state_view import StateView
 
 
 class TimeSeries(Recorder):
@@ -41,13 +41,13 @@ class TimeSeries(Recorder):
         for path in self.files:
             require_writable(path)
 
-    def open(self, simulation: Simulation) -> None:
+    def open(self, simulation: StateView) -> None:
         """Write the mesh and the initial state."""
         self._count = 0
         fields = self._prepare(simulation)
         on_first(simulation.comm, lambda: self._begin(simulation.t, fields))
 
-    def _prepare(self, simulation: Simulation) -> LineFields:
+    def _prepare(self, simulation: StateView) -> LineFields:
         """Note the mesh; the fields of the present state."""
         self._comm: MPI.Intracomm = simulation.comm
         self._lines = LineData(simulation)
@@ -62,7 +62,7 @@ class TimeSeries(Recorder):
     def _writer(self, fields: LineFields, complete: list[int] | None = None) -> Any:
         """Make the writer of a file, or of one that is complete up to some sizes."""
 
-    def write(self, simulation: Simulation) -> None:
+    def write(self, simulation: StateView) -> None:
         """Write the state, every so many steps."""
         self._count += 1
         if self._count % self._every == 0:
@@ -83,7 +83,7 @@ class TimeSeries(Recorder):
         for writer in self._writers:
             writer.sync()
 
-    def resume(self, simulation: Simulation, state: State) -> None:
+    def resume(self, simulation: StateView, state: State) -> None:
         """Cut off what was written after the state, and go on."""
         self._count, *sizes = (int(n) for n in state["sizes"])
         fields = self._prepare(simulation)

@@ -49,8 +49,9 @@ from ufl_beam.model.constraint_checks import (
 from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.state_view import Live
+from ufl_beam.output.state_view import StateView
 from ufl_beam.parallel import communicator, give_back_memory
+from ufl_beam.parameter import Parameter
 from ufl_beam.simulation.branch_check import StaticPath
 from ufl_beam.simulation.initial_state import initial_state, mesh_of
 from ufl_beam.simulation.replicas import Copies
@@ -128,7 +129,7 @@ class Trial(NamedTuple):
     s: Array
 
 
-class Simulation(Live):
+class Simulation(StateView):
     """A scene in motion: one state, and the step to the next.
 
     :func:`simulate` is a loop over :meth:`step_to`; use this class for loops of your own.
@@ -754,6 +755,11 @@ class Simulation(Live):
             self._copies.leave()
 
     # -- the end, and going on -----------------------------------------------------------------
+
+    @property
+    def parameter(self) -> Parameter:
+        """Time, or the load factor of a path."""
+        return self.solution.parameter
 
     @property
     def iterations(self) -> int:

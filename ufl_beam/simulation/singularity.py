@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, Protocol
 
 from mpi4py import MPI
 
@@ -10,13 +10,15 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.compiled.csr import Csr
+from ufl_beam.discretization.dof_numbering import Grid, Share
 from ufl_beam.errors import StepFailed
+from ufl_beam.model.scene import Scene
 from ufl_beam.solvers.null_vectors import SINGULAR, free_matrix, null_vector
 from ufl_beam.terms.connectors import Couplings
-
-if TYPE_CHECKING:
-    from ufl_beam.simulation.simulation import Simulation
+from ufl_beam.terms.guide_curves import Guides
+from ufl_beam.terms.inelastic_beams import InelasticBeams
+from ufl_beam.terms.supports import Supports
 
 SHARE = 0.1
 """Part of the largest motion from which on a motion or a deformation is named."""
@@ -30,6 +32,31 @@ as the step begins."""
 
 NAMED = 3
 """Largest number of names in a list."""
+
+
+class Failed(Protocol):
+    """A simulation whose latest step has failed, as far as a diagnosis asks it.
+
+    Attributes:
+        scene, grid, share: What is modelled, its numbering, and the part of this process.
+        q: Configuration before the step.
+        supports, couplings, inelastic: Terms that may give way.
+    """
+
+    scene: Scene
+    grid: Grid
+    share: Share
+    q: Array
+    supports: Supports
+    couplings: list[Couplings | Guides]
+    inelastic: list[InelasticBeams]
+
+    @property
+    def tangent(self) -> Csr:
+        """The latest tangent."""
+
+    def respond_at(self, q1: Array) -> bool:
+        """Evaluate forces and tangent at ``q1``; return whether all processes can."""
 
 
 class Softest(NamedTuple):
@@ -50,7 +77,7 @@ class Softest(NamedTuple):
     yielding: tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]
 
 
-def singularity(simulation: Simulation, q: Array) -> str:
+def singularity(simulation: Failed, q: Array) -> str:
     """Describe why the tangent of a failed step is singular, or nearly so; else empty.
 
     All processes call it together.  Where the latest tangent says nothing, Newton's method may have
@@ -74,7 +101,7 @@ def singularity(simulation: Simulation, q: Array) -> str:
     return _singularity_at(simulation, near) if simulation.respond_at(near) else ""
 
 
-def _singularity_at(simulation: Simulation, q: Array) -> str:
+def _singularity_at(simulation: Failed, q: Array) -> str:
     """Describe why the latest tangent, which is that at ``q``, is singular; empty if it is not."""
     K, free = free_matrix(simulation.share, simulation.tangent, simulation.supports.dofs)
     if not len(free) or not np.isfinite(K.data).all():
@@ -110,7 +137,7 @@ def _singularity_at(simulation: Simulation, q: Array) -> str:
     return f"a mechanism has formed: {_describe(simulation, found)}" if mechanism else ""
 
 
-def _softest(simulation: Simulation, q: Array, x: Array, motions: Array) -> Softest:
+def _softest(simulation: Failed, q: Array, x: Array, motions: Array) -> Softest:
     """What a motion deforms, and what has lost its stiffness there."""
     grid, scene, share = simulation.grid, simulation.scene, simulation.share
     here, ε = x[share.dofs], 1e-6
@@ -144,7 +171,7 @@ def _deforms(found: Softest, of: int) -> bool:
     return bool((sizes[~found.yielding[of]] >= SHARE).any())
 
 
-def _describe(simulation: Simulation, found: Softest) -> str:
+def _describe(simulation: Failed, found: Softest) -> str:
     """Words for a motion that meets no force."""
     grid, scene = simulation.grid, simulation.scene
     moving = np.where(found.motions >= 1 / 2, found.motions, 0.0)

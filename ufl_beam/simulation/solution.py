@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from mpi4py import MPI
 
@@ -35,6 +35,7 @@ from ufl_beam.output.output_files import require_path
 from ufl_beam.output.recorders import on_first
 from ufl_beam.output.saved_functions import SavedCurve, SavedFunction
 from ufl_beam.output.saved_scene import from_data, lost, to_data
+from ufl_beam.output.state_view import StateView
 from ufl_beam.parallel import ours
 from ufl_beam.parameter import TIME
 from ufl_beam.simulation.opened_hinges import Opened, cells_in_words, percent
@@ -42,10 +43,6 @@ from ufl_beam.terms.beams import SectionForces, mass_matrix
 from ufl_beam.terms.energy_ledger import Energy
 from ufl_beam.terms.inelastic_beams import Strains
 from ufl_beam.version import version
-
-if TYPE_CHECKING:
-    from ufl_beam.simulation.simulation import Simulation
-
 
 LEDGER = ("state", "supplied", "lost")
 """The parts of the ledger, see :class:`~ufl_beam.terms.energy_ledger.Energy`."""
@@ -115,7 +112,7 @@ class Solution:
         self._connections: list[Array] = []
         self.internal: State = {}
 
-    def keep(self, simulation: Simulation) -> None:
+    def keep(self, simulation: StateView) -> None:
         """Append the state of the simulation; all processes call it together."""
         share = simulation.share
         self._times.append(simulation.t)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import singledispatch
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -29,12 +29,10 @@ from ufl_beam.model.connectors import (
 )
 from ufl_beam.model.loads import value_at
 from ufl_beam.model.material_laws import Hardening, Layout
+from ufl_beam.model.scene import Scene
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.material_points import INPUTS, Course, Points, expect_entries
 from ufl_beam.terms.openings import Openable
-
-if TYPE_CHECKING:
-    from ufl_beam.simulation.simulation import Simulation
 
 CREEP = 1e-12
 """Part of the size of the scene, or rad, by which what sticks creeps in a step under its limit.
@@ -44,6 +42,21 @@ Only where several places that stick hold the same motion: so they share the for
 
 Rows = tuple[Any, Any, Any]
 """α, β, γ of some connectors: arrays or numbers."""
+
+
+class Running(Protocol):
+    """A simulation, as far as laws of connectors need it.
+
+    Attributes:
+        scene: What is modelled.
+        asked: Forces of controllers, and limits of friction, in the step; N or N m.
+    """
+
+    scene: Scene
+    asked: dict[Connector, float]
+
+    def rates(self, links: Sequence[Connector]) -> Array:
+        """Return the rates of relative motions; (num_links,); m/s or rad/s."""
 
 
 class Setting(NamedTuple):
@@ -57,7 +70,7 @@ class Setting(NamedTuple):
         course: Flags that all points of the scene share.
     """
 
-    simulation: Simulation
+    simulation: Running
     scheme: Scheme
     ledger: Ledger
     friction_repeats: bool
