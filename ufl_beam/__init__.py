@@ -37,32 +37,31 @@ from ufl_beam.mechanics.energy_momentum import (
 )
 from ufl_beam.model.beams import Beam, Place
 from ufl_beam.model.bodies import Body, Spot, ground
-from ufl_beam.model.connectors import (
+from ufl_beam.model.connector_laws import (
     Actuator,
-    Connector,
     Controller,
     Coulomb,
     Damper,
     Function,
+    Motor,
+    RigidPlastic,
+    Spring,
+    Stop,
+)
+from ufl_beam.model.connectors import Connector, Slide, Stretch, Turn
+from ufl_beam.model.damping import KelvinVoigt, Rayleigh
+from ufl_beam.model.distributions import Lognormal, Normal, TruncatedNormal, Weibull
+from ufl_beam.model.fibres import Fibres
+from ufl_beam.model.joints import (
     Guided,
     Joint,
     Link,
-    Motor,
     Prismatic,
     Release,
     Revolute,
     Rigid,
     RigidLink,
-    RigidPlastic,
-    Slide,
-    Spring,
-    Stop,
-    Stretch,
-    Turn,
 )
-from ufl_beam.model.damping import KelvinVoigt, Rayleigh
-from ufl_beam.model.distributions import Lognormal, Normal, TruncatedNormal, Weibull
-from ufl_beam.model.fibres import Fibres
 from ufl_beam.model.loads import (
     FollowerLoad,
     Gravity,
@@ -74,17 +73,9 @@ from ufl_beam.model.loads import (
 )
 from ufl_beam.model.material_laws import DuvautLions, Hardening, LinearSoftening, Perzyna, Softening
 from ufl_beam.model.mesh_options import Mesh
-from ufl_beam.model.scene import (
-    Clamped,
-    Pinned,
-    PointMass,
-    Prescribed,
-    Roller,
-    Scene,
-    Support,
-    Velocity,
-)
+from ufl_beam.model.scene import PointMass, Scene, Velocity
 from ufl_beam.model.sections import Section
+from ufl_beam.model.supports import Clamped, Pinned, Prescribed, Roller, Support
 from ufl_beam.output.events import Event, Events
 from ufl_beam.output.extremes import Extent, Extremes
 from ufl_beam.output.fatigue import Fatigue, HotSpot

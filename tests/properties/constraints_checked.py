@@ -6,8 +6,8 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from ufl_beam.model.bodies import GROUND, Body, Spot
-from ufl_beam.model.connectors import Guide, Motor
-from ufl_beam.model.scene import still
+from ufl_beam.model.connector_laws import Guide, Motor
+from ufl_beam.model.supports import still
 
 COUPLES = {
     # kind of a joint -> whether it keeps the point, and the rotation

@@ -9,7 +9,8 @@ import pytest
 from test_tangent import Probe
 
 import ufl_beam as ub
-from ufl_beam.model.connectors import HELD, Connector
+from ufl_beam.model.connector_laws import HELD
+from ufl_beam.model.connectors import Connector
 
 SCHEMES = [ub.Midpoint(), ub.Midpoint(0.1, 0.1), ub.ExactStatic(0.5), ub.Static()]
 EXACT = SCHEMES[:3]

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.model.connectors import HELD
+from ufl_beam.model.connector_laws import HELD
 from ufl_beam.output.saved_scene import RECORDS, from_data, to_data
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "properties"))

@@ -13,7 +13,8 @@ from ufl_beam.analysis.path_corrector import Walk
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, StepFailed, require_kind, require_number
 from ufl_beam.model.beams import Place
-from ufl_beam.model.scene import COMPONENTS, Scene
+from ufl_beam.model.scene import Scene
+from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.simulation.simulation import Trial
 
 SHORTEST = 1e-3

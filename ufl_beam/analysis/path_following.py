@@ -17,7 +17,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError, StepFailed, require_count, require_function, require_kind
 from ufl_beam.mechanics.classical import Static
-from ufl_beam.model.connectors import Actuator, Controller, Motor
+from ufl_beam.model.connector_laws import Actuator, Controller, Motor
 from ufl_beam.model.loads import TimeFunction
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene

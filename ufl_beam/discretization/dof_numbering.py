@@ -26,7 +26,8 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.material_laws import Softening
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.plastic_hinges import place_of
-from ufl_beam.model.scene import COMPONENTS, Scene
+from ufl_beam.model.scene import Scene
+from ufl_beam.model.supports import COMPONENTS
 
 
 class Grid:

@@ -15,10 +15,11 @@ from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import warn
 from ufl_beam.model.beams import Place
 from ufl_beam.model.bodies import GROUND, Spot, carries
-from ufl_beam.model.connectors import HELD, Motor
+from ufl_beam.model.connector_laws import HELD, Motor
 from ufl_beam.model.loads import FollowerLoad, PointLoad, value_at
 from ufl_beam.model.plastic_hinges import place_of
-from ufl_beam.model.scene import COMPONENTS, Scene
+from ufl_beam.model.scene import Scene
+from ufl_beam.model.supports import COMPONENTS
 
 TOUCHING = 1e-3
 """Distance of places that touch, as a part of the length of the shorter beam."""

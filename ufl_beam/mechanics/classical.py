@@ -15,7 +15,7 @@ from ufl_beam.errors import SceneError, require_number
 from ufl_beam.mechanics import kinematics
 from ufl_beam.mechanics.kinematics import Axis
 from ufl_beam.mechanics.time_schemes import Constant, Rates, Step, require_between, scaled
-from ufl_beam.model.connectors import Coulomb, Guide, Motor
+from ufl_beam.model.connector_laws import Coulomb, Guide, Motor
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.material_laws import Softening, Values
 from ufl_beam.model.scene import Scene

@@ -119,3 +119,15 @@ def require_anchor(anchor: object, owner: str) -> None:
             f"{owner}: {shorten(anchor)} is not a place; use beam.start, .end or .at(s), "
             "body.at(x, y) or ground(x, y)"
         )
+
+
+def require_node(place: object, owner: str) -> None:
+    """Raise :class:`SceneError` naming ``owner`` unless the motion of a place is that of a node."""
+    require_anchor(place, owner)
+    if isinstance(place, Spot) and place.body is GROUND:
+        raise SceneError(f"{owner}: {place} does not move")
+    if not carries(place):  # type: ignore[arg-type]
+        raise SceneError(
+            f"{owner}: {place} is not the centre of the body; hold other points by joints to "
+            "ground(x, y), and give masses to the body itself"
+        )

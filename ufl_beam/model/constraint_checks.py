@@ -13,8 +13,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError
 from ufl_beam.model.beams import Beam, Point
 from ufl_beam.model.bodies import GROUND, Anchor, Body, Node, Spot, node
-from ufl_beam.model.connectors import (
-    Connector,
+from ufl_beam.model.connector_laws import (
     Coulomb,
     Damper,
     Function,
@@ -24,6 +23,7 @@ from ufl_beam.model.connectors import (
     Spring,
     Stop,
 )
+from ufl_beam.model.connectors import Connector
 from ufl_beam.model.loads import value_at
 from ufl_beam.model.plastic_hinges import Slot
 from ufl_beam.model.scene import PointMass, Scene

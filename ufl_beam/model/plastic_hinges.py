@@ -7,7 +7,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from ufl_beam.errors import SceneError
 from ufl_beam.model.beams import Beam, Place
 from ufl_beam.model.bodies import Anchor, Node, node
-from ufl_beam.model.connectors import Connector, Joint, RigidPlastic
+from ufl_beam.model.connector_laws import RigidPlastic
+from ufl_beam.model.connectors import Connector
+from ufl_beam.model.joints import Joint
 from ufl_beam.model.material_laws import HingeLaw
 
 Slot = tuple[Node, int]

@@ -11,7 +11,9 @@ from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import GROUND, Anchor, Spot, arm, node
-from ufl_beam.model.connectors import Connector, Guide, Joint
+from ufl_beam.model.connector_laws import Guide
+from ufl_beam.model.connectors import Connector
+from ufl_beam.model.joints import Joint
 from ufl_beam.model.plane_curves import nearest, parameter_step, tangent
 from ufl_beam.model.scene import Scene
 

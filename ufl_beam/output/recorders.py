@@ -19,7 +19,8 @@ from ufl_beam.collective_errors import portable
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError, require_count, require_kind, require_sequence
 from ufl_beam.model.bodies import Anchor, require_anchor
-from ufl_beam.model.connectors import Connector, Joint
+from ufl_beam.model.connectors import Connector
+from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.joint_histories import links_of, motion_of
 from ufl_beam.output.output_files import (

@@ -20,15 +20,18 @@ from ufl_beam.model import (
     axis_curves,
     beams,
     bodies,
+    connector_laws,
     connectors,
     damping,
     distributions,
     fibres,
+    joints,
     loads,
     material_laws,
     mesh_options,
     scene,
     sections,
+    supports,
 )
 from ufl_beam.output import saved_functions
 from ufl_beam.output.saved_functions import LostFunction
@@ -40,8 +43,8 @@ Sampling = Callable[[Any, str, Any], Any]
 """Record that stands for a function, given the record and the field that it is in."""
 
 MODULES: tuple[ModuleType, ...] = (
-    *(axis_curves, beams, bodies, connectors, damping, distributions, fibres, loads),
-    *(material_laws, mesh_options, saved_functions, scene, sections),
+    *(axis_curves, beams, bodies, connector_laws, connectors, damping, distributions, fibres),
+    *(joints, loads, material_laws, mesh_options, saved_functions, scene, sections, supports),
 )
 
 RECORDS: dict[str, type] = {
@@ -54,9 +57,9 @@ RECORDS: dict[str, type] = {
 
 KNOWN: dict[str, Any] = {
     "GROUND": bodies.GROUND,
-    "HELD": connectors.HELD,
+    "HELD": connector_laws.HELD,
     "steady": loads.steady,
-    "still": scene.still,
+    "still": supports.still,
 }
 """What is the same object in every scene."""
 

@@ -14,8 +14,10 @@ from ufl_beam.discretization.dof_numbering import Grid, Share
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.bodies import Anchor
-from ufl_beam.model.connectors import Connector, Joint
-from ufl_beam.model.scene import Scene, Support
+from ufl_beam.model.connectors import Connector
+from ufl_beam.model.joints import Joint
+from ufl_beam.model.scene import Scene
+from ufl_beam.model.supports import Support
 from ufl_beam.output.joint_histories import Connection, links_of, motion_of, velocity_of
 from ufl_beam.parameter import Parameter
 from ufl_beam.terms.beams import Inertia, SectionForces

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from ufl_beam.model.bodies import GROUND, Anchor, Body, Spot
-from ufl_beam.model.connectors import Connector, Joint
+from ufl_beam.model.connectors import Connector
+from ufl_beam.model.joints import Joint
 from ufl_beam.model.loads import FollowerLoad, PointLoad
 from ufl_beam.model.scene import Scene
 

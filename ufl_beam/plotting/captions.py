@@ -9,7 +9,7 @@ from functools import singledispatch
 
 from ufl_beam.model.beams import Beam
 from ufl_beam.model.bodies import Body
-from ufl_beam.model.connectors import Coulomb, Damper, Law, RigidPlastic, Spring, Stop
+from ufl_beam.model.connector_laws import Coulomb, Damper, Law, RigidPlastic, Spring, Stop
 from ufl_beam.model.damping import Damping, KelvinVoigt, Rayleigh
 from ufl_beam.model.material_laws import HingeLaw
 from ufl_beam.model.scene import Scene

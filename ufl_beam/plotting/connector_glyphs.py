@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.model.connectors import (
+from ufl_beam.model.connector_laws import (
     Actuator,
     Controller,
     Coulomb,

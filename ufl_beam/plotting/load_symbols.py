@@ -22,7 +22,8 @@ from ufl_beam.model.loads import (
     TimeFunction,
     steady,
 )
-from ufl_beam.model.scene import COMPONENTS, Support, Velocity
+from ufl_beam.model.scene import Velocity
+from ufl_beam.model.supports import COMPONENTS, Support
 from ufl_beam.plotting.connector_glyphs import GREEN, RED, WHITE
 from ufl_beam.plotting.labels import Label, Spot
 from ufl_beam.plotting.plots import with_unit

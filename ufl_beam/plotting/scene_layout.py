@@ -13,7 +13,8 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.model.beams import Curve
 from ufl_beam.model.bodies import GROUND, Anchor, Body, Spot
-from ufl_beam.model.connectors import Connector, Guide
+from ufl_beam.model.connector_laws import Guide
+from ufl_beam.model.connectors import Connector
 from ufl_beam.model.plane_curves import nearest, parameter_step, tangent
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.joint_histories import motion_of, turned

@@ -15,8 +15,10 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.model.beams import Place
 from ufl_beam.model.bodies import GROUND, Anchor, Spot, node
-from ufl_beam.model.connectors import Connector, Guide, Joint
-from ufl_beam.model.scene import Support
+from ufl_beam.model.connector_laws import Guide
+from ufl_beam.model.connectors import Connector
+from ufl_beam.model.joints import Joint
+from ufl_beam.model.supports import Support
 from ufl_beam.output.joint_histories import turned
 from ufl_beam.plotting.connector_glyphs import (
     AROUND,

@@ -11,9 +11,9 @@ from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.state_io import State
 from ufl_beam.discretization.state_transfer import Transfer, same_unknowns
 from ufl_beam.errors import SceneError, require_kind, warn
-from ufl_beam.model.connectors import HELD
+from ufl_beam.model.connector_laws import HELD
 from ufl_beam.model.mesh_options import Mesh
-from ufl_beam.model.scene import COMPONENTS, Support
+from ufl_beam.model.supports import COMPONENTS, Support
 from ufl_beam.simulation.solution import Solution
 
 

@@ -37,7 +37,8 @@ from ufl_beam.errors import (
     shorten,
 )
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
-from ufl_beam.model.connectors import Connector, Controller, Coulomb
+from ufl_beam.model.connector_laws import Controller, Coulomb
+from ufl_beam.model.connectors import Connector
 from ufl_beam.model.constraint_checks import (
     friction_repeats,
     no_number,

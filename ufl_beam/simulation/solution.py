@@ -19,9 +19,12 @@ from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError
 from ufl_beam.model.beams import Beam, Curve, Place
 from ufl_beam.model.bodies import Anchor, Spot
-from ufl_beam.model.connectors import Connector, Controller, Function, Guide, Joint
+from ufl_beam.model.connector_laws import Controller, Function, Guide
+from ufl_beam.model.connectors import Connector
+from ufl_beam.model.joints import Joint
 from ufl_beam.model.plane_curves import nearest, parameter_step
-from ufl_beam.model.scene import Scene, Support
+from ufl_beam.model.scene import Scene
+from ufl_beam.model.supports import Support
 from ufl_beam.output.archive import read, write
 from ufl_beam.output.joint_histories import (
     Connection,

@@ -15,10 +15,9 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.errors import require_returned
 from ufl_beam.mechanics.time_schemes import Scheme, Step
-from ufl_beam.model.connectors import (
+from ufl_beam.model.connector_laws import (
     HELD,
     Actuator,
-    Connector,
     Controller,
     Coulomb,
     Damper,
@@ -27,6 +26,7 @@ from ufl_beam.model.connectors import (
     Spring,
     Stop,
 )
+from ufl_beam.model.connectors import Connector
 from ufl_beam.model.loads import value_at
 from ufl_beam.model.material_laws import Hardening, Layout
 from ufl_beam.model.scene import Scene

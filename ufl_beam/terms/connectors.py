@@ -18,7 +18,8 @@ from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem, line_mesh, space_with_dofs
 from ufl_beam.mechanics.relative_motions import MOTIONS, Numbers, Pair
 from ufl_beam.mechanics.time_schemes import Step
-from ufl_beam.model.connectors import HELD, Connector, Law, RigidPlastic, Spring
+from ufl_beam.model.connector_laws import HELD, Law, RigidPlastic, Spring
+from ufl_beam.model.connectors import Connector
 from ufl_beam.terms.connector_laws import Setting, respond
 from ufl_beam.terms.guide_curves import Guides
 from ufl_beam.terms.links import Links

@@ -20,7 +20,8 @@ from ufl_beam.compiled.c_library import doubles, ffi, integers, lib
 from ufl_beam.discretization.compiled_functions import Pointwise
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.beams import Place
-from ufl_beam.model.connectors import Connector, RigidPlastic
+from ufl_beam.model.connector_laws import RigidPlastic
+from ufl_beam.model.connectors import Connector
 from ufl_beam.model.material_laws import Bulk, Hardening, Softening
 from ufl_beam.model.plastic_hinges import law_of
 from ufl_beam.terms.connector_laws import Rows, Setting
