@@ -43,7 +43,7 @@ def broken(ratio, cells=16):
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
     path = ub.follow(
         scene,
-        ub.Dissipation(energy / 40, ub.ArcLength(0.1)),
+        ub.DissipationControl(energy / 40, ub.ArcLength(0.1)),
         until=lambda now: now.ledger.lost["hinges"] > 0.97 * energy,
         record=ub.XDMF(output / f"hinge_snapback_{ratio:g}.xdmf"),
     )

@@ -138,5 +138,5 @@ assert [point.kind for point in path.critical] == ["limit", "limit"]
 # %% [markdown]
 # ## Try this
 #
-# * `ub.Displacement(place, "v", -0.01)` in the place of the arc length: how far does it get?
+# * `ub.DisplacementControl(place, "v", -0.01)` in the place of the arc length: how far does it get?
 # * 30 and 120 cells: the limit load with Richardson's extrapolation has six digits.

@@ -16,7 +16,12 @@ from ufl_beam.analysis.free_decay import (
 )
 from ufl_beam.analysis.modes import Buckling, Modes, buckling, modes
 from ufl_beam.analysis.parameter_study import study
-from ufl_beam.analysis.path_controls import ArcLength, Displacement, Dissipation, Load
+from ufl_beam.analysis.path_controls import (
+    ArcLength,
+    DisplacementControl,
+    DissipationControl,
+    LoadControl,
+)
 from ufl_beam.analysis.path_following import Path, follow
 from ufl_beam.analysis.study_file import Study
 from ufl_beam.analysis.tradeoff import tradeoff
@@ -42,7 +47,7 @@ from ufl_beam.model.connector_laws import (
     Controller,
     Coulomb,
     Damper,
-    Function,
+    ForceLaw,
     Motor,
     RigidPlastic,
     Spring,
@@ -127,8 +132,8 @@ __all__ = [
     "Damper",
     "Decay",
     "DecayingMidpoint",
-    "Displacement",
-    "Dissipation",
+    "DisplacementControl",
+    "DissipationControl",
     "DuvautLions",
     "Energy",
     "Envelope",
@@ -140,7 +145,7 @@ __all__ = [
     "Fatigue",
     "Fibres",
     "FollowerLoad",
-    "Function",
+    "ForceLaw",
     "GeneralizedAlpha",
     "Gerber",
     "Goodman",
@@ -154,7 +159,7 @@ __all__ = [
     "LineLoad",
     "LinearSoftening",
     "Link",
-    "Load",
+    "LoadControl",
     "Lognormal",
     "Mesh",
     "Midpoint",

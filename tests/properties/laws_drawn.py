@@ -162,7 +162,7 @@ class Laws:
             "Spring": f"ub.Spring({text})",
             "yields": f"ub.Spring({text}, law={yields})",
             "breaks": f"ub.Spring({text}, softening={breaks})",
-            "Function": f"ub.Function(lambda e, rate: {text} * e + "
+            "Function": f"ub.ForceLaw(lambda e, rate: {text} * e + "
             f"{say.number(k / way**2, cubic)} * e**3 + "
             f"{say.number(0.0 if self._static else c, of_c)} * rate)",
             "Stop": f"ub.Stop({text}, low={say.number(-low, of_e)}, high={say.number(high, of_e)})",

@@ -275,7 +275,7 @@ class _Writer:
             f"ub.Stop({k:.6g}, low={-way:.6g}, high={way / 2:.6g})",
             f"ub.Damper({c:.6g})",
             f"ub.Actuator(lambda t: {force:.6g} * math.sin({1 / time:.6g} * t))",
-            f"ub.Function(lambda e, rate: {k:.6g} * (e + {1 / length**2:.6g} * e**3) + "
+            f"ub.ForceLaw(lambda e, rate: {k:.6g} * (e + {1 / length**2:.6g} * e**3) + "
             f"{c:.6g} * rate)",
         ]
 

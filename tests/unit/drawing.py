@@ -60,7 +60,7 @@ def stepped(time):
 def followed(time):
     size = 3 + time(0.9 if time is not fails else 0.1)
     end, scene = scene_of(lambda t: t * size)
-    return ub.follow(scene, ub.Load(0.25), steps=4).displacement(end)[-1].tolist()
+    return ub.follow(scene, ub.LoadControl(0.25), steps=4).displacement(end)[-1].tolist()
 
 
 RUNS = {

@@ -127,7 +127,7 @@ def controller(fail):
 
 
 def function(fail):
-    connected(ub.Function(lambda motion, rate: fail() if abs(motion) > 1e-5 else 0.0))
+    connected(ub.ForceLaw(lambda motion, rate: fail() if abs(motion) > 1e-5 else 0.0))
 
 
 def guide(fail):
@@ -166,7 +166,7 @@ def checkpoint(fail):
 
 def path(fail):
     moves = ub.Prescribed(BEAM.end, v=lambda t: fail() if t > 0.3 else 0.1 * t)
-    ub.follow(scene(loads=[], supports=[ub.Clamped(BEAM.start), moves]), ub.Load(0.1))
+    ub.follow(scene(loads=[], supports=[ub.Clamped(BEAM.start), moves]), ub.LoadControl(0.1))
 
 
 EVERYWHERE = [load, load_in_statics, gravity, controller, recorder, beginning, checkpoint]

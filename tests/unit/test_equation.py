@@ -47,7 +47,7 @@ def machine():
         joints=[ub.Revolute(crank.end, rod.start), ub.Guided(rod.end, lambda s: (3.0 + s, 0.0))],
         connectors=[
             ub.Turn(crank.end, rod.start, spring),
-            ub.Stretch(ground, rod.end, ub.Function(lambda e, de: 3.0 * e**3 + 0.1 * de)),
+            ub.Stretch(ground, rod.end, ub.ForceLaw(lambda e, de: 3.0 * e**3 + 0.1 * de)),
         ],
         supports=[ub.Pinned(crank.start)],
         loads=[ub.PointLoad(rod.at(0.5), force=(0.0, 10.0))],
@@ -102,7 +102,7 @@ def test_what_python_raises_in_the_middle_arrives():
         raise ZeroDivisionError("of the user")
 
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
-    law = ub.Function(force)
+    law = ub.ForceLaw(force)
     scene = ub.Scene(
         [beam],
         supports=[ub.Clamped(beam.start)],

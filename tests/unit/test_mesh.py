@@ -180,7 +180,7 @@ def test_modes_and_buckling():
     assert ub.modes(scene, 1, at=state).grid.mesh == mesh
     with pytest.raises(ub.SceneError, match="modes: at is a solution of other beams, joints or"):
         ub.modes(scene, 1, at=state, mesh=ub.Mesh())
-    path = ub.follow(scene, ub.Load(0.5), steps=2, mesh=mesh)
+    path = ub.follow(scene, ub.LoadControl(0.5), steps=2, mesh=mesh)
     assert len(path.section_forces(beam)) == 32
 
 

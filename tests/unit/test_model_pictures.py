@@ -52,7 +52,7 @@ LAWS = {
     "motor": ub.Motor(lambda t: t),
     "actuator": ub.Actuator(lambda t: t),
     "controller": ub.Controller(lambda simulation: 0.0),
-    "function": ub.Function(lambda motion, rate: motion),
+    "function": ub.ForceLaw(lambda motion, rate: motion),
     "rigid-plastic": ub.RigidPlastic(ub.Softening(1e3, 10.0)),
 }
 

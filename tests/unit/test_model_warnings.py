@@ -109,7 +109,7 @@ def test_massless_parts_whose_motion_is_not_determined(hold, moves):
             }
             for law in (
                 ub.Spring(1.0), ub.Damper(1.0), ub.Motor(lambda t: t), ub.Coulomb(1.0),
-                ub.Function(lambda e, rate: e), ub.Stop(1.0, low=0.0),
+                ub.ForceLaw(lambda e, rate: e), ub.Stop(1.0, low=0.0),
             )
         ),
     ],

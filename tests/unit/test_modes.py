@@ -296,8 +296,8 @@ def mixed():
         ],
         connectors=[
             ub.Turn(b.end, c.start, ub.Spring(7.0)),
-            ub.Stretch(b.end, d.end, ub.Function(lambda x, v: 5 * x + 30 * x**2 + 20 * x**3)),
-            ub.Turn(body.middle, d.end, ub.Function(lambda x, v: 5 * x + 3 * x**2)),
+            ub.Stretch(b.end, d.end, ub.ForceLaw(lambda x, v: 5 * x + 30 * x**2 + 20 * x**3)),
+            ub.Turn(body.middle, d.end, ub.ForceLaw(lambda x, v: 5 * x + 3 * x**2)),
             ub.Turn(ub.ground(1, 2.7), body.middle, ub.Spring(3.0)),
             ub.Stretch(a.at(0.5), d.start, ub.Spring(11.0)),
         ],

@@ -180,5 +180,5 @@ def test_paths_warn_too():
     """At the end of :func:`follow`."""
     beam, scene = pushed(ub.Softening(LIMIT, 100.0))
     with pytest.warns(ub.ModelWarning, match="girder: the hinge of the section"):
-        path = ub.follow(scene, ub.Displacement(beam.at(0.5), "v", 2e-4), steps=30)
+        path = ub.follow(scene, ub.DisplacementControl(beam.at(0.5), "v", 2e-4), steps=30)
     assert beam in path.hinge_place_error()

@@ -102,7 +102,7 @@ def test_the_same_recorder_twice(shared_path):
     with pytest.raises(ub.SceneError, match=r"record\[0\] and record\[2\] are the same History"):
         run(table, ub.Events(), table)
     with pytest.raises(ub.SceneError, match=r"follow: record\[0\] and record\[1\] are the same"):
-        ub.follow(scene(), ub.Load(0.5), record=[table, table])
+        ub.follow(scene(), ub.LoadControl(0.5), record=[table, table])
 
 
 @pytest.mark.parametrize(

@@ -460,7 +460,7 @@ LAWS = [
     ub.Damper(1.0),
     ub.Stop(100.0, high=0.05),
     ub.Coulomb(0.1),
-    ub.Function(lambda x, v: 10.0 * x),
+    ub.ForceLaw(lambda x, v: 10.0 * x),
     ub.RigidPlastic(ub.Softening(0.5, 1.0)),
 ]
 

@@ -228,7 +228,7 @@ class ArcLength:
 
 
 @dataclass(frozen=True)
-class Load:
+class LoadControl:
     """Steps of the load factor, up to the limit load.
 
     Args:
@@ -242,7 +242,7 @@ class Load:
     factor = 1.0
 
     def __post_init__(self) -> None:
-        _require_step(self.step, "Load")
+        _require_step(self.step, "LoadControl")
 
     def require(self, scene: Scene) -> None:
         """It fits all scenes."""
@@ -262,7 +262,7 @@ class Load:
 
 
 @dataclass(frozen=True)
-class Displacement:
+class DisplacementControl:
     """Steps of one component of the motion of a place, through limit points of loads.
 
     Args:
@@ -280,19 +280,19 @@ class Displacement:
     factor = math.inf
 
     def __post_init__(self) -> None:
-        require_kind(self.place, Place, "Displacement: place")
+        require_kind(self.place, Place, "DisplacementControl: place")
         if self.component not in COMPONENTS:
             raise SceneError(
-                f"Displacement: component = {self.component!r} must be one of "
+                f"DisplacementControl: component = {self.component!r} must be one of "
                 f"{', '.join(COMPONENTS)}"
             )
-        _require_step(self.step, "Displacement")
+        _require_step(self.step, "DisplacementControl")
 
     def require(self, scene: Scene) -> None:
         """The beam of the place is in the scene."""
         if self.place.beam not in scene.beams:
             raise SceneError(
-                f"Displacement of {self.place}: {self.place.beam.name} is not in the scene"
+                f"DisplacementControl of {self.place}: {self.place.beam.name} is not in the scene"
             )
 
     def _normal(self, walk: Walk) -> Direction:
@@ -318,7 +318,7 @@ class Displacement:
 
 
 @dataclass(frozen=True)
-class Dissipation:
+class DissipationControl:
     """Steps of the energy that hinges and yielding beams dissipate, through sharp snap-backs.
 
     Softening and unloading may begin in nearly the same direction; only one of them dissipates.
@@ -335,8 +335,8 @@ class Dissipation:
     otherwise: ArcLength = field(default_factory=lambda: ArcLength(0.05))
 
     def __post_init__(self) -> None:
-        require_number(self.step, "Dissipation: step", positive=True)
-        require_kind(self.otherwise, ArcLength, "Dissipation: otherwise")
+        require_number(self.step, "DissipationControl: step", positive=True)
+        require_kind(self.otherwise, ArcLength, "DissipationControl: otherwise")
 
     @property
     def factor(self) -> float:

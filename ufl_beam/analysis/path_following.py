@@ -31,7 +31,7 @@ from ufl_beam.solvers.newton import Newton
 
 ADVICE = (
     "Try a shorter step or another control: ArcLength goes through limit points of loads and of "
-    "displacements, Dissipation through softening that snaps back"
+    "displacements, DissipationControl through softening that snaps back"
 )
 
 SMALLEST_PART = 2.0**-12
@@ -373,7 +373,8 @@ def follow(
 
     Args:
         scene: What is modelled; some load or motion must vary in time, ``time=lambda t: t``.
-        control: :class:`ArcLength`, :class:`Load`, :class:`Displacement` or :class:`Dissipation`.
+        control: :class:`ArcLength`, :class:`LoadControl`, :class:`DisplacementControl` or
+            :class:`DissipationControl`.
         until: The path ends after the first step for which this is true, as in
             ``until=lambda now: now.displacement(tip)[1] < -0.5``; ``now.t`` is the load factor.
         steps: The path ends after so many.
@@ -393,8 +394,8 @@ def follow(
     require_kind(scene, Scene, "scene")
     if not isinstance(control, Control) or isinstance(control, type):
         raise SceneError(
-            f"follow: control = {control!r} must be ArcLength(...), Load(...), Displacement(...) "
-            "or Dissipation(...)"
+            f"follow: control = {control!r} must be ArcLength(...), LoadControl(...), "
+            "DisplacementControl(...) or DissipationControl(...)"
         )
     control.require(scene)
     require_count(steps, "follow: steps")

@@ -84,7 +84,8 @@ class Static(_AtEnd):
         "Try a smaller dt; beyond a limit load, and where softening snaps back (limit**2/energy of "
         "a hinge, half of it if softening is linear, above the stiffness that drives it), there is "
         "no equilibrium nearby: follow the path with ub.follow(scene, ub.ArcLength(...)) or "
-        "ub.Dissipation(...), prescribe a displacement in the place of the load, or run dynamics"
+        "ub.DissipationControl(...), prescribe a displacement in the place of the load, or run "
+        "dynamics"
     )
     slack = 0.05
 

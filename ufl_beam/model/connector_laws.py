@@ -154,7 +154,7 @@ class Stop:
 
 
 @dataclass(frozen=True)
-class Function:
+class ForceLaw:
     """A force that a function of the motion and its rate gives, as a spring or damper would.
 
     Args:
@@ -166,7 +166,7 @@ class Function:
     force: Callable[[float, float], float]
 
     def __post_init__(self) -> None:
-        require_function(self.force, "Function: force", "(motion, rate)")
+        require_function(self.force, "ForceLaw: force", "(motion, rate)")
 
 
 @dataclass(frozen=True)
@@ -251,7 +251,7 @@ Law = (
     | Spring
     | Damper
     | Stop
-    | Function
+    | ForceLaw
     | Coulomb
     | RigidPlastic
 )

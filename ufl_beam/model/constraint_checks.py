@@ -16,7 +16,7 @@ from ufl_beam.model.bodies import GROUND, Anchor, Body, Node, Spot, node
 from ufl_beam.model.connector_laws import (
     Coulomb,
     Damper,
-    Function,
+    ForceLaw,
     Guide,
     Motor,
     RigidPlastic,
@@ -221,7 +221,7 @@ def _center(part: Beam | Body) -> Point:
     return (xa + xb) / 2, (ya + yb) / 2
 
 
-RESISTING = (Motor, Guide, Spring, Function, RigidPlastic)
+RESISTING = (Motor, Guide, Spring, ForceLaw, RigidPlastic)
 """Laws of connectors that resist every motion; others bear nothing, or what they are told."""
 
 

@@ -17,7 +17,7 @@ from ufl_beam.model.connector_laws import (
     Controller,
     Coulomb,
     Damper,
-    Function,
+    ForceLaw,
     Motor,
     RigidPlastic,
     Spring,
@@ -104,7 +104,7 @@ STRAIGHT: dict[type, list[Piece]] = {
         *_ARROW,
         Piece([(0.9, 0.0), (0.9, 1.15), (-0.25, 1.15), (-0.25, 0.6)], weight=1.0),
     ],
-    Function: [
+    ForceLaw: [
         *_LEADS,
         _box(-0.8, 0.8, 0.6, WHITE),
         Piece([(-0.55, -0.35), (-0.25, -0.27), (0.25, 0.27), (0.55, 0.35)], inside=True),
@@ -136,7 +136,7 @@ def _turning(fill: str, *more: Piece, tail: float = -2.0) -> Glyph:
 
 AROUND: dict[type, Glyph] = {
     Spring: Glyph([Piece([(2.0, CENTRE), (2.0, -2.1), (-2.0, 0.0)])], sweep=4.3 * math.pi),
-    **{law: _bent(law) for law in (Damper, Stop, Coulomb, Function, RigidPlastic)},
+    **{law: _bent(law) for law in (Damper, Stop, Coulomb, ForceLaw, RigidPlastic)},
     Motor: _turning(ORANGE),
     Actuator: _turning(WHITE),
     Controller: _turning(WHITE, _box(-2.0, -1.4, 0.5, WHITE), tail=-1.4),

@@ -19,7 +19,7 @@ from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError
 from ufl_beam.model.beams import Beam, Curve, Place
 from ufl_beam.model.bodies import Anchor, Spot
-from ufl_beam.model.connector_laws import Controller, Function, Guide
+from ufl_beam.model.connector_laws import Controller, ForceLaw, Guide
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.plane_curves import nearest, parameter_step
@@ -231,7 +231,7 @@ class Solution:
             return SavedCurve.of(function, 0.0, 1.0, self.grid.parameters(owner))
         if field == "curve":
             return self._used_curve(function)
-        if field in TIME_FUNCTIONS and not isinstance(owner, Controller | Function):
+        if field in TIME_FUNCTIONS and not isinstance(owner, Controller | ForceLaw):
             return SavedFunction.of(function, self._times)
         return lost(owner, field, function)
 

@@ -21,7 +21,7 @@ from ufl_beam.model.connector_laws import (
     Controller,
     Coulomb,
     Damper,
-    Function,
+    ForceLaw,
     Motor,
     Spring,
     Stop,
@@ -344,7 +344,7 @@ class _Damped(_Working):
         return -factor, 1.0, -factor * self._e0
 
 
-@respond.register(Function)
+@respond.register(ForceLaw)
 class _Asked(_Working):
     """Forces that a function of motion and rate gives."""
 
@@ -380,7 +380,7 @@ class _Asked(_Working):
 
 
 def _given(link: Connector, force: Any, motion: Any, rate: Any) -> float:
-    """Evaluate the force of a :class:`Function`; its owner is named if it is no number."""
+    """Evaluate the force of a :class:`ForceLaw`; its owner is named if it is no number."""
     value = force(motion, rate)
     if isinstance(value, float):
         return value
