@@ -44,7 +44,7 @@ def alone() -> Iterator[None]:
 
 
 def in_study() -> bool:
-    """Whether this is a member of a study, which shows no progress of its own."""
+    """Return whether this is a member of a study, which shows no progress of its own."""
     return _OURS.get() != MPI.COMM_WORLD
 
 

@@ -174,7 +174,7 @@ class Stiffness:
         return x
 
     def passed(self, other: Stiffness) -> bool:
-        """Whether an eigenvalue has passed zero on the way from another state."""
+        """Return whether an eigenvalue has passed zero on the way from another state."""
         change = self.negative - other.negative
         return bool(change if self.symmetric and other.symmetric else change % 2)
 

@@ -40,7 +40,7 @@ class Envelope:
 
 @dataclass(frozen=True, eq=False)
 class Decay:
-    """How the peaks of a free vibration decay.
+    """Decay of the peaks of a free vibration.
 
     Attributes:
         times: Times of the n peaks; (n,); s.
@@ -86,7 +86,7 @@ class Decay:
 
     @property
     def evidence(self) -> float:
-        """How many times likelier the better law is, exp(ΔAIC/2); both have two parameters.
+        """Evidence ratio of the better law, exp(ΔAIC/2); both have two parameters.
 
         For independent normal residuals; what is below round-off counts as round-off.
         """

@@ -222,7 +222,7 @@ class SmallMotions:
         return np.concatenate([s, decay[slows]]), np.hstack([x, N @ how[:, slows]])
 
     def _with_zeros(self, s: Complex, x: Complex, free: Array) -> tuple[Complex, Complex]:
-        """What nothing resists has the exponent zero, once, in the place of what is near to it."""
+        """Replace eigenvalues of rigid-body modes that are nearly zero by exact zeros."""
         momentum, mass = free.T @ (self.M @ x), np.sum(x.conj() * (self.M @ x), axis=0).real
         own = np.linalg.solve(free.T @ (self.M @ free), momentum)
         part = np.sum(momentum.conj() * own, axis=0).real / mass

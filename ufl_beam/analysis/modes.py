@@ -1,4 +1,4 @@
-"""What users ask about small motions: natural frequencies, damping ratios, buckling loads."""
+"""Small motions: natural frequencies, damping ratios, buckling loads, their shapes."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Shapes(ABC):
     @property
     @abstractmethod
     def titles(self) -> list[str]:
-        """What to write beside each shape."""
+        """Captions of the shapes."""
 
     def __len__(self) -> int:
         return int(self.shapes.shape[1])
@@ -149,7 +149,7 @@ class _Frame:
         self._forces, self._state, self._change = forces, shapes.q, change
 
     may_break = False
-    """Whether something yields; modes are elastic."""
+    """True if something yields; modes are elastic."""
 
     def velocities(self) -> list[Array]:
         """Shapes have none."""
@@ -160,7 +160,7 @@ class _Frame:
         return []
 
     def connections(self) -> Array:
-        """What connectors do is left out."""
+        """Return nothing: histories of connectors are left out."""
         return np.zeros((len(self.scene.links), len(Connection._fields)))
 
     def section_forces(self) -> Array:

@@ -64,7 +64,7 @@ class Given:
         self._t = t
 
     def miss(self, q: Array, t: float) -> float:
-        """What is missing."""
+        """Return the residual."""
         return t - self._t
 
     def slope(self, q: Array, way: Direction) -> float:
@@ -73,7 +73,7 @@ class Given:
 
 
 class Dissipated:
-    """What beams dissipate in a step.
+    """Constraint of the energy that is dissipated in a step.
 
     Args:
         walk: What steps.
@@ -108,7 +108,7 @@ def _across(walk: Walk, normal: Direction, reach: float, what: str) -> Trial:
         return walk.share.total(float(normal.q @ way.q)) + normal.t * way.t
 
     def length(rest: float, way: Direction) -> float:
-        """How far to go along a way."""
+        """Return the length of the step along a direction."""
         speed = along(way)
         if not speed * reach > 0:
             raise StepFailed(f"{what} turns back, where this control cannot follow; take ArcLength")
@@ -138,7 +138,7 @@ def _joined(gone: Direction, way: Direction, length: float) -> Direction:
 
 @runtime_checkable
 class Control(Protocol):
-    """What decides how long the steps along a path are."""
+    """Protocol of path controls, which set the lengths of steps."""
 
     @property
     def factor(self) -> float:
@@ -198,7 +198,7 @@ class ArcLength:
         return self.step * way.t
 
     def onward(self, walk: Walk, gone: Direction, way: Direction) -> float:
-        """What yields or opens goes on doing so; else the path turns by less than a right angle."""
+        """Choose the direction: plastic flow and openings go on, else the turn is below π/2."""
         side = walk.side(walk.simulation.q + gone.q, way)
         return side or walk.product(gone, way, self.factor)
 

@@ -29,17 +29,17 @@ MET = 1e-9
 
 
 class Constraint(Protocol):
-    """What a step must fulfil besides equilibrium; numbers without dimension."""
+    """Equation of a step besides equilibrium; without dimension."""
 
     def miss(self, q: Array, t: float) -> float:
-        """What is missing in a state."""
+        """Return the residual in a state."""
 
     def slope(self, q: Array, way: Direction) -> float:
         """Its derivative along a way from there."""
 
 
 class Walk:
-    """What goes along a path; the border of the equilibrium is the equation of its control.
+    """Corrector of path following: equilibrium augmented by the equation of the control.
 
     Args:
         simulation: In statics, where the path begins.
@@ -134,7 +134,7 @@ class Walk:
         return Direction(-way.q, -way.t) if self.side(q, way) < 0 else way
 
     def _until(self, reach: float, gone: Direction, way: Direction) -> Direction:
-        """What has gone and as much more along a way as dissipates ``reach``."""
+        """Return the step so far, and as much more along a direction as dissipates ``reach``."""
 
         def dissipated(length: float) -> float:
             return self.dissipation(self.simulation.q + gone.q + length * way.q)
@@ -174,7 +174,7 @@ class Walk:
             term.begin(step)
 
     def _moved(self, t: float) -> Array:
-        """What supports prescribe, at their degrees of freedom; zero elsewhere."""
+        """Return the prescribed motions at the degrees of freedom of supports; zero elsewhere."""
         x = np.zeros(self.share.size)
         self.simulation.supports.move(x, x, self.step_at(t))
         return x
@@ -218,7 +218,7 @@ class Walk:
         y[moving] = self._x[moving] - self._moved(self.t)[moving]
 
     def met(self) -> bool:
-        """Whether the control has what it demands."""
+        """Return whether the control has what it demands."""
         q = self.simulation.supports.in_plane(self._x)
         return abs(self._constraint.miss(q, self.t)) <= MET
 

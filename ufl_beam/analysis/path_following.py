@@ -123,7 +123,7 @@ class Candidate(NamedTuple):
     way: Direction
 
     def passed(self, before: Candidate) -> bool:
-        """Whether a critical point lies between ``before`` and this state.
+        """Return whether a critical point lies between ``before`` and this state.
 
         An eigenvalue of the stiffness has passed zero there, or the load factor has turned.
         """
@@ -315,7 +315,7 @@ class Route:
         return abs(found.way.t) / self._walk.size(found.way)
 
     def _turns(self, found: Candidate, before: Candidate, after: Candidate) -> bool:
-        """Whether the load factor turns in a state that was located between two others.
+        """Return whether the load factor turns in a state that was located between two others.
 
         Either it has turned there, as at a kink, or its slope vanishes.  The load factor and the
         eigenvalue need not change their signs in the same last digit.

@@ -33,7 +33,7 @@ SHORT = 0.1
 
 @dataclass(frozen=True)
 class Dials:
-    """What is chosen for a run; the arguments of :func:`simulate`.
+    """Setting of a run, the arguments of :func:`simulate`.
 
     Attributes:
         scheme: The time scheme.
@@ -85,7 +85,7 @@ class Rung(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """What a run took and gave.
+    """Result of a run, and its cost.
 
     Attributes:
         rung: Where on the ladder.

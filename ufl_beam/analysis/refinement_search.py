@@ -92,7 +92,7 @@ class Climb:
                 base = base[0] + more[0], base[1] + more[1]
 
     def _look(self, base: Level) -> tuple[Outlook | None, str, Level]:
-        """What runs around a base show; or else why nothing is seen, and where to look next."""
+        """Return the findings of the runs around a base, or the reason why there are none."""
         i, j = base
         ladder, levels = self._ladder, Cross.levels(base)
         rungs = [Rung(self._family, 2 ** level[0], level[1]) for level in levels]

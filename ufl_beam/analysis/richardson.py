@@ -41,7 +41,7 @@ def size(values: Array) -> float:
 
 @dataclass(frozen=True)
 class Convergence:
-    """How a quantity converges with one dial, seen on three levels.
+    """Convergence of a quantity with one dial, from three levels.
 
     Attributes:
         finest: The finest of the three levels.
@@ -97,7 +97,7 @@ class Convergence:
 
     @property
     def seen(self) -> bool:
-        """Whether changes fall, or are negligible."""
+        """True if changes fall, or are negligible."""
         return self.used == 0 or self.order >= LEAST_ORDER
 
     def at(self, level: float) -> float:
@@ -153,13 +153,13 @@ class Cross:
 
     @property
     def separate(self) -> bool:
-        """Whether the errors of both dials add up."""
+        """True if the errors of both dials add up."""
         i, j = self.cells.finest - 2, self.steps.finest - 2
         return self.mixed <= MIXED * (self.cells.at(i) + self.steps.at(j))
 
     @property
     def seen(self) -> bool:
-        """Whether self-convergence is seen."""
+        """True if self-convergence is seen."""
         return self.cells.seen and self.steps.seen and self.separate
 
     def error(self, i: float, j: float) -> float:

@@ -1,4 +1,4 @@
-"""What the members of a study gave back, and the file that has it."""
+"""Results of the members of a study, and their file."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_kind
 
 Outcome = dict[str, Array] | str
-"""What a member returned, or why it failed."""
+"""Result of a member, or the reason of its failure."""
 
 FORMAT = "study of ufl_beam, 1"
 
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """What the members of a study returned, the same on every process.
+    """Results of the members of a study, the same on every process.
 
     ``study["peak"]`` has a row for each case; that of a failed member is NaN.
 
@@ -57,7 +57,7 @@ class Study:
         )
 
     def records(self) -> dict[str, tuple[Outcome, float]]:
-        """What :meth:`of` makes this study from."""
+        """Return the data that :meth:`of` makes this study from."""
         found: dict[str, tuple[Outcome, float]] = {}
         for i, case in enumerate(self.cases):
             row = {name: values[i] for name, values in self.results.items()}
@@ -150,7 +150,7 @@ def text_of(case: dict[str, Any], what: str = "case") -> str:
 
 
 def numbers_of(case: dict[str, Any], returned: Any) -> dict[str, Array]:
-    """What a member returned as arrays of floats.
+    """Return the result of a member as arrays of floats.
 
     Raises:
         SceneError: It is no dict of numbers and arrays.

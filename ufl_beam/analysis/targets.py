@@ -1,4 +1,4 @@
-"""What is asked of a trade-off, a tolerance or a time, and which setting serves it best."""
+"""Targets of a trade-off, a tolerance or a time, and the setting that serves them best."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Choice(NamedTuple):
 
 @dataclass(frozen=True)
 class Outlook:
-    """What runs of a family let expect of others.
+    """Prediction of runs from those of their family.
 
     Attributes:
         crosses: How each quantity converges.
@@ -129,7 +129,7 @@ class Found:
 
     @property
     def limits(self) -> dict[str, Array]:
-        """What the quantities converge to."""
+        """Limits of the quantities."""
         return {name: cross.limit for name, cross in self.outlook.crosses.items()}
 
     @property
@@ -146,23 +146,23 @@ class Goal(Protocol):
     """Part of the unit of a quantity up to which changes need not converge."""
 
     measure: str
-    """What errors are parts of."""
+    """Return the sizes that errors are parts of."""
 
     @property
     def bounds(self) -> tuple[float, float]:
         """Wall time and ratio that are asked for; s; infinite where none is."""
 
     def units(self, scales: Mapping[str, float]) -> dict[str, float]:
-        """What errors are measured in, by quantity, from the sizes of the quantities."""
+        """Return the units of errors by quantity, from the sizes of the quantities."""
 
     def choose(self, outlook: Outlook) -> Choice:
         """The setting that serves best."""
 
     def hopeless(self, choice: Choice, best: Choice) -> bool:
-        """Whether a choice cannot be better than another one."""
+        """Return whether a choice cannot be better than another one."""
 
     def accepts(self, found: Found) -> bool:
-        """Whether a run does what is asked."""
+        """Return whether a run does what is asked."""
 
     def rank(self, found: Found) -> tuple[bool, float]:
         """The least is the best."""
@@ -205,11 +205,11 @@ class Tolerance:
         return Choice(*settings[k], float(seconds[k]), float(ratios[k]), serves, not serves)
 
     def hopeless(self, choice: Choice, best: Choice) -> bool:
-        """Whether it would take much longer."""
+        """Return whether it would take much longer."""
         return choice.seconds > 2 * best.seconds
 
     def accepts(self, found: Found) -> bool:
-        """Whether it is accurate enough."""
+        """Return whether it is accurate enough."""
         return found.ratio <= 1.0
 
     def rank(self, found: Found) -> tuple[bool, float]:
@@ -252,11 +252,11 @@ class Budget:
         return Choice(*settings[k], *numbers, bool(fast[k]) and good, bool(fast[k]) and not good)
 
     def hopeless(self, choice: Choice, best: Choice) -> bool:
-        """Whether it would be much less accurate."""
+        """Return whether it would be much less accurate."""
         return choice.ratio > 2 * best.ratio
 
     def accepts(self, found: Found) -> bool:
-        """Whether it takes that time, and not much less."""
+        """Return whether it takes that time, and not much less."""
         return (1 - SLACK) * self.seconds <= found.run.seconds <= self.seconds
 
     def rank(self, found: Found) -> tuple[bool, float]:

@@ -164,7 +164,7 @@ def _goal(
     tolerance: float | Mapping[str, float] | None,
     budget: float | None,
 ) -> Goal:
-    """What is asked."""
+    """Return the target in words."""
     require_kind(quantities, Mapping, "tradeoff: quantities")
     if not quantities:
         raise SceneError("tradeoff: quantities is empty; name what is to be accurate")

@@ -1,4 +1,4 @@
-"""What a trade-off found: its runs, the setting to use, and how far it can be trusted."""
+"""Result of a trade-off: its runs, the recommended setting, and how far to trust it."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Tradeoff:
 
     @property
     def limit(self) -> dict[str, Array]:
-        """What the quantities converge to, extrapolated."""
+        """Extrapolated limits of the quantities."""
         return {name: cross.limit for name, cross in self.crosses.items()}
 
     @property

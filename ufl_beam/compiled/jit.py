@@ -40,7 +40,7 @@ DECLARATIONS = "\n".join(
         text("loops.h"),
     ]
 )
-"""What all files of C know of each other."""
+"""Declarations that all files of C share."""
 
 SANITIZERS = (
     "-O1",

@@ -100,7 +100,7 @@ def _loop(written_in: Path, sizes: dict[str, int]) -> ModuleType:
 
 
 _CPU = repr(np.show_config(mode="dicts"))
-"""What NumPy was built for and has found, of which the features of the processor are a part."""
+"""Configuration of NumPy, which includes the features of the processor."""
 
 _modules: dict[tuple[str, int, int, int], ModuleType | None] = {}
 

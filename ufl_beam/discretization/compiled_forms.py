@@ -107,7 +107,7 @@ class Kernel:
         return np.ascontiguousarray(blocks.reshape(len(blocks), width), dtype=np.int32)
 
     def _prepare(self) -> None:
-        """What the loop over the cells is about."""
+        """Make the data of the loop over the cells."""
         self._arrays = (
             *map(integers, (self._dofs, self._rows)),
             *map(doubles, (self._packed, self._constants, self._coordinates)),
@@ -134,7 +134,7 @@ class Kernel:
         )
 
     def depends_on(self, function: fem.Function) -> bool:
-        """Whether ``function`` appears in the form."""
+        """Return whether ``function`` appears in the form."""
         return function in self._columns
 
     def set(self, function: fem.Function, q: Array) -> None:
@@ -144,7 +144,7 @@ class Kernel:
             lib.set_cells(self.cells, doubles(q), at)
 
     def uses(self, function: fem.Function) -> bool:
-        """Whether a function appears in the form."""
+        """Return whether a function appears in the form."""
         return id(function) in self._starts
 
     def put(self, function: fem.Function, values: Array) -> None:
@@ -188,7 +188,7 @@ class Kernel:
 
     @property
     def vectorised(self) -> bool:
-        """Whether several cells are computed at once."""
+        """True if several cells are computed at once."""
         return self._lanes > 1
 
     def add(self, q: Array, b: Array) -> None:

@@ -80,7 +80,7 @@ class Grid:
         self._number()
 
     def agrees(self, other: Grid) -> bool:
-        """Whether what belongs to the degrees of freedom of another grid belongs to these."""
+        """Return whether the degrees of freedom are those of another grid."""
         return (
             self.scene.beams == other.scene.beams
             and np.array_equal(self.points, other.points)
@@ -385,7 +385,7 @@ class Share:
         return self.grid.node(anchor)
 
     def computes(self, anchor: Anchor) -> bool:
-        """Whether this process has the cell at a place, of two cells the first; or owns a body.
+        """Return whether this process has the (first) cell at a place, or owns a body.
 
         It then has all degrees of freedom of the place, even if others own some of them.
         """
@@ -416,7 +416,7 @@ class Share:
         return self.grid.lengths(self.cells)
 
     def lengths(self) -> Array:
-        """What a strain of one is to each local degree of freedom: a cell's length, or a radian.
+        """Change of each local degree of freedom by a strain of one: a cell's length, or a radian.
 
         Bodies are as large as the scene; forces of connectors have no length.
         """

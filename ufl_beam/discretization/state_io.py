@@ -15,7 +15,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import Share
 
 State = dict[str, Array]
-"""What was remembered, by name."""
+"""Arrays of a state, by name."""
 
 NOWHERE: Array = np.empty(0)
 """In the place of a configuration: of what is remembered, strains and stored energies are not that
@@ -82,7 +82,7 @@ class Saving:
         return rows
 
     def state(self) -> State:
-        """What all processes remember, on each of them; they call it together."""
+        """Return the state of all processes, on each of them; they call it together."""
         here = self._sums, self._rows
         everyone = [here] if self._share.comm.size == 1 else self._share.comm.allgather(here)
         state: State = {}

@@ -22,7 +22,7 @@ from ufl_beam.model.scene import Scene
 
 
 class _AtEnd:
-    """What schemes have in common whose forces act at the end of the step."""
+    """Base of schemes whose forces act at the end of the step."""
 
     load_weight = 1.0
     theta = 1.0
@@ -120,7 +120,7 @@ AVERAGE = Weights(0.0, 0.0, 1 / 2, 1 / 4)
 
 
 class _Accelerated(_AtEnd):
-    """What Newmark's scheme and its relatives have in common."""
+    """Base of Newmark's scheme and its relatives."""
 
     dynamic = True
     slack = math.inf
@@ -208,7 +208,7 @@ class _Accelerated(_AtEnd):
         return np.zeros_like(change)
 
     def error_weights(self) -> tuple[float, float]:
-        """What Taylor's series of u and v miss; a runs ahead of the forces by α_m - α_f steps."""
+        """Return the error of Taylor's series; a runs ahead of the forces by α_m - α_f steps."""
         α_m, α_f, γ, β = self.weights
         ahead = α_m - α_f
         return 0.0, abs(β + ahead / 2 - 1 / 6) + abs(γ + ahead - 1 / 2)

@@ -21,7 +21,7 @@ from ufl_beam.model.scene import Scene
 
 
 class _OverStep:
-    """What schemes have in common whose forces act over the step."""
+    """Base of schemes whose forces act over the step."""
 
     alpha: float
 
@@ -32,7 +32,7 @@ class _OverStep:
 
     @property
     def loss(self) -> float:
-        """What ``alpha`` takes."""
+        """Return the energy that ``alpha`` dissipates."""
         return self.alpha
 
     def resistance(self, softening: Softening, opening: Array, growth: Values) -> Values:
@@ -47,7 +47,7 @@ class _OverStep:
         return mean + constant(self.alpha) * scaled(C, e1 - e0)  # P(89)
 
     def losses(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> tuple[Expr, ...]:
-        """What ``alpha`` takes."""
+        """Return the energy that ``alpha`` dissipates."""
         if self.alpha == 0:
             return ()
         return (constant(self.alpha) * ufl.dot(scaled(C, e1 - e0), e1 - e0),)  # P(90)
@@ -153,7 +153,7 @@ class ExactStatic(_ExactStep):
 
 
 class _Midway:
-    """What dynamic schemes have in common whose loads act in the middle of the step."""
+    """Base of dynamic schemes whose loads act in the middle of the step."""
 
     dynamic = True
     slack = math.inf
@@ -183,7 +183,7 @@ class _Velocities(_Midway):
 
     @property
     def slips(self) -> bool:
-        """Whether ``beta`` takes any."""
+        """True if ``beta`` takes any."""
         return self.beta != 0
 
     def _weights(self, dt: float) -> tuple[float, float]:
@@ -329,7 +329,7 @@ class DecayingMidpoint(_ExactStep, _Midway):
         return self.rho_inf * (1 - self.rho_inf) / (2 * (1 + self.rho_inf) ** 2)
 
     def _remembered(self, dt: float, rates: Rates) -> Array:
-        """What of the last change of velocities counts, c r Δv'."""
+        """Return the part of the last change of velocities that counts, c r Δv'."""
         return self.part * min(1.0, dt / rates.last_dt) * (rates.v - rates.v_before)
 
     def way_to_rest(self, dt: float) -> float:

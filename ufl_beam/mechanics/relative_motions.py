@@ -18,7 +18,7 @@ from ufl_beam.mechanics.kinematics import frame, split, turn
 
 
 class Averaging(Protocol):
-    """What a time scheme says about variations over a step."""
+    """Variations of relative motions over a step, as time schemes define them."""
 
     def average(self, before: Expr, now: Expr) -> Expr:
         """Of a vector that turns or of a distance: the one that variations are taken with."""
@@ -28,7 +28,7 @@ class Averaging(Protocol):
 
 
 class Numbers(NamedTuple):
-    """What a relative motion depends on besides the frames.
+    """Numbers that a relative motion depends on besides the frames.
 
     Attributes:
         arm_a, arm_b: From the nodes to the points a and b; (2,); m.

@@ -54,13 +54,13 @@ class Step(NamedTuple):
 
 @runtime_checkable
 class Scheme(Protocol):
-    """What a time scheme must say."""
+    """Protocol of time schemes."""
 
     dynamic: bool
-    """Whether the scene has inertia."""
+    """True if the scene has inertia."""
 
     advice: str
-    """What to try where a step finds no equilibrium."""
+    """Advice where a step finds no equilibrium."""
 
     load_weight: float
     """Follower loads turn with the rotation at this part of the step."""
@@ -102,7 +102,7 @@ class Scheme(Protocol):
         """Way of a step at the end of which there is no velocity, over that at its beginning; s."""
 
     def nodal_step(self, q0: Array, q1: Array, rotations: Index) -> tuple[Array, float]:
-        """What forces and moments work on in a step; and the largest turn of a node; rad.
+        """Return the conjugates of forces and moments, and the largest turn of a node; rad.
 
         ``rotations`` are the degrees of freedom that are rotations, as int32.
         """
@@ -112,7 +112,7 @@ class Scheme(Protocol):
 
 
 class Rates(Protocol):
-    """What is known of the velocities at the beginning of a step.
+    """Velocities, and accelerations if a scheme has them, at the beginning of a step.
 
     Attributes:
         v: The velocities; m/s, rad/s.
@@ -128,13 +128,13 @@ class Rates(Protocol):
 
 
 class DynamicScheme(Scheme, Protocol):
-    """What a scheme with inertia must say besides."""
+    """Protocol of time schemes with inertia."""
 
     kept: tuple[str, ...]
     """Names of the rates that it keeps besides the velocities, such as accelerations."""
 
     slips: bool
-    """Whether it loses energy by :meth:`slip`."""
+    """True if it loses energy by :meth:`slip`."""
 
     def require(self, scene: Scene) -> None:
         """Raise :class:`SceneError` if the scene has what the scheme cannot do."""
@@ -152,14 +152,14 @@ class DynamicScheme(Scheme, Protocol):
         """Velocities after the step ``s`` of the nodes, then what is kept besides."""
 
     def slip(self, dt: float, change: Array, rates: Rates) -> Array:
-        """What the mean velocity of a step is above that of its ends, from their ``change``."""
+        """Return Δu/Δt less the mean of both end velocities, from their ``change``, P(88)."""
 
     def error_weights(self) -> tuple[float, float]:
         """(c2, c3) of the error c2 a dt² + c3 da/dt dt³ of a step of acceleration a."""
 
 
 def has_inertia(scheme: Scheme) -> TypeGuard[DynamicScheme]:
-    """Whether the scheme is a dynamic one."""
+    """Return whether the scheme is a dynamic one."""
     return scheme.dynamic
 
 

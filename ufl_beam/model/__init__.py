@@ -1,1 +1,1 @@
-"""What a user describes: beams, bodies, sections, laws, joints, supports, loads, scenes."""
+"""Records of a model: beams, bodies, sections, laws, joints, supports, loads, scenes."""

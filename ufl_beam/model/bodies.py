@@ -75,7 +75,7 @@ class Spot:
 
 
 GROUND = Body((0.0, 0.0), name="ground")
-"""What does not move."""
+"""The body that does not move."""
 
 
 def ground(x: float, y: float) -> Spot:
@@ -87,11 +87,11 @@ Anchor = Place | Spot
 """Where something may be attached."""
 
 Node = Place | Body
-"""What has a displacement and a rotation."""
+"""Places of beams and bodies: they have a displacement and a rotation."""
 
 
 def node(anchor: Anchor) -> Node:
-    """What moves an anchor: the cross-section of a beam itself, or the body it is on."""
+    """Return the cross-section of a beam, or the body, that an anchor moves with."""
     return anchor.body if isinstance(anchor, Spot) else anchor
 
 
@@ -108,7 +108,7 @@ def arm(anchor: Anchor, point: Point | None = None) -> Point:
 
 
 def carries(anchor: Anchor) -> bool:
-    """Whether the displacement of an anchor is that of its node."""
+    """Return whether the displacement of an anchor is that of its node."""
     return math.hypot(*arm(anchor)) == 0.0
 
 

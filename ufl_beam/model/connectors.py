@@ -17,7 +17,7 @@ from ufl_beam.model.connector_laws import Coulomb, Guide, Law, Motor, RigidPlast
 
 
 class Rigidly(NamedTuple):
-    """How a relative motion grows with the motions (u, v, ψ) of both nodes in the undeformed scene.
+    """Derivatives of a relative motion by (u, v, ψ) of both nodes in the undeformed scene.
 
     Attributes:
         a, b: Factors; (3,) each.
@@ -61,7 +61,7 @@ class Connector:
 
     @property
     def holds(self) -> bool:
-        """Whether the law may demand a motion, whatever force that takes."""
+        """True if the law may demand a motion, whatever force that takes."""
         return isinstance(self.law, Motor | Coulomb | Guide | RigidPlastic)
 
     @property
@@ -77,11 +77,11 @@ class Connector:
 
     @property
     def turns(self) -> bool:
-        """Whether the motion is a rotation: rad and N m in the place of m and N."""
+        """True if the motion is a rotation: rad and N m in the place of m and N."""
         return self.motion == "turning"
 
     def rigidly(self) -> Rigidly:
-        """How the motion grows with those of the nodes, in the undeformed scene."""
+        """Return the derivatives of the motion by those of the nodes, in the undeformed scene."""
         if self.turns:
             return Rigidly((0.0, 0.0, -1.0), (0.0, 0.0, 1.0))
         (dx, dy), length = self.apart, math.hypot(*self.apart)

@@ -100,7 +100,7 @@ def _determines(link: Connector) -> bool:
 
 
 def no_number(scene: Scene, times: Iterable[float]) -> str:
-    """What has a time function that is no finite number at one of the times; empty if nothing."""
+    """Name the owner of a time function that is not finite at one of the times; else empty."""
     for t in times:
         for owner, function in scene.time_functions():
             if not math.isfinite(value := value_at(function, t, owner)):
@@ -109,7 +109,7 @@ def no_number(scene: Scene, times: Iterable[float]) -> str:
 
 
 def _fixed(scene: Scene) -> set[Slot]:
-    """What the ground and supports hold or move."""
+    """Return the components of motion that the ground and supports give."""
     same = scene.representatives
     fixed: set[Slot] = {(GROUND, component) for component in range(3)}
     fixed |= {(node(s.place), c) for s in scene.supports if not s.angle for c in s.held}
@@ -144,7 +144,7 @@ def require_independent(scene: Scene) -> None:
 
 
 def friction_repeats(scene: Scene) -> bool:
-    """Whether places that stick hold what is held already, by joints or by each other."""
+    """Return whether places that stick hold what is held already, by joints or by each other."""
     if not any(isinstance(link.law, Coulomb) for link in scene.links):
         return False
     return _dependences(_demands(scene, (*HOLDING, Coulomb))).shape[1] > 0
@@ -162,7 +162,7 @@ def _dependences(demands: list[Demand]) -> Array:
 
 
 def _demands(scene: Scene, laws: tuple[type, ...]) -> list[Demand]:
-    """What connectors of some laws, and supports in turned axes, give of what moves freely."""
+    """Return the constraints that connectors of some laws and supports in turned axes make."""
     same, fixed = scene.representatives, _fixed(scene)
 
     def free(factors: Iterable[tuple[Node, int, float]]) -> list[tuple[Slot, float]]:

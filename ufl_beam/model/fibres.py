@@ -15,7 +15,7 @@ from ufl_beam.model.material_laws import Hardening, Layout, Softening
 
 @dataclass(frozen=True)
 class Fibres:
-    """What the fibres of a section are made of, P(93).
+    """Material law of the fibres of a section and their number, P(93).
 
     Args:
         law: Of each fibre; stresses in Pa.  A random limit is drawn for each fibre of each cell.

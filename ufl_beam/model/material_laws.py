@@ -32,7 +32,7 @@ def where(condition: Values, yes: Values, no: Values) -> Values:
 
 @singledispatch
 def below(x: Values, limit: float) -> Values:
-    """Whether x is less than the limit."""
+    """Return whether x is less than the limit."""
     return x < limit
 
 
@@ -62,7 +62,7 @@ def _require_from_zero_to_infinity(value: float, what: str) -> None:
 
 
 class Viscosity(Protocol):
-    """How the rate of flow resists."""
+    """Viscosity of plastic flow."""
 
     def coefficient(self, stiffness: Values) -> Values:
         """Overstress per rate of plastic strain; ``stiffness`` is that of plastic flow."""
@@ -143,7 +143,7 @@ class Hardening:
 
     @property
     def opens(self) -> bool:
-        """Whether it ever flows."""
+        """True if it ever flows."""
         return bool(self.limit != np.inf)
 
     @property
@@ -153,7 +153,7 @@ class Hardening:
 
     @property
     def bounded(self) -> bool:
-        """Whether the stress never exceeds the limit."""
+        """True if the stress never exceeds the limit."""
         viscous = bool(np.any(self.viscosity.coefficient(np.ones(1)) > 0.0))
         return self.modulus == self.kinematic == 0.0 and not viscous
 
@@ -247,12 +247,12 @@ class Softening:
 
     @property
     def bounded(self) -> bool:
-        """Whether the traction never exceeds the limit."""
+        """True if the traction never exceeds the limit."""
         return True
 
     @property
     def opens(self) -> bool:
-        """Whether it ever opens."""
+        """True if it ever opens."""
         return self.limit < np.inf
 
     def of(self, limit: Values, energy: Values) -> Softening:
@@ -347,12 +347,12 @@ class Layout:
 
     @property
     def elastic(self) -> bool:
-        """Whether nothing can happen at the points."""
+        """True if nothing can happen at the points."""
         return self.softening is None and not self.yields
 
     @property
     def yields(self) -> bool:
-        """Whether the bulk can yield."""
+        """True if the bulk can yield."""
         return any(law.limit != np.inf for law, _ in self.laws)
 
     def bulk(self, keys: list[tuple[int, int]]) -> Bulk:

@@ -1,4 +1,4 @@
-"""How finely a scene is discretised: what is no part of its physics."""
+"""Options of the discretization: cells, degrees of elements, mass matrix."""
 
 from __future__ import annotations
 

@@ -116,7 +116,7 @@ def _laws(beam: Beam) -> dict[Place, HingeLaw]:
 
 
 def _outlasts(place: Place, others: Sequence[Node], laws: Mapping[Place, HingeLaw]) -> bool:
-    """Whether the only other member at a joint yields first, or is equal and listed first."""
+    """Return whether the only other member at a joint yields first, or is listed first."""
     if len(others) > 1 or not isinstance(others[0], Place) or others[0] not in laws:
         return False
     here, there, order = laws[place], laws[others[0]], list(laws)

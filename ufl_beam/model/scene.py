@@ -1,4 +1,4 @@
-"""What is modelled: frozen records, and their validity as a whole before any mesh exists."""
+"""Scenes: all records of a model, and their validity as a whole before any mesh exists."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What happens in a run: what yields, opens, breaks free, touches or slides, and when."""
+"""Events of a run: yielding, opening, breaking, touching, sliding, and their times."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 Flags = npt.NDArray[np.bool_]
 
 IN_CELLS = ("yields", "opens", "is free")
-"""What can happen once in a cell: plastic flow, the opening of a hinge or crack, its end."""
+"""Events of a cell, once each: plastic flow, the opening of a hinge or crack, its end."""
 
 BETWEEN = {Stop: ("touches", "lets go"), Coulomb: ("slides", "sticks")}
-"""What can happen to connectors, and its end."""
+"""Events of connectors, and their ends."""
 
 ALL = (*IN_CELLS, *(what for pair in BETWEEN.values() for what in pair))
 """All that can happen."""
@@ -87,7 +87,7 @@ class Events(Recorder):
         self._watch(simulation)
 
     def _watch(self, simulation: StateView) -> None:
-        """What may happen in a scene, and what has."""
+        """Find the events that a scene may have, and those before the run."""
         grid = simulation.grid
         in_cells = [law for beam in simulation.scene.beams for law in grid.hinges(beam)]
         laws = [*in_cells, *(law_of(hinge) for hinge in simulation.scene.hinges)]
@@ -100,7 +100,7 @@ class Events(Recorder):
         self._flags = self._look(simulation)
 
     def _look(self, simulation: StateView) -> tuple[Flags, list[bool]]:
-        """What has happened in each cell and hinge; what goes on in each connector watched."""
+        """Return the events of each cell and hinge, and the state of each connector."""
         in_cells = np.zeros((len(self._enough), len(IN_CELLS)), dtype=bool)
         for cells, rows in simulation.material():
             plastic, broken = rows[:, 4], rows[:, 5]

@@ -1,4 +1,4 @@
-"""What joints and connectors did and bore in a run."""
+"""Histories of joints and connectors: relative motions, forces, works."""
 
 from __future__ import annotations
 

@@ -203,7 +203,7 @@ def replace_file(path: Path, data: bytes) -> None:
 
 
 def is_at(file: int, path: Path) -> bool:
-    """Whether a path leads to an open file."""
+    """Return whether a path leads to an open file."""
     try:
         return os.path.samestat(os.fstat(file), os.stat(path))
     except OSError:

@@ -221,7 +221,7 @@ def library() -> Any:
 
 
 def _cycles(counts: Mapping[Ends, float], waiting: Sequence[float], unit: float) -> Cycles:
-    """What was counted, and halves from one waiting turning point to the next."""
+    """Return the cycles counted, and half cycles between the remaining turning points."""
     counts = defaultdict(float, counts)
     for a, b in pairwise(waiting):
         counts[_ends(a, b)] += 0.5

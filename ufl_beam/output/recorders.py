@@ -43,7 +43,7 @@ MOTION = (("u", "m"), ("v", "m"), ("psi", "rad"))
 """Components of the motion of a place, and their units."""
 
 TRANSLATION = (("motion", "m"), ("force", "N"), ("work", "J"))
-"""What is written of a connector, and its units."""
+"""Columns of a connector, and their units."""
 
 ROTATION = (("motion", "rad"), ("force", "N m"), ("work", "J"))
 """The same of one that turns."""
@@ -74,7 +74,7 @@ class Recorder(ABC):
         """End; also called when the run fails."""
 
     def state(self) -> State:
-        """What :meth:`resume` needs, arrays by name; that of the first process is kept.
+        """Return the arrays for :meth:`resume`, by name; those of the first process count.
 
         Raises:
             SceneError: The recorder has none.
@@ -303,7 +303,7 @@ class History(Recorder):
         self._files[0].cut(length)
 
     def _is_same(self, length: int) -> bool:
-        """Whether there is a file with this header, long enough."""
+        """Return whether there is a file with this header, long enough."""
         try:
             with self._path.open("rb") as file:
                 same = file.read(len(self._header)) == self._header

@@ -37,7 +37,7 @@ from ufl_beam.output import saved_functions
 from ufl_beam.output.saved_functions import LostFunction
 
 Data = Any
-"""What JSON can hold."""
+"""Data of JSON."""
 
 Sampling = Callable[[Any, str, Any], Any]
 """Record that stands for a function, given the record and the field that it is in."""
@@ -61,7 +61,7 @@ KNOWN: dict[str, Any] = {
     "steady": loads.steady,
     "still": supports.still,
 }
-"""What is the same object in every scene."""
+"""Objects that all scenes share."""
 
 
 def lost(owner: Any, field: str, function: Any) -> LostFunction:

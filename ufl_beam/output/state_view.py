@@ -1,4 +1,4 @@
-"""What recorders, controllers and solutions may ask of a simulation between its steps."""
+"""State of a simulation between its steps, for recorders, controllers and solutions."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ class StateView:
         return here
 
     def connector(self, connector: Connector) -> Connection:
-        """What a connector is doing: numbers, at the end of the last step.
+        """Return motion, force, work and rate of a connector at the end of the last step.
 
         Raises:
             SceneError: It is not in the scene.
@@ -202,7 +202,7 @@ class StateView:
 
     @property
     def may_break(self) -> bool:
-        """Whether something in the scene yields, softens or has plastic hinges."""
+        """True if something in the scene yields, softens or has plastic hinges."""
         return self._has_inelastic or bool(self.scene.hinges)
 
     def damage(self) -> tuple[Array, Array]:

@@ -102,7 +102,7 @@ class VtkhdfWriter:
     # -- data sets -----------------------------------------------------------------------------
 
     def _is_same(self, mesh: Mapping[str, Array], fields: LineFields) -> bool:
-        """Whether the file has this mesh, these fields, and enough steps."""
+        """Return whether the file has this mesh, these fields, and enough steps."""
         try:
             root = self._file["VTKHDF"]
             return (

@@ -1,4 +1,4 @@
-"""What springs, dampers, motors and other laws look like, along a line or around a pin.
+"""Glyphs of springs, dampers, motors and other laws, along a line or around a pin.
 
 A glyph is drawn in coordinates (s, t): s runs along the connector, from -2 at its place a to 2 at
 its place b, its body from -1 to 1; t is across, half a symbol of a support being 1.

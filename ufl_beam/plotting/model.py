@@ -97,7 +97,7 @@ def _title(subject: Subject) -> str:
 
 
 def notes_of(scene: Scene) -> list[str]:
-    """What acts on the whole scene, and what symbols mean that explain themselves less."""
+    """Return words on loads of the whole scene, and a legend of the symbols."""
     notes = [damping_in_words(damping) for damping in scene.damping]
     laws = {b.section.hinge for b in scene.beams if b.section.hinge and b.section.hinge.opens}
     if laws:
@@ -281,7 +281,7 @@ def _write(axes: Axes, placed: list[Placed], scale: float) -> None:
 
 
 def _badges(axes: Axes, scene: Scene, plan: Plan, measure: _Measure) -> None:
-    """What acts on the whole scene, right above the axes."""
+    """Write the loads of the whole scene right above the axes."""
     x, y = plan.frame[2:] - plan.frame[:2] + (0.0, 17.0)
     for load in scene.loads:
         found = badge(load)

@@ -131,7 +131,7 @@ def animate(
 
 @dataclass(frozen=True)
 class _Look:
-    """How a solution is shown; checks what the user asked for.
+    """Options of a picture of a solution, checked.
 
     Attributes:
         solution: What is shown.
@@ -161,7 +161,7 @@ class _Look:
         return max(0.022 * self.solution.scene.size, 0.7 * deepest)
 
     def stage(self, shown: list[int]) -> Stage:
-        """What is drawn besides the beams."""
+        """Add bodies, joints, connectors and supports."""
         return Stage(self.solution, self.magnify, self.symbol, sorted(set(shown)))
 
     def depth(self, beam: Beam) -> float:
@@ -190,7 +190,7 @@ class _Look:
         )
 
     def values(self, beam: Beam, n: int) -> Array:
-        """What colours a beam: (num_cells,) or, for the rotation, (num_vertices,)."""
+        """Return the values of a beam's colours: (num_cells,), of rotations (num_vertices,)."""
         if self.color == "rotation":
             dofs = self.solution.grid.dofs[self.solution.grid.vertices_of(beam), 2]
             return np.asarray(self.solution.q[n][dofs])

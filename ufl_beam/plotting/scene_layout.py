@@ -66,7 +66,7 @@ class Setting(ABC):
 
     @cached_property
     def lanes(self) -> dict[Connector, float]:
-        """How far aside each connector is drawn that shares its line, or its pin, with others."""
+        """Offsets of connectors that share their line, or their pin, with others."""
         alike: dict[tuple[bool, frozenset[object]], list[Connector | None]] = {}
         for joint in self.scene.joints:
             if joint.kind in ("Prismatic", "RigidLink", "Link"):
@@ -188,7 +188,7 @@ class Pose:
 
 
 def _lane(k: int, count: int, joint: bool, turns: bool) -> float:
-    """How far aside the k-th of some connectors is drawn; in units."""
+    """Return the offset of the k-th of some connectors; in units."""
     if turns:
         return 1.15 * k
     if joint:  # it keeps the middle

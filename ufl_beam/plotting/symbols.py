@@ -1,4 +1,4 @@
-"""What is drawn of bodies, joints, connectors and supports, and where; in lines and areas.
+"""Symbols of bodies, joints, connectors and supports as lines and areas.
 
 Pictures of all kinds draw these: :mod:`ufl_beam.plotting.plots` in the plane,
 :mod:`ufl_beam.plotting.render3d` solid.
@@ -68,7 +68,7 @@ class Stroke(NamedTuple):
 
 
 class Pin(NamedTuple):
-    """What joins places at one point.
+    """Symbol of a joint of places at one point.
 
     Attributes:
         at: Shape (2,); m.

@@ -26,7 +26,7 @@ KINK = 1e-6
 
 
 class StaticPath:
-    """What a static step must show before it is accepted.
+    """Checks of a static step before it is accepted.
 
     Args:
         share: The degrees of freedom of this process.

@@ -364,7 +364,7 @@ def _packed(content: Content, what: str) -> bytes:
 
 
 def read(path: Path) -> Content:
-    """What :func:`write` wrote.
+    """Read a file of :func:`write`.
 
     Raises:
         SceneError: The file is damaged, or something else.
@@ -408,7 +408,7 @@ def _plain(value: Any) -> Any:
 
 
 def kinds_of(recorders: Sequence[Recorder]) -> list[str]:
-    """What recorders are, for the comparison of runs."""
+    """Return the fingerprint of recorders."""
     return [kind_of(recorder) for recorder in recorders]
 
 

@@ -1,4 +1,4 @@
-"""What a call says as text that can be compared: records, numbers, functions and what they use."""
+"""Fingerprint of the arguments of a run, to tell whether a checkpoint is of the same one."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ class Description:
 
 
 def has_state(value: Any) -> bool:
-    """Whether something says its state and takes it back."""
+    """Return whether something says its state and takes it back."""
     if isinstance(value, type):
         return False
     own = callable(getattr(value, "state", None)) and callable(getattr(value, "restore", None))

@@ -283,7 +283,7 @@ class Simulation(StateView):
         give_back_memory()
 
     def _scales(self) -> Array:
-        """What a displacement or rotation counts beside others; 1/m, 1, zero for forces."""
+        """Return the weights of displacements, rotations and forces; 1/m, 1, zero."""
         scales: Array = np.full(self.share.size, 1 / self.scene.size)
         scales[self.share.rotations()] = 1.0
         scales[self.share.multipliers()] = 0.0
@@ -314,7 +314,7 @@ class Simulation(StateView):
             self._numerical = numerical_forces(self.scheme, fields, self._A, self.ledger)
 
     def _openable(self) -> list[Openable]:
-        """What may open on this process: hinges and cracks of cells, springs that soften."""
+        """Return the places of this process that may open: hinges, cracks, softening springs."""
         cells: list[Openable] = [one for one in self.inelastic if one.points.softens]
         groups = [one.response.openable for one in self.couplings if isinstance(one, Couplings)]
         return [*cells, *(places for places in groups if places is not None)]
@@ -371,13 +371,13 @@ class Simulation(StateView):
         return opened
 
     def _excess(self, x: Array, r: Array, scale: float, moved: float) -> float:
-        """How far the laws of connectors are missed."""
+        """Return the largest residual of the laws of connectors, without dimension."""
         q1 = self.supports.in_plane(x)
         here = max((c.excess(q1, r, scale, moved) for c in self.couplings), default=0.0)
         return self.share.largest(here) if self.scene.links else 0.0
 
     def _working(self, x: Array, y: Array) -> Array:
-        """What residuals work on in the step ``y`` from ``x``: laws of connectors on motions."""
+        """Return the conjugates of residuals in the step ``y`` from ``x``."""
         q, v, works = self.supports.in_plane(x), self.supports.in_plane(y), y.copy()
         for coupling in self.couplings:
             coupling.put_motions(q, v, works)
@@ -521,7 +521,7 @@ class Simulation(StateView):
         self._in_parts(t1, self.attempt)
 
     def _begins_loaded(self) -> bool:
-        """Whether the loads at the beginning are to be applied before the first step.
+        """Return whether the loads at the beginning are to be applied before the first step.
 
         Where forces act over the step, a step that turns a node far does not end in equilibrium.
         So the loads are applied in parts that turn nodes little, and the rest of the step has
@@ -656,7 +656,7 @@ class Simulation(StateView):
         return [load.force for load in self.loads]
 
     def _trial(self, step: Step, q1: Array) -> Trial:
-        """What a step came to, ``q1`` in the axes of the supports, if it was followed."""
+        """Return the result ``q1`` of a step, in the axes of the supports, if it can be trusted."""
         self.supports.leave(q1)
         s, turn = self.scheme.nodal_step(self.q, q1, self._rotations)
         if len(self.grid.multipliers):

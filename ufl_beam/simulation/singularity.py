@@ -138,7 +138,7 @@ def _singularity_at(simulation: Failed, q: Array) -> str:
 
 
 def _softest(simulation: Failed, q: Array, x: Array, motions: Array) -> Softest:
-    """What a motion deforms, and what has lost its stiffness there."""
+    """Return the deformations of a motion, and the parts without stiffness in it."""
     grid, scene, share = simulation.grid, simulation.scene, simulation.share
     here, ε = x[share.dofs], 1e-6
     links, left = np.zeros(len(scene.links)), np.ones(len(scene.links))
@@ -166,7 +166,7 @@ def _softest(simulation: Failed, q: Array, x: Array, motions: Array) -> Softest:
 
 
 def _deforms(found: Softest, of: int) -> bool:
-    """Whether connectors (0) or cells (1) deform that have their stiffness."""
+    """Return whether connectors (0) or cells (1) deform that have their stiffness."""
     sizes = (found.links, found.cells)[of]
     return bool((sizes[~found.yielding[of]] >= SHARE).any())
 

@@ -1,4 +1,4 @@
-"""What a run gives back: the motion, the forces and the ledger."""
+"""Solutions: motion, forces and ledger of a run."""
 
 from __future__ import annotations
 
@@ -226,7 +226,7 @@ class Solution:
             setattr(self, name, text[name])
 
     def _sampled(self, owner: Any, field: str, function: Any) -> Any:
-        """What is saved of a function of a user."""
+        """Return the record that stands for a function of a user in a file."""
         if field == "curve" and isinstance(owner, Beam):
             return SavedCurve.of(function, 0.0, 1.0, self.grid.parameters(owner))
         if field == "curve":
@@ -277,7 +277,7 @@ class Solution:
 
     @property
     def progress(self) -> Array:
-        """How far each kept state is from the first one, never falling; here the time; (n+1,)."""
+        """Abscissa that grows along the kept states; here the time; (n+1,)."""
         return self.times
 
     @property
@@ -329,7 +329,7 @@ class Solution:
         return Connection(*np.array(self._connections)[:, number].T)
 
     def joint(self, joint: Joint) -> JointHistory:
-        """What moves and acts between the first two places of a joint.
+        """Return the relative motion and the forces of the first two places of a joint.
 
         Raises:
             SceneError: It is not in the scene.

@@ -1,4 +1,4 @@
-"""How a run goes through time: one step after the other, from its beginning to its end."""
+"""Step control: equal and adaptive steps from the beginning of a run to its end."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SAMPLES = (0.01, 0.5, 0.99)
 
 
 class Pace(Protocol):
-    """What chooses the steps of a run.
+    """Protocol of step controls.
 
     Attributes:
         steps: Steps done.
@@ -34,7 +34,7 @@ class Pace(Protocol):
 
     @property
     def finished(self) -> bool:
-        """Whether the end is reached."""
+        """True if the end is reached."""
 
     @property
     def progress(self) -> float:
@@ -76,7 +76,7 @@ class EqualSteps:
 
     @property
     def finished(self) -> bool:
-        """Whether all steps are done."""
+        """True if all steps are done."""
         return self.steps == self._all
 
     @property
@@ -182,7 +182,7 @@ class AdaptiveSteps:
 
     @property
     def finished(self) -> bool:
-        """Whether the end is reached."""
+        """True if the end is reached."""
         return self._t == self._t1
 
     @property
@@ -256,7 +256,7 @@ class AdaptiveSteps:
         return simulation.share.largest(here)
 
     def _missed(self, dt: float) -> float:
-        """What the middle of the step misses of a load, as a part of its largest impulse."""
+        """Return the error of the midpoint rule for a load, as a part of its largest impulse."""
         missed = 0.0
         for i, function in enumerate(self._functions):
             # Not at the ends, where there may be jumps
@@ -266,7 +266,7 @@ class AdaptiveSteps:
         return missed / 6 * dt / (self._t1 - self._t0)  # Simpson's rule less the midpoint's
 
     def state(self) -> dict[str, float]:
-        """What the next step depends on, and what was counted."""
+        """Return the numbers that the next step depends on, and the counters."""
         largest = {f"largest {i}": value for i, value in enumerate(self._largest)}
         return {**{name: float(getattr(self, name)) for name in self._STATE}, **largest}
 

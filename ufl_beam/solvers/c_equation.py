@@ -33,7 +33,7 @@ CALLED = (
     *("SNESSetIterationNumber", "SNESSetConvergedReason"),
     *("PCSetUp", "PCGetFailedReason", "PCApply"),
 )
-"""What the callbacks need, in the order of ``petsc`` in loops.h."""
+"""Functions of PETSc that the callbacks call, in the order of ``petsc`` in loops.h."""
 
 Add = Callable[[Array, Array], None]
 
@@ -65,12 +65,12 @@ class InPython:
 
 @ffi.def_extern()  # type: ignore[misc, untyped-decorator, unused-ignore]
 def add_in_python(handle: Any, q: Any, out: Any) -> None:
-    """What loops.h declares."""
+    """Callback of C, declared in loops.h."""
     ffi.from_handle(handle)(q, out)
 
 
 class Demand:
-    """What connectors demand, seen by Python.
+    """Residual of the constraints of connectors, evaluated by Python.
 
     Args:
         missed: Of the unknowns, the residual, the scale of forces and the largest motion: how far
@@ -90,7 +90,7 @@ class Demand:
         self.loop = (lib.missed_in_python, self._handle)
 
     def __call__(self, q: Any, r: Any, scale: float, moved: float) -> float:
-        """How far; not a number where that fails."""
+        """Return the residual; not a number where it fails."""
         try:
             return self._missed(_lent(q, self._size), _lent(r, self._size), scale, moved)
         except BaseException as error:
@@ -100,7 +100,7 @@ class Demand:
 
 @ffi.def_extern()  # type: ignore[misc, untyped-decorator, unused-ignore]
 def missed_in_python(handle: Any, q: Any, r: Any, scale: float, moved: float) -> float:
-    """What loops.h declares."""
+    """Callback of C, declared in loops.h."""
     missed: float = ffi.from_handle(handle)(q, r, scale, moved)
     return missed
 
@@ -180,7 +180,7 @@ class Equation:
         self.error = self.error or error
 
     def taken_error(self) -> BaseException | None:
-        """What Python raised since the last call."""
+        """Return the exception of Python since the last call, if any."""
         error, self.error = self.error, None
         return error
 

@@ -137,7 +137,7 @@ def _inverse_definite(A: Array, B: Array) -> tuple[Array, Array]:
 
 
 def _solved(solver: Any, size: int, n: int, shift: float) -> tuple[Complex, Complex]:
-    """What a solver of SLEPc finds beside a shift."""
+    """Solve by SLEPc for the eigenvalues nearest to a shift."""
     solver.setDimensions(n)
     solver.setTolerances(TOLERANCE, 500)
     solver.setTarget(shift)

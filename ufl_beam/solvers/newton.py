@@ -56,7 +56,7 @@ PREFIX = "ub_"
 
 @dataclass(frozen=True)
 class Newton:
-    """How exactly and how long each equilibrium is sought.
+    """Options of Newton's method: tolerance, number of iterations, PETSc options.
 
     Args:
         rtol: Residual to be reached, as a part of the forces in the scene.
@@ -108,7 +108,7 @@ class Border(Protocol):
         """
 
     def met(self) -> bool:
-        """Whether the equation is."""
+        """Return whether the equation is."""
 
 
 class Solver:
@@ -185,7 +185,7 @@ class Solver:
         self._error: BaseException | None = None
 
     def _make_course(self) -> Any:
-        """How far a solution is, for :func:`judge` in C; and what the test in C needs."""
+        """Make the data of the convergence test in C, see :func:`judge`."""
         c = ffi.new("equation *") if self._equation is None else self._equation.c
         c.size = self._share.size
         c.rtol, c.modified, c.rate = self._newton.rtol, self._newton.modified, math.inf

@@ -1,4 +1,4 @@
-"""What PETSc calls preconditioners; exact ones: elimination along beams, and a bordered tangent."""
+"""Direct solvers as PETSc preconditioners: condensation along beams, bordered systems."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ BAD_PIVOT = int(PETSc.PC.FailedReason.FACTOR_NUMERIC_ZEROPIVOT)
 
 
 class Bordered:
-    """What PETSc calls a preconditioner: the tangent bordered by one more unknown and equation.
+    """Direct solver of the tangent bordered by one more unknown and equation.
 
     By elimination of the border: one factorisation and two solutions, as the tangent alone is
     banded.  Where that is nearly singular, the next iteration makes up for the lost digits.
@@ -48,7 +48,7 @@ class Bordered:
 
 
 class ChainsFirst:
-    """What PETSc calls a preconditioner; an exact one: along the beams, then what that leaves.
+    """Direct solver: condensation along the beams, then factorization of what remains.
 
     Every process factors what is left, which is small, instead of waiting for another.
 

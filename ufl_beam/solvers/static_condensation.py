@@ -168,7 +168,7 @@ class Elimination:
         return entries, np.searchsorted(mine, keys), np.searchsorted(mine, of_chains)
 
     def _make_arguments(self, chains: Chains, left: dict[str, Index]) -> None:
-        """What C takes: the chains, and of what is left the indices that loops.h names."""
+        """Make the data of C: the chains, and the indices of the remaining system, see loops.h."""
         A = self._A
         ends = chains.ends.reshape(-1, 2, 3, 1)
         first, last = (chains.dofs[k] for k in (chains.first[:-1], chains.first[1:] - 1))

@@ -60,7 +60,7 @@ class SecondDifferences(OfForms):
             kernel.put(self._before, min(1.0, step.dt / self._last_dt) * self._change)
 
     def accept(self, q1: Array, s: Array) -> None:
-        """What was lost; and the changes of the strains."""
+        """Enter the energy that was lost, and keep the changes of the strains."""
         self._ledger.lost["numerical"] += self._lost.value(q1)
         e1 = self._strains(q1)
         self._change, self._q, self._e, self._last_dt = e1 - self._e, q1, e1, self._dt

@@ -33,10 +33,10 @@ class Term(Protocol):
     """A virtual work."""
 
     kind: str
-    """What it is the work of, one of :data:`KINDS`."""
+    """Kind of its forces, one of :data:`KINDS`."""
 
     def loops(self) -> tuple[Loop, Loop | None] | None:
-        """What :meth:`add_residual` and :meth:`add_tangent` are in C, if there is one; or None."""
+        """Return C functions with data in the place of both methods, or None without them."""
 
     def begin(self, step: Step) -> None:
         """Take note of the step that is to be solved."""
@@ -173,7 +173,7 @@ class ElasticBeams(OfForms):
         lib.add_first_cells(self._tangents, doubles(q1), doubles(self._A.data))
 
     def accept(self, q1: Array, s: Array) -> None:
-        """What the scheme lost."""
+        """Enter the energy that the scheme lost."""
         self._tangents.begins = 0
         for loss in self._losses:
             self._ledger.lost["numerical"] += loss.value(q1)
@@ -184,7 +184,7 @@ class ElasticBeams(OfForms):
         self._ledger.state["stored"] += self._held
 
     def remember(self, memory: Memory, q: Array) -> None:
-        """What is stored follows from the configuration."""
+        """Nothing to remember: the stored energy follows from the configuration."""
 
     def change(self, q1: Array) -> float:
         """Energy that cells of this process store in the step to ``q1``; J."""
@@ -293,7 +293,7 @@ class Inertia(OfMatrix):
 
     @property
     def ready(self) -> bool:
-        """Whether a step can begin: of what the scheme keeps something is known."""
+        """True if a step can begin: of what the scheme keeps something is known."""
         return not self.scheme.kept or bool(self.more)
 
     def prepare(self, s: Array) -> None:

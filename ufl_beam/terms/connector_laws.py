@@ -1,4 +1,4 @@
-"""How the laws of connectors answer in a step: one row ``α e + β λ = γ`` for each of them.
+"""Laws of connectors over a step: one row ``α e + β λ = γ`` for each of them.
 
 e is the relative motion at the end of the step and λ the force that resists its growth.  What is
 held has a row about e, all other laws have one about λ, linear in e around the latest iterate.
@@ -60,7 +60,7 @@ class Running(Protocol):
 
 
 class Setting(NamedTuple):
-    """What responses are made with.
+    """Arguments that all responses are made with.
 
     Attributes:
         simulation: Whom controllers and friction ask.
@@ -81,7 +81,7 @@ class Response(Protocol):
     """Some connectors whose laws are of one kind; motions and forces are arrays of them."""
 
     steady: bool
-    """Whether the rows stay the same during a step."""
+    """True if the rows stay the same during a step."""
 
     in_c: dict[str, Any]
     """Data of laws that C evaluates, by their names in ``couplings`` of loops.h."""
@@ -115,7 +115,7 @@ class Response(Protocol):
         """Energy dissipated plastically in a step to the motions ``e1``; J."""
 
     def flows(self) -> bool:
-        """Whether one slips plastically in the latest iterate."""
+        """Return whether one slips plastically in the latest iterate."""
 
     @property
     def dissipated(self) -> Array:
@@ -138,7 +138,7 @@ class Response(Protocol):
         """Derivative of α by the motion, internal variables kept; (num_links,)."""
 
     def state(self) -> Array:
-        """What is remembered besides motions and forces; (num_links, k)."""
+        """Return the internal variables; (num_links, k)."""
 
     def restore(self, rows: Array) -> None:
         """Take over :meth:`state`."""
@@ -157,7 +157,7 @@ def respond(law: Any, links: Sequence[Connector], setting: Setting) -> Response:
 
 
 class _Working:
-    """What responses have in common that store nothing: the work of their forces is entered."""
+    """Base of responses that store nothing: the work of their forces is entered."""
 
     steady = False
     in_c: dict[str, Any] = {}  # noqa: RUF012
@@ -176,7 +176,7 @@ class _Working:
         self._prepare()
 
     def _prepare(self) -> None:
-        """What a law notes once."""
+        """Prepare the response; called once."""
 
     def begin(self, e0: Array, step: Step) -> None:
         """Begin a step at the motions ``e0``."""
@@ -184,7 +184,7 @@ class _Working:
         self._note(step)
 
     def _note(self, step: Step) -> None:
-        """What a law notes at the beginning of a step."""
+        """Prepare a step."""
 
     def motion(self, e: Array) -> Array:
         """Those of the nodes."""
@@ -249,7 +249,7 @@ class _Working:
 
 
 class _Held(_Working):
-    """What joints hold: the motion is zero, and there is no work."""
+    """Constraint of a joint: the motion is zero, and there is no work."""
 
     steady = True
 
@@ -429,7 +429,7 @@ class _Rubbing(_Working):
         self._accepted = self._slip
 
     def rows(self, e1: Array, λ: Array) -> Rows:
-        """What sticks comes to rest until it bears too much; what slips goes on until it turns."""
+        """Stick while the force is below the limit; slip until the sliding velocity reverses."""
         step = e1 - self._e0
         stuck = self._slip == 0
         back = ~stuck & (self._slip * step < -self._tiny)

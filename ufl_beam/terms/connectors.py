@@ -206,7 +206,7 @@ class Couplings(Links):
         return self.response.change(self.motion(q1), float(self._taken(q1).sum()))
 
     def flows(self) -> bool:
-        """Whether a connector of this process slips plastically in the latest iterate."""
+        """Return whether a connector of this process slips plastically in the latest iterate."""
         return self.response.flows()
 
     def shown_motion(self, q: Array) -> Array:

@@ -60,7 +60,7 @@ class KelvinVoigtForces(OfForms):
         self._dt = step.dt
 
     def accept(self, q1: Array, s: Array) -> None:
-        """What was damped."""
+        """Enter the energy that was damped."""
         self._ledger.lost["damping"] += self._lost.value(q1)
 
     def add_state(self, q: Array) -> None:
@@ -104,7 +104,7 @@ class RayleighForces(OfMatrix):
         self._times.begin(step.q0, *self._inertia.scheme.velocity(step.dt, self._inertia))
 
     def accept(self, q1: Array, s: Array) -> None:
-        """What was damped."""
+        """Enter the energy that was damped."""
         self._ledger.lost["damping"] += self._times.square(s) / self._dt
 
     def add_state(self, q: Array) -> None:

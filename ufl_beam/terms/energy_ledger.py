@@ -91,7 +91,7 @@ class Energy:
 
     @property
     def imbalance(self) -> Array:
-        """What the ledger does not explain; (n+1,); J."""
+        """Energy that the ledger does not account for; (n+1,); J."""
         total = self.total
         return np.asarray(total - total[0] - _sum(self.supplied) + _sum(self.lost))
 

@@ -1,4 +1,4 @@
-"""What all terms of connectors have in common."""
+"""Base of the terms of connectors."""
 
 from __future__ import annotations
 

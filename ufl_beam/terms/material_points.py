@@ -33,7 +33,7 @@ INPUTS = (
     # numbers of the point; the order of these so far is that of loops.c
     *("C", "length", "θ", "dt", "limit", "H", "B", "eta", "softening limit", "softening energy"),
 )
-"""What the law of a point depends on, in the order of its storage."""
+"""Inputs of the law of a point, in the order of their storage."""
 
 SPENT, NOTHING = 1e-6, 1e-30
 """Part of its limit below which an open hinge counts as a joint; factor of its stiffness then."""
@@ -135,7 +135,7 @@ class Course:
 
     @property
     def opened(self) -> bool:
-        """Whether a point of this process has opened."""
+        """True if a point of this process has opened."""
         return bool(self.flags[OPENED])
 
     def relieve(self, relief: bool) -> None:
@@ -221,7 +221,7 @@ class Points:
         c.cells, c.of_cell, c.theta = cells, n, scheme.theta
 
     def __getitem__(self, name: str) -> Array:
-        """What is known of the points by the name of an input; a view; (cells, n)."""
+        """Return the values of an input at the points, by its name; a view; (cells, n)."""
         return self._at[name]
 
     def _resist(self) -> None:
@@ -297,7 +297,7 @@ class Points:
         return float(np.sum(self._sums_to_come()[:2]))
 
     def _sums_to_come(self) -> Array:
-        """What :meth:`accept` would make of :attr:`sums`."""
+        """Return :attr:`sums` as :meth:`accept` would leave them."""
         copy = ffi.new("points *", self.points[0])
         sums = np.empty_like(self.sums)
         state = (self._e0, self._storage, self.kept)
@@ -344,7 +344,7 @@ class Points:
     # -- the state -----------------------------------------------------------------------------
 
     def state(self) -> Array:
-        """What the accepted state consists of; (cells, k); a copy."""
+        """Return the internal variables of the accepted state; (cells, k); a copy."""
         stored = np.zeros((len(self.kept), 2))
         stored[:1] = self.sums[3:5]  # of all cells together; to whom it belongs does not matter
         return np.hstack([*(self[name] for name in STATE), self.kept, self._e0, stored])

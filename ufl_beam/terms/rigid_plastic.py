@@ -261,7 +261,7 @@ class RigidPlasticResponse:
         return np.where(self._way == 0, 1.0, 0.0)
 
     def flows(self) -> bool:
-        """Whether one slips in the latest iterate."""
+        """Return whether one slips in the latest iterate."""
         return bool(self._way.any())
 
     # -- the state -----------------------------------------------------------------------------

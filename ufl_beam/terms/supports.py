@@ -95,7 +95,7 @@ class Supports:
 
     @property
     def turned(self) -> bool:
-        """Whether some supports are at an angle to the axes of the plane."""
+        """True if some supports are at an angle to the axes of the plane."""
         return bool(self._turned)
 
     def enter(self, x: Array) -> None:
