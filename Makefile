@@ -23,8 +23,8 @@ help: ## this list
 demo: ## the first demo: a four-beam swing
 	@./env python3 demos/demo_four_beam_swing.py
 
-test: ## the tests, without the slow ones
-	@./env python3 -m pytest
+test: ## the tests, without the slow ones, on all cores
+	@./env sh -ec '$(with_workers) python3 -m pytest $$workers'
 
 test-mpi: ## unit and property tests on 2 and on 3 ranks
 	@$(call mpi,2) $(pytest_mpi)
@@ -76,6 +76,9 @@ every ?= 1
 with_sanitizers = export UFL_BEAM_SANITIZE=1 PYTHONMALLOC=malloc PETSC_OPTIONS=-no_signal_handler; \
 	export ASAN_OPTIONS=detect_leaks=0:abort_on_error=1:allocator_may_return_null=1 UBSAN_OPTIONS=print_stacktrace=1; \
 	LD_PRELOAD=$$(gcc -print-file-name=libasan.so):$$(gcc -print-file-name=libstdc++.so.6)
+
+# One process of pytest for each core if pytest-xdist is there; those that run out of tests take some from others.
+with_workers = workers=$$(python3 -c "import xdist" 2>/dev/null && echo "-n auto --dist worksteal" || :);
 
 # ruff, which Debian lacks: from a venv beside the root of ./env, made on first use; its version is in pyproject.toml.
 with_ruff = tools=$${XDG_CACHE_HOME:-$$HOME/.cache}/ufl_beam/tools; ruff=$$tools/bin/ruff; \

@@ -6,6 +6,7 @@ processes; `mpirun -n 2 python3 raising.py CASE RANK` lets one process fail wher
 
 import math
 import sys
+import time
 from pathlib import Path
 
 from mpi4py import MPI
@@ -244,4 +245,5 @@ if __name__ == "__main__":
     else:
         agreement.GRACE = 0.5
         name, rank = sys.argv[1:]
+        print(f"begun at {time.time()}", file=sys.stderr, flush=True)
         globals()[name](failure(int(rank), lambda: RuntimeError(f"user, {name}")))
