@@ -96,7 +96,8 @@ with_sanitizers = export UFL_BEAM_SANITIZE=1 PYTHONMALLOC=malloc PETSC_OPTIONS=-
 # One process of pytest for each core if pytest-xdist is there; those that run out of tests take some from others.
 with_workers = workers=$$(python3 -c "import xdist" 2>/dev/null && echo "-n auto --dist worksteal" || :);
 
-# ruff, which Debian lacks: from a venv beside the root of ./env, made on first use; its version is in pyproject.toml.
+# ruff, which Debian lacks: from a venv beside the root of ./env, made on first use; its version is in pyproject.toml, and
+# the same in .pre-commit-config.yaml.
 with_ruff = tools=$${XDG_CACHE_HOME:-$$HOME/.cache}/ufl_beam/tools; ruff=$$tools/bin/ruff; \
 	$$ruff --version >/dev/null 2>&1 || { python3 -m venv --system-site-packages $$tools; \
 	$$tools/bin/pip install -q "ruff$$(sed -n "s/^required-version = \"\([^\"]*\)\".*/\1/p" pyproject.toml)"; }
