@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Functions of a user that raise on one process or on all; run by test_agreement.py.
 
 `mpirun -n 2 python3 raising.py` prints a line for each case: its name, the exceptions of all

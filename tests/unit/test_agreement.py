@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Exceptions in functions of users under `mpirun`: raised by all processes, or the end of all."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Scenes that are likely wrong are warned of, by name, on the line of the user; others are not."""
 
 import math

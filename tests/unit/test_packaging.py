@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The package as it is shipped: imports without DOLFINx, sdist and wheel, and runs from them."""
 
 import os
