@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What may act between two places: relative motions, and the laws that they follow."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What a call says as text that can be compared: records, numbers, functions and what they use."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """How finely a scene is discretised: what is no part of its physics."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What happens in a run: what yields, opens, breaks free, touches or slides, and when."""
 
 from __future__ import annotations

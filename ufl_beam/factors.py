@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What PETSc calls preconditioners; exact ones: elimination along beams, and a bordered tangent."""
 
 from __future__ import annotations

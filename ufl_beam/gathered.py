@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What the members of a study gave back, and the file that has it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What springs, dampers, motors and other laws look like, along a line or around a pin.
 
 A glyph is drawn in coordinates (s, t): s runs along the connector, from -2 at its place a to 2 at

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What is asked of a trade-off, a tolerance or a time, and which setting serves it best."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What joints and connectors did and bore in a run."""
 
 from __future__ import annotations

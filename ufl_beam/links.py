@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What all terms of connectors have in common."""
 
 from __future__ import annotations

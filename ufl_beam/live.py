@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What recorders, controllers and solutions may ask of a simulation between its steps."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What users ask about small motions: natural frequencies, damping ratios, buckling loads."""
 
 from __future__ import annotations

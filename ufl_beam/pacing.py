@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """How a run goes through time: one step after the other, from its beginning to its end."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What a trade-off found: its runs, the setting to use, and how far it can be trusted."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What is modelled: frozen records, and their validity as a whole before any mesh exists."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What a run gives back: the motion, the forces and the ledger."""
 
 from __future__ import annotations

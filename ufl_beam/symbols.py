@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What is drawn of bodies, joints, connectors and supports, and where; in lines and areas.
 
 Pictures of all kinds draw these: :mod:`ufl_beam.view` in the plane, :mod:`ufl_beam.render` solid.
