@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Time per step and per Newton iteration of the elastic flying beam, and where it goes.
 
 Run on an idle machine, one core::

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What benchmarks keep of a measurement: a line of JSON, with commit, versions and machine."""
 
 import json

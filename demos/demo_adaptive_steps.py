@@ -13,6 +13,7 @@
 # * what the tolerance means.
 
 # %%
+# SPDX-License-Identifier: MIT
 from pathlib import Path
 
 import matplotlib.pyplot as plt

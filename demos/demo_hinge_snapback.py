@@ -16,6 +16,7 @@
 # Data: EI = 1 MN m², L = 2 m, M_u = 10 kN m; fracture energies from ductile to brittle.
 
 # %%
+# SPDX-License-Identifier: MIT
 from pathlib import Path
 
 import numpy as np

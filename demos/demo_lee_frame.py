@@ -15,6 +15,7 @@
 # 1968; A = 6 cm², I = 2 cm⁴, E = 7.2e6 N/cm², ν = 0.3, shear as stiff as G A.
 
 # %%
+# SPDX-License-Identifier: MIT
 from pathlib import Path
 
 import numpy as np

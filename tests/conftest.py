@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What all tests share: scenes, what runs under MPI, no PETSc objects left over."""
 
 import gc

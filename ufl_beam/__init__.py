@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Planar flexible multibody dynamics with geometrically exact beams.  Units are SI."""
 
 from ufl_beam import dolfinx_compat  # noqa: F401 - first, because it explains what is not installed

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Checks of arrays of numbers that users give."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Types of arrays."""
 
 from __future__ import annotations

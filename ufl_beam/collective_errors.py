@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Exceptions under MPI: what one process raises is raised by all, or ends all of them.
 
 Without this a process that fails alone leaves the others waiting for ever in a collective call.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """DOLFINx 0.9 to 0.11: every difference between the versions, and nothing else."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Errors and warnings of the package, and the checks of arguments that all records share."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Locks of files between processes; the operating system frees them when a process ends."""
 
 from __future__ import annotations

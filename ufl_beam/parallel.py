@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Which processes compute a scene together: all of them, or within a study one alone."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What must stop, and what it must say: scenes and calls that are wrong, or go wrong on the way."""
 
 import math

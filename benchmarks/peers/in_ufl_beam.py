@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The problems in ufl_beam, as a user states them; the time loop is timed."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What is turned: a setting of all dials, the grid of each scene, and one dial at a time."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The figures of the study: error over wall time, and what each dial does."""
 
 from __future__ import annotations

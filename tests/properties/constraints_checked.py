@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What joints, motors, guides and supports of a solution promise, checked from positions alone."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Random laws of sections and connectors, written as Python source; see any_scene.py."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Random machines of everything that a scene may have, each a script that anybody can run.
 
 `script(seed)` writes Python that makes `scene`, `scheme` and `dt`.  All numbers are plain, so that

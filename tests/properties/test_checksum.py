@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """One scene of everything gives one result on any number of processes."""
 
 import numpy as np

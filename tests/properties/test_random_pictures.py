@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Pictures of random machines: no failure, and every object leaves something."""
 
 import dataclasses

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Script of test_copies.py, for two processes: scenes that are not the same on both."""
 
 import itertools

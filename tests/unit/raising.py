@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Functions of a user that raise on one process or on all; run by test_agreement.py.
 
 `mpirun -n 2 python3 raising.py` prints a line for each case: its name, the exceptions of all
@@ -6,6 +7,7 @@ processes; `mpirun -n 2 python3 raising.py CASE RANK` lets one process fail wher
 
 import math
 import sys
+import time
 from pathlib import Path
 
 from mpi4py import MPI
@@ -245,4 +247,5 @@ if __name__ == "__main__":
     else:
         collective_errors.GRACE = 0.5
         name, rank = sys.argv[1:]
+        print(f"begun at {time.time()}", file=sys.stderr, flush=True)
         globals()[name](failure(int(rank), lambda: RuntimeError(f"user, {name}")))

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Beams: where the axis runs, which vertices it gets, and what a place is."""
 
 import math

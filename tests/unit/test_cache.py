@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The cache of compiled code: damage, kills, other users, directories that cannot be written to."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Checkpoints: what they refuse and why, what describes a run, full disks, who remembers what."""
 
 import errno

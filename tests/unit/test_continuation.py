@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Paths of static equilibria: controls, critical points, branches, what is refused, what fails."""
 
 import itertools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Damping from a history: peaks, logarithmic decrement, and which law their decay follows."""
 
 import re

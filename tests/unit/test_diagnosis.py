@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Words for what fails: what nothing holds, what gives way, why Newton's method stopped."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Random limits: their moments, and that a seed decides them and nothing else."""
 
 import math

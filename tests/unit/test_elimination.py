@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Elimination along chains of cells against direct solutions of the whole system."""
 
 from itertools import pairwise

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The equation of a step in C against the same terms called by Python."""
 
 from petsc4py import PETSc

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What is reported to happen, and when."""
 
 import math

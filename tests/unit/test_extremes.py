@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What a run says where it goes wrong on the way, and that nothing is lost then."""
 
 import math

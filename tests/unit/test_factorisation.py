@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Factors of indefinite matrices: signs of eigenvalues, solutions, what is singular."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Cycles, S-N curves, extremes and thinned histories: what long runs keep of themselves."""
 
 import csv

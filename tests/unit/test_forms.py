@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What is compiled: one quadrature rule per form, and nothing that the scene does not need."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Pictures and files of what yields and breaks: the arrays of the solution, with units."""
 
 import numpy as np

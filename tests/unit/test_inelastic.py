@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Inelastic cells in a run: steps that fail leave no trace, and only cells that can yield pay."""
 
 import math

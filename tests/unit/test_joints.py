@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Bodies, joints and connectors: what is refused, what is shared, what solutions say."""
 
 import math

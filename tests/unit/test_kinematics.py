@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Strains and their algorithmic variation, at random states of cells in random directions."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Kernels for several cells at once against the same kernels cell by cell."""
 
 from copy import copy

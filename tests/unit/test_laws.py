@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Laws of one point: flow in closed form, its limits, and tractions with their exact means."""
 
 import math

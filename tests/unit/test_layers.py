@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The package as text: who imports what, equations stated once, one version, documented names."""
 
 import ast
@@ -212,6 +213,25 @@ def test_what_is_public_has_a_docstring(module):
 
     visit(tree, module)
     assert missing == []
+
+
+SOURCES = [
+    path
+    for folder in ("ufl_beam", "tests", "demos", "benchmarks")
+    for path in sorted((ROOT / folder).rglob("*"))
+    if path.suffix in {".py", ".c", ".h"} and "output" not in path.parts
+]
+
+
+def test_sources_state_their_licence():
+    """In the first line; demos, whose first cell is text, in that of their first cell of code."""
+    licence = "SPDX-License-Identifier: MIT"
+    for path in SOURCES:
+        text = path.read_text(encoding="utf-8")
+        if text.startswith("# %% [markdown]"):
+            text = text.partition("\n# %%\n")[2]
+        first = text.partition("\n")[0]
+        assert first in (f"# {licence}", f"/* {licence} */"), path
 
 
 @pytest.mark.serial

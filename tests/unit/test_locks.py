@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Two runs on one checkpoint: the second one is refused and touches nothing."""
 
 import re

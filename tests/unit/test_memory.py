@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A long run needs no more memory than a short one."""
 
 import gc

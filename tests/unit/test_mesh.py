@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The dials of a mesh: places remain vertices, and what asks a solution takes any mesh."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Pictures of models before any run: what is in them, labels that stand clear, errors."""
 
 import dataclasses

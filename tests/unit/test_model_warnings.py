@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Scenes that are likely wrong are warned of, by name, on the line of the user; others are not."""
 
 import math
@@ -232,11 +233,11 @@ def test_touching_places_of_large_scenes_are_found_fast():
     row = [beam((i, 0), (i + 1, 0), name=f"b{i}", cells=1) for i in range(number)]
     pairs = [pair for i, pair in enumerate(pairwise(row)) if i != forgotten]
     grid = Grid(ub.Scene(row, joints=[ub.Rigid(x.end, y.start) for x, y in pairs]))
-    began = time.perf_counter()
+    began = time.process_time()
     with warns("b12345.end (12346, 0) and b12346.start (12346, 0) touch"):
         warn_of_touching(grid)
-    # The tenfold of what is expected, for machines that are busy
-    assert time.perf_counter() - began < 3.0
+    # The tenfold of what is expected, for slow machines; others on the same core do not count
+    assert time.process_time() - began < 3.0
 
 
 # -- the same thing twice ------------------------------------------------------------------------

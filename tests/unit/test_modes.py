@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Modes and buckling: what is asked of them, and that it does not matter how."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """C of the package: no warnings, and sanitizers that see what they are to see."""
 
 import os

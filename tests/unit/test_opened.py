@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Reports on cells that opened: how far the place of a hinge shifts its limit, openings in a jump.
 
 The beam has no moment at its ends, so its hinge opens in a cell of the span: next to the push at a

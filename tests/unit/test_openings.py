@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The rule that chooses between two solutions: closed places stay closed while they can bear it.
 
 The beams have no moment at their ends, so hinges of the section open in cells of the span.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Files of runs: no two outputs share one, errors name them, and kills leave complete steps."""
 
 import errno

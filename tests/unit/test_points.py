@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Material points: laws fulfilled after a step, tangents, energies, and openings of any size."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Files of a run: their contents are the solution, on any number of ranks."""
 
 import csv

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Relative motions: values, variations that are increments, rigid motions; tangents of all laws."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Orders, limits, errors, costs and fronts of manufactured runs, whose answers are known."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Solutions in files: what was computed is there again, to the last bit, with its scene."""
 
 import copy

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Loads of any size and units of any size: runs end, and answers are those of unit loads."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Structures of matrices."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Studies: the same on any number of ranks, no member fatal, nothing lost, nothing done twice."""
 
 import math

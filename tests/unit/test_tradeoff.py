@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Trade-offs: of runs whose errors and times are laws, and of small scenes."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Pictures: what is in them, that they need no screen, and what is refused."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Every parameter of every public callable refuses what it cannot take, by name, before any mesh.
 
 The table below has a valid call of each public callable and the kind of each of its parameters.  A

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Bodies, joints and connectors against closed forms; all [closed].
 
 The midpoint rule of a mass on a linear spring, a damper or under a constant force has a closed form

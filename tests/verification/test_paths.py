@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Static paths through limit points, bifurcations and snap-backs: S5, S7, S8, S17 of the reference.
 
 [calc] values are those of an independent converged solution, with the digits that are given.  Mesh

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Plastic hinges of zero length: plastic theory, closed forms, and the joints that they become."""
 
 import math

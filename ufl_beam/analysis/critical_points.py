@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Critical points of static paths: the stiffness of the whole scene, its signs and its modes."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Damping of a free vibration: its peaks, their logarithmic decrement, the law of their decay."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Small motions about a state: their matrices, and the eigenvalues that SLEPc finds of them."""
 
 from __future__ import annotations

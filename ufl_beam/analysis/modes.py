@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Small motions: natural frequencies, damping ratios, buckling loads, their shapes."""
 
 from __future__ import annotations

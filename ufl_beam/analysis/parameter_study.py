@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Studies: one scene many times, with other parameters or seeds, several at a time.
 
 Members are handed out by :mod:`mpi4py.futures`.  Since all processes run the same script, each has

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Controls of static paths: what decides how long their steps are."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Equilibria near a state of a static path, the load factor among the unknowns."""
 
 from __future__ import annotations

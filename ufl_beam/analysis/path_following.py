@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Static paths: equilibria one after the other, the load factor among the unknowns."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Runs of one scene with finer and finer dials: which, how they are timed, what they give."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """From coarse to fine until it is known which setting serves: the search of a trade-off."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Errors by self-convergence: from runs on three levels of a dial to order, limit and uncertainty.
 
 Level k of a dial is 2**k times as fine as level 0.  Richardson's extrapolation, with the safety

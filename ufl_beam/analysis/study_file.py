@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Results of the members of a study, and their file."""
 
 from __future__ import annotations

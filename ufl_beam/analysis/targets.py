@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Targets of a trade-off, a tolerance or a time, and the setting that serves them best."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The trade of speed for accuracy on a user's own scene, measured and chosen from."""
 
 from __future__ import annotations

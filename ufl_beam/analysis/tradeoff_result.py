@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Result of a trade-off: its runs, the recommended setting, and how far to trust it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The loops over cells and rows, compiled once for the machine.
 
 They do what DOLFINx's assemblers do (a test compares both), but bring the unknowns of a cell up to

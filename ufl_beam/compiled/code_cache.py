@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Directory of compiled code: private to its user, checked before use, complete after a kill.
 
 An entry is a directory with the files of one build and a list of their checksums.  It is built

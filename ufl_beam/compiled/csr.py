@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Index arithmetic on matrices whose arrays loops in C fill and PETSc solves with."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Compiled code: modules of C and forms of UFL, compiled once for the machine.
 
 FFCx needs a C compiler at run time anyway.

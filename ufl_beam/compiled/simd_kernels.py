@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """FFCx's kernels for several cells at once: one cell in each lane of the processor's vectors.
 
 Kernels are long straight lines of arithmetic on the numbers of one cell.  Their text is compiled

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """UFL forms compiled for the hot loop: packed once, refreshed only where something changed.
 
 A form is compiled with one quadrature rule: forms that mix a one-point rule with another are

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Functions of single points, stated in UFL and compiled to C."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """From a scene to vertices, cells and the numbering of degrees of freedom.
 
 Every process holds the numbering of the whole scene, a few integers a cell, and meshes only its

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The finite element spaces of a share of the grid, and the functions that forms are written in."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Warnings about scenes that can be computed but are likely not what is meant."""
 
 from __future__ import annotations

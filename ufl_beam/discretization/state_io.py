@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The state of a simulation in numbers of the grid: the same on any number of processes.
 
 Whatever remembers something from one step to the next states in one method, ``remember``, what that

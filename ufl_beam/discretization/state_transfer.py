@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Transfer of the end of a run to a scene of the same beams with other joints and connectors."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Schemes whose forces act at the end of the step: statics, Newmark, generalised-α."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Schemes whose forces act over the step, so that their works are increments of energy."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Strains of the Reissner beam and their algorithmic variation over a time step, in UFL.
 
 Pure functions: configurations ``(u_x, u_y, ψ)`` in, strains ``(Σ, Γ, K)`` out; no state, no mesh

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Relative motions of two frames, and their variation over a time step, in UFL.
 
 A frame is a configuration (u_x, u_y, ψ).  Each motion is stated once, as a value, which is zero in

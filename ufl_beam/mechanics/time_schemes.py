@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Time schemes: how two states of the scene become the equation of a step.
 
 A scheme says, in UFL, which strains vary and which resultants act during a step, how velocities

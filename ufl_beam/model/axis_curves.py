@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Curves of beam axes as records, so that a scene can be compared and saved by its numbers."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Beams and the places on them: where the undeformed axis runs."""
 
 from __future__ import annotations

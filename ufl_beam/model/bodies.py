@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Rigid bodies, the ground, and the points on them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Laws of connectors: what force belongs to a relative motion, or what motion is given."""
 
 from __future__ import annotations

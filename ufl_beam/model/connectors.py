@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Connectors: a relative motion of two places, and the law that it follows."""
 
 from __future__ import annotations

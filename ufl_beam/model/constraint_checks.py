@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Rank analysis: what may move without strain, and what is held twice."""
 
 from __future__ import annotations

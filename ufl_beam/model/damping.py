@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Viscous damping of the elastic motion: what users may ask for beside plastic dissipation."""
 
 from __future__ import annotations

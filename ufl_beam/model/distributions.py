@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Distributions of yield stresses over fibres and cells; seeded, the same on every process.
 
 Each cell of each beam draws from a stream of its own, known by where the beam begins and ends, so

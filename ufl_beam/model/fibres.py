@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Fibres of a cross-section: layers across its depth, each a material point of its own."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Joints: components of motion that places share, or that connectors hold."""
 
 from __future__ import annotations

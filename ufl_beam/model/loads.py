@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Loads, and how they vary in time."""
 
 from __future__ import annotations

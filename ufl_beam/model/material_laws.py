@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Laws of a material point in one dimension: what yields, hardens, flows and breaks.
 
 A point is a resultant of a cross-section (strain 1 or curvature 1/m against N or N m) or a fibre

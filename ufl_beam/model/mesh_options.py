@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Options of the discretization: cells, degrees of elements, mass matrix."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Curves of the plane: tangents by differences, nearest points, the circle around points."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Places of the plastic hinges of zero length in a scene."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Scenes: all records of a model, and their validity as a whole before any mesh exists."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Cross-sections: what a beam is made of, in resultants or in fibres.
 
 Units are SI: N, N m², kg/m, kg m.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Supports: what is held or moved in a given way at a place."""
 
 from __future__ import annotations

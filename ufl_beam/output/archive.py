@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """HDF5 files of named arrays and some text, each replaced at once."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Events of a run: yielding, opening, breaking, touching, sliding, and their times."""
 
 from __future__ import annotations

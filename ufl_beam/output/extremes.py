@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Least and largest values that a run has reached, and when."""
 
 from __future__ import annotations

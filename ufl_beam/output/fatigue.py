@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Stress at named places, its cycles counted while a run goes on."""
 
 from __future__ import annotations

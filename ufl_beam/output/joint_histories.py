@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Histories of joints and connectors: relative motions, forces, works."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A scene as one data set of lines, with fields at its points and in its cells, for files."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Files that runs write: checks of their paths before the run, errors that name the file."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Cycles of stress: how they are counted in a history, and the damage that they do."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Files that a run writes on the way."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Functions of a user in a scene that was saved: their values at some points, and no more."""
 
 from __future__ import annotations

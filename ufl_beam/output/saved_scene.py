@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Scenes as data of JSON: each record with the numbers that it was made of, exact.
 
 Functions of a user are no data.  Those of time are saved by their values at the times of a

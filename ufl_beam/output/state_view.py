@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """State of a simulation between its steps, for recorders, controllers and solutions."""
 
 from __future__ import annotations

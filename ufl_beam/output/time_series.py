@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Recorders of time series for ParaView and PyVista."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Time series of lines as VTKHDF: one HDF5 file, mesh written once, fields appended step by step.
 
 The layout is "UnstructuredGrid" of version 2.0 with "Steps", see the documentation of VTK's file

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Lines that show what is no beam: bodies, and links that join places which are apart."""
 
 from __future__ import annotations

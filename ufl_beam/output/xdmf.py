@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Time series of lines as XDMF: one grid a step with all its fields, valid whenever a run ends.
 
 The text is followed by a processing instruction of spaces, ``<?spare ... ?>``.  A step is written

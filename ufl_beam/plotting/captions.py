@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Short words for connectors, hinges and damping in pictures of a model."""
 
 from __future__ import annotations

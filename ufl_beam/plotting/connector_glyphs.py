@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Glyphs of springs, dampers, motors and other laws, along a line or around a pin.
 
 A glyph is drawn in coordinates (s, t): s runs along the connector, from -2 at its place a to 2 at

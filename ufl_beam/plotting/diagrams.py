@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Pictures of a solution at one of its times, with diagrams of section forces on the frame."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Pictures of what long runs keep: envelopes on the frame, cycles of stress and their damage.
 
 They look like those of :mod:`ufl_beam.plotting.plots`, and need no screen either.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Pictures of what yields and breaks, by Matplotlib: where, along which path, at what cost.
 
 They look like those of :mod:`ufl_beam.plotting.plots`, and need no screen either.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Placement of labels in pictures, off lines and off each other."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Symbols of loads, prescribed motions and initial velocities, with their labels."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Picture of a model before any run."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Strokes and labels of all objects of a model before any run."""
 
 from __future__ import annotations

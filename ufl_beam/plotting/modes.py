@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Pictures of modes and buckling shapes, by Matplotlib."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Pictures of a model before a run, and of a solution at one of its times."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Pictures of a solution in its plane, by Matplotlib: what is drawn, and how it looks.
 
 Every function returns a Matplotlib figure, so that ``plot(solution, "M").savefig("portal.png")``

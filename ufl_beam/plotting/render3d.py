@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Solid pictures and films of a solution, by PyVista: what is built, and on which screen."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Positions of what pictures show, in a solution or before any run, and sizes of symbols."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Symbols of bodies, joints, connectors and supports as lines and areas.
 
 Pictures of all kinds draw these: :mod:`ufl_beam.plotting.plots` in the plane,

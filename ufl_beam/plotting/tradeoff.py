@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The work-precision diagram: what each run of a trade-off took, and how accurate it was."""
 
 from __future__ import annotations

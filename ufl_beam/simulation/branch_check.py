@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The path of static equilibria: whether a step followed it, or leapt somewhere else."""
 
 from __future__ import annotations

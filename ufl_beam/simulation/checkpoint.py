@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Files from which a run goes on after whatever has stopped it.
 
 A file is one line of text, filled up to 512 bytes, and an HDF5 file, which readers of HDF5 find

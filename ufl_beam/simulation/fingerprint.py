@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Fingerprint of the arguments of a run, to tell whether a checkpoint is of the same one."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The state that a run begins with."""
 
 from __future__ import annotations

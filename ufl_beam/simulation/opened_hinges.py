@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Cells whose embedded hinge or cracks opened in a run, and what depends on the mesh there.
 
 An embedded hinge is in the middle of its cell and feels the mean moment of the cell.  At the ends

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Check of processes that compute copies of one small scene: all must find the same motion."""
 
 from __future__ import annotations

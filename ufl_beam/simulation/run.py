@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A run from beginning to end: steps, what is kept, what is written on the way."""
 
 from __future__ import annotations

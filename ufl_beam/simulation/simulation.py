@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """From a scene to its motion: build what the scene requires, then step through time."""
 
 from __future__ import annotations

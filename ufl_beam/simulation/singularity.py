@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Diagnosis of singular tangents: the motion that meets no force, and what gives way in it."""
 
 from __future__ import annotations

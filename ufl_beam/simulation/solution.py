@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Solutions: motion, forces and ledger of a run."""
 
 from __future__ import annotations

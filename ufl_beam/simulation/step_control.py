@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Step control: equal and adaptive steps from the beginning of a run to its end."""
 
 from __future__ import annotations

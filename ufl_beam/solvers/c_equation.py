@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The equation of a step in C: its parts one after the other, with no Python between them.
 
 SNES calls these functions on one process.  What has no loop in C takes part by a call of Python.

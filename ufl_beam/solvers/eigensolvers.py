@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Eigenvalues of sparse pencils by SLEPc, those nearest to zero first."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Direct factorisation of a square sparse matrix that may be indefinite, and the signs of it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Idle motions: those that have no inertia, and that no force resists or drives.
 
 The node where several members meet has no mass of its own.  When all plastic hinges around it have

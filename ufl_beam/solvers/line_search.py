@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Newton's method with a line search, for steps in which full corrections lead nowhere."""
 
 from __future__ import annotations

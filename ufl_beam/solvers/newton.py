@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """One equilibrium by PETSc SNES: vectors, the matrix, tolerances without a dimension."""
 
 from __future__ import annotations

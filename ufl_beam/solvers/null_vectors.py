@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Null vectors of singular tangents."""
 
 from __future__ import annotations

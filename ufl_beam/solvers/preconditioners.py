@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Direct solvers as PETSc preconditioners: condensation along beams, bordered systems."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Gauss elimination of what lies between the ends of chains of cells, which needs no other process.
 
 A beam of many cells is a chain of vertices that couple to their two neighbours only.  Each process

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Resultants in proportion to second differences of strains: what a decaying scheme adds."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Virtual works, one class each: what a scene may contribute to the equation of a step.
 
 A term adds its part of the residual and of the tangent at the end of the step, and says what the

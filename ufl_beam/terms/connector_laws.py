@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Laws of connectors over a step: one row ``α e + β λ = γ`` for each of them.
 
 e is the relative motion at the end of the step and λ the force that resists its growth.  What is

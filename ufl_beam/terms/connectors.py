@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The virtual work of connectors: the force of a law on the variation of a relative motion."""
 
 from __future__ import annotations

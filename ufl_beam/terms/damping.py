@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Damping forces: what the records of damping.py do to the equation of a step."""
 
 from __future__ import annotations

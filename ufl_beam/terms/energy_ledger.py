@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The ledger: every joule that is in the scene, came in, or went out."""
 
 from __future__ import annotations

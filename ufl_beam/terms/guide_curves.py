@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Points on guide curves: held on a curve of the plane, free along it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Cells whose material yields, flows or breaks: the return map between strains and virtual work."""
 
 from __future__ import annotations

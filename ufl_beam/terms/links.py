@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Base of the terms of connectors."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Terms of the loads: their forces, tangents and works."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Material points: the return map of many at once, compiled from the statement of the laws.
 
 The laws are traced with UFL symbols: UFL derives the consistent tangents, by the implicit function

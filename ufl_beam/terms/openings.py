@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Search for the equilibrium of a step in which no more opens than must.
 
 With strong softening a step has two solutions, one in which a hinge stays closed and one in which

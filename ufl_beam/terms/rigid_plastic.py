@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Response of rigid-plastic connectors, such as plastic hinges of zero length.
 
 A connector is held exactly until its force reaches the limit of its law.  Then the force is that of

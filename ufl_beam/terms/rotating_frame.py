@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Forces that a rotating frame of reference makes: centrifugal and Coriolis."""
 
 from __future__ import annotations

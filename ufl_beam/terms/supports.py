@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Supports and prescribed motions: degrees of freedom whose values are given."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Derivative of a tangent along a direction, and works of both: what buckling needs."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Elimination of the interior vertices of chains, by blocks of 3 x 3; see static_condensation.py.
  *
  * A chain is left end - vertices - right end. Its vertices are eliminated from left to right, so that

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What add_cells of loops.c does, for LANES cells at a time; the last ones may be fewer. */
 
 enum { NUMBERS = CONSTANTS + (CONSTANTS == 0) };

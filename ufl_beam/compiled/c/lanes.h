@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Vectors of numbers, one for each of the cells that are computed at once, and what FFCx's kernels
  * ask of them; see simd_kernels.py.
  */
@@ -8,6 +9,16 @@ typedef int64_t mask __attribute__((vector_size(8 * LANES), aligned(8), may_alia
 
 #define ALL(x) ((lanes){0} + (x))
 #define PICK(m, a, b) ((lanes)(((m) & (mask)ALL(a)) | (~(m) & (mask)ALL(b))))
+
+/* The polynomials of sine and cosine are those of fdlibm, k_sin.c and k_cos.c:
+ *
+ * Copyright (C) 1993 by Sun Microsystems, Inc. All rights reserved.
+ *
+ * Developed at SunSoft, a Sun Microsystems, Inc. business.
+ * Permission to use, copy, modify, and distribute this
+ * software is freely granted, provided that this notice
+ * is preserved.
+ */
 
 /* sin(x + quarter π/2): the nearest multiple of π/2 is taken off in three parts (Cody and Waite);
  * the polynomials between -π/4 and π/4 are those of fdlibm (Sun Microsystems, 1993), good to the

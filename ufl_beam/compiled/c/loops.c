@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The loops over cells and rows that a Newton iteration consists of; see loops.h. */
 
 enum { MOST = 144 }; /* entries of an element vector or matrix: 12 unknowns of degree 3 */

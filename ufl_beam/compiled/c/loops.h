@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What Python sees of the loops in C: what they loop over, and their functions.
  *
  * This is read by cffi as well, which knows no directives of the preprocessor.

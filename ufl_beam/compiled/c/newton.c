@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The equation of a step as SNES asks for it, without Python; see newton.py.
  *
  * What has no loop in C is a part all the same: a function that calls Python.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Rigid-plastic connectors, such as plastic hinges: held up to a limit, then following a law. */
 
 /* What the kernels know of a connector; the order in rigid_plastic.py. */
