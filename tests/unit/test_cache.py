@@ -204,13 +204,13 @@ import sys, time
 from pathlib import Path
 from ufl_beam.compiled import code_cache
 place = Path(sys.argv[1])
-cache._place = lambda: place
+code_cache._place = lambda: place
 def build(directory):
     (directory / "begun").write_text("")
     with open(place.parent / "log", "a") as file:
         file.write("built\\n")
     time.sleep(float(sys.argv[2]))
-cache.kept("slow", build, lambda directory: None)
+code_cache.kept("slow", build, lambda directory: None)
 """
 
 
@@ -259,11 +259,11 @@ from ufl_beam.compiled import code_cache, jit
 from ufl_beam.dolfinx_compat import fem, line_mesh
 import numpy as np, ufl
 place = Path(sys.argv[1])
-cache._place = lambda: place
+code_cache._place = lambda: place
 mesh = line_mesh(np.array([[0.0, 0], [1, 0]]), np.array([[0, 1]]))
 v = ufl.TestFunction(fem.functionspace(mesh, ("DG", 0)))
 form = 7.0 * v * ufl.dx(domain=mesh, metadata={"quadrature_degree": 0})
-print(native.compiled_form(form)[1].exists())
+print(jit.compiled_form(form)[1].exists())
 """
 
 

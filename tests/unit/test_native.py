@@ -107,7 +107,7 @@ def test_this_run_is_sanitized():
         import numpy as np
         from ufl_beam.compiled import jit
         source = "double get(const double *x, int n) { return x[n]; }"
-        m = native.compiled(
+        m = jit.compiled(
             "sanitizer_probe", "double get(const double *x, int n);", lambda: source,
             made_of=[source], flags=["-O3"],
         )

@@ -64,7 +64,7 @@ def copied(tmp_path_factory):
     pytest.importorskip("setuptools", minversion="77")
     source = tmp_path_factory.mktemp("packaging") / "source"
     source.mkdir()
-    unwanted = shutil.ignore_patterns("__pycache__", "output", "*.egg-info")
+    unwanted = shutil.ignore_patterns("__pycache__", "*.egg-info")
     for name in SHIPPED:
         shutil.copytree(ROOT / name, source / name, ignore=unwanted)
     for file in ROOT.iterdir():
