@@ -180,26 +180,21 @@ def limit_in_motion(size):
 
 @row(
     "a perfect joint",
-    "cells; the hinge of M_u = 0 is in the first",
-    "end of a pendulum on a revolute joint in the middle of that cell, whose half is a dead weight",
+    "cells of a beam whose clamped end has a hinge of M_u = 0",
+    "the same beam on a pin",
     (8, 32, 128, 512),
 )
 def perfect_joint(cells):
-    """A beam clamped by a cell with a perfect hinge falls like one pinned there; 100 steps."""
+    """A beam clamped by a perfect hinge falls like one that is pinned; 100 steps."""
     section = ub.Section(EA=1e6, GA=1e6, EI=1e3, rhoA=1.0, rhoI=1e-3)
     ends = []
-    for hinged in (True, False):
-        hinges = {0.0: ub.Softening(limit=0.0, energy=1.0)} if hinged else {}
-        h = 1 / cells
-        start = 0.0 if hinged else h / 2
-        beam = ub.Beam((start, 0), (1, 0), section, cells=cells, hinges=hinges)
-        held = ub.Clamped if hinged else ub.Pinned
+    for hinges, held in (({0.0: ub.Softening(limit=0.0, energy=1.0)}, ub.Clamped), ({}, ub.Pinned)):
+        beam = ub.Beam((0, 0), (1, 0), section, cells=cells, hinges=hinges)
         scene = ub.Scene([beam], supports=[held(beam.start)], loads=[ub.Gravity()])
         solution = ub.simulate(scene, ub.Midpoint(0.1, 0.1), t=(0, 1), dt=0.01)
         ends.append(solution.displacement(beam.end)[:, :2])
     error = float(np.abs(ends[0] - ends[1]).max())
-    # First order in the cell: half of it moves otherwise.
-    return outcome(solution, error, 2 / cells)
+    return outcome(solution, error, 1e-9)
 
 
 @row(

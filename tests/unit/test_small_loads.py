@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Loads of any size and units of any size: runs end, and answers are those of unit loads."""
 
+import math
+
 from mpi4py import MPI
 
 import numpy as np
@@ -146,3 +148,23 @@ def test_small_motions_of_a_drive():
         # The jack stands upright; turning it matters to the square of the motion over its length.
         assert run.connector(jack).motion[-1] == pytest.approx(size, rel=1e-9)
         assert run.displacement(beam.end)[-1, 1] == pytest.approx(size, rel=1e-2)
+
+
+@pytest.mark.parametrize("part", [0.5, 0.9])
+def test_a_small_load_beside_a_large_one(part):
+    """A column under a part of its critical load magnifies a lateral load of 4e-10 of that.
+
+    Refined steps are the reference, which do not guess so well; a guess that just meets the
+    tolerance of 1e-10 of all forces would leave a fifth of the deflection.
+    """
+    section = ub.Section(EA=1e8, GA=1e8, EI=1.0)
+    beam = ub.Beam((0, 0), (1, 0), section, cells=8)
+    push = ub.PointLoad(beam.end, force=(-part * math.pi**2 / 4, 0), time=ub.ramp(1.0))
+    side = ub.PointLoad(beam.end, force=(0, 1e-9), time=ub.ramp(1.0))
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push, side])
+    found, expected = (
+        ub.simulate(scene, ub.Static(), t=(0, 1), dt=dt, newton=newton, progress=False)
+        for dt, newton in ((0.1, None), (1.0, ub.Newton(rtol=1e-15)))
+    )
+    deflections = [one.displacement(beam.end)[-1, 1] for one in (found, expected)]
+    assert deflections[0] == pytest.approx(deflections[1], rel=1e-5)

@@ -389,3 +389,37 @@ def test_bad_laws_are_refused(law, words):
     """A hinge of zero length has no elasticity."""
     with pytest.raises(ub.SceneError, match=words):
         ub.RigidPlastic(law)
+
+
+def test_a_moment_at_a_free_end_acts_on_the_member():
+    """Nothing beyond a hinge could bear it; a hinge that was asked for there is warned of."""
+    law = ub.Softening(limit=1.0, energy=1.0)
+    section = ub.Section(EA=1e6, GA=1e6, EI=100.0, hinge=law)
+    for more, hinges in ({"hinges": {1.0: law}}, 1), ({}, 1):
+        beam = ub.Beam((0, 0), (1, 0), section, cells=4, name="arm", **more)
+        turn = ub.PointLoad(beam.end, moment=0.5)
+        scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[turn])
+        assert len(scene.hinges) == hinges  # that at the clamp
+        if more:
+            with pytest.warns(ub.ModelWarning, match="arm: the hinge at s = 1 has nothing beyond"):
+                ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, progress=False)
+        else:
+            ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, progress=False)
+
+
+@pytest.mark.parametrize("limit", [1e-300, 1e-100, 1e-12, 1e300])
+def test_limits_down_to_nothing_and_up_to_everything(limit):
+    """A hinge that bears nothing turns as a pin does, one that bears all as a clamp."""
+    section = ub.Section(EA=1e4, GA=1e4, EI=1.0, rhoA=0.1, rhoI=1e-4)
+    ends = []
+    for hinges, held in (
+        ({0.0: ub.Softening(limit, 1.0)}, ub.Clamped),
+        ({}, ub.Pinned if limit < 1.0 else ub.Clamped),
+    ):
+        beam = ub.Beam((0, 0), (1, 0), section, cells=2, hinges=hinges)
+        push = ub.PointLoad(beam.end, force=(0.0, 1.0))
+        scene = ub.Scene([beam], supports=[held(beam.start)], loads=[push])
+        solution = ub.simulate(scene, ub.Midpoint(), t=(0, 0.2), dt=0.01, progress=False)
+        ends.append(solution.displacement(beam.end))
+    # A moment of 1e-12 changes the motion by as much.
+    assert np.abs(ends[0] - ends[1]).max() < 1e-10
