@@ -149,13 +149,13 @@ def test_only_what_must_open_does():
 @pytest.mark.parametrize("law", [None, ub.Softening(FOREVER, FOREVER), ub.Softening(10.0, 1e-3)])
 def test_only_steps_in_which_something_opens_are_solved_again(law, monkeypatch):
     """Steps without an opening are solved once, with hinges and without."""
-    solved, solve = [], ub.solve.Solver.solve
+    solved, solve = [], ub.solvers.newton.Solver.solve
 
     def counted(self, *args, **keywords):
         solved.append(self)
         return solve(self, *args, **keywords)
 
-    monkeypatch.setattr(ub.solve.Solver, "solve", counted)
+    monkeypatch.setattr(ub.solvers.newton.Solver, "solve", counted)
     beam, scene = pushed(law)
     solution = run(scene, ub.Midpoint(), 0.01)
     once = solution.parts
