@@ -16,7 +16,7 @@ from ufl_beam.compat import Array
 from ufl_beam.connectors import HELD, Motor
 from ufl_beam.errors import warn
 from ufl_beam.grid import Grid, Index
-from ufl_beam.loads import FollowerLoad, PointLoad, value_at
+from ufl_beam.loads import value_at
 from ufl_beam.plastic_hinges import place_of
 from ufl_beam.scene import COMPONENTS, Scene
 
@@ -57,12 +57,13 @@ def warn_of_masses(scene: Scene) -> None:
 
 def warn_of_free_hinges(scene: Scene) -> None:
     """Warn of hinges given at free ends where a load is a moment, which acts on the member."""
-    there = {place_of(hinge) for hinge in scene.hinges if isinstance(hinge.a, Place)}
-    for load in scene.loads:
-        if not (isinstance(load, PointLoad | FollowerLoad) and load.moment):
-            continue
+    there = {place_of(hinge) for hinge in scene.hinges}
+    for load in scene.moments:
         place = load.place
-        if isinstance(place, Place) and place.s in place.beam.hinges and place not in there:
+        if not isinstance(place, Place) or place in there:
+            continue
+        law = place.beam.hinges.get(place.s)
+        if law is not None and law.opens:
             warn(
                 f"{place.beam.name}: the hinge at s = {place.s:g} has nothing beyond it but "
                 f"{load}, so that the load acts on the member, and the hinge is left out"
