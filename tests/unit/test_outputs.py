@@ -179,6 +179,9 @@ def test_names_with_odd_characters(name, shared_path, on_first_rank):
 
 
 @pytest.mark.serial
+@pytest.mark.skipif(
+    os.environ.get("UFL_BEAM_SANITIZE", "0") != "0", reason="sanitizers make everything slower"
+)
 @pytest.mark.parametrize("recorder", [ub.XDMF, ub.VTKHDF])
 def test_a_step_costs_the_same_at_any_time(recorder, tmp_path):
     """The whole recorder, of 8 cells: less than a millisecond, the thousandth step as the first.

@@ -166,14 +166,16 @@ class SmallMotions:
             definite=symmetric,
         )
         values, x = solve(shift=-SHIFT * low)
-        zero = self._unresisted(x)
+        works = self._works(x)
+        zero = self._unresisted(x, works)
         first = np.abs(values[~zero]).min(initial=highest)
         if zero.any():
             # Beside what is nearly infinite, inverses of the others had few digits.
             values, x = solve(shift=-first / 2)
-            zero = self._unresisted(x)
+            works = self._works(x)
+            zero = self._unresisted(x, works)
         if abs(C).max() <= nothing * τ and symmetric:
-            values = self._works(x) / np.sum(x * (M @ x), axis=0)
+            values = works / np.sum(x * (M @ x), axis=0)
             values[zero] = 0.0
             s, motions = np.sqrt((-values).astype(complex)), x.astype(complex)
         else:
@@ -182,15 +184,14 @@ class SmallMotions:
         return s[finite], motions[:, finite]
 
     def _works(self, x: Array) -> Array:
-        """Works of the stiffness on motions, in columns, with no more round-off than strains; J."""
+        """Compute works of the stiffness on motions, in columns, to the digits of strains; J."""
         right, left = self._with_laws()
         return self._simulation.stiffness_works(self.q, right @ x, left.T @ x)
 
-    def _unresisted(self, x: Array) -> npt.NDArray[np.bool_]:
-        """Which motions no stiffness resists, up to round-off; (n,)."""
-        work = np.abs(self._works(x))
+    def _unresisted(self, x: Array, works: Array) -> npt.NDArray[np.bool_]:
+        """Return which motions no stiffness resists, up to round-off; (n,)."""
         sizes = np.sum(np.abs(x) * (abs(self.K) @ np.abs(x)), axis=0)
-        return np.asarray(work <= ZERO * sizes)
+        return np.asarray(np.abs(works) <= ZERO * sizes)
 
     def _damped(self, C: csr_array, free: Array, n: int, lowest: float) -> tuple[Complex, Complex]:
         """Exponents and motions with velocity-dependent forces.

@@ -17,7 +17,7 @@ from ufl_beam.errors import warn
 from ufl_beam.model.beams import Place
 from ufl_beam.model.bodies import GROUND, Spot, carries
 from ufl_beam.model.connector_laws import HELD, Motor
-from ufl_beam.model.loads import FollowerLoad, PointLoad, value_at
+from ufl_beam.model.loads import value_at
 from ufl_beam.model.plastic_hinges import place_of
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
@@ -59,12 +59,13 @@ def warn_of_masses(scene: Scene) -> None:
 
 def warn_of_free_hinges(scene: Scene) -> None:
     """Warn of hinges given at free ends where a load is a moment, which acts on the member."""
-    there = {place_of(hinge) for hinge in scene.hinges if isinstance(hinge.a, Place)}
-    for load in scene.loads:
-        if not (isinstance(load, PointLoad | FollowerLoad) and load.moment):
-            continue
+    there = {place_of(hinge) for hinge in scene.hinges}
+    for load in scene.moments:
         place = load.place
-        if isinstance(place, Place) and place.s in place.beam.hinges and place not in there:
+        if not isinstance(place, Place) or place in there:
+            continue
+        law = place.beam.hinges.get(place.s)
+        if law is not None and law.opens:
             warn(
                 f"{place.beam.name}: the hinge at s = {place.s:g} has nothing beyond it but "
                 f"{load}, so that the load acts on the member, and the hinge is left out"

@@ -215,12 +215,14 @@ class Scene:
     @cached_property
     def hinges(self) -> tuple[Connector, ...]:
         """Plastic hinges of zero length: those of beams, and at ends whose section has a hinge."""
-        loaded = (
-            load.place
-            for load in self.loads
-            if isinstance(load, PointLoad | FollowerLoad) and load.moment
-        )
+        loaded = [load.place for load in self.moments]
         return plastic_hinges(self.beams, self.joints, self._bearing_moments(), loaded)
+
+    @property
+    def moments(self) -> list[PointLoad | FollowerLoad]:
+        """Loads at places that are moments, or have one."""
+        at_places = (load for load in self.loads if isinstance(load, PointLoad | FollowerLoad))
+        return [load for load in at_places if load.moment]
 
     def _bearing_moments(self) -> Iterator[Anchor]:
         """Places where supports, connectors or masses bear a moment."""

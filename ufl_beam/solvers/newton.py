@@ -166,7 +166,8 @@ class Solver:
         self._moves = np.ones(share.size)
         self._moves[held] = 0.0
         self._diagonal = np.flatnonzero(A.rows() == A.indices)
-        self._idle = IdleMotions(share, A, self._diagonal, held)
+        self._held = held
+        self._idle_tangent: tuple[Index, Array] | None = None
         self._x = self._vector()
         self._view(self._x, writable=True)
         self._matrix = self._make_matrix()
@@ -412,8 +413,9 @@ class Solver:
         self._update_ghosts(x)
         with self._noted():
             self._tangent(self._view(x))
-            entries, stiffness = self._idle.entries
-            self._A.data[entries] += stiffness
+            if self._idle_tangent is not None:
+                entries, stiffnesses = self._idle_tangent
+                self._A.data[entries] += stiffnesses
         P.stateIncrease()
 
     # -- convergence ---------------------------------------------------------------------------
@@ -524,9 +526,13 @@ class Solver:
         self._update_ghosts(self._x)
         return x.copy()
 
+    @cached_property
+    def _idle(self) -> IdleMotions:
+        """Idle motions; only scenes in which a tangent was singular have any."""
+        return IdleMotions(self._share, self._A, self._diagonal, self._held)
+
     def _hold_idle(self, guess: Array) -> int:
-        """Iterate with one idle motion held after the other; without any if that does not help."""
-        reason = int(lib.SINGULAR)
+        """Iterate with idle motions held; without any if that does not help."""
 
         def again() -> int:
             self._put_idle()
@@ -542,8 +548,8 @@ class Solver:
         return reason
 
     def _put_idle(self) -> None:
-        """Let C add the stiffnesses against idle motions."""
-        entries, stiffnesses = self._idle.entries
+        """Add the stiffnesses against idle motions to tangents from now on."""
+        entries, stiffnesses = self._idle_tangent = self._idle.entries
         self._at_idle = integers(entries), doubles(stiffnesses)
         c = self._course
         c.idle, (c.idle_entry, c.idle_stiffness) = len(entries), self._at_idle
@@ -633,8 +639,9 @@ class Solver:
     def remember(self, memory: Memory) -> None:
         """Pass on the number of iterations, and motions found to be idle."""
         self.iterations = int(memory.number("iterations", self.iterations))
-        self._idle.remember(memory)
-        self._put_idle()
+        if memory.number("idle motions are known", float(self._idle_tangent is not None)):
+            self._idle.remember(memory)
+            self._put_idle()
 
     def destroy(self) -> None:
         """Give back what PETSc holds."""

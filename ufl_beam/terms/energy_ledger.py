@@ -15,7 +15,6 @@ from ufl_beam.arrays import Array
 EXPLAINED = 0.1
 """Part of an imbalance from which on an estimate of round-off explains it."""
 
-
 NOTHING_HELD = 1e-3
 """Part of the works up to which what the scene held and lost shows that they were round-off."""
 

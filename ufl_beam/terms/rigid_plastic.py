@@ -109,6 +109,10 @@ EARLY = 0.01
 connector slips in an iterate; solutions do not depend on it."""
 
 
+WEAK = 1e-9
+"""Factor of motions at least, as a part of EI of the member over the size of the scene."""
+
+
 def _slope(link: Connector, size: float) -> float:
     """Factor of motions beside forces in the equation of a connector, see rigid_plastic.c.
 
@@ -122,10 +126,6 @@ def _slope(link: Connector, size: float) -> float:
     early = law.limit / (EARLY * (1.0 if link.turns else size))
     least = WEAK * link.a.beam.section.EI / size if isinstance(link.a, Place) else 0.0
     return max(early, least) + (2 * steepest if steepest < np.inf else 0.0)
-
-
-WEAK = 1e-9
-"""Factor of motions at least, as a part of EI of the member over the size of the scene."""
 
 
 class SlipForms:
