@@ -19,6 +19,7 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, integers, lib
 from ufl_beam.discretization.compiled_functions import Pointwise
+from ufl_beam.discretization.function_spaces import stated
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.beams import Place
 from ufl_beam.model.connector_laws import RigidPlastic
@@ -129,7 +130,7 @@ def _slope(link: Connector, size: float) -> float:
 
 
 class SlipForms:
-    """Compiled laws of slip: C functions of :data:`INPUTS`.
+    """Compiled laws of slip: C functions of :data:`INPUTS`; see :func:`slip_forms`.
 
     Attributes:
         force: Force in the step, and its derivative by the slip.
@@ -142,6 +143,14 @@ class SlipForms:
         force, *end = slip(law, at, scheme)
         self.force = pointwise.compile(force, ufl.diff(force, at["slip"]))
         self.end = pointwise.compile(*end)
+
+
+_slip_forms = stated(SlipForms)
+
+
+def slip_forms(law: Softening | Hardening, scheme: Scheme) -> SlipForms:
+    """Compiled laws of slip, made once in a process; numbers of ``law`` do not matter."""
+    return _slip_forms(Hardening(1.0) if isinstance(law, Hardening) else law.of(1.0, 1.0), scheme)
 
 
 class RigidPlasticResponse:
@@ -158,7 +167,7 @@ class RigidPlasticResponse:
             ledger.state["hardening"] += 0.0
             if setting.scheme.loss:
                 ledger.lost["numerical"] += 0.0
-        self._forms = SlipForms(law.law, setting.scheme)
+        self._forms = slip_forms(law.law, setting.scheme)
         self._storage = np.zeros((n, len(INPUTS)))
         self._at = {name: self._storage[:, i] for i, name in enumerate(INPUTS)}
         for i, link in enumerate(links):
