@@ -179,7 +179,7 @@ class RigidPlasticResponse:
         self._rows, self._sums, self._stored = np.zeros((n, 3)), np.zeros(3), 0.0
         self.dissipated: Array = np.zeros(n)
         self._excess = np.zeros(n)
-        self._slope = np.array([_slope(link, setting.simulation.scene.size) for link in links])
+        self._slope = np.array([_slope(link, setting.size) for link in links])
         self._c = c = ffi.new("rigid_plastic *")
         c.force, c.end, c.number, c.width = self._forms.force, self._forms.end, n, len(INPUTS)
         arrays = (self._storage, self._limit, self._back_force, self.dissipated, self._rows)
