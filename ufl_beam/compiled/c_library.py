@@ -7,14 +7,17 @@ date on the way and know beforehand where the entries of its matrix go.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.jit import DECLARATIONS, HEADERS, compiled, text
 from ufl_beam.dolfinx_compat import TABULATE
+
+T = TypeVar("T")
 
 SOURCES = ("loops", "rigid_plastic", "elimination", "newton")
 """Files of C beside this one; they are one translation unit."""
@@ -59,6 +62,24 @@ doubles = partial(ffi.from_buffer, ffi.typeof("double[]"))
 
 integers = partial(ffi.from_buffer, ffi.typeof("int32_t[]"))
 """Pointer to a contiguous array of int32; it keeps the array alive."""
+
+
+def names(enum: str, prefix: str = "") -> tuple[str, ...]:
+    """Names in an enum of loops.h, in order, without its last one, which is their number."""
+    elements = ffi.typeof(f"enum {enum}").elements
+    return tuple(elements[i].lower().removeprefix(prefix) for i in range(len(elements) - 1))
+
+
+def in_order(enum: str, values: Mapping[str, T], prefix: str = "") -> list[T]:
+    """Values in the order of an enum of loops.h, by its names; see :func:`names`.
+
+    Raises:
+        ValueError: Python and C do not name the same.
+    """
+    expected = names(enum, prefix)
+    if set(values) != set(expected):
+        raise ValueError(f"{enum} is {expected} in loops.h, and {tuple(values)} in Python")
+    return [values[name] for name in expected]
 
 
 def extrapolated(x: Array, y: Array, ratio: float) -> Array:

@@ -78,11 +78,32 @@ int has_its_digits(double sum);
 
 /* -- material points --------------------------------------------------------------------------- */
 
-/* Points in cells, `of_cell` in each; see material_points.py. */
+/* Python asks for the names in these enums, in their order; the last of each is their number. */
+
+/* The first inputs of the law of a point; what laws need beside them comes after them. */
+enum point_input {
+  STRAIN, GROWTH, DIRECTION,                                   /* of an iterate: at the end; opening */
+  TRACTION, BEFORE, PLASTIC, ACCUMULATED, JUMP, OPENING, FLOWS, /* the state before the step */
+  STIFFNESS, LENGTH, THETA,
+  POINT_INPUTS
+};
+
+/* Values of FLOWS: did not grow in the last step, grew in it, may open in this one. */
+enum { CLOSED, FLOWING, RELEASED };
+
+/* What the end of a step brings a point. */
+enum point_output {
+  FLOW, WORKED, BROKEN, LOST, ELASTIC, HARDENING, STRESS, RESISTANCE, POINT_OUTPUTS
+};
+
+/* Flags that all points of a scene share in a step; see Course in material_points.py. */
+enum course { OPENED, RELIEF, HOLD, OVER, COURSE_FLAGS };
+
+/* Points in cells, `of_cell` in each, with `width` numbers of each in w; see material_points.py. */
 typedef struct {
   int32_t *course;
   kernel *bulk, *opening, *excess, *end;
-  int cells, of_cell;
+  int cells, of_cell, width;
   const double *B, *weight, *rest, *length;
   double theta;
   double *e0, *e1, *w, *r, *D, *kept, *sum;
@@ -98,6 +119,12 @@ typedef struct {
   int size, begins;
   double *latest; /* the unknowns that the points responded to */
 } inelastic;
+
+/* The first inputs of the law of a rigid-plastic connector, and what the end of a step brings. */
+enum slip_input { SLIP, SLIP_DIRECTION, SLIPPED, SLIP_START, SLIP_INPUTS };
+enum slip_output {
+  SLIP_DISSIPATED, SLIP_LOST, SLIP_STORED, SLIP_LIMIT, SLIP_BACK_FORCE, SLIP_OUTPUTS
+};
 
 /* Rigid-plastic connectors, see rigid_plastic.py. */
 typedef struct {
