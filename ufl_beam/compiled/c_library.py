@@ -7,9 +7,12 @@ date on the way and know beforehand where the entries of its matrix go.
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Mapping
 from functools import partial
 from typing import Any, TypeVar
+
+from petsc4py import PETSc
 
 import numpy as np
 
@@ -37,15 +40,34 @@ _SOURCE = "\n".join(
         *(text(f"{name}.c") for name in SOURCES),
     ]
 )
-_module = compiled(
+module = compiled(
     "ufl_beam_loops",
     DECLARATIONS + _CALLBACKS,
     lambda: _SOURCE,
     made_of=[_SOURCE],
     flags=["-O3"],
 )
-ffi: Any = _module.ffi
-lib: Any = _module.lib
+ffi: Any = module.ffi
+lib: Any = module.lib
+
+_PETSC = ctypes.CDLL(PETSc.__file__)  # petsc4py, which has loaded PETSc
+for _name, _field in ffi.typeof("petsc_functions").fields:
+    _address = ctypes.cast(getattr(_PETSC, _name), ctypes.c_void_p).value
+    setattr(lib.petsc, _name, ffi.cast(_field.type, _address))
+
+
+def petsc(name: str, *arguments: Any) -> None:
+    """Call a function of ``petsc_functions`` in loops.h; objects of petsc4py are theirs in C.
+
+    Raises:
+        PETSc.Error: It returns an error.
+    """
+    in_c = (
+        ffi.cast("void *", argument.handle) if isinstance(argument, PETSc.Object) else argument
+        for argument in arguments
+    )
+    if error := getattr(lib.petsc, name)(*in_c):
+        raise PETSc.Error(error)
 
 
 Loop = tuple[Any, Any]

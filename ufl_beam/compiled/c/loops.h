@@ -206,20 +206,37 @@ int all_finite(int size, const double *values);
 
 /* -- Newton's method, see newton.c ------------------------------------------------------------- */
 
-/* What PETSc offers and the callbacks of SNES need; its objects are opaque. */
+/* Functions of PETSc, which Python finds by these names; its objects are opaque here. Each returns an
+ * error, or zero, as what SNES calls does. */
 typedef struct {
-  int (*read)(void *vec, const double **values);
-  int (*end_read)(void *vec, const double **values);
-  int (*write)(void *vec, double **values);
-  int (*end_write)(void *vec, double **values);
-  int (*entries)(void *mat, double **values);
-  int (*end_entries)(void *mat, double **values);
-  int (*set_iterations)(void *snes, petsc_int number);
-  int (*set_reason)(void *snes, int reason);
-  int (*factor)(void *pc);
-  int (*failed)(void *pc, int *reason);
-  int (*apply)(void *pc, void *b, void *x);
-} petsc;
+  int (*VecGetArrayRead)(void *vec, const double **values);
+  int (*VecRestoreArrayRead)(void *vec, const double **values);
+  int (*VecGetArray)(void *vec, double **values);
+  int (*VecRestoreArray)(void *vec, double **values);
+  int (*VecLockGet)(void *vec, petsc_int *state);
+  int (*VecLockReadPop)(void *vec);
+  int (*MatSeqAIJGetArray)(void *mat, double **values);
+  int (*MatSeqAIJRestoreArray)(void *mat, double **values);
+  int (*PCSetUp)(void *pc);
+  int (*PCGetFailedReason)(void *pc, int *reason);
+  int (*PCApply)(void *pc, void *b, void *x);
+  int (*SNESSetFunction)(void *snes, void *f, int (*function)(void *, void *, void *, void *),
+                         void *context);
+  int (*SNESSetJacobian)(void *snes, void *A, void *P,
+                         int (*jacobian)(void *, void *, void *, void *, void *), void *context);
+  int (*SNESSetConvergenceTest)(void *snes,
+                                int (*test)(void *, petsc_int, double, double, double, int *, void *),
+                                void *context, int (*destroy)(void *));
+  int (*SNESShellSetContext)(void *snes, void *context);
+  int (*SNESShellGetContext)(void *snes, void *context);
+  int (*SNESShellSetSolve)(void *snes, int (*solve)(void *, void *));
+  int (*SNESSetIterationNumber)(void *snes, petsc_int number);
+  int (*SNESSetConvergedReason)(void *snes, int reason);
+} petsc_functions;
+
+extern petsc_functions petsc;
+
+enum { OF_LIBRARY = 76 }; /* PETSC_ERR_LIB: KLU says so of a singular matrix */
 
 /* How far a law is missed by an iterate q and its residual r, without dimension; scale is the size
  * of the forces, and moved the largest motion, see largest_motion. */
@@ -230,7 +247,6 @@ typedef struct {
 
 /* The equation of a step, and how far its solution is. */
 typedef struct {
-  const petsc *petsc;
   int size, inner, forces, stiffnesses;
   const call *force;     /* parts of the residual, the inner forces first */
   const call *stiffness; /* parts of the tangent */
@@ -279,7 +295,6 @@ int judge(equation *e, const double *q, int iteration, double residual, double s
           double floor);
 int snes_function(void *snes, void *x, void *f, void *self);
 int snes_jacobian(void *snes, void *x, void *A, void *P, void *self);
-extern int (*shell_context)(void *snes, void *context);
 int snes_newton(void *snes, void *x);
 int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int *reason,
               void *self);
