@@ -17,7 +17,7 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import doubles, ffi, integers, lib
+from ufl_beam.compiled.c_library import doubles, ffi, in_order, integers, lib, names
 from ufl_beam.discretization.compiled_functions import Pointwise
 from ufl_beam.discretization.function_spaces import stated
 from ufl_beam.mechanics.time_schemes import Scheme, Step
@@ -31,12 +31,11 @@ from ufl_beam.terms.material_points import NOTHING, RELEASED, SPENT
 from ufl_beam.terms.openings import Openable
 
 INPUTS = (
-    *("slip", "direction", "slipped", "start"),
+    *names("slip_input", "slip_"),
     *("θ", "dt", "limit", "energy", "H", "B", "eta"),
 )
 """Inputs of the compiled laws: the slip of the step and its direction (1 or -1); accumulated slip
-and motion at t_n; numbers of the scheme and the law.  The first four are those of rigid_plastic.c.
-"""
+and motion at t_n, which loops.h names as well; numbers of the scheme and the law."""
 
 
 class Slip(NamedTuple):
@@ -134,15 +133,16 @@ class SlipForms:
 
     Attributes:
         force: Force in the step, and its derivative by the slip.
-        end: Numbers that the end of the step brings; the order is that of rigid_plastic.c.
+        end: Numbers that the end of the step brings, see ``slip_output`` in loops.h.
     """
 
     def __init__(self, law: Softening | Hardening, scheme: Scheme) -> None:
         self._pointwise = pointwise = Pointwise(INPUTS)
         at = {**pointwise.at, "slip": ufl.variable(pointwise.at["slip"])}
-        force, *end = slip(law, at, scheme)
+        end = slip(law, at, scheme)._asdict()
+        force = end.pop("force")
         self.force = pointwise.compile(force, ufl.diff(force, at["slip"]))
-        self.end = pointwise.compile(*end)
+        self.end = pointwise.compile(*in_order("slip_output", end, "slip_"))
 
 
 _slip_forms = stated(SlipForms)
