@@ -48,6 +48,13 @@ class Event(NamedTuple):
         where: A place in the middle of a cell, that of a plastic hinge, or a connector.
         what: "yields", "opens", "is free" in a cell; "touches", "lets go", "slides", "sticks".
         parameter: Words for the time.
+
+    Example:
+        >>> events = ub.Events()
+        >>> run = ub.simulate(hinged, ub.Static(), t=(0, 1), dt=0.02, record=events)
+        >>> opening = events.found[0]
+        >>> print(f"{opening.time:.2f} s: {opening.where} {opening.what}")
+        0.10 s: beam.start (0, 0) opens
     """
 
     time: float
@@ -71,6 +78,11 @@ class Events(Recorder):
 
     Attributes:
         found: The events in their order, the same on all processes.
+
+    Example:
+        >>> events = ub.Events(tell=print)
+        >>> run = ub.simulate(hinged, ub.Static(), t=(0, 0.5), dt=0.02, record=events)
+        t = 0.1 s: beam.start (0, 0) opens
     """
 
     def __init__(self, tell: Callable[[Event], object] | None = None) -> None:

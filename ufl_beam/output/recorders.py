@@ -51,7 +51,16 @@ ROTATION = (("motion", "rad"), ("force", "N m"), ("work", "J"))
 
 
 class Recorder(ABC):
-    """Something that looks at each accepted step; all processes call it together."""
+    """Something that looks at each accepted step; all processes call it together.
+
+    Example:
+        >>> class Speed(ub.Recorder):
+        ...     largest = 0.0
+        ...     require_writable = open = close = lambda self, *simulation: None
+        ...     def write(self, simulation):
+        ...         self.largest = max(self.largest, abs(simulation.velocity(beam.end)[1]))
+        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=Speed())
+    """
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -155,6 +164,12 @@ class History(Recorder):
 
     Raises:
         SceneError: ``every`` or ``most`` is no whole number, at least 1.
+
+    Example:
+        >>> table = ub.History("tip.csv", [beam.end])
+        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=table)
+        >>> np.loadtxt("tip.csv", delimiter=",", skiprows=1).shape[0]
+        21
     """
 
     def __init__(

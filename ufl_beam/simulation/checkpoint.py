@@ -60,6 +60,12 @@ class Checkpoint:
 
     Raises:
         SceneError: Neither ``every`` nor ``minutes``, or a bad number; no state in ``also``.
+
+    Example:
+        >>> backup = ub.Checkpoint("run.checkpoint", every=1000)
+        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, checkpoint=backup)
+        >>> [path.name for path in backup.files]
+        ['run.checkpoint', 'run.checkpoint.part']
     """
 
     path: str | Path

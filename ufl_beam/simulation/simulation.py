@@ -154,6 +154,14 @@ class Simulation(StateView):
         parts: Number of parts that steps were cut into, those not cut included.
         together: Calls that raise on all processes of a shared scene what they raise on one.
         last_dt: Length of the last accepted step; s.
+
+    Example:
+        >>> simulation = ub.Simulation(scene, ub.Midpoint())
+        >>> while simulation.t < 1:
+        ...     simulation.step_to(simulation.t + 0.05)
+        >>> print((1e3 * simulation.displacement(beam.end)).round(1))  # mm, mm, mrad
+        [ -0.1 -18.9 -14.3]
+        >>> simulation.close()
     """
 
     def __init__(
