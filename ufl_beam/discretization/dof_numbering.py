@@ -20,9 +20,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.errors import SceneError, require_kind
-from ufl_beam.model.beams import Beam, Place
-from ufl_beam.model.bodies import Anchor, Body, Node, Spot, node
+from ufl_beam.errors import SceneError, require_kind, shorten
+from ufl_beam.model.bodies import Anchor, Body, Member, Node, Place, Spot, node
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.material_laws import Softening
 from ufl_beam.model.mesh_options import Mesh
@@ -93,17 +92,18 @@ class Grid:
         numbers = np.concatenate([self.dofs.ravel(), self.dofs_of_bodies.ravel(), self.multipliers])
         return crc32(numbers.astype("<i8").tobytes(), crc32(self.points.astype("<f8").tobytes()))
 
-    def parameters(self, beam: Beam) -> Array:
+    def parameters(self, beam: Member) -> Array:
         """Parameters of the vertices of a beam."""
         return self._parameters[self._index(beam)]
 
     @cached_property
-    def _number_of_beam(self) -> dict[Beam, int]:
+    def _number_of_beam(self) -> dict[Member, int]:
         return {beam: i for i, beam in enumerate(self.scene.beams)}
 
-    def _index(self, beam: Beam) -> int:
+    def _index(self, beam: Member) -> int:
         """Number of a beam of the scene."""
-        require_kind(beam, Beam, "beam")
+        if not isinstance(beam, Member):
+            raise SceneError(f"beam = {shorten(beam)} is not a Beam")
         if beam not in self._number_of_beam:
             raise SceneError(f"{beam.name} is not in the scene")
         return self._number_of_beam[beam]
@@ -116,22 +116,22 @@ class Grid:
     def place(self, vertex: int) -> Place:
         """Place of a vertex."""
         number = int(np.searchsorted(self._first, vertex, side="right")) - 1
-        beam: Beam = self.scene.beams[number]
+        beam: Member = self.scene.beams[number]
         return beam.at(float(self._parameters[number][vertex - self._first[number]]))
 
-    def vertices_of(self, beam: Beam) -> Index:
+    def vertices_of(self, beam: Member) -> Index:
         """Vertices of a beam from start to end."""
         i = self._index(beam)
         return np.arange(self._first[i], self._first[i + 1])
 
-    def nodes_of(self, one: Beam | Body) -> tuple[Array, Index]:
+    def nodes_of(self, one: Member | Body) -> tuple[Array, Index]:
         """Points and degrees of freedom of the nodes of a beam or body; (n, 2), (n, 3); m."""
         if isinstance(one, Body):
             return np.array([one.center]), self.node(one.middle).reshape(1, 3)
         nodes = self._nodes_of(one)
         return self.points[nodes], self.dofs[nodes]
 
-    def _nodes_of(self, beam: Beam) -> Index:
+    def _nodes_of(self, beam: Member) -> Index:
         """Nodes of a beam, both sides of its hinges included."""
         return np.union1d(self.nodes_of_cells[self.cells_of(beam)], self.vertices_of(beam))
 
@@ -157,12 +157,12 @@ class Grid:
         along = np.column_stack([start, *between, end])
         return np.stack([along[:, :-1], along[:, 1:]], axis=2).reshape(-1, 2)
 
-    def nodes_along(self, beam: Beam) -> Index:
+    def nodes_along(self, beam: Member) -> Index:
         """Vertices of a beam and nodes between them, from start to end."""
         vertices, inner = self.vertices_of(beam), self.nodes_of_cells[self.cells_of(beam), 2:]
         return np.append(np.column_stack([vertices[:-1], inner]), vertices[-1])
 
-    def cells_of(self, beam: Beam) -> Index:
+    def cells_of(self, beam: Member) -> Index:
         """Cells of a beam from start to end."""
         i = self._index(beam)
         return np.arange(self._first[i] - i, self._first[i + 1] - i - 1)
@@ -232,7 +232,7 @@ class Grid:
         """The place in the middle of a cell."""
         number = int(self.beam_of_cell[cell])
         s, i = self._parameters[number], cell - int(self._first[number] - number)
-        beam: Beam = self.scene.beams[number]
+        beam: Member = self.scene.beams[number]
         return beam.at((s[i] + s[i + 1]) / 2)
 
     def place_of(self, number: int) -> Place:
@@ -241,7 +241,7 @@ class Grid:
             return self.middle(number)
         return place_of(self.scene.hinges[number - len(self.cells)])
 
-    def hinges(self, beam: Beam) -> list[Softening | None]:
+    def hinges(self, beam: Member) -> list[Softening | None]:
         """Law of the hinge that may open in the middle of each cell of a beam."""
         return [beam.section.hinge] * len(self.cells_of(beam))
 

@@ -17,8 +17,9 @@ from ufl_beam.mechanics import kinematics
 from ufl_beam.mechanics.kinematics import Axis
 from ufl_beam.mechanics.time_schemes import Constant, Rates, Step, require_between, scaled
 from ufl_beam.model.connector_laws import Coulomb, Guide, Motor
+from ufl_beam.model.law_functions import Values
 from ufl_beam.model.loads import RotatingFrame
-from ufl_beam.model.material_laws import Softening, Values
+from ufl_beam.model.material_laws import Softening
 from ufl_beam.model.scene import Scene
 
 

@@ -18,7 +18,8 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array, Index
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.mechanics.kinematics import Axis
-from ufl_beam.model.material_laws import Softening, Values
+from ufl_beam.model.law_functions import Values
+from ufl_beam.model.material_laws import Softening
 from ufl_beam.model.scene import Scene
 
 Constant = Callable[[float], Expr]

@@ -12,8 +12,7 @@ from scipy.sparse.linalg import eigsh
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError
-from ufl_beam.model.beams import Beam, Point
-from ufl_beam.model.bodies import GROUND, Anchor, Body, Node, Spot, node
+from ufl_beam.model.bodies import GROUND, Anchor, Body, Member, Node, Spot, node
 from ufl_beam.model.connector_laws import (
     Coulomb,
     Damper,
@@ -25,9 +24,11 @@ from ufl_beam.model.connector_laws import (
     Stop,
 )
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.loads import value_at
+from ufl_beam.model.curves import Point
+from ufl_beam.model.masses import PointMass
 from ufl_beam.model.plastic_hinges import Slot
-from ufl_beam.model.scene import PointMass, Scene
+from ufl_beam.model.scene import Scene
+from ufl_beam.model.time_functions import value_at
 
 DENSE = 90
 """Up to this number of unknowns the null space comes from a dense decomposition."""
@@ -214,7 +215,7 @@ def require_no_mechanism(scene: Scene) -> None:
     )
 
 
-def _center(part: Beam | Body) -> Point:
+def _center(part: Member | Body) -> Point:
     """Point about which the rigid motion of a beam or body is described."""
     if isinstance(part, Body):
         return part.center
@@ -292,7 +293,7 @@ def _sparse(entries: list[tuple[int, int, float]], shape: tuple[int, int]) -> cs
     return csr_array((values, (rows.astype(int), columns.astype(int))), shape=shape)
 
 
-def _parts(scene: Scene) -> list[Beam | Body]:
+def _parts(scene: Scene) -> list[Member | Body]:
     return [*scene.beams, *scene.bodies]
 
 

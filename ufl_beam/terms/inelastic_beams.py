@@ -19,7 +19,7 @@ from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_schemes import Scheme, Step
-from ufl_beam.model.material_laws import Layout
+from ufl_beam.model.fibres import Layout
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.material_points import INPUTS, Course, Points
 from ufl_beam.terms.tangent_derivatives import CellTangent

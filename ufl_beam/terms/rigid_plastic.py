@@ -21,7 +21,7 @@ from ufl_beam.compiled.c_library import doubles, ffi, in_order, integers, lib, n
 from ufl_beam.discretization.compiled_functions import Pointwise
 from ufl_beam.discretization.function_spaces import stated
 from ufl_beam.mechanics.time_schemes import Scheme, Step
-from ufl_beam.model.beams import Place
+from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import RigidPlastic
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.material_laws import Bulk, Hardening, Softening
