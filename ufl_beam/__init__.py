@@ -52,12 +52,8 @@ from ufl_beam.errors import (
     TradeoffError,
 )
 from ufl_beam.mechanics.classical import GeneralizedAlpha, Newmark, Static
-from ufl_beam.mechanics.energy_momentum import (
-    DecayingMidpoint,
-    ExactStatic,
-    Midpoint,
-    PrintedMidpoint,
-)
+from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
+from ufl_beam.mechanics.energy_momentum import ExactStatic, Midpoint, PrintedMidpoint
 from ufl_beam.model.beams import Beam
 from ufl_beam.model.bodies import Body, Place, Spot, ground
 from ufl_beam.model.connector_laws import (

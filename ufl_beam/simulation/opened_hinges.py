@@ -79,7 +79,7 @@ class Opened:
     def hinges(self) -> list[OpenedHinges]:
         """Embedded hinges, laws of sections, that opened in the run; beam by beam."""
         grid = self._grid
-        found: list[tuple[Member, int, float]] = []
+        found = []
         for beam in grid.scene.beams:
             law = beam.section.hinge
             cells, laws = grid.cells_of(beam), grid.hinges(beam)

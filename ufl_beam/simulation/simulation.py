@@ -47,6 +47,7 @@ from ufl_beam.model.constraint_checks import (
     require_inertia,
     require_masses,
     require_no_mechanism,
+    require_rates,
 )
 from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.mesh_options import Mesh
@@ -190,7 +191,7 @@ class Simulation(StateView):
             warn_of_masses(scene)
             if scene.initial:
                 warn_of_origin(scene)
-            scheme.require(scene)
+            require_rates(scene, scheme)
         else:
             require_no_mechanism(scene)
         require_independent(scene)
