@@ -1,6 +1,6 @@
 # Every target runs through ./env, which brings DOLFINx where it is missing. `make` lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-mpi verify sanitize long demos check check-paraview bench bench-peers extremes schemes study
+.PHONY: help demo test test-mpi test-sid verify sanitize long demos demos-cheap check check-paraview bench bench-peers extremes schemes study
 
 # Natively as root Open MPI refuses to start; with more ranks than cores, too (the last two lines: versions 5 and 6).
 # ./env sets the same in its root.
@@ -14,7 +14,13 @@ export OMPI_MCA_mpi_yield_when_idle = 1
 # $(call mpi,N) COMMAND...: a rank that fails alone leaves the others waiting, hence the limit in seconds; only the first rank writes to the terminal; what another writes is shown if it fails.
 mpi = ./env timeout 2400 mpirun -n $(1) sh -c 'rank=$${OMPI_COMM_WORLD_RANK:-$${PMI_RANK:-0}}; [ $$rank = 0 ] && exec "$$@"; \
 	log=.rank$$rank.log; "$$@" >$$log 2>&1 && exec rm $$log; status=$$?; echo "rank $$rank:"; cat $$log; exit $$status' -
-pytest_mpi = python3 -m pytest -q --color=no -p no:cacheprovider tests/unit tests/properties
+pytest_mpi = python3 -m pytest -q --color=no -p no:cacheprovider
+# Only on 3 ranks has one of them neighbours on both sides, and do sums depend on their order. That concerns what is shared:
+# random scenes and their invariance (whatever goes wrong with them on 2 ranks does so on 3), elimination, gathering, files,
+# agreement. For all other units it is enough that they have met a second rank. Whole suites on 2 and 3 took half an hour.
+sharing = tests/properties $(addprefix tests/unit/test_,$(addsuffix .py,agreement checkpoint copies elimination factorisation locks mesh modes outputs record solution sparse studies))
+# What compiles forms, reads FFCx's kernels or calls PETSc: there the versions of DOLFINx differ.
+versions = $(addprefix tests/unit/test_,$(addsuffix .py,forms lanes native solve equation elimination factorisation modes))
 cheap_demos = $(addprefix demos/demo_,$(addsuffix .py,four_beam_swing roll_up emergency_stop fibre_damping monte_carlo adaptive_steps lee_frame hinge_snapback rotating_beam))
 
 help: ## this list
@@ -23,12 +29,16 @@ help: ## this list
 demo: ## the first demo: a four-beam swing
 	@./env python3 demos/demo_four_beam_swing.py
 
-test: ## the tests, without the slow ones
-	@./env python3 -m pytest
+test: ## the tests, without the slow ones, on all cores
+	@./env sh -ec '$(with_workers) python3 -m pytest $$workers'
 
-test-mpi: ## unit and property tests on 2 and on 3 ranks
-	@$(call mpi,2) $(pytest_mpi)
-	@$(call mpi,3) $(pytest_mpi)
+test-mpi: ## unit tests on 2 ranks; properties and tests of sharing on 3
+	@$(call mpi,2) $(pytest_mpi) tests/unit
+	@$(call mpi,3) $(pytest_mpi) $(sharing)
+
+test-sid: ## forms, kernels, solver and a demo on the DOLFINx of Debian sid; builds its root once
+	@UFL_BEAM_SUITE=sid ./env sh -ec '$(with_workers) python3 -m pytest $$workers $(versions)'
+	@UFL_BEAM_SUITE=sid ./env python3 demos/demo_roll_up.py
 
 verify: ## the slow verification studies, then the unit tests with sanitizers
 	@./env python3 -m pytest -m slow
@@ -41,8 +51,12 @@ long: ## a million steps of a softening frame: memory, files and ledger; a quart
 	@UFL_BEAM_STEPS=1000000 ./env python3 -m pytest -m slow -s tests/verification/test_long_run.py
 
 demos: ## all demos one after the other, then the cheap ones on 2 ranks
-	@set -e; for demo in demos/demo_*.py; do echo "== $$demo"; ./env python3 $$demo; done
-	@set -e; for demo in $(cheap_demos); do echo "== $$demo, 2 ranks"; $(call mpi,2) python3 $$demo; done
+	@$(call alone,demos/demo_*.py)
+	@$(call on_two,$(cheap_demos))
+
+demos-cheap: ## the cheap demos, alone and on 2 ranks
+	@$(call alone,$(cheap_demos))
+	@$(call on_two,$(cheap_demos))
 
 check: ## lint, format and types
 	@./env sh -ec '$(with_ruff); $$ruff check; $$ruff format --check; python3 -m mypy'
@@ -69,6 +83,9 @@ bench: ## time per step
 bench-peers: ## beside Exudyn, OpenSees and a C loop: time, memory, error
 	@./env python3 benchmarks/peers
 
+alone = set -e; for demo in $(1); do echo "== $$demo"; ./env python3 $$demo; done
+on_two = set -e; for demo in $(1); do echo "== $$demo, 2 ranks"; $(call mpi,2) python3 $$demo; done
+
 # The library of the address sanitizer must be the first one of Python; exceptions of C++ need theirs beside it. Leaks are
 # looked for by no one: Python and MPI leave many. Each object has memory of its own, so that one sees where it ends, and
 # what is printed when the run ends goes past pytest.
@@ -77,7 +94,11 @@ with_sanitizers = export UFL_BEAM_SANITIZE=1 PYTHONMALLOC=malloc PETSC_OPTIONS=-
 	export ASAN_OPTIONS=detect_leaks=0:abort_on_error=1:allocator_may_return_null=1 UBSAN_OPTIONS=print_stacktrace=1; \
 	LD_PRELOAD=$$(gcc -print-file-name=libasan.so):$$(gcc -print-file-name=libstdc++.so.6)
 
-# ruff, which Debian lacks: from a venv beside the root of ./env, made on first use; its version is in pyproject.toml.
+# One process of pytest for each core if pytest-xdist is there; those that run out of tests take some from others.
+with_workers = workers=$$(python3 -c "import xdist" 2>/dev/null && echo "-n auto --dist worksteal" || :);
+
+# ruff, which Debian lacks: from a venv beside the root of ./env, made on first use; its version is in pyproject.toml, and
+# the same in .pre-commit-config.yaml.
 with_ruff = tools=$${XDG_CACHE_HOME:-$$HOME/.cache}/ufl_beam/tools; ruff=$$tools/bin/ruff; \
 	$$ruff --version >/dev/null 2>&1 || { python3 -m venv --system-site-packages $$tools; \
 	$$tools/bin/pip install -q "ruff$$(sed -n "s/^required-version = \"\([^\"]*\)\".*/\1/p" pyproject.toml)"; }

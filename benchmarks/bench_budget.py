@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Whether the setting that ``tradeoff`` recommends for a budget takes as long as was asked.
 
 Run on an idle machine, one thread::

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Cost of inelastic material beside the same scene without, side by side in one run.
 
 Run on an idle machine, one core::

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What a scene pays for effects that it does not have: nothing.
 
 Run on an idle machine, one thread::

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Time per Newton iteration of a lattice of 200 000 cells on one and on two processes.
 
 Run on an idle machine of at least two cores, one thread per process::

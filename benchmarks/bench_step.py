@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Time per step and per Newton iteration of the elastic flying beam, and where it goes.
 
 Run on an idle machine, one core::
@@ -19,7 +20,7 @@ import numpy as np
 from records import keep, machine
 
 import ufl_beam as ub
-from ufl_beam.loops import doubles, ffi, lib
+from ufl_beam.compiled.c_library import doubles, ffi, lib
 
 CASES = ((8, 1000), (64, 500), (512, 200), (4096, 50), (100_000, 10))  # cells, steps
 

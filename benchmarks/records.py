@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What benchmarks keep of a measurement: a line of JSON, with commit, versions and machine."""
 
 import json
@@ -6,7 +7,7 @@ import subprocess
 from functools import cache
 from pathlib import Path
 
-from ufl_beam.compat import dolfinx
+from ufl_beam.dolfinx_compat import dolfinx
 
 RESULTS = Path(__file__).parent / "results"
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Errors of the time schemes at equal steps, into the tables of ``docs/schemes.md``.
 
 Run by ``make schemes``.  The flying beam of Simo and Vu-Quoc with 8 cells: thrown by a force that

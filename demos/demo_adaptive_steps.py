@@ -13,6 +13,7 @@
 # * what the tolerance means.
 
 # %%
+# SPDX-License-Identifier: MIT
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -148,7 +149,7 @@ bottom.set(
 bottom.legend(frameon=False)
 for axes in (top, bottom):
     axes.grid(alpha=0.3)
-if ub.processes.ours().rank == 0:
+if ub.parallel.ours().rank == 0:
     figure.savefig(output / "adaptive_steps.png", dpi=150)
 
 # %% [markdown]

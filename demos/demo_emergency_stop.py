@@ -16,6 +16,7 @@
 # and a payload of 2 kg, in the horizontal plane, so that gravity does no work.
 
 # %%
+# SPDX-License-Identifier: MIT
 import math
 from pathlib import Path
 

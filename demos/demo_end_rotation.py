@@ -15,6 +15,7 @@
 # per second are those of the curvature, so that the end turns by π in 1, 0.1 and 0.01 s.
 
 # %%
+# SPDX-License-Identifier: MIT
 from pathlib import Path
 
 import numpy as np

@@ -12,6 +12,7 @@
 # * `most=`: solution and files that do not grow, however long the storm lasts.
 
 # %%
+# SPDX-License-Identifier: MIT
 import math
 from pathlib import Path
 

@@ -17,6 +17,7 @@
 # It follows section 4.5 of the paper, P(93) to P(95), and its Fig. 16.
 
 # %%
+# SPDX-License-Identifier: MIT
 from pathlib import Path
 
 import numpy as np

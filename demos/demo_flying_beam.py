@@ -14,6 +14,7 @@
 # The planar "flying spaghetti" of J. C. Simo and L. Vu-Quoc (1986).
 
 # %%
+# SPDX-License-Identifier: MIT
 from pathlib import Path
 
 import numpy as np

@@ -19,6 +19,7 @@
 # were computed with an independent program.
 
 # %%
+# SPDX-License-Identifier: MIT
 from pathlib import Path
 
 import numpy as np

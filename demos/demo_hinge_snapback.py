@@ -16,6 +16,7 @@
 # Data: EI = 1 MN m², L = 2 m, M_u = 10 kN m; fracture energies from ductile to brittle.
 
 # %%
+# SPDX-License-Identifier: MIT
 from pathlib import Path
 
 import numpy as np
@@ -43,7 +44,7 @@ def broken(ratio, cells=16):
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
     path = ub.follow(
         scene,
-        ub.Dissipation(energy / 40, ub.ArcLength(0.1)),
+        ub.DissipationControl(energy / 40, ub.ArcLength(0.1)),
         until=lambda now: now.ledger.lost["hinges"] > 0.97 * energy,
         record=ub.XDMF(output / f"hinge_snapback_{ratio:g}.xdmf"),
     )

@@ -16,6 +16,7 @@
 # are the joints, a twentieth of the unknowns, which are solved for together.
 
 # %%
+# SPDX-License-Identifier: MIT
 import argparse
 import resource
 import time

@@ -15,6 +15,7 @@
 # 1968; A = 6 cm², I = 2 cm⁴, E = 7.2e6 N/cm², ν = 0.3, shear as stiff as G A.
 
 # %%
+# SPDX-License-Identifier: MIT
 from pathlib import Path
 
 import numpy as np
@@ -138,5 +139,5 @@ assert [point.kind for point in path.critical] == ["limit", "limit"]
 # %% [markdown]
 # ## Try this
 #
-# * `ub.Displacement(place, "v", -0.01)` in the place of the arc length: how far does it get?
+# * `ub.DisplacementControl(place, "v", -0.01)` in the place of the arc length: how far does it get?
 # * 30 and 120 cells: the limit load with Richardson's extrapolation has six digits.

@@ -19,6 +19,7 @@
 # is the mass.
 
 # %%
+# SPDX-License-Identifier: MIT
 import math
 import warnings
 from pathlib import Path

@@ -16,6 +16,7 @@
 # * how many members a mean needs: its 95 % interval against their number.
 
 # %%
+# SPDX-License-Identifier: MIT
 from pathlib import Path
 
 import numpy as np

@@ -14,6 +14,7 @@
 # Data: cantilever of the peers' benchmark, L = 1 m, aluminium, 2 cm².
 
 # %%
+# SPDX-License-Identifier: MIT
 from pathlib import Path
 
 import numpy as np

@@ -16,6 +16,7 @@
 # Data: an aluminium blade, clamped to the axis, in the plane of rotation.
 
 # %%
+# SPDX-License-Identifier: MIT
 from pathlib import Path
 
 import numpy as np

@@ -14,6 +14,7 @@
 # * the ledger, with an entry for each source and sink.
 
 # %%
+# SPDX-License-Identifier: MIT
 import math
 from pathlib import Path
 

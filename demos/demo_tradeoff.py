@@ -13,6 +13,7 @@
 # * what the search itself costs, and what it refuses.
 
 # %%
+# SPDX-License-Identifier: MIT
 import math
 from pathlib import Path
 

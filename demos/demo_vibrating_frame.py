@@ -17,6 +17,7 @@
 # are compared, from one to ten times a first value: the tougher the hinge, the less it damps.
 
 # %%
+# SPDX-License-Identifier: MIT
 from pathlib import Path
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Answers in closed form that several tests compare with."""
 
 import numpy as np

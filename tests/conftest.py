@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What all tests share: scenes, what runs under MPI, no PETSc objects left over."""
 
 import gc
@@ -8,7 +9,7 @@ from mpi4py import MPI
 
 import pytest
 
-from ufl_beam import simulation
+from ufl_beam.simulation import simulation
 
 sys.path.insert(0, str(Path(__file__).parent))
 

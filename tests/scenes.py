@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Catalogue of scenes for tests and benchmarks: each cheap, parametrised, and a plain `ub.Scene`.
 
 The beam to look at is `scene.beams[0]`, the support `scene.supports[0]`.

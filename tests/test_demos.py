@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Each demo runs to its end, where it checks its own result."""
 
 import runpy

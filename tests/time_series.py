@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Readers of time series, as simple as the formats allow: XML and numbers, and VTK itself."""
 
 import xml.etree.ElementTree as ET

@@ -1,41 +1,12 @@
+# SPDX-License-Identifier: MIT
 """Planar flexible multibody dynamics with geometrically exact beams.  Units are SI."""
 
-from ufl_beam import compat  # noqa: F401 - first, because it explains what is not installed
+from ufl_beam import dolfinx_compat  # noqa: F401 - first, because it explains what is not installed
 
 # isort: split
 
-from ufl_beam.beams import Beam, Place
-from ufl_beam.bodies import Body, Spot, ground
-from ufl_beam.checkpoint import Checkpoint
-from ufl_beam.classical import GeneralizedAlpha, Newmark, Static
-from ufl_beam.connectors import (
-    Actuator,
-    Connector,
-    Controller,
-    Coulomb,
-    Damper,
-    Function,
-    Guided,
-    Joint,
-    Link,
-    Motor,
-    Prismatic,
-    Release,
-    Revolute,
-    Rigid,
-    RigidLink,
-    RigidPlastic,
-    Slide,
-    Spring,
-    Stop,
-    Stretch,
-    Turn,
-)
-from ufl_beam.continuation import Path, follow
-from ufl_beam.controls import ArcLength, Displacement, Dissipation, Load
-from ufl_beam.critical import Branch, CriticalPoint
-from ufl_beam.cycles import Cycles, Gerber, Goodman, SNCurve, rainflow
-from ufl_beam.decay import (
+from ufl_beam.analysis.critical_points import Branch, CriticalPoint
+from ufl_beam.analysis.free_decay import (
     Decay,
     Envelope,
     damping,
@@ -44,9 +15,18 @@ from ufl_beam.decay import (
     logarithmic_decrement,
     peaks,
 )
-from ufl_beam.discretisation import Mesh
-from ufl_beam.distributions import Lognormal, Normal, TruncatedNormal, Weibull
-from ufl_beam.envelopes import plot_cycles, plot_extremes
+from ufl_beam.analysis.modes import Buckling, Modes, buckling, modes
+from ufl_beam.analysis.parameter_study import study
+from ufl_beam.analysis.path_controls import (
+    ArcLength,
+    DisplacementControl,
+    DissipationControl,
+    LoadControl,
+)
+from ufl_beam.analysis.path_following import Path, follow
+from ufl_beam.analysis.study_file import Study
+from ufl_beam.analysis.tradeoff import tradeoff
+from ufl_beam.analysis.tradeoff_result import Tradeoff
 from ufl_beam.errors import (
     ConvergenceError,
     CopiesDiffer,
@@ -54,21 +34,41 @@ from ufl_beam.errors import (
     SceneError,
     TradeoffError,
 )
-from ufl_beam.events import Event, Events
-from ufl_beam.exact_schemes import DecayingMidpoint, ExactStatic, Midpoint, PrintedMidpoint
-from ufl_beam.extremes import Extent, Extremes
-from ufl_beam.fatigue import Fatigue, HotSpot
-from ufl_beam.fibres import Fibres
-from ufl_beam.gathered import Study
-from ufl_beam.hysteresis import (
-    plot_damage,
-    plot_dissipation,
-    plot_hinge,
-    plot_moment_curvature,
+from ufl_beam.mechanics.classical import GeneralizedAlpha, Newmark, Static
+from ufl_beam.mechanics.energy_momentum import (
+    DecayingMidpoint,
+    ExactStatic,
+    Midpoint,
+    PrintedMidpoint,
 )
-from ufl_beam.laws import DuvautLions, Hardening, LinearSoftening, Perzyna, Softening
-from ufl_beam.ledger import Energy
-from ufl_beam.loads import (
+from ufl_beam.model.beams import Beam, Place
+from ufl_beam.model.bodies import Body, Spot, ground
+from ufl_beam.model.connector_laws import (
+    Actuator,
+    Controller,
+    Coulomb,
+    Damper,
+    ForceLaw,
+    Motor,
+    RigidPlastic,
+    Spring,
+    Stop,
+)
+from ufl_beam.model.connectors import Connector, Slide, Stretch, Turn
+from ufl_beam.model.damping import KelvinVoigt, Rayleigh
+from ufl_beam.model.distributions import Lognormal, Normal, TruncatedNormal, Weibull
+from ufl_beam.model.fibres import Fibres
+from ufl_beam.model.joints import (
+    Guided,
+    Joint,
+    Link,
+    Prismatic,
+    Release,
+    Revolute,
+    Rigid,
+    RigidLink,
+)
+from ufl_beam.model.loads import (
     FollowerLoad,
     Gravity,
     LineLoad,
@@ -77,35 +77,37 @@ from ufl_beam.loads import (
     Table,
     ramp,
 )
-from ufl_beam.mode_pictures import plot_modes
-from ufl_beam.modes import Buckling, Modes, buckling, modes
-from ufl_beam.pacing import Adaptive
-from ufl_beam.pictures import plot
-from ufl_beam.precision import Tradeoff
-from ufl_beam.record import History, Recorder
-from ufl_beam.render import animate, render
-from ufl_beam.running import say, simulate
-from ufl_beam.scene import (
-    Clamped,
-    Pinned,
-    PointMass,
-    Prescribed,
-    Roller,
-    Scene,
-    Support,
-    Velocity,
+from ufl_beam.model.material_laws import DuvautLions, Hardening, LinearSoftening, Perzyna, Softening
+from ufl_beam.model.mesh_options import Mesh
+from ufl_beam.model.scene import PointMass, Scene, Velocity
+from ufl_beam.model.sections import Section
+from ufl_beam.model.supports import Clamped, Pinned, Prescribed, Roller, Support
+from ufl_beam.output.events import Event, Events
+from ufl_beam.output.extremes import Extent, Extremes
+from ufl_beam.output.fatigue import Fatigue, HotSpot
+from ufl_beam.output.rainflow import Cycles, Gerber, Goodman, SNCurve, rainflow
+from ufl_beam.output.recorders import History, Recorder
+from ufl_beam.output.time_series import VTKHDF, XDMF
+from ufl_beam.plotting.extremes import plot_cycles, plot_extremes
+from ufl_beam.plotting.inelastic import (
+    plot_damage,
+    plot_dissipation,
+    plot_hinge,
+    plot_moment_curvature,
 )
-from ufl_beam.sections import Section
-from ufl_beam.simulation import Simulation
-from ufl_beam.solution import Solution, load
-from ufl_beam.solve import Newton
-from ufl_beam.studies import study
-from ufl_beam.time_series import VTKHDF, XDMF
-from ufl_beam.tradeoffs import tradeoff
+from ufl_beam.plotting.modes import plot_modes
+from ufl_beam.plotting.plot import plot
+from ufl_beam.plotting.plots import picture, plot_energy, plot_history, plot_shapes
+from ufl_beam.plotting.render3d import animate, render
+from ufl_beam.plotting.tradeoff import plot_tradeoff
+from ufl_beam.simulation.checkpoint import Checkpoint
+from ufl_beam.simulation.run import say, simulate
+from ufl_beam.simulation.simulation import Simulation
+from ufl_beam.simulation.solution import Solution, load
+from ufl_beam.simulation.step_control import Adaptive
+from ufl_beam.solvers.newton import Newton
+from ufl_beam.terms.energy_ledger import Energy
 from ufl_beam.version import version
-from ufl_beam.view import picture, plot_energy, plot_history, plot_shapes
-from ufl_beam.viscous import KelvinVoigt, Rayleigh
-from ufl_beam.work_precision import plot_tradeoff
 
 __version__ = version()
 
@@ -131,8 +133,8 @@ __all__ = [
     "Damper",
     "Decay",
     "DecayingMidpoint",
-    "Displacement",
-    "Dissipation",
+    "DisplacementControl",
+    "DissipationControl",
     "DuvautLions",
     "Energy",
     "Envelope",
@@ -144,7 +146,7 @@ __all__ = [
     "Fatigue",
     "Fibres",
     "FollowerLoad",
-    "Function",
+    "ForceLaw",
     "GeneralizedAlpha",
     "Gerber",
     "Goodman",
@@ -158,7 +160,7 @@ __all__ = [
     "LineLoad",
     "LinearSoftening",
     "Link",
-    "Load",
+    "LoadControl",
     "Lognormal",
     "Mesh",
     "Midpoint",

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Errors and warnings of the package, and the checks of arguments that all records share."""
 
 from __future__ import annotations
@@ -63,8 +64,8 @@ class ConvergenceError(RuntimeError):
     Attributes:
         time: Time of the last accepted state, on a path its load factor; s.
         dt: The smallest step that was tried, on a path the change of the load factor; s.
-        solution: The :class:`~ufl_beam.solution.Solution` up to ``time``; ``start=solution`` goes
-            on from there with another step or scheme.
+        solution: The :class:`~ufl_beam.simulation.solution.Solution` up to ``time``;
+            ``start=solution`` goes on from there with another step or scheme.
         residuals: What is left of the equilibrium where it is largest in each beam, body and
             connector, the largest first; N, moments over the size of the scene.  Empty if
             equilibria were found but refused.
@@ -102,7 +103,7 @@ class TradeoffError(RuntimeError):
     """No setting can be recommended: the runs do not converge, or it would take too long.
 
     Attributes:
-        runs: What was run, see :class:`~ufl_beam.ladders.Run`.
+        runs: What was run, see :class:`~ufl_beam.analysis.refinement_runs.Run`.
     """
 
     def __init__(self, message: str, runs: tuple[Any, ...] = ()) -> None:

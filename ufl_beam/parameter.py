@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Names and units of the parameter of a solution: time, or the load factor of a path."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Version of the package, stated once, in pyproject.toml."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The extremes: what was tried and what happened.
 
 Run by ``make extremes``.  Each row is a process of its own, two at a time, so that a hang is caught

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Rows of elastic scenes: stiffness, slenderness, cells, steps, turns, masses, loads, units.
 
 Each row compares with a closed form, or with what the scheme conserves.  What the last digit of a

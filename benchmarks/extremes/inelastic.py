@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Rows of scenes that yield, flow and break."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What must stop, and what it must say: scenes and calls that are wrong, or go wrong on the way."""
 
 import math
@@ -58,7 +59,7 @@ def _function_fails():
     def force(e, rate):
         return math.nan if abs(e) > 1e-6 else e
 
-    connector = ub.Slide(ub.ground(2, 0), beam.end, ub.Function(force), axis=(0, 1))
+    connector = ub.Slide(ub.ground(2, 0), beam.end, ub.ForceLaw(force), axis=(0, 1))
     load = ub.PointLoad(beam.end, force=(0.0, 1.0))
     scene = ub.Scene(
         [beam], supports=[ub.Clamped(beam.start)], connectors=[connector], loads=[load]

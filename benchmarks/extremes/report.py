@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The table and the figure of the study, made of its results."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What a row of the study is, and how one is run: every value, one after the other."""
 
 from __future__ import annotations

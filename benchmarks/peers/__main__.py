@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """ufl_beam beside Exudyn, OpenSees and a C loop, in one run: time, memory and error.
 
 Run by ``make bench-peers``, on an idle machine.  Every run is a process of its own with one thread;

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What is run: each program with its settings on each problem, and the ladders of the figure."""
 
 from typing import NamedTuple

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What this package wants to be true beside the others, asked of the records of one run."""
 
 import math

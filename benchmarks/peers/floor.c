@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The floor: one chain of two-node Reissner cells, written by hand for this and nothing else.
 
    Statics, and the midpoint rule that conserves energy exactly; Newton's method; equations solved

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The floor: ``floor.c``, compiled here with what this processor has."""
 
 import json

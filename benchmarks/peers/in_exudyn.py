@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The problems in Exudyn: planar geometrically exact beams, no output, the fastest settings.
 
 Loads are symbolic functions, which Exudyn evaluates without Python.

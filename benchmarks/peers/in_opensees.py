@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The problems in OpenSees: corotational elements, lumped masses, no output.
 
 Its planar corotational transformation ends at a rotation of π; where beams turn further (P2), a

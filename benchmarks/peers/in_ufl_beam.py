@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The problems in ufl_beam, as a user states them; the time loop is timed."""
 
 import numpy as np
@@ -5,7 +6,7 @@ from problems import PROBLEMS
 from stopwatch import Stopwatch
 
 import ufl_beam as ub
-from ufl_beam.compat import dolfinx
+from ufl_beam.dolfinx_compat import dolfinx
 
 VERSION = f"DOLFINx {dolfinx.__version__}"
 

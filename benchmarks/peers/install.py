@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The other programs, from PyPI into a directory of the cache: they are no part of the package."""
 
 import os

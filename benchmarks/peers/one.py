@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """One run in a process of its own: ``one.py PROGRAM PROBLEM SETTINGS``; a line of JSON."""
 
 import importlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The problems: their numbers, what a run must tell, and how far that is from the converged answer.
 
 A problem knows nothing of any program.  Every program gets the same chains of cells, loads and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Converged answers: ``python3 reference.py`` (through ./env) computes them anew; half an hour.
 
 Each is a run of ufl_beam on its finest mesh with its finest step.  Runs of half and a quarter as

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Tables and the figure, made of the records of one run: ``python3 report.py`` writes them anew."""
 
 import json

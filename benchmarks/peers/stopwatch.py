@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Time that a loop takes, on the wall and of the processor."""
 
 import time

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The work-precision study: schemes, steps and cells over scenes, and each dial by itself.
 
 Run by ``make study``, on an idle machine, one thread; ``--quick`` for two minutes of coarse

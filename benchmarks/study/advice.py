@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What follows from the numbers: the cheapest setting for an error, and what others take."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Scenes of the study: smooth, stiff, impulsive, plastic, softening and static ones."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What is turned: a setting of all dials, the grid of each scene, and one dial at a time."""
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from cases import Case
 
 import ufl_beam as ub
 
-SCHEMES: dict[str, ub.schemes.Scheme] = {
+SCHEMES: dict[str, ub.mechanics.time_schemes.Scheme] = {
     "Midpoint": ub.Midpoint(),
     "Midpoint, decaying": ub.Midpoint(alpha=0.05, beta=0.05),
     "DecayingMidpoint": ub.DecayingMidpoint(),
@@ -18,7 +19,10 @@ SCHEMES: dict[str, ub.schemes.Scheme] = {
     "Newmark": ub.Newmark(),
     "GeneralizedAlpha": ub.GeneralizedAlpha(),
 }
-STATIC: dict[str, ub.schemes.Scheme] = {"Static": ub.Static(), "ExactStatic": ub.ExactStatic()}
+STATIC: dict[str, ub.mechanics.time_schemes.Scheme] = {
+    "Static": ub.Static(),
+    "ExactStatic": ub.ExactStatic(),
+}
 
 
 @dataclass(frozen=True)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The figures of the study: error over wall time, and what each dial does."""
 
 from __future__ import annotations
@@ -9,8 +10,8 @@ import numpy as np
 from advice import good, schemes
 
 import ufl_beam as ub
-from ufl_beam.glyphs import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY
-from ufl_beam.richardson import pareto
+from ufl_beam.analysis.richardson import pareto
+from ufl_beam.plotting.connector_glyphs import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY
 
 Case = dict[str, Any]
 COLORS = (BLUE, SKY, GREEN, PINK, ORANGE, RED)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Runs of settings: their time, and their error against a reference."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The page of the study, made of its results: what to choose when, figures, tables."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Extrapolation and measured orders of a sequence of runs, each twice as fine as the one before."""
 
 from itertools import pairwise

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Orders in space and time, asserted for all consecutive pairs of runs.
 
 Dynamics, each compared with itself: the flying beam under a load that comes and goes as sin⁴ (a

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Orders in time of a viscoplastic vibration, each run compared with itself.
 
 A law without a yield limit flows all the time, and with kinematic hardening it is smooth: a

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """pvpython look.py FILE READER: one data set with all fields, and a picture of them.
 
 In the folder of the file, beside ``expected.json``; the picture, warped and coloured by M, is

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """make_files.py FOLDER: a run with beams, hinges, a body and a spring, and numbers to expect."""
 
 import json

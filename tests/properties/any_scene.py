@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Random scenes of all public objects and schemes, each a script that anybody can run.
 
 `script(seed, statement)` writes Python that makes `scene`, `scheme`, `times`, `dt` and `mesh`.  All

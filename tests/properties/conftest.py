@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Property tests find the module of random scenes, and keep collections of garbage cheap."""
 
 import gc

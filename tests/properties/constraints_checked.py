@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What joints, motors, guides and supports of a solution promise, checked from positions alone."""
 
 import math
@@ -5,9 +6,9 @@ import math
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from ufl_beam.bodies import GROUND, Body, Spot
-from ufl_beam.connectors import Guide, Motor
-from ufl_beam.scene import still
+from ufl_beam.model.bodies import GROUND, Body, Spot
+from ufl_beam.model.connector_laws import Guide, Motor
+from ufl_beam.model.supports import still
 
 COUPLES = {
     # kind of a joint -> whether it keeps the point, and the rotation

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Random laws of sections and connectors, written as Python source; see any_scene.py."""
 
 import math
@@ -162,7 +163,7 @@ class Laws:
             "Spring": f"ub.Spring({text})",
             "yields": f"ub.Spring({text}, law={yields})",
             "breaks": f"ub.Spring({text}, softening={breaks})",
-            "Function": f"ub.Function(lambda e, rate: {text} * e + "
+            "Function": f"ub.ForceLaw(lambda e, rate: {text} * e + "
             f"{say.number(k / way**2, cubic)} * e**3 + "
             f"{say.number(0.0 if self._static else c, of_c)} * rate)",
             "Stop": f"ub.Stop({text}, low={say.number(-low, of_e)}, high={say.number(high, of_e)})",

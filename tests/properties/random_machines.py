@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Random machines of everything that a scene may have, each a script that anybody can run.
 
 `script(seed)` writes Python that makes `scene`, `scheme` and `dt`.  All numbers are plain, so that
@@ -275,7 +276,7 @@ class _Writer:
             f"ub.Stop({k:.6g}, low={-way:.6g}, high={way / 2:.6g})",
             f"ub.Damper({c:.6g})",
             f"ub.Actuator(lambda t: {force:.6g} * math.sin({1 / time:.6g} * t))",
-            f"ub.Function(lambda e, rate: {k:.6g} * (e + {1 / length**2:.6g} * e**3) + "
+            f"ub.ForceLaw(lambda e, rate: {k:.6g} * (e + {1 / length**2:.6g} * e**3) + "
             f"{c:.6g} * rate)",
         ]
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Random scenes as plain numbers, and the ways to state one scene that must not matter.
 
 A draw is a tree of one to four beams, each joined to an earlier one, with supports, loads and

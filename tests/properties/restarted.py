@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A scene of all that remembers something, and a run of it that can be killed and run again.
 
 As a script: ``python3 restarted.py FOLDER`` runs or goes on, and writes the solution at the end.
@@ -60,7 +61,7 @@ def machine(dynamic=True):
         ub.Turn(a.middle, left.end, ub.Damper(0.2)),
         ub.Stretch(left.at(0.4), right.at(0.5), ub.Stop(50.0, high=0.2)),
         ub.Turn(left.end, a.middle, ub.Coulomb(0.02, coefficient=0.005, joint=pin)),
-        ub.Slide(ub.ground(0, 0), a.middle, ub.Function(lambda e, rate: 10 * e), axis=(0, 1)),
+        ub.Slide(ub.ground(0, 0), a.middle, ub.ForceLaw(lambda e, rate: 10 * e), axis=(0, 1)),
         ub.Turn(ub.ground(0, 0), c.middle, ub.Controller(Steering(left.end))),
         ub.Turn(ub.ground(0, 0), b.middle, ub.Controller(lambda now: 0.01 * random.normal())),
     ]

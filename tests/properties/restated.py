@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A random scene in several statements: runs, and differences of their motions."""
 
 import warnings

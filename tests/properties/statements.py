@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Statements of one scene that must give one motion: other axes, units, directions, orders.
 
 A scene is written as Python source by :mod:`any_scene`.  All its numbers go through a

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Energy, momentum and angular momentum of random scenes, exact at any step size."""
 
 import numpy as np

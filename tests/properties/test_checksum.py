@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """One scene of everything gives one result on any number of processes."""
 
 import numpy as np
@@ -41,7 +42,7 @@ def everything():
         ub.Turn(a.middle, left.end, ub.Damper(0.2)),
         ub.Stretch(left.at(0.4), right.at(0.5), ub.Stop(50.0, high=0.2)),
         ub.Turn(left.end, a.middle, ub.Coulomb(0.05)),
-        ub.Slide(ub.ground(0, 0), a.middle, ub.Function(lambda e, rate: 10 * e), axis=(0, 1)),
+        ub.Slide(ub.ground(0, 0), a.middle, ub.ForceLaw(lambda e, rate: 10 * e), axis=(0, 1)),
         ub.Turn(ub.ground(0, 0), c.middle, ub.Controller(control)),
     ]
     loads = [ub.Gravity(), ub.PointLoad(c.at(2.5, 0.5), force=(3, 2), moment=1.0)]

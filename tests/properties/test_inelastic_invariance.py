@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """One inelastic scene stated in two ways gives one result: units, axes, cuts, order, ranks."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """One scene stated in two ways gives one result: units, axes, cuts, order, ranks."""
 
 from mpi4py import MPI

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """One mechanism stated in two ways gives one result: units, axes, order of its parts."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """One scene stated in several ways has one set of modes: units, axes, order of its beams."""
 
 from dataclasses import replace

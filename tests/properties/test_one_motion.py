@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Scenes whose statements once made two motions, as test_random_scenes.py has found.
 
 Each failed by far more than the tolerance here, which is a few hundred last digits of a metre times

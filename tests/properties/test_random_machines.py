@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """500 random machines: each ends with a closed ledger or says clearly why it cannot."""
 
 import faulthandler

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Pictures of random machines: no failure, and every object leaves something."""
 
 import dataclasses
@@ -7,9 +8,9 @@ import pytest
 from random_machines import script
 
 import ufl_beam as ub
-from ufl_beam.load_symbols import badge
-from ufl_beam.model_pictures import notes_of
-from ufl_beam.model_symbols import Subject, draw
+from ufl_beam.plotting.load_symbols import badge
+from ufl_beam.plotting.model import notes_of
+from ufl_beam.plotting.model_symbols import Subject, draw
 
 PARTS = ("joints", "supports", "loads", "masses", "initial", "damping", "connectors")
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """200 random scenes, each stated in six ways: one motion, constraints kept, a ledger that closes.
 
 `any_scene.py` draws the scenes, `statements.py` states them as given, turned, with beams that run

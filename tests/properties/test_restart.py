@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A run that is stopped, by whatever, and run again is the run, to the last bit."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Unit tests keep collections of garbage cheap."""
 
 import gc

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Script of test_copies.py, for two processes: scenes that are not the same on both."""
 
 import itertools
@@ -60,7 +61,7 @@ def stepped(time):
 def followed(time):
     size = 3 + time(0.9 if time is not fails else 0.1)
     end, scene = scene_of(lambda t: t * size)
-    return ub.follow(scene, ub.Load(0.25), steps=4).displacement(end)[-1].tolist()
+    return ub.follow(scene, ub.LoadControl(0.25), steps=4).displacement(end)[-1].tolist()
 
 
 RUNS = {

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Functions of a user that raise on one process or on all; run by test_agreement.py.
 
 `mpirun -n 2 python3 raising.py` prints a line for each case: its name, the exceptions of all
@@ -6,12 +7,14 @@ processes; `mpirun -n 2 python3 raising.py CASE RANK` lets one process fail wher
 
 import math
 import sys
+import time
 from pathlib import Path
 
 from mpi4py import MPI
 
 import ufl_beam as ub
-from ufl_beam import agreement, simulation
+from ufl_beam import collective_errors
+from ufl_beam.simulation import simulation
 
 WORLD = MPI.COMM_WORLD
 ALL = -1
@@ -126,7 +129,7 @@ def controller(fail):
 
 
 def function(fail):
-    connected(ub.Function(lambda motion, rate: fail() if abs(motion) > 1e-5 else 0.0))
+    connected(ub.ForceLaw(lambda motion, rate: fail() if abs(motion) > 1e-5 else 0.0))
 
 
 def guide(fail):
@@ -165,7 +168,7 @@ def checkpoint(fail):
 
 def path(fail):
     moves = ub.Prescribed(BEAM.end, v=lambda t: fail() if t > 0.3 else 0.1 * t)
-    ub.follow(scene(loads=[], supports=[ub.Clamped(BEAM.start), moves]), ub.Load(0.1))
+    ub.follow(scene(loads=[], supports=[ub.Clamped(BEAM.start), moves]), ub.LoadControl(0.1))
 
 
 EVERYWHERE = [load, load_in_statics, gravity, controller, recorder, beginning, checkpoint]
@@ -242,6 +245,7 @@ if __name__ == "__main__":
     if len(sys.argv) <= 2:
         together()
     else:
-        agreement.GRACE = 0.5
+        collective_errors.GRACE = 0.5
         name, rank = sys.argv[1:]
+        print(f"begun at {time.time()}", file=sys.stderr, flush=True)
         globals()[name](failure(int(rank), lambda: RuntimeError(f"user, {name}")))

@@ -1,7 +1,9 @@
+# SPDX-License-Identifier: MIT
 """Exceptions in functions of users under `mpirun`: raised by all processes, or the end of all."""
 
 import os
 import pickle
+import re
 import shutil
 import subprocess
 import sys
@@ -12,7 +14,7 @@ from mpi4py import MPI
 
 import pytest
 
-from ufl_beam.agreement import Agreement, portable
+from ufl_beam.collective_errors import Agreement, portable
 from ufl_beam.errors import StepFailed
 
 COMM = MPI.COMM_WORLD
@@ -71,9 +73,10 @@ def test_all_processes_raise_together(tmp_path):
 @needs_mpirun
 @pytest.mark.parametrize(("case", "rank"), [("alone", 1), ("asked", 0), ("own", 1)])
 def test_a_process_that_fails_alone_ends_all(case, rank):
-    begin = time.perf_counter()
     run = on_two(case, rank, timeout=100)
-    assert time.perf_counter() - begin < 10  # 2 s on two idle cores; a hang would be for ever
+    end = time.time()
+    # Imports are not counted, which take long beside other tests. A hang would be for ever.
+    assert end - max(map(float, re.findall(r"begun at ([\d.]+)", run.stderr))) < 10
     assert run.returncode != 0
     assert f"RuntimeError: user, {case}" in run.stderr
     if case != "own":  # small scenes on each process are compared, so that the other one ends, too

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What users do wrong, and what the message says: which object, what is wrong, what to do."""
 
 import csv

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Beams: where the axis runs, which vertices it gets, and what a place is."""
 
 import math
@@ -6,7 +7,7 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.grid import Grid
+from ufl_beam.discretization.dof_numbering import Grid
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0)
 

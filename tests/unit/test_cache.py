@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The cache of compiled code: damage, kills, other users, directories that cannot be written to."""
 
 import os
@@ -10,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from ufl_beam import cache, lanes, native
-from ufl_beam.cache import CHECKSUMS, intact, kept
+from ufl_beam.compiled import code_cache, jit, simd_kernels
+from ufl_beam.compiled.code_cache import CHECKSUMS, intact, kept
 
 ENTRY = "numbers_1234"
 
@@ -21,7 +22,7 @@ def place(tmp_path, monkeypatch):
     """An empty cache."""
     directory = tmp_path / "cache"
     directory.mkdir(mode=0o700)
-    monkeypatch.setattr(cache, "_place", lambda: directory)
+    monkeypatch.setattr(code_cache, "_place", lambda: directory)
     return directory
 
 
@@ -165,7 +166,7 @@ def test_damaged_c_is_compiled_again(place):
     """On a real library: loaded as it is, it would end this process."""
 
     def answer():
-        module = native.compiled(
+        module = jit.compiled(
             *("ufl_beam_test", "int answer(void);", lambda: "int answer(void) { return 42; }"),
             **{"made_of": [], "flags": []},
         )
@@ -201,15 +202,15 @@ def test_files_are_on_the_disk_before_the_entry_has_its_name(place, monkeypatch)
 BUILD = """
 import sys, time
 from pathlib import Path
-from ufl_beam import cache
+from ufl_beam.compiled import code_cache
 place = Path(sys.argv[1])
-cache._place = lambda: place
+code_cache._place = lambda: place
 def build(directory):
     (directory / "begun").write_text("")
     with open(place.parent / "log", "a") as file:
         file.write("built\\n")
     time.sleep(float(sys.argv[2]))
-cache.kept("slow", build, lambda directory: None)
+code_cache.kept("slow", build, lambda directory: None)
 """
 
 
@@ -254,15 +255,15 @@ def test_two_processes_build_the_same_once_and_different_entries_at_once(place):
 FORM = """
 import sys
 from pathlib import Path
-from ufl_beam import cache, native
-from ufl_beam.compat import fem, line_mesh
+from ufl_beam.compiled import code_cache, jit
+from ufl_beam.dolfinx_compat import fem, line_mesh
 import numpy as np, ufl
 place = Path(sys.argv[1])
-cache._place = lambda: place
+code_cache._place = lambda: place
 mesh = line_mesh(np.array([[0.0, 0], [1, 0]]), np.array([[0, 1]]))
 v = ufl.TestFunction(fem.functionspace(mesh, ("DG", 0)))
 form = 7.0 * v * ufl.dx(domain=mesh, metadata={"quadrature_degree": 0})
-print(native.compiled_form(form)[1].exists())
+print(jit.compiled_form(form)[1].exists())
 """
 
 
@@ -289,18 +290,18 @@ def test_a_kill_while_ffcx_compiles(place):
 def home(tmp_path, monkeypatch):
     """The directory in which the cache is to be, and another one for temporary files."""
     (tmp_path / "tmp").mkdir(mode=0o700)
-    monkeypatch.setattr(cache.tempfile, "tempdir", str(tmp_path / "tmp"))
-    monkeypatch.setattr(cache, "_temporary", cache._temporary.__wrapped__)
-    monkeypatch.setattr(cache, "jit_directory", lambda: tmp_path / "home" / "fenics")
+    monkeypatch.setattr(code_cache.tempfile, "tempdir", str(tmp_path / "tmp"))
+    monkeypatch.setattr(code_cache, "_temporary", code_cache._temporary.__wrapped__)
+    monkeypatch.setattr(code_cache, "jit_directory", lambda: tmp_path / "home" / "fenics")
     return tmp_path / "home" / "fenics"
 
 
 def chosen():
-    return cache._place.__wrapped__()
+    return code_cache._place.__wrapped__()
 
 
 first_rank_says = pytest.mark.skipif(
-    cache.MPI.COMM_WORLD.rank > 0, reason="only the first process says so"
+    code_cache.MPI.COMM_WORLD.rank > 0, reason="only the first process says so"
 )
 
 
@@ -355,7 +356,7 @@ def test_directories_that_cannot_be_trusted_or_made(home, make, why):
     make(home)
     with pytest.warns(RuntimeWarning, match=f"cannot be used: {why}.*XDG_CACHE_HOME"):
         place = chosen()
-    assert place == Path(cache.tempfile.tempdir) / f"ufl_beam-{os.geteuid()}"
+    assert place == Path(code_cache.tempfile.tempdir) / f"ufl_beam-{os.geteuid()}"
     assert place.stat().st_mode & 0o777 == 0o700
 
 
@@ -364,16 +365,17 @@ def test_a_home_that_cannot_be_written_to(home, monkeypatch):
     """Nobody, not even root, makes directories in /sys; `import ufl_beam` used to be enough."""
     if not Path("/sys").is_dir():
         pytest.skip("there is no /sys")
-    monkeypatch.setattr(cache, "jit_directory", lambda: Path("/sys/.cache/fenics"))
+    monkeypatch.setattr(code_cache, "jit_directory", lambda: Path("/sys/.cache/fenics"))
     with pytest.warns(RuntimeWarning, match="the cache /sys/.* cannot be used: .*XDG_CACHE_HOME"):
-        assert chosen().parent == Path(cache.tempfile.tempdir)
+        assert chosen().parent == Path(code_cache.tempfile.tempdir)
 
 
 @first_rank_says
 def test_a_cache_that_cannot_be_written_to_is_read(place, home, monkeypatch):
     builds = Builds()
     builds()
-    monkeypatch.setattr(cache.os, "access", lambda *_: False)  # for root everything is writable
+    # For root everything is writable.
+    monkeypatch.setattr(code_cache.os, "access", lambda *_: False)
     assert builds() == 1
     with pytest.warns(RuntimeWarning, match="cannot be written to.*ufl_beam-"):
         assert Builds(3)("another") == 1
@@ -383,7 +385,7 @@ def test_a_cache_that_cannot_be_written_to_is_read(place, home, monkeypatch):
 @first_rank_says
 def test_a_directory_of_another_in_the_place_of_temporary_files(home):
     open_to_all(home)
-    other = Path(cache.tempfile.tempdir) / f"ufl_beam-{os.geteuid()}"
+    other = Path(code_cache.tempfile.tempdir) / f"ufl_beam-{os.geteuid()}"
     other.mkdir()
     other.chmod(0o777)
     with pytest.warns(RuntimeWarning, match="others may write"):
@@ -422,14 +424,14 @@ def test_warnings_are_logged_where_the_user_has_a_log():
 
 def test_without_a_compiler_there_are_words(place, monkeypatch):
     monkeypatch.setenv("CC", "no-such-compiler")
-    with pytest.raises(native.CompilerError, match=r"no-such-compiler.*need a C compiler.*gcc"):
-        native.compiled("ufl_beam_test", "", lambda: "", made_of=[], flags=[])
+    with pytest.raises(jit.CompilerError, match=r"no-such-compiler.*need a C compiler.*gcc"):
+        jit.compiled("ufl_beam_test", "", lambda: "", made_of=[], flags=[])
 
 
 def test_a_kernel_without_vectors_is_remembered(place, tmp_path):
     source = tmp_path / "libffcx_forms_0.c"
     source.write_text("nothing")
     for _ in range(2):
-        lanes._modules.clear()
-        assert lanes.in_lanes(source, 1, 1, 0) is None
+        simd_kernels._modules.clear()
+        assert simd_kernels.in_lanes(source, 1, 1, 0) is None
     assert len([path for path in place.iterdir() if path.is_dir()]) == 1

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Checkpoints: what they refuse and why, what describes a run, full disks, who remembers what."""
 
 import errno
@@ -14,9 +15,9 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.checkpoint import HEADER, read
-from ufl_beam.describe import Description, difference
-from ufl_beam.memory import Restoring, Saving
+from ufl_beam.discretization.state_io import Restoring, Saving
+from ufl_beam.simulation.checkpoint import HEADER, read
+from ufl_beam.simulation.fingerprint import Description, difference
 
 STEEL = {"EA": 1e4, "GA": 1e4, "EI": 100.0, "rhoA": 1.0, "rhoI": 0.1}
 

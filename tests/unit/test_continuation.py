@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Paths of static equilibria: controls, critical points, branches, what is refused, what fails."""
 
 import itertools
@@ -7,8 +8,8 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.processes import ours
-from ufl_beam.view import evenly
+from ufl_beam.parallel import ours
+from ufl_beam.plotting.plots import evenly
 
 EA, WIDTH, HEIGHT = 1e6, 4.0, 1.0  # N, m, m: half a truss
 
@@ -71,7 +72,7 @@ def test_snap_through(factor):
 def test_displacement_control_goes_through_limit_loads():
     """Steps are as long as asked for; [closed]."""
     apex, scene = truss()
-    path = ub.follow(scene, ub.Displacement(apex, "v", -0.125), steps=18)
+    path = ub.follow(scene, ub.DisplacementControl(apex, "v", -0.125), steps=18)
     v = path.displacement(apex)[:, 1]
     kept = np.setdiff1d(np.arange(len(v)), [point.n for point in path.critical])
     steps = -np.diff(v[kept])
@@ -84,7 +85,7 @@ def test_load_control_ends_at_the_limit_load():
     """The error says where, and carries the path so far."""
     apex, scene = truss()
     with pytest.raises(ub.ConvergenceError, match="ArcLength") as failure:
-        ub.follow(scene, ub.Load(0.5))
+        ub.follow(scene, ub.LoadControl(0.5))
     path = failure.value.solution
     assert path.factor[-1] == pytest.approx(force(LIMIT - HEIGHT), rel=0.01)
     np.testing.assert_allclose(path.factor, force(path.displacement(apex)[:, 1]), atol=1e-6)
@@ -106,7 +107,7 @@ def test_steady_loads_are_borne_first():
     scene = ub.Scene(
         scene.beams, joints=scene.joints, supports=scene.supports, loads=[*scene.loads, steady]
     )
-    path = ub.follow(scene, ub.Load(0.5), steps=2)
+    path = ub.follow(scene, ub.LoadControl(0.5), steps=2)
     v = path.displacement(apex)[:, 1]
     np.testing.assert_allclose(path.factor + 2, force(v), rtol=1e-7)
 
@@ -116,7 +117,7 @@ def test_backwards_and_on_from_a_path():
     apex, scene = truss()
     path = ub.follow(scene, ub.ArcLength(-0.05), steps=4)
     assert (np.diff(path.factor) < 0).all()
-    on = ub.follow(scene, ub.Load(0.25), start=path, steps=2)
+    on = ub.follow(scene, ub.LoadControl(0.25), start=path, steps=2)
     assert on.factor[0] == path.factor[-1]
     np.testing.assert_allclose(on.factor, force(on.displacement(apex)[:, 1]), atol=1e-6)
 
@@ -234,7 +235,7 @@ def frame(corner):
 def test_releases(free):
     """An elastic frame under small loads has no critical point; Newton's method takes few steps."""
     scene = frame(lambda a, b: ub.Release(a, b, free=free))
-    path = ub.follow(scene, ub.Load(1.0), steps=10)
+    path = ub.follow(scene, ub.LoadControl(1.0), steps=10)
     assert path.factor[-1] == pytest.approx(10, rel=1e-12)
     assert path.critical == []
     assert path.iterations <= 40
@@ -249,7 +250,7 @@ def test_a_cantilever_held_by_measured_forces():
     beam = ub.Beam((0, 0), (0, 3), section, cells=4)
     load = ub.PointLoad(beam.end, force=(10.0, 0), time=growing)
     clamp = ub.Rigid(ub.ground(0, 0), beam.start, measured=True)
-    path = ub.follow(ub.Scene([beam], joints=[clamp], loads=[load]), ub.Load(0.5), steps=20)
+    path = ub.follow(ub.Scene([beam], joints=[clamp], loads=[load]), ub.LoadControl(0.5), steps=20)
     assert path.factor[-1] == pytest.approx(10, rel=1e-12)
     assert path.critical == []
     assert path.iterations <= 3 * 20
@@ -264,7 +265,7 @@ def test_springs_of_all_slopes():
     column = ub.Beam((0, 0), (0, 1), section, cells=4)
     foot = ub.ground(0, 0)
     springs = [
-        ub.Turn(foot, column.start, ub.Function(lambda angle, rate, k=k: k * angle))
+        ub.Turn(foot, column.start, ub.ForceLaw(lambda angle, rate, k=k: k * angle))
         for k in (5.0, -1.0, 0.0)
     ]
     scene = ub.Scene(
@@ -273,7 +274,7 @@ def test_springs_of_all_slopes():
         connectors=springs,
         loads=[ub.PointLoad(column.end, force=(0, -1.0), time=growing)],
     )
-    path = ub.follow(scene, ub.Load(0.7), steps=10)
+    path = ub.follow(scene, ub.LoadControl(0.7), steps=10)
     (point,) = path.critical
     assert point.kind == "bifurcation"
     assert point.factor == pytest.approx(4.0, rel=3e-6)
@@ -317,7 +318,7 @@ def test_springs_that_soften_together(number, stronger, control):
     """
     top, scene = softening_row(number, stronger)
     along = {
-        "displacement": ub.Displacement(top, "u", 0.02),
+        "displacement": ub.DisplacementControl(top, "u", 0.02),
         "arc length": ub.ArcLength(5e-3, factor=2e4),
     }[control]
     path = ub.follow(scene, along, until=lambda now: now.displacement(top)[0] > 0.15)
@@ -336,7 +337,7 @@ def test_displacement_control_in_any_unit_of_the_load():
         apex, scene = truss()
         load = ub.PointLoad(apex, force=(0, -unit), time=growing)
         scene = ub.Scene(scene.beams, joints=scene.joints, supports=scene.supports, loads=[load])
-        path = ub.follow(scene, ub.Displacement(apex, "v", -0.125), steps=18)
+        path = ub.follow(scene, ub.DisplacementControl(apex, "v", -0.125), steps=18)
         assert [point.kind for point in path.critical] == ["limit", "limit"]
         factors = [point.factor * unit / 1e3 for point in path.critical]
         # Located to 1e-7 of a step, where the load is flat.
@@ -347,7 +348,7 @@ def test_load_control_says_what_turns():
     """At the opening of a spring the load factor turns, and nothing else is said of it."""
     _, scene = softening_row(1)
     with pytest.raises(ub.ConvergenceError, match="the load factor turns back") as failure:
-        ub.follow(scene, ub.Load(7.0))
+        ub.follow(scene, ub.LoadControl(7.0))
     text = str(failure.value)
     assert "no equilibrium after load factor 100.00" in text
     assert "a change of the load factor by" in text
@@ -383,7 +384,7 @@ def test_events_of_a_path(law):
     load = ub.PointLoad(beam.end, force=(0, 10.0), time=growing)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
     events = ub.Events()
-    ub.follow(scene, ub.Dissipation(0.5), steps=30, record=events)
+    ub.follow(scene, ub.DissipationControl(0.5), steps=30, record=events)
     assert events.found
     assert str(events.found[0]).startswith("load factor ")
     assert 0.9 < events.found[0].time <= 1.0
@@ -423,12 +424,12 @@ def test_controls_refuse_bad_input():
     cases = [
         (lambda: ub.ArcLength(0.0), "leads nowhere"),
         (lambda: ub.ArcLength(0.1, factor=-1.0), "must be positive"),
-        (lambda: ub.Load(0.0), "leads nowhere"),
-        (lambda: ub.Displacement(apex, "w", 0.1), "must be one of u, v, psi"),
-        (lambda: ub.Displacement(apex, "v", 0), "leads nowhere"),
-        (lambda: ub.Displacement("apex", "v", 0.1), "is not a Place"),
-        (lambda: ub.Dissipation(-1.0), "must be positive"),
-        (lambda: ub.Dissipation(1.0, ub.Load(1.0)), "is not a ArcLength"),
+        (lambda: ub.LoadControl(0.0), "leads nowhere"),
+        (lambda: ub.DisplacementControl(apex, "w", 0.1), "must be one of u, v, psi"),
+        (lambda: ub.DisplacementControl(apex, "v", 0), "leads nowhere"),
+        (lambda: ub.DisplacementControl("apex", "v", 0.1), "is not a Place"),
+        (lambda: ub.DissipationControl(-1.0), "must be positive"),
+        (lambda: ub.DissipationControl(1.0, ub.LoadControl(1.0)), "is not a ArcLength"),
     ]
     for call, message in cases:
         with pytest.raises(ub.SceneError, match=message):
@@ -440,12 +441,12 @@ def test_paths_refuse_bad_input():
     other, _ = truss()
     _, steady = truss(time=lambda t: 1.0)
     cases = [
-        (lambda: ub.follow(scene, ub.Displacement(other, "v", 0.1)), "is not in the scene"),
+        (lambda: ub.follow(scene, ub.DisplacementControl(other, "v", 0.1)), "is not in the scene"),
         (lambda: ub.follow(scene, "arc"), "must be ArcLength"),
         (lambda: ub.follow(scene, ub.ArcLength), "must be ArcLength"),
-        (lambda: ub.follow(scene, ub.Load(1.0), steps=0), "at least 1"),
-        (lambda: ub.follow(scene, ub.Load(1.0), start=3), "is not a Solution or Branch"),
-        (lambda: ub.follow(steady, ub.Load(1.0)), "no load and no motion depends on time"),
+        (lambda: ub.follow(scene, ub.LoadControl(1.0), steps=0), "at least 1"),
+        (lambda: ub.follow(scene, ub.LoadControl(1.0), start=3), "is not a Solution or Branch"),
+        (lambda: ub.follow(steady, ub.LoadControl(1.0)), "no load and no motion depends on time"),
     ]
     for call, message in cases:
         with pytest.raises(ub.SceneError, match=message):
@@ -460,12 +461,12 @@ def test_controllers_need_time():
         connectors=[turn],
     )  # fmt: skip
     with pytest.raises(ub.SceneError, match="a path has none"):
-        ub.follow(scene, ub.Load(1.0))
+        ub.follow(scene, ub.LoadControl(1.0))
 
 
 def test_loads_that_stop_growing():
     """Beyond the end of a ramp there is no direction to go in; what was reached is kept."""
     _, scene = truss(time=ub.ramp(1.0))
     with pytest.raises(ub.ConvergenceError, match="nothing moves with the load factor") as failure:
-        ub.follow(scene, ub.Load(0.4))
+        ub.follow(scene, ub.LoadControl(0.4))
     assert failure.value.solution.factor[-1] > 0.9

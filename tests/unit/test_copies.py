@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Small scenes under `mpirun` are computed by each process: all must find the same motion."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Damping from a history: peaks, logarithmic decrement, and which law their decay follows."""
 
 import re
@@ -6,7 +7,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from ufl_beam.decay import damping, damping_ratio, fit_decay, logarithmic_decrement, peaks
+from ufl_beam.analysis.free_decay import (
+    damping,
+    damping_ratio,
+    fit_decay,
+    logarithmic_decrement,
+    peaks,
+)
 from ufl_beam.errors import SceneError
 
 OMEGA = 2 * np.pi

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Words for what fails: what nothing holds, what gives way, why Newton's method stopped."""
 
 import numpy as np
@@ -5,8 +6,8 @@ import pytest
 from scipy.sparse import csc_array, diags_array
 
 import ufl_beam as ub
-from ufl_beam import null_vectors
-from ufl_beam.null_vectors import null_vector
+from ufl_beam.solvers import null_vectors
+from ufl_beam.solvers.null_vectors import null_vector
 
 CODES = ("DIVERGED", "SNES", "dt = 0 s")
 

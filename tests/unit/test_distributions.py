@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Random limits: their moments, and that a seed decides them and nothing else."""
 
 import math
@@ -9,7 +10,7 @@ import pytest
 from scipy import stats
 
 import ufl_beam as ub
-from ufl_beam.grid import Grid, Share
+from ufl_beam.discretization.dof_numbering import Grid, Share
 
 MEAN, DEVIATION, SEED = 250e6, 50e6, 7
 NORMALS = [ub.Normal, ub.TruncatedNormal, ub.Lognormal]

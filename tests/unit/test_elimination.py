@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Elimination along chains of cells against direct solutions of the whole system."""
 
 from itertools import pairwise
@@ -10,8 +11,8 @@ import pytest
 from scipy.sparse import csr_array
 
 import ufl_beam as ub
-from ufl_beam.elimination import Elimination
-from ufl_beam.sparse import Csr
+from ufl_beam.compiled.csr import Csr
+from ufl_beam.solvers.static_condensation import Elimination
 
 SECTION = ub.Section(EA=60.0, GA=40.0, EI=30.0, rhoA=2.0, rhoI=1.0)
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The equation of a step in C against the same terms called by Python."""
 
 from petsc4py import PETSc
@@ -6,8 +7,8 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.loops import lib
-from ufl_beam.supports import Supports
+from ufl_beam.compiled.c_library import lib
+from ufl_beam.terms.supports import Supports
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
 
@@ -47,7 +48,7 @@ def machine():
         joints=[ub.Revolute(crank.end, rod.start), ub.Guided(rod.end, lambda s: (3.0 + s, 0.0))],
         connectors=[
             ub.Turn(crank.end, rod.start, spring),
-            ub.Stretch(ground, rod.end, ub.Function(lambda e, de: 3.0 * e**3 + 0.1 * de)),
+            ub.Stretch(ground, rod.end, ub.ForceLaw(lambda e, de: 3.0 * e**3 + 0.1 * de)),
         ],
         supports=[ub.Pinned(crank.start)],
         loads=[ub.PointLoad(rod.at(0.5), force=(0.0, 10.0))],
@@ -102,7 +103,7 @@ def test_what_python_raises_in_the_middle_arrives():
         raise ZeroDivisionError("of the user")
 
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
-    law = ub.Function(force)
+    law = ub.ForceLaw(force)
     scene = ub.Scene(
         [beam],
         supports=[ub.Clamped(beam.start)],

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What is reported to happen, and when."""
 
 import math
@@ -19,7 +20,7 @@ def run(scene, scheme, *, t=1.0, dt=0.05):
     told = []
     events = ub.Events(tell=told.append)
     ub.simulate(scene, scheme, t=(0, t), dt=dt, record=events)
-    if ub.processes.ours().rank == 0:
+    if ub.parallel.ours().rank == 0:
         assert told == events.found
     return events.found
 

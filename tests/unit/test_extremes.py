@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What a run says where it goes wrong on the way, and that nothing is lost then."""
 
 import math
@@ -62,7 +63,7 @@ def test_error_of_a_users_function_comes_through():
     """Within an iteration PETSc calls it; what it raises is what the user sees."""
 
     def connect(beam):
-        law = ub.Function(lambda e, rate: 1 / 0 if abs(e) > 1e-9 else 0.0)
+        law = ub.ForceLaw(lambda e, rate: 1 / 0 if abs(e) > 1e-9 else 0.0)
         return [ub.Slide(ub.ground(2, 0), beam.end, law, axis=(0, 1))]
 
     with pytest.raises(ZeroDivisionError) as error:
@@ -93,7 +94,7 @@ def test_singular_tangent_is_a_failed_step():
     A force that grows by 4 m/dt² takes from a step of dt what inertia gives it.
     """
     body, dt = ub.Body((1, 0), mass=1.0, inertia=1.0), 2.0**-6
-    law = ub.Function(lambda e, rate: -4.0 / dt**2 * e)
+    law = ub.ForceLaw(lambda e, rate: -4.0 / dt**2 * e)
     scene = ub.Scene(
         bodies=[body],
         connectors=[ub.Slide(ub.ground(0, 0), body.middle, law)],

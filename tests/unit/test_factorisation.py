@@ -1,10 +1,11 @@
+# SPDX-License-Identifier: MIT
 """Factors of indefinite matrices: signs of eigenvalues, solutions, what is singular."""
 
 import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from ufl_beam.factorisation import Factorisation, SingularMatrix
+from ufl_beam.solvers.factorization import Factorisation, SingularMatrix
 
 
 def saddle(seed, motions=12, forces=5):

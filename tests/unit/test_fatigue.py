@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Cycles, S-N curves, extremes and thinned histories: what long runs keep of themselves."""
 
 import csv
@@ -10,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ufl_beam as ub
-from ufl_beam import fatigue
-from ufl_beam.cycles import RainflowCounter
+from ufl_beam.output import fatigue
+from ufl_beam.output.rainflow import RainflowCounter
 
 STEEL = {"E": 210e9, "nu": 0.3, "rho": 7850.0}
 SECTION = ub.Section.rectangle(b=0.1, h=0.2, **STEEL)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Fibres of cross-sections: their sums, their section in a run, and the plastic moment."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What is compiled: one quadrature rule per form, and nothing that the scene does not need."""
 
 import math
@@ -9,11 +10,11 @@ import pytest
 import ufl
 
 import ufl_beam as ub
-from ufl_beam import forms
-from ufl_beam.compat import fem, line_mesh
-from ufl_beam.fields import Fields
-from ufl_beam.grid import Grid, Share
-from ufl_beam.kinematics import strain
+from ufl_beam.discretization import compiled_forms
+from ufl_beam.discretization.dof_numbering import Grid, Share
+from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.dolfinx_compat import fem, line_mesh
+from ufl_beam.mechanics.kinematics import strain
 
 SECTION = ub.Section(EA=60.0, GA=40.0, EI=30.0, rhoA=2.0, rhoI=1.0)
 
@@ -22,13 +23,13 @@ SECTION = ub.Section(EA=60.0, GA=40.0, EI=30.0, rhoA=2.0, rhoI=1.0)
 def compiled(monkeypatch):
     """List that takes every form that is compiled."""
     found = []
-    compile_form = forms.fem.form
+    compile_form = compiled_forms.fem.form
 
     def note(form, *args, **kwargs):
         found.append(form)
         return compile_form(form, *args, **kwargs)
 
-    monkeypatch.setattr(forms.fem, "form", note)
+    monkeypatch.setattr(compiled_forms.fem, "form", note)
     return found
 
 
@@ -190,12 +191,12 @@ def no_points(monkeypatch):
     def refuse(*args, **kwargs):
         raise AssertionError("made for a scene that is elastic")
 
-    monkeypatch.setattr("ufl_beam.points.Points.__init__", refuse)
-    monkeypatch.setattr("ufl_beam.points.PointForms.__init__", refuse)
-    monkeypatch.setattr("ufl_beam.inelastic.InelasticBeams.__init__", refuse)
-    monkeypatch.setattr("ufl_beam.fields.Fields.at_points", refuse)
-    monkeypatch.setattr("ufl_beam.laws.Softening.traction", refuse)
-    monkeypatch.setattr("ufl_beam.laws.Bulk.flow", refuse)
+    monkeypatch.setattr("ufl_beam.terms.material_points.Points.__init__", refuse)
+    monkeypatch.setattr("ufl_beam.terms.material_points.PointForms.__init__", refuse)
+    monkeypatch.setattr("ufl_beam.terms.inelastic_beams.InelasticBeams.__init__", refuse)
+    monkeypatch.setattr("ufl_beam.discretization.function_spaces.Fields.at_points", refuse)
+    monkeypatch.setattr("ufl_beam.model.material_laws.Softening.traction", refuse)
+    monkeypatch.setattr("ufl_beam.model.material_laws.Bulk.flow", refuse)
 
 
 @pytest.mark.parametrize(

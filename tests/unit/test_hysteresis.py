@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Pictures and files of what yields and breaks: the arrays of the solution, with units."""
 
 import numpy as np
@@ -6,7 +7,7 @@ import scenes
 from time_series import read_xdmf
 
 import ufl_beam as ub
-from ufl_beam.view import decimal_prefix, open_hinges, with_unit
+from ufl_beam.plotting.plots import decimal_prefix, open_hinges, with_unit
 
 LIMIT, FRACTURE, YIELD = 10.0, 3.0, 8.0
 """Moments of the hinge and of yielding, N m; fracture energy of the hinge, J."""

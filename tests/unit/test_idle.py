@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Idle motions: nodes without mass between hinges that bear nothing keep their place."""
 
 import math

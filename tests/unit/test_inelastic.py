@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Inelastic cells in a run: steps that fail leave no trace, and only cells that can yield pay."""
 
 import math
@@ -31,7 +32,7 @@ class CutSteps(ub.Simulation):
         super()._require_small(turn)
         if self.fails:
             self.fails -= 1
-            raise ub.solve.StepFailed("on purpose")
+            raise ub.solvers.newton.StepFailed("on purpose")
 
 
 def state(simulation):
@@ -151,7 +152,7 @@ def test_hinges_of_a_beam_come_before_those_of_its_section():
     assert at == [
         (0, 0.0, law), (0, 1.0, law), (1, 0.0, law), (1, 1.0, other), (2, 1.0, law), (2, 0.5, other)
     ]  # fmt: skip
-    grid = ub.simulation.Grid(scene)
+    grid = ub.simulation.simulation.Grid(scene)
     assert all(grid.hinges(beam) == [law] * 4 for beam in beams)
 
 

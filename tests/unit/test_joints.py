@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Bodies, joints and connectors: what is refused, what is shared, what solutions say."""
 
 import math
@@ -55,7 +56,7 @@ BAD = {
     "motor": (lambda: ub.Motor(1.0), "Motor: time = 1.0 must be a function of t"),
     "actuator": (lambda: ub.Actuator(lambda t: math.nan), "Actuator: the time function is nan"),
     "controller": (lambda: ub.Controller(1.0), "Controller: force = 1.0 must be a function"),
-    "function": (lambda: ub.Function(1.0), "Function: force = 1.0 must be a function"),
+    "function": (lambda: ub.ForceLaw(1.0), "ForceLaw: force = 1.0 must be a function"),
     "release": (lambda: ub.Release(PLACE, body(1.0).middle, free="X"), "letters of 'NVM'"),
     "no release": (lambda: ub.Release(PLACE, body(1.0).middle, free=""), "letters of 'NVM'"),
     "guide": (

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Strains and their algorithmic variation, at random states of cells in random directions."""
 
 import math
@@ -8,9 +9,9 @@ import pytest
 import ufl
 
 import ufl_beam as ub
-from ufl_beam import kinematics
-from ufl_beam.compat import fem, line_mesh
-from ufl_beam.kinematics import Axis
+from ufl_beam.dolfinx_compat import fem, line_mesh
+from ufl_beam.mechanics import kinematics
+from ufl_beam.mechanics.kinematics import Axis
 
 CELLS = 20
 

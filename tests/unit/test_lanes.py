@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Kernels for several cells at once against the same kernels cell by cell."""
 
 from copy import copy
@@ -7,10 +8,10 @@ import pytest
 import ufl
 
 import ufl_beam as ub
-from ufl_beam import lanes
-from ufl_beam.compat import cell_coordinates, fem, line_mesh
-from ufl_beam.forms import Kernel, in_batches, vectorise
-from ufl_beam.loops import ffi
+from ufl_beam.compiled import simd_kernels
+from ufl_beam.compiled.c_library import ffi
+from ufl_beam.discretization.compiled_forms import Kernel, in_batches, vectorise
+from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
 
@@ -31,7 +32,7 @@ def pointwise(expression, values):
 
 def in_lanes(kernel):
     """Let it compute several cells at once, if it can."""
-    vectorise([kernel], in_batches(kernel._coordinates[:, :, 0], lanes.LANES))
+    vectorise([kernel], in_batches(kernel._coordinates[:, :, 0], simd_kernels.LANES))
 
 
 def both(expression, values):
@@ -108,8 +109,8 @@ def test_what_vectors_cannot_is_computed_cell_by_cell(expression, meant):
 
 def test_without_the_text_of_the_kernel(tmp_path):
     """The cache may have lost it."""
-    with pytest.raises(lanes.NotInVectors, match=r"gone\.c has no kernel"):
-        lanes.written(tmp_path / "gone.c")
+    with pytest.raises(simd_kernels.NotInVectors, match=r"gone\.c has no kernel"):
+        simd_kernels.written(tmp_path / "gone.c")
 
 
 # -- the kernels of the hot loop ---------------------------------------------------------------

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Laws of one point: flow in closed form, its limits, and tractions with their exact means."""
 
 import math
@@ -8,7 +9,7 @@ import pytest
 from scipy.integrate import quad
 
 import ufl_beam as ub
-from ufl_beam.laws import Bulk, Layout, positive, sign
+from ufl_beam.model.material_laws import Bulk, Layout, positive, sign
 
 C, LIMIT, H, B, ETA = 200.0, 3.0, 20.0, 10.0, 0.5
 """Numbers of a test material: yields at a strain of 0.015."""

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The package as text: who imports what, equations stated once, one version, documented names."""
 
 import ast
@@ -15,77 +16,53 @@ import ufl_beam as ub
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "ufl_beam"
-MODULES = sorted(path.stem for path in PACKAGE.glob("*.py"))
+FILES = {
+    ".".join(path.relative_to(PACKAGE).with_suffix("").parts): path
+    for path in sorted(PACKAGE.rglob("*.py"))
+    if path.name != "__init__.py"
+}
+"""Files of the modules of the package, by names such as ``model.beams``."""
 
-RECORDS = [
-    "axis_curves",
-    "beams",
-    "bodies",
-    "connectors",
-    "curves",
-    "discretisation",
-    "distributions",
-    "errors",
-    "fibres",
-    "laws",
-    "loads",
-    "numeric",
-    "plastic_hinges",
-    "scene",
-    "sections",
-    "viscous",
+ROOMS = [
+    *("", "model", "compiled", "mechanics", "discretization", "terms", "solvers"),
+    *("output", "simulation", "analysis", "plotting"),
 ]
-"""What users say; it must be readable and usable without any of the machinery."""
+"""Subpackages from the ground up; a module imports from its own room and from those before it.
 
-PICTURES = [
-    "captions",
-    "diagrams",
-    "envelopes",
-    "hysteresis",
-    "load_symbols",
-    "mode_pictures",
-    "model_pictures",
-    "model_symbols",
-    "pictures",
-    "render",
-    "view",
-    "work_precision",
-]
+The first one is the ground: modules that stand beside the rooms.
+"""
 
 MACHINERY = {"basix", "cffi", "dolfinx", "ffcx", "mpi4py", "petsc4py", "ufl"}
 
+PETSC = {"compiled", "solvers", "dolfinx_compat"}
+"""Where PETSc is used; `dolfinx_compat` explains what is not installed."""
 
-def is_type_checking(node):
-    return isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING")
+
+def room(module):
+    """The room of a module, empty for those on the ground."""
+    return module.rpartition(".")[0]
 
 
 @cache
 def imports(module):
-    """Names of the modules that a module of the package imports, anywhere but for type checkers."""
+    """Names that a module imports anywhere, also for type checkers."""
     found = set()
-
-    def visit(node):
-        for child in ast.iter_child_nodes(node):
-            if is_type_checking(child):
-                continue
-            if isinstance(child, ast.Import):
-                found.update(alias.name for alias in child.names)
-            elif isinstance(child, ast.ImportFrom):
-                assert child.level == 0, f"{module}: relative import"
-                if child.module == "ufl_beam":
-                    found.update(f"ufl_beam.{alias.name}" for alias in child.names)
-                else:
-                    found.add(child.module)
-            visit(child)
-
-    visit(ast.parse((PACKAGE / f"{module}.py").read_text(encoding="utf-8")))
+    for node in ast.walk(ast.parse(FILES[module].read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{module}: relative import"
+            inside = node.module.removeprefix("ufl_beam").removeprefix(".") in {*ROOMS}
+            if node.module.split(".")[0] == "ufl_beam" and inside:
+                found.update(f"{node.module}.{alias.name}" for alias in node.names)
+            else:
+                found.add(node.module)
     return found
 
 
 def siblings(module):
     """Modules of the package that a module imports."""
-    inside = {name.split(".")[1] for name in imports(module) if name.startswith("ufl_beam.")}
-    return inside & set(MODULES)
+    return {n.removeprefix("ufl_beam.") for n in imports(module) if n.startswith("ufl_beam.")}
 
 
 def outside(module):
@@ -108,64 +85,61 @@ def reach(module):
 
 def test_the_text_is_read():
     # So that the tests below are about something
-    assert {"compat", "kinematics", "scene", "simulation"} <= set(MODULES)
-    assert "dolfinx" in outside("compat")
-    assert "beams" in siblings("scene")
+    assert {"mechanics.kinematics", "model.scene", "simulation.simulation"} <= {*FILES}
+    assert "dolfinx" in outside("dolfinx_compat")
+    assert "model.beams" in siblings("model.scene")
+    assert {room(module) for module in FILES} == {*ROOMS}
 
 
-@pytest.mark.parametrize("module", [m for m in MODULES if m != "compat"])
-def test_only_compat_imports_dolfinx(module):
+@pytest.mark.parametrize("module", FILES)
+def test_imports_point_down(module):
+    """From room to room, with no exemption for imports of type checkers."""
+    known = siblings(module)
+    assert known <= {*FILES}
+    above = ROOMS[ROOMS.index(room(module)) + 1 :]
+    assert [other for other in known if room(other) in above] == []
+
+
+def test_imports_have_no_cycles():
+    for module in FILES:
+        assert module not in set().union(*(reach(m) for m in siblings(module))), module
+
+
+@pytest.mark.parametrize("module", [m for m in FILES if m != "dolfinx_compat"])
+def test_only_dolfinx_compat_imports_dolfinx(module):
     assert "dolfinx" not in outside(module)
 
 
-@pytest.mark.parametrize("module", [m for m in MODULES if m != "compat"])
-def test_only_compat_asks_for_versions(module):
+@pytest.mark.parametrize("module", [m for m in FILES if m != "dolfinx_compat"])
+def test_only_dolfinx_compat_asks_for_versions(module):
     names = {
         node.id
-        for node in ast.walk(ast.parse((PACKAGE / f"{module}.py").read_text(encoding="utf-8")))
+        for node in ast.walk(ast.parse(FILES[module].read_text(encoding="utf-8")))
         if isinstance(node, ast.Name)
     }
     assert "VERSION" not in names
 
 
 def test_kinematics_imports_ufl_alone():
-    assert outside("kinematics") - sys.stdlib_module_names == {"ufl"}
-    assert siblings("kinematics") == set()
+    assert outside("mechanics.kinematics") - sys.stdlib_module_names == {"ufl"}
+    assert siblings("mechanics.kinematics") == set()
 
 
-@pytest.mark.parametrize("module", RECORDS)
-def test_records_need_no_machinery(module):
+@pytest.mark.parametrize("module", [m for m in FILES if room(m) == "model"])
+def test_the_model_needs_no_machinery(module):
     """Directly, or through other modules of the package."""
-    assert reach(module) <= set(RECORDS)
     for one in reach(module):
         assert not outside(one) & MACHINERY, one
 
 
-PETSC = {
-    *{"compat", "eigen", "equation", "factorisation", "factors"},
-    *{"line_search", "native", "solve", "sparse"},
-}
+def test_only_what_compiles_and_solves_imports_petsc():
+    for module in FILES:
+        assert "petsc4py" not in outside(module) or {module, room(module)} & PETSC, module
 
 
-def test_only_what_solves_imports_petsc():
-    """And `compat`, which explains what is not installed."""
-    assert {m for m in MODULES if "petsc4py" in outside(m)} <= PETSC
-
-
-@pytest.mark.parametrize("module", MODULES)
+@pytest.mark.parametrize("module", [m for m in FILES if room(m) != "plotting"])
 def test_pictures_are_at_the_end(module):
-    """Nothing but the package itself imports the modules of pictures."""
-    if module not in {"__init__", *PICTURES}:
-        assert not siblings(module) & set(PICTURES)
-        assert not outside(module) & {"matplotlib", "pyvista", "imageio"}
-    if module != "__init__":
-        assert not siblings(module) & {"envelopes", "hysteresis", "mode_pictures", "work_precision"}
-
-
-def test_imports_have_no_cycles():
-    for module in MODULES:
-        if module != "__init__":
-            assert module not in set().union(*(reach(m) for m in siblings(module))), module
+    assert not outside(module) & {"matplotlib", "pyvista", "imageio"}
 
 
 # -- equations ---------------------------------------------------------------------------------
@@ -179,7 +153,7 @@ def tags(path):
             yield from re.findall(r"\bP\((\d+)\)(!?)", token.string)
 
 
-TAGS = [(int(n), mark == "!") for m in MODULES for n, mark in tags(PACKAGE / f"{m}.py")]
+TAGS = [(int(n), mark == "!") for path in FILES.values() for n, mark in tags(path)]
 
 
 def test_each_equation_is_stated_once():
@@ -223,9 +197,9 @@ def test_public_names():
         assert thing.__module__.startswith("ufl_beam."), name
 
 
-@pytest.mark.parametrize("module", MODULES)
+@pytest.mark.parametrize("module", FILES)
 def test_what_is_public_has_a_docstring(module):
-    tree = ast.parse((PACKAGE / f"{module}.py").read_text(encoding="utf-8"))
+    tree = ast.parse(FILES[module].read_text(encoding="utf-8"))
     assert ast.get_docstring(tree), module
     missing = []
 
@@ -239,6 +213,25 @@ def test_what_is_public_has_a_docstring(module):
 
     visit(tree, module)
     assert missing == []
+
+
+SOURCES = [
+    path
+    for folder in ("ufl_beam", "tests", "demos", "benchmarks")
+    for path in sorted((ROOT / folder).rglob("*"))
+    if path.suffix in {".py", ".c", ".h"} and "output" not in path.parts
+]
+
+
+def test_sources_state_their_licence():
+    """In the first line; demos, whose first cell is text, in that of their first cell of code."""
+    licence = "SPDX-License-Identifier: MIT"
+    for path in SOURCES:
+        text = path.read_text(encoding="utf-8")
+        if text.startswith("# %% [markdown]"):
+            text = text.partition("\n# %%\n")[2]
+        first = text.partition("\n")[0]
+        assert first in (f"# {licence}", f"/* {licence} */"), path
 
 
 @pytest.mark.serial

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The ledger: its arithmetic, and that it closes in every scheme, at every step size."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Time functions, and that loads do what they say: by the reactions that balance them."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A long run needs no more memory than a short one."""
 
 import gc
@@ -10,10 +11,10 @@ import pytest
 from scenes import swing
 
 import ufl_beam as ub
-from ufl_beam import native
+from ufl_beam.compiled import jit
 
 unsanitized = pytest.mark.skipif(
-    bool(native.EXTRA), reason="the address sanitizer keeps what is freed for a while"
+    bool(jit.EXTRA), reason="the address sanitizer keeps what is freed for a while"
 )
 
 MEBIBYTE = 2**20

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The dials of a mesh: places remain vertices, and what asks a solution takes any mesh."""
 
 import math
@@ -12,9 +13,9 @@ import pytest
 from scipy.sparse import csr_array
 
 import ufl_beam as ub
-from ufl_beam.fields import Fields
-from ufl_beam.grid import Grid, Share
-from ufl_beam.terms import mass_matrix
+from ufl_beam.discretization.dof_numbering import Grid, Share
+from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.terms.beams import mass_matrix
 
 STEEL = ub.Section(EA=1e6, GA=4e5, EI=1e3, rhoA=2.0, rhoI=1e-3)  # N, N, N m2, kg/m, kg m
 
@@ -180,7 +181,7 @@ def test_modes_and_buckling():
     assert ub.modes(scene, 1, at=state).grid.mesh == mesh
     with pytest.raises(ub.SceneError, match="modes: at is a solution of other beams, joints or"):
         ub.modes(scene, 1, at=state, mesh=ub.Mesh())
-    path = ub.follow(scene, ub.Load(0.5), steps=2, mesh=mesh)
+    path = ub.follow(scene, ub.LoadControl(0.5), steps=2, mesh=mesh)
     assert len(path.section_forces(beam)) == 32
 
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Pictures of models before any run: what is in them, labels that stand clear, errors."""
 
 import dataclasses
@@ -9,8 +10,8 @@ import scenes
 from matplotlib.collections import LineCollection, PolyCollection
 
 import ufl_beam as ub
-from ufl_beam.glyphs import GREEN, RED
-from ufl_beam.labels import Label, Spot, areas_covered, crossings, lengths_inside, place
+from ufl_beam.plotting.connector_glyphs import GREEN, RED
+from ufl_beam.plotting.labels import Label, Spot, areas_covered, crossings, lengths_inside, place
 
 STEEL = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
 
@@ -52,7 +53,7 @@ LAWS = {
     "motor": ub.Motor(lambda t: t),
     "actuator": ub.Actuator(lambda t: t),
     "controller": ub.Controller(lambda simulation: 0.0),
-    "function": ub.Function(lambda motion, rate: motion),
+    "function": ub.ForceLaw(lambda motion, rate: motion),
     "rigid-plastic": ub.RigidPlastic(ub.Softening(1e3, 10.0)),
 }
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Scenes that are likely wrong are warned of, by name, on the line of the user; others are not."""
 
 import math
@@ -109,7 +110,7 @@ def test_massless_parts_whose_motion_is_not_determined(hold, moves):
             }
             for law in (
                 ub.Spring(1.0), ub.Damper(1.0), ub.Motor(lambda t: t), ub.Coulomb(1.0),
-                ub.Function(lambda e, rate: e), ub.Stop(1.0, low=0.0),
+                ub.ForceLaw(lambda e, rate: e), ub.Stop(1.0, low=0.0),
             )
         ),
     ],
@@ -225,18 +226,18 @@ def test_beams_that_cross_or_are_apart():
 
 def test_touching_places_of_large_scenes_are_found_fast():
     """20 000 beams in a row, one joint forgotten: 0.3 s on a desk, beside seconds for the scene."""
-    from ufl_beam.grid import Grid
-    from ufl_beam.plausibility import warn_of_touching
+    from ufl_beam.discretization.dof_numbering import Grid
+    from ufl_beam.discretization.model_warnings import warn_of_touching
 
     number, forgotten = 20_000, 12_345
     row = [beam((i, 0), (i + 1, 0), name=f"b{i}", cells=1) for i in range(number)]
     pairs = [pair for i, pair in enumerate(pairwise(row)) if i != forgotten]
     grid = Grid(ub.Scene(row, joints=[ub.Rigid(x.end, y.start) for x, y in pairs]))
-    began = time.perf_counter()
+    began = time.process_time()
     with warns("b12345.end (12346, 0) and b12346.start (12346, 0) touch"):
         warn_of_touching(grid)
-    # The tenfold of what is expected, for machines that are busy
-    assert time.perf_counter() - began < 3.0
+    # The tenfold of what is expected, for slow machines; others on the same core do not count
+    assert time.process_time() - began < 3.0
 
 
 # -- the same thing twice ------------------------------------------------------------------------

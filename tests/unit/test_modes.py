@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Modes and buckling: what is asked of them, and that it does not matter how."""
 
 import math
@@ -9,7 +10,7 @@ import pytest
 from time_series import read_vtkhdf, read_xdmf
 
 import ufl_beam as ub
-from ufl_beam.linearised import AT_REST, SmallMotions
+from ufl_beam.analysis.linearization import AT_REST, SmallMotions
 
 SECTION = ub.Section(EA=1e4, GA=4e3, EI=20.0, rhoA=0.5, rhoI=1e-3)
 
@@ -296,8 +297,8 @@ def mixed():
         ],
         connectors=[
             ub.Turn(b.end, c.start, ub.Spring(7.0)),
-            ub.Stretch(b.end, d.end, ub.Function(lambda x, v: 5 * x + 30 * x**2 + 20 * x**3)),
-            ub.Turn(body.middle, d.end, ub.Function(lambda x, v: 5 * x + 3 * x**2)),
+            ub.Stretch(b.end, d.end, ub.ForceLaw(lambda x, v: 5 * x + 30 * x**2 + 20 * x**3)),
+            ub.Turn(body.middle, d.end, ub.ForceLaw(lambda x, v: 5 * x + 3 * x**2)),
             ub.Turn(ub.ground(1, 2.7), body.middle, ub.Spring(3.0)),
             ub.Stretch(a.at(0.5), d.start, ub.Spring(11.0)),
         ],

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """C of the package: no warnings, and sanitizers that see what they are to see."""
 
 import os
@@ -6,7 +7,7 @@ import sys
 
 import pytest
 
-from ufl_beam import loops, native
+from ufl_beam.compiled import c_library, jit
 
 pytestmark = pytest.mark.serial  # nothing here depends on the number of processes
 
@@ -47,14 +48,14 @@ def lanes_source():
     """The loop of lanes.c with a kernel that asks for every function of lanes.h."""
     sizes = {"LANES": 4, "ENTRIES": 1, "WIDTH": 1, "CONSTANTS": 1}
     defined = [f"#define {name} {size}" for name, size in sizes.items()]
-    head = [native.HEADERS, native.DECLARATIONS, *defined, native.text("lanes.h")]
+    head = [jit.HEADERS, jit.DECLARATIONS, *defined, jit.text("lanes.h")]
     # The only function that other files call is declared in no header: cffi reads it as text.
-    return "\n".join([*head, KERNEL, "void *in_lanes(void);", native.text("lanes.c")])
+    return "\n".join([*head, KERNEL, "void *in_lanes(void);", jit.text("lanes.c")])
 
 
 @pytest.mark.parametrize(
     ("source", "flags"),
-    [(lambda: loops._SOURCE, ["-O3"]), (lanes_source, ["-O2", "-march=native"])],
+    [(lambda: c_library._SOURCE, ["-O3"]), (lanes_source, ["-O2", "-march=native"])],
     ids=["loops", "lanes"],
 )
 def test_no_warnings(tmp_path, source, flags):
@@ -86,7 +87,7 @@ def test_sanitizers_report(tmp_path, fault, report):
         f'{fault} printf("%g\\n", y); return 0; }}\n'
     )
     # As Python's own flags do, which come before those of the package.
-    built = gcc("-w", "-fwrapv", *native.SANITIZERS, str(source), "-o", str(program))
+    built = gcc("-w", "-fwrapv", *jit.SANITIZERS, str(source), "-o", str(program))
     if "cannot find" in built.stderr:
         pytest.skip("gcc is there without libasan and libubsan")
     assert built.returncode == 0, built.stderr
@@ -99,14 +100,14 @@ def test_sanitizers_report(tmp_path, fault, report):
     assert report in ran.stderr
 
 
-@pytest.mark.skipif(not native.EXTRA, reason="for `make sanitize`")
+@pytest.mark.skipif(not jit.EXTRA, reason="for `make sanitize`")
 def test_this_run_is_sanitized():
     """A library that is compiled and loaded as those of the package ends this kind of run."""
     program = """if True:
         import numpy as np
-        from ufl_beam import native
+        from ufl_beam.compiled import jit
         source = "double get(const double *x, int n) { return x[n]; }"
-        m = native.compiled(
+        m = jit.compiled(
             "sanitizer_probe", "double get(const double *x, int n);", lambda: source,
             made_of=[source], flags=["-O3"],
         )

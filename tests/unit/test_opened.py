@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Reports on cells that opened: how far the place of a hinge shifts its limit, openings in a jump.
 
 The beam has no moment at its ends, so its hinge opens in a cell of the span: next to the push at a
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.opened import _fall
+from ufl_beam.simulation.opened_hinges import _fall
 
 LENGTH, EI, LIMIT = 2.0, 1000.0, 10.0  # m, N m², N m
 LONGER = 0.75 * LENGTH
@@ -180,5 +181,5 @@ def test_paths_warn_too():
     """At the end of :func:`follow`."""
     beam, scene = pushed(ub.Softening(LIMIT, 100.0))
     with pytest.warns(ub.ModelWarning, match="girder: the hinge of the section"):
-        path = ub.follow(scene, ub.Displacement(beam.at(0.5), "v", 2e-4), steps=30)
+        path = ub.follow(scene, ub.DisplacementControl(beam.at(0.5), "v", 2e-4), steps=30)
     assert beam in path.hinge_place_error()

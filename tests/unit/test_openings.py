@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The rule that chooses between two solutions: closed places stay closed while they can bear it.
 
 The beams have no moment at their ends, so hinges of the section open in cells of the span.
@@ -10,8 +11,8 @@ import pytest
 
 import ufl_beam as ub
 from ufl_beam.errors import StepFailed
-from ufl_beam.openings import Openings
-from ufl_beam.points import OVER, Course
+from ufl_beam.terms.material_points import OVER, Course
+from ufl_beam.terms.openings import Openings
 
 LENGTH, EI, STIFF = 2.0, 1000.0, 1e6  # m, N m², N
 LAWS = [ub.Softening, ub.LinearSoftening]
@@ -148,13 +149,13 @@ def test_only_what_must_open_does():
 @pytest.mark.parametrize("law", [None, ub.Softening(FOREVER, FOREVER), ub.Softening(10.0, 1e-3)])
 def test_only_steps_in_which_something_opens_are_solved_again(law, monkeypatch):
     """Steps without an opening are solved once, with hinges and without."""
-    solved, solve = [], ub.solve.Solver.solve
+    solved, solve = [], ub.solvers.newton.Solver.solve
 
     def counted(self, *args, **keywords):
         solved.append(self)
         return solve(self, *args, **keywords)
 
-    monkeypatch.setattr(ub.solve.Solver, "solve", counted)
+    monkeypatch.setattr(ub.solvers.newton.Solver, "solve", counted)
     beam, scene = pushed(law)
     solution = run(scene, ub.Midpoint(), 0.01)
     once = solution.parts

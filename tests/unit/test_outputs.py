@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Files of runs: no two outputs share one, errors name them, and kills leave complete steps."""
 
 import errno
@@ -17,11 +18,11 @@ import pytest
 from time_series import read_vtkhdf, read_xdmf
 
 import ufl_beam as ub
-from ufl_beam import outputs
-from ufl_beam.checkpoint import read
-from ufl_beam.outputs import OutputFile
-from ufl_beam.vtkhdf import VtkhdfWriter
-from ufl_beam.xdmf import PAGE, XdmfWriter
+from ufl_beam.output import output_files
+from ufl_beam.output.output_files import OutputFile
+from ufl_beam.output.vtkhdf import VtkhdfWriter
+from ufl_beam.output.xdmf import PAGE, XdmfWriter
+from ufl_beam.simulation.checkpoint import read
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=0.1)
 
@@ -102,7 +103,7 @@ def test_the_same_recorder_twice(shared_path):
     with pytest.raises(ub.SceneError, match=r"record\[0\] and record\[2\] are the same History"):
         run(table, ub.Events(), table)
     with pytest.raises(ub.SceneError, match=r"follow: record\[0\] and record\[1\] are the same"):
-        ub.follow(scene(), ub.Load(0.5), record=[table, table])
+        ub.follow(scene(), ub.LoadControl(0.5), record=[table, table])
 
 
 @pytest.mark.parametrize(
@@ -144,7 +145,7 @@ def test_the_file_of_a_study_is_not_that_of_a_member(shared_path):
     with pytest.raises(RuntimeError, match=r"study and record\[0\] \(History\) would both write"):
         ub.study(member, [{"x": 1.0}, {"x": 2.0}], path=path, progress=False)
     # Afterwards it is free again
-    assert not outputs._in_use
+    assert not output_files._in_use
     run(ub.History(path), steps=1)
 
 
@@ -348,7 +349,7 @@ class Torn:
 
     def __init__(self, monkeypatch, n, pages, error):
         self.n, self.pages, self.error, self.write = n, pages, error, os.pwrite
-        monkeypatch.setattr(outputs.os, "pwrite", self)
+        monkeypatch.setattr(output_files.os, "pwrite", self)
 
     def __call__(self, file, data, at):
         if self.n == 0:
@@ -370,7 +371,7 @@ def test_xdmf_is_complete_whenever_a_kill_comes(tmp_path, monkeypatch):
     What a kill leaves is read, then gone on with from five steps before.
     """
     path, first = tmp_path / "a.xdmf", 20
-    monkeypatch.setattr("ufl_beam.xdmf.ROOM", 2 * PAGE)
+    monkeypatch.setattr("ufl_beam.output.xdmf.ROOM", 2 * PAGE)
     writer = writer_of(path)
     kept = []
     for n in range(first):

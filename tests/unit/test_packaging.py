@@ -1,9 +1,13 @@
-"""The package as it is shipped: what an import without DOLFINx says, and what an sdist contains."""
+# SPDX-License-Identifier: MIT
+"""The package as it is shipped: imports without DOLFINx, sdist and wheel, and runs from them."""
 
+import os
+import re
 import shutil
 import subprocess
 import sys
 import tarfile
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -33,26 +37,119 @@ def test_an_import_without_dolfinx_says_what_is_needed(missing):
     assert "docs/installation.md" in last
 
 
-@pytest.mark.serial
-def test_an_sdist_has_documentation_and_demos(tmp_path):
-    """Built from a copy, because setuptools leaves its notes beside the sources."""
-    backend = pytest.importorskip("setuptools", minversion="77").__name__
-    source = tmp_path / "source"
+def command(*arguments, **more):
+    """Run Python; its output. What it says if it fails is the message."""
+    ran = subprocess.run(
+        [sys.executable, *map(str, arguments)], capture_output=True, text=True, timeout=300, **more
+    )
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    return ran.stdout
+
+
+def pip(verb, *arguments):
+    """Run pip without a network."""
+    command("-m", "pip", verb, "--no-deps", "--no-index", *arguments)
+
+
+def wheel_of(source, folder):
+    """Build a wheel with what is installed."""
+    pip("wheel", "--no-build-isolation", "--wheel-dir", folder, source)
+    (wheel,) = folder.glob("ufl_beam-*.whl")
+    return wheel
+
+
+@pytest.fixture(scope="module")
+def copied(tmp_path_factory):
+    """A copy of the project, because setuptools leaves its notes beside the sources."""
+    pytest.importorskip("setuptools", minversion="77")
+    source = tmp_path_factory.mktemp("packaging") / "source"
     source.mkdir()
-    unwanted = shutil.ignore_patterns("__pycache__", "output", "*.egg-info")
+    unwanted = shutil.ignore_patterns("__pycache__", "*.egg-info")
     for name in SHIPPED:
         shutil.copytree(ROOT / name, source / name, ignore=unwanted)
     for file in ROOT.iterdir():
         if file.is_file() and not file.name.startswith("."):
             shutil.copy(file, source)
-    build = f"import {backend}.build_meta as b; b.build_sdist('dist')"
-    ran = subprocess.run([sys.executable, "-c", build], capture_output=True, text=True, cwd=source)
-    assert ran.returncode == 0, ran.stderr
-    (archive,) = (source / "dist").glob("*.tar.gz")
-    with tarfile.open(archive) as tar:
+    return source
+
+
+@pytest.fixture(scope="module")
+def sdist(copied):
+    """The archive of the sources."""
+    command("-c", "from setuptools import build_meta; build_meta.build_sdist('dist')", cwd=copied)
+    (archive,) = (copied / "dist").glob("*.tar.gz")
+    return archive
+
+
+@pytest.fixture(scope="module")
+def wheel(sdist, tmp_path_factory):
+    """The wheel that is built from the sdist alone."""
+    pytest.importorskip("pip")
+    return wheel_of(sdist, tmp_path_factory.mktemp("wheel"))
+
+
+@pytest.mark.serial
+def test_an_sdist_has_documentation_and_demos(copied, sdist):
+    with tarfile.open(sdist) as tar:
         inside = {name.partition("/")[2] for name in tar.getnames()}
     for name in SHIPPED:
-        for file in (source / name).rglob("*.*"):
+        for file in (copied / name).rglob("*.*"):
             if file.is_file():
-                assert str(file.relative_to(source)) in inside
+                assert str(file.relative_to(copied)) in inside
     assert {"env", "Makefile", "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md"} <= inside
+
+
+@pytest.mark.serial
+def test_a_wheel_has_the_package_its_c_and_the_licence(copied, wheel):
+    """All files of the package, nothing else; the same from the checkout as from the sdist."""
+    with zipfile.ZipFile(wheel) as file:
+        inside = {name for name in file.namelist() if ".dist-info/" not in name}
+        (metadata,) = (n for n in file.namelist() if n.endswith(".dist-info/METADATA"))
+        said = file.read(metadata).decode()
+    package = ROOT / "ufl_beam"
+    known = {
+        str(path.relative_to(ROOT))
+        for path in package.rglob("*")
+        if path.suffix in {".py", ".c", ".h", ".typed"}
+    }
+    assert any(name.endswith(".h") for name in known)
+    assert inside == known
+    assert re.search("^License-Expression: MIT$", said, re.MULTILINE)
+    assert re.search("^License-File: LICENSE$", said, re.MULTILINE)
+    with zipfile.ZipFile(wheel_of(copied, copied / "wheels")) as file:
+        assert {name for name in file.namelist() if ".dist-info/" not in name} == inside
+
+
+INSTALLED = """
+import sys
+import ufl_beam as ub
+beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e4, GA=1e4, EI=1.0, rhoA=1.0, rhoI=1e-3), cells=2)
+load = ub.PointLoad(beam.end, force=(0.0, 0.1))
+scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+solution = ub.simulate(scene, ub.Midpoint(), t=(0.0, 0.1), dt=0.01, progress=False)
+assert solution.energy.worst < 1e-9  # the ledger closes
+print(ub.__file__, ub.__version__, sep="\\n")
+"""
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("compiles", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_an_installed_wheel_runs_outside_of_the_checkout(wheel, tmp_path, compiles):
+    """Its C is read in any case, and compiled where the cache is empty."""
+    site, cache = tmp_path / "site", tmp_path / "cache"
+    pip("install", "--target", site, wheel)
+    rest = [p for p in os.environ.get("PYTHONPATH", "").split(os.pathsep) if p and Path(p) != ROOT]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(site), *rest])}
+    if compiles:
+        environment["XDG_CACHE_HOME"] = str(cache)
+    printed = command("-c", INSTALLED, cwd=tmp_path, env=environment).split()
+    assert printed == [str(site / "ufl_beam" / "__init__.py"), wheel.name.split("-")[1]]
+    assert bool(list(cache.rglob("*.so"))) == compiles
+
+
+def test_pre_commit_has_the_ruff_of_make_check():
+    """`required-version` is what the Makefile installs."""
+    (required,) = re.findall(
+        r'^required-version = "(.*?)"', (ROOT / "pyproject.toml").read_text(), re.MULTILINE
+    )
+    assert f'["ruff{required}"]' in (ROOT / ".pre-commit-config.yaml").read_text()

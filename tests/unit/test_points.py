@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Material points: laws fulfilled after a step, tangents, energies, and openings of any size."""
 
 import math
@@ -6,8 +7,8 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.laws import Layout
-from ufl_beam.points import INPUTS, Points
+from ufl_beam.model.material_laws import Layout
+from ufl_beam.terms.material_points import INPUTS, Points
 
 C, LENGTH = 200.0, 0.5
 NONE = ub.Hardening(math.inf)

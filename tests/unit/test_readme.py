@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The script of README.md runs as printed, and its ledger closes."""
 
 import re

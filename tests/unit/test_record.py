@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Files of a run: their contents are the solution, on any number of ranks."""
 
 import csv
@@ -98,7 +99,7 @@ def test_statics_have_no_velocity(series):
 
 def test_paths_are_written_by_load_factor(series):
     make, read = series
-    path = ub.follow(scene(), ub.Load(0.25), steps=3, record=make())
+    path = ub.follow(scene(), ub.LoadControl(0.25), steps=3, record=make())
     found = read()
     assert found.times == list(path.factor)
     assert (found.of("rotation")[-1] == path.q[-1][path.grid.dofs[:, 2]]).all()

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Relative motions: values, variations that are increments, rigid motions; tangents of all laws."""
 
 import math
@@ -9,7 +10,8 @@ import pytest
 from test_tangent import Probe
 
 import ufl_beam as ub
-from ufl_beam.connectors import HELD, Connector
+from ufl_beam.model.connector_laws import HELD
+from ufl_beam.model.connectors import Connector
 
 SCHEMES = [ub.Midpoint(), ub.Midpoint(0.1, 0.1), ub.ExactStatic(0.5), ub.Static()]
 EXACT = SCHEMES[:3]
@@ -166,7 +168,7 @@ LAWS = {
     "breaking": ub.Spring(20.0, softening=ub.Softening(limit=1.0, energy=5.0)),
     "damper": ub.Damper(3.0),
     "stop": ub.Stop(30.0, low=-0.05, high=0.05),
-    "function": ub.Function(lambda e, rate: 5 * e + e**3 + 0.3 * rate),
+    "function": ub.ForceLaw(lambda e, rate: 5 * e + e**3 + 0.3 * rate),
     "friction": ub.Coulomb(0.7),
 }
 

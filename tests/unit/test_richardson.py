@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Orders, limits, errors, costs and fronts of manufactured runs, whose answers are known."""
 
 import math
@@ -5,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from ufl_beam.richardson import SURE, UNSURE, Convergence, Cost, Cross, pareto
+from ufl_beam.analysis.richardson import SURE, UNSURE, Convergence, Cost, Cross, pareto
 
 SHAPE = np.array([1.0, -2.0, 0.5])
 """Of the error of an array; its largest entry is 2."""

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Solutions in files: what was computed is there again, to the last bit, with its scene."""
 
 import copy
@@ -17,8 +18,8 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.connectors import HELD
-from ufl_beam.saved_scene import RECORDS, from_data, to_data
+from ufl_beam.model.connector_laws import HELD
+from ufl_beam.output.saved_scene import RECORDS, from_data, to_data
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "properties"))
 from restarted import bend, machine
@@ -167,7 +168,7 @@ def test_a_path_with_its_critical_points(shared_path):
         supports=[ub.Clamped(beam.start)],
         loads=[ub.PointLoad(beam.end, force=(0, -1), time=lambda t: t)],
     )
-    path = ub.follow(scene, ub.Load(0.5), steps=8)
+    path = ub.follow(scene, ub.LoadControl(0.5), steps=8)
     loaded = saved(path, shared_path)
     require_same(loaded, path)
     assert same(loaded.factor, path.factor)
@@ -249,7 +250,7 @@ def test_functions_are_known_at_the_times_that_were_kept(shared_path):
 def test_controllers_are_not_saved(shared_path):
     base = cantilever()
     turn = ub.Turn(ub.ground(0, 0), base.beams[0].end, ub.Controller(lambda now: 0.1 * now.t))
-    spring = ub.Turn(ub.ground(0, 0), base.beams[0].end, ub.Function(lambda e, rate: 2 * e))
+    spring = ub.Turn(ub.ground(0, 0), base.beams[0].end, ub.ForceLaw(lambda e, rate: 2 * e))
     scene = ub.Scene(base.beams, supports=base.supports, connectors=[turn, spring])
     solution = swing(scene)
     loaded = saved(solution, shared_path)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Sections: the resultants of shapes, from the formulas of any table book."""
 
 import math

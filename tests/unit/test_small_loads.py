@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Loads of any size and units of any size: runs end, and answers are those of unit loads."""
 
 import math
@@ -88,7 +89,7 @@ def test_a_motion_comes_to_rest():
 
 
 @pytest.mark.parametrize("force", [1e4, 2.0, 1e-6, 1e-200])
-@pytest.mark.parametrize("how", [ub.Static(), ub.ExactStatic(), ub.Load(0.1)], ids=str)
+@pytest.mark.parametrize("how", [ub.Static(), ub.ExactStatic(), ub.LoadControl(0.1)], ids=str)
 def test_a_small_load_on_a_post_that_a_spring_holds(force, how):
     """[closed] F (h³/3EI (1 - 1/4n²) + h/GA + h²/k); moments in the middles of n cells bend them.
 
@@ -102,7 +103,7 @@ def test_a_small_load_on_a_post_that_a_spring_holds(force, how):
         connectors=[ub.Turn(foot, post.start, ub.Spring(k))],
         loads=[ub.PointLoad(post.end, force=(force, 0), time=lambda t: t / 20)],
     )
-    if isinstance(how, ub.Load):
+    if isinstance(how, ub.LoadControl):
         solution = ub.follow(scene, how, steps=200)
         assert solution.critical == []
     else:

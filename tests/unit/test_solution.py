@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What a solution answers: motions, forces, balances."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Newton's method where full steps go round, and where the last tangent does."""
 
 import numpy as np

@@ -1,9 +1,10 @@
+# SPDX-License-Identifier: MIT
 """Structures of matrices."""
 
 import numpy as np
 import pytest
 
-from ufl_beam.sparse import coupling
+from ufl_beam.compiled.csr import coupling
 
 
 @pytest.mark.parametrize("number", [1, 255, 256, 257])

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Where a run begins: at rest, in the state of another solution, in motion."""
 
 import math

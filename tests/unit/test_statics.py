@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Static runs: loads that are there from the start, relaxation, first reactions, broken springs."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Studies: the same on any number of ranks, no member fatal, nothing lost, nothing done twice."""
 
 import math
@@ -14,7 +15,7 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.processes import ours
+from ufl_beam.parallel import ours
 
 COMM = MPI.COMM_WORLD
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)

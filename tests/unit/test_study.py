@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What `make study` says follows from its numbers; the runs themselves are not made here."""
 
 import importlib.util

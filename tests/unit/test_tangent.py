@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Tangents against central differences of the residuals, at random states, for all terms."""
 
 from mpi4py import MPI

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Trade-offs: of runs whose errors and times are laws, and of small scenes."""
 
 import math
@@ -11,7 +12,7 @@ import pytest
 import scenes
 
 import ufl_beam as ub
-from ufl_beam import ladders
+from ufl_beam.analysis import refinement_runs
 
 COMM = MPI.COMM_WORLD
 SCENE = scenes.cantilever(cells=4)
@@ -36,7 +37,7 @@ def law(monkeypatch):
                 value=1.0 + error(4 / cells, length, scheme, newton),
             )  # fmt: skip
 
-        monkeypatch.setattr(ladders, "simulate", simulate)
+        monkeypatch.setattr(refinement_runs, "simulate", simulate)
 
     return use
 
@@ -96,7 +97,7 @@ def test_the_recommendation_are_arguments_of_simulate(law):
     law(smooth)
     found = ask(tolerance=1e-4)
     assert set(found.recommended) == {"scheme", "t", "dt", "mesh", "newton"}
-    again = ladders.simulate(SCENE, progress=False, **found.recommended)
+    again = refinement_runs.simulate(SCENE, progress=False, **found.recommended)
     assert again.value == found.best.values["value"]
     said = str(found)
     assert "errors of 0.0001 of each quantity" in said
@@ -146,14 +147,14 @@ def test_another_newton_is_taken_if_it_changes_little(law, change, taken):
     found = ask(tolerance=1e-4, newton=[strict, loose])
     assert found.best.dials.newton == strict
     assert any(run.dials.newton == loose for run in found.runs)
-    simulate = ladders.simulate
+    simulate = refinement_runs.simulate
 
     def faster(scene, *, newton, **others):
         one = simulate(scene, newton=newton, **others)
         one.seconds *= 0.5 if newton == loose else 1.0
         return one
 
-    ladders.simulate = faster  # the fixture restores it
+    refinement_runs.simulate = faster  # the fixture restores it
     found = ask(tolerance=1e-4, newton=[strict, loose])
     assert found.best.dials.newton == (loose if taken else strict)
 

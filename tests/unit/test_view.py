@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Pictures: what is in them, that they need no screen, and what is refused."""
 
 import math
@@ -12,12 +13,12 @@ import pytest
 import scenes
 
 import ufl_beam as ub
-from ufl_beam import symbols
-from ufl_beam.diagrams import moments_at_ends
-from ufl_beam.glyphs import AROUND, STRAIGHT
-from ufl_beam.stage import Stage
-from ufl_beam.symbols import EDGE, FILLED, support_direction
-from ufl_beam.view import with_unit
+from ufl_beam.plotting import symbols
+from ufl_beam.plotting.connector_glyphs import AROUND, STRAIGHT
+from ufl_beam.plotting.diagrams import moments_at_ends
+from ufl_beam.plotting.plots import with_unit
+from ufl_beam.plotting.scene_layout import Stage
+from ufl_beam.plotting.symbols import EDGE, FILLED, support_direction
 
 FIRST = MPI.COMM_WORLD.rank == 0
 INDEX = {"N": 0, "V": 1, "M": 2}
@@ -460,7 +461,7 @@ LAWS = [
     ub.Damper(1.0),
     ub.Stop(100.0, high=0.05),
     ub.Coulomb(0.1),
-    ub.Function(lambda x, v: 10.0 * x),
+    ub.ForceLaw(lambda x, v: 10.0 * x),
     ub.RigidPlastic(ub.Softening(0.5, 1.0)),
 ]
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Every parameter of every public callable refuses what it cannot take, by name, before any mesh.
 
 The table below has a valid call of each public callable and the kind of each of its parameters.  A
@@ -13,7 +14,7 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam import simulation
+from ufl_beam.simulation import simulation
 
 NAN, INF, HUGE = math.nan, math.inf, 10**400
 ARRAY = np.array([1.0, 2.0])
@@ -236,7 +237,7 @@ TABLE = {
         force=V(1.0, FROM_ZERO), coefficient=V(1.0, FROM_ZERO), joint=V(JOINT, OBJECT),
     ),
     "RigidPlastic": call(ub.RigidPlastic, law=V(LAW, OBJECT)),
-    "Function": call(ub.Function, force=V(lambda e, rate: e, FUNCTION)),
+    "ForceLaw": call(ub.ForceLaw, force=V(lambda e, rate: e, FUNCTION)),
     "Controller": call(ub.Controller, force=V(lambda simulation: 1.0, FUNCTION)),
     "Motor": call(ub.Motor, motion=V(lambda t: t, [*TIME, None])),
     "Actuator": call(ub.Actuator, force=V(lambda t: t, [*TIME, None])),
@@ -321,17 +322,17 @@ TABLE = {
     ),
     "follow": call(
         ub.follow,
-        scene=V(SCENE, OBJECT), control=V(ub.Load(1.0), [*OBJECT, ub.Load]),
+        scene=V(SCENE, OBJECT), control=V(ub.LoadControl(1.0), [*OBJECT, ub.LoadControl]),
         until=V(None, optional(FUNCTION)), steps=V(1, COUNT), **ALONG,
     ),
     "ArcLength": call(ub.ArcLength, step=V(1.0, [*NUMBER, 0.0]), factor=V(1.0, POSITIVE)),
-    "Load": call(ub.Load, step=V(1.0, [*NUMBER, 0.0])),
-    "Displacement": call(
-        ub.Displacement,
+    "LoadControl": call(ub.LoadControl, step=V(1.0, [*NUMBER, 0.0])),
+    "DisplacementControl": call(
+        ub.DisplacementControl,
         place=PLACE, component=V("u", [*TEXT, "w", "", "uv"]), step=V(1.0, [*NUMBER, 0.0]),
     ),
-    "Dissipation": call(
-        ub.Dissipation, step=V(1.0, POSITIVE), otherwise=V(ub.ArcLength(1.0), OBJECT)
+    "DissipationControl": call(
+        ub.DissipationControl, step=V(1.0, POSITIVE), otherwise=V(ub.ArcLength(1.0), OBJECT)
     ),
     "modes": call(
         ub.modes, scene=V(SCENE, OBJECT), n=V(1, COUNT), at=V(None, optional(OBJECT)), **MESH
@@ -532,7 +533,7 @@ OWNERS = {
         )
     ),
     "Turn(ground (2, 0), girder.end (1, 0))": lambda v: shaken(
-        connectors=lambda b: ub.Turn(ub.ground(2, 0), b.end, ub.Function(lambda e, rate: v))
+        connectors=lambda b: ub.Turn(ub.ground(2, 0), b.end, ub.ForceLaw(lambda e, rate: v))
     ),
 }
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A run that goes on after it was killed; prints the checksum of all that it computes and writes.
 
 python3 killed.py DIRECTORY STEPS EVERY: the steps of the run, and from checkpoint to checkpoint.

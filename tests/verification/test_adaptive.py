@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Adaptive steps: what they estimate is what they err, and what they choose is worth it.
 
 An oscillator x'' = -x with the midpoint rule: a step errs by the trapezoidal rule's dt³/12 x'''.

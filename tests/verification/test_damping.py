@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Rayleigh and Kelvin-Voigt damping against closed forms of a damped mode, and the ledger."""
 
 import math

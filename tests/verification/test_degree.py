@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Orders of convergence of cells of degree 1, 2 and 3, against closed forms.
 
 With p points a cell, displacements and rotations at vertices converge with h^2p, and frequencies

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Post-buckling of Euler's column, clamped at its foot, under a dead axial load.
 
 Source: S. P. Timoshenko, J. M. Gere, "Theory of Elastic Stability", 2nd ed. 1961, section 2.7.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Flying flexible beam, "planar spaghetti": free, thrown by a force and a moment for 2.5 s.
 
 Source: J. C. Simo, L. Vu-Quoc, "On the dynamics of flexible beams under large overall motions - the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Natural frequencies, damping ratios and buckling loads against closed forms and a Ritz solution.
 
 Sources: S. P. Timoshenko, D. H. Young, W. Weaver, "Vibration Problems in Engineering", 4th ed.

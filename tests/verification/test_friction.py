@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Dry friction against closed forms: oscillator, incline, bearing; all [closed].
 
 Friction sticks exactly, without a stiffness, and what it takes is never negative.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """An embedded hinge that softens, in one cell: S17 of the reference, closed forms and limits.
 
 The hinge is in the middle of its cell, and the moment of a cell stands for its middle.  So for a

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Runs that are killed at random moments, while code is compiled, in steps and in writes.
 
 The script is simply run again; its results must be those of a run that nothing stopped, to the bit.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Limit loads of beams and frames, and a cantilever that breaks: S17 of the reference.
 
 Plastic hinges are bulk cells with a yield moment M_p.  The moment of a cell stands for its middle,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Long runs: damage against closed forms, and a frame that softens in very many steps."""
 
 import gc

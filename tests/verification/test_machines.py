@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Bodies, joints and connectors against closed forms; all [closed].
 
 The midpoint rule of a mass on a linear spring, a damper or under a constant force has a closed form
@@ -334,7 +335,7 @@ def test_damper():
 def test_function_is_a_spring_and_a_damper():
     scene, _, at = carriage(ub.Spring(STIFFNESS), more=(ub.Damper(4.0),))
     one = run(scene, 2.0, 0.02).displacement(at)
-    scene, asked, at = carriage(ub.Function(lambda e, rate: STIFFNESS * e + 4.0 * rate))
+    scene, asked, at = carriage(ub.ForceLaw(lambda e, rate: STIFFNESS * e + 4.0 * rate))
     other = run(scene, 2.0, 0.02)
     np.testing.assert_allclose(one, other.displacement(at), rtol=0, atol=SOLVED)
     history = other.connector(asked)
@@ -356,7 +357,7 @@ def test_function_in_any_units():
         scene = ub.Scene(
             bodies=[mass],
             joints=[ub.Prismatic(*rail)],
-            connectors=[ub.Slide(*rail, ub.Function(force))],
+            connectors=[ub.Slide(*rail, ub.ForceLaw(force))],
             initial=[ub.Velocity((mass,), linear=(metre, 0))],
         )
         solution = run(scene, 0.5, 0.02)
@@ -625,7 +626,7 @@ def test_works_of_connectors_add_up_to_the_ledger():
             ub.Turn(*hinge, ub.Spring(3.0, ub.Hardening(0.5, 1.0))),
             ub.Turn(*hinge, ub.Damper(0.05)),
             ub.Turn(*hinge, ub.Actuator(lambda t: math.sin(9 * t))),
-            ub.Stretch(ub.ground(3, 0), flap.at(1.6, 0.2), ub.Function(lambda e, r: e**3 + r)),
+            ub.Stretch(ub.ground(3, 0), flap.at(1.6, 0.2), ub.ForceLaw(lambda e, r: e**3 + r)),
         ],
         loads=[ub.Gravity((0, -G)), ub.PointLoad(flap.at(1.6, 0.3), force=(2, 1))],
         initial=[ub.Velocity((box, flap), linear=(1.0, 0.5))],

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Elastica of a cantilever under a transverse dead tip load.
 
 Source: K. Mattiasson, "Numerical results from large deflection beam and frame problems analysed by

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Shear-flexible cantilever under a tip load.
 
 Source: K. Nachbagauer, A. Pechstein, H. Irschik, J. Gerstmayr, "A new locking-free formulation for

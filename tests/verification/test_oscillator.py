@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A mass on a bar that yields: elastic-perfectly plastic, and hardening; all [closed].
 
 The bar is one massless cell, so that the motion is that of one degree of freedom with stiffness

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Static paths through limit points, bifurcations and snap-backs: S5, S7, S8, S17 of the reference.
 
 [calc] values are those of an independent converged solution, with the digits that are given.  Mesh
@@ -148,7 +149,7 @@ def test_branch_to_the_elastica():
         beam, scene = column(cells, ub.Section(EA=1e8, GA=1e8, EI=1.0), math.pi**2 / 4)
         straight = ub.follow(scene, ub.ArcLength(0.2), until=lambda now: now.t > 1.1)
         (point,) = straight.critical
-        turn = ub.Displacement(beam.end, "psi", math.radians(4))
+        turn = ub.DisplacementControl(beam.end, "psi", math.radians(4))
         bent = ub.follow(scene, turn, start=point.branch(), steps=44)
         at = [row[0] // 4 for row in TABLE]
         u, v, ψ = bent.displacement(beam.end)[at].T
@@ -185,7 +186,7 @@ def test_hinge_snap_back(law, steepness):
     )  # fmt: skip
     load = ub.PointLoad(beam.end, force=(0, SCALE * M_U / LENGTH), time=growing)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
-    control = ub.Dissipation(SCALE**2 * energy / 16, ub.ArcLength(0.2))
+    control = ub.DissipationControl(SCALE**2 * energy / 16, ub.ArcLength(0.2))
     spent = SCALE**2 * energy * 0.9
     path = ub.follow(scene, control, until=lambda now: now.ledger.lost["hinges"] > spent)
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Plastic hinges of zero length: plastic theory, closed forms, and the joints that they become."""
 
 import math
@@ -52,7 +53,7 @@ def test_collapse_of_a_portal(by, cells):
     assert len(scene.hinges) == 4
     path = ub.follow(
         scene,
-        ub.Displacement(left.end, "u", 0.01),
+        ub.DisplacementControl(left.end, "u", 0.01),
         until=lambda now: now.displacement(left.end)[0] > 0.12,
     )
     assert path.factor[-1] == pytest.approx(150.0, rel=2e-3)
@@ -71,7 +72,7 @@ def test_collapse_of_a_fixed_ended_beam(law):
     middle = beam.at(0.5)
     path = ub.follow(
         scene,
-        ub.Displacement(middle, "v", -1e-3),
+        ub.DisplacementControl(middle, "v", -1e-3),
         until=lambda now: now.displacement(middle)[1] < -0.02,
     )
     assert path.factor[-1] == pytest.approx(16 * LIMIT / LENGTH**2, rel=2e-3)

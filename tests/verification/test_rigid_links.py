@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Parts without deformation and mass: swing on massless links, eccentric loads, stiff beams.
 
 Swing: a flexible beam with a mass at mid-span, hung on two rigid links.  Source: O. A. Bauchau,

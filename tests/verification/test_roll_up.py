@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Cantilever rolled up by an end moment.
 
 Data sets: P. L. Kinon, P. Betsch, S. R. Eugster, "Energy-momentum-consistent simulation of planar

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Time schemes against closed forms: order, amplification of one mode, energy, momenta, refusals.
 
 Sources: N. M. Newmark, J. Eng. Mech. Div. 85 (1959) 67-94; J. Chung, G. M. Hulbert, J. Appl. Mech.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Slider-crank with a flexible rod, driven by a torque for one second, no gravity.
 
 [calc] values of the reference problem S16 (revolute and prismatic joints; data of Stander and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Spin-up of a flexible beam: the clamped end is turned, ever faster for 15 s, then steadily.
 
 Source: J. C. Simo, L. Vu-Quoc, "On the dynamics of flexible beams under large overall motions - the

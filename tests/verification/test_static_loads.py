@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Every kind of load, support and axis against statics by hand, all [closed].
 
 Where nothing else is said, loads are so small (1e-5 in units of EI/L²) that what is nonlinear is

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Swing: a flexible beam with a mass at mid-span, hung on two rigid links; the links snap taut.
 
 Source: O. A. Bauchau, N. J. Theron, "Energy decaying scheme for non-linear beam models", Comput.

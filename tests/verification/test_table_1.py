@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Table 1 of the paper: a straight cantilever whose end is turned by π, at three rates.
 
 Source: the paper, section 4.1; what it does not print (L = 1 m, T = 1, 0.1 and 0.01 s) follows from

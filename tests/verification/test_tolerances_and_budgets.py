@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What a trade-off recommends keeps the tolerance or the time that was asked for.
 
 Against runs whose steps are a fifth and whose cells are half as long or shorter, of scenes that

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Viscoplastic vibration of a cantilever: two names of one law, its limits, and the ledger."""
 
 import math

@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: MIT
+"""Critical points of static paths: the stiffness of the whole scene, its signs and its modes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import block_array, coo_array, csr_array, diags_array
+
+from ufl_beam.arrays import Array, Index
+from ufl_beam.compiled.csr import Csr
+from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.errors import SceneError, StepFailed
+from ufl_beam.simulation.solution import Solution
+from ufl_beam.solvers.factorization import Factorisation, SingularMatrix
+
+ITERATIONS = 50
+"""Inverse iterations in which a mode is sought."""
+
+
+class Direction(NamedTuple):
+    """A direction of a path.
+
+    Attributes:
+        q: Of the configuration; m, m, rad.
+        t: Of the load factor.
+    """
+
+    q: Array
+    t: float
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """Where a path begins, and in which direction; made by :meth:`CriticalPoint.branch`.
+
+    Attributes:
+        state: Solution whose last state is the beginning.
+        mode: Direction at all degrees of freedom, in the order of the grid.
+    """
+
+    state: Solution
+    mode: Array
+
+
+@dataclass(frozen=True, eq=False)
+class CriticalPoint:
+    """A state of a path in which its tangent stiffness is singular.
+
+    Attributes:
+        kind: "limit" where the load factor turns, "bifurcation" where another branch begins.
+        factor: The load factor.
+        n: Number of the state in the path.
+        state: The state alone, as a solution.
+        mode: What moves without a change of load; root mean square 1 of displacements over the
+            size of the scene, and of rotations; all degrees of freedom in the order of the grid.
+    """
+
+    kind: str
+    factor: float
+    n: int
+    state: Solution
+    mode: Array
+
+    def branch(self, sign: int = 1) -> Branch:
+        """The path that leaves along the mode, or against it with ``sign = -1``.
+
+        Raises:
+            SceneError: ``sign`` is neither 1 nor -1, or nothing branches at a limit point.
+        """
+        if sign not in (1, -1):
+            raise SceneError(f"branch: sign = {sign!r} must be 1 or -1")
+        if self.kind != "bifurcation":
+            raise SceneError(f"branch: no other branch begins at a {self.kind} point")
+        return Branch(self.state, sign * self.mode)
+
+    def __str__(self) -> str:
+        return f"{self.kind} point at factor {self.factor:.6g}"
+
+
+def metric(share: Share) -> Array:
+    """Weights of squares, such that a step's sum is its mean square; (share.size,).
+
+    Displacements count as parts of the size of the scene, forces of connectors do not count.  Only
+    what a process owns does, so that sums over the processes are right.
+    """
+    grid = share.grid
+    weights = np.full(share.size, 1 / grid.scene.size**2)
+    weights[share.rotations()] = 1.0
+    weights[share.multipliers()] = 0.0
+    weights[share.num_owned :] = 0.0
+    return weights / (grid.size - len(grid.multipliers))
+
+
+class Stiffness:
+    """The tangent stiffness of the whole scene, factored by every process.
+
+    Args:
+        share: The degrees of freedom of this process.
+        A: Its part of the tangent.
+        held: Local degrees of freedom that supports hold.
+        rate: Its part of the residual's derivative by the load factor.
+
+    Attributes:
+        symmetric: Whether it is; follower loads make it unsymmetric.
+        negative: Number of negative eigenvalues of the stiffness that is left when the forces of
+            connectors are eliminated and constraints fulfilled.  Where it is not symmetric: 1 if
+            its determinant is negative, else 0.
+        flow: Change of the configuration for a unit of the load factor; (grid.size,), zero where
+            supports hold.
+
+    Raises:
+        StepFailed: It is exactly singular.
+    """
+
+    def __init__(self, share: Share, A: Csr, held: Index, rate: Array) -> None:
+        grid = share.grid
+        here = (share.dofs[A.rows()], share.dofs[A.indices], A.data, share.dofs, rate)
+        parts = share.comm.allgather(here) if share.comm.size > 1 else [here]
+        rows, columns, data, dofs, rates = (np.concatenate(x) for x in zip(*parts, strict=True))
+        of_all = share.dofs[held]
+        if share.comm.size > 1:
+            of_all = np.concatenate(share.comm.allgather(of_all))
+        free = np.setdiff1d(np.arange(grid.size), of_all)
+        shape = (grid.size, grid.size)
+        self._K = csr_array(coo_array((data, (rows, columns)), shape=shape))[free][:, free]
+        forces = np.bincount(dofs, weights=rates, minlength=grid.size)[free]
+        self._free, self._size = free, grid.size
+        self._motions = len(free) - len(grid.multipliers)
+        self._factor()
+        self.flow = self._spread(-self._solve(forces))
+
+    def _factor(self) -> None:
+        """Factor a symmetric form of the tangent.
+
+        A connector has the gradient g of its motion in its column, and α g and β in its row.  The
+        row is divided by α.  Where β is not zero, the unit of the force is such that ±1 stands on
+        the diagonal, so a law whose force does not answer the motion (α = 0) is no exception.
+        Each force brings one negative eigenvalue if it holds a motion or resists its growth, and
+        none if it falls when the motion grows.
+        """
+        n = self._motions
+        K, G, rows = self._K[:n, :n], self._K[:n, n:], self._K[n:, :n]
+        β = self._K.diagonal()[n:]
+        squares = np.asarray(G.multiply(G).sum(axis=0)).ravel()
+        products = np.asarray(G.multiply(rows.T).sum(axis=0)).ravel()
+        α = products / np.where(squares > 0, squares, 1.0)
+        holds = β == 0.0
+        slope = α / np.where(holds, 1.0, β)
+        self._unit = np.where(holds, 1.0, np.sqrt(np.abs(slope)))
+        self._of_row = self._unit / np.where(α == 0.0, 1.0, α)
+        self._β, self._G = np.where(holds, np.inf, β), G
+        negative = holds | (slope < 0.0)
+        diagonal = np.where(holds, 0.0, np.where(negative, -1.0, 1.0))
+        of_forces = diags_array(self._of_row) @ rows
+        blocks = [[K, G @ diags_array(self._unit)], [of_forces, diags_array(diagonal)]]
+        try:
+            self._factors = Factorisation(csr_array(block_array(blocks)))
+        except SingularMatrix:
+            raise StepFailed("the tangent stiffness is singular") from None
+        self.symmetric = self._factors.symmetric
+        self.negative = self._factors.negative - int(negative.sum())
+        if not self.symmetric:
+            self.negative %= 2
+
+    def _solve(self, b: Array) -> Array:
+        """The solution of the tangent for one right-hand side."""
+        n = self._motions
+        given = b[n:] / self._β
+        held = np.where(np.isinf(self._β), self._of_row * b[n:], 0.0)
+        x = self._factors.solve(np.concatenate([b[:n] - self._G @ given, held]))
+        x[n:] = given + self._unit * x[n:]
+        return x
+
+    def passed(self, other: Stiffness) -> bool:
+        """Return whether an eigenvalue has passed zero on the way from another state."""
+        change = self.negative - other.negative
+        return bool(change if self.symmetric and other.symmetric else change % 2)
+
+    def _spread(self, of_free: Array) -> Array:
+        values = np.zeros(self._size)
+        values[self._free] = of_free
+        return values
+
+    def softest(self, weights: Array) -> tuple[float, Array]:
+        """The eigenvalue nearest to zero, N m, and its mode of unit size; (grid.size,).
+
+        Args:
+            weights: :func:`metric` of all degrees of freedom, in the order of the grid.
+        """
+        w = weights[self._free]
+        mode = np.random.default_rng(0).normal(size=len(w)) / np.sqrt(np.maximum(w, w.max()))
+        λ = np.inf
+        for _ in range(ITERATIONS):
+            mode = self._solve(w * mode)
+            mode /= np.sqrt(w @ mode**2)
+            before, λ = λ, float(mode @ (self._K @ mode))
+            if abs(λ - before) <= 1e-10 * abs(λ):
+                break
+        return λ, self._spread(mode * np.sign(mode[np.abs(w * mode).argmax()]))

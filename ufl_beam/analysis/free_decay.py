@@ -1,0 +1,257 @@
+# SPDX-License-Identifier: MIT
+"""Damping of a free vibration: its peaks, their logarithmic decrement, the law of their decay."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import scipy  # its parts are loaded when they are used
+
+from ufl_beam.array_checks import require_array, require_row
+from ufl_beam.arrays import Array
+from ufl_beam.errors import SceneError, require_number
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """A law fitted to peaks; ``_95`` is the half-width of a 95 % interval, Student's, linearised.
+
+    Attributes:
+        initial: A_0, the amplitude at the first peak; unit of x.
+        rate: r of A_0 − r t, unit of x per s, or λ of A_0 exp(−λ t), 1/s; t from the first peak.
+        initial_95: Uncertainty of ``initial``; unit of x.
+        rate_95: Uncertainty of ``rate``; same unit.
+        rms: Root mean square of the residuals; unit of x.
+    """
+
+    initial: float
+    rate: float
+    initial_95: float
+    rate_95: float
+    rms: float
+
+    def __str__(self) -> str:
+        return (
+            f"A0 = {self.initial:.5g} ± {self.initial_95:.1e}, "
+            f"rate = {self.rate:.5g} ± {self.rate_95:.1e}, rms = {self.rms:.1e}"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Decay:
+    """Decay of the peaks of a free vibration.
+
+    Attributes:
+        times: Times of the n peaks; (n,); s.
+        amplitudes: Their amplitudes; (n,); unit of x.
+        decrement: Logarithmic decrement δ, mean of all periods.
+        decrements: That of each period; (n-1,).
+        linear: The fit of A_0 − r t, as under dry friction: every period takes the same amount.
+        exponential: The fit of A_0 exp(−λ t), as under viscous damping: the same part.
+    """
+
+    times: Array
+    amplitudes: Array
+    decrement: float
+    decrements: Array
+    linear: Envelope
+    exponential: Envelope
+
+    @property
+    def period(self) -> float:
+        """Mean time between successive peaks; s."""
+        return float(np.mean(np.diff(self.times)))
+
+    @property
+    def ratio(self) -> float:
+        """Damping ratio ζ that follows from the mean decrement."""
+        return float(damping_ratio(self.decrement))
+
+    @property
+    def fitted_ratio(self) -> float:
+        """Damping ratio ζ that follows from the exponential law, δ = λ T."""
+        return float(damping_ratio(self.exponential.rate * self.period))
+
+    @property
+    def fitted_ratio_95(self) -> float:
+        """Half-width of the 95 % interval of ``fitted_ratio`` that follows from that of λ."""
+        slope = (1 - self.fitted_ratio**2) ** 1.5 / (2 * np.pi)  # dζ/dδ
+        return float(slope * self.exponential.rate_95 * self.period)
+
+    @property
+    def better(self) -> str:
+        """The law with the smaller residuals, "linear" or "exponential"."""
+        return "linear" if self.linear.rms < self.exponential.rms else "exponential"
+
+    @property
+    def evidence(self) -> float:
+        """Evidence ratio of the better law, exp(ΔAIC/2); both have two parameters.
+
+        For independent normal residuals; what is below round-off counts as round-off.
+        """
+        least = np.finfo(float).eps * np.max(self.amplitudes)
+        linear, exponential = (max(law.rms, least) for law in (self.linear, self.exponential))
+        with np.errstate(over="ignore"):
+            return float(np.exp(len(self.times) * abs(np.log(linear / exponential))))
+
+    def __str__(self) -> str:
+        spacing, each = np.diff(self.times), self.decrements
+        return (
+            f"{len(self.times)} peaks, period {self.period:.5g} s "
+            f"({spacing.min():.5g} to {spacing.max():.5g} s)\n"
+            f"  decrement    {self.decrement:.4g} ({each.min():.4g} to {each.max():.4g}), "
+            f"damping ratio {self.ratio:.4g}\n"
+            f"  linear       {self.linear}\n"
+            f"  exponential  {self.exponential}, "
+            f"damping ratio {self.fitted_ratio:.4g} ± {self.fitted_ratio_95:.1e}\n"
+            f"  {self.better} describes them better, evidence ratio {self.evidence:.3g}"
+        )
+
+
+def damping(
+    t: npt.ArrayLike, x: npt.ArrayLike, about: float = 0.0, *, prominence: float = 0.05
+) -> Decay:
+    """Damping of a free vibration from its history; arguments and errors of :func:`peaks`.
+
+    Raises:
+        SceneError: Less than 3 peaks, or not all of them are above ``about``.
+    """
+    times, amplitudes = peaks(t, x, about, prominence=prominence)
+    if len(times) < 3:
+        raise SceneError(
+            f"damping: peaks found: {len(times)}, needed: 3; give a longer history, "
+            f"or lower prominence = {prominence:g}"
+        )
+    return fit_decay(times, amplitudes)
+
+
+def peaks(
+    t: npt.ArrayLike, x: npt.ArrayLike, about: float = 0.0, *, prominence: float = 0.05
+) -> tuple[Array, Array]:
+    """Times (s) and amplitudes (unit of x) of the maxima of a vibration; (m,) each.
+
+    Of x and not of its magnitude: these are one period apart, wherever the equilibrium is.  Each
+    is that of the parabola through three samples; an end of the history is no maximum.
+
+    Noise raises small peaks more than large ones: filter it first if it is more than 0.3 % of the
+    amplitudes.
+
+    Args:
+        t: Increasing times, in any steps; (n,); s.
+        x: Values of the free vibration, without what came before it; (n,).
+        about: Equilibrium from which amplitudes count; unit of x.
+        prominence: By how much of the range of x it must fall on both sides of a maximum: more
+            than what rides on the vibration at high frequency, less than its last peaks.
+
+    Raises:
+        SceneError: t and x are not as many, not finite, or t does not increase.
+    """
+    t, x = _series("peaks", t, x, "x")
+    require_number(about, "peaks: about")
+    require_number(prominence, "peaks: prominence", at_least=0.0)
+    i = scipy.signal.find_peaks(x, prominence=prominence * np.ptp(x))[0] if len(x) else np.arange(0)
+    before, after = t[i] - t[i - 1], t[i + 1] - t[i]
+    rise, fall = (x[i] - x[i - 1]) / before, (x[i + 1] - x[i]) / after
+    curvature = 2 * (fall - rise) / (before + after)
+    slope = (rise * after + fall * before) / (before + after)
+    # Where three samples are equal there is neither slope nor curvature
+    shift = np.divide(-slope, curvature, out=np.zeros(len(i)), where=curvature < 0)
+    return t[i] + shift, x[i] + slope * shift / 2 - about
+
+
+def logarithmic_decrement(amplitudes: npt.ArrayLike) -> tuple[float, Array]:
+    """Logarithmic decrement δ of n + 1 amplitudes: mean over n periods, and of each one, (n,).
+
+    Raises:
+        SceneError: Less than two amplitudes, or some are not positive.
+    """
+    Φ = require_row(amplitudes, "logarithmic_decrement: amplitudes")
+    n = len(Φ) - 1
+    if n < 1:
+        raise SceneError(f"logarithmic_decrement: amplitudes given: {n + 1}, needed: 2")
+    for i in np.flatnonzero(Φ <= 0):
+        raise SceneError(
+            f"logarithmic_decrement: amplitudes[{i}] = {Φ[i]:g} must be positive; "
+            "is `about` the equilibrium, and the prominence more than the noise?"
+        )
+    δ = np.log(Φ[0] / Φ[n]) / n  # P(61)
+    return float(δ), np.log(Φ[:-1] / Φ[1:])
+
+
+def damping_ratio(decrement: npt.ArrayLike) -> Array:
+    """Damping ratio ζ of logarithmic decrements δ of any shape; negative where vibrations grow."""
+    δ = require_array(decrement, "damping_ratio: decrement")
+    ζ: Array = δ / np.hypot(δ, 2 * np.pi)  # P(62)
+    return ζ
+
+
+def fit_decay(t: npt.ArrayLike, amplitudes: npt.ArrayLike) -> Decay:
+    """Fit a linear and an exponential law to peaks that are one period apart, by least squares.
+
+    Both to the amplitudes, not to their logarithms, so that their residuals may be compared.
+
+    Args:
+        t: Increasing times of the peaks; (n,); s.
+        amplitudes: Their amplitudes; (n,).
+
+    Raises:
+        SceneError: t and amplitudes are not as many, at least 3, and finite; t does not increase;
+            an amplitude is not positive; or they scatter so much that nothing fits.
+    """
+    t, A = _series("fit_decay", t, amplitudes, "amplitudes")
+    if len(A) < 3:
+        raise SceneError(f"fit_decay: amplitudes given: {len(A)}, needed: 3")
+    mean, each = logarithmic_decrement(A)
+    s = t - t[0]
+    line = scipy.stats.linregress(s, A)
+    linear = _envelope(
+        (line.intercept, -line.slope),
+        (line.intercept_stderr, line.stderr),
+        A - line.intercept - line.slope * s,
+    )
+    # Without units; first guess: the line through the logarithms, each weighted by its amplitude
+    τ, a, units = s / s[-1], A / np.max(A), np.array([np.max(A), 1 / s[-1]])
+    slope, logarithm = np.polyfit(τ, np.log(a), 1, w=a)
+    guess = np.exp(logarithm), -slope
+    try:
+        with np.errstate(over="ignore"):
+            found, covariance = scipy.optimize.curve_fit(_exponential, τ, a, guess, jac=_gradient)
+    except RuntimeError:
+        raise SceneError(
+            f"fit_decay: no exponential fits amplitudes from {A.min():g} to {A.max():g}; "
+            "are they successive peaks of one free vibration?"
+        ) from None
+    errors = units * np.sqrt(np.diag(covariance))
+    exponential = _envelope(found * units, errors, A - _exponential(s, *(found * units)))
+    return Decay(t, A, mean, each, linear, exponential)
+
+
+def _envelope(values: npt.ArrayLike, errors: npt.ArrayLike, residuals: Array) -> Envelope:
+    half = scipy.stats.t.ppf(0.975, len(residuals) - 2) * np.abs(errors)
+    rms = np.sqrt(np.mean(residuals**2))
+    return Envelope(*np.concatenate([values, half, [rms]]).tolist())
+
+
+def _exponential(t: Array, initial: float, rate: float) -> Array:
+    amplitudes: Array = initial * np.exp(-rate * t)
+    return amplitudes
+
+
+def _gradient(t: Array, initial: float, rate: float) -> Array:
+    """Of :func:`_exponential`, for its two parameters; (n, 2).  Differences fail at rate 0."""
+    e = np.exp(-rate * t)
+    return np.stack([e, -initial * t * e], axis=1)
+
+
+def _series(call: str, t: npt.ArrayLike, x: npt.ArrayLike, what: str) -> tuple[Array, Array]:
+    """Increasing times and as many values, or :class:`SceneError`."""
+    times, values = require_row(t, f"{call}: t"), require_row(x, f"{call}: {what}")
+    if len(times) != len(values):
+        raise SceneError(f"{call}: {len(times)} t and {len(values)} {what}; give as many of each")
+    for i in np.flatnonzero(np.diff(times) <= 0):
+        raise SceneError(
+            f"{call}: t must increase, but t[{i}] = {times[i]:g} is followed by {times[i + 1]:g}"
+        )
+    return times, values

@@ -1,0 +1,299 @@
+# SPDX-License-Identifier: MIT
+"""Small motions about a state: their matrices, and the eigenvalues that SLEPc finds of them."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from functools import partial
+
+from mpi4py import MPI
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import block_array, csr_array, diags_array, eye_array
+from scipy.sparse.linalg import splu
+
+from ufl_beam.arrays import Array, Complex, Index
+from ufl_beam.compiled.csr import Csr
+from ufl_beam.errors import ModelWarning, SceneError
+from ufl_beam.mechanics.classical import Static
+from ufl_beam.mechanics.time_schemes import Rates, Step
+from ufl_beam.model.mesh_options import Mesh
+from ufl_beam.model.scene import Scene
+from ufl_beam.simulation.simulation import Simulation
+from ufl_beam.simulation.solution import Solution
+from ufl_beam.solvers import eigensolvers
+from ufl_beam.solvers.eigensolvers import ROUND_OFF, SHIFT, ZERO
+
+APART = 1e-9
+"""Part of the largest damping below which what couples two motions does not count."""
+
+AT_REST = 1e300
+"""Length of a step in which all rates vanish; s."""
+
+
+class _Standstill(Static):
+    """Everything is taken where it is, and there is inertia: what small motions begin with.
+
+    Nothing steps with this scheme.
+    """
+
+    dynamic = True
+    slips = False
+    kept: tuple[str, ...] = ()
+
+    def require(self, scene: Scene) -> None:
+        """It can do all scenes."""
+
+    def half_tangents(self, rotations: Index) -> Index:
+        """None."""
+        return rotations[:0]
+
+    def inertia(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
+        """Nothing accelerates."""
+        return 1 / dt**2, 0.0, rates.v
+
+    def velocity(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
+        """Velocities are differences over ``dt``."""
+        return 1 / dt, 0.0, rates.v
+
+    def rates(self, dt: float, s: Array, rates: Rates) -> tuple[Array, ...]:
+        """Velocities are differences over ``dt``."""
+        return (np.asarray(s / dt),)
+
+    def slip(self, dt: float, change: Array, rates: Rates) -> Array:
+        """None."""
+        return 0 * change
+
+    def error_weights(self) -> tuple[float, float]:
+        """None are known."""
+        return 0.5, 0.0
+
+
+class SmallMotions:
+    """Matrices of the small motions about a state, at what supports leave free.
+
+    Args:
+        scene: What is modelled.
+        at: Solution whose last state is meant; the undeformed scene by default.
+        t: Time of loads; that of the state by default; s.
+        mesh: How finely it is discretised; as ``at``, or with the cells of the beams.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        at: Solution | None,
+        t: float | None = None,
+        mesh: Mesh | None = None,
+    ) -> None:
+        time = 0.0 if at is None else float(at.times[-1])
+        # Each process does the same: no answer depends on their number.
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ModelWarning)  # they are about runs
+            simulation = Simulation(
+                scene, _Standstill(), t0=time, start=at, mesh=mesh, comm=MPI.COMM_SELF
+            )
+        if t is not None:
+            simulation.t = t
+        self.scene, self._simulation = scene, simulation
+        self.grid, self.q = simulation.grid, simulation.q
+        simulation.close()
+        T = self._derivative(self.q, AT_REST)
+        multipliers = self.grid.multipliers
+        about_forces = T.diagonal()[multipliers] != 0.0
+        self._laws, constraints = multipliers[about_forces], multipliers[~about_forces]
+        self._Z = self._directions(T, constraints)
+        self.K, self.M = self._reduced(T), self._reduced(self._matrix(simulation.inertia.M.data))
+        # A constraint takes itself and a motion away; what has no mass moves with the rest.
+        self.most = self.K.shape[0] - len(constraints) - int(np.sum(self.M.diagonal() == 0.0))
+
+    def _matrix(self, data: Array) -> csr_array:
+        A: Csr = self._simulation.inertia.M  # all matrices have one structure
+        return csr_array((data.copy(), A.indices.copy(), A.indptr.copy()), shape=(A.size, A.size))
+
+    def _derivative(self, q: Array, dt: float) -> csr_array:
+        """K + C / dt at ``q``, of all degrees of freedom."""
+        return self._matrix(self._simulation.linearise(q, dt)[1])
+
+    def _directions(self, T: csr_array, constraints: Index) -> csr_array:
+        """Columns: what may move, in the axes of supports, and the forces of constraints."""
+        size = self.grid.size
+        left = np.ones(size, dtype=bool)
+        left[self._simulation.supports.dofs] = left[self._laws] = False
+        scale = np.ones(size)
+        # So that constraints are as stiff as what they hold.
+        scale[constraints] = abs(T.data).max()
+        return (self._axes() @ diags_array(scale, format="csr"))[:, np.flatnonzero(left)]
+
+    def _axes(self) -> csr_array:
+        """Columns: the components of motion, in the axes of supports."""
+        turned = [support for support in self.scene.supports if support.angle]
+        Q = eye_array(self.grid.size, format="lil")
+        for support in turned:
+            i, j = self.grid.node(support.place)[:2]
+            c, s = math.cos(support.angle), math.sin(support.angle)
+            Q[i, i], Q[i, j], Q[j, i], Q[j, j] = c, -s, s, c
+        return csr_array(Q)
+
+    def _reduced(self, T: csr_array) -> csr_array:
+        """A matrix of all degrees of freedom at what may move; laws of connectors eliminated."""
+        laws = self._laws
+        if len(laws):
+            flexibility = diags_array(1 / (T.diagonal()[laws] + (T.diagonal()[laws] == 0.0)))
+            T = T - T[:, laws] @ flexibility @ T[laws, :]
+        return csr_array(self._Z.T @ T @ self._Z)
+
+    # -- frequencies ---------------------------------------------------------------------------
+
+    def exponents(self, n: int) -> tuple[Complex, Complex]:
+        """At least n exponents, if there are so many, and motions; (m,), (unknowns, m)."""
+        K, M = self.K, self.M
+        heavy = (M.diagonal() > 0) & (K.diagonal() != 0)
+        squares = np.abs(K.diagonal()[heavy]) / M.diagonal()[heavy]
+        highest, low = (squares.max(), squares.min()) if heavy.any() else (1.0, 1.0)
+        τ = highest**-0.5
+        C = (self._reduced(self._derivative(self.q, τ)) - K) * τ
+        nothing = ROUND_OFF * abs(K).max()
+        symmetric = abs(K - K.T).max() <= nothing
+        solve = partial(
+            eigensolvers.linear,
+            (K + K.T) / 2 if symmetric else K,
+            M,
+            n,
+            most=self.most,
+            definite=symmetric,
+        )
+        values, x = solve(shift=-SHIFT * low)
+        works = self._works(x)
+        zero = self._unresisted(x, works)
+        first = np.abs(values[~zero]).min(initial=highest)
+        if zero.any():
+            # Beside what is nearly infinite, inverses of the others had few digits.
+            values, x = solve(shift=-first / 2)
+            works = self._works(x)
+            zero = self._unresisted(x, works)
+        if abs(C).max() <= nothing * τ and symmetric:
+            values = works / np.sum(x * (M @ x), axis=0)
+            values[zero] = 0.0
+            s, motions = np.sqrt((-values).astype(complex)), x.astype(complex)
+        else:
+            s, motions = self._damped(C, x[:, zero], n, first**0.5)
+        finite = (np.abs(s) ** 2 <= 1e3 * highest) & (s.imag >= 0)
+        return s[finite], motions[:, finite]
+
+    def _works(self, x: Array) -> Array:
+        """Compute works of the stiffness on motions, in columns, to the digits of strains; J."""
+        right, left = self._with_laws()
+        return self._simulation.stiffness_works(self.q, right @ x, left.T @ x)
+
+    def _unresisted(self, x: Array, works: Array) -> npt.NDArray[np.bool_]:
+        """Return which motions no stiffness resists, up to round-off; (n,)."""
+        sizes = np.sum(np.abs(x) * (abs(self.K) @ np.abs(x)), axis=0)
+        return np.asarray(np.abs(works) <= ZERO * sizes)
+
+    def _damped(self, C: csr_array, free: Array, n: int, lowest: float) -> tuple[Complex, Complex]:
+        """Exponents and motions with velocity-dependent forces.
+
+        Args:
+            C: Their matrix.
+            free: Motions that nothing resists, in columns.
+            n: How many at least.
+            lowest: The first frequency; rad/s.
+        """
+        # Zero is a double exponent, of drifts, and no solver finds it well.  Where velocities make
+        # of them but a force like inertia, they are excluded as by constraints, and known: drifts
+        # orthogonal to the rest.
+        N = free @ np.linalg.inv(np.linalg.cholesky(free.T @ (self.M @ free))).T
+        Λ = N.T @ (C @ N)
+        _, sizes, rows = np.linalg.svd(C @ N - self.M @ N @ Λ, full_matrices=False)
+        W = rows[sizes <= APART * abs(C).max() * np.abs(N).max(initial=0.0)].T
+        N, Λ = N @ W, W.T @ Λ @ W
+        B = csr_array(self.M @ N * (abs(self.K).max() / abs(self.M).max() ** 0.5))
+        K = csr_array(block_array([[self.K, B], [B.T, csr_array((B.shape[1],) * 2)]]))
+        C, M = C.copy(), self.M.copy()
+        for A in (C, M):
+            A.resize(K.shape)
+        most = 2 * (self.most - B.shape[1])
+        s, x = eigensolvers.quadratic(K, C, M, 2 * n, most=most, shift=lowest)
+        s, x = self._with_zeros(s, x[: len(free)], free)
+        decay, how = np.linalg.eig(-Λ)
+        decay = np.where(np.abs(decay.imag) <= APART * np.abs(decay), decay.real, decay)
+        slows = np.abs(decay) > ROUND_OFF * abs(C).max() / abs(self.M).max()
+        return np.concatenate([s, decay[slows]]), np.hstack([x, N @ how[:, slows]])
+
+    def _with_zeros(self, s: Complex, x: Complex, free: Array) -> tuple[Complex, Complex]:
+        """Replace eigenvalues of rigid-body modes that are nearly zero by exact zeros."""
+        momentum, mass = free.T @ (self.M @ x), np.sum(x.conj() * (self.M @ x), axis=0).real
+        own = np.linalg.solve(free.T @ (self.M @ free), momentum)
+        part = np.sum(momentum.conj() * own, axis=0).real / mass
+        noise = 16 * ROUND_OFF * np.sum(np.abs(x) * (abs(self.K) @ np.abs(x)), axis=0) / mass
+        other = (part < 0.5) | (np.abs(s) ** 2 > noise)
+        zeros = np.zeros(free.shape[1])
+        return np.concatenate([zeros, s[other]]), np.hstack([free, x[:, other]])
+
+    # -- buckling ------------------------------------------------------------------------------
+
+    def buckling(self, n: int) -> tuple[Array, Complex]:
+        """At least n factors, if there are so many, and shapes."""
+        u = self._path()
+        right, left = self._with_laws()
+        change = csr_array(left @ self._matrix(self._simulation.tangent_change(self.q, u)) @ right)
+        factors, x = eigensolvers.linear(self.K, -change, n, most=self.K.shape[0], definite=False)
+        x = x[:, np.abs(factors) < 1e9 * np.abs(factors).min(initial=np.inf)]
+        # Among the shapes that were found, by works whose round-off is that of strains.
+        works = self._simulation.tangent_works(self.q, u, right @ x, left.T @ x)
+        factors, mix = eigensolvers.small(works[0], -works[1])
+        return factors, (x @ mix).astype(complex)
+
+    def _with_laws(self) -> tuple[csr_array, csr_array]:
+        """Motions with the forces of laws that they bring, in columns; virtual ones, in rows.
+
+        The tangent between them is K, and its derivative between them is that of K.
+        """
+        T, laws, Z = self._derivative(self.q, AT_REST), self._laws, self._Z
+        flexibility = diags_array(1 / T.diagonal()[laws])
+        of_laws = eye_array(self.grid.size, format="csr")[:, laws]
+        right = Z - of_laws @ (flexibility @ (T[laws, :] @ Z))
+        left = Z.T - ((Z.T @ T[:, laws]) @ flexibility) @ of_laws.T
+        return csr_array(right), csr_array(left)
+
+    def _path(self) -> Array:
+        """Change of the configuration by the loads and motions, as if everything were linear."""
+        simulation, supports = self._simulation, self._simulation.supports
+        r, data = simulation.linearise(self.q, AT_REST)
+        T, Q = self._matrix(data), self._axes()
+        before = supports.in_axes(self.q)
+        given = before.copy()
+        supports.move(given, before, Step(0.0, 1.0, self.q, simulation.t, simulation.t, 1.0))
+        g = Q @ (given - before)
+        Z = Q[:, np.setdiff1d(np.arange(len(g)), supports.dofs)]
+        rest = Z.T @ (r + T @ g)
+        if not rest.any():
+            raise SceneError(
+                f"buckling: nothing acts on the scene at t = {simulation.t:g} s that does not act "
+                "in the state before; give it loads, or another t"
+            )
+        try:
+            return np.asarray(g - Z @ splu((Z.T @ T @ Z).tocsc()).solve(rest))
+        except RuntimeError:
+            raise SceneError("buckling: the scene is free to move in its state") from None
+
+    # -- shapes --------------------------------------------------------------------------------
+
+    def shapes(self, x: Complex) -> Array | Complex:
+        """Motions of all degrees of freedom, the largest displacement one; (size, n)."""
+        shapes = self._Z @ x
+        turns = self._simulation.share.rotations()
+        sizes = np.abs(shapes)
+        sizes[self.grid.multipliers] = 0.0
+        turning = sizes[turns].max(axis=0, initial=0.0)
+        sizes[turns] = 0.0
+        # Where only rotations move, the largest of them is one.
+        only = sizes.max(axis=0, initial=0.0) <= 1e-9 * self.scene.size * turning
+        sizes[np.ix_(turns, only)] = np.abs(shapes[np.ix_(turns, only)])
+        largest = shapes[sizes.argmax(axis=0), np.arange(shapes.shape[1])]
+        shapes = shapes / largest
+        real = np.abs(shapes.imag).max(initial=0.0) <= 1e-8
+        return np.asarray(shapes.real if real else shapes)

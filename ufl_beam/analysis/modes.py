@@ -1,0 +1,328 @@
+# SPDX-License-Identifier: MIT
+"""Small motions: natural frequencies, damping ratios, buckling loads, their shapes."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from mpi4py import MPI
+
+import numpy as np
+
+from ufl_beam.analysis.linearization import SmallMotions
+from ufl_beam.arrays import Array, Complex
+from ufl_beam.discretization.dof_numbering import Grid, Share
+from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.discretization.model_warnings import warn_of_masses
+from ufl_beam.discretization.state_io import State
+from ufl_beam.errors import SceneError, require_count, require_kind, require_number
+from ufl_beam.model.bodies import Anchor
+from ufl_beam.model.constraint_checks import require_no_mechanism
+from ufl_beam.model.loads import FollowerLoad, RotatingFrame
+from ufl_beam.model.mesh_options import Mesh
+from ufl_beam.model.scene import Scene
+from ufl_beam.output.joint_histories import Connection, velocity_of
+from ufl_beam.output.recorders import on_first
+from ufl_beam.output.time_series import VTKHDF, XDMF, TimeSeries
+from ufl_beam.parallel import ours
+from ufl_beam.simulation.initial_state import mesh_of
+from ufl_beam.simulation.solution import Solution
+from ufl_beam.terms.beams import SectionForces
+
+AMPLITUDE = 0.1
+"""Largest displacement of what is shown of a mode, as a part of the size of the scene."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shapes(ABC):
+    """Shapes about a state; the same on every process.
+
+    Attributes:
+        scene: What was modelled.
+        grid: Its vertices, cells and numbering.
+        q: The state; all degrees of freedom in the order of the grid.
+        shapes: Motions of all degrees of freedom, in columns, the largest displacement one (where
+            only rotations move, the largest of them); (size, n); complex if phases differ.
+    """
+
+    scene: Scene
+    grid: Grid
+    q: Array
+    shapes: Array | Complex
+
+    @property
+    @abstractmethod
+    def titles(self) -> list[str]:
+        """Captions of the shapes."""
+
+    def __len__(self) -> int:
+        return int(self.shapes.shape[1])
+
+    def shape(self, k: int, place: Anchor) -> Array | Complex:
+        """Motion (u, v, ψ) of a place in the k-th shape; (3,).
+
+        Raises:
+            SceneError: No such shape, or the place is not in the scene.
+        """
+        self._require(k)
+        shape: Any = self.shapes[:, k]
+        return np.asarray(velocity_of(self.grid, place, [self.q], [shape])[0])
+
+    def motion(self, k: int, *, amplitude: float = AMPLITUDE, count: int = 24) -> Solution:
+        """One period of the k-th shape, for what shows solutions: ``animate``, ``plot_shapes``.
+
+        Args:
+            k: Which.
+            amplitude: Largest displacement, as a part of the size of the scene.
+            count: States from the beginning of the period to its end, at times from 0 to 1.
+
+        Raises:
+            SceneError: No such shape, or a number that is not positive.
+        """
+        self._require(k)
+        require_number(amplitude, "motion: amplitude", positive=True)
+        require_count(count, "motion: count")
+        times = np.arange(count + 1) / count
+        swing = np.outer(np.exp(2j * math.pi * times), self._scaled(k, amplitude)).real
+        states: State = {"q": self.q + swing, "v": np.empty(0), "every": np.array([1])}
+        empty = {"reactions": np.empty(0), "connections": np.empty(0)}
+        solution = Solution(self.scene, self.grid)
+        solution.resume({"times": times, **states, **empty})
+        return solution
+
+    def write(self, path: str | Path, *, amplitude: float = AMPLITUDE) -> None:
+        """Write a time series for ParaView: the k-th shape is what it shows at time k.
+
+        Displacements are those of the state and the shape together, N, V, M those of the shape.
+
+        Args:
+            path: File, ending in ``.xdmf`` or ``.vtkhdf``, see :class:`XDMF`, :class:`VTKHDF`.
+            amplitude: Largest displacement, as a part of the size of the scene.
+
+        Raises:
+            SceneError: The file cannot be written, or there is no shape.
+        """
+        require_number(amplitude, "write: amplitude", positive=True)
+        self._require(0)
+        recorder = VTKHDF(path) if Path(path).suffix == VTKHDF.ending else XDMF(path)
+        on_first(ours(), lambda: self._write(recorder, amplitude))
+
+    def _write(self, recorder: TimeSeries, amplitude: float) -> None:
+        recorder.require_writable()
+        share = Share(self.grid, MPI.COMM_SELF)
+        forces = SectionForces(Fields(share))
+        frames: list[Any] = [
+            _Frame(self, share, forces, float(k), self._scaled(k, amplitude).real)
+            for k in range(len(self))
+        ]
+        try:
+            recorder.open(frames[0])
+            for frame in frames[1:]:
+                recorder.write(frame)
+        finally:
+            recorder.close()
+
+    def _scaled(self, k: int, amplitude: float) -> Array | Complex:
+        """The k-th shape, its largest motion a part of the size; if a rotation, of 1 rad."""
+        shape = self.shapes[:, k]
+        lengths = np.r_[self.grid.dofs, self.grid.dofs_of_bodies][:, :2]
+        size = self.scene.size if np.abs(shape[lengths]).max() > 0.5 else 1.0
+        scaled: Array | Complex = amplitude * size * shape
+        return scaled
+
+    def _require(self, k: int) -> None:
+        if not -len(self) <= k < len(self):
+            raise SceneError(f"there is no shape {k}; there are {len(self)}")
+
+
+class _Frame:
+    """A state with one shape, as recorders look at a simulation."""
+
+    def __init__(
+        self, shapes: Shapes, share: Share, forces: SectionForces, t: float, change: Array
+    ) -> None:
+        self.scene, self.grid, self.comm, self.share = shapes.scene, shapes.grid, share.comm, share
+        self.q, self.t = shapes.q + change, t
+        self._forces, self._state, self._change = forces, shapes.q, change
+
+    may_break = False
+    """True if something yields; modes are elastic."""
+
+    def velocities(self) -> list[Array]:
+        """Shapes have none."""
+        return []
+
+    def material(self) -> list[Any]:
+        """Nothing yields."""
+        return []
+
+    def connections(self) -> Array:
+        """Return nothing: histories of connectors are left out."""
+        return np.zeros((len(self.scene.links), len(Connection._fields)))
+
+    def section_forces(self) -> Array:
+        """Those of the shape alone: a derivative, by a small difference."""
+        ends, ε = np.empty((2, len(self.grid.cells), 3)), 1e-5
+        for sign, end in zip((1.0, -1.0), ends, strict=True):
+            self._forces.write(self._state + sign * ε * self._change, end)
+        return np.asarray((ends[0] - ends[1]) / (2 * ε))
+
+
+@dataclass(frozen=True, eq=False)
+class Modes(Shapes):
+    """Small motions ``x exp(s t)`` about a state.
+
+    Attributes:
+        exponents: s = -ζω ± iω√(1-ζ²) of each, imaginary part not negative, |s| ascending; (n,);
+            1/s.
+    """
+
+    exponents: Complex
+
+    @property
+    def omega(self) -> Array:
+        """Natural circular frequencies |s|; (n,); rad/s."""
+        ω: Array = np.abs(self.exponents)
+        return ω
+
+    @property
+    def frequencies(self) -> Array:
+        """Natural frequencies, ascending; (n,); Hz."""
+        return np.asarray(self.omega / (2 * math.pi))
+
+    @property
+    def damping(self) -> Array:
+        """Damping ratios ζ = -Re s/|s|; (n,).
+
+        Negative: the motion grows; ±1: it does not oscillate; not a number: nothing drives it back.
+        """
+        ω = self.omega
+        ratios: Array = np.full(len(ω), np.nan)
+        np.divide(-self.exponents.real, ω, out=ratios, where=ω > 0)
+        return ratios
+
+    @property
+    def titles(self) -> list[str]:
+        """Frequency, and the damping ratio if there is damping."""
+        pairs = zip(self.frequencies, self.damping, strict=True)
+        damped = [f", ζ = {ζ:.3g}" if abs(ζ) > 1e-6 else "" for _, ζ in pairs]
+        return [f"{f:.4g} Hz{more}" for f, more in zip(self.frequencies, damped, strict=True)]
+
+    def __str__(self) -> str:
+        return "\n".join(f"mode {k}: {title}" for k, title in enumerate(self.titles))
+
+
+@dataclass(frozen=True, eq=False)
+class Buckling(Shapes):
+    """Shapes that the scene leaves its state with, and the factors on its loads.
+
+    Attributes:
+        factors: Factors on the loads, |factor| ascending; negative: with loads reversed; (n,).
+    """
+
+    factors: Array
+
+    @property
+    def titles(self) -> list[str]:
+        """The factors."""
+        return [f"loads × {factor:.4g}" for factor in self.factors]
+
+    def __str__(self) -> str:
+        return "\n".join(f"shape {k}: {title}" for k, title in enumerate(self.titles))
+
+
+def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None = None) -> Modes:
+    """Natural frequencies, damping ratios and shapes of small motions.
+
+    About the undeformed, unloaded scene; or about the last state of a solution, with its section
+    forces, what loads and a :class:`RotatingFrame` add, and with the elastic stiffness of what has
+    yielded: nothing yields or opens further, and hinges that bear nothing any more are joints.
+    What friction holds is held, what slides slides freely; controllers do not answer.
+
+    Without damping they are eigenvalues of K x = ω² M x.  Damping, Coriolis and follower forces
+    make it (K + s C + s² M) x = 0, solved as it is: no modal damping is assumed, what decays
+    without oscillating counts as a mode, and a negative damping ratio is flutter, or buckling if
+    it is -1.
+
+    Args:
+        scene: What is modelled.
+        n: How many, from the lowest; fewer are given if the scene has fewer.
+        at: Solution whose last state is meant, of the same beams joined alike.
+        mesh: How finely it is discretised; as ``at``, or with the cells of the beams.
+
+    Raises:
+        SceneError: The call or the scene is wrong, or nothing that moves has mass.
+    """
+    require_kind(scene, Scene, "modes: scene")
+    require_count(n, "modes: n")
+    if at is None:
+        # Loads that the state does not balance have no part in its stiffness.
+        scene = replace(scene, loads=())
+    else:
+        _require_of(at, scene, mesh, "modes")
+    small = SmallMotions(scene, at, mesh=mesh)
+    if not small.M.data.any():
+        raise SceneError("modes: nothing that can move has mass; give sections rho or rhoA")
+    warn_of_masses(scene)
+    exponents, x = small.exponents(int(n))
+    order = np.argsort(np.abs(exponents), kind="stable")[: int(n)]
+    return Modes(small.scene, small.grid, small.q, small.shapes(x[:, order]), exponents[order])
+
+
+def buckling(
+    scene: Scene,
+    n: int,
+    *,
+    t: float = 1.0,
+    at: Solution | None = None,
+    mesh: Mesh | None = None,
+) -> Buckling:
+    """Factors on the loads at which the scene buckles, (K + λ K') x = 0.
+
+    Loads and prescribed motions grow in proportion, from those of the state ``at`` (λ = 0; nothing
+    without it) to those at the time ``t`` (λ = 1).  K' is the change of stiffness along the first,
+    linear part of their path, by forces and by displacements.  So factors are exact as the state
+    comes near to buckling, and else as good as that path is straight.
+
+    Args:
+        scene: What is modelled.
+        n: How many, from the smallest |λ|.
+        t: Time at which loads are taken; s.
+        at: Solution whose last state the loads grow from, of the same beams joined alike.
+        mesh: How finely it is discretised; as ``at``, or with the cells of the beams.
+
+    Raises:
+        SceneError: The call is wrong, the scene is free to move, nothing acts on it, or what acts
+            has a stiffness of its own.
+    """
+    require_kind(scene, Scene, "buckling: scene")
+    require_count(n, "buckling: n")
+    require_number(t, "buckling: t")
+    for load in scene.loads:
+        if isinstance(load, FollowerLoad | RotatingFrame):
+            raise SceneError(
+                f"buckling: a {type(load).__name__} has a stiffness of its own; use "
+                "modes(..., at=) about states with more and more of it, and see where a frequency "
+                "vanishes or a damping ratio becomes negative"
+            )
+    if at is None:
+        require_no_mechanism(scene)
+    else:
+        _require_of(at, scene, mesh, "buckling")
+    small = SmallMotions(scene, at, t, mesh)
+    factors, x = small.buckling(int(n))
+    order = np.argsort(np.abs(factors), kind="stable")[: int(n)]
+    return Buckling(small.scene, small.grid, small.q, small.shapes(x[:, order]), factors[order])
+
+
+def _require_of(at: Solution, scene: Scene, mesh: Mesh | None, what: str) -> None:
+    require_kind(at, Solution, f"{what}: at")
+    if not Grid(scene, mesh_of(at, mesh)).agrees(at.grid):
+        raise SceneError(
+            f"{what}: at is a solution of other beams, joints or cells; use the same Beam "
+            "objects, joined alike, and the same Mesh"
+        )

@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: MIT
+"""Studies: one scene many times, with other parameters or seeds, several at a time.
+
+Members are handed out by :mod:`mpi4py.futures`.  Since all processes run the same script, each has
+the function of the member itself and only cases travel: it may be a closure, and need not pickle.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import as_completed
+from contextlib import closing
+from contextvars import ContextVar
+from pathlib import Path
+from typing import Any
+
+from mpi4py import MPI
+from mpi4py.futures import MPICommExecutor
+
+from tqdm import tqdm
+
+from ufl_beam.analysis.study_file import Outcome, Study, numbers_of, text_of
+from ufl_beam.errors import SceneError, require_sequence, require_switch, shorten
+from ufl_beam.output.output_files import require_apart, require_path, take
+from ufl_beam.output.recorders import on_first
+from ufl_beam.parallel import alone, communicator
+from ufl_beam.simulation.run import say
+
+Case = dict[str, Any]
+Member = Callable[..., dict[str, Any]]
+
+_MEMBER: ContextVar[Member] = ContextVar("member of the study that this process serves")
+
+
+def study(
+    member: Member,
+    cases: Sequence[Case],
+    *,
+    path: str | Path | None = None,
+    anew: bool = False,
+    progress: bool = True,
+    comm: MPI.Intracomm | None = None,
+) -> Study:
+    """Call ``member(**case)`` for each case, several at a time under ``mpirun``.
+
+    Each member is computed by one process alone, to the same last bit on any number of them.  The
+    first process hands cases out and writes the file at once; it computes nothing and hardly takes
+    time, so ``mpirun -n 9`` occupies eight cores.  Alone, it calls one after the other.
+
+    A member that raises is a failed one: it is reported, and the others go on.
+
+    Args:
+        member: Makes and simulates a scene and returns numbers and arrays by name, the same names
+            and shapes for each case.  Files that it writes need names of their own.
+        cases: Its arguments: ``[{"seed": seed, "mass": m} for m in (1, 2) for seed in range(50)]``;
+            numbers, texts and lists of them, no two alike.
+        path: HDF5 file of the results, written on the way, which takes a twentieth of the time.
+            Cases that the file has are not computed again, unless they failed; what it has of
+            other cases stays.
+        anew: Compute all cases and forget what the file has: when the member has changed.
+        progress: Show a progress bar if the output is a terminal.
+        comm: Processes; all of them, or this one alone in a member of another study.  A member
+            leaves out ``comm`` of :func:`simulate`.
+
+    Returns:
+        Results in the order of the cases.
+
+    Raises:
+        SceneError: The call or the file is wrong, or a member returned something else than numbers
+            and arrays, or not the names and shapes of the others; the file has those before.
+        RuntimeError: All members failed.
+    """
+    comm = communicator(comm, "study: comm")
+    require_switch(anew, "study: anew")
+    require_switch(progress, "study: progress")
+    name = getattr(member, "__name__", type(member).__name__)
+    outputs = [] if path is None else [("study", _files_of(require_path(path, "study")))]
+    todo: dict[str, Case] = {}
+    records: dict[str, tuple[Outcome, float]] = {}
+    result: Study | None = None
+
+    def prepare() -> None:
+        if not callable(member):
+            raise SceneError(f"study: member = {shorten(member)} cannot be called; give a function")
+        for i, case in enumerate(require_sequence(cases, "study: cases")):
+            key = text_of(case, f"study: cases[{i}]")
+            if key in todo:
+                raise SceneError(f"study: cases[{i}] = {case} is there twice")
+            todo[key] = case
+        if not todo:
+            raise SceneError("study: cases is empty")
+        require_apart(outputs, "study")
+        if path is not None and Path(path).exists():
+            old = Study.load(path)
+            if old.member != name and not anew:
+                raise SceneError(f"study {path} is one of {old.member}, not of {name}")
+            for key, (outcome, seconds) in old.records().items() if not anew else ():
+                if key not in todo or not isinstance(outcome, str):
+                    records[key] = outcome, seconds
+        save()  # that it cannot be written is better known now
+
+    def save() -> None:
+        if path is not None:
+            order = [key for key in todo if key in records]
+            order += [key for key in records if key not in todo]
+            Study.of(name, {key: records[key] for key in order}).save(path)
+
+    def gather() -> None:
+        nonlocal result
+        missing = {key: case for key, case in todo.items() if key not in records}
+        bar = tqdm(
+            total=len(todo),
+            initial=len(todo) - len(missing),
+            unit="member",
+            disable=None if progress else True,
+        )
+        next_save = 0.0
+        try:
+            with bar, closing(_outcomes(comm, member, missing)) as outcomes:
+                for key, outcome, seconds in outcomes:
+                    _require_alike(todo[key], outcome, records)
+                    records[key] = outcome, seconds
+                    bar.update()
+                    begin = time.perf_counter()
+                    if begin > next_save:
+                        save()
+                        next_save = time.perf_counter() + 20 * (time.perf_counter() - begin)
+        finally:
+            save()
+        result = Study.of(name, {key: records[key] for key in todo})
+        if len(result.failed) == len(todo):
+            raise RuntimeError(f"study: all {len(todo)} members failed, {result.failed[0]}")
+        if result.failed:
+            say(result)
+
+    on_first(comm, prepare)
+    release = take(outputs)
+    try:
+        if comm.rank > 0:
+            for _ in _outcomes(comm, member, {}):
+                pass  # this process serves until the first one has everything
+        on_first(comm, gather)
+    finally:
+        release()
+    if comm.size > 1:
+        result = comm.bcast(result)
+    assert result is not None
+    return result
+
+
+def _files_of(path: Path) -> tuple[Path, ...]:
+    """The file of a study, and the one that takes its place."""
+    return path, path.parent / f"{path.name}.part"
+
+
+def _outcomes(
+    comm: MPI.Intracomm, member: Member, cases: dict[str, Case]
+) -> Generator[tuple[str, Outcome, float], None, None]:
+    """Case, outcome and seconds as members end; nothing on processes that serve the first one."""
+    before = _MEMBER.set(member)
+    try:
+        if comm.size == 1:
+            for key, case in cases.items():
+                yield key, *_run(case)
+            return
+        with MPICommExecutor(comm, root=0) as executor:
+            pool: Any = executor
+            if pool is not None:
+                futures = {pool.submit(_run, case): key for key, case in cases.items()}
+                try:
+                    for future in as_completed(futures):
+                        yield futures[future], *future.result()
+                finally:
+                    for future in futures:
+                        future.cancel()
+    finally:
+        _MEMBER.reset(before)
+
+
+def _run(case: Case) -> tuple[Outcome, float]:
+    """One member, on the process that serves; its error is an outcome as well."""
+    begin = time.perf_counter()
+    try:
+        with alone():
+            returned = _MEMBER.get()(**case)
+    except Exception as error:
+        return f"{type(error).__name__}: {error}", time.perf_counter() - begin
+    return numbers_of(case, returned), time.perf_counter() - begin
+
+
+def _require_alike(case: Case, outcome: Outcome, records: dict[str, tuple[Outcome, float]]) -> None:
+    """Names and shapes must be those of the first member that did not fail."""
+    if isinstance(outcome, str):
+        return
+    new = {name: outcome[name].shape for name in sorted(outcome)}
+    for other, (row, _) in records.items():
+        if not isinstance(row, str):
+            old = {name: row[name].shape for name in sorted(row)}
+            if new != old:
+                raise SceneError(
+                    f"study: {case} returned names and shapes {new}, but {other} {old}; return "
+                    "the same from all members, and begin a new file if they have changed"
+                )
+            return

@@ -1,0 +1,280 @@
+# SPDX-License-Identifier: MIT
+"""Equilibria near a state of a static path, the load factor among the unknowns."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+
+from ufl_beam.analysis.critical_points import Direction, Stiffness, metric
+from ufl_beam.arrays import Array
+from ufl_beam.errors import StepFailed
+from ufl_beam.mechanics.time_schemes import Step
+from ufl_beam.simulation.simulation import Simulation, Trial
+from ufl_beam.terms.beams import Term
+
+FARTHEST = 30
+"""Times a way is doubled until something dissipates on it."""
+
+BEGUN = 1e-6
+"""Part of a step that tells what dissipates when it begins."""
+
+HALVINGS = 40
+"""Bisections in which the state is sought in which something begins to dissipate."""
+
+MET = 1e-9
+"""Part of a step by which its end may miss what the control demands."""
+
+
+class Constraint(Protocol):
+    """Equation of a step besides equilibrium; without dimension."""
+
+    def miss(self, q: Array, t: float) -> float:
+        """Return the residual in a state."""
+
+    def slope(self, q: Array, way: Direction) -> float:
+        """Its derivative along a way from there."""
+
+
+class Walk:
+    """Corrector of path following: equilibrium augmented by the equation of the control.
+
+    Args:
+        simulation: In statics, where the path begins.
+        factor: Change of the load factor that counts as much as a unit of displacement.
+
+    Attributes:
+        share: The degrees of freedom of this process.
+        weights: See :func:`~ufl_beam.analysis.critical_points.metric`.
+        t: The load factor of the latest iterate.
+        direction: That of the path at the accepted state.
+        dissipates: Whether the last step did.
+        sought: Where the latest attempt began, seen from the accepted state.
+    """
+
+    def __init__(self, simulation: Simulation, factor: float) -> None:
+        self.simulation, self.factor = simulation, factor
+        self.share = simulation.share
+        self.weights = metric(self.share)
+        self.t = simulation.t
+        self.dissipates = False
+        self._driven: list[Term] = [*simulation.loads, *simulation.couplings]
+        self.direction: Direction = Direction(np.zeros(self.share.size), 0.0)
+        self.sought = self.direction
+
+    # -- measures ------------------------------------------------------------------------------
+
+    def product(self, a: Direction, b: Direction, factor: float) -> float:
+        """Of two directions; without dimension."""
+        return self.share.total(float((self.weights * a.q) @ b.q)) + a.t * b.t / factor**2
+
+    def length(self, way: Direction, factor: float) -> float:
+        """Of a direction, however small; without dimension."""
+        along = abs(way.t) / factor
+        largest = max(self.share.largest(float(np.abs(way.q).max(initial=0.0))), along)
+        if largest == 0.0 or not math.isfinite(largest):
+            return largest
+        # Squares of what is below 1e-154 would be nothing.
+        unit = Direction(np.asarray(way.q / largest, dtype=np.float64), way.t / largest)
+        return largest * math.sqrt(self.product(unit, unit, factor))
+
+    def size(self, way: Direction) -> float:
+        """Of the configuration's part of a direction; without dimension."""
+        return self.length(Direction(way.q, 0.0), 1.0)
+
+    def dissipation(self, q: Array) -> float:
+        """Energy that beams and springs dissipate in the step to ``q``; J."""
+        terms = (*self.simulation.inelastic, *self.simulation.couplings)
+        return self.share.total(sum(one.dissipation(q) for one in terms))
+
+    def aim(self, reach: float) -> Direction:
+        """A way along which so much is dissipated, if nothing gives way; ``reach`` in J.
+
+        Where nothing dissipated before, the direction changes as soon as something does.
+
+        Raises:
+            StepFailed: Nothing dissipates.
+        """
+        way = self.direction
+        self.begin()
+        gone = Direction(np.zeros(self.share.size), 0.0)
+        if not self.dissipates:
+            gone = self._until(BEGUN * reach, gone, way)
+            way = self._bent(gone)
+        return self._until(reach, gone, way)
+
+    def bend(self, length: float) -> tuple[Direction, Direction] | None:
+        """Where something begins to dissipate in the direction of the path, and the way from there.
+
+        Args:
+            length: How far along the direction.
+
+        Returns:
+            From the accepted state to the bend, and the direction of the path beyond it; None if
+            nothing begins to dissipate.
+        """
+        way, q = self.direction, self.simulation.q
+        self.begin()
+        if self.dissipates or not self.dissipation(q + length * way.q) > 0:
+            return None
+        low, high = 0.0, length
+        for _ in range(HALVINGS):
+            middle = (low + high) / 2
+            begun = self.dissipation(q + middle * way.q) > 0
+            low, high = (low, middle) if begun else (middle, high)
+        gone = Direction(high * way.q, high * way.t)
+        return gone, self._bent(gone)
+
+    def _bent(self, gone: Direction) -> Direction:
+        """Direction of the path where something has just begun to dissipate."""
+        self.t, q = self.simulation.t + gone.t, self.simulation.q + gone.q
+        way = self.flow(self.look(q))
+        return Direction(-way.q, -way.t) if self.side(q, way) < 0 else way
+
+    def _until(self, reach: float, gone: Direction, way: Direction) -> Direction:
+        """Return the step so far, and as much more along a direction as dissipates ``reach``."""
+
+        def dissipated(length: float) -> float:
+            return self.dissipation(self.simulation.q + gone.q + length * way.q)
+
+        low, high = 0.0, 1e-6 / self.length(way, self.factor)
+        for _ in range(FARTHEST):
+            if dissipated(high) >= reach:
+                break
+            low, high = high, 2 * high
+        else:
+            raise StepFailed("nothing dissipates in the direction of the path")
+        for _ in range(12):
+            middle = (low + high) / 2
+            low, high = (middle, high) if dissipated(middle) < reach else (low, middle)
+        return Direction(gone.q + high * way.q, gone.t + high * way.t)
+
+    def side(self, q: Array, way: Direction) -> float:
+        """Positive where more dissipates along a way from ``q``, negative where against it."""
+        now, size = self.dissipation(q), self.size(way)
+        flows = self.share.total(float(any(one.flows() for one in self.simulation.couplings)))
+        for doubled in range(FARTHEST if (now > 0 or flows) and size > 0 else 0):
+            δ = 1e-9 * 2**doubled / size
+            more = self.dissipation(q + δ * way.q) - self.dissipation(q - δ * way.q)
+            if abs(more) > now:
+                return more
+        return 0.0
+
+    # -- the border ----------------------------------------------------------------------------
+
+    def step_at(self, t: float) -> Step:
+        """A path is infinitely slow: rates and what they do vanish."""
+        return Step(-math.inf, t, self.simulation.q, load_time=t, motion_time=t, toward=1.0)
+
+    @staticmethod
+    def _give(step: Step, terms: Sequence[Term]) -> None:
+        for term in terms:
+            term.begin(step)
+
+    def _moved(self, t: float) -> Array:
+        """Return the prescribed motions at the degrees of freedom of supports; zero elsewhere."""
+        x = np.zeros(self.share.size)
+        self.simulation.supports.move(x, x, self.step_at(t))
+        return x
+
+    def arrive(self, x: Array) -> None:
+        """Bring the loads to the load factor of an iterate."""
+        self._x = x.copy()
+        self._give(self.step_at(self.t), self._driven)
+
+    def tangent(self, x: Array, r: Array) -> None:
+        """Fill the matrix; the derivative by the load factor, of linear functions exactly."""
+        simulation = self.simulation
+        q = simulation.supports.in_plane(x)
+        ε = 1e-6 * max(1.0, abs(self.t))
+        for sign in (1, -1):
+            self._give(self.step_at(self.t + sign * ε), self._driven)
+            part = np.zeros(self.share.size)
+            for term in self._driven:
+                term.add_residual(q, part)
+            r += sign / (2 * ε) * part
+        self._give(self.step_at(self.t), self._driven)
+        for term in self._driven:
+            term.add_residual(q, np.zeros(self.share.size))
+        simulation.supports.enter(r)
+        rates = (self._moved(self.t + ε) - self._moved(self.t - ε)) / (2 * ε)
+        self._rates = np.asarray(rates, dtype=np.float64)
+        self._A = simulation.tangent_at(x, self._rates, r)
+
+    def correct(self, y: Array, z: Array) -> None:
+        """By the equation of the control, linearised."""
+        supports, moving = self.simulation.supports, self.simulation.supports.moving
+        if len(moving):
+            z = z - self._rates
+        q = supports.in_plane(self._x)
+        miss = self._constraint.miss(q, self.t)
+        by_y = self._constraint.slope(q, Direction(supports.in_plane(y), 0.0))
+        by_z = self._constraint.slope(q, Direction(supports.in_plane(z), -1.0))
+        change = (miss - by_y) / by_z if by_z else math.nan
+        y += change * z
+        self.t += change
+        y[moving] = self._x[moving] - self._moved(self.t)[moving]
+
+    def met(self) -> bool:
+        """Return whether the control has what it demands."""
+        q = self.simulation.supports.in_plane(self._x)
+        return abs(self._constraint.miss(q, self.t)) <= MET
+
+    # -- a step --------------------------------------------------------------------------------
+
+    def attempt(
+        self, way: Direction, length: float, constraint: Constraint, *, hold: bool = True
+    ) -> Trial:
+        """Solve, beginning so far along a way.
+
+        Args:
+            way: The direction.
+            length: How far.
+            constraint: Demanded besides equilibrium.
+            hold: Whether what does not flow stays closed if it can, see openings.py; not on a way
+                along which it opens.
+
+        Raises:
+            StepFailed: There is no equilibrium.
+        """
+        simulation = self.simulation
+        self._constraint = constraint
+        self.sought = Direction(length * way.q, length * way.t)
+        self.t = simulation.t + length * way.t
+        step, guess = self.step_at(self.t), simulation.q + length * way.q
+        simulation.supports.enter(guess)
+        simulation.together(simulation.supports.move, guess, guess, step)
+        trial = simulation.attempt_along(step, guess, self, hold=hold)
+        return trial._replace(step=self.step_at(self.t))
+
+    def begin(self) -> None:
+        """Let all terms begin a step at the present state and load factor."""
+        simulation = self.simulation
+        simulation.together(self._give, self.step_at(simulation.t), simulation.terms)
+
+    def look(self, q: Array) -> Stiffness:
+        """The stiffness at a state."""
+        supports = self.simulation.supports
+        x = supports.in_axes(q)
+        # The first tangent of a step is that of the forces before it, and may not yet be taken.
+        together = self.simulation.together
+        together(self.tangent, x, np.zeros(self.share.size))
+        rate = np.zeros(self.share.size)
+        together(self.tangent, x, rate)
+        return Stiffness(self.share, self._A, supports.dofs, rate)
+
+    def flow(self, stiffness: Stiffness) -> Direction:
+        """Direction of the path of growing load factor."""
+        q = stiffness.flow[self.share.dofs] + self._rates
+        self.simulation.supports.leave(q)
+        way = Direction(q, 1.0)
+        size = self.length(way, self.factor)
+        if not math.isfinite(size) or not self.size(way) > 0:
+            raise StepFailed(
+                "nothing moves with the load factor here; let a load or a motion go on to change, "
+                "as with time=lambda t: t"
+            )
+        return Direction(q / size, 1.0 / size)

@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: MIT
+"""Errors by self-convergence: from runs on three levels of a dial to order, limit and uncertainty.
+
+Level k of a dial is 2**k times as fine as level 0.  Richardson's extrapolation, with the safety
+factors of Roache's grid convergence index (J. Fluids Eng. 116 (1994) 405).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import scipy  # its parts are loaded when they are used
+
+from ufl_beam.arrays import Array
+
+Level = tuple[int, int]
+"""Of the cells and of the steps."""
+
+LEAST_ORDER = 0.5
+"""Differences that fall more slowly than with this power show no convergence."""
+
+NEAR = 0.25
+"""An observed order so near to a whole one, up to that of the method, is trusted."""
+
+SURE, UNSURE = 1.25, 3.0
+"""Safety factors on errors that are extrapolated with a trusted order, and on others."""
+
+ALIGNED = 0.5
+"""Cosine between changes of one direction; what turns is not extrapolated."""
+
+MIXED = 0.5
+"""Two dials are taken one by one if the errors of one depend on the other by less than this."""
+
+
+def size(values: Array) -> float:
+    """Largest magnitude."""
+    return float(np.abs(values).max(initial=0.0))
+
+
+@dataclass(frozen=True)
+class Convergence:
+    """Convergence of a quantity with one dial, from three levels.
+
+    Attributes:
+        finest: The finest of the three levels.
+        differences: Size of the change from the first level to the second, and to the third.
+        order: Observed.
+        aligned: Whether both changes are of one direction; if not, nothing is extrapolated.
+        used: Order that errors are predicted with, not above that of the method; 0 where changes
+            are negligible.
+        method: Order of the method; with it errors grow towards levels coarser than the three.
+        error: Of the finest level; where changes are negligible, of every level.
+        rest: What the finest level lacks of the limit, with its sign.
+        safety: Factor by which ``error`` may be wrong.
+    """
+
+    finest: int
+    differences: tuple[float, float]
+    order: float
+    aligned: bool
+    used: float
+    method: float
+    error: float
+    rest: Array
+    safety: float
+
+    @classmethod
+    def of(
+        cls, values: tuple[Array, Array, Array], finest: int, method: float, floor: float
+    ) -> Convergence:
+        """From the values on three levels, the finest last.
+
+        Args:
+            values: Of the quantity.
+            finest: The last of their levels.
+            method: Order that the method has in theory.
+            floor: Changes up to here are negligible; unit of the quantity.
+        """
+        first, second = values[1] - values[0], values[2] - values[1]
+        a, b = size(first), size(second)
+        if max(a, b) <= floor:
+            return cls(
+                finest, (a, b), 0.0, False, 0.0, method, max(a, b), np.asarray(0 * second), UNSURE
+            )
+        order = math.log2(a / b) if min(a, b) > 0 else math.copysign(math.inf, a - b)
+        lengths = np.linalg.norm(first) * np.linalg.norm(second)
+        aligned = bool(np.vdot(first, second) >= ALIGNED * lengths)
+        used = min(max(order, LEAST_ORDER), method)
+        # What fell faster than the method can explain may have passed through zero.
+        error = max(b, a / 2**method) / (2**used - 1)
+        whole = any(abs(order - k) <= NEAR for k in range(1, round(method) + 1))
+        safety = SURE if aligned and whole else UNSURE
+        rest = np.asarray(aligned * second / (2**used - 1))
+        return cls(finest, (a, b), order, aligned, used, method, error, rest, safety)
+
+    @property
+    def seen(self) -> bool:
+        """True if changes fall, or are negligible."""
+        return self.used == 0 or self.order >= LEAST_ORDER
+
+    def at(self, level: float) -> float:
+        """Error at a level, which need not be whole, with its safety factor; unit of quantity."""
+        coarser = max(0.0, self.finest - 2 - level)
+        growth = self.used * (self.finest - level - coarser) + self.method * coarser
+        return self.safety * self.error * 2**growth
+
+    def __str__(self) -> str:
+        a, b = self.differences
+        if self.used == 0:
+            return f"changes by {max(a, b):.1e} at most: negligible"
+        turns = "" if self.aligned else ", to and fro"
+        return f"changes by {a:.1e}, then {b:.1e}: order {self.order:.2f}{turns}"
+
+
+@dataclass(frozen=True)
+class Cross:
+    """Self-convergence of a quantity with cells and with steps, one by one and together.
+
+    Attributes:
+        cells: With the cells.
+        steps: With the steps.
+        limit: Extrapolated value.
+        mixed: What refining both changes that refining each does not, extrapolated.
+    """
+
+    cells: Convergence
+    steps: Convergence
+    limit: Array
+    mixed: float
+
+    @staticmethod
+    def levels(base: Level) -> list[Level]:
+        """The runs it takes, the cheap ones first."""
+        i, j = base
+        return [(i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1), (i + 2, j), (i, j + 2)]
+
+    @classmethod
+    def of(
+        cls, values: Mapping[Level, Array], base: Level, methods: tuple[float, float], floor: float
+    ) -> Cross:
+        """From the values at :meth:`levels`; ``methods`` are the orders in theory."""
+        i, j = base
+        q = values[base]
+        cells = Convergence.of((q, values[i + 1, j], values[i + 2, j]), i + 2, methods[0], floor)
+        steps = Convergence.of((q, values[i, j + 1], values[i, j + 2]), j + 2, methods[1], floor)
+        mixed = values[i + 1, j + 1] - values[i + 1, j] - values[i, j + 1] + q
+        parts = [1 - 2**-dial.used for dial in (cells, steps)]
+        mixed = np.asarray(mixed / math.prod(parts) if all(parts) else 0 * q)
+        limit = values[i + 2, j] + cells.rest + values[i, j + 2] + steps.rest - q + mixed
+        return cls(cells, steps, limit, size(mixed))
+
+    @property
+    def separate(self) -> bool:
+        """True if the errors of both dials add up."""
+        i, j = self.cells.finest - 2, self.steps.finest - 2
+        return self.mixed <= MIXED * (self.cells.at(i) + self.steps.at(j))
+
+    @property
+    def seen(self) -> bool:
+        """True if self-convergence is seen."""
+        return self.cells.seen and self.steps.seen and self.separate
+
+    def error(self, i: float, j: float) -> float:
+        """Bound of the error at levels that need not be whole; unit of the quantity."""
+        fallen = self.cells.used * (i - self.cells.finest + 2)
+        fallen += self.steps.used * (j - self.steps.finest + 2)
+        return self.cells.at(i) + self.steps.at(j) + self.mixed * 2**-fallen
+
+    @property
+    def uncertainty(self) -> float:
+        """Of the limit; unit of the quantity."""
+        return self.error(self.cells.finest, self.steps.finest) + self.mixed / 4
+
+    def __str__(self) -> str:
+        together = "" if self.separate else f"\n    together: {self.mixed:.1e} more than one by one"
+        return f"\n    cells: {self.cells}\n    steps: {self.steps}{together}"
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Wall time of a run: ``begin + steps (step + cell cells)``; s."""
+
+    begin: float
+    step: float
+    cell: float
+
+    @classmethod
+    def of(cls, steps: Array, cells: Array, seconds: Array) -> Cost:
+        """Fitted to runs, relative differences by least squares; no coefficient is negative."""
+        rows = np.stack([np.ones_like(steps), steps, steps * cells], axis=1)
+        return cls(*scipy.optimize.nnls(rows / seconds[:, None], np.ones_like(seconds))[0].tolist())
+
+    def slower(self, factor: float) -> Cost:
+        """So many times as slow."""
+        return Cost(factor * self.begin, factor * self.step, factor * self.cell)
+
+    def seconds(self, steps: float, cells: float) -> float:
+        """Predicted wall time; s."""
+        return self.begin + steps * (self.step + self.cell * cells)
+
+
+def pareto(seconds: Array, errors: Array) -> list[int]:
+    """Runs that no other one beats in time and error, the fastest first."""
+    front: list[int] = []
+    for k in np.lexsort((errors, seconds)):
+        if not front or errors[k] < errors[front[-1]]:
+            front.append(int(k))
+    return front

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: MIT
+"""Results of the members of a study, and their file."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.errors import SceneError, require_kind
+
+Outcome = dict[str, Array] | str
+"""Result of a member, or the reason of its failure."""
+
+FORMAT = "study of ufl_beam, 1"
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """Results of the members of a study, the same on every process.
+
+    ``study["peak"]`` has a row for each case; that of a failed member is NaN.
+
+    Attributes:
+        member: Name of the function.
+        cases: What it was called with; lists where these were tuples or arrays.
+        results: What it returned; (len(cases), ...) each.
+        failed: Number of a case that failed, and its error.
+        seconds: Wall time of each member; (len(cases),); s.
+    """
+
+    member: str
+    cases: tuple[dict[str, Any], ...]
+    results: dict[str, Array]
+    failed: dict[int, str]
+    seconds: Array
+
+    @classmethod
+    def of(cls, member: str, records: dict[str, tuple[Outcome, float]]) -> Study:
+        """From outcome and seconds of each case, cases as :func:`text_of`."""
+        outcomes = [outcome for outcome, _ in records.values()]
+        first: dict[str, Array] = next((row for row in outcomes if not isinstance(row, str)), {})
+        none = {name: np.full_like(first[name], np.nan) for name in sorted(first)}
+        return cls(
+            member,
+            tuple(map(json.loads, records)),
+            {
+                k: np.array([none[k] if isinstance(o, str) else o[k] for o in outcomes])
+                for k in none
+            },
+            {i: outcome for i, outcome in enumerate(outcomes) if isinstance(outcome, str)},
+            np.array([seconds for _, seconds in records.values()]),
+        )
+
+    def records(self) -> dict[str, tuple[Outcome, float]]:
+        """Return the data that :meth:`of` makes this study from."""
+        found: dict[str, tuple[Outcome, float]] = {}
+        for i, case in enumerate(self.cases):
+            row = {name: values[i] for name, values in self.results.items()}
+            found[text_of(case)] = self.failed.get(i, row), float(self.seconds[i])
+        return found
+
+    def __len__(self) -> int:
+        return len(self.cases)
+
+    def __getitem__(self, name: str) -> Array:
+        if name not in self.results:
+            raise SceneError(f"study: no result {name!r}; there is {', '.join(self.results)}")
+        return self.results[name]
+
+    def __str__(self) -> str:
+        lines = [f"study of {self.member}: {len(self)} members, {len(self.failed)} failed"]
+        lines += [f"  failed: {self.cases[i]}: {error}" for i, error in self.failed.items()]
+        return "\n".join(lines)
+
+    def save(self, path: str | Path) -> None:
+        """Write an HDF5 file; one that is there is replaced once the new one is complete.
+
+        Raises:
+            SceneError: The file cannot be written.
+        """
+        import h5py
+
+        path = Path(path)
+        if not path.parent.is_dir():
+            raise SceneError(f"study {path}: there is no directory {path.parent}; make it first")
+        part, text = path.with_name(path.name + ".part"), h5py.string_dtype()
+        errors = [self.failed.get(i, "") for i in range(len(self))]
+        try:
+            with h5py.File(part, "w") as file:
+                file.attrs["format"], file.attrs["member"] = FORMAT, self.member
+                file.create_dataset("cases", data=[*map(text_of, self.cases)], dtype=text)
+                file.create_dataset("errors", data=errors, dtype=text)
+                file["seconds"] = self.seconds
+                results = file.create_group("results")
+                for name, values in self.results.items():
+                    results[name] = values
+            os.replace(part, path)
+        except OSError as error:
+            raise SceneError(f"study {path} cannot be written: {error}") from None
+
+    @classmethod
+    def load(cls, path: str | Path) -> Study:
+        """Read what :meth:`save` or :func:`study` wrote.
+
+        Raises:
+            SceneError: There is no such file, or it holds no study, or is damaged.
+        """
+        import h5py
+
+        if not Path(path).is_file():
+            raise SceneError(f"study {path}: there is no such file")
+        try:
+            with h5py.File(path, "r") as file:
+                if file.attrs["format"] != FORMAT:
+                    raise ValueError(f"its format is {file.attrs['format']!r}")
+                return cls(
+                    file.attrs["member"],
+                    tuple(map(json.loads, file["cases"].asstr()[()])),
+                    {name: values[()] for name, values in file["results"].items()},
+                    {i: error for i, error in enumerate(file["errors"].asstr()[()]) if error},
+                    file["seconds"][()],
+                )
+        except (OSError, KeyError, ValueError) as error:
+            raise SceneError(
+                f"study {path}: the file holds no study, or is damaged: {error}"
+            ) from None
+
+
+def text_of(case: dict[str, Any], what: str = "case") -> str:
+    """The case as JSON, by which cases are compared: all digits, names in alphabetical order.
+
+    Raises:
+        SceneError: It is no dict, or a value is no number or text and no list of these.
+    """
+    require_kind(case, dict, what)
+    for name in case:
+        require_kind(name, str, f"{what}: name")
+    try:
+        return json.dumps(case, sort_keys=True, ensure_ascii=False, default=_plain)
+    except (TypeError, ValueError):
+        raise SceneError(
+            f"{what} = {case}: values must be numbers, texts or lists of them; let the member "
+            "make of these what else it needs"
+        ) from None
+
+
+def numbers_of(case: dict[str, Any], returned: Any) -> dict[str, Array]:
+    """Return the result of a member as arrays of floats.
+
+    Raises:
+        SceneError: It is no dict of numbers and arrays.
+    """
+    if not isinstance(returned, dict) or not returned:
+        raise SceneError(f"study: {case} returned {returned!r}; return a dict of numbers or arrays")
+    arrays = {}
+    for name, value in returned.items():
+        if not isinstance(name, str) or name in {"", "."} or "/" in name:
+            raise SceneError(f"study: {case} returned {name!r}, which is no name of a result")
+        try:
+            array = np.asarray(value)
+        except ValueError:  # rows of different lengths
+            array = np.asarray(None)
+        if array.dtype.kind not in "biuf":
+            raise SceneError(
+                f"study: {case} returned {name} = {value!r}, which is no number or array of them"
+            )
+        arrays[name] = array.astype(float)
+    return arrays
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    raise TypeError

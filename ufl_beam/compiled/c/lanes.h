@@ -1,0 +1,61 @@
+/* SPDX-License-Identifier: MIT */
+/* Vectors of numbers, one for each of the cells that are computed at once, and what FFCx's kernels
+ * ask of them; see simd_kernels.py.
+ */
+
+/* Numbers that NumPy has put somewhere. */
+typedef double lanes __attribute__((vector_size(8 * LANES), aligned(8), may_alias));
+typedef int64_t mask __attribute__((vector_size(8 * LANES), aligned(8), may_alias));
+
+#define ALL(x) ((lanes){0} + (x))
+#define PICK(m, a, b) ((lanes)(((m) & (mask)ALL(a)) | (~(m) & (mask)ALL(b))))
+
+/* The polynomials of sine and cosine are those of fdlibm, k_sin.c and k_cos.c:
+ *
+ * Copyright (C) 1993 by Sun Microsystems, Inc. All rights reserved.
+ *
+ * Developed at SunSoft, a Sun Microsystems, Inc. business.
+ * Permission to use, copy, modify, and distribute this
+ * software is freely granted, provided that this notice
+ * is preserved.
+ */
+
+/* sin(x + quarter π/2): the nearest multiple of π/2 is taken off in three parts (Cody and Waite);
+ * the polynomials between -π/4 and π/4 are those of fdlibm (Sun Microsystems, 1993), good to the
+ * last digit. x loses digits beyond 1e6, where it has few itself, and must stay below 1e15. */
+static inline lanes trigonometric(lanes x, int64_t quarter)
+{
+  const lanes shifted = x * 0x1.45f306dc9c883p-1 + 0x1.8p52, k = shifted - 0x1.8p52;
+  const mask n = (mask)shifted + quarter, odd = -(n & 1);
+  lanes r = x - k * 0x1.921fb544p0;
+  r -= k * 0x1.0b4611a6p-34;
+  r -= k * 2.02226624879595063154e-21;
+  const lanes z = r * r, half = z / 2, rest = 1 - half;
+  const lanes sine = r + z * r *
+    (-1.66666666666666324348e-01 + z * (8.33333333332248946124e-03 + z *
+    (-1.98412698298579493134e-04 + z * (2.75573137070700676789e-06 + z *
+    (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)))));
+  const lanes cosine = rest + (((1 - rest) - half) + z * z *
+    (4.16666666666666019037e-02 + z * (-1.38888888888741095749e-03 + z *
+    (2.48015872894767294178e-05 + z * (-2.75573143513906633035e-07 + z *
+    (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11))))));
+  return (lanes)((mask)PICK(odd, cosine, sine) ^ ((n & 2) << 62));
+}
+
+static inline lanes lanes_sin(lanes x) { return trigonometric(x, 0); }
+static inline lanes lanes_cos(lanes x) { return trigonometric(x, 1); }
+static inline lanes lanes_fabs(lanes x) { return (lanes)((mask)x & INT64_MAX); }
+
+static inline lanes lanes_sqrt(lanes x)
+{
+  for (int l = 0; l < LANES; ++l) x[l] = sqrt(x[l]);
+  return x;
+}
+
+static inline lanes lanes_pow(lanes x, int n)
+{
+  lanes y = ALL(1);
+  for (int k = 0; k < (n < 0 ? -n : n); ++k) y *= x;
+  if (n < 0) y = 1 / y;
+  return y;
+}

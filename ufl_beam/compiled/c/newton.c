@@ -1,0 +1,227 @@
+/* SPDX-License-Identifier: MIT */
+/* The equation of a step as SNES asks for it, without Python; see newton.py.
+ *
+ * What has no loop in C is a part all the same: a function that calls Python.
+ */
+
+/* The residual at q; what supports carry is noted and removed. */
+void residual(equation *e, const double *q, double *r)
+{
+  memset(e->inner_force, 0, e->size * sizeof *r);
+  for (int k = 0; k < e->inner; ++k) e->force[k].add(e->force[k].self, q, e->inner_force);
+  memcpy(r, e->inner_force, e->size * sizeof *r);
+  for (int k = e->inner; k < e->forces; ++k) e->force[k].add(e->force[k].self, q, r);
+  for (int k = 0; k < e->held; ++k) {
+    e->reactions[k] = r[e->hold[k]];
+    r[e->hold[k]] = 0;
+  }
+}
+
+/* The tangent at q. What stands on the diagonal has the right dimension and size for what is held;
+ * where material that flows freely leaves nothing, what stood there before does as well. */
+void assemble(equation *e, const double *q)
+{
+  memset(e->tangent, 0, e->entries * sizeof *e->tangent);
+  for (int k = 0; k < e->stiffnesses; ++k)
+    e->stiffness[k].add(e->stiffness[k].self, q, e->tangent);
+  for (int k = 0; k < e->held; ++k)
+    if (e->tangent[e->pivot[k]] != 0) e->pivots[k] = e->tangent[e->pivot[k]];
+  for (int k = 0; k < e->zeros; ++k) e->tangent[e->zero[k]] = 0;
+  for (int k = 0; k < e->held; ++k) e->tangent[e->pivot[k]] = e->pivots[k];
+  for (int k = 0; k < e->idle; ++k) e->tangent[e->idle_entry[k]] += e->idle_stiffness[k];
+}
+
+/* Iterations that a tangent may still cost if it is kept: making one costs as much as two. */
+enum { MORE = 3 };
+
+/* Part of the tolerance that is met by no luck, before the least number of iterations. */
+static const double SURE = 1e-4;
+
+static int demands_met(const equation *e, const double *q, double scale)
+{
+  for (int k = 0; k < e->demands; ++k)
+    if (!(e->demand[k].missed(e->demand[k].self, q, e->residual, scale, e->moved) <= e->rtol))
+      return 0;
+  return 1;
+}
+
+/* Whether Newton's method has arrived, goes on, or goes nowhere.
+ *
+ * `floor` is several times the residual that the last digits of the unknowns make.
+ */
+int judge(equation *e, const double *q, int iteration, double residual, double scale, double floor)
+{
+  const double wanted = e->rtol * scale;
+  /* Small loads beside large ones, such as those that make columns buckle, are lost in a guess that
+   * just meets the tolerance; the residual of an iterate is about the square of the one before. */
+  const double enough = iteration < e->least ? SURE * wanted : wanted;
+  if (residual <= enough && demands_met(e, q, scale)) return CONVERGED;
+  const int kept = e->near;
+  e->near = 0;
+  if (iteration > 1) {
+    /* A fraction of the last digit is luck; a few of them that Newton's method no longer halves are
+     * all that can be had: it may go round between two such states for ever. */
+    const int stays = !kept && e->last / 2 < residual && residual <= floor;
+    if ((stays || residual <= floor / 80) && demands_met(e, q, scale)) return AT_ROUND_OFF;
+    /* With the tangent of the iterate before, the residual falls by twice the last factor; works are
+     * to come out as with a new one, so it must be far enough. */
+    e->near = !kept && residual > floor && 2000 * residual * (residual / e->last) <= wanted;
+  }
+  if (e->modified) {
+    /* The residual goes on to fall as it did, if the tangent is kept; from step to step too. */
+    if (iteration > 0) e->rate = residual / e->last;
+    e->near |= residual * pow(e->rate, MORE) <= wanted;
+  }
+  e->slow += 1;
+  if (residual <= e->best / 2) e->best = residual, e->slow = 0;
+  e->last = residual;
+  return e->slow == e->patience ? STALLED : ITERATING;
+}
+
+/* Largest motion in the scene, at most its size. */
+double motion_of(const equation *e, const double *q)
+{
+  return fmin(largest_motion(e->size, e->weight, q), e->scene);
+}
+
+/* Spacing of the numbers around displacements and rotations: the last digits of what they are part
+ * of. Strains are computed from them to their own relative precision, as long as rotations are small.
+ * The next number has the next pattern of bits. */
+void find_last_digits(const equation *e, const double *q, double *digits)
+{
+  const double amplitude = e->moved / e->scene;
+  for (int i = 0; i < e->size; ++i) {
+    const double far = fabs(q[i]) + amplitude * e->lengths[i];
+    union { double number; int64_t bits; } next = {far};
+    next.bits += 1;
+    digits[i] = e->moves[i] * (next.number - far);
+  }
+}
+
+/* SNESShellGetContext, which is asked before anything else is known. */
+int (*shell_context)(void *snes, void *context);
+
+/* -- what SNES calls --------------------------------------------------------------------------- */
+
+int snes_function(void *snes, void *x, void *f, void *self)
+{
+  equation *e = self;
+  const double *q;
+  double *r;
+  int error = e->petsc->read(x, &q);
+  if (error) return error;
+  if ((error = e->petsc->write(f, &r))) return error;
+  residual(e, q, r);
+  if ((error = e->petsc->end_write(f, &r))) return error;
+  return e->petsc->end_read(x, &q);
+}
+
+int snes_jacobian(void *snes, void *x, void *A, void *P, void *self)
+{
+  equation *e = self;
+  const double *q;
+  double *entries; /* they are those of e; asking for them tells PETSc that they change */
+  if (e->near) return 0;
+  int error = e->petsc->read(x, &q);
+  if (error) return error;
+  if ((error = e->petsc->entries(P, &entries))) return error;
+  assemble(e, q);
+  if ((error = e->petsc->end_entries(P, &entries))) return error;
+  return e->petsc->end_read(x, &q);
+}
+
+/* Size of forces, see Solver; N. */
+double size_of_forces(const equation *e, const double *f)
+{
+  const double sum = sum_of_squares(e->size, e->weight, f);
+  if (has_its_digits(sum)) return sqrt(sum);
+  const double largest = largest_size(e->size, e->weight, f);
+  if (largest == 0 || !isfinite(largest)) return largest;
+  return largest * sqrt(scaled_sum_of_squares(e->size, e->weight, f, largest));
+}
+
+/* What becomes of an iterate q. */
+static int verdict(equation *e, const double *q, int iteration)
+{
+  const double now = size_of_forces(e, e->residual);
+  if (!isfinite(now)) return DIVERGED;
+  const double scale = e->loads + size_of_forces(e, e->inner_force);
+  double floor = 0;
+  if (iteration > 1 || e->demands) e->moved = motion_of(e, q);
+  if (iteration > 1 && (now > e->rtol * scale || e->demands)) {
+    find_last_digits(e, q, e->space);
+    for (int i = 0; i < e->size; ++i) e->space[i] *= e->tangent[e->diagonal[i]];
+    floor = 8 * size_of_forces(e, e->space);
+  }
+  return judge(e, q, iteration, now, scale, floor);
+}
+
+int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int *reason, void *self)
+{
+  equation *e = self;
+  const double *q;
+  int error = e->petsc->read(e->x, &q);
+  if (error) return error;
+  *reason = verdict(e, q, (int)iteration);
+  return e->petsc->end_read(e->x, &q);
+}
+
+#define TRY(call) do { int error = (call); if (error) return error; } while (0)
+
+/* Factors of the tangent; *failed if it is singular. */
+int factor_tangent(const equation *e, int *failed)
+{
+  const petsc *p = e->petsc;
+  double *entries; /* asking for them tells PETSc that they change */
+  TRY(p->entries(e->left, &entries));
+  eliminate(e->chains);
+  TRY(p->end_entries(e->left, &entries));
+  if ((*failed = !all_finite(e->chains->left, e->chains->left_data))) return 0;
+  if (!p->factor(e->factors)) return p->failed(e->factors, failed);
+  *failed = 1; /* KLU says so of a singular matrix */
+  return 0;
+}
+
+/* What Newton's method subtracts from the iterate. */
+int solve_tangent(const equation *e)
+{
+  reduce(e->chains, e->residual);
+  TRY(e->petsc->apply(e->factors, e->left_f, e->left_x));
+  expand(e->chains, e->found, e->change);
+  return 0;
+}
+
+/* Newton's method with full steps, as a solver of SNES: what its own does beside that takes as long
+ * as all the rest where there are few unknowns. */
+int snes_newton(void *snes, void *x)
+{
+  equation *e;
+  double *q;
+  int iteration = 0, reason;
+  TRY(shell_context(snes, &e));
+  const petsc *p = e->petsc;
+  TRY(p->write(x, &q));
+  residual(e, q, e->residual);
+  while (!(reason = verdict(e, q, iteration))) {
+    if (iteration == e->most) {
+      reason = TOO_MANY;
+      break;
+    }
+    if (!e->near) {
+      int failed = 0;
+      assemble(e, q);
+      TRY(factor_tangent(e, &failed));
+      if (failed) {
+        reason = SINGULAR;
+        break;
+      }
+    }
+    TRY(solve_tangent(e));
+    for (int i = 0; i < e->size; ++i) q[i] -= e->change[i];
+    residual(e, q, e->residual);
+    ++iteration;
+  }
+  TRY(p->end_write(x, &q));
+  TRY(p->set_iterations(snes, iteration));
+  return p->set_reason(snes, reason);
+}

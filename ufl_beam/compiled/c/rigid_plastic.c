@@ -1,0 +1,106 @@
+/* SPDX-License-Identifier: MIT */
+/* Rigid-plastic connectors, such as plastic hinges: held up to a limit, then following a law. */
+
+/* What the kernels know of a connector; the order in rigid_plastic.py. */
+enum { SLIP, SLIP_DIRECTION, SLIPPED, SLIP_START };
+
+/* What the kernel of the end of a step says; the order in rigid_plastic.py. */
+enum { SLIP_DISSIPATED, SLIP_LOST, SLIP_STORED, SLIP_LIMIT, SLIP_BACK_FORCE, SLIP_SAID };
+
+static void set_slip(double *w, double motion, int way)
+{
+  w[SLIP] = fmax(way * motion, 0), w[SLIP_DIRECTION] = way;
+}
+
+/* Direction in which connector i slips in an iterate, or 0 if it is held.
+ *
+ * With R the resistance after the motion m, and any r > 0, the equation for the force f is
+ *
+ *     r m = 0 where |f + r m| <= R, else f = R or -R:
+ *
+ * its residual is continuous in f and m, as Newton's method wants. While HOLD is set, those that did
+ * not slip in the last step are held, and their excess is |force| / limit - 1.
+ */
+static int direction_of_slip(const rigid_plastic *p, int i, double *w, double motion, double force)
+{
+  const double limit = p->limit[i] * (1 + 1e-12);
+  const double tested = force - p->back_force[i] + p->slope[i] * motion;
+  double s[2];
+  p->excess[i] = 0;
+  if (limit == 0) return motion < 0 ? -1 : 1;
+  if (p->course[HOLD] && p->slipped[i] == CLOSED) {
+    if (fabs(tested) > limit) {
+      p->excess[i] = fabs(tested) / p->limit[i] - 1;
+      p->course[OVER] = 1;
+    }
+    return 0;
+  }
+  const int way = tested < 0 ? -1 : 1;
+  if (way * motion <= 0) {
+    if (!(fabs(tested) > limit)) return 0;
+  } else {
+    set_slip(w, motion, way);
+    ask(p->force, w, 2, s);
+    if (!(way * (force + p->slope[i] * motion - s[0]) > 0)) return 0;
+  }
+  p->course[OPENED] = 1;
+  return way;
+}
+
+/* Rows of the connectors at their motions c->e1 and forces in q: the equations above over -r, which
+ * leaves the tangent of held ones symmetric. */
+void set_rows_of_rigid_plastic(const couplings *c, const double *q)
+{
+  const rigid_plastic *p = c->rigid_plastic;
+  double *w = p->w, s[2];
+  for (int i = 0; i < c->number; ++i, w += p->width) {
+    const double motion = c->e1[i] - w[SLIP_START];
+    const int way = direction_of_slip(p, i, w, motion, q[c->force[i]]);
+    double *row = p->rows + 3 * i;
+    row[0] = 1, row[1] = 0, row[2] = w[SLIP_START];
+    p->way[i] = way;
+    if (!way) continue;
+    set_slip(w, motion, way);
+    ask(p->force, w, 2, s);
+    const double slope = way * s[1], r = p->slope[i];
+    row[0] = slope / r, row[1] = -1 / r, row[2] = (slope * c->e1[i] - s[0]) / r;
+  }
+}
+
+/* What the connectors dissipate in a step to the motions e1; a held one that bears more than its
+ * limit counts with its excess times a unit of motion. */
+double dissipation_of_rigid_plastic(const rigid_plastic *p, const double *e1, const double *force)
+{
+  double *w = p->w, s[SLIP_SAID], sum = 0;
+  for (int i = 0; i < p->number; ++i, w += p->width) {
+    if (!p->way[i]) {
+      sum += fmax(fabs(force[i] - p->back_force[i]) - p->limit[i] * (1 + 1e-12), 0);
+      continue;
+    }
+    set_slip(w, e1[i] - w[SLIP_START], p->way[i]);
+    ask(p->end, w, SLIP_SAID, s);
+    sum += s[SLIP_DISSIPATED];
+  }
+  return sum;
+}
+
+/* Take the motions e1 as the new state, those of held connectors as they were; sums get what the step dissipated and lost numerically, and
+ * what the connectors store. */
+void commit_rigid_plastic(const rigid_plastic *p, const double *e1, double *sums)
+{
+  double *w = p->w, s[SLIP_SAID];
+  memset(sums, 0, 3 * sizeof *sums);
+  for (int i = 0; i < p->number; ++i, w += p->width) {
+    const int way = p->way[i];
+    set_slip(w, e1[i] - w[SLIP_START], way);
+    if (p->limit[i] < INFINITY) {
+      ask(p->end, w, SLIP_SAID, s);
+      for (int k = 0; k < 3; ++k) sums[k] += s[SLIP_DISSIPATED + k];
+      p->dissipated[i] += s[SLIP_DISSIPATED];
+      p->limit[i] = s[SLIP_LIMIT], p->back_force[i] = s[SLIP_BACK_FORCE];
+    }
+    p->slipped[i] = w[SLIP] > 0 ? FLOWING : CLOSED;
+    w[SLIPPED] += w[SLIP];
+    w[SLIP_START] += way * w[SLIP];
+  }
+}

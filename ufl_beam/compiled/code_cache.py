@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: MIT
+"""Directory of compiled code: private to its user, checked before use, complete after a kill.
+
+An entry is a directory with the files of one build and a list of their checksums.  It is built
+elsewhere, written to the disk and renamed, so that a process that dies leaves no part of one.  The
+lock of an entry belongs to the operating system, which frees it when the process ends.
+"""
+
+from __future__ import annotations
+
+import atexit
+import hashlib
+import os
+import shutil
+import stat
+import tempfile
+import warnings
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import TypeVar
+
+from mpi4py import MPI
+
+from ufl_beam.dolfinx_compat import jit_directory
+from ufl_beam.file_locks import locked
+
+T = TypeVar("T")
+
+CHECKSUMS = "checksums"
+"""File of an entry with its name and the checksums of its other files."""
+
+
+def kept(name: str, build: Callable[[Path], T], load: Callable[[Path], T]) -> tuple[T, Path]:
+    """Load an entry of the cache, built first if it is missing or damaged.
+
+    Processes that need the same entry at once build it once; the others wait.
+
+    Args:
+        name: Name of the entry; it must change with whatever the entry is made of.
+        build: Writes the files of the entry into an empty directory and loads them.
+        load: Loads the entry from its directory.
+
+    Returns:
+        The loaded entry and its directory.
+    """
+    place, foreign = _place(), False
+    if intact(place / name):
+        try:
+            return load(place / name), place / name
+        except ImportError:
+            foreign = True  # built for another system
+    if not os.access(place, os.W_OK | os.X_OK):
+        place, foreign = _temporary(f"the cache {place} cannot be written to"), False
+    entry = place / name
+    with locked(place / f"{name}.lock"):
+        if not foreign and intact(entry):  # another process was faster
+            return load(entry), entry
+        for rest in place.glob(f"{name}.*.part"):
+            shutil.rmtree(rest, ignore_errors=True)  # of a process that was killed
+        scratch = Path(tempfile.mkdtemp(prefix=f"{name}.", suffix=".part", dir=place))
+        try:
+            new = scratch / "new"
+            new.mkdir()
+            loaded = build(new)
+            _seal(new, name)
+            if os.path.lexists(entry):
+                entry.rename(scratch / "damaged")
+            new.rename(entry)
+            _sync(place)
+        finally:
+            shutil.rmtree(scratch, ignore_errors=True)
+    return loaded, entry
+
+
+# -- entries -------------------------------------------------------------------------------------
+
+
+def intact(entry: Path) -> bool:
+    """Return whether an entry is complete, as it was built, and of a trusted owner."""
+    try:
+        return (entry / CHECKSUMS).read_text() == _checksums(entry, entry.name)
+    except (OSError, ValueError):
+        return False
+
+
+def _checksums(entry: Path, name: str) -> str:
+    """Name of an entry and SHA-256 of its files.
+
+    Raises:
+        ValueError: Something else than files of this user is in it.
+    """
+    lines = [name]
+    for path in sorted(entry.iterdir()):
+        status = path.lstat()
+        if not stat.S_ISREG(status.st_mode) or status.st_uid not in _trusted():
+            raise ValueError(f"{path} is no file of this user")
+        if path.name != CHECKSUMS:
+            lines.append(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}")
+    return "\n".join(lines) + "\n"
+
+
+def _seal(entry: Path, name: str) -> None:
+    """Add the checksums; bring all files to the disk."""
+    for path in entry.glob("*.o"):
+        path.unlink()
+    (entry / CHECKSUMS).write_text(_checksums(entry, name))
+    for path in (*entry.iterdir(), entry):
+        _sync(path)
+
+
+def _sync(path: Path) -> None:
+    """Wait until a file or a directory is on the disk."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+# -- directories ---------------------------------------------------------------------------------
+
+
+def _trusted() -> tuple[int, int]:
+    """Users whose files are loaded: this one and the administrator."""
+    return os.geteuid(), 0
+
+
+def _distrust(directory: Path) -> str:
+    """Return why code in a directory may be someone else's; empty if it may not."""
+    status = directory.lstat()
+    if not stat.S_ISDIR(status.st_mode):
+        return "it is no directory"
+    if status.st_uid not in _trusted():
+        return f"it belongs to the user with the number {status.st_uid}"
+    if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        return f"others may write to it (mode {stat.S_IMODE(status.st_mode):o}); remove it"
+    for parent in directory.absolute().parents:
+        mode = parent.stat().st_mode
+        if mode & stat.S_IWOTH and not mode & stat.S_ISVTX:
+            return f"others may write to {parent} (mode {stat.S_IMODE(mode):o})"
+    return ""
+
+
+def _made(directory: Path) -> str:
+    """Make a private directory if it is missing; return why it cannot be used, empty if it can."""
+    try:
+        directory.mkdir(mode=0o700, parents=True, exist_ok=True)
+        return _distrust(directory)
+    except OSError as error:
+        return error.strerror or str(error)
+
+
+@cache
+def _place() -> Path:
+    """Directory of the entries."""
+    chosen = jit_directory() / "ufl_beam"
+    if why := _made(chosen):
+        return _temporary(f"the cache {chosen} cannot be used: {why}")
+    return chosen
+
+
+@cache
+def _temporary(why: str) -> Path:
+    """Private directory for temporary files; the first process says once why it is used."""
+    base = Path(tempfile.gettempdir())
+    directory = base / f"ufl_beam-{os.geteuid()}"
+    if _made(directory):
+        directory = Path(tempfile.mkdtemp(prefix="ufl_beam-"))
+        atexit.register(shutil.rmtree, directory, ignore_errors=True)
+    if MPI.COMM_WORLD.rank == 0:
+        warnings.warn(
+            f"{why}. Compiled code is kept in {directory} instead; "
+            "for another cache set XDG_CACHE_HOME",
+            RuntimeWarning,
+            stacklevel=2,
+        )
+    return directory

@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: MIT
+"""Index arithmetic on matrices whose arrays loops in C fill and PETSc solves with."""
+
+from __future__ import annotations
+
+from copy import copy
+from typing import Any, Protocol
+
+from petsc4py import PETSc
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import csr_array
+
+from ufl_beam.arrays import Array, Index
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, integers, lib, loop
+
+
+class Structure(Protocol):
+    """A matrix by rows, the columns of each in order."""
+
+    data: npt.NDArray[Any]
+    indices: npt.NDArray[Any]
+    indptr: npt.NDArray[Any]
+
+
+def coupling(size: int, *coupled: Index) -> Structure:
+    """A matrix of zeros with a diagonal, and entries for what stands in a row.
+
+    Args:
+        size: Number of degrees of freedom.
+        coupled: Degrees of freedom of cells, or of what else couples some; (number, some).
+    """
+    groups = [np.arange(size, dtype=np.int32)[:, None], *coupled]
+    lengths = np.concatenate([np.full(len(rows), rows.shape[1]) for rows in groups])
+    columns = np.concatenate([rows.ravel() for rows in groups]).astype(np.int32)
+    ends = np.append(0, np.cumsum(lengths))
+    parts = csr_array((np.ones(len(columns), np.bool_), columns, ends), shape=(len(lengths), size))
+    matrix = parts.T.tocsr() @ parts
+    matrix.sort_indices()
+    arrays = (np.zeros(matrix.nnz), matrix.indices, matrix.indptr)
+    zeros: Structure = csr_array(arrays, shape=matrix.shape)
+    return zeros
+
+
+class Csr:
+    """The arrays of a matrix, in which PETSc and the loops in C find the entries.
+
+    Attributes:
+        data: Its entries, row after row.
+        indices: Column of each entry.
+        indptr: First entry of each row, and the number of entries.
+    """
+
+    def __init__(self, matrix: Structure) -> None:
+        self.data: Array = matrix.data
+        self.indices = matrix.indices.astype(np.int32, copy=False)
+        self.indptr = matrix.indptr.astype(np.int32, copy=False)
+
+    def zeros_like(self) -> Csr:
+        """A matrix of the same structure, which is stored once."""
+        other = copy(self)
+        other.data = np.zeros_like(self.data)
+        return other
+
+    @property
+    def size(self) -> int:
+        """Number of rows."""
+        return len(self.indptr) - 1
+
+    def rows(self) -> Index:
+        """Row of each entry."""
+        return np.repeat(np.arange(self.size, dtype=np.int32), np.diff(self.indptr))
+
+    def positions(self, rows: Index, columns: Index) -> Index:
+        """Where :attr:`data` holds the entries (rows[k], columns[k]); they must exist."""
+        found = np.empty(len(rows), dtype=np.int32)
+        structure = (integers(self.indptr), integers(self.indices))
+        pairs = [np.ascontiguousarray(x, dtype=np.int32) for x in (rows, columns)]
+        if not lib.find_entries(*structure, len(found), *map(integers, (*pairs, found))):
+            raise ValueError("the matrix has no such entry")
+        return found
+
+    def petsc(self) -> PETSc.Mat:
+        """PETSc matrix on this process with the same arrays: no copy, before or after."""
+        indptr = self.indptr.astype(PETSc.IntType, copy=False)
+        indices = self.indices.astype(PETSc.IntType, copy=False)
+        matrix = PETSc.Mat().createAIJWithArrays(
+            self.size, (indptr, indices, self.data), comm=PETSc.COMM_SELF
+        )
+        matrix.assemble()
+        return matrix
+
+
+def as_slice(index: Index) -> Index | slice:
+    """The slice that selects the same as ``index``, if there is one: slices copy nothing."""
+    if len(index) < 2:
+        return index
+    steps = np.unique(np.diff(index))
+    if len(steps) > 1 or steps[0] <= 0:
+        return index
+    return slice(int(index[0]), int(index[-1]) + 1, int(steps[0]))
+
+
+class Product:
+    """``x -> A x`` on this process; what ``A`` stores of zeros is left out."""
+
+    def __init__(self, A: Csr) -> None:
+        self._entries = np.flatnonzero(A.data).astype(np.int32)
+        self._columns = A.indices[self._entries]
+        self._data = A.data[self._entries]
+        indptr = np.searchsorted(self._entries, A.indptr).astype(np.int32)
+        pointers = (integers(indptr), integers(self._columns), doubles(self._data))
+        self._arrays = (A.size, *pointers)
+
+    def __call__(self, x: Array) -> Array:
+        """The product; a new array."""
+        y = np.zeros(len(x))
+        lib.add_product(*self._arrays, doubles(x), doubles(y))
+        return y
+
+    def square(self, x: Array) -> float:
+        """``x`` times its product."""
+        square: float = lib.quadratic_form(*self._arrays, doubles(x))
+        return square
+
+
+class StepProduct(Product):
+    """Forces ``A (factor s - back v)``, s being (Δu, 2 tan(Δψ/2)), and their derivative.
+
+    Args:
+        A: Constant matrix.
+        rotations: Degrees of freedom that are rotations, as int32.
+        tangent: Matrix of the same structure that takes the derivative.
+
+    Attributes:
+        product: What ``add_step_force`` and ``add_step_tangent`` of loops.c take.
+    """
+
+    def __init__(self, A: Csr, rotations: Index, tangent: Csr) -> None:
+        super().__init__(A)
+        size, indptr, indices, data = self._arrays
+        entry, self._tangent = integers(self._entries), doubles(tangent.data)
+        self._structure = tangent
+        self._alive = (integers(rotations), entry, doubles(np.empty(size)))
+        self.product = ffi.new("step_product *")
+        c = self.product
+        c.size, c.indptr, c.indices, c.data = size, indptr, indices, data
+        c.rotations, (c.rotation, c.entry, c.space) = len(rotations), self._alive
+
+    def matrix(self) -> Csr:
+        """The matrix; a new one."""
+        A = self._structure.zeros_like()
+        A.data[self._entries] = self._data
+        return A
+
+    def begin(self, q0: Array, factor: float, back: float, v: Array) -> None:
+        """Prepare what stays constant in the step that begins at ``q0``."""
+        c = self.product
+        c.factor, c.back = factor, back
+        self._states = c.v, c.q0 = doubles(v), doubles(q0)
+
+    def loops(self) -> tuple[Loop, Loop]:
+        """The loops of :meth:`add_force` and :meth:`add_tangent`."""
+        return loop("add_step_force", self.product), loop("add_step_tangent", self.product)
+
+    def add_force(self, q1: Array, r: Array) -> None:
+        """Add the forces at ``q1``."""
+        lib.add_step_force(self.product, doubles(q1), doubles(r))
+
+    def add_tangent(self, q1: Array) -> None:
+        """Add their derivative at ``q1``."""
+        lib.add_step_tangent(self.product, doubles(q1), self._tangent)

@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: MIT
+"""Compiled code: modules of C and forms of UFL, compiled once for the machine.
+
+FFCx needs a C compiler at run time anyway.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import os
+import sys
+import sysconfig
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from types import ModuleType
+
+from petsc4py import PETSc
+
+import cffi
+import numpy as np
+import ufl
+
+from ufl_beam.compiled.code_cache import kept
+from ufl_beam.dolfinx_compat import TABULATE, compile_form, fem, form_key
+
+HEADERS = "\n".join(f"#include <{name}.h>" for name in ("float", "math", "stdint", "string"))
+
+
+def text(name: str) -> str:
+    """Return the text of a file of C."""
+    return (Path(__file__).parent / "c" / name).read_text()
+
+
+DECLARATIONS = "\n".join(
+    [
+        f"typedef void (kernel)({TABULATE[0]});",
+        f"typedef int{8 * np.dtype(PETSc.IntType).itemsize}_t petsc_int;",
+        text("loops.h"),
+    ]
+)
+"""Declarations that all files of C share."""
+
+SANITIZERS = (
+    "-O1",
+    "-g1",  # line numbers
+    "-fno-omit-frame-pointer",
+    "-fno-wrapv",
+    "-fsanitize=address,undefined,bounds-strict",
+    "-fno-sanitize-recover=all",
+)
+"""Flags that make the compiler check addresses and undefined behaviour; see `make sanitize`."""
+
+EXTRA = SANITIZERS if os.environ.get("UFL_BEAM_SANITIZE", "0") != "0" else ()
+"""Flags after those of each library: the sanitizers if ``UFL_BEAM_SANITIZE=1``, else none."""
+
+
+class CompilerError(RuntimeError):
+    """The C compiler is missing, or refuses the code."""
+
+
+def compiled(
+    stem: str,
+    declarations: str,
+    source: Callable[[], str],
+    *,
+    made_of: Sequence[str],
+    flags: Sequence[str],
+) -> ModuleType:
+    """Load a module of C, compiled first if the cache has it not.
+
+    Args:
+        stem: Beginning of its name.
+        declarations: C declarations of its functions and types for Python.
+        source: Its C; called if it is not in the cache.
+        made_of: Texts that the C, and the effect of the flags, depend on.
+        flags: For the compiler.
+
+    Raises:
+        CompilerError: The compiler is missing, or refuses.
+    """
+    flags = [*flags, *EXTRA]
+    name = f"{stem}_{_digest(declarations, *made_of, *flags, sys.version)}"
+
+    def build(directory: Path) -> ModuleType:
+        builder = cffi.FFI()
+        builder.cdef(declarations)
+        builder.set_source(
+            name,
+            source(),
+            extra_compile_args=flags,
+            extra_link_args=list(EXTRA),
+            libraries=["m"],
+        )
+        with _explained(stem):
+            builder.compile(tmpdir=directory)
+        return load(directory)
+
+    def load(directory: Path) -> ModuleType:
+        library = directory / (name + str(sysconfig.get_config_var("EXT_SUFFIX")))
+        spec = importlib.util.spec_from_file_location(name, library)
+        if spec is None or spec.loader is None:
+            raise ImportError(f"{library} is no library of Python")
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        return module
+
+    return kept(name, build, load)[0]
+
+
+def compiled_form(form: ufl.Form) -> tuple[fem.Form, Path]:
+    """Load a form, compiled first if the cache has it not.
+
+    Returns:
+        The form, and the C that FFCx wrote for it.
+
+    Raises:
+        CompilerError: The compiler is missing, or refuses.
+    """
+
+    def build(directory: Path) -> fem.Form:
+        with _explained("a form"):
+            return compile_form(form, directory)
+
+    key = _digest(form_key(form))
+    loaded, directory = kept(f"form_{key}", build, partial(compile_form, form))
+    module = Path(loaded.module.__file__).name
+    return loaded, directory / (module.split(".")[0] + ".c")
+
+
+def _digest(*texts: str) -> str:
+    return hashlib.sha256("\0".join(texts).encode()).hexdigest()[:16]
+
+
+@contextmanager
+def _explained(code: str) -> Iterator[None]:
+    """Say what to do where the compiler fails."""
+    try:
+        yield
+    except cffi.VerificationError as error:
+        raise CompilerError(
+            f"{code} cannot be compiled: {error}. DOLFINx and ufl_beam need a C compiler when they "
+            "run: install one (Debian: gcc, conda: c-compiler), or name it in the environment "
+            "variable CC"
+        ) from error

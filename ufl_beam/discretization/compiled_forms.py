@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: MIT
+"""UFL forms compiled for the hot loop: packed once, refreshed only where something changed.
+
+A form is compiled with one quadrature rule: forms that mix a one-point rule with another are
+silently wrong in FFCx 0.9 to 0.11.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import ufl
+
+from ufl_beam.arrays import Array, Index
+from ufl_beam.compiled.c_library import doubles, ffi, integers, kernel, lib
+from ufl_beam.compiled.csr import Csr
+from ufl_beam.compiled.jit import compiled_form
+from ufl_beam.compiled.simd_kernels import LANES, in_lanes
+from ufl_beam.dolfinx_compat import fem, pack
+
+
+def in_batches(rows: npt.NDArray[Any], lanes: int) -> npt.NDArray[Any]:
+    """Rows of numbers, one of each cell, as loops.h says; (num_batches, numbers, lanes).
+
+    Args:
+        rows: Shape (num_cells, ...).
+        lanes: Number of rows in a batch.
+    """
+    rows = rows.reshape(len(rows), math.prod(rows.shape[1:]))
+    if missing := -len(rows) % lanes:
+        rows = np.concatenate([rows, np.repeat(rows[-1:], missing, axis=0)])
+    return np.ascontiguousarray(rows.reshape(-1, lanes, rows.shape[1]).transpose(0, 2, 1))
+
+
+def vectorise(kernels: Iterable[Kernel], coordinates: Array) -> None:
+    """Let all of some kernels compute several cells at once, or none: they may share numbers.
+
+    Args:
+        kernels: On the same cells.
+        coordinates: Of the cells, in batches of ``LANES``.
+    """
+    addresses = {kernel: kernel.address_in_lanes() for kernel in kernels}
+    known = {kernel: address for kernel, address in addresses.items() if address is not None}
+    if len(known) == len(addresses):
+        for kernel, address in known.items():
+            kernel.compute_in_lanes(address, coordinates)
+
+
+def tabulator(compiled: fem.Form) -> Any:
+    """The C function of a compiled cell form; it lives as long as the form."""
+    integral = compiled.ufcx_form.form_integrals[0]
+    return kernel(integral.tabulate_tensor_float64, compiled.module.ffi)
+
+
+class Kernel:
+    """A compiled cell form together with the packed values of its coefficients.
+
+    Args:
+        form: Cell integrals with one quadrature rule.
+        unknown: The configuration that most calls change; it need not appear in the form.
+        cell_dofs: Its degrees of freedom; shape (num_cells, 6).
+        coordinates: Vertices of the cells; shape (num_cells, 2, 3); m.
+
+    Attributes:
+        compiled: The DOLFINx form.
+        cells: What ``add_cells`` of loops.c takes; a new one after :meth:`share`, :meth:`place`,
+            :meth:`compute_in_lanes`.
+    """
+
+    def __init__(
+        self, form: ufl.Form, unknown: fem.Function, cell_dofs: Index, coordinates: Array
+    ) -> None:
+        self.compiled, self._source = compiled_form(form)
+        ufcx = self.compiled.ufcx_form
+        constants, packed = pack(self.compiled)
+        everything = form.coefficients()
+        used = [
+            everything[ufcx.original_coefficient_positions[i]] for i in range(ufcx.num_coefficients)
+        ]
+        ends = np.cumsum([f.function_space.element.space_dimension for f in used])
+        self._columns = {
+            f: slice(end - f.function_space.element.space_dimension, end)
+            for f, end in zip(used, ends, strict=True)
+        }
+        self._starts = {id(f): columns.start for f, columns in self._columns.items()}
+        self._dofs = np.ascontiguousarray(cell_dofs, dtype=np.int32)
+        self._lanes, self._in_lanes = 1, ffi.NULL
+        self._packed, self._coordinates = (in_batches(x, 1) for x in (packed, coordinates))
+        self._rows = in_batches(self._rows_of_cells(form), 1)
+        spaces = [argument.ufl_function_space() for argument in form.arguments()]
+        self._entries = math.prod(space.element.space_dimension for space in spaces)
+        self._at = self._columns[unknown].start if self.depends_on(unknown) else 0
+        self._unknowns = self._dofs.shape[1] if self.depends_on(unknown) else 0
+        self._constants = constants
+        self._prepare()
+
+    def _rows_of_cells(self, form: ufl.Form) -> Index:
+        """Entries of the vector that the cells add to; (num_cells, entries of a cell)."""
+        if not form.arguments():
+            return np.zeros((len(self._dofs), 1), dtype=np.int32)
+        dofmap = form.arguments()[0].ufl_function_space().dofmap
+        blocks = np.asarray(dofmap.list)[:, :, None] * dofmap.bs + np.arange(dofmap.bs)
+        width = blocks.shape[1] * dofmap.bs
+        return np.ascontiguousarray(blocks.reshape(len(blocks), width), dtype=np.int32)
+
+    def _prepare(self) -> None:
+        """Make the data of the loop over the cells."""
+        self._arrays = (
+            *map(integers, (self._dofs, self._rows)),
+            *map(doubles, (self._packed, self._constants, self._coordinates)),
+        )
+        dofs, row, packed, constants, coordinates = self._arrays
+        self.cells = ffi.new(
+            "cells *",
+            {
+                "tabulate": tabulator(self.compiled),
+                "in_lanes": self._in_lanes,
+                "lanes": self._lanes,
+                "number": len(self._dofs),
+                "of_cell": self._dofs.shape[1],
+                "unknowns": self._unknowns,
+                "dofs": dofs,
+                "at": self._at,
+                "width": self._packed.shape[1],
+                "w": packed,
+                "constants": constants,
+                "coordinates": coordinates,
+                "rows": self._entries,
+                "row": row,
+            },
+        )
+
+    def depends_on(self, function: fem.Function) -> bool:
+        """Return whether ``function`` appears in the form."""
+        return function in self._columns
+
+    def set(self, function: fem.Function, q: Array) -> None:
+        """Give ``function`` the degrees of freedom ``q``, if it appears in the form."""
+        # By identity: functions of UFL compute what they hash to.
+        if (at := self._starts.get(id(function))) is not None:
+            lib.set_cells(self.cells, doubles(q), at)
+
+    def uses(self, function: fem.Function) -> bool:
+        """Return whether a function appears in the form."""
+        return id(function) in self._starts
+
+    def put(self, function: fem.Function, values: Array) -> None:
+        """Give ``function`` other values in the cells; shape (num_cells, dofs per cell)."""
+        columns = self._columns[function]
+        rows = np.broadcast_to(values, (len(self._dofs), columns.stop - columns.start))
+        self._packed[:, columns] = in_batches(rows, self._lanes)
+
+    def position(self, function: fem.Function) -> int:
+        """Where the coefficients of a cell have the values of ``function``."""
+        position: int = self._columns[function].start
+        return position
+
+    def share(self, other: Kernel) -> None:
+        """Use the packed values of ``other``, a form of the same coefficients."""
+        if self._columns != other._columns or self._lanes != other._lanes:
+            raise ValueError("the forms do not have the same coefficients")
+        self._packed = other._packed
+        self._prepare()
+
+    def place(self, A: Csr) -> None:
+        """Let a bilinear form on the degrees of freedom of the cells add to ``A``."""
+        per_cell = self._dofs.shape[1]
+        rows = np.repeat(self._dofs, per_cell, axis=1)
+        positions = A.positions(rows.ravel(), np.tile(self._dofs, per_cell).ravel())
+        self._rows = in_batches(positions.reshape(rows.shape), self._lanes)
+        self._prepare()
+
+    def address_in_lanes(self) -> int | None:
+        """Address of what computes several cells at once; none if the compiler cannot."""
+        return in_lanes(self._source, self._entries, self._packed.shape[1], len(self._constants))
+
+    def compute_in_lanes(self, address: int, coordinates: Array) -> None:
+        """Compute several cells at once from now on, with their coordinates in batches."""
+        self._in_lanes = ffi.cast("void (*)(const cells *, const double *, double *)", address)
+        self._packed, self._rows = (
+            in_batches(x[:, :, 0], LANES) for x in (self._packed, self._rows)
+        )
+        self._lanes, self._coordinates = LANES, coordinates
+        self._prepare()
+
+    @property
+    def vectorised(self) -> bool:
+        """True if several cells are computed at once."""
+        return self._lanes > 1
+
+    def add(self, q: Array, b: Array) -> None:
+        """Add the form at the unknown ``q`` to a vector, or to the entries of the matrix."""
+        lib.add_cells(self.cells, doubles(q), doubles(b))
+
+    def value(self, q: Array) -> float:
+        """Value of the functional at the unknown ``q``."""
+        value: float = lib.value_of_cells(self.cells, doubles(q))
+        return value

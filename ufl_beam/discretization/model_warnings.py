@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: MIT
+"""Warnings about scenes that can be computed but are likely not what is meant."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
+
+from ufl_beam.arrays import Array, Index
+from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.errors import warn
+from ufl_beam.model.beams import Place
+from ufl_beam.model.bodies import GROUND, Spot, carries
+from ufl_beam.model.connector_laws import HELD, Motor
+from ufl_beam.model.loads import value_at
+from ufl_beam.model.plastic_hinges import place_of
+from ufl_beam.model.scene import Scene
+from ufl_beam.model.supports import COMPONENTS
+
+TOUCHING = 1e-3
+"""Distance of places that touch, as a part of the length of the shorter beam."""
+
+JUMP = 1e-6
+"""Least jump of a prescribed motion, as a part of the size of the scene, or in rad."""
+
+FAR_OUT = 10.0
+"""Distance of a point from its body's centre that is unlikely, in radii of gyration."""
+
+
+# -- masses --------------------------------------------------------------------------------------
+
+
+def warn_of_masses(scene: Scene) -> None:
+    """Warn of beams without mass beside others that have mass, and of scenes without any."""
+    light = [beam.name for beam in scene.beams if beam.section.massless_by_default]
+    if not light:
+        return
+    names = ", ".join(dict.fromkeys(light[:20]))
+    if any(beam.section.rhoA for beam in scene.beams):
+        warn(
+            f"{names}: without mass, because neither rho nor rhoA of the section is given, but "
+            "other beams of the scene have mass. Give it, rhoA=0.0 if none is meant"
+        )
+    elif not any(body.mass for body in scene.bodies) and not any(m.mass for m in scene.masses):
+        warn(
+            f"{names}: without mass, because neither rho nor rhoA of the section is given, and "
+            "nothing else in the scene has mass, so that dynamics has no inertia. Give it, or use "
+            "Static()"
+        )
+
+
+# -- hinges --------------------------------------------------------------------------------------
+
+
+def warn_of_free_hinges(scene: Scene) -> None:
+    """Warn of hinges given at free ends where a load is a moment, which acts on the member."""
+    there = {place_of(hinge) for hinge in scene.hinges}
+    for load in scene.moments:
+        place = load.place
+        if not isinstance(place, Place) or place in there:
+            continue
+        law = place.beam.hinges.get(place.s)
+        if law is not None and law.opens:
+            warn(
+                f"{place.beam.name}: the hinge at s = {place.s:g} has nothing beyond it but "
+                f"{load}, so that the load acts on the member, and the hinge is left out"
+            )
+
+
+# -- places that touch ---------------------------------------------------------------------------
+
+
+def warn_of_touching(grid: Grid) -> None:
+    """Warn of ends of beams that touch another beam without a joint or connector between them."""
+    if not grid.scene.beams or not len(pairs := _touching(grid)):
+        return
+    end, other = (grid.place(int(vertex)) for vertex in pairs[0])
+    gap = math.dist(end.point, other.point)
+    more = f"; so do {len(pairs) - 1} more pairs of places" if len(pairs) > 1 else ""
+    warn(
+        f"{end} and {other} touch ({gap:.3g} m apart), but no joint or connector joins them, so "
+        f"that they move independently{more}. Join them with Rigid or Revolute if that is meant"
+    )
+
+
+def _touching(grid: Grid) -> Index:
+    """Vertices of ends, and of what they touch without being joined to it; (num_pairs, 2)."""
+    first = grid.first_vertices
+    beam_of = np.repeat(np.arange(len(first) - 1), np.diff(first))
+    points = grid.points[: first[-1]]
+    ends = np.column_stack([first[:-1], first[1:] - 1]).ravel()
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1) * (np.diff(beam_of) == 0)
+    lengths = np.bincount(beam_of[:-1], weights=steps, minlength=len(first) - 1)
+    reach = TOUCHING * lengths[beam_of]
+    tree = KDTree(points)
+    near = tree.query_ball_point(points[ends], reach[ends], return_sorted=False)
+    counts = np.array([len(one) for one in near])
+    end = np.repeat(ends, counts)
+    other = np.concatenate([np.asarray(one, dtype=np.int64) for one in near])
+    is_end = np.isin(other, ends)
+    # A beam touches itself where both of its ends meet.
+    apart = np.where(beam_of[end] == beam_of[other], is_end & (end < other), True)
+    gap = np.linalg.norm(points[end] - points[other], axis=1)
+    kept = apart & (gap <= np.minimum(reach[end], reach[other]))
+    end, other, gap = end[kept], other[kept], gap[kept]
+    group = _groups(grid)[: first[-1]]
+    joined = group[end] == group[other]
+    keys = end * len(first) + beam_of[other]
+    loose = ~joined & ~np.isin(keys, keys[joined])
+    end, other, gap, keys = end[loose], other[loose], gap[loose], keys[loose]
+    order = np.lexsort((gap, keys))
+    _, nearest = np.unique(keys[order], return_index=True)
+    pairs = np.column_stack([end, other])[order][nearest]
+    # Two ends that touch each other are one pair.
+    _, once = np.unique(np.sort(pairs, axis=1), axis=0, return_index=True)
+    return np.asarray(pairs[np.sort(once)])
+
+
+def _groups(grid: Grid) -> Index:
+    """Number of the group of nodes that joints, connectors and supports join to each node."""
+    links = grid.dofs_of_links[:, :2]
+    held = [support for support in grid.scene.supports if {0, 1} <= support.held.keys()]
+    ground = grid.size
+    if GROUND in grid.scene.movers:
+        ground = int(grid.node(GROUND.middle)[0])
+    fast = np.array([(grid.node(s.place)[0], ground) for s in held], dtype=np.int64).reshape(-1, 2)
+    rows, columns = np.concatenate([links, fast]).T
+    size = grid.size + 1
+    graph = coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(size, size))
+    _, group = connected_components(graph, directed=False)
+    return np.asarray(group[grid.dofs[:, 0]])
+
+
+# -- points of bodies ----------------------------------------------------------------------------
+
+
+def warn_of_far_points(scene: Scene) -> None:
+    """Warn of points of bodies that are far from their body and from everything else.
+
+    ``body.at(x, y)`` takes coordinates of the undeformed scene; a point that was meant relative to
+    the centre is far out.
+    """
+    spots = dict.fromkeys(spot for spot in _spots(scene) if not carries(spot))
+    if not spots:
+        return
+    others = list(_points(scene))
+    tree = KDTree([point for point, _ in others])
+    for spot in spots:
+        near = tree.query_ball_point(spot.point, 1e-9 * scene.size)
+        if any(others[i][1] is not spot.body for i in near):
+            continue
+        if _is_far(spot, np.array([point for point, of in others if of is not spot.body])):
+            (x, y), (cx, cy) = spot.point, spot.body.center
+            out = math.dist(spot.point, spot.body.center)
+            warn(
+                f"{spot} is {out:.4g} m away from the centre of {spot.body.name}, and nothing else "
+                "is there. body.at(x, y) takes coordinates of the undeformed scene; what is meant "
+                f"relative to the centre is at({cx:g} + {x:g}, {cy:g} + {y:g})"
+            )
+
+
+def _spots(scene: Scene) -> Iterator[Spot]:
+    for _, place in scene.attachments():
+        if isinstance(place, Spot) and place.body is not GROUND:
+            yield place
+
+
+def _points(scene: Scene) -> Iterator[tuple[tuple[float, float], object]]:
+    """Points of a scene, and the beam or body that each of them belongs to."""
+    for beam in scene.beams:
+        for s in (0.0, *beam.corners, *(i / beam.cells for i in range(1, beam.cells + 1))):
+            yield beam.at(s).point, beam
+    for body in scene.bodies:
+        yield body.center, body
+    for _, place in scene.attachments():
+        yield place.point, place.body if isinstance(place, Spot) else place.beam
+
+
+def _is_far(spot: Spot, others: Array) -> bool:
+    """Return true if a point is unlikely for what its body is, or far outside the scene."""
+    body, center = spot.body, np.array(spot.body.center)
+    if body.mass and body.inertia:
+        return math.dist(spot.point, center) > FAR_OUT * math.sqrt(body.inertia / body.mass)
+    box = np.vstack([others.reshape(-1, 2), center])
+    return _outside(np.array(spot.point), box) > float(np.linalg.norm(np.ptp(box, axis=0))) > 0.0
+
+
+# -- initial velocities --------------------------------------------------------------------------
+
+
+def warn_of_origin(scene: Scene) -> None:
+    """Warn of velocities that turn about the origin by default where the scene is far from it."""
+    points = np.array([point for point, _ in _points(scene)])
+    away = _outside(np.zeros(2), points)
+    for velocity in scene.initial:
+        if velocity.angular == 0.0 or velocity.about is not None:
+            continue
+        moved = set(velocity.beams)
+        ends = np.array([p for p, of in _points(scene) if of in moved])
+        if away > (np.linalg.norm(np.ptp(ends, axis=0)) if len(ends) else 0.0):
+            names = ", ".join(one.name for one in velocity.beams[:3])
+            warn(
+                f"Velocity of {names}: angular = {velocity.angular:g} rad/s without about= turns "
+                f"about the origin, which is {away:.4g} m away from the scene. Give about=(x, y), "
+                "also if the origin is meant"
+            )
+
+
+def _outside(point: Array, points: Array) -> float:
+    """Distance of a point from the box around others; m."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    beyond = np.maximum(low - point, 0.0) + np.maximum(point - high, 0.0)
+    return float(np.linalg.norm(beyond))
+
+
+# -- prescribed motions --------------------------------------------------------------------------
+
+
+def warn_of_jumps(grid: Grid, t: float, q: Array, motions: Array) -> None:
+    """Warn of prescribed motions that are not where the motion begins; in dynamics.
+
+    Args:
+        grid: The scene.
+        t: Time of the beginning; s.
+        q: Configuration there, all degrees of freedom.
+        motions: Relative motions of the connectors there; (num_links,).
+    """
+    size = grid.scene.size
+    for support in grid.scene.supports:
+        for component, motion in support.moving.items():
+            here = float(q[grid.node(support.place)[component]])
+            name, unit = COMPONENTS[component], "rad" if component == 2 else "m"
+            _warn_of_jump(f"{support}: {name}", here, value_at(motion, t, support), unit, size, t)
+    for link, here in zip(grid.scene.links, motions, strict=True):
+        if isinstance(link.law, Motor) and link.law is not HELD:
+            target, unit = value_at(link.law.motion, t, link), "rad" if link.turns else "m"
+            _warn_of_jump(f"{link}: its motion", float(here), target, unit, size, t)
+
+
+def _warn_of_jump(what: str, here: float, target: float, unit: str, size: float, t: float) -> None:
+    if abs(target - here) > JUMP * (size if unit == "m" else 1.0):
+        warn(
+            f"{what} jumps from {here:.6g} to {target:.6g} {unit} at the start, t = {t:g} s, which "
+            "in dynamics is a blow. Let it grow in time, as ub.Table and lambda t: ... can, or "
+            "begin with start= from a static run"
+        )

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: MIT
+"""Transfer of the end of a run to a scene of the same beams with other joints and connectors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ufl_beam.arrays import Array, Index
+from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.state_io import State
+from ufl_beam.errors import SceneError
+from ufl_beam.model.bodies import GROUND, Body
+from ufl_beam.model.connectors import Connector
+
+APART = 1e-6
+"""Distance of places that a joint may join in motion: part of the scene's size or largest
+velocity, or rad."""
+
+OF_CELLS = ("cells", "changes of strains")
+"""Tables of internal variables whose rows are numbered like cells; all others like connectors."""
+
+
+class Transfer:
+    """Map from the degrees of freedom of one scene to those of another.
+
+    Nodes of beams and bodies are the same if their records are, connectors if they join the same
+    points by laws of one kind.  Where a joint was removed, both places begin where the joint was;
+    where one was added, its places must be together.
+
+    Args:
+        old: Scene that the state is of.
+        new: Scene that begins with it.
+
+    Raises:
+        SceneError: The scenes have other beams or vertices, or the new one has another body.
+    """
+
+    def __init__(self, old: Grid, new: Grid) -> None:
+        self._old, self._new = old, new
+        self._require_alike()
+        bodies = [body for body in new.scene.movers if body in old.scene.movers]
+        news, olds = (
+            np.vstack([grid.dofs, *(self._dofs_of(grid, body) for body in bodies)]).ravel()
+            for grid in (new, old)
+        )
+        links = self._links()
+        self._numbers = {a: b for b, a in links.items()}
+        self._to = np.concatenate([news, new.multipliers[list(links)]])
+        self._from = np.concatenate([olds, old.multipliers[list(links.values())]])
+
+    @staticmethod
+    def _dofs_of(grid: Grid, body: Body) -> Index:
+        return np.asarray(grid.dofs_of_bodies[grid.scene.movers.index(body)]).reshape(1, 3)
+
+    def _require_alike(self) -> None:
+        """Raise unless beams and vertices are the same, and every body is known."""
+        old, new = self._old, self._new
+        if old.scene.beams != new.scene.beams or old.mesh != new.mesh:
+            raise SceneError(
+                "start: the solution is of other beams, joints or cells; use the same Beam objects "
+                "in the same order, and the same Mesh"
+            )
+        if not np.array_equal(old.points, new.points):
+            for beam in new.scene.beams:
+                if not np.array_equal(old.nodes_of(beam)[0], new.nodes_of(beam)[0]):
+                    break
+            raise SceneError(
+                f"start: {beam.name} has other vertices than in the solution, because something "
+                "is attached at other places; let these be corners=(s, ...) of the beam in both"
+            )
+        for body in new.scene.bodies:
+            if body not in old.scene.bodies:
+                raise SceneError(
+                    f"start: {body.name} is not in the scene of the solution, so that nobody knows "
+                    "where it is; let it be in both, held by supports before"
+                )
+
+    def _links(self) -> dict[int, int]:
+        """Numbers of connectors that both scenes have: new -> old."""
+        known: dict[object, list[int]] = {}
+        for i, link in enumerate(self._old.scene.links):
+            known.setdefault(_geometry(link), []).append(i)
+        found: dict[int, int] = {}
+        for i, link in enumerate(self._new.scene.links):
+            candidates = known.get(_geometry(link), [])
+            if candidates:
+                found[i] = candidates.pop(0)
+        return found
+
+    def state(self, q: Array) -> Array:
+        """Configuration in the numbering of the new scene.
+
+        Raises:
+            SceneError: Places that a new joint joins are apart.
+        """
+        size = self._new.scene.size
+        return self._map(q, lambda c: APART * (size if c < 2 else 1.0), ("m", "rad"), "are")
+
+    def velocity(self, v: Array) -> Array:
+        """Velocities in the numbering of the new scene.
+
+        Raises:
+            SceneError: Places that a new joint joins have different velocities.
+        """
+        fastest = float(np.abs(v).max(initial=0.0)) * max(self._new.scene.size, 1.0)
+        return self._map(v, lambda c: APART * fastest, ("m/s", "rad/s"), "move")
+
+    def _map(
+        self, x: Array, allowed: Callable[[int], float], units: tuple[str, str], how: str
+    ) -> Array:
+        mapped = np.zeros(self._new.size)
+        mapped[self._to] = x[self._from]
+        missed = np.abs(mapped[self._to] - x[self._from])
+        moving = len(self._to) - len(self._numbers)
+        for c in range(3):
+            part = missed[c:moving:3]
+            if part.size and part.max() > allowed(c):
+                where = self._new.describe(int(self._to[c + 3 * int(np.argmax(part))]))
+                unit = units[c == 2]
+                raise SceneError(
+                    f"start: the new scene joins places that {how} {part.max():.3g} {unit} apart "
+                    f"at the end of the solution: {where}. Join them by springs, or where they "
+                    "are together"
+                )
+        if GROUND in self._new.scene.movers:
+            mapped[self._new.node(GROUND.middle)] = 0.0
+        return mapped
+
+    def internal(self, state: State) -> State:
+        """Internal variables, forces and kept rates in the numbering of the new scene."""
+        mapped: State = {}
+        for name, values in state.items():
+            if values.ndim == 1:
+                mapped[name] = np.zeros(self._new.size)
+                mapped[name][self._to] = values[self._from]
+            elif name.rpartition(",")[0] in OF_CELLS:
+                mapped[name] = values
+            else:
+                kept = [row for row in values if int(row[0]) in self._numbers]
+                rows = [[self._numbers[int(row[0])], *row[1:]] for row in kept]
+                if rows:
+                    mapped[name] = np.array(sorted(rows, key=lambda row: row[0]))
+        return mapped
+
+
+def same_unknowns(old: Grid, new: Grid) -> bool:
+    """Return true if degrees of freedom and connectors have the same numbers in two scenes."""
+    links = ([_geometry(link) for link in grid.scene.links] for grid in (old, new))
+    return (
+        new.agrees(old)
+        and old.size == new.size
+        and old.scene.movers == new.scene.movers
+        and next(links) == next(links)
+    )
+
+
+def _geometry(link: Connector) -> object:
+    return link.motion, link.a, link.b, link.axis, link.corner, type(link.law)

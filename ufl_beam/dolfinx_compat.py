@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: MIT
+"""DOLFINx 0.9 to 0.11: every difference between the versions, and nothing else."""
+
+from __future__ import annotations
+
+import logging
+import sysconfig
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ufl_beam.arrays import Array
+
+try:
+    import petsc4py  # noqa: F401 - solvers need it
+    from mpi4py import MPI
+
+    import basix.ufl
+    import dolfinx
+    import ffcx
+    import ufl
+    from dolfinx import cpp, fem, io, jit, mesh
+except ImportError as error:  # pragma: no cover - depends on the machine
+    raise ImportError(
+        "ufl_beam needs DOLFINx 0.9 or newer with PETSc, which is not on PyPI "
+        f"({error}). Run through ./env of the source tree, or see docs/installation.md."
+    ) from error
+
+
+__all__ = [
+    "TABULATE",
+    "VERSION",
+    "Array",
+    "cell_coordinates",
+    "compile_form",
+    "cpp",
+    "dolfinx",
+    "fem",
+    "form_key",
+    "io",
+    "jit_directory",
+    "line_mesh",
+    "pack",
+    "space_with_dofs",
+]
+
+VERSION = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
+if VERSION < (0, 9):  # pragma: no cover - depends on the machine
+    raise ImportError(
+        f"ufl_beam needs DOLFINx 0.9 or newer, this is {dolfinx.__version__}; "
+        "run through ./env of the source tree, or see docs/installation.md"
+    )
+
+if all(
+    isinstance(handler, logging.NullHandler)
+    for name in (None, "py.warnings")
+    for handler in logging.getLogger(name).handlers
+):
+    # FFCx sends all warnings of Python to the log, where without a handler nobody sees them. The
+    # log gets a handler that shows nothing if a warning comes before this line, as with -W always.
+    logging.captureWarnings(False)
+
+
+TABULATE = (
+    "double *A, const double *w, const double *c, const double *x, const int *entity, "
+    "const uint8_t *permutation" + ("" if VERSION < (0, 10) else ", void *data"),
+    "" if VERSION < (0, 10) else ", 0",
+)
+"""Arguments of the kernels of FFCx, and what a call adds after the first six."""
+
+
+def jit_directory() -> Path:
+    """Directory in which DOLFINx keeps compiled forms.
+
+    Raises:
+        RuntimeError: The options of DOLFINx cannot be read.
+    """
+    return Path(_jit_options()["cache_dir"])
+
+
+def _jit_options() -> dict[str, Any]:
+    try:
+        options: dict[str, Any] = jit.get_options()
+    except OSError as error:
+        raise RuntimeError(
+            f"DOLFINx cannot read its options in {error.filename}: {error.strerror}; set "
+            "XDG_CONFIG_HOME to a directory that can be read"
+        ) from None
+    return options
+
+
+def compile_form(form: ufl.Form, directory: Path) -> fem.Form:
+    """Compile a form with FFCx, or load it from a directory in which it was compiled before."""
+    logger = logging.getLogger()
+    handlers = logger.handlers[:]
+    try:
+        return fem.form(form, jit_options={"cache_dir": directory})
+    finally:
+        logger.handlers = handlers  # FFCx exchanges them, and an interrupt leaves its own
+
+
+def form_key(form: ufl.Form) -> str:
+    """Text that differs between forms which FFCx compiles to different code."""
+    options = {k: v for k, v in _jit_options().items() if k not in ("cache_dir", "timeout")}
+    system = [sysconfig.get_config_var(name) for name in ("CFLAGS", "EXT_SUFFIX")]
+    ours = (form.signature(), ffcx.__version__, dolfinx.__version__, ffcx.get_options(), options)
+    return "\0".join(map(repr, (*ours, *system)))
+
+
+def pack(form: fem.Form) -> tuple[Array, Array]:
+    """Constants of a form, and coefficients of its cells; shapes (n,), (num_cells, m)."""
+    coefficients = cpp.fem.pack_coefficients(form._cpp_object)
+    (cells,) = coefficients.values()
+    return cpp.fem.pack_constants(form._cpp_object), np.array(cells)
+
+
+def line_mesh(points: Array, cells: npt.NDArray[np.int64]) -> mesh.Mesh:
+    """Mesh of straight cells in the plane, on this process alone.
+
+    Args:
+        points: Vertices; shape (num_points, 2); m.
+        cells: Vertices of each cell; shape (num_cells, 2).
+    """
+    line = ufl.Mesh(basix.ufl.element("Lagrange", "interval", 1, shape=(2,)))
+    more = {} if VERSION < (0, 10) else {"max_facet_to_cell_links": 2}
+    return mesh.create_mesh(MPI.COMM_SELF, cells=cells, x=points, e=line, **more)
+
+
+def cell_coordinates(domain: mesh.Mesh) -> Array:
+    """Vertices of the cells; shape (num_cells, 2, 3); m."""
+    geometry = domain.geometry
+    dofmap = geometry.dofmap if VERSION < (0, 11) else geometry.dofmaps[0]
+    return np.ascontiguousarray(geometry.x[dofmap])
+
+
+def space_with_dofs(
+    domain: mesh.Mesh, element: Any, cell_dofs: npt.NDArray[np.int32], size: int
+) -> fem.FunctionSpace:
+    """Function space whose cells share the degrees of freedom that ``cell_dofs`` says.
+
+    Args:
+        domain: Mesh on this process.
+        element: Scalar, vector or mixed element with unblocked dofs.
+        cell_dofs: Degrees of freedom of each cell; shape (num_cells, dofs per cell).
+        size: Number of degrees of freedom.
+    """
+    plain = fem.functionspace(domain, element)
+    index_map = cpp.common.IndexMap(MPI.COMM_SELF, size)
+    adjacency = cpp.graph.AdjacencyList_int32(np.ascontiguousarray(cell_dofs, dtype=np.int32))
+    dofmap = cpp.fem.DofMap(plain.dofmap.dof_layout, index_map, 1, adjacency, 1)
+    arguments = [domain._cpp_object, plain._cpp_object.element, dofmap]
+    if VERSION < (0, 11):
+        arguments.append(list(element.reference_value_shape))
+    return fem.FunctionSpace(domain, element, cpp.fem.FunctionSpace_float64(*arguments))

@@ -1,0 +1,359 @@
+# SPDX-License-Identifier: MIT
+"""Schemes whose forces act over the step, so that their works are increments of energy."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import ufl
+from ufl.core.expr import Expr
+
+from ufl_beam.arrays import Array, Index
+from ufl_beam.compiled.c_library import combined, doubles, integers, lib
+from ufl_beam.mechanics import kinematics
+from ufl_beam.mechanics.classical import Static
+from ufl_beam.mechanics.kinematics import Axis
+from ufl_beam.mechanics.time_schemes import Constant, Rates, Step, require_between, scaled
+from ufl_beam.model.material_laws import Softening, Values
+from ufl_beam.model.scene import Scene
+
+
+class _OverStep:
+    """Base of schemes whose forces act over the step."""
+
+    alpha: float
+
+    @property
+    def theta(self) -> float:
+        """The resultants of P(89) are those at this part of the step."""
+        return 0.5 + self.alpha
+
+    @property
+    def loss(self) -> float:
+        """Return the energy that ``alpha`` dissipates."""
+        return self.alpha
+
+    def resistance(self, softening: Softening, opening: Array, growth: Values) -> Values:
+        """The mean traction, so that the work of the step is what the opening dissipates."""
+        return softening.mean_traction(opening, growth)
+
+    def resultants(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> Expr:
+        """The mean of both ends, and more of the end the more energy is to go."""
+        mean = scaled(C, (e0 + e1) / 2)  # P(83)
+        if self.alpha == 0:
+            return mean
+        return mean + constant(self.alpha) * scaled(C, e1 - e0)  # P(89)
+
+    def losses(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> tuple[Expr, ...]:
+        """Return the energy that ``alpha`` dissipates."""
+        if self.alpha == 0:
+            return ()
+        return (constant(self.alpha) * ufl.dot(scaled(C, e1 - e0), e1 - e0),)  # P(90)
+
+    def average(self, before: Expr, now: Expr) -> Expr:
+        """The mean of both ends, of which increments are products."""
+        return (before + now) / 2
+
+    def secant(self, force: Callable[[Array], Array], e0: Array, e1: Array) -> tuple[Array, Array]:
+        """The mean force over the way, so that its work is what f²/2 grows by."""
+        f0, f1, way = force(e0), force(e1), e1 - e0
+        ends = (f0 != 0) + 0.0, (f1 != 0) + 0.0
+        moves = way != 0
+        part = np.divide(f1 - f0, way, out=(ends[0] + ends[1]) / 2, where=moves)
+        f = (f0 + f1) / 2 * part
+        return f, np.divide(f1 - f, way, out=ends[1] / 2, where=moves)
+
+    def acting(self, before: Array, now: Array) -> Array:
+        """The forces in the equation of the step."""
+        return now
+
+
+class _ExactStep(_OverStep):
+    """Steps whose works are exact increments of energy."""
+
+    exact_ledger = True
+
+    def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
+        """The variation that turns the step into the increment of the strains."""
+        return kinematics.virtual_strain_over_step(q0, q1, w, axis)
+
+    def virtual_turn(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
+        """The increment of the rotation, if ``w`` is 2 tan(turn_b/2) - 2 tan(turn_a/2)."""
+        tan_a, tan_b = (ufl.sin(x / 2) / ufl.cos(x / 2) for x in (turn_a, turn_b))
+        return kinematics.over_tan((turn_b - turn_a) / 2) / (1 + tan_a * tan_b) * w
+
+    def nodal_step(self, q0: Array, q1: Array, rotations: Index) -> tuple[Array, float]:
+        """(Δu, 2 tan(Δψ/2)): with it works are exact increments; see docs/errata.md."""
+        s = np.empty(len(q1))
+        turn: float = lib.step_of_nodes(
+            len(s), len(rotations), integers(rotations), doubles(s), doubles(q0), doubles(q1)
+        )
+        return s, turn
+
+    def half_tangents(self, rotations: Index) -> Index:
+        """All of them."""
+        return rotations
+
+
+@dataclass(frozen=True)
+class ExactStatic(_ExactStep):
+    """Equilibrium without inertia, with an exact ledger: works are exact increments of energy.
+
+    :class:`Static` finds equilibrium at the ends of the steps and counts works by the trapezoidal
+    rule; here the equation of the step is that of :class:`Midpoint`.  Inelastic material follows
+    its laws over the step, not only at its end.  The ledger is exact, the solution is of first
+    order in the step with ``theta=1`` and of second order with ``theta=1/2``; docs/schemes.md has
+    measured errors.  Loads that are there from the start are applied in the first step, in parts
+    that turn nodes little.  A leap to another branch of equilibria does not
+    stop it, but what that sets free is in the entry "numerical"; :class:`Static` stops.
+
+    Args:
+        theta: Part of the step at which resultants and loads are in equilibrium.  1/2 loses
+            nothing, but leaves the states at the ends free to oscillate about equilibrium; 1
+            brings them there, and what that costs is the entry "numerical" of the ledger.
+            Uniform moments differ along a beam by (Δψ/2)² of a step.
+
+    Raises:
+        SceneError: A number outside [1/2, 1].
+    """
+
+    theta: float = 1.0
+
+    dynamic = False
+    slack = math.inf
+    advice = Static.advice
+
+    def __post_init__(self) -> None:
+        require_between("ExactStatic: theta", self.theta, 0.5, 1.0)
+
+    @property
+    def alpha(self) -> float:  # type: ignore[override]
+        """Dissipation by the resultants."""
+        return self.theta - 0.5
+
+    @property
+    def load_weight(self) -> float:
+        """Follower loads turn with the rotation where the resultants are in equilibrium."""
+        return self.theta
+
+    def way_to_rest(self, dt: float) -> float:
+        """None: everything is at rest."""
+        return 0.0
+
+    def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
+        """Loads act where the resultants are, on the straight way to those at the end of the step.
+
+        Parts of a step go in proportion, as those of :class:`Static`; so loads and motions that are
+        there at once can be reached in parts.
+        """
+        toward = (t1 - t0) / (end - t0)
+        return Step(t0, t1, q0, load_time=end, motion_time=end, toward=toward, at=self.theta)
+
+
+class _Midway:
+    """Base of dynamic schemes whose loads act in the middle of the step."""
+
+    dynamic = True
+    slack = math.inf
+    load_weight = 0.5
+    kept: tuple[str, ...] = ()
+    advice = (
+        "Try a smaller dt, loads and motions without jumps, or more energy taken out of high "
+        "frequencies, such as Midpoint(alpha=0.05, beta=0.05) or DecayingMidpoint()"
+    )
+
+    def require(self, scene: Scene) -> None:
+        """They can do all scenes."""
+
+    def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
+        """Loads act in the middle of the step, motions arrive at its end."""
+        return Step(t0, t1, q0, load_time=(t0 + t1) / 2, motion_time=t1, toward=1.0)
+
+    def velocity(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
+        """The mean velocity of the step."""
+        return 1 / dt, 0.0, rates.v
+
+
+class _Velocities(_Midway):
+    """Velocities of which ``beta`` takes energy."""
+
+    beta: float
+
+    @property
+    def slips(self) -> bool:
+        """True if ``beta`` takes any."""
+        return self.beta != 0
+
+    def _weights(self, dt: float) -> tuple[float, float]:
+        """(a, b) of the velocities v1 = a s - b v0 after the step s of the nodes."""
+        keep = 0.5 + self.beta
+        return 1 / (dt * keep), (0.5 - self.beta) / keep  # P(87)
+
+    def way_to_rest(self, dt: float) -> float:
+        """From v1 = a s - b v0 = 0."""
+        a, b = self._weights(dt)
+        return b / a
+
+    def inertia(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
+        """Mass times the change of velocity over the time."""
+        a, b = self._weights(dt)
+        return a / dt, (1 + b) / dt, rates.v  # P(78)
+
+    def rates(self, dt: float, s: Array, rates: Rates) -> tuple[Array, ...]:
+        """The velocities."""
+        a, b = self._weights(dt)
+        return (combined(a, s, -b, rates.v),)
+
+    def slip(self, dt: float, change: Array, rates: Rates) -> Array:
+        """In proportion to the change; what it loses is D_K of the paper."""
+        return self.beta * change  # P(88)
+
+
+@dataclass(frozen=True)
+class Midpoint(_ExactStep, _Velocities):
+    """Midpoint rule that conserves energy and momentum exactly, or loses energy as it is told.
+
+    ``alpha = beta = 0`` conserves energy, linear and angular momentum to solver tolerance at any
+    step size.  Positive values take energy out of the high frequencies, never in: ``alpha`` through
+    the resultants, which keeps the momenta exact; ``beta`` through the velocities, which gives
+    up angular momentum.  What they take is the entry "numerical" of the ledger.
+
+    Laws of inelastic material are stated in the middle of the step, which is of second order;
+    ``alpha = 1/2`` states them at its end: backward Euler, of first order.  In the middle of the
+    step stresses lie on the yield surface, and an open hinge bears nothing; at the ends they
+    alternate about that by the order of a step, which a small ``alpha`` damps.  The elastic energy
+    of what breaks completely is lost at once, as "numerical".
+
+    Args:
+        alpha: Dissipation by the resultants, from 0 to 1/2.
+        beta: Dissipation by the velocities, from 0 to 1/2.
+
+    Raises:
+        SceneError: A number outside [0, 1/2].
+
+    Equations:
+        P(77)-P(91); P(82) corrected, see docs/errata.md.
+    """
+
+    alpha: float = 0.0
+    beta: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("alpha", "beta"):
+            require_between(f"Midpoint: {name}", getattr(self, name), 0.0, 0.5)
+
+    def error_weights(self) -> tuple[float, float]:
+        """The trapezoidal rule's, and what both kinds of dissipation delay."""
+        return self.beta, 1 / 12 + self.alpha
+
+
+@dataclass(frozen=True)
+class PrintedMidpoint(_OverStep, _Velocities):
+    """The midpoint rule as the paper prints it, for comparison; :class:`Midpoint` is better.
+
+    Strains vary as in the middle of the step, which is not how they grow over it: energy drifts by
+    the square of the rotation of a step.  Linear and angular momentum are kept.  The ledger counts
+    the works of the step, and its imbalance is that drift.  Joints that are held by multipliers do
+    work of the same size.
+
+    Equations:
+        P(77)-P(84), with the sign of P(79) mended; see docs/errata.md.
+    """
+
+    alpha = beta = 0.0
+
+    def half_tangents(self, rotations: Index) -> Index:
+        """None."""
+        return rotations[:0]
+
+    def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
+        """The variation in the middle of the step."""
+        return kinematics.virtual_strain((q0 + q1) / 2, w, axis)
+
+    def virtual_turn(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
+        """The virtual rotation itself."""
+        return w
+
+    def nodal_step(self, q0: Array, q1: Array, rotations: Index) -> tuple[Array, float]:
+        """The increments themselves, and the largest turn."""
+        s: Array = q1 - q0
+        return s, float(np.abs(s[rotations]).max(initial=0.0))
+
+    def error_weights(self) -> tuple[float, float]:
+        """The trapezoidal rule's."""
+        return 0.0, 1 / 12
+
+
+@dataclass(frozen=True)
+class DecayingMidpoint(_ExactStep, _Midway):
+    """Midpoint rule that takes energy out of high frequencies and stays of second order.
+
+    :class:`Midpoint` loses energy in proportion to the changes of strains and velocities in a step,
+    which is of first order.  Here it is in proportion to how these changes change from step to
+    step: a mode of circular frequency ω loses the part c (ω dt)⁴ of its energy in a step, with
+    c = rho_inf (1 - rho_inf) / (2 (1 + rho_inf)²), and what no step resolves falls to ``rho_inf``
+    of its amplitude.  The equations of the step are
+
+        resultants  C ((e0 + e1)/2 + c (Δe - r Δe')),     Δu/dt = (v0 + v1)/2 + c (Δv - r Δv'),
+
+    Δe' and Δv' being the changes in the step before, and r the ratio of both steps, 1 at most.
+
+    The energy, and c/2 times that of Δe and Δv beside it, never grows, whatever the steps, for
+    Δe (Δe - r Δe') = (Δe² - r² Δe'² + (Δe - r Δe')²)/2: the motion never has more energy than it
+    began with and was given.  The loss is the entry "numerical" of the ledger, exactly; it is never
+    negative, but a single step may give back a part of what steps before it took.  Linear momentum
+    is kept, angular momentum to second order.  Resultants of cells that may yield or break are not
+    damped, so that open hinges turn freely, nor are connectors.
+
+    Args:
+        rho_inf: Spectral radius at infinite frequency, from 1/3 to 1; 1 loses nothing.
+
+    Raises:
+        SceneError: A number outside [1/3, 1].
+    """
+
+    rho_inf: float = 0.5
+
+    alpha = 0.0
+    slips = True
+
+    def __post_init__(self) -> None:
+        require_between("DecayingMidpoint: rho_inf", self.rho_inf, 1 / 3, 1.0)
+
+    @property
+    def part(self) -> float:
+        """The part c of what second differences of strains and velocities store that is lost."""
+        # At infinity (λ + 1)/2 + c (λ - 1)²/λ = 0; λ = -rho_inf is the larger root.
+        return self.rho_inf * (1 - self.rho_inf) / (2 * (1 + self.rho_inf) ** 2)
+
+    def _remembered(self, dt: float, rates: Rates) -> Array:
+        """Return the part of the last change of velocities that counts, c r Δv'."""
+        return self.part * min(1.0, dt / rates.last_dt) * (rates.v - rates.v_before)
+
+    def way_to_rest(self, dt: float) -> float:
+        """From v1 = 0, were there no step before."""
+        return (0.5 - self.part) * dt
+
+    def inertia(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
+        """Mass times the change of velocity over the time."""
+        keep = 0.5 + self.part
+        v: Array = 1 / keep * (rates.v - self._remembered(dt, rates))
+        return 1 / (dt**2 * keep), 1 / dt, v
+
+    def rates(self, dt: float, s: Array, rates: Rates) -> tuple[Array, ...]:
+        """The velocities."""
+        keep = 0.5 + self.part
+        v: Array = 1 / dt * s - (0.5 - self.part) * rates.v + self._remembered(dt, rates)
+        v *= 1 / keep
+        return (v,)
+
+    def slip(self, dt: float, change: Array, rates: Rates) -> Array:
+        """In proportion to how the change changes."""
+        return self.part * change - self._remembered(dt, rates)
+
+    def error_weights(self) -> tuple[float, float]:
+        """The trapezoidal rule's, and what the second differences delay."""
+        return 0.0, 1 / 12 + self.part

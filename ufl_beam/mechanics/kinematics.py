@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: MIT
+"""Strains of the Reissner beam and their algorithmic variation over a time step, in UFL.
+
+Pure functions: configurations ``(u_x, u_y, ψ)`` in, strains ``(Σ, Γ, K)`` out; no state, no mesh
+but the one that the arguments live on.  The letters are the paper's; P(n) is its equation n.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from itertools import accumulate, pairwise
+
+import ufl
+from ufl.core.expr import Expr
+
+
+class Axis:
+    """Undeformed axis of the beams on a mesh of straight cells.
+
+    Args:
+        mesh: Their mesh.
+        nodes: Where in a cell, from 0 to 1, the nodes of configurations are; ascending.
+        X: From 0 to 1 along each cell; by default the point is in the middle.
+
+    Attributes:
+        nodes: As given.
+        X: As given.
+        t0: Unit tangent of the cell, from its first to its last vertex; shape (2,).
+        n0: Unit normal, ``t0`` turned by +90°; shape (2,).
+        h: Length of the cell; m.
+    """
+
+    def __init__(self, mesh: ufl.Mesh, nodes: Iterable[float] = (0.0, 1.0), X: Expr = 0.5) -> None:
+        self.nodes, self.X = [float(a) for a in nodes], X
+        J = ufl.Jacobian(mesh)
+        self.h = ufl.sqrt(J[0, 0] ** 2 + J[1, 0] ** 2)
+        self.t0 = ufl.as_vector([J[0, 0] / self.h, J[1, 0] / self.h])
+        self.n0 = ufl.as_vector([-self.t0[1], self.t0[0]])
+
+    def d(self, f: Expr) -> Expr:
+        """Derivative along the axis, ``f' = grad(f)·t0``."""
+        return ufl.dot(ufl.grad(f), self.t0)
+
+    def at_nodes(self, f: Expr) -> list[Expr]:
+        """Values of a scalar function in the nodes of the cell, by its derivatives at the point."""
+        terms = [f]
+        for _ in self.nodes[1:]:
+            terms.append(self.h * self.d(terms[-1]))
+        return [
+            sum(((a - self.X) ** k / math.factorial(k) * t for k, t in enumerate(terms)), 0)
+            for a in self.nodes
+        ]
+
+    def interpolate(self, values: Sequence[Expr]) -> tuple[Expr, Expr]:
+        """Of values in the nodes of the cell: value and derivative at the point, by Lagrange."""
+        X = ufl.variable(self.X)
+        f = 0
+        for a, value in zip(self.nodes, values, strict=True):
+            weight = math.prod((X - b) / (a - b) for b in self.nodes if b != a)
+            f += weight * value
+        return f, ufl.diff(f, X) / self.h
+
+
+def frame(ψ: Expr) -> tuple[Expr, Expr]:
+    """(cos ψ - 1, sin ψ), both to the relative precision of ``ψ``, however small that is.
+
+    The difference of two numbers near one would keep no digits of a small rotation.
+    """
+    half_sin, half_cos = ufl.sin(ψ / 2), ufl.cos(ψ / 2)
+    return -2 * half_sin**2, 2 * half_sin * half_cos
+
+
+def _pull_back(a: Expr, ψ: Expr, axis: Axis) -> tuple[Expr, Expr]:
+    """Components of the plane vector ``a`` in the frame (t0, n0) turned by ``ψ``: Λᵀ a."""
+    along, across = ufl.dot(a, axis.t0), ufl.dot(a, axis.n0)
+    cos_1, sin = frame(ψ)
+    return along + cos_1 * along + sin * across, across + cos_1 * across - sin * along
+
+
+def turn(a: Expr) -> Expr:
+    """W a: the plane vector ``a`` turned by +90°."""
+    return ufl.as_vector([-a[1], a[0]])
+
+
+def split(q: Expr) -> tuple[Expr, Expr]:
+    """Displacement (2,) and rotation of a configuration (3,)."""
+    return ufl.as_vector([q[0], q[1]]), q[2]
+
+
+def strain(q: Expr, axis: Axis) -> Expr:
+    """Reissner's generalised strain (Σ, Γ, K).
+
+    Args:
+        q: Configuration (u_x, u_y, ψ); shape (3,); m, m, rad.
+        axis: Undeformed axis.
+
+    Returns:
+        (Σ, Γ, K): axial strain, shear strain, curvature; shape (3,); 1, 1, 1/m.
+
+    Equations:
+        P(6), P(10), for any initial direction of the axis.
+    """
+    u, ψ = split(q)
+    Σ, Γ = _pull_back(axis.d(u), ψ, axis)
+    cos_1, sin = frame(ψ)
+    # Λᵀ t0 - e1 = (cos ψ - 1, -sin ψ): no digits of small strains are lost in a difference of ones.
+    return ufl.as_vector([Σ + cos_1, Γ - sin, axis.d(ψ)])  # P(6)
+
+
+def virtual_strain(q: Expr, w: Expr, axis: Axis) -> Expr:
+    """Variation of :func:`strain` at ``q`` in the direction ``w``.
+
+    Args:
+        q: Configuration; shape (3,).
+        w: Direction (w_u, w_ψ), usually a test function; shape (3,).
+        axis: Undeformed axis.
+
+    Returns:
+        (w_Σ, w_Γ, w_K); shape (3,).
+
+    Equations:
+        P(21), pulled back.
+    """
+    (u, ψ), (w_u, w_ψ) = split(q), split(w)
+    w_Σ, w_Γ = _pull_back(axis.d(w_u) - turn(axis.t0 + axis.d(u)) * w_ψ, ψ, axis)  # P(21)
+    return ufl.as_vector([w_Σ, w_Γ, axis.d(w_ψ)])
+
+
+def _sinc(x: Expr) -> Expr:
+    """Sin x / x, smooth at zero: the series below 1e-2 has a remainder under 1e-18."""
+    x2 = x**2
+    series = 1 - x2 / 6 * (1 - x2 / 20 * (1 - x2 / 42))
+    small = ufl.lt(x2, 1e-4)
+    return ufl.conditional(small, series, ufl.sin(x) / ufl.conditional(small, 1.0, x))
+
+
+def over_tan(x: Expr) -> Expr:
+    """X / tan x, smooth at zero."""
+    return ufl.cos(x) / _sinc(x)
+
+
+def virtual_strain_over_step(q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
+    """Algorithmic variation of the strain over one step, exact for energy and momentum.
+
+    With ``w = (Δu, 2 tan(Δψ/2))`` at the nodes it is ``strain(q1) - strain(q0)`` to round-off,
+    which makes the work of the algorithmic resultants the increment of stored energy; and it
+    vanishes for rigid rotations about any point, which makes angular momentum exact.  P(82) as
+    printed has neither property beyond O(Δψ²); docs/errata.md derives this form.
+
+    Valid for ``|Δψ| < π``; on two-node cells with a one-point rule, on others with any.
+
+    Args:
+        q0: Configuration at t_n; shape (3,).
+        q1: Configuration at t_n+1; shape (3,).
+        w: Direction (w_u, w_ψ); shape (3,).
+        axis: Undeformed axis.
+
+    Returns:
+        (w_Σ, w_Γ, w_K); shape (3,).
+
+    Equations:
+        P(82) in its corrected form.
+    """
+    (u0, ψ0), (u1, ψ1), (w_u, w_ψ) = split(q0), split(q1), split(w)
+    turn_over_step = _turn_of_two_nodes if len(axis.nodes) == 2 else _turn_of_nodes
+    w_turn, w_K = turn_over_step(ψ0, ψ1, w_ψ, axis)
+    φ_m = axis.t0 + axis.d((u0 + u1) / 2)
+    a = axis.d(w_u) - turn(φ_m) * w_turn
+    # The mean of both frames is cos δ times the frame of the mean rotation.
+    along, across = ufl.dot(a, axis.t0), ufl.dot(a, axis.n0)
+    (cos_0, sin_0), (cos_1, sin_1) = frame(ψ0), frame(ψ1)
+    cos_m, sin_m = 1 + (cos_0 + cos_1) / 2, (sin_0 + sin_1) / 2
+    w_Σ, w_Γ = cos_m * along + sin_m * across, cos_m * across - sin_m * along
+    return ufl.as_vector([w_Σ, w_Γ, w_K])  # P(82)!
+
+
+def _turn_of_two_nodes(ψ0: Expr, ψ1: Expr, w: Expr, axis: Axis) -> tuple[Expr, Expr]:
+    """:func:`_turn_of_nodes` in the middle of a cell with two nodes, where it is short."""
+    # Half the increments of rotation at both nodes of the cell are δ - e and δ + e.
+    e = axis.h / 4 * axis.d(ψ1 - ψ0)
+    sinc_e, cos_e = _sinc(e), ufl.cos(e)
+    tan_e = e * sinc_e / cos_e
+    # Of 2 δ = ψ1 - ψ0 no functions are needed but those of the frames.
+    (cos_0, sin_0), (cos_1, sin_1) = ((1 + c, s) for c, s in map(frame, (ψ0, ψ1)))
+    cos_δ_2 = (1 + cos_0 * cos_1 + sin_0 * sin_1) / 2
+    tan_δ = (sin_1 * cos_0 - cos_1 * sin_0) / (2 * cos_δ_2)
+    shift = -tan_δ * tan_e / 2
+    stretch = (cos_δ_2 - (1 - cos_δ_2) * tan_e**2) * cos_e / sinc_e
+    return w + shift * axis.h * axis.d(w), stretch * axis.d(w)
+
+
+def _turn_of_nodes(ψ0: Expr, ψ1: Expr, w: Expr, axis: Axis) -> tuple[Expr, Expr]:
+    """Virtual rotation and curvature at a point: 2 tan δ and 2 δ' if w is 2 tan δ at the nodes.
+
+    Both are linear in w, and a uniform w is that rotation, and no curvature; docs/errata.md.
+
+    Args:
+        ψ0: Rotation at the beginning of the step.
+        ψ1: Rotation at its end; 2 δ is the difference.
+        w: Virtual rotation.
+        axis: Undeformed axis.
+    """
+    δ = (ψ1 - ψ0) / 2
+    nodes, virtual = axis.at_nodes(δ), axis.at_nodes(w)
+    # Differences of 2 tan δ between neighbours are made differences of 2 δ.
+    steps = [
+        ufl.cos(a) * ufl.cos(b) / _sinc(b - a) * (w_b - w_a)
+        for (a, b), (w_a, w_b) in zip(pairwise(nodes), pairwise(virtual), strict=True)
+    ]
+    y, w_K = axis.interpolate([0, *accumulate(steps)])
+    ends = ((nodes[0], virtual[0], y), (nodes[-1], virtual[-1], y - sum(steps, 0)))
+    turns = [w_a + y_a * _sinc(δ - a) / (ufl.cos(a) * ufl.cos(δ)) for a, w_a, y_a in ends]
+    return sum(turns, 0) / 2, w_K

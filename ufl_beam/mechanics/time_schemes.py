@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: MIT
+"""Time schemes: how two states of the scene become the equation of a step.
+
+A scheme says, in UFL, which strains vary and which resultants act during a step, how velocities
+follow from displacements, and at what time loads act.  Neither the laws of the material nor the
+solver know which scheme runs.  This is what a scheme must say; the schemes whose forces act over
+the step are in energy_momentum.py, those whose forces act at its end in classical.py.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple, Protocol, TypeGuard, runtime_checkable
+
+import ufl
+from ufl.core.expr import Expr
+
+from ufl_beam.arrays import Array, Index
+from ufl_beam.errors import SceneError, require_number
+from ufl_beam.mechanics.kinematics import Axis
+from ufl_beam.model.material_laws import Softening, Values
+from ufl_beam.model.scene import Scene
+
+Constant = Callable[[float], Expr]
+"""Makes a number of the scheme a constant of the form, so that changing it compiles nothing."""
+
+
+class Step(NamedTuple):
+    """A step in time.
+
+    Attributes:
+        t0: Beginning; s.
+        t1: End; s.
+        q0: Configuration at the beginning, local degrees of freedom.
+        load_time: Time at which loads are taken; s.
+        motion_time: Time at which prescribed motions are taken; s.
+        toward: How far the step goes from the loads and motions before it to these; 1: there.
+        at: Part of the way from the loads at the beginning to those at the end of the step at which
+            they are in its equation; 1: at the end.
+    """
+
+    t0: float
+    t1: float
+    q0: Array
+    load_time: float
+    motion_time: float
+    toward: float
+    at: float = 1.0
+
+    @property
+    def dt(self) -> float:
+        """Length of the step; s."""
+        return self.t1 - self.t0
+
+
+@runtime_checkable
+class Scheme(Protocol):
+    """Protocol of time schemes."""
+
+    dynamic: bool
+    """True if the scene has inertia."""
+
+    advice: str
+    """Advice where a step finds no equilibrium."""
+
+    load_weight: float
+    """Follower loads turn with the rotation at this part of the step."""
+
+    theta: float
+    """Laws of inelastic material are stated at this part of the step."""
+
+    slack: float
+    """A step is cut if its forces do not account for this part of what it stores and dissipates."""
+
+    loss: float
+    """Part of twice the energy of a change of strain that is lost numerically."""
+
+    def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
+        """The step from ``t0`` to ``t1``, perhaps a part of one that goes on to ``end``."""
+
+    def resistance(self, softening: Softening, opening: Array, growth: Values) -> Values:
+        """Traction of a discontinuity whose opening grows in the step."""
+
+    def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
+        """Variation of the strains that the resultants work on; shape (3,)."""
+
+    def resultants(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> Expr:
+        """(N, V, M) that act during the step, from stiffness and strains at both ends."""
+
+    def losses(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> tuple[Expr, ...]:
+        """Energies per length that the resultants lose numerically in the step; often none."""
+
+    def average(self, before: Expr, now: Expr) -> Expr:
+        """Of a vector or a distance between frames: the one that variations are taken with."""
+
+    def virtual_turn(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
+        """Variation of a relative rotation whose virtual motion is ``w``."""
+
+    def secant(self, force: Callable[[Array], Array], e0: Array, e1: Array) -> tuple[Array, Array]:
+        """Force of a step from e0 to e1, and its derivative, where ``force`` has slopes 0 and 1."""
+
+    def way_to_rest(self, dt: float) -> float:
+        """Way of a step at the end of which there is no velocity, over that at its beginning; s."""
+
+    def nodal_step(self, q0: Array, q1: Array, rotations: Index) -> tuple[Array, float]:
+        """Return the conjugates of forces and moments, and the largest turn of a node; rad.
+
+        ``rotations`` are the degrees of freedom that are rotations, as int32.
+        """
+
+    def acting(self, before: Array, now: Array) -> Array:
+        """Forces that do the work of a step, from those in its equation and in the one before."""
+
+
+class Rates(Protocol):
+    """Velocities, and accelerations if a scheme has them, at the beginning of a step.
+
+    Attributes:
+        v: The velocities; m/s, rad/s.
+        v_before: Those at the beginning of the step before.
+        more: What a scheme keeps besides, as many as are known yet of :attr:`DynamicScheme.kept`.
+        last_dt: Length of the step before; infinite if there was none; s.
+    """
+
+    v: Array
+    v_before: Array
+    more: tuple[Array, ...]
+    last_dt: float
+
+
+class DynamicScheme(Scheme, Protocol):
+    """Protocol of time schemes with inertia."""
+
+    kept: tuple[str, ...]
+    """Names of the rates that it keeps besides the velocities, such as accelerations."""
+
+    slips: bool
+    """True if it loses energy by :meth:`slip`."""
+
+    def require(self, scene: Scene) -> None:
+        """Raise :class:`SceneError` if the scene has what the scheme cannot do."""
+
+    def half_tangents(self, rotations: Index) -> Index:
+        """Those rotations whose step of the nodes is 2 tan(Δψ/2); it is Δψ for the others."""
+
+    def inertia(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
+        """(factor, back, v) of the force of inertia M (factor s - back v), s being the step."""
+
+    def velocity(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
+        """(factor, back, v) of the velocity factor s - back v in the equation of the step."""
+
+    def rates(self, dt: float, s: Array, rates: Rates) -> tuple[Array, ...]:
+        """Velocities after the step ``s`` of the nodes, then what is kept besides."""
+
+    def slip(self, dt: float, change: Array, rates: Rates) -> Array:
+        """Return Δu/Δt less the mean of both end velocities, from their ``change``, P(88)."""
+
+    def error_weights(self) -> tuple[float, float]:
+        """(c2, c3) of the error c2 a dt² + c3 da/dt dt³ of a step of acceleration a."""
+
+
+def has_inertia(scheme: Scheme) -> TypeGuard[DynamicScheme]:
+    """Return whether the scheme is a dynamic one."""
+    return scheme.dynamic
+
+
+def scaled(C: Expr, e: Expr) -> Expr:
+    """Component by component product; shape (3,)."""
+    return ufl.as_vector([C[i] * e[i] for i in range(3)])
+
+
+def require_between(what: str, value: float, low: float, high: float) -> None:
+    """Raise :class:`SceneError` if a number of a scheme lies outside its range."""
+    if require_number(value, what, at_least=low) > high:
+        raise SceneError(f"{what} = {value:g} must lie between {low:g} and {high:g}")

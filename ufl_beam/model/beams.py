@@ -1,0 +1,265 @@
+# SPDX-License-Identifier: MIT
+"""Beams and the places on them: where the undeformed axis runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass, field
+from itertools import pairwise
+
+import numpy as np
+
+from ufl_beam.errors import (
+    SceneError,
+    require_count,
+    require_function,
+    require_kind,
+    require_memory,
+    require_number,
+    require_sequence,
+    require_switch,
+    require_text,
+    require_vector,
+    shorten,
+    warn,
+)
+from ufl_beam.model.axis_curves import Arc, Polyline, Straight
+from ufl_beam.model.axis_curves import Point as Point
+from ufl_beam.model.material_laws import HingeLaw, require_hinge_law
+from ufl_beam.model.plane_curves import tangent_within
+from ufl_beam.model.sections import Section
+
+Curve = Callable[[float], Sequence[float]]
+
+TOGETHER = 1e-9
+"""Part of a cell below which two places of a beam are one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Beam:
+    """A beam with straight cells along a curve; straight from ``a`` to ``b`` by default.
+
+    Args:
+        a: First end; m.
+        b: Last end; m.
+        section: Its cross-section.
+        cells: Number of cells, of equal length in the parameter of the curve.  Places that
+            something is attached to, and corners, become vertices too.
+        name: What error messages and pictures call it.
+        curve: Axis from ``s = 0`` at ``a`` to ``s = 1`` at ``b``.
+        corners: Parameters ``s`` that must be vertices.
+        hinges: Plastic hinges of zero length, by their parameter ``s``, which becomes a vertex:
+            ``{0.0: Softening(limit, energy)}``.  A hinge is rigid until the moment at ``s`` reaches
+            its limit; then it follows its law, :class:`Softening` or :class:`Hardening` (limit in
+            N m, moduli in N m/rad, ``eta`` in N m s).  At an end it comes before the law of the
+            section; ``None`` there is an end without a hinge.
+
+    Raises:
+        SceneError: Zero length, ``cells < 1``, coordinates that are no finite numbers, or hinges in
+            a section of fibres.
+    """
+
+    a: Point
+    b: Point
+    section: Section
+    _: KW_ONLY
+    cells: int = 8
+    name: str = "beam"
+    curve: Curve = field(default=None, repr=False)  # type: ignore[assignment]
+    corners: tuple[float, ...] = ()
+    hinges: Mapping[float, HingeLaw | None] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        require_text(self.name, "Beam: name")
+        a, b = (require_vector(x, f"{self.name}: end") for x in (self.a, self.b))
+        object.__setattr__(self, "a", a)
+        object.__setattr__(self, "b", b)
+        if not isinstance(self.section, Section):
+            raise SceneError(f"{self.name}: section = {shorten(self.section)} is not a Section")
+        object.__setattr__(self, "cells", require_count(self.cells, f"{self.name}: cells"))
+        require_memory(self.cells, f"{self.name}: cells = {self.cells}")
+        if self.curve is None:
+            if a == b:
+                raise SceneError(f"{self.name}: zero length, both ends are at {a}")
+            object.__setattr__(self, "curve", Straight(a, b))
+        for s, end in ((0.0, a), (1.0, b)):
+            there = point_of(self.curve, s, f"{self.name}: curve")
+            if math.dist(there, end) > 1e-9 * max(math.hypot(*there), math.hypot(*end)):
+                raise SceneError(f"{self.name}: curve({s:g}) = {there} is not the end {end}")
+        corners = require_sequence(self.corners, f"{self.name}: corners")
+        object.__setattr__(self, "corners", corners)
+        for s in corners:
+            require_number(s, f"{self.name}: corner")
+            if not 0.0 < s < 1.0:
+                raise SceneError(f"{self.name}: corner s = {s:g} must lie between 0 and 1")
+        require_kind(self.hinges, Mapping, f"{self.name}: hinges")
+        for s, law in self.hinges.items():
+            require_number(s, f"{self.name}: hinge at")
+            if not 0.0 <= s <= 1.0:
+                raise SceneError(f"{self.name}: hinge at s = {s:g} must lie between 0 and 1")
+            if law is not None or s not in (0.0, 1.0):
+                require_hinge_law(law, f"{self.name}: hinge at s = {s:g}")
+        for first, second in pairwise(sorted(self.hinges)):
+            if (second - first) * self.cells <= TOGETHER:
+                raise SceneError(
+                    f"{self.name}: two hinges at s = {first:g}; give one, with the law of both"
+                )
+        if self.hinges and self.section.fibres is not None:
+            raise SceneError(
+                f"{self.name}: hinges are for resultants; here the fibres of the section soften"
+            )
+        at = sorted({*self.corners, *(i / self.cells for i in range(self.cells + 1))})
+        points = [point_of(self.curve, s, f"{self.name}: curve") for s in at]
+        self._warn_of_thickness(sum(math.dist(p, q) for p, q in pairwise(points)))
+
+    def _warn_of_thickness(self, length: float) -> None:
+        """Warn if the radius of gyration of a section is larger than the beam is long."""
+        depth = self.section.depth
+        if depth > math.sqrt(12) * length > 0.0:
+            warn(
+                f"{self.name}: its section is {depth:.3g} m deep (sqrt(12 EI/EA) where no depth is "
+                f"given), but it is only {length:.3g} m long. Are sizes of the section in mm? "
+                "Units are SI: m, N, N m². If EI is large on purpose, give the section its depth"
+            )
+
+    @classmethod
+    def arc(
+        cls,
+        center: Point,
+        radius: float,
+        angles: tuple[float, float],
+        section: Section,
+        *,
+        cells: int = 8,
+        name: str = "beam",
+    ) -> Beam:
+        """Circular arc from ``angles[0]`` to ``angles[1]`` (rad, counter-clockwise from x)."""
+        middle = require_vector(center, f"{name}: center")
+        require_number(radius, f"{name}: radius", positive=True)
+        first, last = require_vector(angles, f"{name}: angles")
+        if first == last:
+            raise SceneError(f"{name}: zero length, both angles of the arc are {first:g}")
+
+        curve = Arc(middle, float(radius), first, last)
+        return cls(curve(0), curve(1), section, cells=cells, name=name, curve=curve)
+
+    @classmethod
+    def polyline(
+        cls, points: Sequence[Point], section: Section, *, cells: int = 8, name: str = "beam"
+    ) -> Beam:
+        """Straight pieces through ``points``, rigidly joined; ``s`` is the part of the length."""
+        points = require_sequence(points, f"{name}: points")
+        xy = [require_vector(p, f"{name}: point {i}") for i, p in enumerate(points)]
+        if len(xy) < 2:
+            raise SceneError(f"{name}: a polyline needs at least two points, not {len(xy)}")
+        ends = [0.0]
+        for p, q in pairwise(xy):
+            if p == q:
+                raise SceneError(f"{name}: zero length between two points at {p}")
+            ends.append(ends[-1] + math.dist(p, q))
+        at = [end / ends[-1] for end in ends]
+
+        curve = Polyline(tuple(xy), tuple(at))
+        corners = tuple(at[1:-1])
+        return cls(xy[0], xy[-1], section, cells=cells, name=name, curve=curve, corners=corners)
+
+    @classmethod
+    def along(cls, curve: Curve, section: Section, *, cells: int = 8, name: str = "beam") -> Beam:
+        """Any curve ``s -> (x, y)``, ``s`` from 0 to 1; m."""
+        a, b = (point_of(curve, s, f"{name}: curve") for s in (0.0, 1.0))
+        return cls(a, b, section, cells=cells, name=name, curve=curve)
+
+    def at(self, s: float) -> Place:
+        """Place at the parameter ``s`` of the axis, 0 at the start and 1 at the end.
+
+        On straight beams, arcs and polylines ``s`` is the part of the length.
+        """
+        return Place(self, s)
+
+    @property
+    def start(self) -> Place:
+        """First end."""
+        return Place(self, 0.0)
+
+    @property
+    def end(self) -> Place:
+        """Last end."""
+        return Place(self, 1.0)
+
+    def vertices(self, attached: Sequence[float]) -> list[float]:
+        """Parameters of the vertices: equal cells, the corners and what is ``attached``.
+
+        A place nearer to a regular vertex than :data:`TOGETHER` is that vertex.
+        """
+        regular = [i / self.cells for i in range(self.cells + 1)]
+        vertices = sorted({*regular, *self.corners, *attached})
+        kept = [0.0]
+        for s in vertices[1:]:
+            if (s - kept[-1]) * self.cells > TOGETHER:
+                kept.append(s)
+        kept[-1] = 1.0
+        return kept
+
+
+@dataclass(frozen=True)
+class Place:
+    """A point of a beam; made by ``beam.start``, ``beam.end`` and ``beam.at(s)``.
+
+    Attributes:
+        beam: The beam, by identity.
+        s: Parameter of its axis, from 0 to 1.
+        beyond: Whether the cross-section beyond the plastic hinge at ``s`` is meant, the one that
+            no joint, support or load is attached to.
+    """
+
+    beam: Beam
+    s: float
+    beyond: bool = False
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.beam, Beam):
+            raise SceneError(f"Place: {shorten(self.beam)} is not a Beam")
+        require_number(self.s, f"{self.beam.name}.at(s): s")
+        if not 0.0 <= self.s <= 1.0:
+            raise SceneError(f"{self.beam.name}.at({self.s:g}): s must lie between 0 and 1")
+        require_switch(self.beyond, f"{self.beam.name}.at({self.s:g}): beyond")
+
+    @property
+    def point(self) -> Point:
+        """Coordinates in the undeformed scene; m."""
+        x, y = self.beam.curve(self.s)
+        return float(x), float(y)
+
+    @property
+    def direction(self) -> Point:
+        """Unit tangent of the undeformed axis; at a corner the mean of both sides."""
+        edges = sorted({0.0, *self.beam.corners, 1.0})
+        sides = [
+            tangent_within(self.beam.curve, self.s, low, high)
+            for low, high in pairwise(edges)
+            if low <= self.s <= high
+        ]
+        x, y = sum((side / math.hypot(*side) for side in sides), np.zeros(2))
+        length = math.hypot(x, y)
+        return float(x / length), float(y / length)
+
+    def __str__(self) -> str:
+        ends = {0.0: "start", 1.0: "end"}
+        x, y = self.point
+        name = f"{self.beam.name}.{ends.get(self.s, f'at({self.s:g})')} ({x:g}, {y:g})"
+        return f"{name} beyond the hinge" if self.beyond else name
+
+
+def point_of(curve: Curve, s: float, what: str) -> Point:
+    """Evaluate a curve of a user.
+
+    Raises:
+        SceneError: It fails there, or returns no pair of finite numbers; the message has ``what``.
+    """
+    require_function(curve, what, "s that returns (x, y)")
+    try:
+        point = curve(s)
+    except Exception as error:
+        raise SceneError(f"{what}({s:g}) fails: {shorten(error)}") from error
+    return require_vector(point, f"{what}({s:g})")

@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: MIT
+"""Rigid bodies, the ground, and the points on them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import KW_ONLY, dataclass
+
+from ufl_beam.errors import (
+    SceneError,
+    require_kind,
+    require_number,
+    require_text,
+    require_vector,
+    shorten,
+)
+from ufl_beam.model.beams import Place, Point
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A rigid body; anything may be attached to any point of it.
+
+    Args:
+        center: Centre of mass in the undeformed scene; m.
+        mass: kg.
+        inertia: About the centre of mass; kg m².
+        name: What error messages and pictures call it.
+
+    Raises:
+        SceneError: Coordinates that are no finite numbers, a negative mass or inertia.
+    """
+
+    center: Point
+    _: KW_ONLY
+    mass: float = 0.0
+    inertia: float = 0.0
+    name: str = "body"
+
+    def __post_init__(self) -> None:
+        require_text(self.name, "Body: name")
+        object.__setattr__(self, "center", require_vector(self.center, f"{self.name}: center"))
+        require_number(self.mass, f"{self.name}: mass", at_least=0.0)
+        require_number(self.inertia, f"{self.name}: inertia", at_least=0.0)
+
+    def at(self, x: float, y: float) -> Spot:
+        """The point of the body that is at (x, y) in the undeformed scene; m."""
+        return Spot(self, (x, y))
+
+    @property
+    def middle(self) -> Spot:
+        """The centre of mass."""
+        return Spot(self, self.center)
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A point of a rigid body; made by ``body.at(x, y)``, ``body.middle`` and :func:`ground`.
+
+    Attributes:
+        body: The body, by identity.
+        point: Coordinates in the undeformed scene; m.
+    """
+
+    body: Body
+    point: Point
+
+    def __post_init__(self) -> None:
+        require_kind(self.body, Body, "Spot: body")
+        point = require_vector(self.point, f"{self.body.name}.at(x, y)")
+        object.__setattr__(self, "point", point)
+
+    def __str__(self) -> str:
+        x, y = self.point
+        return f"{self.body.name} ({x:g}, {y:g})"
+
+
+GROUND = Body((0.0, 0.0), name="ground")
+"""The body that does not move."""
+
+
+def ground(x: float, y: float) -> Spot:
+    """The point (x, y) of the ground; m."""
+    return Spot(GROUND, (x, y))
+
+
+Anchor = Place | Spot
+"""Where something may be attached."""
+
+Node = Place | Body
+"""Places of beams and bodies: they have a displacement and a rotation."""
+
+
+def node(anchor: Anchor) -> Node:
+    """Return the cross-section of a beam, or the body, that an anchor moves with."""
+    return anchor.body if isinstance(anchor, Spot) else anchor
+
+
+def arm(anchor: Anchor, point: Point | None = None) -> Point:
+    """From the node of an anchor to a point that moves with it, by default its own; m.
+
+    All points of the ground are one: they do not move.
+    """
+    if node(anchor) is GROUND:
+        return 0.0, 0.0
+    x, y = point or anchor.point
+    nx, ny = anchor.body.center if isinstance(anchor, Spot) else anchor.point
+    return x - nx, y - ny
+
+
+def carries(anchor: Anchor) -> bool:
+    """Return whether the displacement of an anchor is that of its node."""
+    return math.hypot(*arm(anchor)) == 0.0
+
+
+def require_anchor(anchor: object, owner: str) -> None:
+    """Raise :class:`SceneError` naming ``owner`` unless something can be attached there."""
+    if not isinstance(anchor, Place | Spot):
+        raise SceneError(
+            f"{owner}: {shorten(anchor)} is not a place; use beam.start, .end or .at(s), "
+            "body.at(x, y) or ground(x, y)"
+        )
+
+
+def require_node(place: object, owner: str) -> None:
+    """Raise :class:`SceneError` naming ``owner`` unless the motion of a place is that of a node."""
+    require_anchor(place, owner)
+    if isinstance(place, Spot) and place.body is GROUND:
+        raise SceneError(f"{owner}: {place} does not move")
+    if not carries(place):  # type: ignore[arg-type]
+        raise SceneError(
+            f"{owner}: {place} is not the centre of the body; hold other points by joints to "
+            "ground(x, y), and give masses to the body itself"
+        )

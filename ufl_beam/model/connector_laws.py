@@ -1,0 +1,266 @@
+# SPDX-License-Identifier: MIT
+"""Laws of connectors: what force belongs to a relative motion, or what motion is given."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import KW_ONLY, dataclass
+from numbers import Real
+from typing import Any, Protocol
+
+from ufl_beam.errors import (
+    SceneError,
+    require_function,
+    require_kind,
+    require_number,
+    require_returned,
+)
+from ufl_beam.model.beams import Curve
+from ufl_beam.model.loads import TimeFunction, require_time_function
+from ufl_beam.model.material_laws import Hardening, HingeLaw, Softening, require_hinge_law
+
+
+@dataclass(frozen=True)
+class Motor:
+    """The motion is given; the force that it takes is found.
+
+    Args:
+        motion: In time; m or rad.  Zero, which joints use, holds it.
+    """
+
+    motion: TimeFunction
+
+    def __post_init__(self) -> None:
+        require_time_function(self.motion, "Motor")
+
+
+@dataclass(frozen=True)
+class Actuator:
+    """The force is given; a positive one makes the motion grow.
+
+    Args:
+        force: In time; N or N m.
+    """
+
+    force: TimeFunction
+
+    def __post_init__(self) -> None:
+        require_time_function(self.force, "Actuator")
+
+
+class Bearing:
+    """Base of joints and supports: their force may press on places that rub."""
+
+
+class Running(Protocol):
+    """A simulation between two steps, as far as laws of connectors ask it.
+
+    Attributes:
+        t: Time; s.
+    """
+
+    t: float
+
+    def press(self, joint: Any) -> float:
+        """Return the force that a joint or support bears across its motion; N."""
+
+
+@dataclass(frozen=True)
+class Controller:
+    """The force is what a function says at the beginning of each step, and constant during it.
+
+    Args:
+        force: ``force(simulation)``; N or N m; a positive one makes the motion grow.  It may ask
+            the simulation for its time, motions, velocities and the forces of joints.
+    """
+
+    force: Callable[[Any], float]
+
+    def __post_init__(self) -> None:
+        require_function(self.force, "Controller: force", "the simulation")
+
+    def ask(self, simulation: Running, link: object) -> float:
+        """Evaluate the force of ``link`` in the next step; all processes call it together."""
+        at = f"t = {simulation.t:.9g} s"
+        return require_returned(self.force(simulation), f"{link}: the controller", at)
+
+
+@dataclass(frozen=True)
+class Spring:
+    """A spring, which may yield and break.
+
+    Args:
+        stiffness: N/m or N m/rad.
+        law: How it yields; limit in N or N m, moduli as the stiffness.
+        softening: How it breaks; energy in J.
+
+    Raises:
+        SceneError: A stiffness that is not positive.
+    """
+
+    stiffness: float
+    law: Hardening | None = None
+    softening: Softening | None = None
+
+    def __post_init__(self) -> None:
+        require_number(self.stiffness, "Spring: stiffness", positive=True)
+        if self.law is not None:
+            require_kind(self.law, Hardening, "Spring: law")
+        if self.softening is not None:
+            require_kind(self.softening, Softening, "Spring: softening")
+
+
+@dataclass(frozen=True)
+class Damper:
+    """A force in proportion to the rate of the motion.
+
+    Args:
+        viscosity: N s/m or N m s/rad.
+    """
+
+    viscosity: float
+
+    def __post_init__(self) -> None:
+        require_number(self.viscosity, "Damper: viscosity", positive=True)
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Contact where the motion leaves an interval; free inside.
+
+    Args:
+        low, high: Ends of the interval; m or rad.
+        stiffness: Of the contact; N/m or N m/rad.
+
+    Raises:
+        SceneError: An interval that does not contain the undeformed scene, or no stiffness.
+    """
+
+    stiffness: float
+    _: KW_ONLY
+    low: float = -math.inf
+    high: float = math.inf
+
+    def __post_init__(self) -> None:
+        require_number(self.stiffness, "Stop: stiffness", positive=True)
+        for name, end in (("low", self.low), ("high", self.high)):
+            if not isinstance(end, Real) or abs(end) != math.inf:
+                require_number(end, f"Stop: {name}")
+        if not self.low <= 0.0 <= self.high or (math.isinf(self.low) and math.isinf(self.high)):
+            raise SceneError(
+                f"Stop: the interval from low = {self.low:g} to high = {self.high:g} must contain "
+                "0, the undeformed scene, and have at least one end"
+            )
+
+
+@dataclass(frozen=True)
+class ForceLaw:
+    """A force that a function of the motion and its rate gives, as a spring or damper would.
+
+    Args:
+        force: ``force(motion, rate)``; arrays or numbers; N or N m; a positive one resists growth.
+            It is asked for the middle of the step.  What it takes is the entry "functions" of the
+            ledger, because nobody knows what it stores.
+    """
+
+    force: Callable[[float, float], float]
+
+    def __post_init__(self) -> None:
+        require_function(self.force, "ForceLaw: force", "(motion, rate)")
+
+
+@dataclass(frozen=True)
+class Coulomb:
+    """Dry friction: no motion up to a limit, and the limit against the motion beyond it.
+
+    The limit is ``force`` and ``coefficient`` times the force of a joint at the end of the step
+    before.  There is no stiffness of sticking: the motion stops exactly, with its velocity.
+
+    Args:
+        force: Limit whatever the joint bears; N or N m.
+        coefficient: Coefficient of friction; for rotations times the radius of the pin; 1 or m.
+        joint: The joint or support whose force presses.  Joints must be ``measured``, or hold
+            their places with forces anyway, as :func:`Prismatic` and :func:`Link` do.
+
+    Raises:
+        SceneError: No limit, or a coefficient without a joint.
+    """
+
+    force: float = 0.0
+    _: KW_ONLY
+    coefficient: float = 0.0
+    joint: Bearing | None = None
+
+    def __post_init__(self) -> None:
+        require_number(self.force, "Coulomb: force", at_least=0.0)
+        require_number(self.coefficient, "Coulomb: coefficient", at_least=0.0)
+        if self.force == self.coefficient == 0.0:
+            raise SceneError("Coulomb: force and coefficient are both zero; leave it out")
+        if (self.coefficient > 0) != (self.joint is not None):
+            raise SceneError("Coulomb: give coefficient and joint together")
+        if self.joint is not None:
+            require_kind(self.joint, Bearing, "Coulomb: joint")
+
+    def ask(self, simulation: Running, link: object) -> float:
+        """Return the limit of the next step; all processes call it together."""
+        if self.joint is None:
+            return self.force
+        return self.force + self.coefficient * simulation.press(self.joint)
+
+
+@dataclass(frozen=True)
+class RigidPlastic:
+    """No motion up to the limit of a law, which the motion follows beyond it.
+
+    There is no elastic stiffness: below the limit the motion is held exactly.  Plastic hinges of
+    beams, ``Beam(hinges={s: law})``, are rotations with this law.
+
+    Args:
+        law: :class:`Softening` or :class:`Hardening`; limit in N m or N, moduli in N m/rad or N/m,
+            fracture energy in J.
+
+    Raises:
+        SceneError: A law of another kind, or one that relaxes an elastic stress.
+    """
+
+    law: HingeLaw
+
+    def __post_init__(self) -> None:
+        require_hinge_law(self.law, "RigidPlastic: law")
+
+
+@dataclass(frozen=True)
+class Guide:
+    """The point stays on a curve of the plane, free along it; see :func:`Guided`.
+
+    Args:
+        curve: ``s -> (x, y)``, smooth, for all s that the motion may reach; m.
+    """
+
+    curve: Curve
+
+    def __post_init__(self) -> None:
+        require_function(self.curve, "Guide: curve", "s that returns (x, y)")
+
+
+Law = (
+    Guide
+    | Motor
+    | Actuator
+    | Controller
+    | Spring
+    | Damper
+    | Stop
+    | ForceLaw
+    | Coulomb
+    | RigidPlastic
+)
+
+
+def _still(t: float) -> float:
+    return 0.0
+
+
+HELD = Motor(_still)
+"""The law of what a joint holds."""

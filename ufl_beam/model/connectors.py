@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: MIT
+"""Connectors: a relative motion of two places, and the law that it follows."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from ufl_beam.errors import (
+    SceneError,
+    require_kind,
+    require_vector,
+)
+from ufl_beam.model.beams import Point
+from ufl_beam.model.bodies import Anchor, arm, require_anchor
+from ufl_beam.model.connector_laws import Coulomb, Guide, Law, Motor, RigidPlastic
+
+
+class Rigidly(NamedTuple):
+    """Derivatives of a relative motion by (u, v, ψ) of both nodes in the undeformed scene.
+
+    Attributes:
+        a, b: Factors; (3,) each.
+    """
+
+    a: tuple[float, float, float]
+    b: tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Connector:
+    """A relative motion of two anchors that follows a law; made by :func:`Turn` and its siblings.
+
+    The motion is zero in the undeformed scene.  The force of a connector resists its growth: it is
+    positive in a spring that is stretched, and negative in a motor that drives.
+
+    Attributes:
+        kind: Name for messages.
+        motion: Which relative motion; a name of ``relative.MOTIONS``.
+        a, b: The anchors.
+        law: What it follows.
+        axis: Unit vector, for motions along one.
+        corner: The point of frame a that is meant, if it is not that of the anchor.
+    """
+
+    kind: str
+    motion: str
+    a: Anchor
+    b: Anchor
+    law: Law
+    axis: Point = (1.0, 0.0)
+    corner: Point | None = None
+
+    def __post_init__(self) -> None:
+        for anchor in (self.a, self.b):
+            require_anchor(anchor, self.kind)
+        require_kind(self.law, Law.__args__, f"{self}: law")
+
+    def __str__(self) -> str:
+        return f"{self.kind}({self.a}, {self.b})"
+
+    @property
+    def holds(self) -> bool:
+        """True if the law may demand a motion, whatever force that takes."""
+        return isinstance(self.law, Motor | Coulomb | Guide | RigidPlastic)
+
+    @property
+    def arms(self) -> tuple[Point, Point]:
+        """From both nodes to the points that are meant; m."""
+        return arm(self.a, self.corner), arm(self.b)
+
+    @property
+    def apart(self) -> Point:
+        """From the point of a to the point of b in the undeformed scene; m."""
+        (ax, ay), (bx, by) = self.corner or self.a.point, self.b.point
+        return bx - ax, by - ay
+
+    @property
+    def turns(self) -> bool:
+        """True if the motion is a rotation: rad and N m in the place of m and N."""
+        return self.motion == "turning"
+
+    def rigidly(self) -> Rigidly:
+        """Return the derivatives of the motion by those of the nodes, in the undeformed scene."""
+        if self.turns:
+            return Rigidly((0.0, 0.0, -1.0), (0.0, 0.0, 1.0))
+        (dx, dy), length = self.apart, math.hypot(*self.apart)
+        x, y = (dx / length, dy / length) if self.motion == "stretching" else self.axis
+        (ax, ay), (bx, by) = self.arms
+        turned_with_a = x * dy - y * dx if self.motion == "sliding" else 0.0
+        # d/dψ of axis(ψ)·d is (W axis)·d = -y dx + x dy
+        return Rigidly((-x, -y, x * ay - y * ax + turned_with_a), (x, y, y * bx - x * by))
+
+
+def Turn(a: Anchor, b: Anchor, law: Law) -> Connector:
+    """Rotation of ``b`` relative to ``a``: rotational springs, dampers, motors; rad, N m."""
+    return Connector("Turn", "turning", a, b, law)
+
+
+def Stretch(a: Anchor, b: Anchor, law: Law) -> Connector:
+    """Growth of the distance of ``a`` and ``b``: springs, dampers, rods that push; m, N.
+
+    Raises:
+        SceneError: Both are at the same point, so that there is no direction.
+    """
+    connector = Connector("Stretch", "stretching", a, b, law)
+    _require_apart(connector)
+    return connector
+
+
+def Slide(a: Anchor, b: Anchor, law: Law, *, axis: Point | None = None) -> Connector:
+    """Way of ``b`` along an axis that turns with ``a``; m, N.
+
+    Args:
+        a: Whose axis it is; it may be on the ground.
+        b: What moves along it.
+        law: What acts along the axis.
+        axis: Direction in the undeformed scene; from ``a`` to ``b`` by default.
+
+    Raises:
+        SceneError: An axis of zero length.
+    """
+    return Connector("Slide", "sliding", a, b, law, _axis(a, b, axis, "Slide"))
+
+
+def _axis(a: Anchor, b: Anchor, axis: Point | None, kind: str) -> Point:
+    for anchor in (a, b):
+        require_anchor(anchor, kind)
+    (ax, ay), (bx, by) = a.point, b.point
+    x, y = (bx - ax, by - ay) if axis is None else require_vector(axis, f"{kind}: axis")
+    length = math.hypot(x, y)
+    if length == 0.0:
+        raise SceneError(
+            f"{kind}({a}, {b}): the axis has zero length; give axis = (x, y), a direction in the "
+            "undeformed scene"
+        )
+    return x / length, y / length
+
+
+def _require_apart(connector: Connector) -> None:
+    if math.hypot(*connector.apart) == 0.0:
+        raise SceneError(
+            f"{connector}: zero length, both ends are at the same point; join them with Revolute, "
+            "or use Slide with an axis"
+        )

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: MIT
+"""Viscous damping of the elastic motion: what users may ask for beside plastic dissipation."""
+
+from __future__ import annotations
+
+from dataclasses import KW_ONLY, dataclass
+
+from ufl_beam.errors import SceneError, require_kind, require_number, require_sequence
+from ufl_beam.model.beams import Beam
+
+
+@dataclass(frozen=True)
+class Rayleigh:
+    """Forces (a0 M + a1 K) v, K being the stiffness of the undeformed scene, P(92).
+
+    The damping ratio of a mode of circular frequency ω is a0/(2ω) + a1 ω/2.  It is a property of
+    the structure, not of the material, and it is not objective: rigid rotation is damped too, and
+    a hinge that has opened keeps being resisted.  For large motion see :class:`KelvinVoigt`.
+
+    Args:
+        mass: a0; 1/s.
+        stiffness: a1; s.
+
+    Raises:
+        SceneError: A negative number, or both zero.
+    """
+
+    _: KW_ONLY
+    mass: float = 0.0
+    stiffness: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_number(self.mass, "Rayleigh: mass", at_least=0.0)
+        require_number(self.stiffness, "Rayleigh: stiffness", at_least=0.0)
+        if self.mass == self.stiffness == 0.0:
+            raise SceneError("Rayleigh: mass and stiffness are both zero; leave damping out")
+
+
+@dataclass(frozen=True, eq=False)
+class KelvinVoigt:
+    """Resultants C times the rates of the strains beside the elastic ones: objective damping.
+
+    Rigid motion is free of it; the damping ratio of a mode of circular frequency ω in small
+    vibration is time ω/2, that of ``Rayleigh(stiffness=time)``.  Cells with a hinge are left out,
+    so that an open hinge turns freely.
+
+    Args:
+        time: Retardation time; s.
+        beams: The beams that are damped; all by default.
+
+    Raises:
+        SceneError: A time that is not positive.
+    """
+
+    time: float
+    beams: tuple[Beam, ...] | None = None
+
+    def __post_init__(self) -> None:
+        require_number(self.time, "KelvinVoigt: time", positive=True)
+        if self.beams is not None:
+            object.__setattr__(self, "beams", require_sequence(self.beams, "KelvinVoigt: beams"))
+            for i, beam in enumerate(self.beams):
+                require_kind(beam, Beam, f"KelvinVoigt: beams[{i}]")
+
+
+Damping = Rayleigh | KelvinVoigt

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: MIT
+"""Distributions of yield stresses over fibres and cells; seeded, the same on every process.
+
+Each cell of each beam draws from a stream of its own, known by where the beam begins and ends, so
+that neither the order of beams nor the number of processes changes what it gets.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import KW_ONLY, dataclass
+from numbers import Integral
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import scipy  # its parts are loaded when they are used
+
+from ufl_beam.errors import SceneError, require_number, shorten
+
+
+@dataclass(frozen=True)
+class Distribution(ABC):
+    """A random positive quantity.
+
+    Args:
+        seed: The same seed gives the same scene again.
+    """
+
+    _: KW_ONLY
+    seed: int
+
+    def __post_init__(self) -> None:
+        name = type(self).__name__
+        if isinstance(self.seed, bool) or not isinstance(self.seed, Integral) or self.seed < 0:
+            raise SceneError(
+                f"{name}: seed = {shorten(self.seed)} must be a whole number, 0 or more"
+            )
+        for parameter in self.__match_args__:
+            require_number(getattr(self, parameter), f"{name}: {parameter}", positive=True)
+
+    @abstractmethod
+    def law(self) -> Any:
+        """The distribution of SciPy."""
+
+    def draw(self, n: int, key: tuple[int, int]) -> npt.NDArray[np.float64]:
+        """``n`` independent values of the stream ``key``; none is negative; shape (n,)."""
+        stream = np.random.default_rng(np.random.SeedSequence(int(self.seed), spawn_key=key))
+        return np.asarray(np.maximum(self.law().rvs(n, random_state=stream), 0.0))
+
+
+@dataclass(frozen=True)
+class Normal(Distribution):
+    """Gauss's distribution; values below zero become zero, such fibres yield at once.
+
+    Args:
+        mean: Mean; Pa for fibres, N or N m for resultants.
+        deviation: Standard deviation; same unit.
+        seed: The same seed gives the same scene again.
+
+    Raises:
+        SceneError: Mean or deviation are not positive, or the seed is no whole number.
+    """
+
+    mean: float
+    deviation: float
+
+    def law(self) -> Any:
+        """The distribution of SciPy."""
+        return scipy.stats.norm(self.mean, self.deviation)
+
+
+class TruncatedNormal(Normal):
+    """Gauss's distribution of these parameters, given that the value is positive."""
+
+    def law(self) -> Any:
+        """The distribution of SciPy."""
+        return scipy.stats.truncnorm(-self.mean / self.deviation, np.inf, self.mean, self.deviation)
+
+
+class Lognormal(Normal):
+    """The distribution of this mean and deviation whose logarithm is normal."""
+
+    def law(self) -> Any:
+        """The distribution of SciPy."""
+        spread = np.sqrt(np.log1p((self.deviation / self.mean) ** 2))
+        return scipy.stats.lognorm(spread, scale=self.mean * np.exp(-(spread**2) / 2))
+
+
+@dataclass(frozen=True)
+class Weibull(Distribution):
+    """Weibull's distribution.
+
+    Args:
+        scale: What a part exp(-1) of the values exceeds; Pa for fibres, N or N m for resultants.
+        shape: Weibull's modulus; the larger, the less scatter.
+        seed: The same seed gives the same scene again.
+
+    Raises:
+        SceneError: Scale or shape are not positive, or the seed is no whole number.
+    """
+
+    scale: float
+    shape: float
+
+    def law(self) -> Any:
+        """The distribution of SciPy."""
+        return scipy.stats.weibull_min(self.shape, scale=self.scale)

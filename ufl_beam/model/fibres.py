@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: MIT
+"""Fibres of a cross-section: layers across its depth, each a material point of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import KW_ONLY, dataclass
+
+import numpy as np
+
+from ufl_beam.array_checks import require_array
+from ufl_beam.arrays import Array
+from ufl_beam.errors import SceneError, require_count, require_kind
+from ufl_beam.model.material_laws import Hardening, Layout, Softening
+
+
+@dataclass(frozen=True)
+class Fibres:
+    """Material law of the fibres of a section and their number, P(93).
+
+    Args:
+        law: Of each fibre; stresses in Pa.  A random limit is drawn for each fibre of each cell.
+        number: Of layers of equal thickness, where the shape of the section tells their areas.
+        softening: Law of the crack that opens in a fibre where the stress reaches its limit; Pa,
+            J/m².
+
+    Raises:
+        SceneError: A law is none, or ``number`` is no whole number from 1.
+    """
+
+    law: Hardening
+    _: KW_ONLY
+    number: int = 20
+    softening: Softening | None = None
+
+    def __post_init__(self) -> None:
+        require_kind(self.law, Hardening, "Fibres: law")
+        require_count(self.number, "Fibres: number")
+        object.__setattr__(self, "number", int(self.number))
+        if self.softening is not None:
+            require_kind(self.softening, Softening, "Fibres: softening")
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedFibres:
+    """Fibres at their places in a section.
+
+    Args:
+        fibres: Their laws.
+        E: Young's modulus; Pa.
+        y: Distances from the axis, positive to the left of its direction; (n,); m.
+        A: Areas; (n,); m².
+
+    Raises:
+        SceneError: Different lengths, an area that is not positive, or no bending stiffness.
+    """
+
+    fibres: Fibres
+    E: float
+    y: Array
+    A: Array
+
+    @classmethod
+    def at(cls, fibres: Fibres, E: float, y: Sequence[float], A: Sequence[float]) -> PlacedFibres:
+        """Fibres of a user; ``y`` from any line, the axis will run through their centroid."""
+        y_, A_ = (
+            require_array(x, f"Section.of_fibres: {name}") for name, x in (("y", y), ("A", A))
+        )
+        if y_.ndim != 1 or y_.shape != A_.shape or not len(y_):
+            raise SceneError(
+                f"Section.of_fibres: y and A must be lists of one length, not {y_.shape} and "
+                f"{A_.shape}"
+            )
+        if not (A_ > 0).all():
+            raise SceneError("Section.of_fibres: y must be finite, and all A positive")
+        if np.ptp(y_) == 0.0:
+            raise SceneError(
+                "Section.of_fibres: all fibres at one y have no bending stiffness; spread them"
+            )
+        return cls(fibres, E, y_ - (A_ @ y_) / A_.sum(), A_)
+
+    @classmethod
+    def layers(
+        cls,
+        fibres: Fibres,
+        E: float,
+        h: float,
+        area: Callable[[Array], Array],
+        first_moment: Callable[[Array], Array],
+        edges: Sequence[float] = (),
+    ) -> PlacedFibres:
+        """Layers of equal thickness over the depth ``h``, cut at ``edges`` too.
+
+        Args:
+            fibres: Their laws and number.
+            E: Young's modulus; Pa.
+            h: Depth; m.
+            area: Area below y, from any line; m².
+            first_moment: Its first moment about y = 0; m³.
+            edges: Further limits between layers; m.
+        """
+        if fibres.number < 2:
+            raise SceneError("Fibres: number = 1 has no bending stiffness; use 2 or more")
+        cuts = np.union1d(np.linspace(-h / 2, h / 2, fibres.number + 1), np.array(edges))
+        cuts = cuts[np.insert(np.diff(cuts) > 1e-9 * h, 0, True)]
+        A = np.diff(area(cuts))
+        return cls(fibres, E, np.diff(first_moment(cuts)) / A, A)
+
+    @property
+    def EA(self) -> float:
+        """Axial stiffness; N."""
+        return float(self.E * self.A.sum())
+
+    @property
+    def EI(self) -> float:
+        """Bending stiffness; N m²."""
+        return float(self.E * self.A @ self.y**2)
+
+    def layout(self, GA: float) -> Layout:
+        """One material point for each fibre; shear stays elastic."""
+        n, softening = len(self.y), self.fibres.softening
+        return Layout(
+            strains=np.column_stack([np.ones(n), np.zeros(n), -self.y]),
+            weights=self.A,
+            stiffness=np.full(n, self.E),
+            laws=((self.fibres.law, n),),
+            rest=np.array([0.0, GA, 0.0]),
+            softening=softening if softening is not None and softening.opens else None,
+            breaking=slice(None),
+        )

@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: MIT
+"""Joints: components of motion that places share, or that connectors hold."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from ufl_beam.errors import (
+    SceneError,
+    require_kind,
+    require_switch,
+    require_text,
+)
+from ufl_beam.model.beams import Curve, Place, Point, point_of
+from ufl_beam.model.bodies import Anchor, carries, ground, require_anchor
+from ufl_beam.model.connector_laws import HELD, Bearing, Guide
+from ufl_beam.model.connectors import Connector, _axis, _require_apart
+
+
+@dataclass(frozen=True, eq=False)
+class Joint(Bearing):
+    """Anchors that share components of motion, or are held by connectors; see :func:`Rigid`.
+
+    Attributes:
+        kind: Name for messages.
+        places: The anchors.
+        shared: Components that are equal: 0, 1 displacement, 2 rotation.  Those of rotation are one
+            unknown; so are displacements of anchors that their nodes carry.
+        holders: What is held besides, by connectors.
+        meets: Whether the anchors are at one point of the undeformed scene.
+        advice: For anchors that should meet and do not.
+    """
+
+    kind: str
+    places: tuple[Anchor, ...]
+    shared: tuple[int, ...]
+    holders: tuple[Connector, ...] = field(default=(), repr=False)
+    meets: bool = False
+    advice: str = "RigidLink and Link join places that are apart"
+
+    def __post_init__(self) -> None:
+        if len(self.places) < 2:
+            raise SceneError(f"{self.kind}: a joint needs at least two places")
+        for place in self.places:
+            require_anchor(place, self.kind)
+
+    def __str__(self) -> str:
+        return f"{self.kind}({', '.join(map(str, self.places))})"
+
+    @property
+    def sameness(self) -> object:
+        """Key that joints share if they hold the same motions of the same places."""
+        held = [(link.motion, link.axis, id(link.law)) for link in self.holders]
+        return self.kind, frozenset(self.places), tuple(held)
+
+    @property
+    def carriers(self) -> tuple[Anchor, ...]:
+        """The anchors whose displacement is that of their node."""
+        return tuple(place for place in self.places if carries(place))
+
+
+def _joined(
+    kind: str, places: tuple[Anchor, ...], shared: tuple[int, ...], measured: bool = False
+) -> Joint:
+    """A joint at one point: what is measured, and what nodes do not carry, connectors hold."""
+    for place in places:
+        require_anchor(place, kind)
+    require_switch(measured, f"{kind}: measured")
+    carriers = [place for place in places if carries(place) and not measured]
+    first = (carriers or list(places))[:1]
+    others = [place for place in places if place not in (*carriers, *first)]
+    motions = [("parting", (1.0, 0.0)), ("parting", (0.0, 1.0))]
+    if measured and 2 in shared:
+        motions.append(("turning", (1.0, 0.0)))
+    holders = tuple(
+        Connector(kind, motion, base, other, HELD, axis)
+        for base in first
+        for other in others
+        for motion, axis in motions
+    )
+    return Joint(kind, places, () if measured else shared, holders, meets=True)
+
+
+def Rigid(*places: Anchor, measured: bool = False) -> Joint:
+    """Rigid joint at one point: displacement and rotation are shared by all ``places``.
+
+    Args:
+        places: What is joined.
+        measured: Keep separate unknowns and hold them with forces, which solutions and
+            controllers can ask for, in the place of sharing the unknowns, which costs nothing.
+    """
+    return _joined("Rigid", places, (0, 1, 2), measured)
+
+
+def Revolute(*places: Anchor, measured: bool = False) -> Joint:
+    """Revolute joint: displacement is shared by all ``places``, each turns freely.
+
+    Args:
+        places: What is joined.
+        measured: As in :func:`Rigid`; friction needs it.
+    """
+    return _joined("Revolute", places, (0, 1), measured)
+
+
+def Prismatic(
+    rail: Anchor, slider: Anchor, *, axis: Point | None = None, turning: bool = False
+) -> Joint:
+    """Prismatic joint: ``slider`` moves along an axis that turns with ``rail``.
+
+    Args:
+        rail: Where the axis is; it may be on the ground.
+        slider: What slides.
+        axis: Direction in the undeformed scene; from rail to slider by default.
+        turning: Whether the slider may turn on the rail, like a pin in a slot.
+
+    Raises:
+        SceneError: An axis of zero length.
+    """
+    require_switch(turning, "Prismatic: turning")
+    x, y = _axis(rail, slider, axis, "Prismatic")
+    across = Connector("Prismatic", "sliding", rail, slider, HELD, (-y, x))
+    return Joint("Prismatic", (rail, slider), () if turning else (2,), (across,))
+
+
+def RigidLink(a: Anchor, b: Anchor) -> Joint:
+    """Massless rigid link: ``b`` moves as if it were a point of the cross-section or body of ``a``.
+
+    Raises:
+        SceneError: Both are at the same point.
+    """
+    for anchor in (a, b):
+        require_anchor(anchor, "RigidLink")
+    if a.point == b.point:
+        raise SceneError(f"RigidLink({a}, {b}): zero length; join them with Rigid")
+    holders = tuple(
+        Connector("RigidLink", "parting", a, b, HELD, axis, corner=b.point)
+        for axis in ((1.0, 0.0), (0.0, 1.0))
+    )
+    return Joint("RigidLink", (a, b), (2,), holders)
+
+
+def Link(a: Anchor, b: Anchor) -> Joint:
+    """Massless rigid rod with a revolute joint at both ends: the distance stays.
+
+    Raises:
+        SceneError: Zero length.
+    """
+    rod = Connector("Link", "stretching", a, b, HELD)
+    _require_apart(rod)
+    return Joint("Link", (a, b), (), (rod,))
+
+
+def Guided(place: Anchor, curve: Curve) -> Joint:
+    """A point stays on a guide curve of the ground, free along it and free to turn.
+
+    Args:
+        place: What is guided; of bodies the centre, other points by a :func:`Revolute` to a beam.
+        curve: ``s -> (x, y)`` for all s that the motion may reach; ``curve(0)`` is at the place; m.
+
+    Raises:
+        SceneError: The curve stands still at s = 0.  A scene raises it where ``curve(0)`` is not at
+            the place.
+    """
+    require_anchor(place, "Guided")
+    if not carries(place):
+        raise SceneError(f"Guided({place}): it must be the centre of the body")
+    law = Guide(curve)
+    x, y = point_of(curve, 0.0, f"Guided({place}): curve")
+    (x0, y0), (x1, y1) = (point_of(curve, s, f"Guided({place}): curve") for s in (-1e-6, 1e-6))
+    length = math.hypot(x1 - x0, y1 - y0)
+    if length == 0.0:
+        raise SceneError(f"Guided({place}): the curve stands still at s = 0")
+    base, across = ground(x, y), ((y0 - y1) / length, (x1 - x0) / length)
+    holder = Connector("Guided", "guided", base, place, law, across)
+    advice = "curve(0) must be at the place"
+    return Joint("Guided", (base, place), (), (holder,), meets=True, advice=advice)
+
+
+def Release(a: Place, b: Anchor, *, free: str, measured: bool = False) -> Joint:
+    """Joint at one point that transmits all but some resultants of the beam of ``a``.
+
+    Args:
+        a: The place on a beam whose axis says what is axial.
+        b: What it is joined to there.
+        free: What is not transmitted: letters of "NVM".
+        measured: As in :func:`Rigid`.
+
+    Raises:
+        SceneError: Other letters, or none.
+    """
+    require_kind(a, Place, "Release: a")
+    require_anchor(b, "Release: b")
+    require_text(free, f"Release({a}, {b}): free")
+    require_switch(measured, f"Release({a}, {b}): measured")
+    if not free or set(free) - set("NVM"):
+        raise SceneError(f"Release({a}, {b}): free = {free!r} must be letters of 'NVM'")
+    shared = () if "M" in free else (2,)
+    if not set(free) & set("NV"):
+        return _joined("Release", (a, b), (0, 1, *shared), measured)
+    x, y = a.direction
+    held = [axis for name, axis in (("N", (x, y)), ("V", (-y, x))) if name not in free]
+    holders = [Connector("Release", "sliding", a, b, HELD, axis) for axis in held]
+    if shared and measured:
+        holders.append(Connector("Release", "turning", a, b, HELD))
+        shared = ()
+    return Joint("Release", (a, b), shared, tuple(holders), meets=True)

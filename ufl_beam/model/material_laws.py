@@ -1,0 +1,381 @@
+# SPDX-License-Identifier: MIT
+"""Laws of a material point in one dimension: what yields, hardens, flows and breaks.
+
+A point is a resultant of a cross-section (strain 1 or curvature 1/m against N or N m) or a fibre
+(strain against Pa).  The laws are plain functions of arrays, and of UFL expressions as well: UFL
+derives their tangents and FFCx compiles them for the time loop, see
+:mod:`ufl_beam.terms.material_points`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import singledispatch
+from typing import Any, Protocol
+
+import numpy as np
+
+from ufl_beam.errors import SceneError, is_infinite, require_kind, require_number
+
+Values = Any
+"""Array of real or complex numbers, or a UFL expression."""
+
+
+# -- what laws are written with ----------------------------------------------------------------
+
+
+@singledispatch
+def where(condition: Values, yes: Values, no: Values) -> Values:
+    """``yes`` where the condition holds, else ``no``; both are evaluated everywhere."""
+    return np.where(condition, yes, no)
+
+
+@singledispatch
+def below(x: Values, limit: float) -> Values:
+    """Return whether x is less than the limit."""
+    return x < limit
+
+
+@singledispatch
+def exp(x: Values) -> Values:
+    """Exponential function."""
+    return np.exp(x)
+
+
+def sign(x: Values) -> Values:
+    """1 or -1; 1 at zero."""
+    return where(below(x, 0.0), -1.0, 1.0)
+
+
+def positive(x: Values) -> Values:
+    """Macaulay's bracket <x>: x where it is positive, else zero."""
+    return where(below(-x, 0.0), x, 0.0)
+
+
+def _require_from_zero_to_infinity(value: float, what: str) -> None:
+    """Raise :class:`SceneError` unless ``value`` is a non-negative number or infinity."""
+    if not is_infinite(value):
+        require_number(value, what, at_least=0.0)
+
+
+# -- bulk --------------------------------------------------------------------------------------
+
+
+class Viscosity(Protocol):
+    """Viscosity of plastic flow."""
+
+    def coefficient(self, stiffness: Values) -> Values:
+        """Overstress per rate of plastic strain; ``stiffness`` is that of plastic flow."""
+
+
+@dataclass(frozen=True)
+class Perzyna:
+    """Overstress in proportion to the rate of plastic strain, P(39).
+
+    Args:
+        eta: Overstress per rate; Pa s for fibres, N s and N m² s for resultants.  Zero is
+            rate-independent, infinity elastic.
+    """
+
+    eta: float
+
+    def __post_init__(self) -> None:
+        _require_from_zero_to_infinity(self.eta, "Perzyna: eta")
+
+    def coefficient(self, stiffness: Values) -> Values:
+        """The same for all."""
+        return np.full_like(stiffness, self.eta)
+
+
+@dataclass(frozen=True)
+class DuvautLions:
+    """Relaxation towards the rate-independent stress, P(45).
+
+    The same law as :class:`Perzyna` with ``eta = tau (C + H)``; the relaxation time is what the
+    user knows.
+
+    Args:
+        tau: Relaxation time; s.  Zero is rate-independent, infinity elastic.
+    """
+
+    tau: float
+
+    def __post_init__(self) -> None:
+        _require_from_zero_to_infinity(self.tau, "DuvautLions: tau")
+
+    def coefficient(self, stiffness: Values) -> Values:
+        """Relaxation time times the stiffness of plastic flow."""
+        return np.asarray(self.tau * stiffness)  # P(46)
+
+
+@dataclass(frozen=True)
+class Hardening:
+    """Elasto-(visco)plastic law with linear isotropic and kinematic hardening, P(35)-P(48).
+
+    Args:
+        limit: Yield stress, or yield force or moment of a resultant; Pa, N or N m.  For fibres
+            also a distribution such as :class:`Normal`.
+        modulus: Isotropic hardening; stress per plastic strain.
+        kinematic: Kinematic hardening (Prager); stress per plastic strain.
+        viscosity: :class:`Perzyna` or :class:`DuvautLions`; rate-independent by default.
+
+    Raises:
+        SceneError: A number is negative or none; infinity is allowed for the limit.
+    """
+
+    limit: Any
+    modulus: float = 0.0
+    kinematic: float = 0.0
+    viscosity: Viscosity = Perzyna(0.0)
+
+    def __post_init__(self) -> None:
+        if not hasattr(self.limit, "draw"):
+            _require_from_zero_to_infinity(self.limit, "Hardening: limit")
+        for name in ("modulus", "kinematic"):
+            value = getattr(self, name)
+            require_number(value, f"Hardening: {name}")
+            if value < 0.0:
+                raise SceneError(
+                    f"Hardening: {name} = {value:g} must not be negative: a softening bulk has no "
+                    "size, and results would depend on the mesh; use Softening(limit, energy)"
+                )
+        require_kind(self.viscosity, (Perzyna, DuvautLions), "Hardening: viscosity")
+
+    @property
+    def opens(self) -> bool:
+        """True if it ever flows."""
+        return bool(self.limit != np.inf)
+
+    @property
+    def energy(self) -> float:
+        """Fracture energy: infinite, as it never breaks."""
+        return np.inf
+
+    @property
+    def bounded(self) -> bool:
+        """True if the stress never exceeds the limit."""
+        viscous = bool(np.any(self.viscosity.coefficient(np.ones(1)) > 0.0))
+        return self.modulus == self.kinematic == 0.0 and not viscous
+
+
+@dataclass(frozen=True, eq=False)
+class Bulk:
+    """The numbers of :class:`Hardening` at many points, and the law itself.
+
+    Attributes:
+        C: Stiffness; arrays of one shape, or numbers.
+        limit: Yield stress.
+        H: Isotropic hardening modulus.
+        B: Kinematic hardening modulus.
+        eta: Viscosity.
+    """
+
+    C: Values
+    limit: Values
+    H: Values
+    B: Values
+    eta: Values
+
+    def flow(self, strain: Values, p: Values, ξ: Values, θ: Values, dt: Values) -> Values:
+        """Increment of the plastic strain over a step, in closed form.
+
+        The rule is stated at t_n+θ: 1/2 is of second order, 1 is backward Euler.
+
+        Args:
+            strain: Strain at t_n+θ.
+            p: Plastic strain at t_n.
+            ξ: Accumulated plastic strain at t_n.
+            θ: Part of the step.
+            dt: Length of the step; s.
+
+        Equations:
+            P(38)-P(44).
+        """
+        trial = self.C * (strain - p) - self.B * p
+        direction = sign(trial)
+        overstress = direction * trial - (self.limit + self.H * ξ)  # P(38)
+        γ = positive(overstress) / (self.eta / dt + θ * (self.C + self.H + self.B))  # P(44)
+        return direction * γ
+
+    def stress(self, strain: Values, p: Values) -> Values:
+        """Stress of the elastic part of the strain."""
+        return self.C * (strain - p)
+
+    def elastic_energy(self, strain: Values) -> Values:
+        """Energy per volume of an elastic strain."""
+        return self.C * strain**2 / 2
+
+    def hardening_energy(self, p: Values, ξ: Values) -> Values:
+        """Energy per volume that hardening stores."""
+        return (self.B * p**2 + self.H * ξ**2) / 2  # P(35)
+
+    def dissipation(self, dp: Values, dt: Values) -> Values:
+        """Energy per volume that a plastic increment dissipates, by yield stress and viscosity."""
+        γ = abs(dp)
+        flows = below(-γ, 0.0)  # a limit that is infinite must not meet an increment of zero
+        return (where(flows, self.limit, 0.0) + where(flows, self.eta, 0.0) * γ / dt) * γ  # P(37)
+
+
+# -- softening ---------------------------------------------------------------------------------
+
+BROKEN = 70.0
+"""Exponent of the decay of a traction from which on it is zero, some 1e-30 of the limit.
+
+Far below round-off; but numbers that underflow would be forces and stiffnesses made of noise.
+"""
+
+
+@dataclass(frozen=True)
+class Softening:
+    """Exponential softening of a discontinuity, P(51)-P(53): a hinge that ends as a joint.
+
+    Args:
+        limit: Traction at which it opens: moment of a hinge, N m; stress of a fibre, Pa.  Zero is a
+            perfect joint, infinity never opens.
+        energy: Fracture energy, dissipated by a complete opening: J; for fibres J/m².
+
+    Raises:
+        SceneError: A negative limit, or an energy that is not positive.
+    """
+
+    limit: float
+    energy: float
+
+    def __post_init__(self) -> None:
+        _require_from_zero_to_infinity(self.limit, f"{type(self).__name__}: limit")
+        require_number(self.energy, f"{type(self).__name__}: energy", positive=True)
+
+    @property
+    def bounded(self) -> bool:
+        """True if the traction never exceeds the limit."""
+        return True
+
+    @property
+    def opens(self) -> bool:
+        """True if it ever opens."""
+        return self.limit < np.inf
+
+    def of(self, limit: Values, energy: Values) -> Softening:
+        """The same law with other numbers, or with symbols."""
+        law = object.__new__(type(self))
+        object.__setattr__(law, "limit", limit)
+        object.__setattr__(law, "energy", energy)
+        return law
+
+    def traction(self, ξ: Values) -> Values:
+        """Resistance after the accumulated opening ξ."""
+        decay = self.limit / self.energy * ξ
+        return where(below(decay, BROKEN), self.limit * exp(-decay), 0.0)  # P(52)!
+
+    def mean_traction(self, ξ: Values, a: Values) -> Values:
+        """Mean resistance while the opening grows from ξ by a; its product with a is dissipated."""
+        return self.traction(ξ) * _mean_of_decay(self.limit / self.energy * a)
+
+
+@dataclass(frozen=True)
+class LinearSoftening(Softening):
+    """Linear softening of a discontinuity, down to nothing at the opening 2 energy / limit.
+
+    Args and errors are those of :class:`Softening`.
+    """
+
+    def traction(self, ξ: Values) -> Values:
+        """Resistance after the accumulated opening ξ."""
+        return positive(self.limit - self.limit**2 / (2 * self.energy) * ξ)
+
+    def mean_traction(self, ξ: Values, a: Values) -> Values:
+        """Mean resistance while the opening grows from ξ by a; its product with a is dissipated."""
+        now, slope = self.traction(ξ), self.limit**2 / (2 * self.energy)
+        ends = below(now - slope * a, 0.0)
+        safe = where(ends, slope * a, 1.0)
+        return where(ends, now**2 / (2 * safe), now - slope * a / 2)
+
+
+def _mean_of_decay(x: Values) -> Values:
+    """Mean of exp(-x) from 0 to x, smooth at zero: (1 - exp(-x))/x, its series below 0.1."""
+    small = below(x, 0.1)
+    series = 1.0
+    for k in range(12, 1, -1):
+        series = 1 - x / k * series
+    safe = where(small, 1.0, x)
+    return where(small, series, (1 - exp(-safe)) / safe)
+
+
+HingeLaw = Softening | Hardening
+"""Laws of a plastic hinge of zero length, which has no elasticity of its own."""
+
+
+def require_hinge_law(law: object, owner: str) -> None:
+    """Raise :class:`SceneError` naming ``owner`` unless a rigid-plastic hinge can follow a law."""
+    require_kind(law, HingeLaw.__args__, owner)
+    if isinstance(law, Hardening):
+        _require_from_zero_to_infinity(law.limit, f"{owner}: limit")
+        if isinstance(law.viscosity, DuvautLions):
+            raise SceneError(
+                f"{owner}: DuvautLions relaxes an elastic stress, and a hinge of zero length is "
+                "rigid before it flows; use Perzyna(eta)"
+            )
+
+
+# -- where the points of a cross-section are ---------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Material points of a cross-section: what strains them, and what their stresses add up to.
+
+    Attributes:
+        strains: Strain of each point per strain (Σ, Γ, K) of the section; shape (n, 3).  The
+            resultants are the sum of weight times stress times the same numbers.
+        weights: Shape (n,); area of fibres, 1 for resultants.
+        stiffness: Elastic stiffness of the points; shape (n,).
+        laws: Laws and the number of points in a row that follow them.
+        rest: Stiffness (axial, shear, bending) of what has no points; shape (3,).
+        softening: Law of the discontinuities, if points can break.
+        breaking: Which points can.
+        hinges: Whether the discontinuity is one hinge, a jump of rotation.
+    """
+
+    strains: Values
+    weights: Values
+    stiffness: Values
+    laws: tuple[tuple[Hardening, int], ...]
+    rest: Values
+    softening: Softening | None
+    breaking: slice
+    hinges: bool = False
+
+    @property
+    def elastic(self) -> bool:
+        """True if nothing can happen at the points."""
+        return self.softening is None and not self.yields
+
+    @property
+    def yields(self) -> bool:
+        """True if the bulk can yield."""
+        return any(law.limit != np.inf for law, _ in self.laws)
+
+    def bulk(self, keys: list[tuple[int, int]]) -> Bulk:
+        """The laws at the points of many cells.
+
+        Args:
+            keys: For each cell two numbers that random limits depend on, besides their seed.
+        """
+        one = np.ones(len(self.weights))
+
+        def row(value: Callable[[Hardening], float]) -> Values:
+            return np.concatenate([np.full(n, value(law)) for law, n in self.laws])
+
+        H, B = row(lambda law: law.modulus), row(lambda law: law.kinematic)
+        flow = self.stiffness + H + B
+        first = np.cumsum([0, *(n for _, n in self.laws)])
+        eta, limits = one.copy(), np.empty((len(keys), len(one)))
+        for (law, n), k in zip(self.laws, first, strict=False):
+            eta[k : k + n] = law.viscosity.coefficient(flow[k : k + n])
+            limits[:, k : k + n] = (
+                [law.limit.draw(n, key) for key in keys]
+                if hasattr(law.limit, "draw")
+                else law.limit
+            )
+        return Bulk(self.stiffness, limits, H, B, eta)

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: MIT
+"""Options of the discretization: cells, degrees of elements, mass matrix."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from itertools import pairwise
+from numbers import Rational, Real
+
+import numpy as np
+import numpy.typing as npt
+
+from ufl_beam.errors import SceneError, require_kind, require_memory, require_number, shorten
+from ufl_beam.model.beams import Beam
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """The cells that a scene is computed with; those of its beams by default.
+
+    Args:
+        refine: Factor on the number of cells between any two places of a beam; a whole number
+            divides each cell, ``Fraction(1, 2)`` joins two and two.
+        degree: Polynomial degree of displacements and rotations in a cell, 1, 2 or 3, integrated
+            with as many points; more than 1 for elastic beams only.
+        lumped: Whether the mass of the beams is that of their nodes: a diagonal matrix, the row
+            sums of the consistent one.
+
+    Raises:
+        SceneError: A number that makes no mesh.
+    """
+
+    refine: int | Fraction = 1
+    degree: int = 1
+    lumped: bool = False
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.refine, Rational) or self.refine <= 0:
+            raise SceneError(
+                f"Mesh: refine = {shorten(self.refine)} must be a positive whole number or "
+                "Fraction(p, q)"
+            )
+        require_number(self.refine, "Mesh: refine")
+        object.__setattr__(self, "refine", Fraction(self.refine))
+        if not isinstance(self.degree, Real) or self.degree not in (1, 2, 3):
+            raise SceneError(f"Mesh: degree = {shorten(self.degree)} must be 1, 2 or 3")
+        object.__setattr__(self, "degree", int(self.degree))
+        require_kind(self.lumped, bool, "Mesh: lumped")
+
+    @cached_property
+    def nodes(self) -> npt.NDArray[np.float64]:
+        """Where in a cell, from 0 to 1, its nodes are; ascending: Gauss-Lobatto points."""
+        inner = np.polynomial.legendre.Legendre.basis(self.degree).deriv().roots()
+        return np.array([0.0, *((1 + x) / 2 for x in inner.tolist()), 1.0])
+
+    @cached_property
+    def point_weights(self) -> npt.NDArray[np.float64]:
+        """Parts of a cell that its Gauss points stand for."""
+        return np.polynomial.legendre.leggauss(self.degree)[1] / 2
+
+    @cached_property
+    def parts(self) -> npt.NDArray[np.float64]:
+        """Part of a uniform load on a cell, or of its mass, that each node bears."""
+        p = self.degree
+        at = np.polynomial.legendre.Legendre.basis(p)(2 * self.nodes - 1)
+        return np.asarray(1 / (p * (p + 1) * at**2))
+
+    def weights(self, part: float) -> npt.NDArray[np.float64]:
+        """Weights of the nodes of a cell in the value at a part of it, by Lagrange."""
+        return np.asarray(part ** np.arange(self.degree + 1) @ self._polynomials)
+
+    @cached_property
+    def _polynomials(self) -> npt.NDArray[np.float64]:
+        """Coefficients of the polynomials that are one in one node, in columns."""
+        return np.asarray(np.linalg.inv(np.vander(self.nodes, increasing=True)))
+
+    def vertices(self, beam: Beam, attached: Sequence[float]) -> list[float]:
+        """Parameters of the vertices of a beam: ends, corners and what is ``attached`` among them.
+
+        Raises:
+            SceneError: Between two of those there are too few cells to be joined.
+        """
+        given = beam.vertices(attached)
+        if self.refine == 1:
+            return given
+        places = sorted({0.0, 1.0, *beam.corners, *attached})
+        kept = sorted({_nearest(given, s) for s in places})
+        for first, last in pairwise(kept):
+            if (last - first) * self.refine % 1:
+                common = math.gcd(*(b - a for a, b in pairwise(kept)))
+                least = f"Fraction(1, {common})" if common > 1 else "1"
+                raise SceneError(
+                    f"Mesh: refine = {self.refine} makes no whole number of the {last - first} "
+                    f"cells between {beam.at(given[first])} and {beam.at(given[last])}, which "
+                    f"must be vertices; {beam.name} can take multiples of {least}"
+                )
+        number = int((len(given) - 1) * self.refine)
+        require_memory(number, f"Mesh: refine = {self.refine} of {beam.name}, {number} cells,")
+        return [_between(given, i / Fraction(self.refine)) for i in range(number + 1)]
+
+
+def _nearest(values: Sequence[float], s: float) -> int:
+    """Position of the value that is nearest to ``s``; they ascend."""
+    i = bisect_left(values, s)
+    return min(range(max(i - 1, 0), min(i + 1, len(values))), key=lambda k: abs(values[k] - s))
+
+
+def _between(values: Sequence[float], position: Fraction) -> float:
+    """Value at a position that need not be whole; linear in between."""
+    i = int(position)
+    part = float(position - i)
+    return values[i] * (1 - part) + values[i + 1] * part if part else values[i]

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: MIT
+"""Curves of the plane: tangents by differences, nearest points, the circle around points."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+
+Curve = Callable[[float], Sequence[float]]
+
+REACH = 1e-3
+"""Part of a length over which tangents are taken: differences of fourth order err by some 1e-12 of
+a curve as bent as the length is long, and lose three digits of its coordinates."""
+
+PROJECTIONS = 50
+"""Iterations in which the nearest point of a curve is sought."""
+
+WEIGHTS = np.array(
+    [[-25, 48, -36, 16, -3], [-3, -10, 18, -6, 1], [1, -8, 0, 8, -1],
+     [-1, 6, -18, 10, 3], [3, -16, 36, -48, 25]]
+) / 12  # fmt: skip
+"""Weights of five equidistant values in the derivative at each of them."""
+
+
+def tangent(curve: Curve, s: float, step: float) -> Array:
+    """Derivative of a curve by its parameter, from points at most two steps away; (2,); m."""
+    inner = np.subtract(curve(s + step), curve(s - step))
+    outer = np.subtract(curve(s + 2 * step), curve(s - 2 * step))
+    return np.asarray((8 * inner - outer) / (12 * step))
+
+
+def tangent_within(curve: Curve, s: float, low: float, high: float) -> Array:
+    """The same where the curve is smooth between two parameters only; (2,); m."""
+    step = min(REACH, (high - low) / 8)
+    left, right = int((s - low) / step), int((high - s) / step)
+    before = left if left < 2 else max(2, 4 - right)
+    points = np.array([curve(s + step * (k - before)) for k in range(5)], dtype=np.float64)
+    return np.asarray(WEIGHTS[before] @ points / step)
+
+
+def parameter_step(curve: Curve, s: float, length: float) -> float:
+    """Change of the parameter by which a curve goes on by :data:`REACH` of a length.
+
+    The parameter may have any unit: the search begins at a step that means nothing.
+    """
+    step = 1e-6
+    for _ in range(60):
+        way = math.dist(curve(s + step), curve(s - step)) / 2
+        if not math.isfinite(way):
+            step /= 1e3
+        elif abs(way / (REACH * length) - 1) < 0.5:
+            break
+        else:
+            step *= min(max(REACH * length / way, 1e-3), 1e3) if way else 1e3
+    return step
+
+
+def nearest(curve: Curve, point: Array, s: float, step: float, length: float) -> float:
+    """Parameter of the point of a curve that is nearest to another; not a number if none is found.
+
+    Args:
+        curve: ``s -> (x, y)``; m.
+        point: Shape (2,); m.
+        s: Where to begin.
+        step: Step of :func:`tangent`.
+        length: Size of what the curve guides; m.
+    """
+    last_digits = 4 * np.spacing(length + math.hypot(*point))
+    for _ in range(PROJECTIONS):
+        t = tangent(curve, s, step)
+        change = float((point - curve(s)) @ t / (t @ t))
+        s += change
+        if abs(change) * math.hypot(*t) <= last_digits:
+            return s
+    return s if abs(change) * math.hypot(*t) <= 1e-9 * length else math.nan
+
+
+def enclosing_diameter(points: Array) -> float:
+    """Diameter of the smallest circle around points; (n, 2) or more rows; m.
+
+    It is the same in all axes.  The circle goes through two or three points; those that are
+    farthest outside are taken in, one after the other.
+    """
+    points = points - points.mean(axis=0)
+    held = [int(np.argmax(np.hypot(*points.T)))]
+    center, radius = points[held[0]], 0.0
+    slack = 1e-12 * float(np.hypot(*points.T).max())
+    while True:
+        distances = np.hypot(*(points - center).T)
+        outside = int(np.argmax(distances))
+        if distances[outside] <= radius + slack:
+            return 2 * radius
+        held, center, larger = _circle_around(points, [*held, outside])
+        if larger <= radius:  # by the last digits
+            return 2 * radius
+        radius = larger
+
+
+def _circle_around(points: Array, few: list[int]) -> tuple[list[int], Array, float]:
+    """Smallest circle around at most four points: those that it goes through, centre, radius."""
+    circles = []
+    for number in (2, 3):
+        for chosen in combinations(few, number):
+            center = _center(points[list(chosen)])
+            radius = float(np.hypot(*(points[chosen[0]] - center)))
+            far = float(np.hypot(*(points[few] - center).T).max())
+            circles.append((max(far, radius), list(chosen), center))
+    radius, held, center = min(circles, key=lambda circle: circle[0])
+    return held, center, radius
+
+
+def _center(corners: Array) -> Array:
+    """Centre of the circle through three points, or around two; infinitely far if in a row."""
+    middle = (corners[0] + corners[1]) / 2
+    if len(corners) == 2:
+        return np.asarray(middle)
+    (ax, ay), (bx, by) = corners[1] - corners[0], corners[2] - corners[0]
+    twice = 2 * (ax * by - ay * bx)
+    if twice == 0.0:
+        return np.full(2, np.inf)
+    a, b = ax * ax + ay * ay, bx * bx + by * by
+    return np.asarray(corners[0] + np.array([by * a - ay * b, ax * b - bx * a]) / twice)

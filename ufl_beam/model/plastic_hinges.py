@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: MIT
+"""Places of the plastic hinges of zero length in a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+from ufl_beam.errors import SceneError
+from ufl_beam.model.beams import Beam, Place
+from ufl_beam.model.bodies import Anchor, Node, node
+from ufl_beam.model.connector_laws import RigidPlastic
+from ufl_beam.model.connectors import Connector
+from ufl_beam.model.joints import Joint
+from ufl_beam.model.material_laws import HingeLaw
+
+Slot = tuple[Node, int]
+"""A component of motion of a node: 0, 1 displacement, 2 rotation."""
+
+
+def merged(groups: Iterable[Sequence[Slot]]) -> dict[Slot, Slot]:
+    """Representative of each component of motion that equals others, from groups of equal ones."""
+    parent: dict[Slot, Slot] = {}
+
+    def root(slot: Slot) -> Slot:
+        while slot in parent:
+            slot = parent[slot]
+        return slot
+
+    for group in groups:
+        for other in group[1:]:
+            a, b = root(group[0]), root(other)
+            if a != b:
+                parent[b] = a
+    return {slot: root(slot) for slot in parent}
+
+
+def shared_by_joints(joints: Iterable[Joint]) -> Iterator[list[Slot]]:
+    """Groups of components of motion that joints make equal."""
+    for joint in joints:
+        for component in joint.shared:
+            alike = joint.places if component == 2 else joint.carriers
+            yield [(node(place), component) for place in alike]
+
+
+def plastic_hinges(
+    beams: Sequence[Beam],
+    joints: Sequence[Joint],
+    bearing: Iterable[Anchor],
+    loaded: Iterable[Anchor],
+) -> tuple[Connector, ...]:
+    """Plastic hinges of zero length, as connectors of both sides.
+
+    A beam has those of its ``hinges``, and one at each end if its section has a hinge.  There is
+    none at an end that bears no moment, nor at one where nothing but a load is: the load acts on
+    the member, as nothing beyond a hinge could bear it.  Where two members meet and nothing else
+    bears a moment, both have the same moment; then only the weaker one has a hinge, as the other
+    one never opens.
+
+    Args:
+        beams: The beams of the scene.
+        joints: Its joints.
+        bearing: Places where supports, connectors or masses bear a moment.
+        loaded: Places where loads are moments.
+    """
+    laws = {place: law for beam in beams for place, law in _laws(beam).items() if law.opens}
+    same = merged(
+        [(node(place), 2) for place in joint.places] for joint in joints if 2 in joint.shared
+    )
+    members: dict[Slot, list[Node]] = {}
+    for slot in {*same, *same.values()}:
+        members.setdefault(same.get(slot, slot), []).append(slot[0])
+
+    def at(places: Iterable[Anchor]) -> set[Slot]:
+        return {same.get(slot, slot) for slot in ((node(place), 2) for place in places)}
+
+    borne, acted = at(bearing), at(loaded)
+
+    def stays(place: Place) -> bool:
+        if 0.0 < place.s < 1.0:
+            return True
+        slot: Slot = (place, 2)
+        slot = same.get(slot, slot)
+        others = [other for other in members.get(slot, ()) if other != place]
+        between = len(others) > 0 and (slot in acted or not _outlasts(place, others, laws))
+        return slot in borne or between
+
+    return tuple(_hinge(place, law) for place, law in laws.items() if stays(place))
+
+
+def law_of(link: Connector) -> HingeLaw:
+    """Return the law of a plastic hinge, or of another rigid-plastic connector.
+
+    Raises:
+        SceneError: The connector follows another law.
+    """
+    if not isinstance(link.law, RigidPlastic):
+        raise SceneError(f"{link}: its law is not rigid-plastic")
+    return link.law.law
+
+
+def place_of(hinge: Connector) -> Place:
+    """Return the place of a plastic hinge, on the side that joints and loads are attached to.
+
+    Raises:
+        SceneError: The connector does not act between places of beams.
+    """
+    if not isinstance(hinge.a, Place):
+        raise SceneError(f"{hinge}: it is not a plastic hinge of a beam")
+    return hinge.a.beam.at(hinge.a.s)
+
+
+def _laws(beam: Beam) -> dict[Place, HingeLaw]:
+    """Laws of the hinges that a beam may have, by place."""
+    laws: dict[float, HingeLaw | None] = dict.fromkeys((0.0, 1.0), beam.section.hinge)
+    laws |= {float(s): law for s, law in beam.hinges.items()}
+    return {beam.at(s): law for s, law in laws.items() if law is not None}
+
+
+def _outlasts(place: Place, others: Sequence[Node], laws: Mapping[Place, HingeLaw]) -> bool:
+    """Return whether the only other member at a joint yields first, or is listed first."""
+    if len(others) > 1 or not isinstance(others[0], Place) or others[0] not in laws:
+        return False
+    here, there, order = laws[place], laws[others[0]], list(laws)
+    if here.limit == there.limit and here.bounded and there.bounded:
+        return order.index(others[0]) < order.index(place)
+    return there.bounded and there.limit <= here.limit
+
+
+def _hinge(place: Place, law: HingeLaw) -> Connector:
+    """The connector of a hinge; its motion is the jump of the rotation along the beam."""
+    beyond = Place(place.beam, place.s, beyond=True)
+    before, after = (beyond, place) if place.s == 1.0 else (place, beyond)
+    return Connector("Hinge", "turning", before, after, RigidPlastic(law))

@@ -1,0 +1,410 @@
+# SPDX-License-Identifier: MIT
+"""Scenes: all records of a model, and their validity as a whole before any mesh exists."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property, singledispatch
+
+import numpy as np
+
+from ufl_beam.errors import (
+    SceneError,
+    clip,
+    require_kind,
+    require_number,
+    require_sequence,
+    require_vector,
+)
+from ufl_beam.model.beams import Beam, Place, Point
+from ufl_beam.model.bodies import (
+    GROUND,
+    Anchor,
+    Body,
+    Spot,
+    carries,
+    ground,
+    node,
+    require_node,
+)
+from ufl_beam.model.connector_laws import Actuator, Bearing, Coulomb, Motor
+from ufl_beam.model.connectors import Connector
+from ufl_beam.model.damping import Damping, KelvinVoigt, Rayleigh
+from ufl_beam.model.joints import Joint
+from ufl_beam.model.loads import (
+    FollowerLoad,
+    Gravity,
+    LineLoad,
+    Load,
+    PointLoad,
+    RotatingFrame,
+    TimeFunction,
+    value_at,
+)
+from ufl_beam.model.plane_curves import enclosing_diameter
+from ufl_beam.model.plastic_hinges import Slot, merged, plastic_hinges, shared_by_joints
+from ufl_beam.model.supports import COMPONENTS, Support
+
+# -- masses and initial motion -----------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class PointMass:
+    """Mass, and rotary inertia, fixed to a place.
+
+    Args:
+        place: Where.
+        mass: kg.
+        inertia: About the place; kg m².
+    """
+
+    place: Anchor
+    mass: float
+    inertia: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_node(self.place, "PointMass")
+        require_number(self.mass, f"PointMass at {self.place}: mass", at_least=0.0)
+        require_number(self.inertia, f"PointMass at {self.place}: inertia", at_least=0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Velocity:
+    """Initial motion of beams and bodies as one rigid body.
+
+    Args:
+        beams: The beams and bodies that move so.
+        linear: Velocity of the point ``about``; m/s.
+        angular: Angular velocity; rad/s.
+        about: Point of the undeformed scene, by default the origin; m.
+    """
+
+    beams: tuple[Beam | Body, ...]
+    linear: tuple[float, float] = (0.0, 0.0)
+    angular: float = 0.0
+    about: Point | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "beams", require_sequence(self.beams, "Velocity: beams"))
+        for i, beam in enumerate(self.beams):
+            require_kind(beam, (Beam, Body), f"Velocity: beams[{i}]")
+        require_vector(self.linear, "Velocity: linear")
+        require_number(self.angular, "Velocity: angular")
+        if self.about is not None:
+            require_vector(self.about, "Velocity: about")
+
+    def at(self, x: float, y: float) -> tuple[float, float, float]:
+        """(du/dt, dv/dt, dψ/dt) of the point (x, y); m/s, m/s, rad/s."""
+        about_x, about_y = self.about or (0.0, 0.0)
+        return (
+            self.linear[0] - self.angular * (y - about_y),
+            self.linear[1] + self.angular * (x - about_x),
+            self.angular,
+        )
+
+
+# -- the scene ---------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Beams and bodies, and what joins, holds, loads and moves them.
+
+    Args:
+        beams: The beams.
+        joints: Made by :func:`Rigid`, :func:`Revolute`, :func:`Prismatic`, :func:`RigidLink`,
+            :func:`Link` and :func:`Release`.
+        supports: Made by :func:`Clamped`, :func:`Pinned`, :func:`Roller`, :func:`Prescribed`.
+        loads: :class:`PointLoad`, :class:`FollowerLoad`, :class:`LineLoad`, :class:`Gravity`,
+            :class:`RotatingFrame`.
+        masses: :class:`PointMass`.
+        initial: :class:`Velocity`; at rest without.
+        damping: :class:`Rayleigh`, :class:`KelvinVoigt`; besides what materials dissipate.
+        bodies: :class:`Body`.
+        connectors: Made by :func:`Turn`, :func:`Stretch`, :func:`Slide`: springs, dampers, stops,
+            friction, motors.
+
+    Raises:
+        SceneError: The parts do not fit together; the message names them.
+    """
+
+    beams: Sequence[Beam] = ()
+    joints: Sequence[Joint] = ()
+    supports: Sequence[Support] = ()
+    loads: Sequence[Load] = ()
+    masses: Sequence[PointMass] = ()
+    initial: Sequence[Velocity] = ()
+    damping: Sequence[Damping] = ()
+    bodies: Sequence[Body] = ()
+    connectors: Sequence[Connector] = ()
+
+    def __post_init__(self) -> None:
+        for part in (
+            "beams", "joints", "supports", "loads", "masses", "initial", "damping", "bodies",
+            "connectors",
+        ):  # fmt: skip
+            records = require_sequence(getattr(self, part), f"Scene: {part}")
+            object.__setattr__(self, part, records)
+        if not self.beams and not self.bodies:
+            raise SceneError("Scene: no beams and no bodies")
+        _require_kinds(self)
+        known: dict[Beam | Body, str] = {GROUND: "ground"}
+        for part in ("beams", "bodies"):
+            for i, one in enumerate(getattr(self, part)):
+                first = known.setdefault(one, f"{part}[{i}]")
+                if first != f"{part}[{i}]":
+                    raise SceneError(
+                        f"Scene: {one.name} is in the scene twice, as {first} and {part}[{i}]"
+                    )
+        for owner, place in self.attachments():
+            one = place.beam if isinstance(place, Place) else place.body
+            if one not in known:
+                part = "beams" if isinstance(one, Beam) else "bodies"
+                raise SceneError(f"{owner}: {one.name} is not in the scene; add it to {part}")
+        self._require_once()
+        for joint in self.joints:
+            self._require_together(joint)
+        for connector in self.links:
+            if node(connector.a) == node(connector.b):
+                raise SceneError(f"{connector}: both ends are at the same body or cross-section")
+            if isinstance(connector.law, Coulomb) and connector.law.joint is not None:
+                self._require_pressing(connector, connector.law.joint)
+        self._require_single_supports()
+
+    def __getitem__(self, name: str) -> Beam | Body:
+        """The beam or body of a name, as in ``scene["left"].end``.
+
+        Raises:
+            SceneError: There is none, or more than one.
+        """
+        everything: tuple[Beam | Body, ...] = (*self.beams, *self.bodies)
+        found = [one for one in everything if one.name == name]
+        if len(found) != 1:
+            there = ", ".join(dict.fromkeys(str(one.name) for one in everything))
+            raise SceneError(
+                f"Scene: {len(found) or 'no'} beams and bodies are called {name!r}; "
+                f"there is {there}; scene.beams[i] and scene.bodies[i] are those of a number"
+            )
+        return found[0]
+
+    @cached_property
+    def size(self) -> float:
+        """Diameter of the smallest circle around the undeformed scene; m.
+
+        It is the same in all axes.  A single point is as large as its radius of gyration.
+        """
+        points = [b.curve(s) for b in self.beams for s in b.vertices(())]
+        points += [body.center for body in self.bodies]
+        points += [place.point for _, place in self.attachments() if isinstance(place, Spot)]
+        gyration = [math.sqrt(b.inertia / b.mass) for b in self.bodies if b.mass > 0]
+        return enclosing_diameter(np.array(points)) or max(gyration, default=0.0) or 1.0
+
+    @cached_property
+    def links(self) -> tuple[Connector, ...]:
+        """All connectors: of joints, of the scene, of off-centre loads, and plastic hinges."""
+        return (*self._links_but_hinges, *self.hinges)
+
+    @cached_property
+    def _links_but_hinges(self) -> tuple[Connector, ...]:
+        held = [holder for joint in self.joints for holder in joint.holders]
+        loads = [push for load in self.loads for push in _off_center(load)]
+        return (*held, *self.connectors, *loads)
+
+    @cached_property
+    def hinges(self) -> tuple[Connector, ...]:
+        """Plastic hinges of zero length: those of beams, and at ends whose section has a hinge."""
+        loaded = [load.place for load in self.moments]
+        return plastic_hinges(self.beams, self.joints, self._bearing_moments(), loaded)
+
+    @property
+    def moments(self) -> list[PointLoad | FollowerLoad]:
+        """Loads at places that are moments, or have one."""
+        at_places = (load for load in self.loads if isinstance(load, PointLoad | FollowerLoad))
+        return [load for load in at_places if load.moment]
+
+    def _bearing_moments(self) -> Iterator[Anchor]:
+        """Places where supports, connectors or masses bear a moment."""
+        for support in self.supports:
+            if 2 in support.held:
+                yield support.place
+        for link in self._links_but_hinges:
+            by_a, by_b = link.rigidly()
+            if by_a[2] or link.motion == "sliding":
+                yield link.a
+            if by_b[2]:
+                yield link.b
+        for mass in self.masses:
+            if mass.inertia:
+                yield mass.place
+
+    @cached_property
+    def movers(self) -> tuple[Body, ...]:
+        """The bodies, and the ground if something is attached to it."""
+        attached = [place for _, place in self.attachments()]
+        attached += [link.a for link in self.links]
+        return (*self.bodies, *((GROUND,) if any(node(p) is GROUND for p in attached) else ()))
+
+    def time_functions(self) -> Iterator[tuple[object, TimeFunction]]:
+        """All functions of time, of loads, prescribed motions and drives, and whose they are."""
+        for load in self.loads:
+            if not isinstance(load, RotatingFrame):
+                yield load, load.time
+        for support in self.supports:
+            for motion in support.held.values():
+                yield support, motion
+        for link in self.links:
+            if isinstance(link.law, Motor):
+                yield link, link.law.motion
+            if isinstance(link.law, Actuator):
+                yield link, link.law.force
+
+    def attachments(self) -> Iterator[tuple[object, Anchor]]:
+        """Iterate over all that has a place, and its place."""
+        for joint in self.joints:
+            for place in joint.places:
+                yield joint, place
+        for connector in self.connectors:
+            yield connector, connector.a
+            yield connector, connector.b
+        for support in self.supports:
+            yield support, support.place
+        for mass in self.masses:
+            yield "PointMass", mass.place
+        for load in self.loads:
+            if isinstance(load, PointLoad | FollowerLoad):
+                yield type(load).__name__, load.place
+            elif isinstance(load, LineLoad):
+                yield "LineLoad", load.beam.start
+        for velocity in self.initial:
+            for one in velocity.beams:
+                yield "Velocity", one.start if isinstance(one, Beam) else one.middle
+        for damping in self.damping:
+            if isinstance(damping, KelvinVoigt):
+                for beam in damping.beams or ():
+                    yield "KelvinVoigt", beam.start
+
+    @cached_property
+    def attached(self) -> dict[Beam, list[float]]:
+        """Parameters of the places of each beam that must be vertices."""
+        found: dict[Beam, list[float]] = {beam: list(beam.hinges) for beam in self.beams}
+        for _, place in self.attachments():
+            if isinstance(place, Place):
+                found[place.beam].append(place.s)
+        return found
+
+    def _require_once(self) -> None:
+        """Raise if a record is in a list twice, or if two joints are the same."""
+        for part in ("joints", "connectors", "loads", "masses", "initial", "damping"):
+            first: dict[int, int] = {}
+            for i, record in enumerate(getattr(self, part)):
+                j = first.setdefault(id(record), i)
+                if i != j:
+                    raise SceneError(
+                        f"Scene: {clip(str(record))} is there twice, as {part}[{j}] and "
+                        f"{part}[{i}]; remove one, or make two of them"
+                    )
+        seen: dict[object, int] = {}
+        for i, joint in enumerate(self.joints):
+            j = seen.setdefault(joint.sameness, i)
+            if i != j:
+                raise SceneError(
+                    f"Scene: {joint} is there twice, as joints[{j}] and joints[{i}]; remove one"
+                )
+
+    def _require_together(self, joint: Joint) -> None:
+        here, *others = joint.places
+        for other in others:
+            if other in joint.places[: joint.places.index(other)] or other == here:
+                raise SceneError(f"{joint}: the same place twice")
+            gap = math.dist(here.point, other.point)
+            if joint.meets and gap > 1e-9 * self.size:
+                raise SceneError(
+                    f"{joint.kind}: joint ends lie {gap:.6g} m apart: {here} and {other}; "
+                    f"{joint.advice}"
+                )
+
+    def _require_pressing(self, connector: Connector, pressing: Bearing) -> None:
+        """Raise unless the force of what presses on friction can be known."""
+        if pressing not in (*self.joints, *self.supports):
+            raise SceneError(
+                f"{connector}: {pressing}, which presses on its friction, is not in the scene; add "
+                "it to joints or supports"
+            )
+        if isinstance(pressing, Support) and not pressing.held.keys() & {0, 1}:
+            raise SceneError(
+                f"{connector}: {pressing}, which presses on its friction, holds no displacement "
+                "and bears no force; name another support or joint"
+            )
+        if isinstance(pressing, Joint) and all(holder.turns for holder in pressing.holders):
+            raise SceneError(
+                f"{connector}: {pressing}, which presses on its friction, shares unknowns, so that "
+                "its force is not known; make it with measured=True"
+            )
+
+    @cached_property
+    def representatives(self) -> dict[Slot, Slot]:
+        """Which component of a node stands for it, for all components that joints share."""
+        hinges = ([(node(link.a), c), (node(link.b), c)] for link in self.hinges for c in (0, 1))
+        return merged([*shared_by_joints(self.joints), *hinges])
+
+    def _require_single_supports(self) -> None:
+        same = self.representatives
+        holders: dict[Slot, str] = {}
+        slot: Slot
+        for component in (0, 1, 2):
+            slot = (GROUND, component)
+            holders[same.get(slot, slot)] = "the ground"
+        for support in self.supports:
+            # A support in turned axes takes both displacements of its place.
+            components = {*support.held, *((0, 1) if support.angle else ())}
+            for component in sorted(components):
+                slot = (node(support.place), component)
+                slot = same.get(slot, slot)
+                if slot in holders:
+                    raise SceneError(
+                        f"supports in conflict: {holders[slot]} and {support} both hold "
+                        f"{COMPONENTS[component]}; remove one"
+                    )
+                holders[slot] = str(support)
+
+
+@singledispatch
+def _off_center(load: Load) -> tuple[Connector, ...]:
+    """Connectors that push like a load at a point of a body that is not its centre."""
+    return ()
+
+
+@_off_center.register
+def _(load: PointLoad) -> tuple[Connector, ...]:
+    if carries(load.place):
+        return ()
+
+    def push(motion: str, size: float, axis: Point = (1.0, 0.0)) -> Connector:
+        law = Actuator(lambda t: size * value_at(load.time, t, load))
+        return Connector("PointLoad", motion, ground(*load.place.point), load.place, law, axis)
+
+    (x, y), moment = load.force, load.moment
+    return (
+        push("parting", x, (1.0, 0.0)),
+        push("parting", y, (0.0, 1.0)),
+        *((push("turning", moment),) if moment else ()),
+    )
+
+
+def _require_kinds(scene: Scene) -> None:
+    kinds: tuple[tuple[str, Iterable[object], tuple[type, ...]], ...] = (
+        ("beams", scene.beams, (Beam,)),
+        ("joints", scene.joints, (Joint,)),
+        ("supports", scene.supports, (Support,)),
+        ("loads", scene.loads, (PointLoad, FollowerLoad, LineLoad, Gravity, RotatingFrame)),
+        ("masses", scene.masses, (PointMass,)),
+        ("initial", scene.initial, (Velocity,)),
+        ("damping", scene.damping, (Rayleigh, KelvinVoigt)),
+        ("bodies", scene.bodies, (Body,)),
+        ("connectors", scene.connectors, (Connector,)),
+    )
+    for name, records, kind in kinds:
+        for i, record in enumerate(records):
+            require_kind(record, kind, f"Scene: {name}[{i}]")

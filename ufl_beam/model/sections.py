@@ -1,0 +1,335 @@
+# SPDX-License-Identifier: MIT
+"""Cross-sections: what a beam is made of, in resultants or in fibres.
+
+Units are SI: N, N m², kg/m, kg m.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import KW_ONLY, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.errors import SceneError, require_kind, require_number
+from ufl_beam.model.fibres import Fibres, PlacedFibres
+from ufl_beam.model.material_laws import Hardening, Layout, Softening
+
+Integral = Callable[[Array], Array]
+"""Area of a shape below y, or its first moment."""
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """Stiffness and inertia of a cross-section, P(7) and P(18).
+
+    Args:
+        EA: Axial stiffness; N.
+        GA: Shear stiffness, shear factor included; N.
+        EI: Bending stiffness; N m².
+        rhoA: Mass per length; kg/m.  Zero, the default, is a beam without mass; state it where
+            other beams of a scene in motion have mass.
+        rhoI: Rotary inertia per length; kg m.  Zero leaves rotary inertia out.
+        depth: Depth in the plane of motion, for pictures; m.  By default that of the rectangle
+            with the same EI/EA.  Beams that are much shorter are warned of.
+        axial: Law of the axial force N, if it can yield; N.
+        shear: Law of the shear force V, if it can yield; N.
+        bending: Law of the bending moment M, if it can yield; N m.
+        hinge: Law of the hinge that opens in each cell where the moment reaches its limit; N m, J.
+            For hinges in chosen cells see :class:`Beam`.
+        fibres: Fibres in the place of the laws of N, M and the hinge; the shapes below and
+            :meth:`of_fibres` place them.
+
+    Raises:
+        SceneError: A stiffness is not positive, a number is not finite, a law is none, or laws of
+            resultants stand beside fibres.
+    """
+
+    EA: float
+    GA: float
+    EI: float
+    rhoA: float = field(default=None)  # type: ignore[assignment]
+    rhoI: float = 0.0
+    depth: float = 0.0
+    _: KW_ONLY
+    axial: Hardening | None = None
+    shear: Hardening | None = None
+    bending: Hardening | None = None
+    hinge: Softening | None = None
+    fibres: PlacedFibres | None = None
+    massless_by_default: bool = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "massless_by_default", self.rhoA is None)
+        if self.rhoA is None:
+            object.__setattr__(self, "rhoA", 0.0)
+        for name in ("EA", "GA", "EI"):
+            require_number(getattr(self, name), f"Section: {name}", positive=True)
+        for name in ("rhoA", "rhoI", "depth"):
+            require_number(getattr(self, name), f"Section: {name}", at_least=0.0)
+        if self.depth == 0.0:
+            object.__setattr__(self, "depth", math.sqrt(12 * self.EI / self.EA))
+        if self.fibres is not None:
+            require_kind(self.fibres, PlacedFibres, "Section: fibres")
+        laws = {name: getattr(self, name) for name in ("axial", "shear", "bending", "hinge")}
+        for name, law in laws.items():
+            if law is not None:
+                require_kind(law, Softening if name == "hinge" else Hardening, f"Section: {name}")
+                if self.fibres is not None:
+                    raise SceneError(
+                        f"Section: a law {name} beside fibres; the fibres bear N and M, shear is "
+                        "elastic"
+                    )
+
+    def layout(self, hinge: Softening | None) -> Layout | None:
+        """Material points of a cell with a hinge of this law; none if the cell is elastic."""
+        if self.fibres is not None:
+            return self.fibres.layout(self.GA)
+        stiffness = np.array([self.EA, self.GA, self.EI])
+        laws = [self.axial, self.shear, self.bending]
+        if hinge is not None and not hinge.opens:
+            hinge = None
+        if hinge is not None and self.bending is None:
+            laws[2] = Hardening(limit=math.inf)
+        here = np.array([law is not None for law in laws])
+        if not here.any():
+            return None
+        return Layout(
+            strains=np.eye(3)[here],
+            weights=np.ones(here.sum()),
+            stiffness=stiffness[here],
+            laws=tuple((law, 1) for law in laws if law is not None),
+            rest=np.where(here, 0.0, stiffness),
+            softening=hinge,
+            breaking=slice(here.sum() - 1, None),
+            hinges=hinge is not None,
+        )
+
+    @classmethod
+    def of_shape(
+        cls,
+        *,
+        A: float,
+        I: float,
+        E: float,
+        nu: float,
+        rho: float | None,
+        shear_factor: float,
+        depth: float,
+        fibres: PlacedFibres | None = None,
+        **laws: Any,
+    ) -> Section:
+        """Homogeneous isotropic section of a given shape.
+
+        Args:
+            A: Area; m².
+            I: Second moment of area about the axis of bending; m⁴.
+            E: Young's modulus; Pa.
+            nu: Poisson's ratio.
+            rho: Density; kg/m³.
+            shear_factor: Part of A that carries shear.
+            depth: Depth in the plane of motion; m.
+            fibres: Fibres; their sums are then EA and EI.
+            laws: ``axial``, ``shear``, ``bending`` and ``hinge`` of :class:`Section`.
+        """
+        for name, value in (("A", A), ("I", I), ("E", E), ("shear_factor", shear_factor)):
+            require_number(value, f"Section: {name}", positive=True)
+        require_number(depth, "Section: depth", at_least=0.0)
+        if rho is not None:
+            require_number(rho, "Section: rho", at_least=0.0)
+        if not -1.0 < require_number(nu, "Section: nu") <= 0.5:
+            raise SceneError(f"Section: nu = {nu} must lie in (-1, 0.5]")
+        if fibres is not None:
+            require_kind(fibres, PlacedFibres, "Section: fibres")
+        GA = shear_factor * A * E / (2 * (1 + nu))
+        EA, EI = (E * A, E * I) if fibres is None else (fibres.EA, fibres.EI)
+        if rho is not None:
+            laws |= {"rhoA": rho * A, "rhoI": rho * I}
+        return cls(EA=EA, GA=GA, EI=EI, depth=depth, fibres=fibres, **laws)
+
+    @classmethod
+    def of_fibres(
+        cls,
+        y: Sequence[float],
+        A: Sequence[float],
+        *,
+        E: float,
+        nu: float,
+        fibres: Fibres,
+        rho: float | None = None,
+        shear_factor: float = 5 / 6,
+    ) -> Section:
+        """Fibres of areas ``A`` (m²) at distances ``y`` (m) from any line along the beam.
+
+        The axis of the beam runs through their centroid.
+
+        Raises:
+            SceneError: The lists do not fit, or all fibres lie at one y.
+        """
+        require_kind(fibres, Fibres, "Section.of_fibres: fibres")
+        require_number(E, "Section: E", positive=True)
+        placed = PlacedFibres.at(fibres, E, y, A)
+        total, depth = float(placed.A.sum()), float(np.ptp(placed.y))
+        return cls.of_shape(
+            A=total, I=placed.EI / E, E=E, nu=nu, rho=rho,
+            shear_factor=shear_factor, depth=depth, fibres=placed,
+        )  # fmt: skip
+
+    @classmethod
+    def rectangle(
+        cls,
+        b: float,
+        h: float,
+        *,
+        E: float,
+        nu: float,
+        rho: float | None = None,
+        shear_factor: float = 5 / 6,
+        fibres: Fibres | None = None,
+        **laws: Any,
+    ) -> Section:
+        """Rectangle of width ``b`` and depth ``h`` (in the plane of motion); m."""
+        _positive("rectangle", b=b, h=h)
+        placed = _place(fibres, E, h, *_below_in_rectangle(b, h))
+        return cls.of_shape(
+            A=b * h, I=b * h**3 / 12, E=E, nu=nu, rho=rho,
+            shear_factor=shear_factor, depth=h, fibres=placed, **laws,
+        )  # fmt: skip
+
+    @classmethod
+    def circle(
+        cls,
+        d: float,
+        *,
+        E: float,
+        nu: float,
+        rho: float | None = None,
+        shear_factor: float = 9 / 10,
+        fibres: Fibres | None = None,
+        **laws: Any,
+    ) -> Section:
+        """Solid circle of diameter ``d``; m."""
+        _positive("circle", d=d)
+        placed = _place(fibres, E, d, *_below_in_circle(d))
+        return cls.of_shape(
+            A=math.pi * d**2 / 4, I=math.pi * d**4 / 64, E=E, nu=nu, rho=rho,
+            shear_factor=shear_factor, depth=d, fibres=placed, **laws,
+        )  # fmt: skip
+
+    @classmethod
+    def tube(
+        cls,
+        d: float,
+        t: float,
+        *,
+        E: float,
+        nu: float,
+        rho: float | None = None,
+        shear_factor: float = 1 / 2,
+        fibres: Fibres | None = None,
+        **laws: Any,
+    ) -> Section:
+        """Circular tube of outer diameter ``d`` and wall thickness ``t``; m."""
+        _positive("tube", d=d, t=t)
+        if 2 * t > d:
+            raise SceneError(
+                f"Section.tube: wall t = {t} m is thicker than the radius of d = {d} m"
+            )
+        inner = d - 2 * t
+        placed = _place(
+            fibres, E, d, *_less(_below_in_circle(d), _below_in_circle(inner)),
+            edges=(-inner / 2, inner / 2),
+        )  # fmt: skip
+        return cls.of_shape(
+            A=math.pi * (d**2 - inner**2) / 4, I=math.pi * (d**4 - inner**4) / 64,
+            E=E, nu=nu, rho=rho, shear_factor=shear_factor, depth=d, fibres=placed, **laws,
+        )  # fmt: skip
+
+    @classmethod
+    def i_shape(
+        cls,
+        h: float,
+        b: float,
+        tw: float,
+        tf: float,
+        *,
+        E: float,
+        nu: float,
+        rho: float | None = None,
+        fibres: Fibres | None = None,
+        **laws: Any,
+    ) -> Section:
+        """Doubly symmetric I of depth ``h``, width ``b``, web ``tw`` and flanges ``tf``; m.
+
+        Bends about its strong axis; the web between the mid-planes of the flanges carries shear.
+        """
+        _positive("i_shape", h=h, b=b, tw=tw, tf=tf)
+        if 2 * tf >= h or tw > b:
+            raise SceneError(
+                f"Section.i_shape: web and flanges do not fit: h = {h}, b = {b}, tw = {tw}, "
+                f"tf = {tf} m"
+            )
+        web = h - 2 * tf
+        A = 2 * b * tf + tw * web
+        placed = _place(
+            fibres, E, h, *_less(_below_in_rectangle(b, h), _below_in_rectangle(b - tw, web)),
+            edges=(-web / 2, web / 2),
+        )  # fmt: skip
+        return cls.of_shape(
+            A=A, I=(b * h**3 - (b - tw) * web**3) / 12, E=E, nu=nu, rho=rho,
+            shear_factor=tw * (h - tf) / A, depth=h, fibres=placed, **laws,
+        )  # fmt: skip
+
+
+def _below_in_rectangle(b: float, h: float) -> tuple[Integral, Integral]:
+    """Area below y, and its first moment."""
+
+    def inside(y: Array) -> Array:
+        return np.asarray(np.clip(y, -h / 2, h / 2))
+
+    return lambda y: b * inside(y), lambda y: b * inside(y) ** 2 / 2
+
+
+def _below_in_circle(d: float) -> tuple[Integral, Integral]:
+    """Area below y, and its first moment."""
+    r = d / 2
+
+    def half_chord(y: Array) -> Array:
+        return np.asarray(np.sqrt(np.maximum(r**2 - y**2, 0.0)))
+
+    def area(y: Array) -> Array:
+        y = np.clip(y, -r, r)
+        return np.asarray(y * half_chord(y) + (r**2 * np.arcsin(y / r) if r else 0.0))
+
+    return area, lambda y: -2 / 3 * half_chord(y) ** 3
+
+
+def _less(
+    outer: tuple[Integral, Integral], inner: tuple[Integral, Integral]
+) -> tuple[Integral, Integral]:
+    """A shape with a hole."""
+    (A, S), (a, s) = outer, inner
+    return lambda y: A(y) - a(y), lambda y: S(y) - s(y)
+
+
+def _place(
+    fibres: Fibres | None,
+    E: float,
+    h: float,
+    area: Integral,
+    first_moment: Integral,
+    edges: Sequence[float] = (),
+) -> PlacedFibres | None:
+    if fibres is None:
+        return None
+    require_kind(fibres, Fibres, "Section: fibres")
+    require_number(E, "Section: E", positive=True)
+    return PlacedFibres.layers(fibres, E, h, area, first_moment, edges)
+
+
+def _positive(shape: str, **sizes: float) -> None:
+    for name, value in sizes.items():
+        require_number(value, f"Section.{shape}: {name}", positive=True)

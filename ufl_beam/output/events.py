@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: MIT
+"""Events of a run: yielding, opening, breaking, touching, sliding, and their times."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ufl_beam.discretization.state_io import State
+from ufl_beam.errors import require_function
+from ufl_beam.model.beams import Place
+from ufl_beam.model.connector_laws import Coulomb, Stop
+from ufl_beam.model.connectors import Connector
+from ufl_beam.model.plastic_hinges import law_of
+from ufl_beam.output.recorders import Recorder, on_first
+from ufl_beam.parameter import TIME, Parameter
+
+if TYPE_CHECKING:
+    from ufl_beam.output.state_view import StateView
+
+Flags = npt.NDArray[np.bool_]
+
+IN_CELLS = ("yields", "opens", "is free")
+"""Events of a cell, once each: plastic flow, the opening of a hinge or crack, its end."""
+
+BETWEEN = {Stop: ("touches", "lets go"), Coulomb: ("slides", "sticks")}
+"""Events of connectors, and their ends."""
+
+ALL = (*IN_CELLS, *(what for pair in BETWEEN.values() for what in pair))
+"""All that can happen."""
+
+Row = tuple[float, int, str]
+"""Time, number of the cell or connector, what."""
+
+FREE = 0.999
+"""Part of the energy of a hinge after which it is called a joint."""
+
+
+class Event(NamedTuple):
+    """Something that happened in a step.
+
+    Attributes:
+        time: End of the step; s; on a path its load factor.
+        where: A place in the middle of a cell, that of a plastic hinge, or a connector.
+        what: "yields", "opens", "is free" in a cell; "touches", "lets go", "slides", "sticks".
+        parameter: Words for the time.
+    """
+
+    time: float
+    where: Place | Connector
+    what: str
+    parameter: Parameter = TIME
+
+    def __str__(self) -> str:
+        return f"{self.parameter.at(self.time, '.9g')}: {self.where} {self.what}"
+
+
+class Events(Recorder):
+    """A list of what happens, for scenes with hinges, inelastic material, stops or friction.
+
+    A hinge "is free" when it has dissipated 99.9 % of its energy; stops touch and let go, friction
+    slides and sticks as often as they do, the rest happens once in a cell or hinge.  A hinge that
+    hardens "yields".
+
+    Args:
+        tell: Called on the first process with each event as it happens, such as ``print``.
+
+    Attributes:
+        found: The events in their order, the same on all processes.
+    """
+
+    def __init__(self, tell: Callable[[Event], object] | None = None) -> None:
+        if tell is not None:
+            require_function(tell, "Events: tell", "an Event")
+        self._tell = tell
+        self.found: list[Event] = []
+        self._rows: list[Row] = []
+
+    def require_writable(self) -> None:
+        """Nothing is written."""
+
+    def open(self, simulation: StateView) -> None:
+        """Take note of the initial state."""
+        self.found, self._rows = [], []
+        self._watch(simulation)
+
+    def _watch(self, simulation: StateView) -> None:
+        """Find the events that a scene may have, and those before the run."""
+        grid = simulation.grid
+        in_cells = [law for beam in simulation.scene.beams for law in grid.hinges(beam)]
+        laws = [*in_cells, *(law_of(hinge) for hinge in simulation.scene.hinges)]
+        breaking = [law is not None and law.limit > 0 for law in laws]
+        energies = np.array([law.energy if law is not None else np.inf for law in laws])
+        self._enough = np.where(breaking, FREE * energies, np.inf)
+        self._breaks = np.isfinite(energies)
+        links = simulation.scene.links
+        self._links = [i for i, link in enumerate(links) if type(link.law) in BETWEEN]
+        self._flags = self._look(simulation)
+
+    def _look(self, simulation: StateView) -> tuple[Flags, list[bool]]:
+        """Return the events of each cell and hinge, and the state of each connector."""
+        in_cells = np.zeros((len(self._enough), len(IN_CELLS)), dtype=bool)
+        for cells, rows in simulation.material():
+            plastic, broken = rows[:, 4], rows[:, 5]
+            happened = (plastic > 0, broken > 0, broken >= self._enough[cells])
+            in_cells[cells] = np.column_stack(happened)
+        if simulation.scene.hinges:
+            hinges = slice(len(simulation.grid.cells), None)
+            lost, breaks = simulation.hinges()[:, -1], self._breaks[hinges]
+            happened = ((lost > 0) & ~breaks, (lost > 0) & breaks, lost >= self._enough[hinges])
+            in_cells[hinges] = np.column_stack(happened)
+        if not self._links:
+            return in_cells, []
+        forces = np.abs(simulation.connections()[self._links, 1])
+        limits = [self._limit(simulation, link) for link in self._links]
+        return in_cells, [bool(goes_on) for goes_on in forces > limits]
+
+    def _limit(self, simulation: StateView, link: int) -> float:
+        """Force of a connector above which it touches, or slides; N or N m."""
+        # A force at the limit of friction is known to some digits.
+        return (1 - 1e-9) * simulation.asked.get(simulation.scene.links[link], 0.0)
+
+    def write(self, simulation: StateView) -> None:
+        """Note what has changed in the step."""
+        flags = self._look(simulation)
+        (cells, goes_on), (cells_before, went_on) = flags, self._flags
+        self._flags = flags
+        new: list[Row] = []
+        for cell, n in np.argwhere(cells & ~cells_before):
+            new.append((simulation.t, int(cell), IN_CELLS[n]))
+        for link, now, before in zip(self._links, goes_on, went_on, strict=True):
+            if now != before:
+                begins, ends = BETWEEN[type(simulation.scene.links[link].law)]
+                new.append((simulation.t, link, begins if now else ends))
+        events = self._add(simulation, new)
+        if self._tell is not None and events:
+            on_first(simulation.comm, lambda: self._tell_all(events))
+
+    def _tell_all(self, events: list[Event]) -> None:
+        for event in events:
+            if self._tell is not None:
+                self._tell(event)
+
+    def _add(self, simulation: StateView, rows: list[Row]) -> list[Event]:
+        links, grid = simulation.scene.links, simulation.grid
+        named = simulation.parameter
+        events = [
+            Event(t, grid.place_of(number) if what in IN_CELLS else links[number], what, named)
+            for t, number, what in rows
+        ]
+        self._rows += rows
+        self.found += events
+        return events
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+    def state(self) -> State:
+        """The events so far: time, number of the cell or connector, and what."""
+        return {"events": np.array([(t, n, ALL.index(what)) for t, n, what in self._rows])}
+
+    def resume(self, simulation: StateView, state: State) -> None:
+        """Go on after those events."""
+        self.found, self._rows = [], []
+        self._add(simulation, [(float(t), int(n), ALL[int(k)]) for t, n, k in state["events"]])
+        self._watch(simulation)

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: MIT
+"""Least and largest values that a run has reached, and when."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ufl_beam.arrays import Array, Index
+from ufl_beam.discretization.state_io import State
+from ufl_beam.errors import SceneError
+from ufl_beam.model.beams import Beam
+from ufl_beam.model.bodies import Body
+from ufl_beam.output.recorders import Recorder
+
+if TYPE_CHECKING:
+    from ufl_beam.discretization.dof_numbering import Grid
+    from ufl_beam.output.state_view import StateView
+
+
+class Extent(NamedTuple):
+    """From where to where values went, all arrays of the shape of the values.
+
+    Attributes:
+        low: The least values.
+        high: The largest values.
+        time_low: When the least were reached first; s.
+        time_high: When the largest were reached first; s.
+    """
+
+    low: Array
+    high: Array
+    time_low: Array
+    time_high: Array
+
+    @classmethod
+    def around(cls, values: Array, t: float) -> Extent:
+        """That of one time."""
+        return cls(values.copy(), values.copy(), *np.full((2, *values.shape), t))
+
+    def widen(self, values: Array, t: float) -> None:
+        """Take in the values of a time."""
+        for reached, when, beyond in (
+            (self.low, self.time_low, values < self.low),
+            (self.high, self.time_high, values > self.high),
+        ):
+            if beyond.any():
+                reached[beyond] = values[beyond]
+                when[beyond] = t
+
+    def of(self, rows: Index) -> Extent:
+        """That of some of the values."""
+        return Extent(*(values[rows] for values in self))
+
+
+class Extremes(Recorder):
+    """Running extremes of the section forces in all cells and of the motion of all nodes.
+
+    Each step counts, whatever the solution keeps; memory does not grow.
+    """
+
+    def require_writable(self) -> None:
+        """Nothing is written."""
+
+    def open(self, simulation: StateView) -> None:
+        """Begin with the initial state."""
+        self._grid: Grid = simulation.grid
+        self._forces, self._q = (Extent.around(x, simulation.t) for x in _state(simulation))
+
+    def write(self, simulation: StateView) -> None:
+        """Take in the state."""
+        for extent, values in zip((self._forces, self._q), _state(simulation), strict=True):
+            extent.widen(values, simulation.t)
+
+    def close(self) -> None:
+        """Nothing is to be closed."""
+
+    def state(self) -> State:
+        """The extremes."""
+        names = Extent._fields
+        return {
+            **{f"forces {name}": values for name, values in zip(names, self._forces, strict=True)},
+            **{f"q {name}": values for name, values in zip(names, self._q, strict=True)},
+        }
+
+    def resume(self, simulation: StateView, state: State) -> None:
+        """Go on after a :meth:`state`."""
+        self._grid = simulation.grid
+        self._forces, self._q = (
+            Extent(*(state[f"{what} {name}"].copy() for name in Extent._fields))
+            for what in ("forces", "q")
+        )
+
+    @property
+    def grid(self) -> Grid:
+        """Vertices and cells of the scene.
+
+        Raises:
+            SceneError: Nothing was run.
+        """
+        if not hasattr(self, "_grid"):
+            raise SceneError("Extremes: nothing was run; give it to simulate(..., record=)")
+        return self._grid
+
+    def section_forces(self, beam: Beam) -> Extent:
+        """Extremes of (N, V, M) in the cells of a beam; (num_cells, 3); N, N, N m.
+
+        Raises:
+            SceneError: The beam is not in the scene, or nothing was run.
+        """
+        cells = self.grid.cells_of(beam)
+        return self._forces.of(cells)
+
+    def displacement(self, one: Beam | Body) -> Extent:
+        """Extremes of (u, v, ψ) at the nodes of a beam, or of a body; (n, 3); m, m, rad.
+
+        Raises:
+            SceneError: It is not in the scene, or nothing was run.
+        """
+        dofs = self.grid.nodes_of(one)[1]
+        return self._q.of(dofs)
+
+
+def _state(simulation: StateView) -> tuple[Array, Array]:
+    """Section forces of all cells, and the configuration, the same on every process."""
+    return simulation.section_forces(), simulation.share.gather(simulation.q)

@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: MIT
+"""Stress at named places, its cycles counted while a run goes on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.discretization.state_io import State
+from ufl_beam.errors import SceneError, require_kind, require_number, require_sequence
+from ufl_beam.model.beams import Place
+from ufl_beam.output.rainflow import Cycles, RainflowCounter, SNCurve, library
+from ufl_beam.output.recorders import Recorder
+
+if TYPE_CHECKING:
+    from ufl_beam.discretization.dof_numbering import Grid
+    from ufl_beam.output.state_view import StateView
+
+BLOCK = 1000
+"""Steps that are collected before their cycles are counted."""
+
+
+@dataclass(frozen=True, eq=False)
+class HotSpot:
+    """A place whose stress is followed.
+
+    Args:
+        place: Where on a beam.
+        stress: Stress from N, V (N) and M (N m) at many times; (n,) each; Pa.
+
+    Raises:
+        SceneError: The place is none, or the stress no function.
+    """
+
+    place: Place
+    stress: Callable[[Array, Array, Array], Array]
+
+    def __post_init__(self) -> None:
+        require_kind(self.place, Place, "HotSpot: place")
+        if not callable(self.stress):
+            raise SceneError(f"HotSpot {self.place}: stress = {self.stress!r} is not a function")
+
+    @classmethod
+    def fibre(cls, place: Place, *, y: float, E: float, factor: float = 1.0) -> HotSpot:
+        """Elastic stress E (N/EA − y M/EI) of a fibre of the section at a place.
+
+        Args:
+            place: Where on a beam.
+            y: Distance from the axis, positive on the left of the way from start to end; m.
+            E: Young's modulus; Pa.
+            factor: Stress concentration: hot-spot over nominal stress.
+        """
+        require_kind(place, Place, "HotSpot: place")
+        require_number(y, f"HotSpot {place}: y")
+        require_number(E, f"HotSpot {place}: E", positive=True)
+        require_number(factor, f"HotSpot {place}: factor", positive=True)
+        section = place.beam.section
+        per_N, per_M = factor * E / section.EA, -factor * E * y / section.EI
+        return cls(place, lambda N, V, M: per_N * N + per_M * M)
+
+    def __str__(self) -> str:
+        return str(self.place)
+
+
+class Fatigue(Recorder):
+    """Rainflow cycles of the stress at named places, counted while the run goes on.
+
+    Its memory does not grow with the number of steps.  Between the middle of a cell, where the
+    element knows it, and the place the moment varies by the shear force.
+
+    Args:
+        spots: Where.
+        curve: Cycles that the stress ranges there can be borne for.
+        resolution: Stresses are rounded to multiples of it; Pa.  By default a hundredth of the
+            range that the curve is named by.
+
+    Raises:
+        SceneError: A spot or the curve is none, or the resolution is not positive.
+        ImportError: The package `rainflow`, which counts, is missing.
+    """
+
+    def __init__(
+        self, spots: Sequence[HotSpot] | HotSpot, curve: SNCurve, *, resolution: float = 0.0
+    ) -> None:
+        one = isinstance(spots, HotSpot)
+        self.spots: tuple[HotSpot, ...] = (
+            (spots,) if one else require_sequence(spots, "Fatigue: spots")
+        )
+        for i, spot in enumerate(self.spots):
+            require_kind(spot, HotSpot, f"Fatigue: spots[{i}]")
+        require_kind(curve, SNCurve, "Fatigue: curve")
+        require_number(resolution, "Fatigue: resolution", at_least=0.0)
+        library()
+        self.curve = curve
+        self._resolution = resolution or curve.range / 100
+        self._counters: dict[HotSpot, RainflowCounter] = {}
+
+    def require_writable(self) -> None:
+        """Nothing is written."""
+
+    def open(self, simulation: StateView) -> None:
+        """Begin to count, with the initial state."""
+        self._prepare(simulation.grid)
+        self._begin = simulation.t
+        self.write(simulation)
+        self._count()  # A stress that is no number is found at once.
+
+    def _prepare(self, grid: Grid) -> None:
+        self._cells = np.array([grid.cell(spot.place) for spot in self.spots], dtype=np.int64)
+        self._arms = [_arm(grid, spot.place) for spot in self.spots]
+        self._counters = {spot: RainflowCounter(self._resolution) for spot in self.spots}
+        self._block, self._filled = np.empty((len(self.spots), 3, BLOCK)), 0
+
+    def write(self, simulation: StateView) -> None:
+        """Note the section forces, and count now and then."""
+        self._block[..., self._filled] = simulation.section_forces()[self._cells]
+        self._filled += 1
+        self._end = simulation.t
+        if self._filled == BLOCK:
+            self._count()
+
+    def _count(self) -> None:
+        filled, self._filled = self._filled, 0
+        for spot, arm, forces in zip(self.spots, self._arms, list(self._block), strict=True):
+            N, V, M = (forces[i, :filled] for i in range(3))
+            stress = np.asarray(spot.stress(N, V, M - arm * V), dtype=np.float64)
+            if stress.shape != N.shape or not np.isfinite(stress).all():
+                raise SceneError(f"HotSpot {spot}: stress(N, V, M) must be a finite number each")
+            self._counters[spot].add(stress)
+
+    def close(self) -> None:
+        """Count what is left."""
+        if self._counters and self._filled:
+            self._count()
+
+    def state(self) -> State:
+        """The time that was counted, cycles and what waits at each spot."""
+        self.close()
+        state: State = {"duration": np.array([self._begin, self._end])}
+        for i, counter in enumerate(self._counters.values()):
+            state[f"counted {i}"], state[f"waiting {i}"] = counter.state()
+        return state
+
+    def resume(self, simulation: StateView, state: State) -> None:
+        """Go on after a :meth:`state`."""
+        self._prepare(simulation.grid)
+        self._begin, self._end = map(float, state["duration"])
+        for i, counter in enumerate(self._counters.values()):
+            counter.resume(state[f"counted {i}"], state[f"waiting {i}"])
+
+    # -- what was counted ----------------------------------------------------------------------
+
+    @property
+    def duration(self) -> float:
+        """Time that was counted; s."""
+        return self._end - self._begin
+
+    def cycles(self, spot: HotSpot) -> Cycles:
+        """The cycles at a spot.
+
+        Raises:
+            SceneError: The spot is not one of these, or nothing was run.
+        """
+        if spot not in self._counters:
+            raise SceneError(f"Fatigue: nothing was counted at {spot}; name it, and run")
+        return self._counters[spot].cycles()
+
+    def damage(self, spot: HotSpot) -> float:
+        """Miner's sum at a spot, 1 at failure; errors as :meth:`cycles`."""
+        return self.cycles(spot).damage(self.curve)
+
+    def life(self, spot: HotSpot) -> float:
+        """Time to failure if all goes on like this; s; errors as :meth:`cycles`."""
+        damage = self.damage(spot)
+        return self.duration / damage if damage > 0 else math.inf
+
+    def __str__(self) -> str:
+        lines = [f"fatigue in {self.duration:g} s"] if self._counters else ["fatigue: not run yet"]
+        for spot in self._counters:
+            cycles = self.cycles(spot)
+            largest = cycles.range.max(initial=0.0)
+            lines.append(
+                f"  {spot}: {cycles.count.sum():g} cycles up to {1e-6 * largest:.4g} MPa, "
+                f"damage {self.damage(spot):.4g}, life {self.life(spot):.4g} s"
+            )
+        return "\n".join(lines)
+
+
+def _arm(grid: Grid, place: Place) -> float:
+    """Distance of a place from the middle of its cell, positive towards the end; m."""
+    nodes, weights = grid.weights(place)
+    start, end = grid.points[nodes[:2]]
+    axis = (end - start) / np.linalg.norm(end - start)
+    return float((weights @ grid.points[nodes] - (start + end) / 2) @ axis)

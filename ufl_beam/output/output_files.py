@@ -1,0 +1,241 @@
+# SPDX-License-Identifier: MIT
+"""Files that runs write: checks of their paths before the run, errors that name the file."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import stat
+import warnings
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+from ufl_beam.errors import SceneError, shorten
+
+Output = tuple[str, tuple[Path, ...]]
+"""Name of a writer in messages, and the files that it writes."""
+
+_in_use: list[Output] = []
+"""Outputs of the runs that go on in this process, the outer ones first."""
+
+
+# -- before the run ----------------------------------------------------------------------------
+
+
+def require_path(path: str | Path, what: str) -> Path:
+    """Return ``path`` as a :class:`Path`, or raise :class:`SceneError` naming ``what``."""
+    if not isinstance(path, str | os.PathLike) or not os.fspath(path):
+        raise SceneError(f"{what}: path = {shorten(path)} must be the name of a file")
+    return Path(path)
+
+
+def require_writable(path: Path) -> None:
+    """Raise :class:`SceneError` if a file cannot be written; its content stays as it is."""
+    why = ""
+    try:
+        if not path.parent.is_dir():
+            why = f": there is no directory {path.parent}; make it first"
+        else:
+            new = not path.exists()
+            with path.open("ab"):
+                pass
+            if new:
+                path.unlink()
+    except OSError as error:
+        why = f" cannot be written: {error.strerror}"
+    except ValueError as error:  # a null character
+        why = f" cannot be written: {error}"
+    if why:
+        raise SceneError(f"output {path}{why}")
+
+
+def require_apart(outputs: Sequence[Output], call: str) -> None:
+    """Raise :class:`SceneError` if two outputs, or an outer run's and one of these, share a file.
+
+    Files are compared as the file system knows them: through symbolic and hard links.  Devices
+    such as ``/dev/null`` may be shared.
+
+    Args:
+        outputs: Those of a run that is about to begin.
+        call: Name for messages.
+    """
+    owners: dict[object, str] = {}
+    for owner, paths in (*_in_use, *outputs):
+        for path in paths:
+            for identity in _identities(path):
+                other = owners.setdefault(identity, owner)
+                if other is not owner:
+                    raise SceneError(
+                        f"{call}: {other} and {owner} would both write {os.path.realpath(path)}; "
+                        "give one of them another path"
+                    )
+
+
+def _identities(path: Path) -> list[object]:
+    """The real path, and the inode of a file that exists; none of a device."""
+    try:
+        real = os.path.realpath(path)
+        found = os.stat(real)
+    except OSError:
+        return [real]
+    except ValueError as error:  # a null character
+        raise SceneError(f"output {path} cannot be written: {error}") from None
+    return [real, (found.st_dev, found.st_ino)] if stat.S_ISREG(found.st_mode) else []
+
+
+def take(outputs: Iterable[Output]) -> Callable[[], None]:
+    """Keep runs within this one from writing its files, until the function returned is called."""
+    taken = list(outputs)
+    _in_use.extend(taken)
+
+    def release() -> None:
+        for output in taken:
+            _in_use.remove(output)
+
+    return release
+
+
+# -- during the run ----------------------------------------------------------------------------
+
+
+class OutputFile:
+    """A file that is written at given positions; an error in writing names it.
+
+    Args:
+        path: The file.
+        new: Whether it is emptied, or made; else it is opened as it is.
+
+    Attributes:
+        path: The file.
+
+    Raises:
+        OSError: It cannot be opened.
+    """
+
+    def __init__(self, path: Path, *, new: bool = True) -> None:
+        self.path = path
+        flags = os.O_RDWR | os.O_CLOEXEC | (os.O_CREAT | os.O_TRUNC if new else 0)
+        try:
+            self._file = os.open(path, flags, 0o666)
+        except OSError as error:
+            raise failure(error, path) from None
+        self._regular = stat.S_ISREG(os.fstat(self._file).st_mode)
+
+    @property
+    def size(self) -> int:
+        """Its length; bytes."""
+        return os.fstat(self._file).st_size
+
+    def put(self, at: int, data: bytes | bytearray) -> None:
+        """Write at a position.
+
+        Raises:
+            OSError: There is no space, or the device fails.
+        """
+        rest = memoryview(data)
+        try:
+            while rest:
+                if self._regular:
+                    done = os.pwrite(self._file, rest, at)
+                else:  # pipes and terminals have no positions
+                    done = os.write(self._file, rest)
+                rest, at = rest[done:], at + done
+        except OSError as error:
+            raise failure(error, self.path) from None
+
+    def read(self, at: int, count: int) -> bytes:
+        """Read some bytes, fewer at the end of the file."""
+        return os.pread(self._file, count, at)
+
+    def cut(self, length: int) -> None:
+        """Cut the file off."""
+        if self._regular:
+            os.ftruncate(self._file, length)
+
+    def rename(self, path: Path) -> None:
+        """Move the file, in the place of another one if that exists."""
+        os.replace(self.path, path)
+        self.path = path
+
+    def sync(self) -> None:
+        """Bring everything to the disk.
+
+        Raises:
+            FileNotFoundError: The file was removed, or another one stands in its place.
+        """
+        if not is_at(self._file, self.path):
+            raise removed(self.path)
+        try:
+            os.fsync(self._file)
+        except OSError as error:
+            if error.errno not in (errno.EINVAL, errno.EROFS):  # not of a file
+                raise failure(error, self.path) from None
+
+    def close(self) -> None:
+        """Close the file; warn if it is not where it was."""
+        file, self._file = self._file, -1
+        if file >= 0:
+            there = is_at(file, self.path)
+            os.close(file)
+            if not there:
+                warn_of_removal(self.path)
+
+
+def replace_file(path: Path, data: bytes) -> None:
+    """Write a whole file; the one before stays until the new one is on the disk.
+
+    Raises:
+        OSError: It cannot be written.
+    """
+    part = path.parent / f"{path.name}.part"
+    try:
+        with part.open("wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(part, path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise failure(error, path) from None
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+
+
+def is_at(file: int, path: Path) -> bool:
+    """Return whether a path leads to an open file."""
+    try:
+        return os.path.samestat(os.fstat(file), os.stat(path))
+    except OSError:
+        return False
+
+
+def removed(path: Path) -> FileNotFoundError:
+    """The error of an output that is not where it was when a checkpoint is due."""
+    return FileNotFoundError(
+        errno.ENOENT,
+        f"output {path} was removed or replaced during the run, so that no checkpoint can count "
+        "on it; the checkpoint before is kept, and the solution so far is in the error",
+    )
+
+
+def warn_of_removal(path: Path) -> None:
+    """Warn that an output is not where it was."""
+    warnings.warn(
+        f"output {path} was removed or replaced during the run; what was written to it is lost",
+        RuntimeWarning,
+        stacklevel=2,
+    )
+
+
+def failure(error: OSError, path: Path) -> OSError:
+    """An error in writing in words: the file, the reason, the free space, what is kept."""
+    space = ""
+    if error.errno == errno.ENOSPC and path.is_file():
+        space = f" ({shutil.disk_usage(path.parent).free / 1e6:.3g} MB are free)"
+    return OSError(
+        error.errno or errno.EIO,
+        f"output {path} cannot be written: {error.strerror or error}{space}; what was written "
+        "before is complete",
+    )

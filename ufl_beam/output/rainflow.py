@@ -1,0 +1,274 @@
+# SPDX-License-Identifier: MIT
+"""Cycles of stress: how they are counted in a history, and the damage that they do."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ufl_beam.array_checks import require_row
+from ufl_beam.arrays import Array
+from ufl_beam.errors import SceneError, is_infinite, require_function, require_number
+
+Ends = tuple[float, float]
+"""Lower and upper end of a cycle."""
+
+
+# -- what a cycle does -------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Goodman:
+    """Equivalent range S / (1 − mean / ultimate) of cycles about a mean stress in tension.
+
+    The straight line of the Haigh diagram; with the yield stress it is Soderberg's.  Compression is
+    of no help.  A mean stress of ``ultimate`` breaks at once.
+
+    Args:
+        ultimate: Ultimate stress; Pa.
+    """
+
+    ultimate: float
+
+    def __post_init__(self) -> None:
+        require_number(self.ultimate, "Goodman: ultimate", positive=True)
+
+    def __call__(self, range: Array, mean: Array) -> Array:
+        """Equivalent ranges of cycles; Pa."""
+        return _over(range, 1 - np.maximum(mean, 0.0) / self.ultimate)
+
+
+@dataclass(frozen=True)
+class Gerber:
+    """Equivalent range S / (1 − (mean / ultimate)²), a parabola in the place of Goodman's line.
+
+    Args:
+        ultimate: Ultimate stress; Pa.
+    """
+
+    ultimate: float
+
+    def __post_init__(self) -> None:
+        require_number(self.ultimate, "Gerber: ultimate", positive=True)
+
+    def __call__(self, range: Array, mean: Array) -> Array:
+        """Equivalent ranges of cycles; Pa."""
+        return _over(range, 1 - (np.maximum(mean, 0.0) / self.ultimate) ** 2)
+
+
+def _over(range: Array, part: Array) -> Array:
+    """Ranges over the part of the strength that the mean stress leaves; infinite where none."""
+    equivalent: Array = np.divide(range, part, out=np.full_like(range, np.inf), where=part > 0)
+    return equivalent
+
+
+def any_mean(range: Array, mean: Array) -> Array:
+    """The range itself: the mean stress is of no account, as in welds with residual stress."""
+    return range
+
+
+@dataclass(frozen=True, kw_only=True)
+class SNCurve:
+    """Cycles that a stress range can be borne for: straight lines in logarithms, Basquin's law.
+
+    Args:
+        range: Stress range that is borne for ``cycles``; Pa.
+        cycles: Their number.
+        slope: m of N = cycles (range / S)^m.
+        knee: Number of cycles from which on the slope is another.
+        slope_beyond: The other slope, above ``knee`` cycles.
+        limit: Ranges that are borne for more cycles than this do no damage.
+        mean: Equivalent range of ranges about mean stresses, such as :class:`Goodman`.
+
+    Raises:
+        SceneError: A number is not positive, or ``limit`` is less than ``knee``.
+    """
+
+    range: float
+    cycles: float = 2e6
+    slope: float = 3.0
+    knee: float = math.inf
+    slope_beyond: float = 5.0
+    limit: float = math.inf
+    mean: Callable[[Array, Array], Array] = any_mean
+
+    def __post_init__(self) -> None:
+        for name in ("range", "cycles", "slope", "slope_beyond"):
+            require_number(getattr(self, name), f"SNCurve: {name}", positive=True)
+        for name in ("knee", "limit"):
+            if not is_infinite(getattr(self, name)):
+                require_number(getattr(self, name), f"SNCurve: {name}", positive=True)
+        if self.limit < self.knee < math.inf:
+            raise SceneError(
+                f"SNCurve: limit = {self.limit:g} cycles lies before the knee, {self.knee:g}"
+            )
+        require_function(self.mean, "SNCurve: mean", "(range, mean)")
+
+    @classmethod
+    def eurocode(cls, category: float) -> SNCurve:
+        """EN 1993-1-9, direct stress: slope 3 to 5e6 cycles, 5 to 1e8, no damage beyond.
+
+        Args:
+            category: Detail category, the range that is borne for 2e6 cycles; Pa: 71e6.
+        """
+        require_number(category, "SNCurve.eurocode: category", positive=True)
+        return cls(range=category, cycles=2e6, slope=3.0, knee=5e6, slope_beyond=5.0, limit=1e8)
+
+    def endurance(self, range: npt.ArrayLike, mean: npt.ArrayLike = 0.0) -> Array:
+        """Cycles to failure of ranges about mean stresses, both Pa; infinite below the limit."""
+        ranges, means = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (range, mean)))
+        with np.errstate(divide="ignore"):
+            first = self.cycles * (self.range / self.mean(ranges, means)) ** self.slope
+        if math.isfinite(self.knee):
+            second = self.knee * (first / self.knee) ** (self.slope_beyond / self.slope)
+            first = np.where(first > self.knee, second, first)
+        # A category is a rounded number: its limit holds to round-off.
+        return np.where(first > self.limit * (1 + 1e-12), np.inf, first)
+
+
+@dataclass(frozen=True, eq=False)
+class Cycles:
+    """Cycles of a stress history, the smallest first.
+
+    Attributes:
+        range: Their ranges; (n,); Pa.
+        mean: Their mean stresses; (n,); Pa.
+        count: How many there were, halves included; (n,).
+    """
+
+    range: Array
+    mean: Array
+    count: Array
+
+    def damage(self, curve: SNCurve) -> float:
+        """Miner's sum: the part of the life that these cycles take, 1 at failure."""
+        with np.errstate(divide="ignore"):  # what breaks at once
+            return float(np.sum(self.count / curve.endurance(self.range, self.mean)))
+
+    def equivalent(self, curve: SNCurve) -> float:
+        """Range of constant size that does the same damage in as many cycles; Pa.
+
+        By the first slope alone, as damage equivalent ranges are given.
+        """
+        m, ranges = curve.slope, curve.mean(self.range, self.mean)
+        total = self.count.sum()
+        return float((self.count @ ranges**m / total) ** (1 / m)) if total > 0 else 0.0
+
+
+# -- counting ----------------------------------------------------------------------------------
+
+
+def rainflow(series: npt.ArrayLike) -> Cycles:
+    """Rainflow cycles of a whole series, ASTM E1049-85; needs the package `rainflow`.
+
+    Args:
+        series: Stresses, or whatever goes to and fro; (n,).
+
+    Raises:
+        SceneError: It is not one row of finite numbers.
+        ImportError: The package is missing.
+    """
+    values = require_row(series, "rainflow: series")
+    counts: defaultdict[Ends, float] = defaultdict(float)
+    waiting = _count([float(x) for x in values], counts)
+    return _cycles(counts, waiting, 1.0)
+
+
+def _count(series: Sequence[float], counts: defaultdict[Ends, float]) -> list[float]:
+    """Add what a series counts to ``counts``; the turning points that wait for what follows.
+
+    The method of ASTM E1049 reads one point after the other, and all that it remembers is a row of
+    points between which ranges become smaller.  Taken as the beginning of what follows, they count
+    what the series would.
+    """
+    # The library leaves out series of one and of two points.
+    points = [*series, *series[-1:], *series[-1:]]
+    chain = points[:1]
+    for _, _, count, i, j in library()(points):
+        if count == 1.0:
+            counts[_ends(points[i], points[j])] += 1.0
+        else:  # each begins where the one before it ended
+            chain.append(points[j])
+    # Half cycles that grow contain the first point and are done; those that shrink are what the
+    # library finds at the end.
+    halves = list(pairwise(chain))
+    waits = max(range(len(halves)), key=lambda k: (abs(chain[k + 1] - chain[k]), k), default=0)
+    for a, b in halves[:waits]:
+        counts[_ends(a, b)] += 0.5
+    return chain[waits:]
+
+
+def _ends(a: float, b: float) -> Ends:
+    return min(a, b), max(a, b)
+
+
+def library() -> Any:
+    """The function of the package `rainflow` that counts, which need not be installed."""
+    try:
+        from rainflow import extract_cycles
+    except ImportError as error:
+        raise ImportError(
+            "counting cycles needs the package rainflow: pip install rainflow, "
+            "or ./env with a network"
+        ) from error
+    return extract_cycles
+
+
+def _cycles(counts: Mapping[Ends, float], waiting: Sequence[float], unit: float) -> Cycles:
+    """Return the cycles counted, and half cycles between the remaining turning points."""
+    counts = defaultdict(float, counts)
+    for a, b in pairwise(waiting):
+        counts[_ends(a, b)] += 0.5
+    low, high = np.array(list(counts), dtype=float).reshape(-1, 2).T
+    count = np.array(list(counts.values()), dtype=float)
+    order = np.lexsort((low, high - low))
+    order = order[(high > low)[order]]
+    return Cycles(unit * (high - low)[order], unit / 2 * (low + high)[order], count[order])
+
+
+class RainflowCounter:
+    """Rainflow cycles of a series that comes in pieces, in memory that does not grow with it.
+
+    Values are rounded to multiples of ``resolution``: cycles are then counts in classes, and the
+    turning points that wait for their cycle to close are no more than the classes.  Apart
+    from the rounding the count is that of :func:`rainflow` for the whole series.
+
+    Args:
+        resolution: Width of the classes; Pa.
+    """
+
+    def __init__(self, resolution: float) -> None:
+        require_number(resolution, "RainflowCounter: resolution", positive=True)
+        self._resolution = resolution
+        self._counts: defaultdict[Ends, float] = defaultdict(float)
+        self._waiting: list[float] = []
+
+    def add(self, series: Array) -> None:
+        """Count what follows; (n,)."""
+        levels = np.rint(series / self._resolution)
+        self._waiting = _count([*self._waiting, *map(float, levels)], self._counts)
+
+    def cycles(self) -> Cycles:
+        """All cycles so far."""
+        return _cycles(self._counts, self._waiting, self._resolution)
+
+    def state(self) -> tuple[Array, Array]:
+        """Ends of cycles and how many there were, (n, 3), and the turning points that wait.
+
+        Both in classes.
+        """
+        counted = [(*ends, count) for ends, count in self._counts.items()]
+        return np.array(counted, dtype=float).reshape(-1, 3), np.array(self._waiting, dtype=float)
+
+    def resume(self, counted: Array, waiting: Array) -> None:
+        """Go on after a :meth:`state`."""
+        rows = (map(float, row) for row in counted)
+        self._counts = defaultdict(float, {(low, high): count for low, high, count in rows})
+        self._waiting = [float(level) for level in waiting]

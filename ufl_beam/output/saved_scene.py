@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: MIT
+"""Scenes as data of JSON: each record with the numbers that it was made of, exact.
+
+Functions of a user are no data.  Those of time are saved by their values at the times of a
+solution, curves by many points; of others the name is left.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from ufl_beam.errors import ModelWarning, SceneError
+from ufl_beam.model import (
+    axis_curves,
+    beams,
+    bodies,
+    connector_laws,
+    connectors,
+    damping,
+    distributions,
+    fibres,
+    joints,
+    loads,
+    material_laws,
+    mesh_options,
+    scene,
+    sections,
+    supports,
+)
+from ufl_beam.output import saved_functions
+from ufl_beam.output.saved_functions import LostFunction
+
+Data = Any
+"""Data of JSON."""
+
+Sampling = Callable[[Any, str, Any], Any]
+"""Record that stands for a function, given the record and the field that it is in."""
+
+MODULES: tuple[ModuleType, ...] = (
+    *(axis_curves, beams, bodies, connector_laws, connectors, damping, distributions, fibres),
+    *(joints, loads, material_laws, mesh_options, saved_functions, scene, sections, supports),
+)
+
+RECORDS: dict[str, type] = {
+    name: kind
+    for module in MODULES
+    for name, kind in vars(module).items()
+    if isinstance(kind, type) and dataclasses.is_dataclass(kind)
+}
+"""Classes of records, by name."""
+
+KNOWN: dict[str, Any] = {
+    "GROUND": bodies.GROUND,
+    "HELD": connector_laws.HELD,
+    "steady": loads.steady,
+    "still": supports.still,
+}
+"""Objects that all scenes share."""
+
+
+def lost(owner: Any, field: str, function: Any) -> LostFunction:
+    """Sampling that leaves nothing but the name."""
+    return LostFunction(saved_functions.name_of(function))
+
+
+def to_data(value: Any, sampling: Sampling = lost) -> Data:
+    """Describe a scene, or another record.
+
+    Args:
+        value: The record.
+        sampling: What stands for functions of a user.
+
+    Raises:
+        SceneError: Something in it is neither a record of the package nor a function.
+    """
+    records: list[Data] = []
+    # By identity; the objects are kept, so that none gets the identity of another.
+    numbers: dict[int, tuple[int, Any]] = {}
+
+    def describe(value: Any, owner: Any, field: str) -> Data:
+        if value is None or isinstance(value, bool | str):
+            return value
+        if isinstance(value, int | np.integer):
+            return int(value)
+        if isinstance(value, float | np.floating):
+            return float(value)
+        if isinstance(value, Fraction):
+            return {"fraction": str(value)}
+        if isinstance(value, np.ndarray):
+            return {"array": value.tolist()}
+        if isinstance(value, tuple | list):
+            return [describe(one, owner, field) for one in value]
+        if isinstance(value, Mapping):
+            pairs = (
+                (describe(k, owner, field), describe(v, owner, field)) for k, v in value.items()
+            )
+            return {"mapping": [*map(list, pairs)]}
+        for name, known in KNOWN.items():
+            if value is known:
+                return {"known": name}
+        if id(value) not in numbers:
+            record = value
+            if RECORDS.get(type(value).__name__) is not type(value):
+                if not callable(value):
+                    raise SceneError(
+                        f"{value!r} cannot be saved: {type(value).__name__} is no record of "
+                        "ufl_beam, which are numbers and names"
+                    )
+                record = sampling(owner, field, value)
+            content = {
+                f.name: describe(getattr(record, f.name), record, f.name)
+                for f in dataclasses.fields(record)
+                if f.init
+            }
+            numbers[id(value)] = len(records), value
+            records.append({"is": type(record).__name__, **content})
+        return {"record": numbers[id(value)][0]}
+
+    root = describe(value, None, "")
+    return {"records": records, "root": root}
+
+
+def from_data(data: Data) -> Any:
+    """Make what :func:`to_data` described; warnings about the scene were given when it was made."""
+    made: list[Any] = []
+
+    def make(data: Data) -> Any:
+        if isinstance(data, list):
+            return tuple(map(make, data))
+        if not isinstance(data, dict):
+            return data
+        ((kind, content),) = data.items()
+        if kind == "fraction":
+            return Fraction(content)
+        if kind == "array":
+            return np.array(content)
+        if kind == "mapping":
+            return {make(key): make(value) for key, value in content}
+        if kind == "known":
+            return KNOWN[content]
+        return made[content]
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)
+        for record in data["records"]:
+            fields = {name: make(value) for name, value in record.items() if name != "is"}
+            made.append(RECORDS[record["is"]](**fields))
+    return make(data["root"])

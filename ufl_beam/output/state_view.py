@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: MIT
+"""State of a simulation between its steps, for recorders, controllers and solutions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+from mpi4py import MPI
+
+import numpy as np
+
+from ufl_beam.arrays import Array, Index
+from ufl_beam.discretization.dof_numbering import Grid, Share
+from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.model.bodies import Anchor
+from ufl_beam.model.connectors import Connector
+from ufl_beam.model.joints import Joint
+from ufl_beam.model.scene import Scene
+from ufl_beam.model.supports import Support
+from ufl_beam.output.joint_histories import Connection, links_of, motion_of, velocity_of
+from ufl_beam.parameter import Parameter
+from ufl_beam.terms.beams import Inertia, SectionForces
+from ufl_beam.terms.connectors import Couplings
+from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.guide_curves import Guides
+from ufl_beam.terms.inelastic_beams import InelasticBeams
+from ufl_beam.terms.supports import Supports
+
+NO_REACTIONS = np.zeros((0, 3))
+
+
+class StateView:
+    """The state of a scene in words of the scene.
+
+    Unless they say otherwise all processes call these together.
+
+    Attributes:
+        scene: What is modelled.
+        comm: All processes of the run.
+        asked: Forces of controllers, and limits of friction, in the step; N or N m.
+        grid: Its vertices, cells and numbering.
+        share: The degrees of freedom of this process.
+        t: Time; s.
+        q: Configuration at the local degrees of freedom.
+        parts: Number of steps so far, parts of cut steps counted each.
+        reactions_known: Whether the reactions of the initial state are; in dynamics they are not.
+    """
+
+    scene: Scene
+    comm: MPI.Intracomm
+    asked: dict[Connector, float]
+    scheme: Scheme
+    grid: Grid
+    share: Share
+    fields: Fields
+    t: float
+    q: Array
+    parts: int
+    ledger: Ledger
+    supports: Supports
+    inertia: Inertia
+    reactions_known: bool = False
+    couplings: list[Couplings | Guides]
+    inelastic: list[InelasticBeams]
+    _has_inelastic: bool
+
+    @property
+    def parameter(self) -> Parameter:
+        """Time, or the load factor of a path."""
+        raise NotImplementedError
+
+    @property
+    def iterations(self) -> int:
+        """Newton iterations so far."""
+        raise NotImplementedError
+
+    def velocities(self) -> list[Array]:
+        """Velocities at the local degrees of freedom; none in statics."""
+        return [self.inertia.v] if self.scheme.dynamic else []
+
+    def reactions(self) -> Array:
+        """Forces of all supports on the scene; (num_supports, 3); N, N, N m."""
+        if not self.scene.supports:
+            return NO_REACTIONS
+        if self.parts == 0 and not self.reactions_known:
+            return np.full((len(self.scene.supports), 3), np.nan)
+        return self._support_forces()
+
+    def _support_forces(self) -> Array:
+        """Forces of all supports in the latest residual; (num_supports, 3); N, N, N m."""
+        dofs, mine = self._support_dofs
+        here = np.where(mine, self.supports.all_reactions(self.share.size)[dofs], 0.0)
+        if self.share.comm.size > 1:
+            self.share.comm.Allreduce(MPI.IN_PLACE, here)
+        return here
+
+    @cached_property
+    def _support_dofs(self) -> tuple[Index, Index]:
+        """Local degrees of freedom of the supports, and which of them this process owns."""
+        dofs = np.array([self.share.at(support.place) for support in self.scene.supports])
+        mine = self.share.owns(dofs)
+        local = np.zeros_like(dofs)
+        local[mine] = self.share.local(dofs[mine])
+        return local, mine
+
+    def entries(self) -> tuple[dict[str, float], ...]:
+        """The ledger over all processes: state, supplied, lost; J."""
+        ledger = self.ledger
+        groups = (dict(ledger.state), dict(ledger.supplied), dict(ledger.lost))
+        if self.share.comm.size == 1:
+            return groups
+        everyone = self.share.comm.allgather(groups)
+        return tuple(
+            {name: sum(one[g][name] for one in everyone) for name in group}
+            for g, group in enumerate(groups)
+        )
+
+    def ledger_names(self) -> list[str]:
+        """Names of the entries of the ledger."""
+        return [*self.ledger.state, *self.ledger.supplied, *self.ledger.lost]
+
+    def connections(self) -> Array:
+        """The columns of :class:`Connection` for all links of the scene.
+
+        All processes call it together; (num_links, 5).
+        """
+        here = np.zeros((len(self.scene.links), len(Connection._fields)))
+        for coupling in self.couplings:
+            q = self.q
+            here[coupling.numbers] = np.column_stack(
+                [coupling.shown_motion(q), coupling.force(q), coupling.work, coupling.rate,
+                 coupling.dissipated()]
+            )  # fmt: skip
+        if self.share.comm.size > 1:
+            self.share.comm.Allreduce(MPI.IN_PLACE, here)
+        return here
+
+    def connector(self, connector: Connector) -> Connection:
+        """Return motion, force, work and rate of a connector at the end of the last step.
+
+        Raises:
+            SceneError: It is not in the scene.
+        """
+        (number,) = links_of(self.scene, connector)
+        return Connection(*self.connections()[number].tolist())
+
+    def displacement(self, place: Anchor) -> Array:
+        """Displacement and rotation (u, v, ψ) of a place now; (3,); m, m, rad."""
+        return np.asarray(motion_of(self.grid, place, [self.share.gather(self.q)])[0])
+
+    def velocity(self, place: Anchor) -> Array:
+        """Velocity (du/dt, dv/dt, dψ/dt) of a place now; (3,); m/s, m/s, rad/s."""
+        q, v = self.share.gather(self.q), self.share.gather(self.velocities()[0])
+        return np.asarray(velocity_of(self.grid, place, [q], [v])[0])
+
+    def press(self, joint: Joint | Support) -> float:
+        """Size of the force of a joint or a support at the end of the last step; N.
+
+        Raises:
+            SceneError: The joint shares its displacement; make it with ``measured=True``.
+        """
+        if isinstance(joint, Support):
+            force = self._support_forces()[self.scene.supports.index(joint)]
+            return float(np.linalg.norm(force[:2]))
+        links = self.scene.links
+        numbers = [n for n in links_of(self.scene, joint) if not links[n].turns]
+        return float(np.linalg.norm(self.connections()[numbers, 1]))
+
+    def rates(self, links: Sequence[Connector]) -> Array:
+        """Rates of the relative motions of one kind of connectors now; m/s or rad/s."""
+        rates = np.zeros(len(links))
+        for v in self.velocities():
+            for coupling in self.couplings:
+                if isinstance(coupling, Couplings) and coupling.links == list(links):
+                    rates += coupling.rates(self.q, v)
+        return rates
+
+    def section_forces(self) -> Array:
+        """(N, V, M) in all cells; (num_cells, 3); N, N, N m; all processes call it together."""
+        here = np.empty((len(self.share.cells), 3))
+        self._section_forces.write(self.q, here)
+        forces = self.share.gather_cells(here)
+        for cells, rows in self.material():
+            forces[cells] = rows[:, :3]
+        return forces
+
+    @cached_property
+    def _section_forces(self) -> SectionForces:
+        return SectionForces(self.fields)
+
+    def material(self) -> list[tuple[Index, Array]]:
+        """Cells that can yield or break, and :attr:`Points.kept`; all processes call together."""
+        return self._gather([inelastic.kept() for inelastic in self.inelastic])
+
+    def hinges(self) -> Array:
+        """The columns of :class:`Connection` for the plastic hinges of the scene; (num_hinges, 5).
+
+        All processes call it together.
+        """
+        return self.connections()[len(self.scene.links) - len(self.scene.hinges) :]
+
+    @property
+    def may_break(self) -> bool:
+        """True if something in the scene yields, softens or has plastic hinges."""
+        return self._has_inelastic or bool(self.scene.hinges)
+
+    def damage(self) -> tuple[Array, Array]:
+        """Jump of rotation (rad) and dissipated energy (J) of each cell; both (num_cells,).
+
+        Those of plastic hinges at the ends of a cell are included; of several jumps it is the
+        largest.  All processes call it together.
+        """
+        jump, dissipated = np.zeros((2, len(self.grid.cells)))
+        for cells, rows in self.material():
+            jump[cells], dissipated[cells] = rows[:, 3], rows[:, 4] + rows[:, 5]
+        if self.scene.hinges:
+            hinges = Connection(*self.hinges().T)
+            np.add.at(dissipated, self.grid.cells_at_hinges, hinges.dissipated)
+            for cell, motion in zip(self.grid.cells_at_hinges, hinges.motion, strict=True):
+                jump[cell] = max(jump[cell], motion, key=abs)
+        return jump, dissipated
+
+    def _gather(self, here: list[tuple[Index, Array]]) -> list[tuple[Index, Array]]:
+        if not self._has_inelastic or self.share.comm.size == 1:
+            return here
+        return [group for groups in self.share.comm.allgather(here) for group in groups]

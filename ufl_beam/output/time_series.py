@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: MIT
+"""Recorders of time series for ParaView and PyVista."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mpi4py import MPI
+
+import numpy as np
+
+from ufl_beam.discretization.state_io import State
+from ufl_beam.errors import SceneError, require_count
+from ufl_beam.output.line_data import LineData, LineFields
+from ufl_beam.output.output_files import require_path, require_writable
+from ufl_beam.output.recorders import Recorder, on_first
+from ufl_beam.output.vtkhdf import VtkhdfWriter
+from ufl_beam.output.xdmf import Complete, XdmfWriter, data_path
+
+if TYPE_CHECKING:
+    from ufl_beam.output.state_view import StateView
+
+
+class TimeSeries(Recorder):
+    """Time series of a scene as one data set of lines, see :class:`XDMF` and :class:`VTKHDF`."""
+
+    ending: str
+
+    def __init__(self, path: str | Path, *, every: int = 1) -> None:
+        kind = type(self).__name__
+        self._path = require_path(path, kind)
+        require_count(every, f"{kind} {path}: every")
+        self._every, self._count = every, 0
+        if self._path.suffix != self.ending:
+            raise SceneError(f"{kind} {path}: the name of the file must end in {self.ending}")
+        self._writers: list[Any] = []
+
+    def require_writable(self) -> None:
+        """Raise :class:`SceneError` if a file cannot be written."""
+        for path in self.files:
+            require_writable(path)
+
+    def open(self, simulation: StateView) -> None:
+        """Write the mesh and the initial state."""
+        self._count = 0
+        fields = self._prepare(simulation)
+        on_first(simulation.comm, lambda: self._begin(simulation.t, fields))
+
+    def _prepare(self, simulation: StateView) -> LineFields:
+        """Note the mesh; the fields of the present state."""
+        self._comm: MPI.Intracomm = simulation.comm
+        self._lines = LineData(simulation)
+        return self._lines.fields(simulation)
+
+    def _begin(self, t: float, fields: LineFields) -> None:
+        self.close()
+        self._writers = [self._writer(fields)]
+        self._writers[0].write(t, fields)
+
+    @abstractmethod
+    def _writer(self, fields: LineFields, complete: list[int] | None = None) -> Any:
+        """Make the writer of a file, or of one that is complete up to some sizes."""
+
+    def write(self, simulation: StateView) -> None:
+        """Write the state, every so many steps."""
+        self._count += 1
+        if self._count % self._every == 0:
+            fields = self._lines.fields(simulation)
+            on_first(self._comm, lambda: self._writers[0].write(simulation.t, fields))
+
+    @abstractmethod
+    def _complete(self, writer: Any) -> list[int]:
+        """Sizes of what is complete in the files of a writer."""
+
+    def state(self) -> State:
+        """The number of steps, and the sizes of what is complete; that is on the disk."""
+        on_first(self._comm, self._sync)
+        sizes = [n for writer in self._writers for n in self._complete(writer)]
+        return {"sizes": np.array([self._count, *sizes], dtype=float)}
+
+    def _sync(self) -> None:
+        for writer in self._writers:
+            writer.sync()
+
+    def resume(self, simulation: StateView, state: State) -> None:
+        """Cut off what was written after the state, and go on."""
+        self._count, *sizes = (int(n) for n in state["sizes"])
+        fields = self._prepare(simulation)
+        on_first(simulation.comm, lambda: self._take_back(fields, sizes))
+
+    def _take_back(self, fields: LineFields, sizes: list[int]) -> None:
+        try:
+            self._writers = [self._writer(fields, sizes)]
+        except (FileNotFoundError, ValueError):
+            raise SceneError(
+                f"{type(self).__name__} {self._path}: it is not what was written up to the "
+                "checkpoint; bring it back, or delete the checkpoint to begin anew"
+            ) from None
+
+    def close(self) -> None:
+        """Close the files."""
+        writers, self._writers = self._writers, []
+        for writer in writers:
+            writer.close()
+
+
+class XDMF(TimeSeries):
+    """Time series for ParaView: all fields of a step on one data set of lines.
+
+    At points ``displacement`` (3 components; m) and ``rotation`` (rad), in dynamics also
+    ``velocity`` (m/s) and ``angular velocity`` (rad/s).  In cells ``N``, ``V`` (N), ``M`` (N m);
+    where something yields or breaks, also the ``jump`` of the hinge (rad) and the ``dissipated
+    energy`` (J).  ``part`` is 0 in beams; 1 in lines from the centre of each body to its points; 2
+    along links and springs, where N is the force of what pulls along its line.
+
+    The file is valid and has all complete steps at any moment, also after a kill.  A step costs the
+    same however many there are.  On a path the time is the load factor.
+
+    Args:
+        path: File, ending in ``.xdmf``; its numbers are beside it in a file of the same name with
+            ``.bin`` behind it.
+        every: Write every so many steps.
+
+    Raises:
+        SceneError: ``every`` is no whole number of steps, or the path does not end in ``.xdmf``.
+    """
+
+    ending = ".xdmf"
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The file, and that of its numbers."""
+        return self._path, data_path(self._path)
+
+    def require_writable(self) -> None:
+        """Raise :class:`SceneError` if a file cannot be written, or its name stand in XML."""
+        name = self._path.name
+        if name != name.strip() or not name.isprintable():
+            raise SceneError(
+                f"XDMF {name!r}: spaces at the ends and characters that cannot be printed do not "
+                "survive in XML; take another name"
+            )
+        super().require_writable()
+
+    def _writer(self, fields: LineFields, complete: list[int] | None = None) -> XdmfWriter:
+        lines = self._lines
+        sizes = None if complete is None else Complete(*complete)
+        return XdmfWriter(self._path, lines.points, lines.cells, {"part": lines.parts}, sizes)
+
+    def _complete(self, writer: XdmfWriter) -> list[int]:
+        return [*writer.complete]
+
+
+class VTKHDF(TimeSeries):
+    """Time series for ParaView, VTK and PyVista in one HDF5 file, with the fields of :class:`XDMF`.
+
+    Each step is flushed: the file can be opened while the run goes on, and has all complete steps
+    after a kill unless it comes within the microseconds in which HDF5 rearranges its index.
+
+    Args:
+        path: File, ending in ``.vtkhdf``.
+        every: Write every so many steps.
+
+    Raises:
+        SceneError: ``every`` is no whole number of steps, or the path does not end in
+            ``.vtkhdf``.
+    """
+
+    ending = ".vtkhdf"
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The file."""
+        return (self._path,)
+
+    def _writer(self, fields: LineFields, complete: list[int] | None = None) -> VtkhdfWriter:
+        lines, steps = self._lines, None if complete is None else complete[0]
+        mesh = lines.points, lines.cells, {"part": lines.parts}
+        return VtkhdfWriter(self._path, *mesh, fields, steps)
+
+    def _complete(self, writer: VtkhdfWriter) -> list[int]:
+        return [writer.steps]

@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: MIT
+"""Glyphs of springs, dampers, motors and other laws, along a line or around a pin.
+
+A glyph is drawn in coordinates (s, t): s runs along the connector, from -2 at its place a to 2 at
+its place b, its body from -1 to 1; t is across, half a symbol of a support being 1.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.model.connector_laws import (
+    Actuator,
+    Controller,
+    Coulomb,
+    Damper,
+    ForceLaw,
+    Motor,
+    RigidPlastic,
+    Spring,
+    Stop,
+)
+
+# Okabe and Ito's palette, which the colour-blind can tell apart.
+BLUE, RED, GREEN, PINK, ORANGE, SKY = (
+    "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9",
+)  # fmt: skip
+INK, GREY, WHITE = "#222222", "#B5B5B5", "#FFFFFF"
+
+
+class Piece(NamedTuple):
+    """A line of a glyph, or an area if it is filled.
+
+    Attributes:
+        points: Coordinates (s, t).
+        fill: Colour of the area.
+        weight: Width of the line; points.
+        inside: Whether it is drawn upon an area.
+    """
+
+    points: list[tuple[float, float]]
+    fill: str | None = None
+    weight: float = 1.6
+    inside: bool = False
+
+
+class Glyph(NamedTuple):
+    """A symbol around a pin.
+
+    Attributes:
+        pieces: Its lines, bent.
+        sweep: Angle from place a to place b in the undeformed scene; rad.
+        spins: Whether it turns with b as a whole; others begin at a and end at b.
+    """
+
+    pieces: list[Piece]
+    sweep: float = math.pi + 1.0
+    spins: bool = False
+
+
+def _box(low: float, high: float, half: float, fill: str) -> Piece:
+    return Piece([(low, half), (high, half), (high, -half), (low, -half), (low, half)], fill)
+
+
+def _zigzag(teeth: int) -> list[tuple[float, float]]:
+    s = np.linspace(-1.0, 1.0, 2 * teeth + 1)[1::2]
+    return [(float(x), 0.55 * (-1.0) ** k) for k, x in enumerate(s)]
+
+
+_LEADS = [Piece([(-2.0, 0.0), (-0.8, 0.0)]), Piece([(0.8, 0.0), (2.0, 0.0)])]
+_PUSHED = [Piece([(-2.0, 0.0), (-0.8, 0.0)]), Piece([(0.35, 0.0), (2.0, 0.0)], weight=3.2)]
+_ARROW = [
+    Piece([(-0.6, 0.0), (0.0, 0.0)], weight=2.2, inside=True),
+    Piece([(-0.12, 0.34), (0.2, 0.0), (-0.12, -0.34), (-0.12, 0.34)], ORANGE, 1.0, inside=True),
+]
+_CYLINDER = [*_PUSHED, _box(-0.8, 0.35, 0.6, WHITE)]
+
+STRAIGHT: dict[type, list[Piece]] = {
+    Spring: [Piece([(-2.0, 0.0), (-1.0, 0.0), *_zigzag(6), (1.0, 0.0), (2.0, 0.0)])],
+    Damper: [
+        Piece([(-2.0, 0.0), (-0.5, 0.0)]),
+        Piece([(0.6, 0.6), (-0.5, 0.6), (-0.5, -0.6), (0.6, -0.6)]),
+        Piece([(0.15, 0.42), (0.15, -0.42)], weight=2.6),
+        Piece([(0.15, 0.0), (2.0, 0.0)]),
+    ],
+    Stop: [
+        Piece([(-2.0, 0.0), (-0.25, 0.0)]),
+        Piece([(-0.25, 0.7), (-0.25, -0.7)], weight=3.6),
+        Piece([(0.25, 0.7), (0.25, -0.7)], weight=3.6),
+        Piece([(0.25, 0.0), (2.0, 0.0)]),
+    ],
+    Coulomb: [
+        Piece([(-2.0, 0.0), (-0.8, 0.0), (-0.8, 0.3), (0.6, 0.3)], weight=2.2),
+        Piece([(2.0, 0.0), (0.8, 0.0), (0.8, -0.3), (-0.6, -0.3)], weight=2.2),
+        *(Piece([(s - 0.1, -0.3), (s + 0.1, 0.3)], weight=1.0) for s in (-0.4, -0.13, 0.13, 0.4)),
+    ],
+    Motor: [*_PUSHED, _box(-0.8, 0.35, 0.6, ORANGE)],
+    Actuator: [*_CYLINDER, *_ARROW],
+    Controller: [
+        *_CYLINDER,
+        *_ARROW,
+        Piece([(0.9, 0.0), (0.9, 1.15), (-0.25, 1.15), (-0.25, 0.6)], weight=1.0),
+    ],
+    ForceLaw: [
+        *_LEADS,
+        _box(-0.8, 0.8, 0.6, WHITE),
+        Piece([(-0.55, -0.35), (-0.25, -0.27), (0.25, 0.27), (0.55, 0.35)], inside=True),
+    ],
+    RigidPlastic: [  # nothing below a limit, flow at it
+        *_LEADS,
+        _box(-0.8, 0.8, 0.6, WHITE),
+        Piece([(-0.55, -0.35), (0.0, -0.35), (0.0, 0.35), (0.55, 0.35)], inside=True),
+    ],
+}
+"""Along a line; what drives is orange, filled if its motion is given."""
+
+CENTRE = -9.0
+"""The coordinate t of the pin."""
+
+
+def _bent(law: type) -> Glyph:
+    """The straight glyph around the pin, with a spoke at both ends."""
+    spokes = [Piece([(s, CENTRE), (s, 0.0)]) for s in (-2.0, 2.0)]
+    return Glyph([*STRAIGHT[law], *spokes])
+
+
+def _turning(fill: str, *more: Piece, tail: float = -2.0) -> Glyph:
+    """A curved arrow."""
+    shaft = Piece([(tail, 0.0), (1.6, 0.0)], weight=2.6)
+    head = Piece([(1.45, 0.95), (2.05, 0.0), (1.45, -0.95), (1.45, 0.95)], fill, 1.4)
+    return Glyph([shaft, head, *more], sweep=1.4 * math.pi, spins=True)
+
+
+AROUND: dict[type, Glyph] = {
+    Spring: Glyph([Piece([(2.0, CENTRE), (2.0, -2.1), (-2.0, 0.0)])], sweep=4.3 * math.pi),
+    **{law: _bent(law) for law in (Damper, Stop, Coulomb, ForceLaw, RigidPlastic)},
+    Motor: _turning(ORANGE),
+    Actuator: _turning(WHITE),
+    Controller: _turning(WHITE, _box(-2.0, -1.4, 0.5, WHITE), tail=-1.4),
+}
+"""Around a pin."""
+
+
+def along(piece: Piece, a: Array, b: Array, sides: tuple[Array, float], body: float) -> Array:
+    """Points of a piece of a straight glyph; (n, 2); m.
+
+    Args:
+        piece: Of ``STRAIGHT``.
+        a: First end; (2,); m.
+        b: Last end; (2,); m.
+        sides: Unit vector across, and the length of 1 in it; m.
+        body: Part of the way that the body of the glyph takes.
+    """
+    s, t = np.array(piece.points).T
+    part = np.interp(s, [-2.0, -1.0, 1.0, 2.0], [0.0, (1 - body) / 2, (1 + body) / 2, 1.0])
+    across, unit = sides
+    return np.asarray(a + part[:, None] * (b - a) + (t * unit)[:, None] * across)
+
+
+def around(piece: Piece, pin: Array, radius: float, angles: tuple[float, float]) -> Array:
+    """Points of a piece of a glyph around a pin; (n, 2); m.
+
+    Args:
+        piece: Of ``AROUND``.
+        pin: Its centre; (2,); m.
+        radius: Where t is 0; three units of t; m.
+        angles: Where s is -2 and 2; rad.
+    """
+    points = np.array(piece.points)
+    # Steps of 5 degrees, such that what is straight between two points is bent.
+    steps = np.abs(np.diff(points[:, 0])) / 4.0 * abs(angles[1] - angles[0])
+    counts = np.maximum(1, np.ceil(steps / math.radians(5.0))).astype(int)
+    at = np.concatenate([[0.0], *(k + np.arange(1, n + 1) / n for k, n in enumerate(counts))])
+    s, t = (np.interp(at, np.arange(len(points)), column) for column in points.T)
+    angle = np.interp(s, [-2.0, 2.0], angles)
+    r = np.maximum(radius * (1.0 + t / 3.0), 0.18 * radius)
+    return np.asarray(pin + r[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]))

@@ -1,0 +1,329 @@
+# SPDX-License-Identifier: MIT
+"""Pictures of a solution at one of its times, with diagrams of section forces on the frame."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from itertools import groupby
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.model.beams import Beam
+from ufl_beam.plotting.connector_glyphs import BLUE, INK, RED
+from ufl_beam.plotting.labels import Label, Spot, leader_of, place
+from ufl_beam.plotting.plots import (
+    RESULTANTS,
+    draw_axes,
+    draw_symbols,
+    draw_undeformed,
+    make_room,
+    moved_points,
+    picture,
+    plane_axes,
+    plane_size,
+    plane_stage,
+    require_choice,
+    with_unit,
+)
+from ufl_beam.simulation.solution import Solution
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.text import Annotation
+
+NOTHING = 1e-6
+"""Part of the largest value below which a value is drawn as zero and is not written."""
+
+LABEL_SIZE, TITLE_SIZE = 13.0, 14.0
+"""Sizes of the texts and of the title; points."""
+
+AROUND, LEAST, MOST = (1.0, 1.2), (3.6, 2.6), (9.0, 6.8)
+"""Room for words and numbers around the axes; least and largest size of a figure; inch."""
+
+POINTS = 72.0
+"""Points of an inch."""
+
+
+def plot(solution: Solution, what: str = "shape", *, n: int = -1, magnify: float = 1.0) -> Figure:
+    """The frame at the n-th kept time, with the diagram of a section force if ``what`` says so.
+
+    Diagrams stand on the deformed axis: M on the side in tension, positive N and V to the left of
+    the way from start to end.  Positive values are red, negative ones blue; the extreme values are
+    written beside them.  N and V are constant in each cell; M is linear between the moments that
+    act at its ends, see :func:`moments_at_ends`.
+
+    Bodies are outlined around their centre, a quartered circle, and all points where something is
+    attached.  What is orange drives: filled if it gives the motion, hollow if it gives the force.
+
+    Args:
+        solution: What to show.
+        what: "shape", "N", "V" or "M".
+        n: Number of the kept time; negative from the end.
+        magnify: Factor on the displacements.
+
+    Raises:
+        SceneError: Unknown ``what``, no such time, or ``magnify`` is not positive.
+    """
+    require_choice(what, ("shape", *RESULTANTS), "plot: what")
+    points = moved_points(solution, n, magnify)
+    stage = plane_stage(solution, [n], magnify)
+    pose = stage.pose(n)
+    name = f"{RESULTANTS[what][0]} {what}" if what in RESULTANTS else "shape"
+    factor = f", displacements × {magnify:g}" if magnify != 1 else ""
+    with picture(plane_size(solution.grid.points, points, pose.points())) as figure:
+        axes = plane_axes(figure, f"{name} at {solution.parameter.at(solution.times[n])}{factor}")
+        draw_undeformed(axes, stage)
+        extremes: list[Extreme] = []
+        if what in RESULTANTS:
+            beams = solution.scene.beams
+            values = [_values(solution, beam, what, n) for beam in beams]
+            extremes = draw_diagrams(axes, solution, what, [values], points)
+        draw_axes(axes, solution, points, color=INK, linewidth=2.6, zorder=4)
+        draw_symbols(axes, pose)
+        finish(figure, axes, extremes)
+    return figure
+
+
+def moments_at_ends(solution: Solution, beam: Beam, n: int = -1) -> Array:
+    """Moments that act at both ends of each cell; (num_cells, 2); N m.
+
+    The moment of a cell is that in its middle.  From there it changes by ``N Γ - V (1 + Σ)`` over a
+    unit of length, which is what equilibrium of the cell asks for: moments at the ends of cells are
+    in equilibrium with loads, joints and supports at the nodes.  With ``Mesh(degree=1)`` loads on
+    beams act at the nodes, too.
+
+    Args:
+        solution: What to show.
+        beam: One of its beams.
+        n: Number of the kept time; negative from the end.
+    """
+    N, V, M = solution.section_forces(beam, n).T
+    axial, shear, _ = solution.strains(beam, n).T
+    chain = solution.grid.points[solution.grid.vertices_of(beam)]
+    half = np.linalg.norm(np.diff(chain, axis=0), axis=1) / 2
+    change = half * (N * shear - V * (1.0 + axial))
+    return np.column_stack([M - change, M + change])
+
+
+def _values(solution: Solution, beam: Beam, what: str, n: int) -> Array:
+    """Values of a section force at both ends of each cell; (num_cells, 2); N, N m."""
+    if what == "M":
+        return moments_at_ends(solution, beam, n)
+    values = solution.section_forces(beam, n)[:, list(RESULTANTS).index(what)]
+    return np.column_stack([values, values])
+
+
+class Extreme(NamedTuple):
+    """Largest or least value of a diagram.
+
+    Attributes:
+        text: What is written.
+        color: Its colour.
+        tip: Point of the diagram; (2,); m.
+        outward: Unit vector away from the axis; (2,).
+    """
+
+    text: str
+    color: str
+    tip: Array
+    outward: Array
+
+
+def draw_diagrams(
+    axes: Axes, solution: Solution, what: str, diagrams: Sequence[Sequence[Array]], points: Array
+) -> list[Extreme]:
+    """Draw diagrams of a section force on the frame, to one scale.
+
+    Args:
+        axes: Where to draw.
+        solution: Of the frame.
+        what: "N", "V" or "M".
+        diagrams: Each a list of the values at both ends of the cells of all beams,
+            (num_cells, 2) each; N, N m.
+        points: Nodes of all beams; (num_nodes, 2); m.
+
+    Returns:
+        The largest and the least value, for :func:`finish` to write.
+    """
+    index, side = list(RESULTANTS).index(what), -1.0 if what == "M" else 1.0
+    beams = solution.scene.beams
+    # A strain of 1e-10 is what rounding and the tolerance of the iteration leave behind.
+    limits = [(b.section.EA, b.section.GA, b.section.EI / b.section.depth)[index] for b in beams]
+    if all(
+        np.all(np.abs(f) <= 1e-10 * limit)
+        for forces in diagrams
+        for f, limit in zip(forces, limits, strict=True)
+    ):
+        return []
+    largest = max(float(np.max(np.abs(f))) for forces in diagrams for f in forces)
+    scale = 0.13 * side * math.hypot(*np.ptp(points, axis=0)) / largest
+    every, tips, outward = [], [], []
+    for forces in diagrams:
+        for beam, found in zip(beams, forces, strict=True):
+            values = np.where(np.abs(found) > NOTHING * largest, found, 0.0)
+            chain = points[solution.grid.vertices_of(beam)]
+            along = np.diff(chain, axis=0)
+            left = along[:, ::-1] * (-1.0, 1.0) / np.linalg.norm(along, axis=1)[:, None]
+            ends = np.stack([chain[:-1], chain[1:]], axis=1)
+            _draw_areas(axes, ends, values, scale * left)
+            every.append(values.ravel())
+            tips.append((ends + scale * values[..., None] * left[:, None]).reshape(-1, 2))
+            away = side * np.sign(values)[..., None] * left[:, None]
+            outward.append(away.reshape(-1, 2))
+    found, tip, away = (np.concatenate(parts) for parts in (every, tips, outward))
+    return [
+        Extreme(with_unit(found[k], RESULTANTS[what][1]), color, tip[k], away[k])
+        for k, sign, color in ((np.argmax(found), 1, RED), (np.argmin(found), -1, BLUE))
+        if sign * found[k] > 0
+    ]
+
+
+class Piece(NamedTuple):
+    """Part of a cell in which a value has one sign.
+
+    Attributes:
+        a: Point of the axis at which it begins; (2,); m.
+        b: Point at which it ends; (2,); m.
+        first: Value at ``a``; N, N m.
+        last: Value at ``b``; N, N m.
+        ordinate: Ordinate of the value one; (2,); m.
+    """
+
+    a: Array
+    b: Array
+    first: float
+    last: float
+    ordinate: Array
+
+
+def _draw_areas(axes: Axes, ends: Array, values: Array, left: Array) -> None:
+    """Draw the diagram of a beam: an area for each part of it with one sign.
+
+    Args:
+        axes: Where to draw.
+        ends: Points of the axis at both ends of each cell; (num_cells, 2, 2); m.
+        values: Values there; (num_cells, 2).
+        left: Ordinate of the value one in each cell; (num_cells, 2); m.
+    """
+    pieces: list[Piece] = []
+    for k in range(len(values)):
+        (a, b), (first, last), ordinate = ends[k], values[k].tolist(), np.asarray(left[k])
+        if first * last < 0.0:
+            middle = a + first / (first - last) * (b - a)
+            pieces += [
+                Piece(a, middle, first, 0.0, ordinate),
+                Piece(middle, b, 0.0, last, ordinate),
+            ]
+        else:
+            pieces.append(Piece(a, b, first, last, ordinate))
+    for sign, run in groupby(pieces, lambda piece: np.sign(piece.first + piece.last)):
+        if sign == 0.0:
+            continue
+        cells = list(run)
+        axis = np.array([point for piece in cells for point in (piece.a, piece.b)])
+        tips = axis + np.array(
+            [value * piece.ordinate for piece in cells for value in (piece.first, piece.last)]
+        )
+        outline = np.concatenate([axis[:1], tips, axis[:0:-1]])
+        color = RED if sign > 0 else BLUE
+        axes.fill(*outline.T, facecolor=(color, 0.28), edgecolor=color, linewidth=1.0, zorder=2)
+
+
+# -- words and sizes -------------------------------------------------------------------------------
+
+
+def finish(figure: Figure, axes: Axes, extremes: Sequence[Extreme] = ()) -> None:
+    """Fit the figure to what is drawn, and write the extreme values where they cover nothing."""
+    without_texts = axes.dataLim.frozen()
+    written: list[Annotation] = []
+    _fit(figure, axes)
+    # Room for the texts changes the scale, and with it what is beside them.
+    for _ in range(3):
+        for text in written:
+            text.remove()
+        written = _write(figure, axes, extremes)
+        axes.dataLim.set(without_texts)
+        make_room(figure, axes)
+        _fit(figure, axes)
+
+
+def _fit(figure: Figure, axes: Axes) -> None:
+    """Make the figure as wide and high as what is drawn, at the largest scale that fits."""
+    axes.autoscale_view()
+    figure.draw_without_rendering()
+    title = 2 * _half_size(figure, axes, axes.get_title(loc="left"), TITLE_SIZE)[0]
+    width, height = np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())
+    least = np.array([max(LEAST[0], title / POINTS + AROUND[0]), LEAST[1]])
+    room = np.array(MOST) - AROUND
+    inches = np.array([width, height]) * np.min(room / (width, height))
+    figure.set_size_inches(np.clip(inches + AROUND, np.minimum(least, MOST), MOST))
+
+
+def _write(figure: Figure, axes: Axes, extremes: Sequence[Extreme]) -> list[Annotation]:
+    """Write extreme values beside the areas and lines of a picture."""
+    if not extremes:
+        return []
+    figure.draw_without_rendering()
+
+    def in_points(xy: Array) -> Array:
+        return np.asarray(axes.transData.transform(xy) * POINTS / figure.dpi)
+
+    lines = _segments(axes, in_points)
+    labels, halves = [], []
+    for text, color, tip, outward in extremes:
+        way = math.atan2(outward[1], outward[0])
+        # Straight away from the axis first, then more and more aside
+        ways = (way + math.radians(turn) for turn in (0, 40, -40, 75, -75, 105, -105))
+        at = in_points(tip)
+        spots = [Spot(at, np.array([math.cos(a), math.sin(a)])) for a in ways]
+        labels.append(Label(text, color, 0, tuple(spots)))
+        halves.append(_half_size(figure, axes, text, LABEL_SIZE, weight="bold"))
+    written = []
+    for one in place(labels, halves, lines):
+        tip = next(e.tip for e in extremes if e.text == one.label.text)
+        offset = one.center - one.spot
+        arrow = {"arrowstyle": "-", "color": one.label.color, "linewidth": 0.8}
+        written.append(
+            axes.annotate(
+                one.label.text, (tip[0], tip[1]), (offset[0], offset[1]),
+                textcoords="offset points", ha="center", va="center", fontsize=LABEL_SIZE,
+                color=one.label.color, weight="bold", zorder=6,
+                arrowprops=arrow if len(leader_of(one)) else None,
+            )
+        )  # fmt: skip
+    return written
+
+
+def _half_size(figure: Figure, axes: Axes, text: str, size: float, **style: Any) -> Array:
+    """Half of the width and height of a text; (2,); points."""
+    probe = axes.text(0.0, 0.0, text, fontsize=size, **style)
+    box = probe.get_window_extent()
+    probe.remove()
+    return np.asarray(np.array([box.width, box.height]) / 2 * POINTS / figure.dpi)
+
+
+def _segments(axes: Axes, in_points: Callable[[Array], Array]) -> Array:
+    """Lines that texts should not cover, those within areas too; (n, 4); points."""
+    found = []
+    for line in axes.lines:
+        chain = in_points(np.asarray(line.get_xydata(), dtype=np.float64))
+        if len(chain) == 1:  # a symbol
+            half = line.get_markersize() / 2
+            chain = chain + np.array([[-half, -half], [half, half], [-half, half], [half, -half]])
+        found.append(np.hstack([chain[:-1], chain[1:]]))
+    for patch in axes.patches:
+        outline = in_points(np.asarray(patch.get_path().vertices, dtype=np.float64))
+        found.append(np.hstack([outline[:-1], outline[1:]]))
+        count = len(outline) // 2
+        # Ordinates, from a point of the outline to the one across the axis
+        for k in range(5):
+            tips = outline[1:count] + k / 4 * (outline[2 : count + 1] - outline[1:count])
+            feet = outline[::-1][1:count] + k / 4 * (
+                outline[::-1][2 : count + 1] - outline[::-1][1:count]
+            )
+            found.append(np.hstack([tips, feet[: len(tips)]]))
+    return np.concatenate(found) if found else np.empty((0, 4))

@@ -1,0 +1,303 @@
+# SPDX-License-Identifier: MIT
+"""Pictures of what yields and breaks, by Matplotlib: where, along which path, at what cost.
+
+They look like those of :mod:`ufl_beam.plotting.plots`, and need no screen either.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import cycle, islice, pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.errors import SceneError
+from ufl_beam.model.beams import Place
+from ufl_beam.model.plastic_hinges import law_of
+from ufl_beam.plotting.connector_glyphs import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY
+from ufl_beam.plotting.plots import (
+    decimal_prefix,
+    draw_axes,
+    draw_bar,
+    draw_symbols,
+    draw_undeformed,
+    make_room,
+    moved_points,
+    open_hinges,
+    picture,
+    plane_axes,
+    plane_size,
+    plane_stage,
+    scale,
+    time_axes,
+    with_unit,
+)
+from ufl_beam.simulation.solution import Solution
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FULLY_OPEN = 0.99
+"""Part of the fracture energy from which on a hinge is drawn as a joint."""
+
+
+# -- what users call ---------------------------------------------------------------------------
+
+
+def plot_moment_curvature(solution: Solution, place: Place) -> Figure:
+    """Moment M (N m) of the cell at a place against its curvature K (1/m), coloured by time.
+
+    The curvature includes the jump of a hinge over the length of the cell; loops enclose what is
+    dissipated per length.  A ring marks the first kept time, a dot the last one.
+
+    Args:
+        solution: What to show.
+        place: Where; at a vertex it is the cell before it.
+
+    Raises:
+        SceneError: The scene is elastic, or the beam of the place is not in it.
+    """
+    M, K = solution.material_at(place).forces[:, 2], solution.strains_at(place)[:, 2]
+    with picture((8.0, 5.4)) as figure:
+        axes = figure.add_subplot()
+        _draw_path(figure, axes, solution, K, M)
+        axes.set_xlabel("curvature K (1/m)")
+        axes.set_title(f"cell at {place}", loc="left", color=INK)
+    return figure
+
+
+def plot_hinge(solution: Solution, place: Place) -> Figure:
+    """Moment M (N m) of the hinge at a place against its jump (rad), coloured by time.
+
+    The area between the path and the axis is the energy that the hinge dissipated; the title says
+    how much it is (J), and how much of its fracture energy.
+
+    Args:
+        solution: What to show.
+        place: Where; without a plastic hinge at the place it is that of the cell, at a vertex of
+            the cell before it.
+
+    Raises:
+        SceneError: The scene is elastic, there is no hinge, or the beam of the place is not in the
+            scene.
+    """
+    kept, grid = solution.material_at(place), solution.grid
+    hinge = grid.hinge_at(place)
+    in_cell = grid.hinges(place.beam)[grid.cell(place) - int(grid.cells_of(place.beam)[0])]
+    law = in_cell if hinge is None else law_of(hinge)
+    if law is None or np.isinf(law.limit):
+        raise SceneError(f"plot_hinge: neither {place} nor the cell there has a hinge")
+    M, jump, lost = kept.forces[:, 2], kept.jump, float(kept.hinge[-1])
+    with picture((8.0, 5.4)) as figure:
+        axes = figure.add_subplot()
+        for part in _monotone(jump):
+            axes.fill_between(jump[part], M[part], facecolor=(ORANGE, 0.3), linewidth=0.0, zorder=2)
+        _draw_path(figure, axes, solution, jump, M)
+        _prefix(axes, "x", jump, "jump of rotation", "rad")
+        spent = f"{with_unit(lost, 'J')} dissipated"
+        if math.isfinite(law.energy):
+            spent += f", {_percent(lost / law.energy)} of {with_unit(law.energy, 'J')}"
+        axes.set_title(f"hinge at {place}: {spent}", loc="left", color=INK)
+    return figure
+
+
+def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Figure:
+    """The frame at the n-th kept time, where it has yielded and where it has broken.
+
+    Cells that have yielded are coloured by the energy that plastic strains dissipated per length
+    (J/m); in cells of fibres that includes cracks.  Hinges that have opened are circles, the larger
+    the more of their fracture energy is spent; from 99 % they are as hollow as a joint.
+
+    Args:
+        solution: What to show.
+        n: Number of the kept time; negative from the end.
+        magnify: Factor on the displacements.
+
+    Raises:
+        SceneError: The scene is elastic, no such time, or ``magnify`` is not positive.
+    """
+    from matplotlib.collections import LineCollection
+
+    points, grid = moved_points(solution, n, magnify), solution.grid
+    density = _dissipated_per_length(solution, n)
+    factor = f", displacements × {magnify:g}" if magnify != 1 else ""
+    stage = plane_stage(solution, [n], magnify)
+    pose = stage.pose(n)
+    room = _room(np.concatenate([grid.points, points, pose.points()]))
+    width, height = plane_size(room)
+    # Upright frames need less; the bar and the legend have their own widths.
+    across = height * float(np.divide(*np.ptp(room, axis=0)))
+    with picture((min(width, max(6.0, across + 3.0)), height)) as figure:
+        axes = plane_axes(figure, f"damage at {solution.parameter.at(solution.times[n])}{factor}")
+        axes.update_datalim(room)
+        draw_undeformed(axes, stage)
+        draw_axes(axes, solution, points, color=INK, linewidth=2.0, zorder=2)
+        draw_symbols(axes, pose)
+        yielded = density > 0.0
+        if yielded.any():
+            unit, prefix = decimal_prefix(float(density.max()))
+            colors = scale("YlOrRd", 0.2, 1.0, 0.0, float(density.max()) / unit)
+            zones = LineCollection(
+                list(points[grid.cells[yielded]]),
+                colors=colors.to_rgba(density[yielded] / unit),
+                linewidths=11.0, capstyle="butt", zorder=3,
+            )  # fmt: skip
+            axes.add_collection(zones)
+            draw_bar(figure, axes, colors, f"{_what_dissipates(solution)} ({prefix}J/m)")
+        _draw_hinges(figure, axes, solution, n, points)
+        make_room(figure, axes)
+    return figure
+
+
+def plot_dissipation(solution: Solution) -> Figure:
+    """Where the energy went over time (J): what was lost, by sink, as areas upon each other.
+
+    The line above them is what was supplied, with what the scene held at the first kept time, if
+    anything; the gap between is the energy in the scene, a line of its own.  The title says the
+    worst imbalance of the ledger.
+
+    Raises:
+        SceneError: The scene is elastic, and has no connectors.
+    """
+    if not solution.scene.connectors:
+        _require_inelastic(solution)
+    energy, t = solution.energy, solution.progress
+    held = energy.total
+    supplied = held[0] + sum(energy.supplied.values(), np.zeros_like(t))
+    start = held[0] > 1e-12 * energy.throughput
+    with picture((8.0, 5.0)) as figure:
+        axes = time_axes(figure.add_subplot(), solution)
+        # Blue is the energy in the scene.
+        colors = islice(cycle((ORANGE, RED, GREEN, PINK, SKY)), len(energy.lost))
+        axes.stackplot(
+            t, *energy.lost.values(), labels=[f"lost: {name}" for name in energy.lost],
+            colors=[(color, 0.75) for color in colors],
+        )  # fmt: skip
+        label = "at the start, and supplied" if start else "supplied"
+        axes.plot(t, supplied, color=INK, label=label)
+        axes.plot(t, held, color=BLUE, label="in the scene")
+        _prefix(axes, "y", np.concatenate([supplied, held]), "energy", "J")
+        axes.set_xlabel(solution.parameter.progress)
+        axes.set_title(
+            f"worst imbalance {_scientific(energy.worst)} of {with_unit(energy.throughput, 'J')} "
+            "throughput",
+            loc="left", color=INK,
+        )  # fmt: skip
+        figure.legend(loc="outside upper left", ncols=3)
+    return figure
+
+
+# -- words and numbers -------------------------------------------------------------------------
+
+
+def _require_inelastic(solution: Solution) -> None:
+    if not solution.scene.beams:
+        raise SceneError("plot_dissipation: the scene has neither beams nor connectors")
+    solution.material(solution.scene.beams[0])  # or its error
+
+
+def _percent(part: float) -> str:
+    return f"{100 * part:.3g} %"
+
+
+def _scientific(value: float) -> str:
+    """A value with two digits and a power of ten: "3.1 × 10⁻¹²"."""
+    digits, power = f"{value:.1e}".split("e")
+    raised = str(int(power)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return f"{digits} × 10{raised}" if value else "0"
+
+
+def _room(points: Array) -> Array:
+    """Corners of a box around points, in no direction less than a third of the other; (2, 2); m.
+
+    The broad lines of a slender frame would else be cut at the edge.
+    """
+    low, high = points.min(axis=0), points.max(axis=0)
+    more = np.maximum(0.0, (high - low).max() / 3 - (high - low)) / 2
+    return np.array([low - more, high + more])
+
+
+def _dissipated_per_length(solution: Solution, n: int) -> Array:
+    """By plastic strains, and by the cracks of fibres, in all cells; (num_cells,); J/m."""
+    grid = solution.grid
+    ends = grid.points[grid.cells]
+    energy = np.zeros(len(grid.cells))
+    for beam in solution.scene.beams:
+        state = solution.material(beam, n)
+        cracks = state.hinge if beam.section.fibres is not None else 0.0
+        energy[grid.cells_of(beam)] = state.plastic + cracks
+    return np.asarray(energy / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
+
+
+def _what_dissipates(solution: Solution) -> str:
+    placed = [beam.section.fibres for beam in solution.scene.beams]
+    cracks = any(p is not None and p.fibres.softening is not None for p in placed)
+    return "dissipated by plastic strains" + (" and cracks" if cracks else "")
+
+
+def _monotone(x: Array) -> list[slice]:
+    """Pieces of a path in which x only grows or only falls; neighbours share a point."""
+    steps = np.diff(x)
+    moves = np.flatnonzero(steps)
+    turns = moves[1:][np.diff(np.sign(steps[moves])) != 0]
+    ends = [0, *(int(turn) for turn in turns), len(x) - 1]
+    return [slice(a, b + 1) for a, b in pairwise(ends)]
+
+
+# -- drawing -----------------------------------------------------------------------------------
+
+
+def _prefix(axes: Axes, which: str, values: Array, quantity: str, unit: str) -> None:
+    """Label an axis in a unit that suits the values; the data stay in SI units."""
+    factor, prefix = decimal_prefix(float(np.max(np.abs(values))))
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    axis.set_major_formatter(lambda x, _: f"{x / factor:.6g}".replace("-", "−"))
+    axis.set_label_text(f"{quantity} ({prefix}{unit})")
+
+
+def _draw_path(figure: Figure, axes: Axes, solution: Solution, x: Array, M: Array) -> None:
+    """M against x, from light to dark in time; a ring at the beginning, a dot at the end."""
+    times, named = solution.progress, solution.parameter
+    from matplotlib.collections import LineCollection
+
+    colors = scale("viridis_r", 0.12, 1.0, float(times[0]), float(times[-1]))
+    path = np.column_stack([x, M])
+    middle = (times[1:] + times[:-1]) / 2
+    pieces = LineCollection(
+        list(np.stack([path[:-1], path[1:]], axis=1)), colors=colors.to_rgba(middle),
+        linewidths=2.2, capstyle="round", zorder=3,
+    )  # fmt: skip
+    for at_zero in (axes.axhline, axes.axvline):
+        at_zero(0.0, color=GREY, linewidth=1.0, zorder=1)
+    axes.add_collection(pieces)
+    for i, inside in ((0, "white"), (-1, INK)):
+        label = named.at(solution.times[i])
+        axes.plot(
+            *path[i], "o", ms=8.0, mfc=inside, mec=INK, mew=1.6, zorder=5, ls="none", label=label
+        )
+    axes.autoscale_view()
+    axes.tick_params(labelsize=12, color="#888888")
+    _prefix(axes, "y", M, "bending moment M", "N m")
+    draw_bar(figure, axes, colors, named.progress)
+    figure.legend(loc="outside upper left", ncols=2)
+
+
+def _draw_hinges(figure: Figure, axes: Axes, solution: Solution, n: int, points: Array) -> None:
+    """Circles at the hinges that have opened, and what their sizes mean."""
+    hinges = open_hinges(solution, n, points)
+    if not hinges:
+        return
+
+    def circle(part: float) -> dict[str, Any]:
+        inside = "white" if part >= FULLY_OPEN else BLUE
+        size = 4.0 + 6.0 * math.sqrt(part)
+        return {"ms": size, "mfc": inside, "mec": "white" if inside == BLUE else BLUE, "ls": "none"}
+
+    for hinge in hinges:
+        axes.plot(*hinge.at, "o", mew=1.8, zorder=6, **circle(hinge.part))
+    for example, text in ((0.1, "hinge, 10 % broken"), (0.5, "50 %"), (1.0, "fully open")):
+        axes.plot([], [], "o", mew=1.8, label=text, **circle(example))
+    figure.legend(loc="outside upper left", ncols=3)

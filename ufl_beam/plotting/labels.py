@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: MIT
+"""Placement of labels in pictures, off lines and off each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+
+GAPS = (4.0, 12.0, 24.0, 40.0, 60.0)
+"""Distances of a label from its spot that are tried; points."""
+
+CLEAR = 2.0
+"""Room around a label; points."""
+
+LINE, LABEL, OUTSIDE, AWAY, LATER, CROSSING = 8.0, 40.0, 100.0, 0.6, 0.4, 25.0
+"""Costs of a candidate: of a point of length of lines under the label, of a square point of another
+label and of a point beyond the frame, of a point of distance, of a place in the list of spots, and
+of a label that the leader crosses; a line that it crosses costs a tenth of that."""
+
+LEADER = 10.0
+"""Distance of a label from its spot from which on a line leads to it; points."""
+
+
+class Spot(NamedTuple):
+    """Place that a label belongs to, and the direction in which the label lies from it.
+
+    Attributes:
+        at: Shape (2,).
+        way: Unit vector; (2,).
+        gap: Least distance of the label; points.
+    """
+
+    at: Array
+    way: Array
+    gap: float = 0.0
+
+
+class Label(NamedTuple):
+    """Text and the places where it may stand, the best first.
+
+    Attributes:
+        text: The text.
+        color: Its colour.
+        rank: Labels of lower ranks are placed first.
+        spots: Where it may stand.
+    """
+
+    text: str
+    color: str
+    rank: int
+    spots: tuple[Spot, ...]
+
+
+class Placed(NamedTuple):
+    """Label with its place.
+
+    Attributes:
+        label: The label.
+        center: Of its box; (2,); points.
+        half: Half the width and height of its box; (2,); points.
+        spot: The spot it belongs to; (2,); points.
+        overlap: Part of its box that other labels cover.
+    """
+
+    label: Label
+    center: Array
+    half: Array
+    spot: Array
+    overlap: float
+
+
+def place(
+    labels: Sequence[Label], halves: Sequence[Array], lines: Array, frame: Array | None = None
+) -> list[Placed]:
+    """Place labels where they cover least; each again when all others have a place.
+
+    Args:
+        labels: With spots in points.
+        halves: Half the width and height of each; points.
+        lines: Segments that should stay visible; (n, 4); points.
+        frame: Lower left and upper right corner that labels should not leave; (4,); points.
+    """
+    order = sorted(range(len(labels)), key=lambda k: labels[k].rank)
+    placed: dict[int, Placed] = {}
+    for _ in range(2):
+        for k in order:
+            others = [one for j, one in placed.items() if j != k]
+            placed[k] = _best(labels[k], np.asarray(halves[k], dtype=float), lines, others, frame)
+    return [placed[k] for k in order]
+
+
+def _best(
+    label: Label, half: Array, lines: Array, others: list[Placed], frame: Array | None
+) -> Placed:
+    """The place of a label that costs least."""
+    boxes: Array = np.reshape([(*x.center - x.half, *x.center + x.half) for x in others], (-1, 4))
+    sides = np.concatenate([boxes, boxes[:, [0, 3, 2, 1]]])  # diagonals, which leaders would cross
+    leaders = [leader.ravel() for x in others if len(leader := leader_of(x))]
+    lines = np.vstack([lines, *leaders])
+    at = np.array([spot.at for spot in label.spots])
+    way = np.array([spot.way for spot in label.spots])
+    least = np.array([spot.gap for spot in label.spots])
+    # So far from its spot a box is beyond the line through it, across the way.
+    reach = np.abs(way) @ half
+    spots = at + least[:, None] * way
+    found, lowest = None, np.inf
+    for gap in GAPS:
+        if AWAY * gap >= lowest:
+            break
+        centers = spots + way * (gap + reach)[:, None]
+        low, high = centers - half - CLEAR, centers + half + CLEAR
+        ends = np.hstack([spots, np.clip(spots, centers - half, centers + half)])
+        leads = np.linalg.norm(ends[:, 2:] - ends[:, :2], axis=1) >= LEADER
+        near = _near(lines, low.min(axis=0), high.max(axis=0))
+        covered = areas_covered(low, high, boxes)
+        cost = AWAY * gap + LATER * np.arange(len(at))
+        cost += LINE * lengths_inside(low, high, near) + LABEL * covered
+        cost += CROSSING * leads * (crossings(ends, sides) + 0.1 * crossings(ends, near))
+        if frame is not None:
+            beyond = np.maximum(frame[:2] - low, 0.0) + np.maximum(high - frame[2:], 0.0)
+            cost += OUTSIDE * beyond.sum(axis=1)
+        best = int(np.argmin(cost))
+        if found is None or cost[best] < lowest:
+            overlap = float(covered[best] / np.prod(high[best] - low[best]))
+            found = Placed(label, centers[best], half, spots[best], overlap)
+            lowest = float(cost[best])
+    assert found is not None
+    return found
+
+
+def leader_of(placed: Placed) -> Array:
+    """Line from the spot of a label to its box, if it stands away from it; (2, 2) or (0, 2)."""
+    edge = np.clip(placed.spot, placed.center - placed.half, placed.center + placed.half)
+    if np.linalg.norm(edge - placed.spot) < LEADER:
+        return np.empty((0, 2))
+    return np.array([placed.spot, edge])
+
+
+def _near(lines: Array, low: Array, high: Array) -> Array:
+    """Segments whose own boxes meet a box; (n, 4)."""
+    first, last = lines[:, :2], lines[:, 2:]
+    meets = (np.minimum(first, last) <= high) & (np.maximum(first, last) >= low)
+    return np.asarray(lines[meets.all(axis=1)])
+
+
+def crossings(first: Array, second: Array) -> Array:
+    """Number of segments that each of some segments crosses; (num_first,).
+
+    Args:
+        first: Segments; (num_first, 4).
+        second: The other ones; (n, 4).
+    """
+    a, b, c, d = first[:, None, :2], first[:, None, 2:], second[None, :, :2], second[None, :, 2:]
+
+    def side(p: Array, q: Array, r: Array) -> Array:
+        """Sign of the area of the triangle p, q, r."""
+        (x, y), (u, v) = np.moveaxis(q - p, -1, 0), np.moveaxis(r - p, -1, 0)
+        return np.asarray(np.sign(x * v - y * u))
+
+    apart = (side(a, b, c) * side(a, b, d) < 0) & (side(c, d, a) * side(c, d, b) < 0)
+    return np.asarray(apart.sum(axis=1))
+
+
+def lengths_inside(low: Array, high: Array, lines: Array) -> Array:
+    """Length of segments inside each of some boxes; (num_boxes,).
+
+    Args:
+        low: Lower left corners; (num_boxes, 2).
+        high: Upper right corners; (num_boxes, 2).
+        lines: Segments; (n, 4).
+    """
+    first, way = lines[None, :, :2], (lines[:, 2:] - lines[:, :2])[None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        enter, leave = (low[:, None] - first) / way, (high[:, None] - first) / way
+    # Along an axis in which a segment does not move, it is inside for ever or never.
+    level = way == 0.0
+    inside = (low[:, None] <= first) & (first <= high[:, None])
+    begin = np.where(level, np.where(inside, -np.inf, np.inf), np.minimum(enter, leave))
+    end = np.where(level, np.where(inside, np.inf, -np.inf), np.maximum(enter, leave))
+    part = np.minimum(end.min(axis=2), 1.0) - np.maximum(begin.max(axis=2), 0.0)
+    return np.asarray(np.maximum(part, 0.0) @ np.linalg.norm(way[0], axis=1))
+
+
+def areas_covered(low: Array, high: Array, boxes: Array) -> Array:
+    """Area of each of some boxes that other boxes cover; (num_boxes,).
+
+    Args:
+        low: Lower left corners; (num_boxes, 2).
+        high: Upper right corners; (num_boxes, 2).
+        boxes: The other ones: both corners; (n, 4).
+    """
+    sides = np.minimum(high[:, None], boxes[None, :, 2:]) - np.maximum(
+        low[:, None], boxes[None, :, :2]
+    )
+    return np.asarray(np.prod(np.maximum(sides, 0.0), axis=2).sum(axis=1))

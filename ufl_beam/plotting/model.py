@@ -1,0 +1,309 @@
+# SPDX-License-Identifier: MIT
+"""Picture of a model before any run."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.model.scene import Scene
+from ufl_beam.output.wireframe import spots_of
+from ufl_beam.plotting.captions import (
+    counted,
+    damping_in_words,
+)
+from ufl_beam.plotting.connector_glyphs import INK, RED
+from ufl_beam.plotting.labels import Placed, leader_of, place
+from ufl_beam.plotting.load_symbols import (
+    CAPTIONS,
+    NAMES,
+    badge,
+)
+from ufl_beam.plotting.model_symbols import MOST_LABELS, TEXT, Drawing, Subject, draw
+from ufl_beam.plotting.plots import picture, with_unit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+POINTS = 72.0
+"""Points of an inch."""
+
+WIDTH, HEIGHT = (5.5, 9.0), (3.0, 6.8)
+"""Least and largest size of the figure; inch."""
+
+LEFT, RIGHT, BELOW, ABOVE, NOTE = 66.0, 14.0, 46.0, 34.0, 16.0
+"""Room for what is around the axes, and for a line of notes; points."""
+
+LABEL_SIZE, TITLE_SIZE = 11.0, 14.0
+"""Sizes of labels and of the title; points."""
+
+BADGE = 60.0
+"""Room for the symbol of a load on the whole scene, and between two of them; points."""
+
+
+class Plan(NamedTuple):
+    """Size of a picture.
+
+    Attributes:
+        scale: Length of a point in the scene; m.
+        frame: Lower left and upper right corner of the axes, in the scene; (4,); points.
+        size: Of the figure; inch.
+    """
+
+    scale: float
+    frame: Array
+    size: tuple[float, float]
+
+
+def plot_model(scene: Scene) -> Figure:
+    """Draw the undeformed model with all that is in it; see :func:`ufl_beam.plot`."""
+    subject = Subject.of(scene)
+    skeleton = _skeleton(subject)
+    notes = notes_of(scene)
+    with picture((WIDTH[1], HEIGHT[1])) as figure:
+        figure.set_layout_engine("none")
+        plan = _first_plan(skeleton, scene.size)
+        measure = _Measure(figure)
+        least = _width_of_words(subject, notes, measure)
+        # What stands around the beams has a size in points: with the second plan it fits.
+        for again in (False, True):
+            drawing = draw(subject, plan.scale)
+            placed = _arrange(drawing, plan.scale, measure, plan.frame if again else None)
+            box = _box(drawing, placed, plan.scale)
+            plan = _plan(skeleton, plan.scale, box, len(notes), least)
+        drawing = draw(subject, plan.scale)
+        placed = _arrange(drawing, plan.scale, measure, plan.frame)
+        axes = _axes(figure, plan, _title(subject), notes)
+        _paint(axes, drawing)
+        _write(axes, placed, plan.scale)
+        _badges(axes, scene, plan, measure)
+    return figure
+
+
+# -- words -------------------------------------------------------------------------------------
+
+
+def _title(subject: Subject) -> str:
+    scene, cells = subject.scene, counted(subject.cells, "cell")
+    parts = [
+        *([counted(len(scene.beams), "beam"), cells] if scene.beams else []),
+        *([counted(len(scene.bodies), "body", "bodies")] if scene.bodies else []),
+    ]
+    return "model: " + ", ".join(parts)
+
+
+def notes_of(scene: Scene) -> list[str]:
+    """Return words on loads of the whole scene, and a legend of the symbols."""
+    notes = [damping_in_words(damping) for damping in scene.damping]
+    laws = {b.section.hinge for b in scene.beams if b.section.hinge and b.section.hinge.opens}
+    if laws:
+        limits = sorted({with_unit(law.limit, "N m") for law in laws})
+        notes.append(f"dots: hinges may form, from {', '.join(limits[:4])}")
+    return notes
+
+
+# -- where it is drawn -------------------------------------------------------------------------
+
+
+def _skeleton(subject: Subject) -> Array:
+    """Points of the scene without symbols; (n, 2); m."""
+    scene = subject.scene
+    points = [*subject.axes.values(), *(np.array([body.center]) for body in scene.bodies)]
+    points += [np.array([spot.point]) for spots in spots_of(scene).values() for spot in spots]
+    return np.concatenate(points)
+
+
+class _Measure:
+    """Sizes of texts."""
+
+    def __init__(self, figure: Figure) -> None:
+        self._axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        self._points = POINTS / figure.dpi
+        self._known: dict[str, Array] = {}
+
+    def __call__(self, text: str) -> Array:
+        """Half of width and height; (2,); points."""
+        if text not in self._known:
+            probe = self._axes.text(0.0, 0.0, text, fontsize=LABEL_SIZE)
+            box = probe.get_window_extent()
+            probe.remove()
+            self._known[text] = 0.5 * self._points * np.array([box.width, box.height])
+        return self._known[text]
+
+    def finish(self) -> None:
+        """Remove what texts were measured in."""
+        self._axes.remove()
+
+
+def _arrange(
+    drawing: Drawing, scale: float, measure: _Measure, frame: Array | None
+) -> list[Placed]:
+    """Labels at their places; those that others would cover are left out."""
+    labels = drawing.labels
+    for rank in (NAMES, CAPTIONS):
+        if len(labels) > MOST_LABELS:
+            labels = [label for label in labels if label.rank < rank]
+    in_points = [
+        label._replace(spots=tuple(s._replace(at=np.asarray(s.at / scale)) for s in label.spots))
+        for label in labels[:MOST_LABELS]
+    ]
+    lines = _segments([np.asarray(x.points / scale) for x in drawing.everything()])
+    placed = place(in_points, [measure(label.text) for label in in_points], lines, frame)
+    return [one for one in placed if one.overlap < 0.1]
+
+
+def _segments(chains: list[Array]) -> Array:
+    """Segments of some lines; (n, 4)."""
+    points = np.concatenate(chains)
+    last = np.cumsum([len(chain) for chain in chains]) - 1
+    return np.delete(np.hstack([points[:-1], points[1:]]), last[:-1], axis=0)
+
+
+def _box(drawing: Drawing, placed: list[Placed], scale: float) -> Array:
+    """Lower left and upper right corner of everything; (4,); points."""
+    points = [stroke.points for stroke in drawing.everything()]
+    points += [scale * (one.center + sign * one.half[None]) for one in placed for sign in (-1, 1)]
+    everything = np.concatenate(points) / scale
+    return np.array([*everything.min(axis=0), *everything.max(axis=0)])
+
+
+def _width_of_words(subject: Subject, notes: list[str], measure: _Measure) -> float:
+    """Width of the words above the axes; points."""
+    badges = [found[0] for load in subject.scene.loads if (found := badge(load)) is not None]
+    first = TITLE_SIZE / LABEL_SIZE * 2 * measure(_title(subject))[0]
+    first += sum(2 * measure(text)[0] + BADGE for text in badges)
+    return float(max([first, *(2 * measure(note)[0] for note in notes)]))
+
+
+def _first_plan(skeleton: Array, size: float) -> Plan:
+    width, height = np.ptp(skeleton, axis=0)
+    return Plan(max(width / 400.0, height / 250.0, size / 500.0), np.empty(4), (0.0, 0.0))
+
+
+def _plan(skeleton: Array, scale: float, box: Array, notes: int, words: float) -> Plan:
+    """The largest scale at which everything fits, and the frame around it.
+
+    Args:
+        skeleton: Points of the scene; (n, 2); m.
+        scale: At which the box was found; m.
+        box: Corners of everything; (4,); points.
+        notes: Number of lines of notes.
+        words: Width of the words above the axes; points.
+    """
+    low, high = skeleton.min(axis=0), skeleton.max(axis=0)
+    # What stands out beyond the skeleton has a size in points.
+    below, beyond = low / scale - box[:2] + 8.0, box[2:] - high / scale + 8.0
+    around_axes = np.array([LEFT + RIGHT, BELOW + ABOVE + NOTE * notes])
+    least, most = (
+        np.array(side) * POINTS - around_axes for side in zip(WIDTH, HEIGHT, strict=True)
+    )
+    least[0] = min(max(least[0], words), most[0])
+    room = np.maximum(most - below - beyond, 0.3 * most)
+    largest = float(np.max((high - low) / room))
+    scale = largest if largest > 0.0 else scale
+    frame = np.array([*(low / scale - below), *(high / scale + beyond)])
+    more = np.maximum(least - (frame[2:] - frame[:2]), 0.0) / 2
+    frame += np.concatenate([-more, more])
+    width, height = (frame[2:] - frame[:2] + around_axes) / POINTS
+    return Plan(scale, frame, (float(width), float(height)))
+
+
+# -- Matplotlib --------------------------------------------------------------------------------
+
+
+def _axes(figure: Figure, plan: Plan, title: str, notes: list[str]) -> Axes:
+    """The axes, and the words above them."""
+    from matplotlib.ticker import MaxNLocator
+
+    x0, y0, x1, y1 = plan.frame
+    left, (width, height) = LEFT, (POINTS * side for side in plan.size)
+    axes = figure.add_axes((0.1, 0.1, 0.8, 0.8))
+    axes.set(xlim=(x0 * plan.scale, x1 * plan.scale), ylim=(y0 * plan.scale, y1 * plan.scale))
+    axes.set(xlabel="x (m)", ylabel="y (m)")
+    for line, length, each in ((axes.xaxis, x1 - x0, 60.0), (axes.yaxis, y1 - y0, 32.0)):
+        number = min(max(int(length / each), 2), 9)
+        line.set_major_locator(MaxNLocator(number, steps=[1, 2, 2.5, 5, 10]))
+    axes.tick_params(labelsize=12, color="#888888")
+    for _ in range(2):  # the second time with as much room as the numbers at the axis take
+        figure.set_size_inches(width / POINTS, height / POINTS)
+        axes.set_position((left / width, BELOW / height, (x1 - x0) / width, (y1 - y0) / height))
+        outer: Any = axes.get_tightbbox()
+        beyond = axes.get_window_extent().x0 - outer.x0
+        more = beyond * POINTS / figure.dpi + 8.0 - left
+        left, width = left + more, width + more
+    axes.set_aspect("equal")
+    axes.set_title(title, loc="left", color=INK, fontsize=TITLE_SIZE, pad=8.0 + NOTE * len(notes))
+    for k, note in enumerate(reversed(notes)):
+        axes.annotate(
+            note, (0.0, 1.0), (0.0, 6.0 + NOTE * k), xycoords="axes fraction",
+            textcoords="offset points", fontsize=LABEL_SIZE, color=TEXT, gid="notes",
+        )  # fmt: skip
+    return axes
+
+
+def _paint(axes: Axes, drawing: Drawing) -> None:
+    """One collection for all strokes of a group that look alike."""
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    for group, strokes in drawing.strokes.items():
+        alike: defaultdict[tuple[str, float, str | None, float], list[Array]] = defaultdict(list)
+        for points, color, weight, fill, layer in strokes:
+            alike[color, weight, fill, layer].append(points)
+        for (color, weight, fill, layer), chains in alike.items():
+            look: dict[str, Any] = {
+                "edgecolors": color, "linewidths": weight, "zorder": layer, "gid": group,
+                "joinstyle": "round", "capstyle": "round",
+            }  # fmt: skip
+            shape = (
+                LineCollection(chains, **look)
+                if fill is None
+                else PolyCollection(chains, facecolors=fill, **look)
+            )
+            axes.add_collection(shape, autolim=False)
+
+
+def _write(axes: Axes, placed: list[Placed], scale: float) -> None:
+    """The labels, and lines from those that stand away to what they name."""
+    for one in placed:
+        leader = scale * leader_of(one)
+        if len(leader):
+            axes.plot(*leader.T, color="#999999", linewidth=0.8, zorder=6, gid="leaders")
+        x, y = scale * one.center
+        axes.text(
+            x, y, one.label.text, color=one.label.color, fontsize=LABEL_SIZE, ha="center",
+            va="center", zorder=7, gid="labels",
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.8},
+        )  # fmt: skip
+
+
+def _badges(axes: Axes, scene: Scene, plan: Plan, measure: _Measure) -> None:
+    """Write the loads of the whole scene right above the axes."""
+    x, y = plan.frame[2:] - plan.frame[:2] + (0.0, 17.0)
+    for load in scene.loads:
+        found = badge(load)
+        if found is None:
+            continue
+        text, sense = found
+        if not isinstance(sense, tuple):
+            text = ("\u21ba " if sense >= 0 else "\u21bb ") + text
+        axes.annotate(
+            text, (x, y), xycoords="axes points", ha="right", va="center", color=RED,
+            fontsize=LABEL_SIZE, gid="badges", annotation_clip=False,
+        )  # fmt: skip
+        x -= 2 * float(measure(text)[0]) + 0.35 * BADGE
+        if isinstance(sense, tuple) and math.hypot(*sense) > 0.0:
+            way = 12.0 * np.array(sense) / math.hypot(*sense)
+            axes.annotate(
+                "", (x + way[0], y + way[1]), (x - way[0], y - way[1]), xycoords="axes points",
+                annotation_clip=False, gid="badges",
+                arrowprops={
+                    "color": RED, "arrowstyle": "-|>", "lw": 2.0, "shrinkA": 0, "shrinkB": 0,
+                },
+            )  # fmt: skip
+        x -= 0.65 * BADGE
+    measure.finish()

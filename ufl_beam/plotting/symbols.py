@@ -1,0 +1,397 @@
+# SPDX-License-Identifier: MIT
+"""Symbols of bodies, joints, connectors and supports as lines and areas.
+
+Pictures of all kinds draw these: :mod:`ufl_beam.plotting.plots` in the plane,
+:mod:`ufl_beam.plotting.render3d` solid.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.model.beams import Place
+from ufl_beam.model.bodies import GROUND, Anchor, Spot, node
+from ufl_beam.model.connector_laws import Guide
+from ufl_beam.model.connectors import Connector
+from ufl_beam.model.joints import Joint
+from ufl_beam.model.supports import Support
+from ufl_beam.output.joint_histories import turned
+from ufl_beam.plotting.connector_glyphs import (
+    AROUND,
+    GREY,
+    INK,
+    ORANGE,
+    STRAIGHT,
+    WHITE,
+    Piece,
+    along,
+    around,
+)
+from ufl_beam.plotting.scene_layout import Pose
+
+FILLED, EDGE = "#D6E2ED", "#5F7A94"
+"""Colours of bodies."""
+
+BACK, MIDDLE, UPON, FRONT = 2.5, 4.2, 4.3, 5.5
+"""Layers: beneath the beams, over them, upon the areas there, and over the pins of joints."""
+
+# Outlines of the symbols of supports; half a symbol is 1, the place is the origin, the beam comes
+# from above.
+Outline = list[tuple[float, float]]
+_TRIANGLE = [(0.0, 0.0), (-0.6, -0.8), (0.6, -0.8), (0.0, 0.0)]
+_CLAMP = [(-1.0, 0.0), (1.0, 0.0), (1.0, -0.5), (-1.0, -0.5), (-1.0, 0.0)]
+_PLATE = [(-1.0, -0.8), (1.0, -0.8), (1.0, -0.9), (-1.0, -0.9), (-1.0, -0.8)]
+_TRACK = [(-1.0, -1.0), (1.0, -1.0), (1.0, -1.1), (-1.0, -1.1), (-1.0, -1.0)]
+_DIAMOND = [(-0.6, 0.0), (0.0, 0.6), (0.6, 0.0), (0.0, -0.6), (-0.6, 0.0)]
+
+
+class Stroke(NamedTuple):
+    """A line, or an area if it is filled.
+
+    Attributes:
+        points: Shape (n, 2); m.
+        color: Of the line.
+        weight: Width of the line; points.
+        fill: Colour of the area.
+        layer: ``BACK``, ``MIDDLE``, ``UPON`` or ``FRONT``.
+    """
+
+    points: Array
+    color: str = INK
+    weight: float = 1.6
+    fill: str | None = None
+    layer: float = MIDDLE
+
+
+class Pin(NamedTuple):
+    """Symbol of a joint of places at one point.
+
+    Attributes:
+        at: Shape (2,); m.
+        turns: Whether they turn freely.
+        places: What is joined.
+    """
+
+    at: Array
+    turns: bool
+    places: tuple[Anchor, ...]
+
+
+class Footing(NamedTuple):
+    """The symbol of a support, or of a point of the ground.
+
+    Attributes:
+        at: Shape (2,); m.
+        angle: By which it is turned; rad.
+        outlines: Half a symbol is 1, the place is the origin.
+        color: Orange ones move.
+        place: What it holds.
+    """
+
+    at: Array
+    angle: float
+    outlines: list[Outline]
+    color: str
+    place: Anchor
+
+
+# -- bodies ------------------------------------------------------------------------------------
+
+
+def bodies(pose: Pose) -> list[Stroke]:
+    """Their outlines."""
+    outlines = pose.stage.outlines.items()
+    return [
+        Stroke(pose.of_body(body, outline), EDGE, 1.6, FILLED, BACK) for body, outline in outlines
+    ]
+
+
+def centres(pose: Pose) -> Iterator[Stroke]:
+    """Marks of the centres of mass: circles, two quarters dark."""
+    angle = np.linspace(0.0, math.pi / 2, 13)
+    arc = 0.45 * pose.stage.unit * np.column_stack([np.cos(angle), np.sin(angle)])
+    quarter = np.vstack([(0.0, 0.0), arc, (0.0, 0.0)])
+    for body in pose.stage.scene.bodies:
+        at, ψ = pose.at(body.middle), pose.turn(body.middle)
+        for k, fill in enumerate((EDGE, WHITE, EDGE, WHITE)):
+            angles = np.full(len(quarter), ψ + k * math.pi / 2)
+            yield Stroke(at + turned(quarter, angles), EDGE, 1.0, fill)
+
+
+# -- joints ------------------------------------------------------------------------------------
+
+
+def rods(pose: Pose) -> Iterator[Stroke]:
+    """Rigid links, thick, and links, thin."""
+    for joint in pose.stage.scene.joints:
+        if joint.kind in ("RigidLink", "Link"):
+            weight = 6.0 if joint.kind == "RigidLink" else 2.6
+            ends = np.array([pose.at(place) for place in joint.places])
+            yield Stroke(ends, "#4A4A4A", weight)
+
+
+def pins(pose: Pose) -> Iterator[Pin]:
+    """Circles where joints turn, squares where they do not."""
+    for joint in pose.stage.scene.joints:
+        yield from _PINS[joint.kind](pose, joint)
+
+
+def rails(pose: Pose) -> Iterator[Stroke]:
+    """Rails, guide curves, and the blocks on them."""
+    for joint in pose.stage.scene.joints:
+        if joint.kind in _RAILS:
+            yield from _RAILS[joint.kind](pose, joint)
+
+
+# -- connectors --------------------------------------------------------------------------------
+
+
+def connectors(pose: Pose) -> Iterator[Stroke]:
+    """Springs, dampers, motors and their like."""
+    for connector in pose.stage.scene.connectors:
+        draw = _around if connector.turns else _straight
+        yield from draw(pose, connector)
+
+
+def _straight(pose: Pose, connector: Connector) -> Iterator[Stroke]:
+    a, b = pose.at(connector.a), pose.at(connector.b)
+    unit, lane = pose.stage.unit, pose.stage.lanes[connector]
+    length = float(np.linalg.norm(b - a))
+    if length > 0.1 * unit:
+        x, y = (b - a) / length
+    else:
+        x, y = pose.turned(connector.axis, connector.a)
+    across = np.array([-y, x])
+    ends = a, b
+    if lane:
+        aside = lane * unit * across
+        ends = a + 0.06 * (b - a), b - 0.06 * (b - a)
+        yield Stroke(np.array([a, ends[0], ends[0] + aside]))
+        yield Stroke(np.array([b, ends[1], ends[1] + aside]))
+        ends = ends[0] + aside, ends[1] + aside
+    # It takes the same part of the way at all times, so it stretches with the motion.
+    body = min(0.66, 6.0 * unit / max(math.hypot(*connector.apart), unit))
+    for piece in STRAIGHT[type(connector.law)]:
+        yield _inked(piece, along(piece, *ends, (across, unit), body))
+
+
+def _around(pose: Pose, connector: Connector) -> Iterator[Stroke]:
+    glyph, pin = AROUND[type(connector.law)], pose.at(connector.b)
+    radius = (1.6 + pose.stage.lanes[connector]) * pose.stage.unit
+    a, b = pose.turn(connector.a), pose.turn(connector.b)
+    first, sweep = (b, 0.0) if glyph.spins else (a, b - a)
+    first -= 0.5
+    # Where it turns for many times, the symbol stops winding.
+    sweep = glyph.sweep + min(max(sweep, -0.75 * glyph.sweep), 2.0)
+    for piece in glyph.pieces:
+        points = around(piece, pin, radius, (first, first + sweep))
+        yield _inked(piece, points)._replace(layer=FRONT)
+    start = pose.at(connector.a)
+    if np.linalg.norm(pin - start) > radius and node(connector.a) is not GROUND:
+        yield Stroke(np.array([start, pin]), GREY, 1.0)
+
+
+# -- supports ----------------------------------------------------------------------------------
+
+
+def footings(pose: Pose) -> Iterator[Footing]:
+    """Symbols of supports, and of the points of the ground that hold something."""
+    for support in pose.stage.scene.supports:
+        angle = support_direction(support, pose.turn(support.place))
+        color = ORANGE if support.moving else "#808080"
+        symbol = support_symbol(support)
+        yield Footing(pose.at(support.place), angle, symbol, color, support.place)
+    for spot, (inward, turns) in _grounds(pose).items():
+        symbol = [_TRIANGLE, _PLATE] if turns else [_CLAMP]
+        angle = _upright(inward) if turns else inward - math.pi / 2
+        yield Footing(np.array(spot.point), angle, symbol, "#808080", spot)
+
+
+def _grounds(pose: Pose) -> dict[Spot, tuple[float, bool]]:
+    """Where what a point of the ground holds is, and whether it all turns freely."""
+    found: dict[Spot, tuple[float, bool]] = {}
+    for places, turns in _held(pose):
+        for spot in places:
+            if isinstance(spot, Spot) and spot.body is GROUND:
+                inward = _towards(spot, next(p for p in places if p != spot))
+                known, before = found.get(spot, (inward, True))
+                found[spot] = known, before and turns
+    return found
+
+
+def _held(pose: Pose) -> Iterator[tuple[Sequence[Anchor], bool]]:
+    scene = pose.stage.scene
+    for joint in scene.joints:
+        if joint.kind not in ("Prismatic", "Guided"):
+            yield joint.places, 2 not in joint.shared and not _holds_turning(joint)
+    for connector in scene.connectors:
+        if not connector.turns:
+            yield (connector.a, connector.b), False
+
+
+# -- joints, by kind ---------------------------------------------------------------------------
+
+
+def _holds_turning(joint: Joint) -> bool:
+    return any(holder.turns for holder in joint.holders)
+
+
+def _one_pin(pose: Pose, joint: Joint) -> Iterator[Pin]:
+    turns = 2 not in joint.shared and not _holds_turning(joint)
+    yield Pin(pose.at(joint.places[0]), turns, joint.places)
+
+
+def _pin_at_ends(pose: Pose, joint: Joint) -> Iterator[Pin]:
+    for place in joint.places:
+        yield Pin(pose.at(place), True, (place,))
+
+
+def _pin_that_slides(pose: Pose, joint: Joint) -> Iterator[Pin]:
+    if 2 not in joint.shared:
+        yield Pin(pose.at(joint.places[1]), True, joint.places[1:])
+
+
+def _pin_of_release(pose: Pose, joint: Joint) -> Iterator[Pin]:
+    """None if it only slides, which rails show."""
+    if 2 not in joint.shared or 0 in joint.shared:
+        yield from _one_pin(pose, joint)
+
+
+def _no_pin(pose: Pose, joint: Joint) -> Iterator[Pin]:
+    return iter(())
+
+
+_PINS: dict[str, Callable[[Pose, Joint], Iterator[Pin]]] = {
+    "Rigid": _one_pin,
+    "Revolute": _one_pin,
+    "Release": _pin_of_release,
+    "Link": _pin_at_ends,
+    "RigidLink": _no_pin,
+    "Prismatic": _pin_that_slides,
+    "Guided": _pin_that_slides,
+}
+
+
+def _rail(pose: Pose, joint: Joint) -> Iterator[Stroke]:
+    """The rail as long as the way, and the block on it."""
+    (across,), (base, slider) = joint.holders, joint.places
+    unit = pose.stage.unit
+    x, y = pose.turned(across.axis, base)
+    ahead, left = np.array([y, -x]), np.array([x, y])  # the axis held is across the rail
+    start, block = pose.at(base), pose.at(slider)
+    s = float((block - start) @ ahead)
+    low, high = pose.stage.travels[across]
+    low, high = min(low, s), max(high, s)  # magnified rotations lead elsewhere
+    first = block + (low - 1.8 * unit - s) * ahead
+    last = block + (high + 1.8 * unit - s) * ahead
+    yield Stroke(np.array([first, last]), "#6E6E6E", 2.2)
+    if node(base) is GROUND:
+        yield from _hatches(np.array([first, last]), unit)
+    else:
+        foot = min(max(0.0, low - 1.8 * unit), high + 1.8 * unit)
+        yield Stroke(np.array([start, block + (foot - s) * ahead]), "#6E6E6E", 2.2)
+    corners = [(-0.95, 0.55), (0.95, 0.55), (0.95, -0.55), (-0.95, -0.55), (-0.95, 0.55)]
+    outline = block + unit * (np.array(corners) @ np.array([ahead, left]))
+    yield Stroke(outline, INK, 1.8, WHITE)
+
+
+def _guide(pose: Pose, joint: Joint) -> Iterator[Stroke]:
+    """The guide curve, as far as it was used."""
+    (holder,) = joint.holders
+    assert isinstance(holder.law, Guide)
+    low, high = pose.stage.travels[holder]
+    curve = np.array([holder.law.curve(s) for s in np.linspace(low, high, 200)], dtype=float)
+    yield Stroke(curve, "#6E6E6E", 2.2, layer=BACK)
+    yield from (h._replace(layer=BACK) for h in _hatches(curve, pose.stage.unit))
+
+
+def _sleeve(pose: Pose, joint: Joint) -> Iterator[Stroke]:
+    """Two bars along what a release leaves free; a box if it leaves both free."""
+    if 0 in joint.shared:
+        return
+    at, unit, place = pose.at(joint.places[0]), pose.stage.unit, joint.places[0]
+    x, y = pose.turned(joint.holders[0].axis if joint.holders else (0.0, 1.0), place)
+    free, held = np.array([y, -x]), np.array([x, y])
+    for side in (1, -1):
+        bar = at + unit * np.array([0.9 * free, -0.9 * free]) + side * 0.6 * unit * held
+        yield Stroke(bar, INK, 2.4, layer=FRONT)
+        if not joint.holders:
+            across = at + unit * np.array([0.6 * held, -0.6 * held]) + side * 0.9 * unit * free
+            yield Stroke(across, INK, 2.4, layer=FRONT)
+
+
+_RAILS: dict[str, Callable[[Pose, Joint], Iterator[Stroke]]] = {
+    "Prismatic": _rail,
+    "Guided": _guide,
+    "Release": _sleeve,
+}
+
+
+# -- directions --------------------------------------------------------------------------------
+
+
+def support_symbol(support: Support) -> list[Outline]:
+    """Outlines of the symbol of a support; half a symbol is 1, the place is the origin."""
+    if len(support.held) == 3:
+        return [_CLAMP]
+    return {0: [_DIAMOND], 1: [_TRIANGLE, _TRACK], 2: [_TRIANGLE, _PLATE]}[
+        len({0, 1} & set(support.held))
+    ]
+
+
+def support_direction(support: Support, turned: float) -> float:
+    """Angle by which the symbol of a support is turned, away from its beam; rad.
+
+    Args:
+        support: The support.
+        turned: Rotation ψ of its place, which a clamp follows; rad.
+    """
+    inward = _inward(support.place)
+    if len(support.held) == 3:
+        return inward + turned - math.pi / 2
+    return _upright(inward, support.angle - (0.0 if 1 in support.held else math.pi / 2))
+
+
+def _upright(inward: float, angle: float = 0.0) -> float:
+    """An angle, or the opposite one where the symbol would else lie on the beam; rad."""
+    return angle + (math.pi if math.sin(inward - angle) < -0.5 else 0.0)
+
+
+def _inward(anchor: Anchor) -> float:
+    """Direction in which the beam leaves its end; upwards from a place in between; rad."""
+    if not isinstance(anchor, Place) or 0.0 < anchor.s < 1.0:
+        return math.pi / 2
+    (x, y), (X, Y) = anchor.point, anchor.beam.curve(1e-3 if anchor.s == 0.0 else 1.0 - 1e-3)
+    return math.atan2(Y - y, X - x)
+
+
+def _towards(spot: Spot, other: Anchor) -> float:
+    """Direction in which what is attached to the ground lies; rad."""
+    (x, y), (X, Y) = spot.point, other.point
+    if (x, y) == (X, Y) and isinstance(other, Spot):
+        X, Y = other.body.center
+    return _inward(other) if (x, y) == (X, Y) else math.atan2(Y - y, X - x)
+
+
+# -- lines -------------------------------------------------------------------------------------
+
+
+def _inked(piece: Piece, points: Array) -> Stroke:
+    return Stroke(points, INK, piece.weight, piece.fill, UPON if piece.inside else MIDDLE)
+
+
+def _hatches(line: Array, unit: float) -> Iterator[Stroke]:
+    """The mark of the ground along a line, to its right."""
+    steps = np.diff(line, axis=0)
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))])
+    for s in np.arange(0.3 * unit, way[-1], 0.55 * unit):
+        x, y = (np.interp(s, way, column) for column in line.T)
+        k = min(int(np.searchsorted(way, s)), len(steps)) - 1
+        dx, dy = steps[k] / (np.linalg.norm(steps[k]) or 1.0)
+        foot = np.array([x - 0.4 * unit * (dx - dy), y - 0.4 * unit * (dy + dx)])
+        yield Stroke(np.array([[x, y], foot]), "#6E6E6E", 1.0)

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""From a scene to its motion: steps, solutions, checkpoints."""

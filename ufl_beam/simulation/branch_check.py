@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: MIT
+"""The path of static equilibria: whether a step followed it, or leapt somewhere else."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Sequence
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.state_io import Memory
+from ufl_beam.errors import StepFailed
+from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.terms.beams import Beams
+from ufl_beam.terms.connectors import Couplings
+from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.guide_curves import Guides
+
+FAR = 1e3
+"""Sizes of the scene, or radians, by which nothing moves in a static step but a mechanism."""
+
+KINK = 1e-6
+"""Part of the energy that went through at which a static step may pass a kink of a law."""
+
+
+class StaticPath:
+    """Checks of a static step before it is accepted.
+
+    Args:
+        share: The degrees of freedom of this process.
+        scheme: A static scheme; its ``slack`` says how much may stay unexplained.
+        beams: What stores and dissipates.
+        couplings: Connectors, which may store, dissipate, supply.
+        ledger: Energies before the step.
+        q: Configuration at the beginning.
+        t0: Time at the beginning; s.
+    """
+
+    def __init__(
+        self,
+        share: Share,
+        scheme: Scheme,
+        beams: Sequence[Beams],
+        couplings: Sequence[Couplings | Guides],
+        ledger: Ledger,
+        q: Array,
+        t0: float,
+    ) -> None:
+        self._share, self._scheme, self._ledger = share, scheme, ledger
+        self._beams, self._couplings = beams, couplings
+        self._rotations = share.rotations()
+        self._before: Array = np.zeros(share.size)
+        # In so short a step nothing viscous flows; forces of connectors are among the unknowns.
+        short = scheme.step(0.0, sys.float_info.min, sys.float_info.min, q)
+        for beam in beams:
+            beam.begin(short)
+            beam.add_residual(q, self._before)
+        for coupling in couplings:
+            coupling.begin(scheme.step(t0, t0 + 1.0, t0 + 1.0, q))
+            coupling.add_residual(q, self._before)
+
+    @property
+    def force(self) -> Array:
+        """The internal forces at the end of the last step."""
+        return self._before
+
+    def remember(self, memory: Memory, q: Array) -> None:
+        """The internal forces at the end of the last step."""
+        self._before = memory.added("internal forces", self._before)
+
+    def require(self, q1: Array, s: Array, force: Array, least_work: float) -> None:
+        """Raise unless the step was followed.
+
+        Args:
+            q1: Its end.
+            s: Its step of the nodes.
+            force: Internal forces in it.
+            least_work: Work that round-off makes; J.
+
+        Raises:
+            StepFailed: It was not.
+        """
+        self._require_near(s)
+        if math.isfinite(self._scheme.slack):
+            self._require_explained(q1, s, force, least_work)
+
+    def accept(self, force: Array) -> None:
+        """Take the internal forces of a step as those before the next."""
+        self._before = force.copy()
+
+    def _require_near(self, s: Array) -> None:
+        size = self._share.grid.scene.size
+        moves = np.abs(s) / size
+        moves[self._rotations] *= size
+        far = self._share.largest(moves.max(initial=0.0))
+        if not far <= FAR:
+            raise StepFailed(
+                f"a node moves by {far:.1e} times the size of the scene, or turns by so many "
+                "radians, in the step: what yields and what has opened leave a mechanism"
+            )
+
+    def _require_explained(self, q1: Array, s: Array, force: Array, least_work: float) -> None:
+        """The forces on the way must account for what the step stores and dissipates.
+
+        Otherwise Newton's method may have found another branch of equilibria than the one followed:
+        beyond a limit load, or where softening lets go more than it dissipates.
+        """
+        total = self._share.total
+        work = total(float(self._scheme.acting(self._before, force) @ s))
+        in_beams = total(sum(one.change(q1) for one in self._beams))
+        change = in_beams + total(sum(one.change(q1) for one in self._couplings))
+        # A motor that stretches a spring gives what the spring takes; their sum measures nothing.
+        # Connectors count one by one, so that the size is the same on any number of processes.
+        size = abs(work) + abs(in_beams) + total(sum(one.effort(q1) for one in self._couplings))
+        # Smaller numbers than the least normal one have not all their digits.
+        slack = self._scheme.slack * size + least_work + sys.float_info.min
+        if abs(work - change) > slack + KINK * total(self._ledger.size()):
+            raise StepFailed(
+                f"the step stores and dissipates {change:.3e} J, but the forces along it do "
+                f"{work:.3e} J of work: it leaps to another branch of equilibria, or is too long "
+                "to tell"
+            )

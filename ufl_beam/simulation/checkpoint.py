@@ -1,0 +1,428 @@
+# SPDX-License-Identifier: MIT
+"""Files from which a run goes on after whatever has stopped it.
+
+A file is one line of text, filled up to 512 bytes, and an HDF5 file, which readers of HDF5 find
+behind it.  The line has the checksum of all that follows.
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import json
+import os
+import shutil
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mpi4py import MPI
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.errors import SceneError, require_count, require_number, require_sequence, shorten
+from ufl_beam.file_locks import Lock
+from ufl_beam.output.output_files import require_path
+from ufl_beam.output.recorders import Recorder, on_first
+from ufl_beam.simulation.fingerprint import CODE, Description, difference, has_state, kind_of
+from ufl_beam.simulation.simulation import Simulation
+from ufl_beam.simulation.step_control import Pace
+
+FORMAT = "checkpoint of ufl_beam, 2"
+"""To be counted up whenever files of before mean something else."""
+
+HEADER = 512
+"""Bytes before the HDF5 file, the least that readers of HDF5 skip."""
+
+Content = dict[str, Any]
+"""Arrays by name; what is not an array is JSON."""
+
+
+@dataclass(frozen=True, eq=False)
+class Checkpoint:
+    """Where and how often a run writes down all that it needs to go on.
+
+    If the file exists when the run begins, it goes on from there, as the same run to the last bit:
+    after a crash the same script is simply run again.
+
+    Args:
+        path: File; HDF5.
+        every: Write every so many steps.
+        minutes: Write when so much wall time is over since the last time.
+        also: What else has a state, besides what functions in the scene use: random generators of
+            NumPy, and objects with ``state()`` and ``restore(state)``, where the state is made of
+            numbers, texts, lists and dicts.
+
+    Raises:
+        SceneError: Neither ``every`` nor ``minutes``, or a bad number; no state in ``also``.
+    """
+
+    path: str | Path
+    every: int | None = None
+    minutes: float | None = None
+    also: Sequence[Any] = ()
+
+    def __post_init__(self) -> None:
+        require_path(self.path, "Checkpoint")
+        what = f"Checkpoint {self.path}"
+        if self.every is None and self.minutes is None:
+            raise SceneError(f"{what}: say how often, every=1000 (steps), minutes=10, or both")
+        if self.every is not None:
+            require_count(self.every, f"{what}: every")
+        if self.minutes is not None:
+            require_number(self.minutes, f"{what}: minutes", at_least=0.0)
+        object.__setattr__(self, "also", require_sequence(self.also, f"{what}: also"))
+        for i, one in enumerate(self.also):
+            if not has_state(one):
+                raise SceneError(
+                    f"{what}: also[{i}] = {shorten(one)} has no state; give a random generator of "
+                    "NumPy, or an object with methods state() and restore(state)"
+                )
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The file, and the one that takes its place; no other output may write them."""
+        path = Path(self.path)
+        return path, path.parent / f"{path.name}.part"
+
+
+class Keeper:
+    """The checkpoint of one run.
+
+    Args:
+        choice: What the user asks for.
+        call: What the run is, by name.
+        step: Size of its steps if they are equal; then the run may have another end.
+        comm: Processes of the run.
+
+    Raises:
+        SceneError: Another run writes the file, or it is damaged, or of another run, or cannot be
+            written.
+
+    Attributes:
+        path: The file; locked until :meth:`close`.
+        found: What it has; empty if there is none.
+    """
+
+    def __init__(
+        self,
+        choice: Checkpoint,
+        call: Mapping[str, Any],
+        step: float | None,
+        comm: MPI.Intracomm,
+    ) -> None:
+        self._choice, self._call, self._comm = choice, call, comm
+        self.path = Path(choice.path)
+        self._step = step
+        self._described = Description(call)
+        also = {f"also[{i}]": one for i, one in enumerate(choice.also)}
+        self._stateful = {**self._described.stateful, **also}
+        self.found: Content = {}
+        self._lock = Lock(self.path)
+        try:
+            on_first(comm, self._find)
+        except BaseException:
+            self.close()
+            raise
+        if comm.size > 1:
+            self.found = comm.bcast(self.found)
+        self._last_time, self._last_step = time.perf_counter(), -1
+        self._begin = self._last_time - self.found.get("seconds", 0.0)
+
+    # -- going on ------------------------------------------------------------------------------
+
+    def _find(self) -> None:
+        folder = self.path.parent
+        if not folder.is_dir():
+            raise SceneError(f"checkpoint {self.path}: there is no directory {folder}; make it")
+        if not os.access(folder, os.W_OK):
+            raise SceneError(f"checkpoint {self.path}: the directory cannot be written to")
+        try:
+            owner = self._lock.take()
+            exists = self.path.exists()
+        except OSError as error:
+            raise SceneError(
+                f"checkpoint {self.path}: {self._lock.path} cannot be written: {error.strerror}"
+            ) from None
+        if owner:
+            raise SceneError(
+                f"checkpoint {self.path} is in use: {owner} writes it. Let that run end, or stop "
+                "it, or name another file"
+            )
+        if exists:
+            self.found = read(self.path)
+            self._require_same(self.found)
+
+    def _require_same(self, found: Content) -> None:
+        now, then = dict(self._described.texts), dict(found["call"])
+        if found["python"] != _python():
+            for texts in (now, then):
+                for name in [n for n in texts if n.endswith(f".{CODE}")]:
+                    del texts[name]
+        differs = difference(now, then)
+        step, before = self._step, found["step"]
+        if not differs and (step is None) != (before is None):
+            differs = "steps are equal in one of both, and adaptive in the other"
+        if not differs and step and abs(step - before) > 1e-9 * before:
+            differs = f"the step is {step!r} s, in the file {before!r} s"
+        if not differs and [*self._stateful] != [*found["stateful"]]:
+            differs = "other objects have a state"
+        if differs:
+            raise SceneError(
+                f"checkpoint {self.path} is of another run: {differs}. Delete the file to begin "
+                "anew, or name another"
+            )
+
+    def close(self) -> None:
+        """Let other runs have the file."""
+        self._lock.release()
+
+    def resume(
+        self, simulation: Simulation, pace: Pace, recorders: Sequence[Recorder], t1: float
+    ) -> None:
+        """Take all over that the file has.
+
+        Raises:
+            SceneError: The run is beyond ``t1``, or a recorder cannot go on.
+        """
+        found = self.found
+        state = _below("state/", found)
+        t = float(state["t"][0])
+        if t > t1 and t - t1 > 1e-9 * (self._step or 0.0):
+            raise SceneError(
+                f"checkpoint {self.path} is at t = {t:.9g} s, beyond the end t[1] = {t1:.9g} s"
+            )
+        simulation.resume(state)
+        simulation.solution.resume(_below("history/", found))
+        simulation.solution.parts = simulation.parts
+        simulation.solution.iterations = simulation.iterations
+        simulation.solution.seconds = found["seconds"]
+        pace.restore(found["pace"])
+        for one, its_state in zip(self._stateful.values(), found["stateful"].values(), strict=True):
+            _restore(one, its_state)
+        for i, recorder in enumerate(recorders):
+            recorder.resume(simulation, _below(f"recorder {i}/", found))
+        self._last_step = pace.steps
+        self.found = {}
+
+    # -- writing -------------------------------------------------------------------------------
+
+    def note(self, simulation: Simulation, pace: Pace, recorders: Sequence[Recorder]) -> None:
+        """Write if it is time to; all processes call it together after each step.
+
+        Raises:
+            SceneError: A function of the scene remembers something that it does not tell.
+            OSError: The file cannot be written; the one before is still there.
+        """
+        if self._last_step < 0:  # better now than after an hour
+            self._require_told()
+            self._last_step = 0
+        if pace.finished or self._due(pace.steps):
+            self.write(simulation, pace, recorders)
+
+    def _due(self, steps: int) -> bool:
+        every, minutes = self._choice.every, self._choice.minutes
+        due = every is not None and steps - self._last_step >= every
+        if minutes is not None:
+            over = time.perf_counter() - self._last_time >= 60 * minutes
+            due = due or bool(self._comm.bcast(over) if self._comm.size > 1 else over)
+        return due
+
+    def write(self, simulation: Simulation, pace: Pace, recorders: Sequence[Recorder]) -> None:
+        """Write; all processes call it together."""
+        self._require_told()
+        content: Content = {
+            "python": _python(),
+            "call": self._described.texts,
+            "step": self._step,
+            "seconds": time.perf_counter() - self._begin,
+            "pace": pace.state(),
+            "stateful": simulation.together(self._states),
+            **_above("state/", simulation.state()),
+        }
+        parts = [recorder.state() for recorder in recorders]
+
+        def put() -> None:
+            content.update(_above("history/", simulation.solution.history()))
+            for i, part in enumerate(parts):
+                content.update(_above(f"recorder {i}/", part))
+            write(self.path, content, f"of t = {simulation.t:.9g} s")
+
+        on_first(self._comm, put)
+        self._last_time, self._last_step = time.perf_counter(), pace.steps
+
+    def _states(self) -> dict[str, Any]:
+        """States of the user's objects, by name."""
+        return {name: _state(one) for name, one in self._stateful.items()}
+
+    def _require_told(self) -> None:
+        """Raise if what functions use changes without their saying so: it would be lost."""
+        changed = difference(Description(self._call).texts, self._described.texts)
+        if changed:
+            raise SceneError(
+                f"checkpoint {self.path}: a function of the scene remembers what no checkpoint "
+                f"knows of: {changed.replace(', in the file', ', at the beginning')}. Make it an "
+                "object with methods state() and restore(state), see docs/restart.md"
+            )
+
+
+def _python() -> str:
+    return ".".join(map(str, sys.version_info[:2]))
+
+
+def _above(prefix: str, content: Mapping[str, Any]) -> Content:
+    return {prefix + name: value for name, value in content.items()}
+
+
+def _below(prefix: str, content: Content) -> Content:
+    inside = ((n, v) for n, v in content.items() if n.startswith(prefix))
+    return {name.removeprefix(prefix): value for name, value in inside}
+
+
+# -- what has a state ---------------------------------------------------------------------------
+
+
+def _state(one: Any) -> Any:
+    if isinstance(one, np.random.Generator):
+        return one.bit_generator.state
+    if isinstance(one, np.random.RandomState):
+        return one.get_state(legacy=False)
+    return one.state()
+
+
+def _restore(one: Any, state: Any) -> None:
+    if isinstance(one, np.random.Generator):
+        one.bit_generator.state = state
+    elif isinstance(one, np.random.RandomState):
+        one.set_state(state)
+    else:
+        one.restore(state)
+
+
+# -- the file -----------------------------------------------------------------------------------
+
+
+def write(path: Path, content: Content, what: str) -> None:
+    """Write a file at once: there is always a whole one, the new or the one before.
+
+    Raises:
+        OSError: It cannot be written; the message says how much space there is.
+    """
+    body = _packed(content, what)
+    line = f"{FORMAT}; sha256 {hashlib.sha256(body).hexdigest()}\n"
+    part = path.with_name(path.name + ".part")
+    try:
+        try:
+            with part.open("wb") as file:
+                file.write(line.encode().ljust(HEADER, b"\0"))
+                file.write(body)
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(part, path)
+        except BaseException:
+            part.unlink(missing_ok=True)
+            raise
+        folder = os.open(path.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+    except OSError as error:
+        free = shutil.disk_usage(path.parent).free
+        before = "the one before is still there" if path.exists() else "there is none yet"
+        raise OSError(
+            error.errno or errno.EIO,
+            f"checkpoint {path} {what} cannot be written: {error.strerror}; it needs "
+            f"{(len(body) + HEADER) / 1e6:.3g} MB, and {path.parent} has {free / 1e6:.3g} MB; "
+            f"{before}",
+        ) from None
+
+
+def _packed(content: Content, what: str) -> bytes:
+    """An HDF5 file, made in memory: full disks are no business of its library."""
+    import h5py
+
+    text = {name: value for name, value in content.items() if not isinstance(value, np.ndarray)}
+    arrays = {name: value for name, value in content.items() if name not in text}
+    try:
+        encoded = json.dumps({**text, "arrays": list(arrays)}, default=_plain)
+    except TypeError as error:
+        raise SceneError(
+            f"checkpoint {what}: a state() has something else than numbers, texts, lists and "
+            f"dicts: {error}"
+        ) from None
+    with h5py.File("checkpoint", "w", driver="core", backing_store=False) as file:
+        file.attrs["format"] = FORMAT
+        file["text"] = np.frombuffer(encoded.encode(), dtype=np.uint8)
+        for name, values in arrays.items():
+            file[name] = values
+        file.flush()
+        return bytes(file.id.get_file_image())
+
+
+def read(path: Path) -> Content:
+    """Read a file of :func:`write`.
+
+    Raises:
+        SceneError: The file is damaged, or something else.
+    """
+    import h5py
+
+    def refuse(why: str) -> SceneError:
+        return SceneError(
+            f"checkpoint {path}: {why}. Delete the file to begin anew, or name another"
+        )
+
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise refuse(f"the file cannot be read: {error.strerror}") from None
+    line, _, rest = data[:HEADER].partition(b"\n")
+    kind, _, checksum = line.decode(errors="replace").partition("; sha256 ")
+    name, _, version = FORMAT.rpartition(", ")
+    if not data:
+        raise refuse("the file is empty")
+    if kind != FORMAT:
+        if kind.startswith(name):
+            raise refuse(
+                f"the file is a {kind}, and this version of ufl_beam reads number {version}"
+            )
+        raise refuse("the file is no checkpoint, or its beginning is damaged")
+    body = data[HEADER:]
+    if hashlib.sha256(body).hexdigest() != checksum or rest.strip(b"\0"):
+        raise refuse("the file is damaged: its checksum is not that of its content")
+    with h5py.File(path, "r") as file:
+        content: Content = json.loads(file["text"][()].tobytes())
+        for array in content.pop("arrays"):
+            content[array] = file[array][()]
+    return content
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    raise TypeError(repr(value))
+
+
+def kinds_of(recorders: Sequence[Recorder]) -> list[str]:
+    """Return the fingerprint of recorders."""
+    return [kind_of(recorder) for recorder in recorders]
+
+
+def require_continuable(recorder: Recorder) -> None:
+    """Raise :class:`SceneError` if a recorder does not say how to go on."""
+    if type(recorder).state is Recorder.state:
+        recorder.state()
+
+
+def digest_of(arrays: Mapping[str, Array]) -> str:
+    """A checksum of arrays by name."""
+    total = hashlib.sha256()
+    for name, values in arrays.items():
+        total.update(f"{name} {values.shape}".encode())
+        total.update(np.ascontiguousarray(values).tobytes())
+    return total.hexdigest()[:16]

@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: MIT
+"""The state that a run begins with."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.state_io import State
+from ufl_beam.discretization.state_transfer import Transfer, same_unknowns
+from ufl_beam.errors import SceneError, require_kind, warn
+from ufl_beam.model.connector_laws import HELD
+from ufl_beam.model.mesh_options import Mesh
+from ufl_beam.model.supports import COMPONENTS, Support
+from ufl_beam.simulation.solution import Solution
+
+
+def mesh_of(start: Solution | None, mesh: Mesh | None) -> Mesh:
+    """The mesh of a call: the one it says, that of the solution it starts with, or that given."""
+    if mesh is not None:
+        require_kind(mesh, Mesh, "mesh")
+        return mesh
+    if start is None:
+        return Mesh()
+    require_kind(start, Solution, "start")
+    return start.grid.mesh
+
+
+class InitialState(NamedTuple):
+    """State that a run begins with, in the numbering of its grid.
+
+    Attributes:
+        q: Configuration at all degrees of freedom.
+        v: Velocities at all degrees of freedom.
+        internal: Internal variables of cells and connectors; empty at the beginning.
+    """
+
+    q: Array
+    v: Array
+    internal: State
+
+
+def initial_state(grid: Grid, start: Solution | None) -> InitialState:
+    """Find the state that a run begins with, before anything is built.
+
+    Raises:
+        SceneError: The solution is of a scene whose state cannot be taken over.
+    """
+    v = _initial_velocity(grid)
+    if start is None:
+        return InitialState(np.zeros(grid.size), v, {})
+    q0, v0 = start.q[-1], start.v[-1] if len(start.v) else None
+    if same_unknowns(start.grid, grid):
+        return InitialState(q0, v if v0 is None else v0, start.internal)
+    transfer = Transfer(start.grid, grid)
+    q = transfer.state(q0)
+    velocity = v if v0 is None else transfer.velocity(v0)
+    return InitialState(q, velocity, transfer.internal(start.internal))
+
+
+def _initial_velocity(grid: Grid) -> Array:
+    """Velocities of :class:`Velocity`; zero elsewhere."""
+    v = np.full(grid.size, np.nan)
+    for velocity in grid.scene.initial:
+        for beam in velocity.beams:
+            points, dofs = grid.nodes_of(beam)
+            new = np.array([velocity.at(x, y) for x, y in points])
+            turning = abs(velocity.angular)
+            size = np.hypot(*new.T[:2]).max() + turning * grid.scene.size
+            apart = np.abs(v[dofs] - new) > 1e-9 * np.array([size, size, turning])
+            if apart.any():
+                x, y = points[np.flatnonzero(apart.any(axis=1))[0]]
+                raise SceneError(
+                    f"Velocity: {beam.name} gets two different velocities at ({x:g}, {y:g}), "
+                    "from itself or from a beam that it is joined to"
+                )
+            v[dofs] = new
+    known: Array = np.asarray(np.nan_to_num(v))
+    if grid.scene.initial:
+        _require_held(grid, known)
+        _require_free(grid, known)
+    return known
+
+
+def _require_free(grid: Grid, v: Array) -> None:
+    """Refuse velocities that supports take away altogether, and warn of those that lose a part."""
+    held: dict[int, Support] = {}
+    for support in grid.scene.supports:
+        if support.moving:
+            continue
+        dofs = grid.node(support.place)
+        held.update((int(dofs[c]), support) for c in support.held if not support.angle)
+    fastest = np.abs(v).max() * max(grid.scene.size, 1.0)
+    stopped = {dof for dof in held if abs(v[dof]) > 1e-9 * fastest}
+    for velocity in grid.scene.initial:
+        for one in velocity.beams:
+            dofs = np.unique(grid.nodes_of(one)[1])
+            moving = {int(dof) for dof in dofs if abs(v[dof]) > 1e-9 * fastest}
+            lost = moving & stopped
+            if lost and lost == moving:
+                raise SceneError(
+                    f"Velocity: {one.name} does not move, because {held[min(lost)]} holds it; "
+                    "remove the support or the velocity"
+                )
+            if lost:
+                names = ", ".join(COMPONENTS[c] for c in _components(grid, lost))
+                warn(
+                    f"Velocity of {one.name}: {held[min(lost)]} holds {names} there, so that its "
+                    "velocity is zero there from the start while that of the rest is not, a blow. "
+                    "Give a velocity that agrees with the support, about= its place"
+                )
+
+
+def _components(grid: Grid, dofs: set[int]) -> list[int]:
+    """Components (0, 1, 2) of motion that degrees of freedom belong to."""
+    columns = np.vstack([grid.dofs, grid.dofs_of_bodies]).T
+    return [c for c in range(3) if np.isin(columns[c], list(dofs)).any()]
+
+
+def _require_held(grid: Grid, v: Array) -> None:
+    """Velocities must agree with what joints hold, or they would ring for ever."""
+    size, nodes = grid.scene.size, np.vstack([grid.dofs, grid.dofs_of_bodies])
+    fastest = np.abs(v[nodes] * [1.0, 1.0, size]).max()
+    for link, dofs in zip(grid.scene.links, grid.dofs_of_links, strict=True):
+        a, b = v[dofs[0:6:2]], v[dofs[1:6:2]]
+        rate = float(np.dot(link.rigidly().a, a) + np.dot(link.rigidly().b, b))
+        if link.law is HELD and abs(rate) > 1e-9 * fastest / (size if link.turns else 1.0):
+            raise SceneError(
+                f"Velocity: the parts that {link} joins would move apart at {rate:.3g} m/s "
+                "or rad/s; give all that is joined a Velocity that agrees"
+            )

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: MIT
+"""Cells whose embedded hinge or cracks opened in a run, and what depends on the mesh there.
+
+An embedded hinge is in the middle of its cell and feels the mean moment of the cell.  At the ends
+of the cell the moment differs by |V| h/2, so a hinge that belongs there opens at another load.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ufl_beam.arrays import Array, Index
+from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.errors import ModelWarning
+from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.model.beams import Beam, Place
+from ufl_beam.model.material_laws import Layout
+
+LARGE = 0.05
+"""Part of its limit from which a run warns that the place of an embedded hinge shifts it."""
+
+TINY = 1e-6
+"""Opening, as a part of energy / limit, over which the first slope of a resistance is taken."""
+
+Kept = Sequence[Sequence[tuple[Index, Array]]]
+"""At each kept time: groups of cells, and rows that begin with N, V, M; the sixth entry is the
+dissipated energy of the discontinuities."""
+
+
+class OpenedHinges(NamedTuple):
+    """Embedded hinges of a beam that opened in a run.
+
+    Attributes:
+        beam: The beam.
+        number: Number of the cells whose hinge opened.
+        error: Largest |V| h / (2 limit): difference between the moments in the middle and at the
+            ends of such a cell, as a part of the limit.
+        place: Middle of the cell with the largest error.
+    """
+
+    beam: Beam
+    number: int
+    error: float
+    place: Place
+
+
+class Opened:
+    """Cells that opened in a run.
+
+    Args:
+        grid: The grid of the run.
+        kept: Forces and dissipated energies of cells that may yield or break, at the kept times.
+
+    Attributes:
+        first: Number of the first kept time after the opening; 0 of cells that were open at the
+            beginning, -1 of those that stayed closed; (num_cells,).
+        shear: |V| at the kept time before that one, or at that one where the run began in between;
+            (num_cells,); N.
+    """
+
+    def __init__(self, grid: Grid, kept: Kept) -> None:
+        self._grid = grid
+        self.first = np.full(len(grid.cells), -1)
+        self.shear, before = np.zeros((2, len(grid.cells)))
+        if not any((rows[:, 5] > 0).any() for _, rows in kept[-1]):
+            return
+        for n, groups in enumerate(kept):
+            for cells, rows in groups:
+                V, new = np.abs(rows[:, 1]), (rows[:, 5] > 0) & (self.first[cells] < 0)
+                self.first[cells[new]] = n
+                # After an opening in a jump V is that of vibrations.
+                self.shear[cells[new]] = (before[cells] if n > 1 else V)[new]
+                before[cells] = V
+
+    def hinges(self) -> list[OpenedHinges]:
+        """Embedded hinges, laws of sections, that opened in the run; beam by beam."""
+        grid, found = self._grid, []
+        for beam in grid.scene.beams:
+            law = beam.section.hinge
+            cells, laws = grid.cells_of(beam), grid.hinges(beam)
+            cells = cells[[one is law for one in laws] & (self.first[cells] > 0)]
+            if law is None or not len(cells) or law.limit == 0:
+                continue
+            errors = self.shear[cells] * grid.lengths(cells) / (2 * law.limit)
+            worst = int(np.argmax(errors))
+            place = grid.middle(int(cells[worst]))
+            found.append(OpenedHinges(beam, len(cells), float(errors[worst]), place))
+        return found
+
+    def jumps(self, scheme: Scheme) -> list[tuple[Beam, int, float]]:
+        """Beams with cells whose opening is a jump within a step.
+
+        The resistance falls faster with the opening than the stress of the cell, whose stiffness
+        against an opening is θ EI/h, or θ E/h of a fibre.
+
+        Returns:
+            Each beam, the cell in which it is worst, and how many times too fast that is.
+        """
+        grid, found = self._grid, []
+        for beam in grid.scene.beams:
+            cells, laws = grid.cells_of(beam), grid.hinges(beam)
+            fall = {law: _fall(beam.section.layout(law), scheme) for law in set(laws)}
+            opened = np.where(self.first[cells] > 0, grid.lengths(cells), 0.0)
+            ratios = opened * [fall[law] for law in laws]
+            worst = int(np.argmax(ratios))
+            if ratios[worst] > 1:
+                found.append((beam, int(cells[worst]), float(ratios[worst])))
+        return found
+
+    def warn(self, scheme: Scheme, times: Array) -> None:
+        """Issue a :class:`ModelWarning` for each beam where much depends on the mesh."""
+        for beam, cell, ratio in self.jumps(scheme):
+            length = float(self._grid.lengths(np.array([cell]))[0])
+            t = times[self.first[cell]]
+            _warn(
+                f"{beam.name}: what opened in the cell at s = {self._grid.middle(cell).s:.3g} by "
+                f"t = {t:.6g} s did so in a jump: its resistance falls {ratio:.3g} times as fast "
+                f"as its cell of {length:.3g} m can follow. Energy that the cell released and the "
+                "opening did not dissipate went to the rest of the scene. Use cells shorter than "
+                f"{length / ratio:.3g} m, or an energy {ratio:.3g} times as large"
+            )
+        for beam, number, error, place in self.hinges():
+            if error > LARGE:
+                _warn(
+                    f"{beam.name}: the hinge of the section opened in {cells_in_words(number)}, "
+                    "in the middle of a cell. At the ends of the cell at "
+                    f"s = {place.s:.3g} the moment differs from that in its middle by "
+                    f"{percent(error)} of the limit, so the load at which the hinge opens is "
+                    "uncertain by as much. Put a hinge exactly where it belongs, "
+                    "Beam(hinges={s: law}), or use shorter cells"
+                )
+
+
+def cells_in_words(number: int) -> str:
+    """A number of cells in words: "1 cell", "2 cells"."""
+    return f"{number} cell{'s'[: number != 1]}"
+
+
+def percent(part: float) -> str:
+    """A part in words: "12 %", or "more than 100 %" where the limit is next to nothing."""
+    return f"{100 * part:.2g} %" if part <= 1 else "more than 100 %"
+
+
+def _warn(message: str) -> None:
+    """Warn at the line that called :func:`simulate` or :func:`follow`."""
+    warnings.warn(message, ModelWarning, stacklevel=4)
+
+
+def _fall(layout: Layout | None, scheme: Scheme) -> float:
+    """First fall of the resistance per opening, over θ times the stiffness of the points; 1/m."""
+    law = None if layout is None else layout.softening
+    if layout is None or law is None or law.limit == 0:
+        return 0.0
+    opening = TINY * law.energy / law.limit
+    fall = (law.limit - scheme.resistance(law, np.zeros(1), np.array([opening]))[0]) / opening
+    return float(fall / (scheme.theta * layout.stiffness[layout.breaking].min()))

@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: MIT
+"""A run from beginning to end: steps, what is kept, what is written on the way."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+
+from mpi4py import MPI
+
+from tqdm import tqdm
+
+from ufl_beam.errors import SceneError, require_count, require_kind, require_number, require_switch
+from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
+from ufl_beam.model.mesh_options import Mesh
+from ufl_beam.model.scene import Scene
+from ufl_beam.output.output_files import take
+from ufl_beam.output.recorders import UNLIMITED, Recorder, close_all, recorders_of
+from ufl_beam.parallel import communicator, in_study, ours
+from ufl_beam.simulation.checkpoint import (
+    Checkpoint,
+    Keeper,
+    digest_of,
+    kinds_of,
+    require_continuable,
+)
+from ufl_beam.simulation.initial_state import mesh_of
+from ufl_beam.simulation.simulation import SMALLEST_PART, Simulation
+from ufl_beam.simulation.solution import Solution
+from ufl_beam.simulation.step_control import Adaptive, AdaptiveSteps, EqualSteps, Pace
+from ufl_beam.solvers.newton import Newton
+
+BAR = "{percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
+
+
+def simulate(
+    scene: Scene,
+    scheme: Scheme,
+    *,
+    t: tuple[float, float],
+    dt: float | Adaptive,
+    record: Sequence[Recorder] | Recorder = (),
+    every: int = 1,
+    most: int = UNLIMITED,
+    start: Solution | None = None,
+    newton: Newton | None = None,
+    mesh: Mesh | None = None,
+    checkpoint: Checkpoint | None = None,
+    progress: bool = True,
+    comm: MPI.Intracomm | None = None,
+) -> Solution:
+    """Simulate a scene.
+
+    Args:
+        scene: What is modelled.
+        scheme: :class:`Static`, :class:`Midpoint` or another one, see docs/schemes.md.
+        t: Beginning and end; s.  In statics time is the load parameter.
+        dt: Step; s.  All steps are a little shorter if ``dt`` does not divide the time.  A step
+            without convergence is cut into parts.  :class:`Adaptive` steps are as long as an
+            accuracy allows.
+        record: Files to write on the way, such as :class:`XDMF` and :class:`History`.
+        every: Keep every so many steps in the solution; the last one always.
+        most: States, besides the initial and the last one, that the solution may have.  When there
+            are more, every other one goes, and only half as many steps are kept from then on.
+        start: Solution of the same beams whose last state is the initial state.  Joints may be
+            removed, or added where places are together.
+        newton: Tolerances and PETSc options.
+        mesh: How finely it is discretised; as ``start``, or with the cells of the beams.
+        checkpoint: File from which the run goes on if it is run again after whatever stopped it.
+        progress: Show a progress bar if the output is a terminal.
+        comm: Processes that share the scene; all of them, or in a :func:`study` this one alone.  A
+            small scene is computed by each of them.
+
+    Returns:
+        The motion, the forces and the ledger.
+
+    Raises:
+        SceneError: The call or the scene is wrong; nothing was computed.
+        ConvergenceError: A step failed; it carries the solution so far, and files are complete.
+    """
+    comm = communicator(comm, "simulate: comm")
+    require_switch(progress, "simulate: progress")
+    t0, t1 = _require_times(t)
+    _require_step(dt, scheme, (t0, t1))
+    require_count(every, "simulate: every")
+    require_count(most, "simulate: most")
+    if checkpoint is not None:
+        require_kind(checkpoint, Checkpoint, "simulate: checkpoint")
+    kept = [] if checkpoint is None else [("checkpoint", checkpoint.files)]
+    recorders, outputs = recorders_of(record, comm, "simulate", *kept)
+    begin = time.perf_counter()
+    keeper: Keeper | None = None
+    if checkpoint is not None:
+        step = None if isinstance(dt, Adaptive) else EqualSteps(t0, t1, dt).dt
+        call = {
+            "scene": scene, "scheme": scheme, "t[0]": t0, "dt": dt, "every": every, "most": most,
+            "newton": newton or Newton(), "start": _end_of(start), "record": kinds_of(recorders),
+            "t[1]": t1 if step is None else "any", "mesh": mesh_of(start, mesh),
+        }  # fmt: skip
+        for recorder in recorders:
+            require_continuable(recorder)
+        keeper = Keeper(checkpoint, call, step, comm)
+    with ExitStack() as stack:
+        if keeper is not None:
+            stack.callback(keeper.close)
+        simulation = Simulation(
+            scene, scheme, t0=t0, start=start, newton=newton, mesh=mesh, comm=comm
+        )
+        pace: Pace = (
+            AdaptiveSteps(simulation, t1, dt)
+            if isinstance(dt, Adaptive)
+            else EqualSteps(simulation.t, t1, dt)
+        )
+        stack.pop_all()  # the run closes it
+    solution = simulation.solution
+    release = take(outputs)
+
+    def after_step() -> None:
+        if recorders or keeper is not None:
+            simulation.settle()  # before anything is written
+        if pace.steps % solution.every == 0 or pace.finished:
+            solution.keep(simulation)
+            if len(solution) > most + 1 and not pace.finished:
+                solution.thin()
+                solution.every *= 2
+        for recorder in recorders:
+            recorder.write(simulation)
+        if keeper is not None:
+            keeper.note(simulation, pace, recorders)
+
+    try:
+        solution.every = every
+        if keeper is not None and keeper.found:
+            simulation.together(keeper.resume, simulation, pace, recorders, t1)
+            say(f"checkpoint {keeper.path}: the run goes on from t = {simulation.t:.9g} s")
+            begin -= solution.seconds
+        else:
+            for recorder in recorders:
+                simulation.together(recorder.open, simulation)
+            solution.keep(simulation)
+        quiet = None if progress and comm.rank == 0 and not in_study() else True
+        with tqdm(total=1.0, bar_format=BAR, disable=quiet, mininterval=0.5) as bar:
+            while not pace.finished:
+                pace.advance(simulation)
+                simulation.together(after_step)
+                bar.update(pace.progress - bar.n)
+        simulation.end()
+        simulation.check_ledger()
+    except BaseException as error:
+        # Whatever stops a run, an interrupt or a user's function, what was reached is not lost.
+        simulation.leave()
+        if simulation.share.comm.size == 1 or error is simulation.together.raised:
+            simulation.end()  # else the processes may not all be here
+        error.__dict__["solution"] = solution
+        raise
+    finally:
+        release()
+        close_all(recorders)
+        simulation.close()
+        if keeper is not None:
+            keeper.close()
+        solution.seconds = time.perf_counter() - begin
+    if comm.rank == 0:
+        solution.opened.warn(scheme, solution.times)
+    return solution
+
+
+def _end_of(start: Solution | None) -> str:
+    """A checksum of what a run begins with."""
+    if start is None:
+        return "nothing"
+    require_kind(start, Solution, "start")
+    return digest_of({"q": start.q[-1:], "v": start.v[-1:], **start.internal})
+
+
+def _require_times(t: tuple[float, float]) -> tuple[float, float]:
+    try:
+        t0, t1 = t
+    except (TypeError, ValueError):
+        raise SceneError(f"simulate: t = {t!r} must be a pair (beginning, end)") from None
+    require_number(t0, "simulate: t[0]")
+    require_number(t1, "simulate: t[1]")
+    if t1 <= t0:
+        raise SceneError(f"simulate: the end t[1] = {t1:g} must come after the beginning {t0:g}")
+    return float(t0), float(t1)
+
+
+def _require_step(dt: float | Adaptive, scheme: Scheme, t: tuple[float, float]) -> None:
+    if not isinstance(dt, Adaptive):
+        require_number(dt, "simulate: dt", positive=True)
+        least = SMALLEST_PART * math.ulp(max(map(abs, t)))
+        if dt < least:
+            raise SceneError(
+                f"simulate: dt = {dt:g} s is too small: steps from t = {t[0]:g} to {t[1]:g} s can "
+                f"be told apart, and cut, from {least:.1e} s on; use a larger one, or begin at 0"
+            )
+    elif not has_inertia(scheme):
+        raise SceneError(
+            "simulate: dt = Adaptive(...) estimates the error of accelerations, and a static "
+            "scheme has none; give a number"
+        )
+
+
+def say(*words: object, sep: str = " ") -> None:
+    """Print from the first process only, as scripts do that may run under ``mpirun``."""
+    if ours().rank == 0:
+        print(*words, sep=sep, flush=True)  # noqa: T201

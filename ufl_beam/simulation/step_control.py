@@ -1,0 +1,281 @@
+# SPDX-License-Identifier: MIT
+"""Step control: equal and adaptive steps from the beginning of a run to its end."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.errors import StepFailed, require_number, require_sequence
+
+if TYPE_CHECKING:
+    from ufl_beam.simulation.simulation import Simulation, Trial
+
+GROWTH = 1.5
+"""A step is at most so many times as long as the one before it, whose error it may repeat."""
+
+SAMPLES = (0.01, 0.5, 0.99)
+"""Parts of a step at which loads are asked for."""
+
+
+class Pace(Protocol):
+    """Protocol of step controls.
+
+    Attributes:
+        steps: Steps done.
+    """
+
+    steps: int
+
+    @property
+    def finished(self) -> bool:
+        """True if the end is reached."""
+
+    @property
+    def progress(self) -> float:
+        """Part of the way that is done, from 0 to 1."""
+
+    def advance(self, simulation: Simulation) -> None:
+        """One step.
+
+        Raises:
+            ConvergenceError: It failed.
+        """
+
+    def state(self) -> dict[str, float]:
+        """Numbers from which :meth:`restore` goes on."""
+
+    def restore(self, state: dict[str, float]) -> None:
+        """Go on from a :meth:`state`."""
+
+
+class EqualSteps:
+    """Steps of one size, a little shorter than asked for where that does not divide the time.
+
+    Args:
+        t0: Beginning; s.
+        t1: End; s.
+        dt: Longest step; s.
+    """
+
+    def __init__(self, t0: float, t1: float, dt: float) -> None:
+        self._t0, self._t1 = t0, t1
+        # The slack is for the rounding of (t1 - t0) / dt.
+        self._all = max(1, math.ceil((t1 - t0) / dt * (1 - 1e-9)))
+        self.steps = 0
+
+    @property
+    def dt(self) -> float:
+        """Size of the steps; s."""
+        return (self._t1 - self._t0) / self._all
+
+    @property
+    def finished(self) -> bool:
+        """True if all steps are done."""
+        return self.steps == self._all
+
+    @property
+    def progress(self) -> float:
+        """Part of the steps that are done."""
+        return self.steps / self._all
+
+    def advance(self, simulation: Simulation) -> None:
+        """One step; where it fails, in parts."""
+        n = self.steps + 1
+        simulation.step_to(self._t0 + (self._t1 - self._t0) * n / self._all)
+        self.steps = n
+
+    def state(self) -> dict[str, float]:
+        """The number of steps."""
+        return {"steps": float(self.steps)}
+
+    def restore(self, state: dict[str, float]) -> None:
+        """Go on after that many."""
+        self.steps = int(state["steps"])
+
+
+@dataclass(frozen=True)
+class Adaptive:
+    """Steps as long as the accuracy that is asked for allows; given in the place of ``dt``.
+
+    Each step estimates its own error: what its mean velocity and acceleration miss of a motion
+    whose acceleration changes, and what the middle of the step misses of the loads.  As with other
+    integrators of differential equations the tolerance is that of a step; what the steps of a run
+    add up to is :attr:`Solution.time_error`, of which the motion may forget or magnify a part.  A
+    share of the time in the place of the step's would have every vibration of the mesh resolved,
+    however small.  All this is about the time steps, not about the cells.
+
+    Steps end at the times of every :class:`Table` in the scene, at those that other functions of
+    time name in an attribute ``kinks``, and at ``stops``.
+
+    Args:
+        tolerance: Error that a step may add; to positions as a part of the size of the scene, to
+            rotations in rad, to the impulse of a load as a part of that of its largest value.
+        first: Where the search for the first step begins; s.  By default a hundredth of the run.
+        longest: Longest step; s.
+        shortest: A run that needs shorter steps ends with an error; s.  By default 1e-12 of it.
+        stops: More times at which steps must end; s.
+
+    Raises:
+        SceneError: A number is out of range.
+    """
+
+    tolerance: float
+    first: float | None = None
+    longest: float | None = None
+    shortest: float | None = None
+    stops: Sequence[float] = ()
+
+    def __post_init__(self) -> None:
+        require_number(self.tolerance, "Adaptive: tolerance", positive=True)
+        for name in ("first", "longest", "shortest"):
+            if getattr(self, name) is not None:
+                require_number(getattr(self, name), f"Adaptive: {name}", positive=True)
+        object.__setattr__(self, "stops", require_sequence(self.stops, "Adaptive: stops"))
+        for i, stop in enumerate(self.stops):
+            require_number(stop, f"Adaptive: stops[{i}]")
+
+
+class AdaptiveSteps:
+    """Steps whose error is estimated and limited.
+
+    Args:
+        simulation: What goes through time.
+        t1: End; s.
+        choice: What the user asks for.
+
+    Attributes:
+        rejected: Steps that were solved but too long.
+        error: Sum of the errors so far.
+    """
+
+    def __init__(self, simulation: Simulation, t1: float, choice: Adaptive) -> None:
+        self._t0 = self._t = t0 = simulation.t
+        self._t1, self._solution = t1, simulation.solution
+        self._tolerance = choice.tolerance
+        self._longest = choice.longest or t1 - t0
+        last_digit = math.ulp(max(abs(t0), abs(t1)))
+        self._shortest = max(choice.shortest or 1e-12 * (t1 - t0), 16 * last_digit)
+        self._dt = min(choice.first or (t1 - t0) / 100, self._longest)
+        functions = (function for _, function in simulation.scene.time_functions())
+        self._functions = list(dict.fromkeys(functions))
+        self._largest = [0.0] * len(self._functions)
+        kinks = {float(t) for f in self._functions for t in getattr(f, "kinks", ())}
+        # Times that differ by rounding alone are one.
+        same = max(1e-9 * (t1 - t0), self._shortest)
+        inside = sorted(t for t in (*kinks, *choice.stops) if t0 + same < t < t1 - same)
+        apart = [t for before, t in pairwise([t0, *inside]) if t - before > same]
+        self._stops = [*apart, t1]
+        self._fresh = True
+        share = simulation.share
+        self._turns, (self._x, self._y) = share.rotations(), share.translations()
+        M = simulation.inertia.M
+        bears = np.bincount(M.rows(), weights=np.abs(M.data), minlength=share.size)
+        self._massless = np.flatnonzero(bears == 0.0)
+        self.steps = self.rejected = 0
+        self.error = 0.0
+
+    @property
+    def finished(self) -> bool:
+        """True if the end is reached."""
+        return self._t == self._t1
+
+    @property
+    def progress(self) -> float:
+        """Part of the time that is over."""
+        return (self._t - self._t0) / (self._t1 - self._t0)
+
+    def advance(self, simulation: Simulation) -> None:
+        """One step that is accurate, after as many as it takes that are not."""
+        stop = next(t for t in self._stops if t > self._t)
+        while True:
+            try:
+                trial, error = self._attempt(simulation, stop)
+                dt = trial.step.dt
+                change = 0.9 * (self._tolerance / max(error, 1e-300)) ** (1 / 3)
+                if error <= self._tolerance:
+                    break
+                self.rejected += 1
+                self._dt = dt * max(change, 0.1)
+                failure = StepFailed(
+                    f"its error {error:.1e} is above the tolerance {self._tolerance:.1e}; if a "
+                    "load or a motion jumps, name the time in `stops`"
+                )
+            except StepFailed as reason:
+                failure, self._dt = reason, self._dt / 4
+            if self._dt < self._shortest:
+                simulation.give_up(failure, self._t + self._dt)
+        simulation.accept(trial)
+        self._t = simulation.t
+        self.error = self._solution.time_error = self.error + error
+        self.steps += 1
+        self._dt = min(dt * min(change, GROWTH), self._longest)
+        # The acceleration may jump at a stop, so what was before tells nothing about what comes.
+        self._fresh = self._t == stop
+
+    def _attempt(self, simulation: Simulation, stop: float) -> tuple[Trial, float]:
+        """Solve the next step; also its error."""
+        left = stop - self._t
+        # Two equal steps to a stop in the place of a long and a tiny one
+        dt = left if self._dt >= left else min(self._dt, left / 2)
+        inertia = simulation.inertia
+        if self._fresh:
+            # Nothing to compare with: half of a step is compared with the whole.
+            whole = simulation.attempt(self._t + dt)
+            before, between = (inertia.velocities(whole.s) - inertia.v) / dt, -dt / 4
+            dt /= 2
+        else:
+            before = (inertia.v - inertia.v_before) / simulation.last_dt
+            between = (dt + simulation.last_dt) / 2
+        trial = simulation.attempt(stop if dt == left else self._t + dt)
+        dt = trial.step.dt
+        a = (inertia.velocities(trial.s) - inertia.v) / dt
+        jerk = (a - before) / between
+        c2, c3 = inertia.scheme.error_weights()
+        error = self._size(simulation, trial, c2 * dt**2 * a + c3 * dt**3 * jerk)
+        missed = simulation.share.largest(simulation.together(self._missed, dt))
+        return trial, max(error, missed)
+
+    def _size(self, simulation: Simulation, trial: Trial, error: Array) -> float:
+        """Largest error of a position over the size of the scene, or of a rotation."""
+        error[self._turns] += (trial.q1 - simulation.q - trial.s)[self._turns]
+        supports = simulation.supports
+        supports.enter(error)
+        error[supports.dofs] = 0.0
+        # Rotations without inertia follow the others, at once where a load jumps.
+        error[self._massless] = 0.0
+        supports.leave(error)
+        moves = np.hypot(error[self._x], error[self._y]).max(initial=0.0)
+        turns = np.abs(error[self._turns]).max(initial=0.0)
+        here = float(max(moves / simulation.scene.size, turns))
+        return simulation.share.largest(here)
+
+    def _missed(self, dt: float) -> float:
+        """Return the error of the midpoint rule for a load, as a part of its largest impulse."""
+        missed = 0.0
+        for i, function in enumerate(self._functions):
+            # Not at the ends, where there may be jumps
+            before, middle, after = (float(function(self._t + part * dt)) for part in SAMPLES)
+            self._largest[i] = max(self._largest[i], abs(before), abs(middle), abs(after))
+            missed = max(missed, abs(before - 2 * middle + after) / (self._largest[i] or 1.0))
+        return missed / 6 * dt / (self._t1 - self._t0)  # Simpson's rule less the midpoint's
+
+    def state(self) -> dict[str, float]:
+        """Return the numbers that the next step depends on, and the counters."""
+        largest = {f"largest {i}": value for i, value in enumerate(self._largest)}
+        return {**{name: float(getattr(self, name)) for name in self._STATE}, **largest}
+
+    def restore(self, state: dict[str, float]) -> None:
+        """Go on from there."""
+        for name in self._STATE:
+            setattr(self, name, type(getattr(self, name))(state[name]))
+        self._largest = [state[f"largest {i}"] for i in range(len(self._largest))]
+        self._solution.time_error = self.error
+
+    _STATE = ("steps", "rejected", "error", "_t", "_dt", "_fresh")

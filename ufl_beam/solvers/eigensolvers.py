@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: MIT
+"""Eigenvalues of sparse pencils by SLEPc, those nearest to zero first."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from petsc4py import PETSc
+
+import numpy as np
+from scipy.sparse import block_array, csr_array, eye_array
+
+from ufl_beam.arrays import Array, Complex
+
+TOLERANCE = 1e-12
+"""Residual of an eigenpair, as a part of its eigenvalue."""
+
+SHIFT = 1e-13
+"""Shift as a part of the squared frequencies of single nodes; round-off hides smaller ones."""
+
+MORE = 8
+"""Eigenvalues that are sought beside those asked for, lest one of several alike be missed."""
+
+DENSE = 200
+"""Up to this number of unknowns LAPACK finds all eigenvalues, however often each is there."""
+
+ROUND_OFF = 64 * float(np.finfo(np.float64).eps)
+"""Part of the largest entry of a matrix that its round-off may reach."""
+
+ZERO = ROUND_OFF / 8
+"""Part of the sum of sizes in a quadratic form below which it is round-off: a sixtieth was met."""
+
+
+def _slepc() -> Any:
+    try:
+        from slepc4py import SLEPc
+    except ImportError as error:  # pragma: no cover - depends on the machine
+        raise ImportError(
+            "modes and buckling need slepc4py; install the package slepc4py of conda-forge, or "
+            "python3-slepc4py-real of Debian, see docs/installation.md"
+        ) from error
+    return SLEPc
+
+
+def _petsc(A: csr_array) -> PETSc.Mat:
+    A = A.tocsr()
+    A.sort_indices()
+    arrays = (A.indptr.astype(PETSc.IntType), A.indices.astype(PETSc.IntType), A.data)
+    matrix = PETSc.Mat().createAIJ(A.shape, csr=arrays, comm=PETSc.COMM_SELF)
+    matrix.assemble()
+    return matrix
+
+
+def linear(
+    A: csr_array, B: csr_array, n: int, *, most: int, shift: float = 0.0, definite: bool
+) -> tuple[Array, Array]:
+    """The n eigenvalues of ``A x = λ B x`` nearest to ``shift``; values (n,), vectors (size, n).
+
+    Args:
+        A: Symmetric.
+        B: Symmetric; with no negative eigenvalue if ``definite``.
+        n: How many; a few more may be given.
+        most: How many there are.
+        shift: Where ``A - shift B`` is regular.
+        definite: See ``B``.
+    """
+    size, n = A.shape[0], min(n + MORE, most)
+    if size <= DENSE:
+        θ, x = (_inverse_definite if definite else _inverse)((A - shift * B).toarray(), B.toarray())
+        return (1 / θ[:n] + shift).real, x[:, :n].real
+    slepc = _slepc()
+    solver = slepc.EPS().create(PETSc.COMM_SELF)
+    solver.setOperators(_petsc(A), _petsc(B))
+    kind = slepc.EPS.ProblemType
+    solver.setProblemType(kind.GHEP if definite else kind.GNHEP)
+    solver.setWhichEigenpairs(slepc.EPS.Which.TARGET_MAGNITUDE)
+    values, vectors = _solved(solver, size, n, shift)
+    return values.real, vectors.real
+
+
+def quadratic(
+    K: csr_array, C: csr_array, M: csr_array, n: int, *, most: int, shift: float
+) -> tuple[Complex, Complex]:
+    """The n exponents s of ``(K + s C + s² M) x = 0`` nearest to ``shift``, conjugates counted."""
+    size, n = K.shape[0], min(n + MORE, most)
+    if size <= DENSE:
+        # In times of 1/shift, with velocities as unknowns: s x = v, s M v = -K x - C v.
+        one, none = eye_array(size), csr_array((size, size))
+        A = block_array([[none, one], [-K, -shift * C]])
+        B = block_array([[one, none], [none, shift**2 * M]])
+        θ, x = _inverse((A - B).toarray(), B.toarray())
+        return shift * (1 / θ[:n] + 1), x[:size, :n]
+    slepc = _slepc()
+    solver = slepc.PEP().create(PETSc.COMM_SELF)
+    solver.setOperators([_petsc(A) for A in (K, C, M)])
+    solver.setType("toar")
+    solver.setScale(slepc.PEP.Scale.SCALAR)
+    solver.setWhichEigenpairs(slepc.PEP.Which.TARGET_MAGNITUDE)
+    solver.getST().setTransform(True)
+    return _solved(solver, size, n, shift)
+
+
+def small(A: Array, B: Array) -> tuple[Array, Array]:
+    """All eigenvalues of ``A x = λ B x`` of small matrices; values (n,), vectors (size, n).
+
+    Args:
+        A: Symmetric; rows and columns may differ in size.
+        B: Symmetric.
+    """
+    sizes = np.sqrt(np.abs(A.diagonal()) + np.abs(B.diagonal()))
+    scale = 1 / np.where(sizes > 0, sizes, 1.0)
+    across = np.outer(scale, scale)
+    θ, x = _inverse(A * across, B * across)
+    return (1 / θ).real, scale[:, None] * x.real
+
+
+def _inverse(A: Array, B: Array) -> tuple[Complex, Complex]:
+    """Eigenvalues of A⁻¹ B and vectors, the largest first, zeros left out."""
+    θ, x = np.linalg.eig(np.linalg.solve(A, B))
+    order = np.argsort(-np.abs(θ), kind="stable")
+    order = order[np.abs(θ[order]) > 0]
+    return θ[order].astype(complex), x[:, order].astype(complex)
+
+
+def _inverse_definite(A: Array, B: Array) -> tuple[Array, Array]:
+    """The same by a symmetric matrix, which has a full set of vectors: Fᵀ A⁻¹ F with B = F Fᵀ."""
+    scale = np.sqrt(B.diagonal())
+    there = np.flatnonzero(scale)
+    F = np.zeros((len(A), len(there)))
+    unit = B[np.ix_(there, there)] / np.outer(scale[there], scale[there])
+    F[there] = scale[there, None] * np.linalg.cholesky(unit)
+    flexible = np.linalg.solve(A, F)
+    S = F.T @ flexible
+    θ, y = np.linalg.eigh((S + S.T) / 2)
+    order = np.argsort(-np.abs(θ), kind="stable")
+    order = order[np.abs(θ[order]) > 0]
+    return θ[order], flexible @ (y[:, order] / θ[order])
+
+
+def _solved(solver: Any, size: int, n: int, shift: float) -> tuple[Complex, Complex]:
+    """Solve by SLEPc for the eigenvalues nearest to a shift."""
+    solver.setDimensions(n)
+    solver.setTolerances(TOLERANCE, 500)
+    solver.setTarget(shift)
+    st = solver.getST()
+    st.setType("sinvert")
+    st.setShift(shift)
+    ksp = st.getKSP()
+    ksp.setType("preonly")
+    ksp.getPC().setType("lu")
+    # What constraints leave has zeros on the diagonal.
+    ksp.getPC().setFactorSolverType("klu")
+    # The same first vector on every process and in every run.
+    first = np.random.default_rng(0).uniform(0.5, 1.0, size)
+    solver.setInitialSpace([PETSc.Vec().createWithArray(first, comm=PETSc.COMM_SELF)])
+    solver.solve()
+    real, imaginary = (PETSc.Vec().createSeq(size, comm=PETSc.COMM_SELF) for _ in range(2))
+    values, vectors = [], []
+    for k in range(solver.getConverged()):
+        values.append(solver.getEigenpair(k, real, imaginary))
+        vectors.append(real.array_r + 1j * imaginary.array_r)
+    solver.destroy()
+    return np.array(values, dtype=complex), np.array(vectors, dtype=complex).reshape(-1, size).T

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: MIT
+"""Direct factorisation of a square sparse matrix that may be indefinite, and the signs of it."""
+
+from __future__ import annotations
+
+from petsc4py import PETSc
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from ufl_beam.arrays import Array, Index
+
+SCALINGS = 6
+"""Passes of the scaling; each one takes the square root of the range of sizes."""
+
+SYMMETRIC = 64 * float(np.finfo(np.float64).eps)
+"""Difference to the transposed matrix, in entries of size one, below which it is round-off."""
+
+DETERMINANT = 33
+"""Number of MUMPS's option that asks for the determinant."""
+
+NEGATIVE_PIVOTS = 12
+"""Number of MUMPS's answer that counts negative pivots of a symmetric matrix."""
+
+MANTISSA = 12
+"""Number of MUMPS's answer that has the sign of the determinant."""
+
+
+class SingularMatrix(Exception):
+    """The matrix has no inverse."""
+
+
+class Factorisation:
+    """L D Lᵀ factors of a symmetric matrix, or L U factors of another one, by MUMPS.
+
+    Rows and columns are exchanged, so zeros on the diagonal do no harm.  Before that they are
+    scaled such that the largest entry of each is about one: units do not matter.
+
+    Args:
+        A: The matrix; its structure is symmetric.
+
+    Attributes:
+        symmetric: Whether the matrix is, up to round-off.
+        negative: Number of its negative eigenvalues if it is symmetric; else 1 where its
+            determinant is negative, and 0 where it is positive.
+
+    Raises:
+        SingularMatrix: No pivot was found, or an entry is not finite.
+    """
+
+    def __init__(self, A: csr_array) -> None:
+        if not np.isfinite(A.data).all():
+            raise SingularMatrix
+        rows = np.repeat(np.arange(A.shape[0]), np.diff(A.indptr))
+        self._scale = _scale(A, rows)
+        scaled = A.data * (self._scale[rows] * self._scale[A.indices])
+        S = csr_array((scaled, A.indices, A.indptr), shape=A.shape)
+        self.symmetric = bool(abs(S - S.T).max() <= SYMMETRIC)
+        self._S = csr_array((S + S.T) / 2) if self.symmetric else S
+        self._pc = pc = PETSc.PC().create(PETSc.COMM_SELF)
+        pc.setOperators(self._matrix())
+        pc.setType("cholesky" if self.symmetric else "lu")
+        pc.setFactorSolverType("mumps")
+        pc.setFactorSetUpSolverType()
+        factors = pc.getFactorMatrix()
+        factors.setMumpsIcntl(DETERMINANT, 0 if self.symmetric else 1)
+        pc.setUp()
+        if pc.getFailedReason():
+            raise SingularMatrix
+        self.negative = (
+            int(factors.getMumpsInfog(NEGATIVE_PIVOTS))
+            if self.symmetric
+            else int(factors.getMumpsRinfog(MANTISSA) < 0)
+        )
+
+    def _matrix(self) -> PETSc.Mat:
+        arrays = (self._S.indptr.astype(PETSc.IntType), self._S.indices.astype(PETSc.IntType))
+        matrix = PETSc.Mat().createAIJ(
+            self._S.shape, csr=(*arrays, self._S.data), comm=PETSc.COMM_SELF
+        )
+        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, self.symmetric)
+        return matrix
+
+    def solve(self, b: Array) -> Array:
+        """The solution for one right-hand side, refined once."""
+        rhs = self._scale * b
+        x = self._apply(rhs)
+        x += self._apply(rhs - self._S @ x)
+        return np.asarray(self._scale * x)
+
+    def _apply(self, b: Array) -> Array:
+        x = np.empty_like(b)
+        vectors = [PETSc.Vec().createWithArray(values, comm=PETSc.COMM_SELF) for values in (b, x)]
+        self._pc.apply(*vectors)
+        return x
+
+
+def _scale(A: csr_array, rows: Index) -> Array:
+    """Powers of two by which rows and columns are multiplied: Ruiz's iteration."""
+    scale = np.ones(A.shape[0])
+    sizes = np.abs(A.data)
+    for _ in range(SCALINGS):
+        scaled = sizes * scale[rows] * scale[A.indices]
+        largest = np.zeros_like(scale)
+        np.maximum.at(largest, rows, scaled)
+        np.maximum.at(largest, A.indices, scaled)
+        scale /= np.sqrt(np.where(largest > 0, largest, 1.0))
+    return np.asarray(np.exp2(np.round(np.log2(scale))))

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: MIT
+"""Idle motions: those that have no inertia, and that no force resists or drives.
+
+The node where several members meet has no mass of its own.  When all plastic hinges around it have
+lost their strength, any rotation of the node is an equilibrium, and the tangent stiffness is
+singular.  Newton's method then keeps the node where it is: an entry on the diagonal of the tangent
+makes its equation solvable.  Residuals, hence forces, energies and solutions, know nothing of it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import qr
+
+from ufl_beam.arrays import Array, Index
+from ufl_beam.compiled.csr import Csr
+from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.state_io import Memory
+from ufl_beam.solvers.null_vectors import free_matrix, null_vectors
+
+STIFFNESS = 0.01
+"""Stiffness against an idle motion in the tangent, as a part of the largest one in the scene.
+
+A motion that is resisted after all converges the faster, the smaller this is; round-off moves what
+is idle the less, the larger it is.
+"""
+
+DRIVEN = 1e-6
+"""Force, as a part of the forces in the scene, above which a motion is driven, and not idle."""
+
+
+class IdleMotions:
+    """Stiffnesses that the tangent has against idle motions; none until one is found.
+
+    Args:
+        share: The degrees of freedom of this process.
+        A: The tangent.
+        diagonal: Positions of the diagonal in its data.
+        held: Local degrees of freedom that supports hold.
+
+    Attributes:
+        stiffness: At the local degrees of freedom; N/m, N m/rad.
+    """
+
+    def __init__(self, share: Share, A: Csr, diagonal: Index, held: Index) -> None:
+        self._share, self._A, self._diagonal, self._held = share, A, diagonal, held
+        self._turns = np.zeros(share.size, dtype=bool)
+        self._turns[share.rotations()] = True
+        self._owned = np.arange(share.size) < share.num_owned
+        self._owned[share.multipliers()] = False
+        grid = share.grid
+        self._radians = np.full(grid.size, 1 / grid.scene.size)
+        self._radians[np.r_[grid.dofs[:, 2], grid.dofs_of_bodies[:, 2]]] = 1.0
+        self._radians[grid.multipliers] = 0.0
+        self.stiffness: Array = np.zeros(share.size)
+
+    @property
+    def entries(self) -> tuple[Index, Array]:
+        """Positions in the data of the tangent, and what is added there."""
+        here = np.flatnonzero(self.stiffness)
+        return self._diagonal[here].astype(np.int32), self.stiffness[here]
+
+    def find(self, forces: Array, scale: float) -> bool:
+        """Look for idle motions of the latest tangent; all processes call it together.
+
+        Args:
+            forces: Sizes of the latest residual at the local degrees of freedom, moments over the
+                size of the scene; N.
+            scale: Size of the forces in the scene; N.
+
+        Returns:
+            Whether there are any; not if a motion that meets no force is driven.
+        """
+        share = self._share
+        K, free = free_matrix(share, self._A, self._held)
+        if not len(free) or not np.isfinite(K.data).all():
+            return False
+        try:
+            _, vectors = null_vectors(K)
+        except (np.linalg.LinAlgError, RuntimeError):
+            return False
+        motions = self._radians[free, None] * vectors
+        # One degree of freedom of each motion, such that these motions are independent there.
+        pivots = qr(motions.T, mode="r", pivoting=True)[1][: vectors.shape[1]]
+        found = free[pivots[np.abs(motions[pivots]).max(axis=1) > 0.0]]
+        here = np.isin(share.dofs, found)
+        new = here & (self.stiffness == 0.0)
+        driven = here & (forces > DRIVEN * scale)
+        if not share.total(float(new.any())) or share.total(float(driven.any())):
+            return False
+        diagonal = np.abs(self._A.data[self._diagonal])
+        for alike in (self._turns, ~self._turns):
+            stiffest = share.largest(float(diagonal[alike & self._owned].max(initial=0.0)))
+            self.stiffness[new & alike & self._owned] = STIFFNESS * stiffest
+        return True
+
+    def forget(self) -> bool:
+        """Take all stiffnesses away; return whether there were any, on any process."""
+        some = self._share.largest(float(self.stiffness.max(initial=0.0))) > 0.0
+        self.stiffness[:] = 0.0
+        return some
+
+    def remember(self, memory: Memory) -> None:
+        """Pass on the stiffnesses."""
+        self.stiffness[:] = memory.at_dofs("idle motions", self.stiffness)

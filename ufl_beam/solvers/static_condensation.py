@@ -1,0 +1,233 @@
+# SPDX-License-Identifier: MIT
+"""Gauss elimination of what lies between the ends of chains of cells, which needs no other process.
+
+A beam of many cells is a chain of vertices that couple to their two neighbours only.  Each process
+eliminates them from its chains, by blocks, and leaves a small matrix of what remains: joints, ends,
+vertices at the border between processes, whatever else couples to more than two neighbours.  Its
+entries are summed over the processes.
+"""
+
+from __future__ import annotations
+
+from mpi4py import MPI
+
+import numpy as np
+import numpy.typing as npt
+
+from ufl_beam.arrays import Array, Index
+from ufl_beam.compiled.c_library import doubles, ffi, integers, lib
+from ufl_beam.compiled.csr import Csr
+from ufl_beam.discretization.dof_numbering import Share
+
+
+class Chains:
+    """Vertices of the cells of one process that couple to their two neighbours and to nothing else.
+
+    They are found in the structure of the matrix, so they remain right whatever comes to couple.
+
+    Args:
+        cell_dofs: Local degrees of freedom of the cells, see :class:`Share`.
+        A: Matrix with the columns of each row in order.
+        alone: Which local degrees of freedom no other process has; (A.size,).
+
+    Attributes:
+        dofs: Degrees of freedom of the vertices, chain after chain; (num_vertices, 3).
+        first: First vertex of each chain, and the number of vertices.
+        ends: Degrees of freedom of the left and the right end of each chain; (num_chains, 6).
+        spikes: Which chains have a left end, so that all their vertices come to couple to it; the
+            others begin at a vertex with one neighbour, and have their right end twice in ``ends``.
+        order: Where in the rows of a vertex the columns of the vertex before, of itself and of the
+            vertex after stand; (num_vertices, 9).
+    """
+
+    def __init__(self, cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -> None:
+        nodes = cell_dofs.shape[1] // 3
+        start, end = cell_dofs[:, 0::nodes], cell_dofs[:, 1::nodes]
+        # Vertex number k is the one between the cells k and k + 1.
+        around = np.hstack([start[:-1], end[:-1], end[1:]])
+        inside = (end[:-1] == start[1:]).all(axis=1) & (np.diff(np.sort(around)) > 0).all(axis=1)
+        # With nine entries in rows and columns, these nine are all.
+        plain = alone & (np.diff(A.indptr) == 9)
+        plain &= np.bincount(A.indices, minlength=A.size) == 9
+        inside &= plain[end[:-1]].all(axis=1)
+        inside &= _is_first(end[:-1, 0])
+        # Beams side by side may make an end of a chain the middle of another.
+        middle = np.zeros(A.size, dtype=bool)
+        middle[end[:-1][inside]] = True
+        chain, first, last = _runs(inside)
+        ends = np.hstack([start[:-1][first], end[1:][last]])
+        inside[inside] = ~middle[ends].any(axis=1)[chain]
+
+        chain, first, last = _runs(inside)
+        left, middle_, right = start[:-1][first], end[:-1][inside], end[1:][last]
+        before, after = start[:-1][inside], end[1:][inside]
+        # A vertex with six entries has no neighbour but the first or last of its chain.
+        narrow = alone & (np.diff(A.indptr) == 6)
+        narrow &= np.bincount(A.indices, minlength=A.size) == 6
+        dead_left, dead_right = (narrow[dofs].all(axis=1) for dofs in (left, right))
+        backward = dead_right & ~dead_left
+        dead = dead_left | dead_right
+        long = last - first + 1
+        self.first = np.append(0, np.cumsum(long + dead))
+        begin = self.first[:-1]
+        here = np.arange(len(chain)) - np.append(0, np.cumsum(long))[chain]
+        here = np.where(backward[chain], long[chain] - 1 - here, here)
+        place = begin[chain] + dead[chain] + here
+        around = np.empty((self.first[-1], 3, 3), dtype=np.int32)
+        around[place, 1] = middle_
+        around[place, 0] = np.where(backward[chain, None], after, before)
+        around[place, 2] = np.where(backward[chain, None], before, after)
+        around[begin[dead], 0] = A.size + np.arange(3)
+        around[begin[dead], 1] = np.where(backward[:, None], right, left)[dead]
+        around[begin[dead], 2] = around[begin[dead] + 1, 1]
+        right = np.where(backward[:, None], left, right)
+        self.ends = np.hstack([np.where(dead[:, None], right, left), right])
+        self.dofs, self.spikes = around[:, 1], ~dead
+        around = around.reshape(-1, 9)
+        self.order = np.argsort(np.argsort(around, axis=1), axis=1).astype(np.int32)
+
+
+def _is_first(values: Index) -> npt.NDArray[np.bool_]:
+    """Which of the values did not occur before."""
+    first = np.zeros(len(values), dtype=bool)
+    first[np.unique(values, return_index=True)[1]] = True
+    return first
+
+
+def _runs(mask: npt.NDArray[np.bool_]) -> tuple[Index, Index, Index]:
+    """Runs of true values: the run of each of them; first and last position of each run."""
+    edges = np.diff(np.concatenate([[0], mask.astype(np.int8), [0]]))
+    first, last = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+    return np.repeat(np.arange(len(first)), last - first + 1), first, last
+
+
+class Elimination:
+    """Solves with a matrix but for a small one of what cannot be eliminated in chains.
+
+    The call is :meth:`factor`, and for each right-hand side :meth:`reduce`, the solution of the
+    small system by the caller, and :meth:`expand`.  The entries of ``A`` must not change meanwhile.
+    On one process C does the same with :attr:`c`, see newton.c.
+
+    Args:
+        share: Degrees of freedom of this process.
+        A: The matrix; of degrees of freedom that several processes have, a summand on each.
+
+    Attributes:
+        indptr: First entry of each row of the small matrix, which all processes have.
+        indices: Column of each entry.
+        data: Its entries; summed over the processes by :meth:`factor`.
+        f: Right-hand side of the small system, of :meth:`reduce`.
+        c: All of it in C, see loops.h.
+    """
+
+    def __init__(self, share: Share, A: Csr) -> None:
+        self._comm, self._A = share.comm, A
+        chains = Chains(share.cell_dofs, A, self._alone(share))
+        left = np.ones(share.size, dtype=bool)
+        left[chains.dofs] = False
+        here = np.flatnonzero(left)
+        numbers = np.unique(np.concatenate(self._comm.allgather(share.dofs[here])))
+        number = np.full(share.size, -1, dtype=np.int32)
+        number[here] = np.searchsorted(numbers, share.dofs[here])
+        ends = number[chains.ends]
+        entries, *places = self._make_matrix(number, ends, len(numbers))
+        owned = here[here < share.num_owned]
+        self._make_arguments(chains, {
+            "entry": entries, "place": places[0], "places": places[1],
+            "dof": owned, "number": number[owned], "ends": ends,
+        })  # fmt: skip
+
+    @staticmethod
+    def _alone(share: Share) -> npt.NDArray[np.bool_]:
+        ghosts = np.concatenate(share.comm.allgather(share.dofs[share.num_owned :]))
+        return ~np.isin(share.dofs, ghosts)
+
+    def _make_matrix(self, number: Index, ends: Index, size: int) -> tuple[Index, Index, Index]:
+        """Structure of the small matrix, and where its entries come from.
+
+        Args:
+            number: In the small matrix, of each local degree of freedom; -1 of those eliminated.
+            ends: Those of the ends of the chains; (num_chains, 6).
+            size: Of the small matrix.
+
+        Returns:
+            Entries of ``A`` that stay, where they are in :attr:`data`, and where the blocks of the
+            ends of the chains are.
+        """
+        rows, columns, left = self._A.rows(), self._A.indices, number >= 0
+        entries = np.flatnonzero(left[rows] & left[columns])
+        keys = number[rows[entries]].astype(np.int64) * size + number[columns[entries]]
+        of_ends = ends.astype(np.int64).reshape(-1, 2, 3)
+        of_blocks = of_ends[:, :, None, :, None] * size + of_ends[:, None, :, None, :]
+        of_chains = of_blocks.ravel()
+        mine = np.unique(np.concatenate([keys, of_chains]))
+        if self._comm.size > 1:
+            mine = np.unique(np.concatenate(self._comm.allgather(mine)))
+        self.indices = (mine % size).astype(np.int32)
+        self.indptr = np.searchsorted(mine, np.arange(size + 1) * size).astype(np.int32)
+        self.data, self.f = np.zeros(len(mine)), np.zeros(size)
+        return entries, np.searchsorted(mine, keys), np.searchsorted(mine, of_chains)
+
+    def _make_arguments(self, chains: Chains, left: dict[str, Index]) -> None:
+        """Make the data of C: the chains, and the indices of the remaining system, see loops.h."""
+        A = self._A
+        ends = chains.ends.reshape(-1, 2, 3, 1)
+        first, last = (chains.dofs[k] for k in (chains.first[:-1], chains.first[1:] - 1))
+        next_to = np.stack([np.where(chains.spikes[:, None], first, last), last], axis=1)
+        rows, columns = np.broadcast_arrays(ends, next_to[:, :, None, :])
+        vertices = len(chains.dofs)
+        of_integers = {
+            "first": chains.first,
+            "spike": chains.spikes,
+            "row": chains.dofs,
+            "order": chains.order,
+            "from_ends": A.positions(rows.ravel(), columns.ravel()),
+            "indptr": A.indptr,
+            "swaps": np.empty(3 * vertices, np.int32),
+            **left,
+        }
+        of_doubles = {
+            "data": A.data,
+            "pivots": np.empty(9 * vertices),  # sizes as in elimination.c
+            "to_next": np.empty(9 * vertices),
+            "sides": np.empty(18 * vertices if chains.spikes.any() else 0),
+            "f": np.zeros(3 * vertices),
+            "left_data": self.data,
+            "left_f": self.f,
+        }
+        self._alive = {
+            **{k: integers(np.ascontiguousarray(v, np.int32)) for k, v in of_integers.items()},
+            **{k: doubles(v) for k, v in of_doubles.items()},
+        }
+        sizes = {
+            "chains": len(chains.ends),
+            "left": len(self.data),
+            "stay": len(left["entry"]),
+            "rows": len(left["dof"]),
+            "left_size": self.size,
+        }
+        self.c = ffi.new("chains *", {**self._alive, **sizes})
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns of the small system."""
+        return len(self.indptr) - 1
+
+    def factor(self) -> bool:
+        """Eliminate the chains and fill :attr:`data`; whether all of it is finite."""
+        lib.eliminate(self.c)
+        self._sum(self.data)
+        return bool(lib.all_finite(len(self.data), doubles(self.data)))
+
+    def reduce(self, b: Array) -> None:
+        """Fill :attr:`f`; ``b`` at the degrees of freedom owned here."""
+        lib.reduce(self.c, doubles(b))
+        self._sum(self.f)
+
+    def expand(self, small: Array, x: Array) -> None:
+        """The solution at the degrees of freedom owned here, after that of the small system."""
+        lib.expand(self.c, doubles(small), doubles(x))
+
+    def _sum(self, values: Array) -> None:
+        if self._comm.size > 1:
+            self._comm.Allreduce(MPI.IN_PLACE, values)

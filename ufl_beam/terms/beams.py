@@ -1,0 +1,324 @@
+# SPDX-License-Identifier: MIT
+"""Virtual works, one class each: what a scene may contribute to the equation of a step.
+
+A term adds its part of the residual and of the tangent at the end of the step, and says what the
+step did to the energy.  Vectors hold the local degrees of freedom of a process, ghosts included;
+what several processes add to one degree of freedom is summed by the solver.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property, partial
+from typing import Protocol
+
+import numpy as np
+import ufl
+
+from ufl_beam.arrays import Array
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop
+from ufl_beam.compiled.csr import Csr, StepProduct
+from ufl_beam.discretization.compiled_forms import Kernel
+from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.discretization.state_io import Memory
+from ufl_beam.mechanics.kinematics import split, strain
+from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, Step
+from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.tangent_derivatives import CellTangent
+
+KINDS = ("beams", "connectors", "loads", "inertia", "damping")
+"""Kinds of forces."""
+
+
+class Term(Protocol):
+    """A virtual work."""
+
+    kind: str
+    """Kind of its forces, one of :data:`KINDS`."""
+
+    def loops(self) -> tuple[Loop, Loop | None] | None:
+        """Return C functions with data in the place of both methods, or None without them."""
+
+    def begin(self, step: Step) -> None:
+        """Take note of the step that is to be solved."""
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Add the virtual work at ``q1`` to ``r``."""
+
+    def add_tangent(self, q1: Array) -> None:
+        """Add the derivative at ``q1`` to the matrix that the term was made with."""
+
+    def accept(self, q1: Array, s: Array) -> None:
+        """Take the end of the step as the new state, and enter what the step supplied or lost.
+
+        ``s`` is the step of the nodes that the virtual works are works on.
+        """
+
+    def add_state(self, q: Array) -> None:
+        """Enter the energy that the term holds in the accepted state ``q``."""
+
+    def remember(self, memory: Memory, q: Array) -> None:
+        """State what later steps depend on; ``q`` is the configuration of the state."""
+
+
+class Beams(Term, Protocol):
+    """Resultants of cells working on the virtual strains; the residual is an internal force."""
+
+    def change(self, q1: Array) -> float:
+        """Energy that cells of this process store and dissipate in the step to ``q1``; J."""
+
+    def add_tangent_change(self, q1: Array, u: Array) -> None:
+        """Add the derivative of the tangent at ``q1`` along ``u``; no internal variable changes."""
+
+
+class Cells(Beams, Protocol):
+    """Beams whose tangent is known by its works, too, summed over cells from strains."""
+
+    def tangent_work(self, q1: Array, x: Array, y: Array) -> float:
+        """Return the work of the tangent for the motion x on y; J."""
+
+    def work_of_change(self, q1: Array, u: Array, x: Array, y: Array) -> float:
+        """Return the work of the derivative of the tangent along u, for x on y; J."""
+
+
+class OfForms:
+    """A term whose forces and their derivative are two forms on cells."""
+
+    _force: Kernel
+    _tangent: Kernel
+    _A: Csr
+
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """Two forms."""
+        return loop("add_cells", self._force.cells), loop("add_cells", self._tangent.cells)
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Add the forces."""
+        self._force.add(q1, r)
+
+    def add_tangent(self, q1: Array) -> None:
+        """Add their derivative."""
+        self._tangent.add(q1, self._A.data)
+
+
+class OfMatrix:
+    """A term whose forces are a constant matrix times the step of the nodes."""
+
+    _times: StepProduct
+
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """The product, and its derivative."""
+        return self._times.loops()
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Add the forces."""
+        self._times.add_force(q1, r)
+
+    def add_tangent(self, q1: Array) -> None:
+        """Add their derivative."""
+        self._times.add_tangent(q1)
+
+
+class ElasticBeams(OfForms):
+    """Resultants of elastic cells working on the virtual strains, P(12)."""
+
+    kind = "beams"
+
+    def __init__(self, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger) -> None:
+        q0, q1 = fields.configuration(), fields.configuration()
+        w, dx, axis = ufl.TestFunction(fields.space), fields.dx(1), fields.axis
+        C = fields.stiffness()
+        e0, e1 = strain(q0, axis), strain(q1, axis)
+
+        r = scheme.resultants(C, e0, e1, fields.constant)
+        w_e = scheme.virtual_strain(q0, q1, w, axis)
+        stored = sum(C[i] * e1[i] ** 2 / 2 for i in range(3)) * dx  # P(9)
+        losses = [d * dx for d in scheme.losses(C, e0, e1, fields.constant)]
+
+        self._q0, self._q1, self._fields = q0, q1, fields
+        self._work = ufl.dot(r, w_e) * dx
+        self._force, self._tangent = fields.force_and_tangent(self._work, q1, A)  # P(12)
+        self._stored, *self._losses = (fields.hot_kernel(f, q1) for f in (stored, *losses))
+        self._first: Kernel | None = None
+        self._tangents = ffi.new("first_cells *", {"then": self._tangent.cells})
+        if not scheme.dynamic:
+            dq = ufl.TrialFunction(fields.space)
+            before = ufl.as_vector([C[i] * e0[i] for i in range(3)])
+            geometric = ufl.dot(before, ufl.derivative(w_e, q1, dq))
+            material = ufl.dot(ufl.derivative(r, q1, dq), w_e)
+            self._first = fields.kernel((geometric + material) * dx, q1)
+            self._first.place(A)
+            self._tangents.first = self._first.cells
+        self._A, self._ledger = A, ledger
+        if losses:
+            ledger.lost["numerical"] += 0.0
+
+    def begin(self, step: Step) -> None:
+        """Remember the configuration at the beginning."""
+        for kernel in (self._force, *self._losses):
+            kernel.set(self._q0, step.q0)
+        if self._first is not None:
+            self._first.set(self._q0, step.q0)
+            self._tangents.begins = 1
+
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """Two forms."""
+        return loop("add_cells", self._force.cells), loop("add_first_cells", self._tangents)
+
+    def add_tangent(self, q1: Array) -> None:
+        """Add the stiffness, material and geometric.
+
+        Extrapolated displacements strain slender beams by nothing but error; forces from that would
+        send the first iteration of a static step astray, so it takes those before the step.
+        """
+        lib.add_first_cells(self._tangents, doubles(q1), doubles(self._A.data))
+
+    def accept(self, q1: Array, s: Array) -> None:
+        """Enter the energy that the scheme lost."""
+        self._tangents.begins = 0
+        for loss in self._losses:
+            self._ledger.lost["numerical"] += loss.value(q1)
+
+    def add_state(self, q: Array) -> None:
+        """Stored energy."""
+        self._held = self._stored.value(q)
+        self._ledger.state["stored"] += self._held
+
+    def remember(self, memory: Memory, q: Array) -> None:
+        """Nothing to remember: the stored energy follows from the configuration."""
+
+    def change(self, q1: Array) -> float:
+        """Energy that cells of this process store in the step to ``q1``; J."""
+        return self._stored.value(q1) - self._held
+
+    def add_tangent_change(self, q1: Array, u: Array) -> None:
+        """Add the derivative of the tangent at ``q1`` along ``u``."""
+        self._cell_tangent.add_change(q1, u)
+
+    def tangent_work(self, q1: Array, x: Array, y: Array) -> float:
+        """Return the work of the tangent for the motion x on y; J."""
+        return self._cell_tangent.work(q1, x, y)
+
+    def work_of_change(self, q1: Array, u: Array, x: Array, y: Array) -> float:
+        """Return the work of the derivative of the tangent along u, for x on y; J."""
+        return self._cell_tangent.work_of_change(q1, u, x, y)
+
+    @cached_property
+    def _cell_tangent(self) -> CellTangent:
+        kernel = partial(self._fields.kernel, unknown=self._q1)
+        return CellTangent(self._work, self._q1, kernel, self._A)
+
+
+class SectionForces:
+    """(N, V, M) in the cells were they elastic, from the strains of a configuration, P(7)."""
+
+    def __init__(self, fields: Fields) -> None:
+        q = fields.configuration()
+        C, e = fields.stiffness(), strain(q, fields.axis)
+        z = ufl.TestFunction(C.function_space)
+        mean = sum(C[i] * e[i] * z[i] for i in range(3)) / fields.axis.h  # P(7)
+        self._kernel = fields.kernel(mean * fields.dx(1), q)
+        self._order = fields.order
+
+    def write(self, q: Array, resultants: Array) -> None:
+        """Resultants at ``q`` into the rows of the cells, in the order of the share; N, N, N m."""
+        values = np.zeros(3 * len(self._order))
+        self._kernel.add(np.ascontiguousarray(q), values)
+        resultants[self._order] = values.reshape(-1, 3)
+
+
+def mass_matrix(fields: Fields) -> Csr:
+    """Mass of the beams, the point masses and the bodies."""
+    share = fields.share
+    (u, ψ), (w_u, w_ψ) = (split(f(fields.space)) for f in (ufl.TrialFunction, ufl.TestFunction))
+    ρ = fields.inertia()
+    M = fields.matrix()
+    work = (ρ[0] * ufl.dot(u, w_u) + ρ[1] * ψ * w_ψ) * fields.dx_of_mass()  # P(67)
+    kernel = fields.kernel(work, fields.configuration())
+    kernel.place(M)
+    kernel.add(np.zeros(share.size), M.data)
+    scene = share.grid.scene
+    lumps = [(share.at(one.place), one.mass, one.inertia) for one in scene.masses]
+    lumps += [(share.at(one.middle), one.mass, one.inertia) for one in scene.bodies]
+    for dofs, mass, inertia in lumps:
+        mine = share.owns(dofs)
+        here = share.local(dofs[mine])
+        M.data[M.positions(here, here)] += np.array([mass, mass, inertia])[mine]
+    return M
+
+
+class Inertia(OfMatrix):
+    """Consistent inertia of the beams and inertia of point masses: a constant matrix, P(18).
+
+    Attributes:
+        v: Velocities at the end of the last accepted step.
+        v_before: Those at its beginning.
+        more: What the scheme keeps besides; empty before the first step.
+        last_dt: Length of the last accepted step; s.
+        scheme: The time scheme.
+    """
+
+    kind = "inertia"
+
+    def __init__(
+        self, fields: Fields, scheme: DynamicScheme, A: Csr, ledger: Ledger, v: Array
+    ) -> None:
+        rotations = scheme.half_tangents(fields.share.rotations())
+        self._times = StepProduct(mass_matrix(fields), rotations, A)
+        self._ledger = ledger
+        if scheme.slips:
+            ledger.lost["numerical"] += 0.0
+        self.scheme = scheme
+        self.v = self.v_before = v
+        self.more: tuple[Array, ...] = ()
+        self._dt = self.last_dt = math.inf
+
+    @property
+    def M(self) -> Csr:
+        """The mass matrix; a new one."""
+        return self._times.matrix()
+
+    def begin(self, step: Step) -> None:
+        """Prepare what stays constant in the step."""
+        self._dt = step.dt
+        self._times.begin(step.q0, *self.scheme.inertia(step.dt, self))
+
+    def carry_on(self, memory: Memory, known: int) -> None:
+        """State what the scheme keeps besides the velocities, as much as is ``known`` of it."""
+        more = self.more or (self.v,) * known
+        self.more = tuple(map(memory.at_dofs, self.scheme.kept[:known], more))
+
+    def velocities(self, s: Array) -> Array:
+        """Velocities at the end of a step ``s`` of the nodes."""
+        return self.scheme.rates(self._dt, s, self)[0]
+
+    @property
+    def ready(self) -> bool:
+        """True if a step can begin: of what the scheme keeps something is known."""
+        return not self.scheme.kept or bool(self.more)
+
+    def prepare(self, s: Array) -> None:
+        """Take from a trial step ``s`` what the scheme keeps besides the velocities."""
+        _, *more = self.scheme.rates(self._dt, s, self)
+        self.more = tuple(more)
+
+    def accept(self, q1: Array, s: Array) -> None:
+        """New velocities, and what the scheme lost."""
+        v, *more = self.scheme.rates(self._dt, s, self)
+        if self.scheme.slips:
+            change = v - self.v
+            momentum = self._times(change)
+            lost = self.scheme.slip(self._dt, change, self) @ momentum
+            self._ledger.lost["numerical"] += float(lost)
+        self.v_before, self.v, self.more, self.last_dt = self.v, v, tuple(more), self._dt
+
+    def add_state(self, q: Array) -> None:
+        """Kinetic energy."""
+        self._ledger.state["kinetic"] += self._times.square(self.v) / 2  # P(18)
+
+    def remember(self, memory: Memory, q: Array) -> None:
+        """The velocities."""
+        self.v = memory.at_dofs("velocity", self.v)
+        self.v_before = memory.at_dofs("velocity before", self.v_before)
+        self.last_dt = memory.number("step of velocity", self.last_dt)
+        self.carry_on(memory, int(memory.number("further rates", len(self.more))))

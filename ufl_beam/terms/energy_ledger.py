@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: MIT
+"""The ledger: every joule that is in the scene, came in, or went out."""
+
+from __future__ import annotations
+
+import sys
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+
+EXPLAINED = 0.1
+"""Part of an imbalance from which on an estimate of round-off explains it."""
+
+NOTHING_HELD = 1e-3
+"""Part of the works up to which what the scene held and lost shows that they were round-off."""
+
+
+@dataclass
+class Ledger:
+    """Energies of one process at one time; terms write into it when a step is accepted.
+
+    Terms make their entries when they are made, so that all processes know the same ones.
+
+    Attributes:
+        state: Energies that depend on the state: kinetic, stored; J.
+        supplied: Work that came in since the beginning, by source; J.
+        lost: Energy that went out since the beginning, by sink; never negative; J.
+    """
+
+    state: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
+    supplied: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
+    lost: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
+
+    def size(self) -> float:
+        """Sum of the sizes of all entries; J."""
+        entries = (*self.state.values(), *self.supplied.values(), *self.lost.values())
+        return sum(map(abs, entries))
+
+    def begin(self) -> None:
+        """Forget the state; what was supplied and lost remains."""
+        for name in self.state:
+            self.state[name] = 0.0
+
+
+class Entries(dict[str, Array]):
+    """Entries of a part of the ledger by name; a missing one is explained."""
+
+    def __init__(self, entries: dict[str, Array], known: Sequence[str]) -> None:
+        super().__init__(entries)
+        self._known = tuple(known)
+
+    def __missing__(self, name: str) -> Array:
+        raise KeyError(
+            f"the ledger has no entry {name!r} here: the scene has nothing that makes it. "
+            f"Entries: {', '.join(map(repr, self._known)) or 'none'}"
+        )
+
+
+@dataclass(frozen=True)
+class Energy:
+    """The ledger of a run.
+
+    Attributes:
+        state: Arrays by name, "kinetic" and "stored"; each (n+1,); J.
+        supplied: Work since the beginning, by source: "loads", "supports"; each (n+1,); J.
+        lost: Energy that went out since the beginning, by sink: "numerical", ...; each (n+1,); J.
+    """
+
+    state: dict[str, Array]
+    supplied: dict[str, Array]
+    lost: dict[str, Array]
+
+    def __post_init__(self) -> None:
+        names = [*self.state, *self.supplied, *self.lost]
+        for part in ("state", "supplied", "lost"):
+            object.__setattr__(self, part, Entries(getattr(self, part), names))
+
+    def __getitem__(self, name: str) -> Array:
+        """Entry ``name``; (n+1,); J.  Entries of effects that the scene lacks do not exist."""
+        parts = (self.state, self.supplied, self.lost)
+        return next((part for part in parts if name in part), self.state)[name]
+
+    @property
+    def total(self) -> Array:
+        """Energy in the scene; (n+1,); J."""
+        return _sum(self.state)
+
+    @property
+    def imbalance(self) -> Array:
+        """Energy that the ledger does not account for; (n+1,); J."""
+        total = self.total
+        return np.asarray(total - total[0] - _sum(self.supplied) + _sum(self.lost))
+
+    @property
+    def throughput(self) -> float:
+        """Energy that went through: the most that the scene held, and all work on or by it; J."""
+        works = sum(float(np.sum(np.abs(np.diff(work)))) for work in self.supplied.values())
+        return float(np.max(self.total)) + works
+
+    @property
+    def worst(self) -> float:
+        """Largest imbalance, as a part of the energy that went through."""
+        largest = float(np.max(np.abs(self.imbalance)))
+        return largest / self.throughput if self.throughput > 0 else largest
+
+    def opened(self, claimed: float, round_off: float) -> str:
+        """Describe how far the ledger is open; empty if it closes as claimed.
+
+        Args:
+            claimed: Largest imbalance that the scheme and the solver claim, as a part of the
+                energy that went through.
+            round_off: Estimate of the energy that the last digits of the unknowns make; J.
+        """
+        # Squares of the least numbers have lost their digits.
+        if not self.throughput > sys.float_info.min / sys.float_info.epsilon:
+            return ""
+        if self.worst <= claimed:
+            return ""
+        part = round_off / self.throughput
+        held = float(np.max(self.total)) + sum(float(lost[-1]) for lost in self.lost.values())
+        if part >= 1.0 and held <= NOTHING_HELD * self.throughput:
+            return ""  # all works are round-off, as where supports turn a scene as a whole
+        said = (
+            f"the energy ledger is open by {self.worst:.1e} of the energy that went through, and "
+            f"the scheme claims {claimed:.0e}: "
+        )
+        if part >= EXPLAINED * self.worst:
+            return said + (
+                f"round-off is estimated at {part:.1e}, the last digits of positions times the "
+                "largest stiffness; less stiffness of what hardly deforms, or fewer cells, close it"
+            )
+        return said + (
+            f"round-off is estimated at {part:.1e} and does not explain it; a smaller rtol of "
+            "Newton may, or a force that the ledger does not know"
+        )
+
+    def __str__(self) -> str:
+        lines = [
+            f"  {kind:9s} {name:12s} {values[-1]: .6e} J"
+            for kind, entries in (
+                ("in scene", self.state),
+                ("supplied", self.supplied),
+                ("lost", self.lost),
+            )
+            for name, values in entries.items()
+        ]
+        lines.append(f"  imbalance at most {self.worst:.1e} of {self.throughput:.6e} J throughput")
+        return "\n".join(["energy at the end", *lines])
+
+
+def _sum(entries: dict[str, Array]) -> Array:
+    return np.asarray(sum(entries.values(), np.zeros(1)))

@@ -1,0 +1,265 @@
+# SPDX-License-Identifier: MIT
+"""Cells whose material yields, flows or breaks: the return map between strains and virtual work."""
+
+from __future__ import annotations
+
+from functools import cached_property, partial
+
+import numpy as np
+import ufl
+
+from ufl_beam.arrays import Array, Index
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop
+from ufl_beam.compiled.csr import Csr
+from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.discretization.state_io import Memory
+from ufl_beam.errors import SceneError
+from ufl_beam.mechanics.kinematics import strain
+from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.model.material_laws import Layout
+from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.material_points import INPUTS, Course, Points
+from ufl_beam.terms.tangent_derivatives import CellTangent
+
+
+def inelastic_cells(grid: Grid) -> list[tuple[Layout, Index]]:
+    """Layouts of material points, and the cells (numbers of the grid) that have them.
+
+    Raises:
+        SceneError: There are some, and cells have a higher degree than 1.
+    """
+    groups: dict[Layout, list[int]] = {}
+    layouts: dict[object, Layout | None] = {}
+    for beam in grid.scene.beams:
+        laws = grid.hinges(beam)
+        for cell, softening in zip(grid.cells_of(beam), laws, strict=True):
+            key = (beam.section, softening)
+            if key not in layouts:
+                layouts[key] = beam.section.layout(softening)
+            layout = layouts[key]
+            if layout is not None and not layout.elastic:
+                if grid.mesh.degree > 1:
+                    raise SceneError(
+                        f"Mesh: degree = {grid.mesh.degree} is for elastic beams, and {beam.name} "
+                        "may yield or break; use degree=1 with more cells, or an elastic section"
+                    )
+                groups.setdefault(layout, []).append(int(cell))
+    return [(layout, np.array(cells)) for layout, cells in groups.items()]
+
+
+class Strains:
+    """(Σ, Γ, K) in the points of the cells of some fields.
+
+    Attributes:
+        kernel: Strains times the weights of the points.
+        shape: Cells, and three times the points in each.
+    """
+
+    def __init__(self, fields: Fields) -> None:
+        q = fields.configuration()
+        z = ufl.TestFunction(fields.at_points(3).function_space)
+        weighted = ufl.dot(strain(q, fields.axis), z) / fields.axis.h
+        self.kernel = fields.hot_kernel(weighted * fields.dx(1), q)
+        self._weights = np.repeat(fields.share.grid.mesh.point_weights, 3)
+        self.shape = (len(fields.order), len(self._weights))
+
+    def __call__(self, q: Array) -> Array:
+        """Strains at ``q``, in the order of the mesh, point after point; 1, 1, 1/m."""
+        return self._weighted(q) / self._weights
+
+    def mean(self, q: Array) -> Array:
+        """Means of the cells at ``q``, in the order of the mesh; (num_cells, 3); 1, 1, 1/m."""
+        in_points = self._weighted(q).reshape(self.shape[0], self.shape[1] // 3, 3)
+        return np.asarray(in_points.sum(axis=1))
+
+    def _weighted(self, q: Array) -> Array:
+        strains = np.zeros(self.shape)
+        self.kernel.add(q, strains)
+        return strains
+
+
+class InelasticBeams:
+    """Resultants of cells with material points, working on the virtual strains.
+
+    The points answer the strains of an iterate with resultants r and their derivatives D; around
+    it resultants are b + D e, linear in the strains e, from which UFL derives the tangent,
+    material and geometric.
+    """
+
+    kind = "beams"
+
+    def __init__(
+        self,
+        fields: Fields,
+        layout: Layout,
+        scheme: Scheme,
+        A: Csr,
+        ledger: Ledger,
+        course: Course,
+    ) -> None:
+        self._layout, self._scheme, self._A, self._ledger = layout, scheme, A, ledger
+        self._order = fields.order
+        self._cells = fields.share.cells[fields.order]
+        self._strains = Strains(fields)
+        cells, n = len(fields.order), len(layout.weights)
+        # Internal variables and numbers of the points: one function in their quadrature space.
+        self._variables = fields.at_points(n * len(INPUTS))
+        self.points = Points(
+            layout,
+            fields.share.grid.keys(self._cells),
+            fields.share.cell_lengths()[fields.order],
+            scheme,
+            self._variables.x.array.reshape(cells, n, len(INPUTS)),
+            course,
+        )
+
+        q0, q1 = fields.configuration(), fields.configuration()
+        r, b, D = fields.at_points(3), fields.at_points(3), fields.at_points(3, 3)
+        w, axis = ufl.TestFunction(fields.space), fields.axis
+        w_e, dx = scheme.virtual_strain(q0, q1, w, axis), fields.dx(1)
+        around = ufl.dot(b + ufl.dot(D, strain(q1, axis)), w_e) * dx
+        derivative = ufl.derivative(around, q1, ufl.TrialFunction(fields.space))
+        self._q0, self._q1, self._b, self._D = q0, q1, b, D
+        self._fields, self._around = fields, around
+        self._force, self._tangent = (
+            fields.hot_kernel(form, q1)
+            for form in (ufl.dot(r, w_e) * dx, derivative)  # P(34)
+        )
+        self._tangent.place(A)
+        self._latest: Array = np.full(fields.share.size, np.nan)
+        self._in_c = c = ffi.new("inelastic *")
+        c.points, c.strains = self.points.points, self._strains.kernel.cells
+        c.force, c.tangent = self._force.cells, self._tangent.cells
+        c.at_r, c.at_b, c.at_D = self._force.position(r), *map(self._tangent.position, (b, D))
+        self._at_latest = doubles(self._latest)
+        c.size, c.latest = len(self._latest), self._at_latest
+        self._q: Array = np.empty(0)
+
+    # -- the step ------------------------------------------------------------------------------
+
+    def begin(self, step: Step) -> None:
+        """Remember the strains at the beginning."""
+        self._force.set(self._q0, step.q0)
+        self._tangent.set(self._q0, step.q0)
+        if step.q0 is not self._q:
+            self._q = step.q0
+            self.points.start(self._strains(step.q0))
+        self.points.begin(step.dt)
+        self._latest.fill(np.nan)
+        self._in_c.begins = not self._scheme.dynamic
+
+    def _respond(self, q1: Array) -> None:
+        """Resultants at ``q1``, and their derivatives."""
+        lib.respond_at(self._in_c, doubles(q1))
+
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """The points, and two forms."""
+        functions = ("add_inelastic_force", "add_inelastic_tangent")
+        return loop(functions[0], self._in_c), loop(functions[1], self._in_c)
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Add the internal forces."""
+        lib.add_inelastic_force(self._in_c, doubles(q1), doubles(r))
+
+    def add_tangent(self, q1: Array) -> None:
+        """Add the stiffness, material and geometric; see :class:`ElasticBeams`."""
+        lib.add_inelastic_tangent(self._in_c, doubles(q1), doubles(self._A.data))
+
+    def change(self, q1: Array) -> float:
+        """Energy that cells of this process store and dissipate in the step to ``q1``; J."""
+        self._respond(q1)
+        return self.points.change()
+
+    def dissipation(self, q1: Array) -> float:
+        """Energy that cells of this process dissipate in the step to ``q1``; J."""
+        self._respond(q1)
+        return self.points.dissipation()
+
+    def add_tangent_change(self, q1: Array, u: Array) -> None:
+        """Add the derivative of the tangent at ``q1`` along ``u``; points go on as they answer."""
+        self._cell_tangent_at(q1).add_change(q1, u)
+
+    def tangent_work(self, q1: Array, x: Array, y: Array) -> float:
+        """Return the work of the tangent for the motion x on y; J."""
+        return self._cell_tangent_at(q1).work(q1, x, y)
+
+    def work_of_change(self, q1: Array, u: Array, x: Array, y: Array) -> float:
+        """Return the work of the derivative of the tangent along u, for x on y; J."""
+        return self._cell_tangent_at(q1).work_of_change(q1, u, x, y)
+
+    def _cell_tangent_at(self, q1: Array) -> CellTangent:
+        strains = self._strains(q1)
+        r, D = self.points.respond(strains)
+        self._latest.fill(np.nan)
+        around = r - np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), strains)
+        self._cell_tangent.put(self._b, around)
+        self._cell_tangent.put(self._D, D)
+        return self._cell_tangent
+
+    @cached_property
+    def _cell_tangent(self) -> CellTangent:
+        kernel = partial(self._fields.kernel, unknown=self._q1)
+        return CellTangent(self._around, self._q1, kernel, self._A)
+
+    # -- see openings.py -----------------------------------------------------------------------
+
+    @property
+    def excess(self) -> float:
+        """Largest excess of a held point over its limit, as a part of it."""
+        return self.points.excess
+
+    def release(self, least: float) -> None:
+        """Let held points open whose excess is so large."""
+        self.points.release(least)
+        self._latest.fill(np.nan)
+
+    def hold(self) -> None:
+        """Take back :meth:`release`."""
+        self.points.hold()
+
+    def freeze(self) -> None:
+        """From now on nothing yields or opens further."""
+        self.points.freeze()
+
+    # -- the state -----------------------------------------------------------------------------
+
+    def accept(self, q1: Array, s: Array) -> None:
+        """Commit the internal variables."""
+        self._respond(q1)
+        self.points.accept()
+        self._q = q1
+        self.points.enter_losses(self._ledger)
+
+    def add_state(self, q: Array) -> None:
+        """Stored energy."""
+        if q is not self._q:
+            self._q = q
+            strains = self._strains(q)
+            self.points.start(strains)
+            self.points.refresh(strains)
+        self.points.enter_stored(self._ledger)
+
+    def remember(self, memory: Memory, q: Array) -> None:
+        """Internal variables."""
+        self.restore(self._cells, memory.rows("cells", *self.state()))
+        self._q = q
+
+    # -- what solutions keep -------------------------------------------------------------------
+
+    def kept(self) -> tuple[Index, Array]:
+        """Cells (numbers of the grid), and :attr:`Points.kept` of them; (num_cells, 6)."""
+        rows = self.points.kept.copy()
+        if not self._layout.hinges:
+            rows[:, 3] = 0.0
+        return self._cells, rows
+
+    def state(self) -> tuple[Index, Array]:
+        """Cells (numbers of the grid), and their internal variables; (num_cells, k)."""
+        return self._cells, self.points.state()
+
+    def restore(self, cells: Index, rows: Array) -> None:
+        """Take over internal variables, of those cells that are here too."""
+        _, here, there = np.intersect1d(self._cells, cells, return_indices=True)
+        if len(here):
+            self.points.restore(here, rows[there])

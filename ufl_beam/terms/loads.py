@@ -1,0 +1,254 @@
+# SPDX-License-Identifier: MIT
+"""Terms of the loads: their forces, tangents and works."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import singledispatch
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ufl_beam.arrays import Array
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, loop
+from ufl_beam.compiled.csr import Csr
+from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.state_io import Memory
+from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.model.bodies import carries
+from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, value_at
+from ufl_beam.terms.energy_ledger import Ledger
+
+
+class DeadLoads:
+    """Forces and moments that keep their direction: vectors times functions of time.
+
+    Args:
+        loads: What acts; all but follower loads.
+        share: The degrees of freedom of this process.
+        scheme: Says which forces do the work of a step.
+        ledger: Takes their work.
+
+    Attributes:
+        force: The loads in the equation of the step.
+    """
+
+    kind = "loads"
+
+    def __init__(self, loads: Sequence[Load], share: Share, scheme: Scheme, ledger: Ledger) -> None:
+        # Loads of one time function are one vector; functions need not be hashable.
+        vectors: dict[int, tuple[Load, Array]] = {}
+        for load in loads:
+            _, vector = vectors.setdefault(id(load.time), (load, np.zeros(share.size)))
+            vector += _forces(load, share)
+        self._vectors = list(vectors.values())
+        self._acting, self._ledger = scheme.acting, ledger
+        ledger.supplied["loads"] += 0.0
+        self.force: Array = np.zeros(share.size)
+        self._before: Array = self.force
+        self._end: Array = self.force
+        self._in_c = ffi.new("vector *", {"size": share.size})
+        self._factors: list[float] = []
+
+    def begin(self, step: Step) -> None:
+        """The loads of the step; nothing is to do for those that stay."""
+        factors = self._factors_at(step.load_time)
+        if factors == self._factors and step.toward == step.at == 1:
+            return
+        self.force = self._end = self._times(factors)
+        self._factors = factors
+        if step.toward < 1 or step.at < 1:
+            change = step.toward * (self._end - self._before)
+            self._end = self._before + change
+            self.force = self._end if step.at == 1 else self._before + step.at * change
+            self._factors = []
+        self._values = self._in_c.values = doubles(self.force)
+
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """A vector."""
+        return loop("subtract_vector", self._in_c), None
+
+    def carry_on(self, t: float, q: Array) -> Array:
+        """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them."""
+        self._before = self._times(self._factors_at(t))
+        return self._before
+
+    def _factors_at(self, t: float) -> list[float]:
+        """Factors of the vectors; a vector belongs to its first load for messages."""
+        return [value_at(load.time, t, load) for load, _ in self._vectors]
+
+    def _times(self, factors: list[float]) -> Array:
+        (_, vector), *others = self._vectors
+        force = factors[0] * vector
+        for factor, (_, vector) in zip(factors[1:], others, strict=True):
+            force += factor * vector
+        return force
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Subtract the loads."""
+        r -= self.force
+
+    def add_tangent(self, q1: Array) -> None:
+        """Dead loads do not depend on the configuration."""
+
+    def accept(self, q1: Array, s: Array) -> None:
+        """Work of the loads."""
+        if any(self._factors) or self._before is not self.force:
+            self._ledger.supplied["loads"] += float(self._acting(self._before, self.force) @ s)
+            self._before = self._end
+
+    def add_state(self, q: Array) -> None:
+        """Loads hold no energy; what a potential would hold is in their work."""
+
+    def remember(self, memory: Memory, q: Array) -> None:
+        """The forces at the end of the last step."""
+        self.force = self._end = self._before = memory.added("dead loads", self._before)
+        self._factors = []
+
+
+class FollowerLoads:
+    """Forces that turn with the cross-section they act on.
+
+    Args:
+        loads: What acts.
+        share: The degrees of freedom of this process.
+        scheme: Says where in the step loads act, and which forces do the work of a step.
+        ledger: Takes their work.
+        A: Matrix that takes the tangent.
+
+    Attributes:
+        force: The loads in the latest residual.
+    """
+
+    kind = "loads"
+
+    def __init__(
+        self,
+        loads: Sequence[FollowerLoad],
+        share: Share,
+        scheme: Scheme,
+        ledger: Ledger,
+        A: Csr,
+    ) -> None:
+        here = [i for i, load in enumerate(loads) if share.computes(load.place)]
+        self._numbers, mine = np.array(here, dtype=np.int64), [loads[i] for i in here]
+        dofs = np.array([share.local(share.at(load.place)) for load in mine], dtype=np.int64)
+        self._dofs = dofs.reshape(-1, 3)
+        self._forces = np.array([[*load.force, load.moment] for load in mine]).reshape(-1, 3)
+        self._loads = mine
+        x, y, turn = self._dofs.T
+        self._entries = np.array([A.positions(x, turn), A.positions(y, turn)])
+        self._A = A
+        self._weight = scheme.load_weight
+        self._sizes_before: Array = np.zeros_like(self._forces)
+        self._acting, self._ledger = scheme.acting, ledger
+        ledger.supplied["loads"] += 0.0
+        self.force: Array = np.zeros(share.size)
+        self._before: Array = self.force
+
+    def begin(self, step: Step) -> None:
+        """The size of the loads in the step."""
+        before, target = self._sizes_before, self._sizes_at(step.load_time)
+        self._sizes_at_end = before + step.toward * (target - before)
+        self._sizes = before + step.at * (self._sizes_at_end - before)
+        self._ψ0 = step.q0[self._dofs[:, 2]]
+
+    def carry_on(self, t: float, q: Array) -> Array:
+        """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them."""
+        self._sizes_before = self._sizes = self._sizes_at(t)
+        self._ψ0 = q[self._dofs[:, 2]]
+        self.force = self._before = self._in_plane(q)
+        return self.force
+
+    def _sizes_at(self, t: float) -> Array:
+        factors = np.array([value_at(load.time, t, load) for load in self._loads])
+        return np.asarray(self._forces * factors.reshape(-1, 1))
+
+    def _in_plane(self, q: Array) -> Array:
+        """Nodal forces at ``q``."""
+        force = np.zeros_like(q)
+        x, y = self._turned(q)
+        np.add.at(force, self._dofs, np.column_stack([x, y, self._sizes[:, 2]]))
+        return force
+
+    def _turned(self, q1: Array) -> tuple[Array, Array]:
+        """The forces in the plane, each (number of loads,)."""
+        ψ = self._ψ0 + self._weight * (q1[self._dofs[:, 2]] - self._ψ0)
+        cos, sin = np.cos(ψ), np.sin(ψ)
+        x, y = self._sizes[:, 0], self._sizes[:, 1]
+        return cos * x - sin * y, sin * x + cos * y
+
+    def loops(self) -> None:
+        """None."""
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Subtract the loads."""
+        self.force = self._in_plane(q1)
+        r -= self.force
+
+    def add_tangent(self, q1: Array) -> None:
+        """Subtract the derivative by the rotation."""
+        x, y = self._turned(q1)
+        np.add.at(self._A.data, self._entries[0], self._weight * y)
+        np.add.at(self._A.data, self._entries[1], -self._weight * x)
+
+    def accept(self, q1: Array, s: Array) -> None:
+        """Work of the loads."""
+        self._ledger.supplied["loads"] += float(self._acting(self._before, self.force) @ s)
+        self._before, self._sizes_before = self.force, self._sizes_at_end
+
+    def add_state(self, q: Array) -> None:
+        """Loads hold no energy; what a potential would hold is in their work."""
+
+    def remember(self, memory: Memory, q: Array) -> None:
+        """The forces in the equation of the last step."""
+        self.force = self._before = memory.added("follower loads", self._before)
+        sizes = memory.rows("follower loads", self._numbers, self._sizes_before)
+        self._sizes = self._sizes_before = sizes
+
+
+@singledispatch
+def _forces(load: Load, share: Share) -> Array:
+    """Nodal forces of a dead load with factor one, consistent with the displacements of cells."""
+    raise TypeError(f"{type(load).__name__} is not a dead load")
+
+
+@_forces.register
+def _(load: PointLoad, share: Share) -> Array:
+    forces = np.zeros(share.size)
+    if not carries(load.place):
+        return forces  # Scene.links has connectors for it
+    dofs = share.at(load.place)
+    mine = share.owns(dofs)
+    forces[share.local(dofs[mine])] = np.array([*load.force, load.moment])[mine]
+    return forces
+
+
+@_forces.register
+def _(load: LineLoad, share: Share) -> Array:
+    here = [beam is load.beam for beam in share.grid.scene.beams]
+    return _along_beams(np.outer(here, [*load.force, load.moment]), share)
+
+
+@_forces.register
+def _(load: Gravity, share: Share) -> Array:
+    scene = share.grid.scene
+    rhoA = [beam.section.rhoA for beam in scene.beams]
+    forces = _along_beams(np.outer(rhoA, [*load.acceleration, 0.0]), share)
+    heavy = [(one.place, one.mass) for one in scene.masses]
+    heavy += [(one.middle, one.mass) for one in scene.bodies]
+    for place, mass in heavy:
+        g_x, g_y = load.acceleration
+        forces += _forces(PointLoad(place, force=(mass * g_x, mass * g_y)), share)
+    return forces
+
+
+def _along_beams(per_beam: npt.NDArray[Any], share: Share) -> Array:
+    """Nodal forces of line loads (num_beams, 3): two nodes of a cell bear a half of it each."""
+    grid = share.grid
+    loads = per_beam[grid.beam_of_cell[share.cells]] * share.cell_lengths()[:, None]
+    first, *between, last = grid.mesh.parts
+    forces = np.zeros(share.size)
+    np.add.at(forces, share.cell_dofs, np.kron(loads, [first, last, *between]))
+    return forces

@@ -1,0 +1,376 @@
+# SPDX-License-Identifier: MIT
+"""Material points: the return map of many at once, compiled from the statement of the laws.
+
+The laws are traced with UFL symbols: UFL derives the consistent tangents, by the implicit function
+theorem where a discontinuity opens, FFCx compiles them, and a loop in C goes over the points.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import ufl
+from ufl.conditional import Condition
+from ufl.core.expr import Expr
+
+from ufl_beam.arrays import Array, Index
+from ufl_beam.compiled.c_library import doubles, ffi, integers, lib
+from ufl_beam.discretization.compiled_functions import Pointwise
+from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.model import material_laws
+from ufl_beam.model.material_laws import Bulk, Layout, Softening
+from ufl_beam.terms.energy_ledger import Ledger
+
+material_laws.where.register(Condition, ufl.conditional)
+material_laws.below.register(Expr, ufl.lt)
+material_laws.exp.register(Expr, ufl.exp)
+
+INPUTS = (
+    # what an iterate changes: strain at the end, growth of the opening and its direction
+    *("strain", "growth", "direction"),
+    # the state at t_n: resistance, strain, plastic strain and its sum, jump and its sum
+    *("traction", "before", "p", "ξ", "jump", "opening"),
+    # 1 if the opening grew in the last step, 2 if it may in this one, else 0
+    "flows",
+    # numbers of the point; the order of these so far is that of loops.c
+    *("C", "length", "θ", "dt", "limit", "H", "B", "eta", "softening limit", "softening energy"),
+)
+"""Inputs of the law of a point, in the order of their storage."""
+
+SPENT, NOTHING = 1e-6, 1e-30
+"""Part of its limit below which an open hinge counts as a joint; factor of its stiffness then."""
+
+STATE = ("p", "ξ", "jump", "opening", "before", "traction", "flows")
+"""The internal variables, and what else of an accepted state the next step depends on."""
+
+
+def expect_entries(layout: Layout, scheme: Scheme, ledger: Ledger) -> None:
+    """Make the entries of the ledger that points of a layout write, on whatever process."""
+    if layout.yields:
+        ledger.state["hardening"] += 0.0
+        ledger.lost["plastic"] += 0.0
+    if layout.softening is not None:
+        ledger.lost["hinges"] += 0.0
+    if scheme.loss or (layout.softening is not None and scheme.theta < 1):
+        # In the middle of a step no stress is left in what has broken, but perhaps at its ends.
+        ledger.lost["numerical"] += 0.0
+
+
+class PointForms:
+    """Compiled laws: C functions from the inputs of a point to what the loops need.
+
+    Args:
+        softening: Law of the discontinuities, if points can break; its numbers do not matter.
+        scheme: The time scheme.
+
+    Attributes:
+        bulk: Stress of a point that does not open, and its derivative.
+        opening: The same of a point that opens, its growth being known.
+        excess: What the bulk bears more than the discontinuity resists, and its derivative by the
+            growth.
+        end: What the end of the step brings; the order is that of loops.c.
+    """
+
+    def __init__(self, softening: Softening | None, scheme: Scheme) -> None:
+        self._pointwise = pointwise = Pointwise(INPUTS)
+        at = pointwise.at
+        strain, a = ufl.variable(at["strain"]), ufl.variable(at["growth"])
+        s, p, ξ, length, θ, dt = (at[n] for n in ("direction", "p", "ξ", "length", "θ", "dt"))
+        bulk = Bulk(at["C"], at["limit"], at["H"], at["B"], at["eta"])
+
+        # The incompatible mode: a jump relaxes the strain of the bulk by jump over length.
+        relieved = at["jump"] / length
+        e = (1 - θ) * at["before"] + θ * strain - (relieved + θ * s * a / length)  # P(30)
+        dp = bulk.flow(e, p, ξ, θ, dt)
+        σ = bulk.stress(e, p + θ * dp)
+        self.bulk = pointwise.compile(σ, ufl.diff(σ, strain))
+
+        e0, e1 = at["before"] - relieved - p, strain - (relieved + s * a / length) - p - dp
+        broken, traction = 0 * a, 0 * a
+        self.opening = self.excess = ffi.NULL
+        if softening is not None:
+            law = softening.of(at["softening limit"], at["softening energy"])
+            resistance = scheme.resistance(law, at["opening"], a)
+            excess = s * σ - resistance  # P(32), its second equation
+            growth_by_strain = -ufl.diff(excess, strain) / ufl.diff(excess, a)
+            tangent = ufl.diff(σ, strain) + ufl.diff(σ, a) * growth_by_strain  # P(76)
+            self.opening = pointwise.compile(σ, tangent)
+            self.excess = pointwise.compile(excess, ufl.diff(excess, a))
+            broken = a * law.mean_traction(at["opening"], a)
+            traction = law.traction(at["opening"] + a)
+        self.end = pointwise.compile(
+            dp,
+            bulk.dissipation(dp, dt),
+            broken,
+            bulk.elastic_energy(e1 - e0) + bulk.hardening_energy(dp, dp),
+            bulk.elastic_energy(e1),
+            bulk.hardening_energy(p + dp, ξ + abs(dp)),
+            bulk.stress(e1, 0),
+            traction,
+        )
+
+
+OPENED, RELIEF, HOLD, OVER = range(4)
+"""Entries of :attr:`Course.flags`; the order in loops.c."""
+
+RELEASED = 2.0
+"""Value of "flows" of a point that may open in this step although it did not flow in the last."""
+
+
+class Course:
+    """Flags that all points of a scene share in a step.
+
+    Attributes:
+        flags: Of the present search for an equilibrium; (4,), int32.  OPENED: a point has opened.
+            RELIEF: points that do not open answer elastically.  HOLD: points that do not flow stay
+            closed.  OVER: one of them has borne more than its limit.
+    """
+
+    def __init__(self) -> None:
+        self.flags: Index = np.zeros(4, dtype=np.int32)
+        self._first: tuple[Index, Index] = (self.flags.copy(), self.flags.copy())
+        self._first[True][HOLD] = 1
+
+    def begin(self, hold: bool) -> None:
+        """Begin a search for an equilibrium."""
+        self.flags[:] = self._first[hold]
+
+    @property
+    def opened(self) -> bool:
+        """True if a point of this process has opened."""
+        return bool(self.flags[OPENED])
+
+    def relieve(self, relief: bool) -> None:
+        """Let points that do not open answer elastically, or no more."""
+        self.flags[RELIEF] = relief
+
+
+class Points:
+    """Points of the same layout in many cells.
+
+    Args:
+        layout: The points of a cell.
+        keys: For each cell two numbers that random limits depend on, besides their seed.
+        length: Of the cells; (cells,); m.
+        scheme: The time scheme.
+        storage: Zeros, for all that is known of the points; (cells, n, len(INPUTS)).
+        course: Shared by all points of a scene.
+
+    Attributes:
+        softens: Whether they can open.
+        strains: Of the cells at the latest response; (cells, 3); may be written to.
+        r, D: The latest response, see :meth:`respond`.
+        points: What the loops over the points take, see loops.h.
+        kept: By cell: (N, V, M) in the accepted state, the jump of the last point, and the energy
+            dissipated by plastic strains and by discontinuities; (cells, 6); N, N m, rad or m, J.
+        sums: Of all cells: dissipated in the last step by plastic strains, by discontinuities,
+            lost numerically by backward Euler (θ = 1); stored elastically, and by hardening;
+            stored elastically in points until they broke in the last step; work of the mean of the
+            stresses at both ends on plastic strains, less that of those at the end, of points whose
+            stress relaxes; (7,); J.
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        keys: list[tuple[int, int]],
+        length: Array,
+        scheme: Scheme,
+        storage: Array,
+        course: Course | None = None,
+    ) -> None:
+        course = course or Course()
+        self._forms = PointForms(layout.softening, scheme)
+        self._layout, self._storage, self._loss = layout, storage, scheme.loss
+        self._yields, self.softens = layout.yields, layout.softening is not None
+        self._at = {name: storage[:, :, i] for i, name in enumerate(INPUTS)}
+        self._bulk = bulk = layout.bulk(keys)
+        numbers = {"C": bulk.C, "limit": bulk.limit, "H": bulk.H, "B": bulk.B, "eta": bulk.eta}
+        for name, value in numbers.items():
+            self._at[name][:] = value
+        self._at["length"][:] = length[:, None]
+        self._at["θ"][:] = scheme.theta
+        self._steps = self._at["dt"]
+        self._steps[:] = self._dt = 1.0
+        self._at["softening energy"][:] = 1.0
+        self._at["traction"][:] = np.inf
+        if layout.softening is not None:
+            for name in ("limit", "energy"):
+                value = getattr(layout.softening, name)
+                self._at[f"softening {name}"][:, layout.breaking] = value
+            self._resist()
+
+        cells, n, _ = storage.shape
+        self.kept, self.sums = np.zeros((cells, 6)), np.zeros(7)
+        self.r, self.D = np.zeros((cells, 3)), np.zeros((cells, 9))
+        self._e0, self.strains = np.zeros((cells, 3)), np.zeros((cells, 3))
+        self._over = np.zeros(1)
+        B, weights, rest = (
+            np.ascontiguousarray(x, dtype=np.float64)
+            for x in (layout.strains, layout.weights, layout.rest)
+        )
+        self._course, forms = course, self._forms
+        self._alive = [
+            *map(doubles, (B, weights, rest, np.ascontiguousarray(length))),
+            *map(doubles, (self._e0, self.strains, storage, self.r, self.D, self.kept, self.sums)),
+            integers(course.flags),
+            doubles(self._over),
+        ]
+        self.points = c = ffi.new("points *")
+        c.B, c.weight, c.rest, c.length = self._alive[:4]
+        c.e0, c.e1, c.w, c.r, c.D, c.kept, c.sum, c.course, c.over = self._alive[4:]
+        c.bulk, c.opening, c.excess, c.end = forms.bulk, forms.opening, forms.excess, forms.end
+        c.cells, c.of_cell, c.theta = cells, n, scheme.theta
+
+    def __getitem__(self, name: str) -> Array:
+        """Return the values of an input at the points, by its name; a view; (cells, n)."""
+        return self._at[name]
+
+    def _resist(self) -> None:
+        """Resistance after the openings so far."""
+        softening, breaking = self._layout.softening, self._layout.breaking
+        if softening is not None:
+            self["traction"][:, breaking] = softening.traction(self["opening"][:, breaking])
+
+    # -- the step ------------------------------------------------------------------------------
+
+    def start(self, strains: Array) -> None:
+        """Begin at these strains of the cells and not at those accepted; (cells, 3); 1, 1, 1/m."""
+        self._e0[:] = strains
+        self["before"][:] = strains @ self._layout.strains.T
+        self._resist()
+
+    def begin(self, dt: float) -> None:
+        """Begin a step of this length; s."""
+        if dt != self._dt:
+            self._steps[:] = self._dt = dt
+
+    def respond(self, strains: Array) -> tuple[Array, Array]:
+        """(N, V, M) that act in a step to these strains, and derivatives; (cells, 3), (cells, 9).
+
+        They are not a number where an opening was not found.  The arrays are reused.
+        """
+        self.strains[:] = strains
+        lib.respond(self.points)
+        return self.r, self.D
+
+    @property
+    def excess(self) -> float:
+        """Largest ``|stress| / limit - 1`` of a point that was held closed, or zero."""
+        return float(self._over[0])
+
+    def release(self, least: float) -> None:
+        """Let held points open from now on whose excess was so large in the latest response."""
+        lib.release(self.points, least)
+
+    def hold(self) -> None:
+        """Take back :meth:`release`."""
+        flows = self["flows"]
+        flows[flows == RELEASED] = 0.0
+
+    def remaining(self, change: Array) -> Array:
+        """Part of the elastic stiffness that is left in the latest response; (cells,).
+
+        Args:
+            change: Small changes of the strains of the cells; (cells, 3).
+        """
+        layout, stiffness = self._layout, self._at["θ"][0, 0] * self._at["C"]
+        by_point = change @ layout.strains.T
+        elastic = self._at["θ"][0, 0] * change**2 @ layout.rest
+        elastic += (stiffness * by_point**2) @ layout.weights
+        now = np.einsum("ci,cij,cj->c", change, self.D.reshape(-1, 3, 3), change)
+        return np.asarray(np.divide(now, elastic, out=np.ones(len(now)), where=elastic > 0))
+
+    def accept(self) -> None:
+        """Take the strains of the latest response as the new state."""
+        lib.commit(self.points)
+
+    def change(self) -> float:
+        """Energy that :meth:`accept` would add to what is stored and dissipated; J.
+
+        Where viscous stresses relax it is as the trapezoidal rule counts it: backward Euler's
+        dissipation is that of the stress at the end, and the difference is no energy.
+        """
+        changes = self._sums_to_come() - [0, 0, 0, *self.sums[3:5], 0, 0]
+        return float(np.sum(changes[[0, 1, 3, 4, 5, 6]]))
+
+    def dissipation(self) -> float:
+        """Energy that :meth:`accept` would add to what is dissipated; J."""
+        return float(np.sum(self._sums_to_come()[:2]))
+
+    def _sums_to_come(self) -> Array:
+        """Return :attr:`sums` as :meth:`accept` would leave them."""
+        copy = ffi.new("points *", self.points[0])
+        sums = np.empty_like(self.sums)
+        state = (self._e0, self._storage, self.kept)
+        copy.e0, copy.w, copy.kept, copy.sum = alive = [doubles(x.copy()) for x in state] + [
+            doubles(sums)
+        ]
+        lib.commit(copy)
+        del alive
+        return sums
+
+    def freeze(self) -> None:
+        """From now on nothing yields or opens further; hinges that bear nothing any more are free.
+
+        So points answer a vibration, however small, of what has yielded: elastic unloading.
+        """
+        breaking, softening = self._layout.breaking, self._layout.softening
+        if softening is not None:
+            borne, limit = (self[name][:, breaking] for name in ("traction", "softening limit"))
+            spent = np.isfinite(limit) & (borne <= SPENT * limit)
+            self["C"][:, breaking] *= np.where(spent, NOTHING, 1.0)
+        self["traction"][:] = self["limit"][:] = np.inf
+
+    # -- the ledger ----------------------------------------------------------------------------
+
+    def enter_losses(self, ledger: Ledger) -> None:
+        """Enter what the last step dissipated."""
+        plastic, broken, lost, _, _, released, _ = self.sums.tolist()
+        if self._yields:
+            ledger.lost["plastic"] += plastic
+        if self.softens:
+            ledger.lost["hinges"] += broken
+        if self._loss:
+            ledger.lost["numerical"] += 2 * self._loss * lost
+        if released:
+            ledger.lost["numerical"] += released
+
+    def enter_stored(self, ledger: Ledger) -> None:
+        """Enter what the accepted state stores."""
+        _, _, _, elastic, hardening, *_ = self.sums.tolist()
+        ledger.state["stored"] += elastic
+        if self._yields:
+            ledger.state["hardening"] += hardening
+
+    # -- the state -----------------------------------------------------------------------------
+
+    def state(self) -> Array:
+        """Return the internal variables of the accepted state; (cells, k); a copy."""
+        stored = np.zeros((len(self.kept), 2))
+        stored[:1] = self.sums[3:5]  # of all cells together; to whom it belongs does not matter
+        return np.hstack([*(self[name] for name in STATE), self.kept, self._e0, stored])
+
+    def restore(self, cells: Index, rows: Array) -> None:
+        """Take over :meth:`state` in some of the cells.
+
+        Call :meth:`start` and :meth:`refresh` where strains or laws are not those it is of.
+        """
+        ends = np.arange(1, len(STATE) + 1) * self._storage.shape[1]
+        *variables, kept, e0, stored = np.split(rows, [*ends, ends[-1] + 6, ends[-1] + 9], axis=1)
+        for name, values in zip(STATE, variables, strict=True):
+            self[name][cells] = values
+        self.kept[cells], self._e0[cells] = kept, e0
+        self.sums[3:5] = stored.sum(axis=0)
+
+    def refresh(self, strains: Array) -> None:
+        """Make forces and stored energies those of a state that no step has led to."""
+        layout, bulk, length = self._layout, self._bulk, self["length"][:, :1]
+        e = strains @ layout.strains.T - self["jump"] / self["length"]
+        volume = layout.weights * length
+        self.kept[:, :3] = (
+            layout.rest * strains + (layout.weights * bulk.stress(e, self["p"])) @ layout.strains
+        )
+        self.sums[3] = np.sum(volume * bulk.elastic_energy(e - self["p"])) + np.sum(
+            strains**2 @ layout.rest / 2 * length[:, 0]
+        )
+        self.sums[4] = np.sum(volume * bulk.hardening_energy(self["p"], self["ξ"]))

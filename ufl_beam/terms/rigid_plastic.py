@@ -1,0 +1,297 @@
+# SPDX-License-Identifier: MIT
+"""Response of rigid-plastic connectors, such as plastic hinges of zero length.
+
+A connector is held exactly until its force reaches the limit of its law.  Then the force is that of
+the law, a function of the slip that grows in the step; see rigid_plastic.c.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import singledispatch
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import ufl
+from ufl.core.expr import Expr
+
+from ufl_beam.arrays import Array
+from ufl_beam.compiled.c_library import doubles, ffi, integers, lib
+from ufl_beam.discretization.compiled_functions import Pointwise
+from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.model.beams import Place
+from ufl_beam.model.connector_laws import RigidPlastic
+from ufl_beam.model.connectors import Connector
+from ufl_beam.model.material_laws import Bulk, Hardening, Softening
+from ufl_beam.model.plastic_hinges import law_of
+from ufl_beam.terms.connector_laws import Rows, Setting
+from ufl_beam.terms.material_points import NOTHING, RELEASED, SPENT
+from ufl_beam.terms.openings import Openable
+
+INPUTS = (
+    *("slip", "direction", "slipped", "start"),
+    *("θ", "dt", "limit", "energy", "H", "B", "eta"),
+)
+"""Inputs of the compiled laws: the slip of the step and its direction (1 or -1); accumulated slip
+and motion at t_n; numbers of the scheme and the law.  The first four are those of rigid_plastic.c.
+"""
+
+
+class Slip(NamedTuple):
+    """A law of slip over a step, in UFL.
+
+    Attributes:
+        force: Force in the direction of the motion that acts in the step; N or N m.
+        dissipated: Energy dissipated in the step; J.
+        lost: Energy lost numerically by backward Euler, over ``2 alpha`` of the scheme; J.
+        stored: Energy stored at the end; J.
+        limit: Force beyond the back force up to which the motion is held after the step; N or N m.
+        back_force: Force about which the limit lies after the step; N or N m.
+    """
+
+    force: Expr
+    dissipated: Expr
+    lost: Expr
+    stored: Expr
+    limit: Expr
+    back_force: Expr
+
+
+@singledispatch
+def slip(law: Any, at: Mapping[str, Expr], scheme: Scheme) -> Slip:
+    """Slip by a law, from :data:`INPUTS` by name; numbers of ``law`` itself do not matter."""
+    raise TypeError(f"{law!r} is no law of a hinge")
+
+
+@slip.register
+def _(law: Softening, at: Mapping[str, Expr], scheme: Scheme) -> Slip:
+    a, ξ, none = at["slip"], at["slipped"], 0 * at["slip"]
+    law = law.of(at["limit"], at["energy"])
+    force = at["direction"] * scheme.resistance(law, ξ, a)
+    return Slip(force, a * law.mean_traction(ξ, a), none, none, law.traction(ξ + a), none)
+
+
+@slip.register
+def _(law: Hardening, at: Mapping[str, Expr], scheme: Scheme) -> Slip:
+    a, ξ, s, e, θ, H, B = (at[n] for n in ("slip", "slipped", "direction", "start", "θ", "H", "B"))
+    numbers = Bulk(0.0, at["limit"], H, B, at["eta"])
+    resistance = at["limit"] + H * (ξ + θ * a) + at["eta"] * a / at["dt"]
+    return Slip(
+        s * resistance + B * (e + θ * s * a),
+        numbers.dissipation(a, at["dt"]),
+        numbers.hardening_energy(a, a),
+        numbers.hardening_energy(e + s * a, ξ + a),
+        at["limit"] + H * (ξ + a),
+        B * (e + s * a),
+    )
+
+
+@singledispatch
+def numbers_of(law: Any) -> dict[str, float]:
+    """Numbers of a law by their names in :data:`INPUTS`."""
+    raise TypeError(f"{law!r} is no law of a hinge")
+
+
+@numbers_of.register
+def _(law: Softening) -> dict[str, float]:
+    return {"limit": law.limit, "energy": law.energy}
+
+
+@numbers_of.register
+def _(law: Hardening) -> dict[str, float]:
+    eta = float(law.viscosity.coefficient(np.ones(1))[0])
+    return {"limit": law.limit, "H": law.modulus, "B": law.kinematic, "eta": eta}
+
+
+EARLY = 0.01
+"""Motion, in rad or as a part of the scene, that counts as much as the limit in deciding whether a
+connector slips in an iterate; solutions do not depend on it."""
+
+
+WEAK = 1e-9
+"""Factor of motions at least, as a part of EI of the member over the size of the scene."""
+
+
+def _slope(link: Connector, size: float) -> float:
+    """Factor of motions beside forces in the equation of a connector, see rigid_plastic.c.
+
+    It is above the steepest softening, so that an open branch is found open; and so large that
+    motions, not the round-off of forces, say in which direction a weak hinge slips.
+    """
+    law = law_of(link)
+    if not 0.0 < law.limit < np.inf:
+        return 1.0
+    steepest = law.limit * (law.limit / law.energy)
+    early = law.limit / (EARLY * (1.0 if link.turns else size))
+    least = WEAK * link.a.beam.section.EI / size if isinstance(link.a, Place) else 0.0
+    return max(early, least) + (2 * steepest if steepest < np.inf else 0.0)
+
+
+class SlipForms:
+    """Compiled laws of slip: C functions of :data:`INPUTS`.
+
+    Attributes:
+        force: Force in the step, and its derivative by the slip.
+        end: Numbers that the end of the step brings; the order is that of rigid_plastic.c.
+    """
+
+    def __init__(self, law: Softening | Hardening, scheme: Scheme) -> None:
+        self._pointwise = pointwise = Pointwise(INPUTS)
+        at = {**pointwise.at, "slip": ufl.variable(pointwise.at["slip"])}
+        force, *end = slip(law, at, scheme)
+        self.force = pointwise.compile(force, ufl.diff(force, at["slip"]))
+        self.end = pointwise.compile(*end)
+
+
+class RigidPlasticResponse:
+    """Rigid-plastic connectors whose laws are of one kind."""
+
+    steady = False
+
+    def __init__(self, law: RigidPlastic, links: Sequence[Connector], setting: Setting) -> None:
+        n, ledger = len(links), setting.ledger
+        self._ledger, self._scheme = ledger, setting.scheme
+        ledger.lost["hinges"] += 0.0
+        self._stores = isinstance(law.law, Hardening)
+        if self._stores:
+            ledger.state["hardening"] += 0.0
+            if setting.scheme.loss:
+                ledger.lost["numerical"] += 0.0
+        self._forms = SlipForms(law.law, setting.scheme)
+        self._storage = np.zeros((n, len(INPUTS)))
+        self._at = {name: self._storage[:, i] for i, name in enumerate(INPUTS)}
+        for i, link in enumerate(links):
+            for name, value in numbers_of(law_of(link)).items():
+                self._at[name][i] = value
+        self._at["θ"][:], self._at["dt"][:] = setting.scheme.theta, 1.0
+        self._limit, self._back_force = self._at["limit"].copy(), np.zeros(n)
+        self._slipped, self._way, self._way_before = np.zeros((3, n), dtype=np.int32)
+        self._rows, self._sums, self._stored = np.zeros((n, 3)), np.zeros(3), 0.0
+        self.dissipated: Array = np.zeros(n)
+        self._excess = np.zeros(n)
+        self._slope = np.array([_slope(link, setting.simulation.scene.size) for link in links])
+        self._c = c = ffi.new("rigid_plastic *")
+        c.force, c.end, c.number, c.width = self._forms.force, self._forms.end, n, len(INPUTS)
+        arrays = (self._storage, self._limit, self._back_force, self.dissipated, self._rows)
+        self._alive = [
+            *map(doubles, (*arrays, self._slope, self._excess)),
+            *map(integers, (self._slipped, self._way)),
+        ]
+        c.w, c.limit, c.back_force, c.dissipated, c.rows, c.slope = self._alive[:6]
+        c.excess, c.slipped, c.way = self._alive[6:]
+        self._course = integers(setting.course.flags)
+        c.course = self._course
+        self.in_c = {"rigid_plastic": c}
+
+    # -- the step ------------------------------------------------------------------------------
+
+    def begin(self, e0: Array, step: Step) -> None:
+        """Begin a step: connectors that slipped in the last one go on."""
+        self._at["dt"][:] = step.dt
+        self._way[:] = self._way_before
+
+    def rows(self, e1: Array, λ: Array) -> Rows:
+        """Rows of the latest iterate, which C has set."""
+        return self._rows[:, 0], self._rows[:, 1], self._rows[:, 2]
+
+    def accept(self, e1: Array, work: float) -> None:
+        """Commit the slips."""
+        lib.commit_rigid_plastic(self._c, doubles(e1), doubles(self._sums))
+        self._way_before[:] = self._way * self._slipped
+        dissipated, lost, self._stored = self._sums.tolist()
+        self._ledger.lost["hinges"] += dissipated
+        if self._stores and self._scheme.loss:
+            self._ledger.lost["numerical"] += 2 * self._scheme.loss * lost
+
+    def add_state(self, e: Array) -> None:
+        """Enter the energy that hardening stores."""
+        if self._stores:
+            self._ledger.state["hardening"] += self._stored
+
+    # -- openings, see openings.py -------------------------------------------------------------
+
+    @property
+    def openable(self) -> Openable:
+        """Connectors that slip beyond a limit: these."""
+        return self
+
+    @property
+    def excess(self) -> float:
+        """Largest ``|force| / limit - 1`` of a connector that was held, or zero."""
+        return float(self._excess.max(initial=0.0))
+
+    def release(self, least: float) -> None:
+        """Let held connectors slip from now on whose excess was so large."""
+        self._slipped[(self._excess > 0) & (self._excess >= least)] = RELEASED
+
+    def hold(self) -> None:
+        """Take back :meth:`release`."""
+        self._slipped[:] = np.abs(self._way_before)
+
+    # -- energies ------------------------------------------------------------------------------
+
+    def motion(self, e: Array) -> Array:
+        """Motions without the round-off of those that are held."""
+        return self._at["start"].copy()
+
+    def change(self, e1: Array, work: float) -> float:
+        """Energy stored and dissipated in the step: the work; J."""
+        return work
+
+    def dissipation(self, e1: Array, λ: Array) -> float:
+        """Energy dissipated in a step to the motions ``e1``, positive where one would slip; J."""
+        arrays = doubles(e1), doubles(np.ascontiguousarray(λ))
+        dissipated: float = lib.dissipation_of_rigid_plastic(self._c, *arrays)
+        return dissipated
+
+    def bends(self, e1: Array) -> Array:
+        """None: held connectors stay held, internal variables kept."""
+        return np.zeros(len(e1))
+
+    def again(self) -> None:
+        """Go on from the accepted state."""
+        self._way[:] = self._way_before
+
+    def about_force(self, rows: Array) -> Array:
+        """Factors of the rows of those that slip, see rigid_plastic.c."""
+        return np.where(self._way == 0, 0.0, -self._slope)
+
+    def remaining(self) -> Array:
+        """Part of the stiffness that is left in the latest iterate, 0 of what slips."""
+        return np.where(self._way == 0, 1.0, 0.0)
+
+    def flows(self) -> bool:
+        """Return whether one slips in the latest iterate."""
+        return bool(self._way.any())
+
+    # -- the state -----------------------------------------------------------------------------
+
+    def state(self) -> Array:
+        """Internal variables; (num_links, 7)."""
+        stored = np.zeros(len(self._rows))
+        stored[:1] = self._stored  # of all together; to whom it belongs does not matter
+        return np.column_stack([*self._variables, stored])
+
+    def restore(self, rows: Array) -> None:
+        """Take over :meth:`state`."""
+        *variables, stored = rows.T
+        for mine, values in zip(self._variables, variables, strict=True):
+            mine[:] = values
+        self._slipped[:] = np.abs(self._way_before)
+        self._stored = float(stored.sum())
+
+    @property
+    def _variables(self) -> tuple[npt.NDArray[Any], ...]:
+        at = self._at["slipped"], self._at["start"]
+        return (*at, self._limit, self._back_force, self.dissipated, self._way_before)
+
+    def start(self, e: Array) -> None:
+        """Begin at motions that no step has led to."""
+        self._at["start"][:] = e
+
+    def freeze(self) -> None:
+        """Hold from now on, but for connectors that bear nothing any more: these are free."""
+        spent = self._limit <= SPENT * self._at["limit"]
+        self._limit[:] = np.where(spent, 0.0, np.inf)
+        self._at["limit"][spent] *= NOTHING

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: MIT
+"""Forces that a rotating frame of reference makes: centrifugal and Coriolis."""
+
+from __future__ import annotations
+
+import numpy as np
+import ufl
+
+from ufl_beam.arrays import Array
+from ufl_beam.compiled.csr import Csr, Product
+from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.discretization.state_io import Memory
+from ufl_beam.mechanics.kinematics import split, turn
+from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.model.loads import RotatingFrame
+from ufl_beam.terms.beams import mass_matrix
+from ufl_beam.terms.energy_ledger import Ledger
+
+
+def turned_mass_matrix(fields: Fields) -> Csr:
+    """Mass times a quarter turn of velocities, so that 2 Ω of it times them is Coriolis' force."""
+    share = fields.share
+    (u, _), (w_u, _) = (split(f(fields.space)) for f in (ufl.TrialFunction, ufl.TestFunction))
+    G = fields.matrix()
+    work = fields.inertia()[0] * ufl.dot(turn(u), w_u) * fields.dx_of_mass()
+    kernel = fields.kernel(work, fields.configuration())
+    kernel.place(G)
+    kernel.add(np.zeros(share.size), G.data)
+    scene = share.grid.scene
+    lumps = [(share.at(one.place), one.mass) for one in scene.masses]
+    lumps += [(share.at(one.middle), one.mass) for one in scene.bodies]
+    for dofs, mass in lumps:
+        if share.owns(dofs[:2]).all():
+            u, v = share.local(dofs[:2])
+            G.data[G.positions(np.array([u, v]), np.array([v, u]))] += (-mass, mass)
+    return G
+
+
+class FrameForces:
+    """Centrifugal and Coriolis forces; the first have a potential, the second do no work.
+
+    Rotary inertia keeps its spin in steady rotation, so no moments come of it.
+
+    Args:
+        frame: Rate and centre.
+        fields: The cells and degrees of freedom of this process.
+        scheme: Says where in a step forces act, and which do its work.
+        ledger: Takes the work.
+        A: Matrix that takes the tangent.
+
+    Attributes:
+        force: The centrifugal forces in the latest residual.
+    """
+
+    kind = "loads"
+
+    def __init__(
+        self, frame: RotatingFrame, fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr
+    ) -> None:
+        share = fields.share
+        S, G = mass_matrix(fields), turned_mass_matrix(fields)
+        S.data[np.isin(S.rows(), share.rotations())] = 0.0
+        S.data *= frame.rate**2
+        G.data *= 2 * frame.rate if scheme.dynamic else 0.0
+        self._S, self._G, self._pull, self._turn = S.data, G.data, Product(S), Product(G)
+        self._from_centre = _positions(fields, frame.about)
+        self._A, self._ledger = A, ledger
+        self._acting = scheme.acting
+        self._share_of_end = scheme.load_weight
+        ledger.supplied["loads"] += 0.0
+        self.force: Array = np.zeros(share.size)
+        self._before: Array = self.force
+        self._grown = 0.0
+
+    def begin(self, step: Step) -> None:
+        """Remember the beginning, and how much of the forces acts."""
+        self._q0, self._dt = step.q0, step.dt
+        growth = step.toward * (1.0 - self._grown)
+        self._growth, self._growth_at_end = self._grown + step.at * growth, self._grown + growth
+
+    def carry_on(self, t: float, q: Array) -> Array:
+        """The forces at ``q``; take that state as one that is in equilibrium with them."""
+        self._grown = 1.0
+        self.force = self._before = self._pull(self._from_centre + q)
+        return self.force
+
+    def loops(self) -> None:
+        """None."""
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Subtract the forces."""
+        q: Array = self._q0 + self._share_of_end * (q1 - self._q0)
+        self.force = self._growth * self._pull(self._from_centre + q)
+        r -= self.force
+        r += self._turn(q1 - self._q0) / self._dt
+
+    def add_tangent(self, q1: Array) -> None:
+        """Subtract the derivative."""
+        self._A.data -= self._growth * self._share_of_end * self._S
+        self._A.data += self._G / self._dt
+
+    def accept(self, q1: Array, s: Array) -> None:
+        """Work of the centrifugal forces."""
+        self._ledger.supplied["loads"] += float(self._acting(self._before, self.force) @ s)
+        self._before, self._grown = self.force, self._growth_at_end
+
+    def add_state(self, q: Array) -> None:
+        """Loads hold no energy; what a potential would hold is in their work."""
+
+    def remember(self, memory: Memory, q: Array) -> None:
+        """The forces in the equation of the last step, and how much of them acts."""
+        self.force = self._before = memory.added("rotating frame", self._before)
+        self._grown = memory.number("growth of the rotating frame", self._grown)
+
+
+def _positions(fields: Fields, about: tuple[float, float]) -> Array:
+    """From a point to where each displacement belongs, in the undeformed scene; (size,); m."""
+    share = fields.share
+    grid, x = share.grid, np.zeros(share.grid.size)
+    centers = np.array([body.center for body in grid.scene.movers]).reshape(-1, 2)
+    # Beams last: those joined to the ground share its displacement, not the place of its centre.
+    points = np.concatenate([centers, grid.points]) - about
+    x[np.concatenate([grid.dofs_of_bodies, grid.dofs])[:, :2]] = points
+    return np.asarray(x[share.dofs])

@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: MIT
+"""Supports and prescribed motions: degrees of freedom whose values are given."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ufl_beam.arrays import Array, Index
+from ufl_beam.compiled.csr import Csr, as_slice
+from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.state_io import Memory
+from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.model.bodies import GROUND
+from ufl_beam.model.loads import TimeFunction, value_at
+from ufl_beam.model.supports import Support
+from ufl_beam.terms.energy_ledger import Ledger
+
+
+class TurnedAxes:
+    """The displacement of one place in axes turned by an angle, as supports at an angle hold it."""
+
+    def __init__(self, dofs: Index, angle: float, A: Csr) -> None:
+        self._i, self._j = dofs
+        self._c, self._s = math.cos(angle), math.sin(angle)
+        self._rows = [slice(A.indptr[d], A.indptr[d + 1]) for d in dofs]
+        self._columns = [np.flatnonzero(A.indices == d) for d in dofs]
+
+    def enter(self, x: Array) -> None:
+        """From the axes of the plane to the turned axes, in place."""
+        i, j, c, s = self._i, self._j, self._c, self._s
+        x[i], x[j] = c * x[i] + s * x[j], c * x[j] - s * x[i]
+
+    def leave(self, x: Array) -> None:
+        """From the turned axes to the axes of the plane, in place."""
+        i, j, c, s = self._i, self._j, self._c, self._s
+        x[i], x[j] = c * x[i] - s * x[j], c * x[j] + s * x[i]
+
+    def enter_matrix(self, data: Array) -> None:
+        """Rows and columns of a matrix to the turned axes, in place."""
+        c, s = self._c, self._s
+        # Both dofs belong to the same cells, so their rows, and their columns, have one sparsity.
+        for i, j in (self._rows, self._columns):
+            first, second = data[i].copy(), data[j]
+            data[i], data[j] = c * first + s * second, c * second - s * first
+
+
+class Supports:
+    """All supports of a scene.
+
+    Unknowns and residuals of the solver are in the turned axes of the supports, those of the terms
+    in the axes of the plane; :meth:`enter` and :meth:`leave` change between them.
+
+    Attributes:
+        reactions: Forces of the supports on the scene in the latest residual, at the degrees of
+            freedom that are held, in turned axes.
+        entries: Entries of the matrix that hold them, and those of them on the diagonal.
+        pivots: What stands on the diagonal.
+        moving: Local degrees of freedom whose values depend on time.
+        work: Whether there are such anywhere in the scene.
+    """
+
+    def __init__(self, share: Share, scheme: Scheme, ledger: Ledger, A: Csr) -> None:
+        self._turned: list[TurnedAxes] = []
+        held: list[int] = []
+        self._motions: list[tuple[int, TimeFunction, Support]] = []
+        if GROUND in share.grid.scene.movers:
+            held.extend(share.local(share.at(GROUND.middle)))
+        for support in share.grid.scene.supports:
+            dofs = share.at(support.place)
+            if support.angle and len(share.local(dofs[:2])):
+                self._turned.append(TurnedAxes(share.local(dofs[:2]), support.angle, A))
+            for component, motion in support.held.items():
+                held.extend(share.local(dofs[[component]]))
+                if component in support.moving:
+                    self._motions.extend(
+                        (d, motion, support) for d in share.local(dofs[[component]])
+                    )
+        self.dofs = np.array(sorted(held), dtype=np.int64)
+        self.moving = np.array([dof for dof, *_ in self._motions], dtype=np.int64)
+        self._held = as_slice(self.dofs)
+        rows, columns = A.rows(), A.indices
+        zero = np.isin(rows, self.dofs) | np.isin(columns, self.dofs)
+        self._zero = np.flatnonzero(zero)
+        self._diagonal = np.flatnonzero(zero & (rows == columns))
+        self.entries = self._zero, self._diagonal
+        self.pivots: Array = np.ones(len(self.dofs))
+        self._owned = self.dofs < share.num_owned
+        self._acting, self._ledger = scheme.acting, ledger
+        self.work = any(support.moving for support in share.grid.scene.supports)
+        if self.work:
+            ledger.supplied["supports"] += 0.0
+        self.reactions: Array = np.zeros(len(self.dofs))
+        self._before: Array = self.reactions.copy()
+
+    @property
+    def turned(self) -> bool:
+        """True if some supports are at an angle to the axes of the plane."""
+        return bool(self._turned)
+
+    def enter(self, x: Array) -> None:
+        """From the axes of the plane to those of the supports, in place."""
+        for axes in self._turned:
+            axes.enter(x)
+
+    def leave(self, x: Array) -> None:
+        """From the axes of the supports to those of the plane, in place."""
+        for axes in self._turned:
+            axes.leave(x)
+
+    def in_axes(self, q: Array) -> Array:
+        """``q`` in the axes of the supports; a copy only if an axis is turned."""
+        if not self._turned:
+            return q
+        x = q.copy()
+        self.enter(x)
+        return x
+
+    def in_plane(self, x: Array) -> Array:
+        """``x`` in the axes of the plane; a copy only if an axis is turned."""
+        if not self._turned:
+            return x
+        q = x.copy()
+        self.leave(q)
+        return q
+
+    def move(self, x: Array, x0: Array, step: Step) -> None:
+        """Set in ``x`` what is prescribed for the step that begins at ``x0``."""
+        for dof, motion, support in self._motions:
+            target = value_at(motion, step.motion_time, support)
+            x[dof] = x0[dof] + step.toward * (target - x0[dof])
+
+    def hold(self, r: Array) -> None:
+        """Note the reactions in a residual that is complete, and remove them from it."""
+        if len(self.dofs):
+            self.reactions[:] = r[self._held]
+            r[self._held] = 0.0
+
+    def hold_matrix(self, data: Array) -> None:
+        """Turn a tangent into the axes of the supports and hold what is held."""
+        for axes in self._turned:
+            axes.enter_matrix(data)
+        if len(self.dofs):
+            # What stands on the diagonal has the right dimension and size for what is held.
+            # Where material that flows freely leaves nothing, what stood there before does as well.
+            diagonal = data[self._diagonal]
+            np.copyto(self.pivots, diagonal, where=diagonal != 0.0)
+            data[self._zero] = 0.0
+            data[self._diagonal] = self.pivots
+
+    def accept(self, s: Array) -> None:
+        """Work of the supports that move; ``s`` in their axes."""
+        if self._motions:
+            work = self._acting(self._before, self.reactions) * s[self._held]
+            self._ledger.supplied["supports"] += float(np.sum(work[self._owned]))
+            self._before = self.reactions.copy()
+
+    def stop(self, v: Array) -> None:
+        """Set velocities of what does not move to zero, in place; else they would ring."""
+        self.enter(v)
+        v[np.setdiff1d(self.dofs, self.moving)] = 0.0
+        self.leave(v)
+
+    def take(self) -> None:
+        """Take the latest reactions as those before the next step."""
+        self._before = self.reactions.copy()
+
+    def carry_on(self, memory: Memory, q: Array) -> None:
+        """The reactions."""
+        reactions: Array = np.zeros(len(q))
+        reactions[self._held] = self._before if self._motions else self.reactions
+        self.reactions[:] = memory.at_dofs("reactions", reactions)[self._held]
+        self._before = self.reactions.copy()
+
+    def remember(self, memory: Memory, q: Array) -> None:
+        """The reactions, and what stands for what is held in the tangent."""
+        self.carry_on(memory, q)
+        pivots = np.zeros(len(q))
+        pivots[self._held] = self.pivots
+        self.pivots[:] = memory.at_dofs("pivots", pivots)[self._held]
+
+    def all_reactions(self, size: int) -> Array:
+        """The reactions as a vector of all local degrees of freedom, in the axes of the plane."""
+        r = np.zeros(size)
+        r[self._held] = self.reactions
+        self.leave(r)
+        return r
