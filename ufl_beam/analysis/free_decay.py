@@ -24,6 +24,12 @@ class Envelope:
         initial_95: Uncertainty of ``initial``; unit of x.
         rate_95: Uncertainty of ``rate``; same unit.
         rms: Root mean square of the residuals; unit of x.
+
+    Example:
+        >>> t = np.arange(5.0)
+        >>> fit = ub.fit_decay(t, 1.0 - 0.1 * t).linear
+        >>> print(f"{fit.initial:.2f} - {fit.rate:.2f} t")
+        1.00 - 0.10 t
     """
 
     initial: float
@@ -50,6 +56,12 @@ class Decay:
         decrements: That of each period; (n-1,).
         linear: The fit of A_0 − r t, as under dry friction: every period takes the same amount.
         exponential: The fit of A_0 exp(−λ t), as under viscous damping: the same part.
+
+    Example:
+        >>> t = np.arange(0, 5, 0.01)
+        >>> decay = ub.damping(t, np.exp(-0.1 * t) * np.cos(2 * np.pi * t))
+        >>> print(f"{decay.period:.2f} s, ratio {decay.ratio:.4f}, {decay.better}")
+        1.00 s, ratio 0.0159, exponential
     """
 
     times: Array
@@ -117,6 +129,12 @@ def damping(
 
     Raises:
         SceneError: Less than 3 peaks, or not all of them are above ``about``.
+
+    Example:
+        >>> t = np.arange(0, 5, 0.01)
+        >>> decay = ub.damping(t, np.exp(-0.1 * t) * np.cos(2 * np.pi * t))
+        >>> print(f"{decay.decrement:.3f} {decay.ratio:.4f}")
+        0.100 0.0159
     """
     times, amplitudes = peaks(t, x, about, prominence=prominence)
     if len(times) < 3:
@@ -147,6 +165,12 @@ def peaks(
 
     Raises:
         SceneError: t and x are not as many, not finite, or t does not increase.
+
+    Example:
+        >>> t = np.arange(0, 3, 0.01)
+        >>> times, amplitudes = ub.peaks(t, np.cos(2 * np.pi * t))
+        >>> print(times.round(3), amplitudes.round(3))
+        [1. 2.] [1. 1.]
     """
     t, x = _series("peaks", t, x, "x")
     require_number(about, "peaks: about")
@@ -166,6 +190,11 @@ def logarithmic_decrement(amplitudes: npt.ArrayLike) -> tuple[float, Array]:
 
     Raises:
         SceneError: Less than two amplitudes, or some are not positive.
+
+    Example:
+        >>> mean, each = ub.logarithmic_decrement([1.0, 0.9, 0.81])
+        >>> print(round(mean, 4), each.round(4))
+        0.1054 [0.1054 0.1054]
     """
     Φ = require_row(amplitudes, "logarithmic_decrement: amplitudes")
     n = len(Φ) - 1
@@ -181,7 +210,12 @@ def logarithmic_decrement(amplitudes: npt.ArrayLike) -> tuple[float, Array]:
 
 
 def damping_ratio(decrement: npt.ArrayLike) -> Array:
-    """Damping ratio ζ of logarithmic decrements δ of any shape; negative where vibrations grow."""
+    """Damping ratio ζ of logarithmic decrements δ of any shape; negative where vibrations grow.
+
+    Example:
+        >>> print(f"{ub.damping_ratio(0.1):.4f}")
+        0.0159
+    """
     δ = require_array(decrement, "damping_ratio: decrement")
     ζ: Array = δ / np.hypot(δ, 2 * np.pi)  # P(62)
     return ζ
@@ -199,6 +233,12 @@ def fit_decay(t: npt.ArrayLike, amplitudes: npt.ArrayLike) -> Decay:
     Raises:
         SceneError: t and amplitudes are not as many, at least 3, and finite; t does not increase;
             an amplitude is not positive; or they scatter so much that nothing fits.
+
+    Example:
+        >>> t = np.arange(6.0)
+        >>> decay = ub.fit_decay(t, 2.0 * np.exp(-0.1 * t))
+        >>> print(decay.better, f"{decay.exponential.rate:.3f}")
+        exponential 0.100
     """
     t, A = _series("fit_decay", t, amplitudes, "amplitudes")
     if len(A) < 3:

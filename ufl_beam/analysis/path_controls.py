@@ -181,6 +181,15 @@ class ArcLength:
 
     Raises:
         SceneError: No step, or ``factor`` is not positive.
+
+    Example:
+        >>> rod = ub.Section.circle(d=0.05, E=210e9, nu=0.3)
+        >>> arch = ub.Beam.polyline([(0, 0), (2, 0.2), (4, 0)], rod)
+        >>> down = ub.PointLoad(arch.at(0.5), force=(0, -1e5), time=lambda t: t)
+        >>> shallow = ub.Scene([arch], [], [ub.Pinned(arch.start), ub.Pinned(arch.end)], [down])
+        >>> path = ub.follow(shallow, ub.ArcLength(0.1), steps=40)  # it snaps through
+        >>> print([round(point.factor, 2) for point in path.critical if point.kind == "limit"])
+        [0.56, -0.14]
     """
 
     step: float
@@ -237,6 +246,11 @@ class LoadControl:
 
     Raises:
         SceneError: No step.
+
+    Example:
+        >>> path = ub.follow(scene, ub.LoadControl(0.25), steps=4)
+        >>> print(path.factor)
+        [0.   0.25 0.5  0.75 1.  ]
     """
 
     step: float
@@ -273,6 +287,12 @@ class DisplacementControl:
 
     Raises:
         SceneError: Not a place of a beam, another component, no step.
+
+    Example:
+        >>> control = ub.DisplacementControl(beam.end, "v", -0.05)
+        >>> path = ub.follow(scene, control, steps=4)
+        >>> print(path.displacement(beam.end)[:, 1].round(6))
+        [ 0.   -0.05 -0.1  -0.15 -0.2 ]
     """
 
     place: Place
@@ -330,6 +350,13 @@ class DissipationControl:
 
     Raises:
         SceneError: ``step`` is not positive.
+
+    Example:
+        >>> pull = ub.PointLoad(weak.end, force=(0, -1e5), time=lambda t: t)
+        >>> pulled = ub.Scene([weak], supports=[ub.Clamped(weak.start)], loads=[pull])
+        >>> path = ub.follow(pulled, ub.DissipationControl(50.0), steps=15)
+        >>> print(path.factor.max().round(2))  # at the limit of the hinge
+        0.25
     """
 
     step: float

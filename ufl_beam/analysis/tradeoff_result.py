@@ -30,6 +30,12 @@ class Tradeoff:
         families: The kinds of dials, in words.
         notes: What else should be known.
         spent: Wall time of all runs, repetitions and compiling included; s.
+
+    Example:
+        >>> tip = {"tip": lambda run: run.position(beam.end)[-1]}
+        >>> found = ub.tradeoff(scene, tip, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance=0.01)
+        >>> found.ratio(found.best) <= 1  # largest error over the tolerance
+        True
     """
 
     runs: tuple[Run, ...]

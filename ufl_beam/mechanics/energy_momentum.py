@@ -118,6 +118,11 @@ class ExactStatic(_ExactStep):
 
     Raises:
         SceneError: A number outside [1/2, 1].
+
+    Example:
+        >>> run = ub.simulate(scene, ub.ExactStatic(), t=(0, 1), dt=0.1)
+        >>> bool(run.energy.worst < 1e-9)
+        True
     """
 
     theta: float = 1.0
@@ -236,6 +241,12 @@ class Midpoint(_ExactStep, _Velocities):
 
     Equations:
         P(77)-P(91); P(82) corrected, see docs/errata.md.
+
+    Example:
+        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05)
+        >>> lossy = ub.simulate(scene, ub.Midpoint(alpha=0.05, beta=0.05), t=(0, 1), dt=0.05)
+        >>> bool(run.energy.worst < 1e-9), bool(lossy.energy.lost["numerical"][-1] > 0)
+        (True, True)
     """
 
     alpha: float = 0.0
@@ -261,6 +272,13 @@ class PrintedMidpoint(_OverStep, _Velocities):
 
     Equations:
         P(77)-P(84), with the sign of P(79) mended; see docs/errata.md.
+
+    Example:
+        >>> free = ub.Scene([beam], initial=[ub.Velocity((beam,), angular=10.0)])
+        >>> printed = ub.simulate(free, ub.PrintedMidpoint(), t=(0, 1), dt=0.1)
+        >>> exact = ub.simulate(free, ub.Midpoint(), t=(0, 1), dt=0.1)
+        >>> bool(printed.energy.worst > 1e-5), bool(exact.energy.worst < 1e-9)
+        (True, True)
     """
 
     alpha = beta = 0.0
@@ -313,6 +331,11 @@ class DecayingMidpoint(_ExactStep, _Midway):
 
     Raises:
         SceneError: A number outside [1/3, 1].
+
+    Example:
+        >>> run = ub.simulate(scene, ub.DecayingMidpoint(rho_inf=0.5), t=(0, 1), dt=0.05)
+        >>> bool(run.energy.lost["numerical"][-1] > 0), bool(run.energy.worst < 1e-9)
+        (True, True)
     """
 
     rho_inf: float = 0.5

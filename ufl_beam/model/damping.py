@@ -23,6 +23,13 @@ class Rayleigh:
 
     Raises:
         SceneError: A negative number, or both zero.
+
+    Example:
+        >>> damping = ub.Rayleigh(mass=1.0, stiffness=1e-5)  # 1/s, s
+        >>> damped = ub.Scene([beam], supports=scene.supports, damping=[damping])
+        >>> vibration = ub.modes(damped, 3)
+        >>> np.allclose(vibration.damping, 0.5 / vibration.omega + 0.5e-5 * vibration.omega)
+        True
     """
 
     _: KW_ONLY
@@ -50,6 +57,12 @@ class KelvinVoigt:
 
     Raises:
         SceneError: A time that is not positive.
+
+    Example:
+        >>> damped = ub.Scene([beam], supports=scene.supports, damping=[ub.KelvinVoigt(time=1e-4)])
+        >>> vibration = ub.modes(damped, 2)
+        >>> np.allclose(vibration.damping, 0.5e-4 * vibration.omega)
+        True
     """
 
     time: float

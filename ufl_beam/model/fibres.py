@@ -26,6 +26,12 @@ class Fibres:
 
     Raises:
         SceneError: A law is none, or ``number`` is no whole number from 1.
+
+    Example:
+        >>> steel = ub.Fibres(ub.Hardening(355e6, modulus=2e9), number=16)
+        >>> layered = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, fibres=steel)
+        >>> print(f"{layered.EI:.3g}")  # of 16 layers; N m²
+        1.39e+07
     """
 
     law: Hardening

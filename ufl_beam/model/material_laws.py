@@ -76,6 +76,10 @@ class Perzyna:
     Args:
         eta: Overstress per rate; Pa s for fibres, N s and N m² s for resultants.  Zero is
             rate-independent, infinity elastic.
+
+    Example:
+        >>> law = ub.Hardening(250e6, modulus=2e9, viscosity=ub.Perzyna(eta=1e6))  # Pa, Pa s
+        >>> viscous = ub.Fibres(law, number=10)
     """
 
     eta: float
@@ -97,6 +101,10 @@ class DuvautLions:
 
     Args:
         tau: Relaxation time; s.  Zero is rate-independent, infinity elastic.
+
+    Example:
+        >>> law = ub.Hardening(250e6, modulus=2e9, viscosity=ub.DuvautLions(tau=1e-3))  # Pa, s
+        >>> viscous = ub.Fibres(law, number=10)
     """
 
     tau: float
@@ -122,6 +130,10 @@ class Hardening:
 
     Raises:
         SceneError: A number is negative or none; infinity is allowed for the limit.
+
+    Example:
+        >>> law = ub.Hardening(3e5, modulus=1e6)  # N m, N m²
+        >>> yielding = ub.Section(EA=4e9, GA=1e9, EI=1.4e7, rhoA=157.0, bending=law)
     """
 
     limit: Any
@@ -237,6 +249,11 @@ class Softening:
 
     Raises:
         SceneError: A negative limit, or an energy that is not positive.
+
+    Example:
+        >>> law = ub.Softening(limit=5e4, energy=1e3)  # N m, J
+        >>> print(law.traction(np.array([0.0, 0.02, 0.04])).round())  # after openings in rad; N m
+        [50000. 18394.  6767.]
     """
 
     limit: float
@@ -278,6 +295,11 @@ class LinearSoftening(Softening):
     """Linear softening of a discontinuity, down to nothing at the opening 2 energy / limit.
 
     Args and errors are those of :class:`Softening`.
+
+    Example:
+        >>> law = ub.LinearSoftening(limit=5e4, energy=1e3)  # N m, J
+        >>> print(law.traction(np.array([0.0, 0.02, 0.04])))  # after openings in rad; N m
+        [50000. 25000.     0.]
     """
 
     def traction(self, ξ: Values) -> Values:

@@ -33,6 +33,12 @@ class Mesh:
 
     Raises:
         SceneError: A number that makes no mesh.
+
+    Example:
+        >>> fine = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, mesh=ub.Mesh(refine=4))
+        >>> cubic = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, mesh=ub.Mesh(degree=3))
+        >>> print(len(fine.shape(beam)), len(cubic.shape(beam)))
+        17 5
     """
 
     refine: int | Fraction = 1

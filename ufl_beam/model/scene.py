@@ -58,6 +58,11 @@ class PointMass:
         place: Where.
         mass: kg.
         inertia: About the place; kg m².
+
+    Example:
+        >>> heavy = ub.Scene([beam], [], scene.supports, masses=[ub.PointMass(beam.end, 300.0)])
+        >>> bool(ub.modes(heavy, 1).omega < ub.modes(scene, 1).omega)
+        True
     """
 
     place: Anchor
@@ -79,6 +84,11 @@ class Velocity:
         linear: Velocity of the point ``about``; m/s.
         angular: Angular velocity; rad/s.
         about: Point of the undeformed scene, by default the origin; m.
+
+    Example:
+        >>> spin = ub.Velocity((beam,), linear=(1.0, 0.0), angular=2.0)
+        >>> spin.at(0.0, 3.0)  # of the point (0, 3); m/s, m/s, rad/s
+        (-5.0, 0.0, 2.0)
     """
 
     beams: tuple[Beam | Body, ...]
@@ -128,6 +138,10 @@ class Scene:
 
     Raises:
         SceneError: The parts do not fit together; the message names them.
+
+    Example:
+        >>> frame = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.Gravity()])
+        >>> figure = ub.plot(frame)  # check it by eye before the run
     """
 
     beams: Sequence[Beam] = ()

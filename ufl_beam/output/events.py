@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from ufl_beam.collective_errors import on_first
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import require_function
 from ufl_beam.model.beams import Place
 from ufl_beam.model.connector_laws import Coulomb, Stop
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.plastic_hinges import law_of
-from ufl_beam.output.recorders import Recorder, on_first
+from ufl_beam.output.recorders import Recorder
 from ufl_beam.parameter import TIME, Parameter
 
 if TYPE_CHECKING:
@@ -47,6 +48,13 @@ class Event(NamedTuple):
         where: A place in the middle of a cell, that of a plastic hinge, or a connector.
         what: "yields", "opens", "is free" in a cell; "touches", "lets go", "slides", "sticks".
         parameter: Words for the time.
+
+    Example:
+        >>> events = ub.Events()
+        >>> run = ub.simulate(hinged, ub.Static(), t=(0, 1), dt=0.02, record=events)
+        >>> opening = events.found[0]
+        >>> print(f"{opening.time:.2f} s: {opening.where} {opening.what}")
+        0.10 s: beam.start (0, 0) opens
     """
 
     time: float
@@ -70,6 +78,11 @@ class Events(Recorder):
 
     Attributes:
         found: The events in their order, the same on all processes.
+
+    Example:
+        >>> events = ub.Events(tell=print)
+        >>> run = ub.simulate(hinged, ub.Static(), t=(0, 0.5), dt=0.02, record=events)
+        t = 0.1 s: beam.start (0, 0) opens
     """
 
     def __init__(self, tell: Callable[[Event], object] | None = None) -> None:

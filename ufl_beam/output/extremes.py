@@ -27,6 +27,13 @@ class Extent(NamedTuple):
         high: The largest values.
         time_low: When the least were reached first; s.
         time_high: When the largest were reached first; s.
+
+    Example:
+        >>> extremes = ub.Extremes()
+        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=extremes)
+        >>> v = extremes.displacement(beam).of((-1, 1))
+        >>> print(v.low.round(3), v.time_low)  # m, s
+        -0.019 1.0
     """
 
     low: Array
@@ -58,6 +65,12 @@ class Extremes(Recorder):
     """Running extremes of the section forces in all cells and of the motion of all nodes.
 
     Each step counts, whatever the solution keeps; memory does not grow.
+
+    Example:
+        >>> extremes = ub.Extremes()
+        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=extremes)
+        >>> print(extremes.section_forces(beam).low[:, 2].round(-3))  # least M in the cells; N m
+        [-175000. -125000.  -75000.  -25000.]
     """
 
     def require_writable(self) -> None:

@@ -35,6 +35,12 @@ class HotSpot:
 
     Raises:
         SceneError: The place is none, or the stress no function.
+
+    Example:
+        >>> nominal = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9, factor=1.5)
+        >>> own = ub.HotSpot(beam.start, lambda N, V, M: N / 0.02 - 0.1 * M / 6.67e-5)
+        >>> np.allclose(nominal.stress(0.0, 0.0, 1e4), 1.5 * own.stress(0.0, 0.0, 1e4), rtol=1e-3)
+        True
     """
 
     place: Place
@@ -82,6 +88,15 @@ class Fatigue(Recorder):
     Raises:
         SceneError: A spot or the curve is none, or the resolution is not positive.
         ImportError: The package `rainflow`, which counts, is missing.
+
+    Example:
+        >>> spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
+        >>> fatigue = ub.Fatigue(spot, ub.SNCurve.eurocode(71e6))
+        >>> shake = ub.PointLoad(beam.end, force=(0, 5e4), time=np.sin)
+        >>> shaken = ub.Scene([beam], supports=scene.supports, loads=[shake])
+        >>> run = ub.simulate(shaken, ub.Static(), t=(0, 20), dt=0.2, record=fatigue)
+        >>> print(f"life: {fatigue.life(spot):.0e} s")
+        life: 2e+05 s
     """
 
     def __init__(

@@ -33,6 +33,11 @@ class Goodman:
 
     Args:
         ultimate: Ultimate stress; Pa.
+
+    Example:
+        >>> curve = ub.SNCurve(range=71e6, mean=ub.Goodman(ultimate=500e6))
+        >>> print(curve.endurance(71e6, mean=0.0), curve.endurance(71e6, mean=250e6))
+        2000000.0 250000.0
     """
 
     ultimate: float
@@ -51,6 +56,11 @@ class Gerber:
 
     Args:
         ultimate: Ultimate stress; Pa.
+
+    Example:
+        >>> welded, machined = ub.SNCurve(range=71e6), ub.SNCurve(range=71e6, mean=ub.Gerber(500e6))
+        >>> bool(machined.endurance(100e6, mean=200e6) < welded.endurance(100e6, mean=200e6))
+        True
     """
 
     ultimate: float
@@ -89,6 +99,11 @@ class SNCurve:
 
     Raises:
         SceneError: A number is not positive, or ``limit`` is less than ``knee``.
+
+    Example:
+        >>> curve = ub.SNCurve.eurocode(71e6)
+        >>> print(curve.endurance([142e6, 71e6, 10e6]))  # cycles to failure
+        [ 250000. 2000000.      inf]
     """
 
     range: float
@@ -141,6 +156,13 @@ class Cycles:
         range: Their ranges; (n,); Pa.
         mean: Their mean stresses; (n,); Pa.
         count: How many there were, halves included; (n,).
+
+    Example:
+        >>> cycles = ub.rainflow([0, 100e6, -50e6, 80e6, 0])  # Pa
+        >>> print(cycles.range / 1e6, cycles.count)
+        [ 80. 100. 130. 150.] [0.5 0.5 0.5 0.5]
+        >>> print(f"{cycles.damage(ub.SNCurve.eurocode(71e6)):.2e}")
+        4.95e-06
     """
 
     range: Array
@@ -174,6 +196,11 @@ def rainflow(series: npt.ArrayLike) -> Cycles:
     Raises:
         SceneError: It is not one row of finite numbers.
         ImportError: The package is missing.
+
+    Example:
+        >>> cycles = ub.rainflow([0, 3, 1, 2, 0])
+        >>> print(cycles.range, cycles.mean, cycles.count)
+        [1. 3.] [1.5 1.5] [1. 1.]
     """
     values = require_row(series, "rainflow: series")
     counts: defaultdict[Ends, float] = defaultdict(float)

@@ -49,6 +49,11 @@ def plot_extremes(solution: Solution, extremes: Extremes, what: str = "M") -> Fi
 
     Raises:
         SceneError: Unknown ``what``, or the extremes are of another scene or of no run.
+
+    Example:
+        >>> extremes = ub.Extremes()
+        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=extremes)
+        >>> ub.plot_extremes(run, extremes, "M").savefig("extremes.png")
     """
     require_choice(what, RESULTANTS, "plot_extremes: what")
     index, points = list(RESULTANTS).index(what), solution.grid.points
@@ -82,6 +87,14 @@ def plot_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:
 
     Raises:
         SceneError: The spot is none of them, nothing was run, or the stress never turned.
+
+    Example:
+        >>> spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
+        >>> fatigue = ub.Fatigue(spot, ub.SNCurve.eurocode(71e6))
+        >>> shake = ub.PointLoad(beam.end, force=(0, 5e4), time=np.sin)
+        >>> shaken = ub.Scene([beam], supports=scene.supports, loads=[shake])
+        >>> run = ub.simulate(shaken, ub.Static(), t=(0, 20), dt=0.2, record=fatigue)
+        >>> ub.plot_cycles(fatigue, spot).savefig("cycles.png")
     """
     cycles, curve = fatigue.cycles(spot), fatigue.curve
     if not len(cycles.range):

@@ -59,6 +59,9 @@ def plot_moment_curvature(solution: Solution, place: Place) -> Figure:
 
     Raises:
         SceneError: The scene is elastic, or the beam of the place is not in it.
+
+    Example:
+        >>> ub.plot_moment_curvature(broken, weak.start).savefig("loops.png")
     """
     M, K = solution.material_at(place).forces[:, 2], solution.strains_at(place)[:, 2]
     with picture((8.0, 5.4)) as figure:
@@ -83,6 +86,9 @@ def plot_hinge(solution: Solution, place: Place) -> Figure:
     Raises:
         SceneError: The scene is elastic, there is no hinge, or the beam of the place is not in the
             scene.
+
+    Example:
+        >>> ub.plot_hinge(broken, weak.start).savefig("hinge.png")
     """
     kept, grid = solution.material_at(place), solution.grid
     hinge = grid.hinge_at(place)
@@ -118,6 +124,9 @@ def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Fig
 
     Raises:
         SceneError: The scene is elastic, no such time, or ``magnify`` is not positive.
+
+    Example:
+        >>> ub.plot_damage(broken).savefig("damage.png")
     """
     from matplotlib.collections import LineCollection
 
@@ -161,6 +170,9 @@ def plot_dissipation(solution: Solution) -> Figure:
 
     Raises:
         SceneError: The scene is elastic, and has no connectors.
+
+    Example:
+        >>> ub.plot_dissipation(broken).savefig("dissipation.png")
     """
     if not solution.scene.connectors:
         _require_inelastic(solution)

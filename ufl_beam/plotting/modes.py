@@ -36,6 +36,9 @@ def plot_modes(
 
     Raises:
         SceneError: There is no such shape, or ``amplitude`` is not positive.
+
+    Example:
+        >>> ub.plot_modes(ub.modes(scene, 3)).savefig("modes.png")
     """
     chosen = list(which) if len(which) else list(range(len(shapes)))
     if not chosen:

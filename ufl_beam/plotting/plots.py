@@ -79,6 +79,9 @@ def plot_shapes(
     Raises:
         SceneError: ``times`` is one number, ``count`` is less than 1, or ``magnify`` is not
             positive.
+
+    Example:
+        >>> ub.plot_shapes(solution, count=5, magnify=10).savefig("shapes.png")
     """
     require_number(count, "plot_shapes: count", at_least=1)
     if np.ndim(times) != 1:
@@ -120,6 +123,9 @@ def plot_history(
     Raises:
         SceneError: Unknown ``component``, a place that is not in the scene, or the velocity of a
             static run.
+
+    Example:
+        >>> ub.plot_history(solution, beam.end, component="v").savefig("history.png")
     """
     require_choice(component, COMPONENTS, "plot_history: component")
     followed = (places,) if isinstance(places, Anchor) else tuple(places)
@@ -143,6 +149,9 @@ def plot_energy(solution: Solution) -> Figure:
 
     Above: energy in the scene, solid; supplied, dashed; lost, dotted.  Below: the imbalance as a
     part of the energy that went through, with the machine precision for comparison.
+
+    Example:
+        >>> ub.plot_energy(solution).savefig("energy.png")
     """
     energy, precision = solution.energy, float(np.finfo(np.float64).eps)
     along = solution.progress
@@ -278,6 +287,11 @@ def picture(size: tuple[float, float]) -> Iterator[Figure]:
 
     Args:
         size: Width and height; inch.
+
+    Example:
+        >>> with ub.picture((6, 4)) as figure:
+        ...     lines = figure.subplots().plot(solution.times, solution.position(beam.end)[:, 1])
+        >>> figure.savefig("drop.png")
     """
     import matplotlib as mpl
     from matplotlib.figure import Figure

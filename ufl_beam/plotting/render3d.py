@@ -73,6 +73,9 @@ def render(
         SceneError: A wrong argument; the message says which.
         ImportError: PyVista is missing.
         RuntimeError: There is neither a screen nor Xvfb.
+
+    Example:
+        >>> ub.render(solution, "beam.png", color="M", size=(640, 360))
     """
     from matplotlib.image import imsave
 
@@ -115,6 +118,9 @@ def animate(
         SceneError: A wrong argument; the message says which.
         ImportError: PyVista, imageio or imageio-ffmpeg is missing.
         RuntimeError: There is neither a screen nor Xvfb.
+
+    Example:
+        >>> ub.animate(solution, "beam.gif", fps=5, seconds=0.4, size=(320, 192))
     """
     look = _Look(solution, color, thickness, magnify, size)
     path = _require_suffix(path, (".gif", ".mp4"))

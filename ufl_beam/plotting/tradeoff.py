@@ -27,6 +27,11 @@ def plot_tradeoff(tradeoff: Tradeoff) -> Figure:
 
     Args:
         tradeoff: What :func:`tradeoff` returned.
+
+    Example:
+        >>> tip = {"tip": lambda run: run.position(beam.end)[-1]}
+        >>> found = ub.tradeoff(scene, tip, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance=0.01)
+        >>> ub.plot_tradeoff(found).savefig("tradeoff.png")
     """
     with picture((9.0, 6.0)) as figure:
         axes = figure.subplots()

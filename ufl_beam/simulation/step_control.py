@@ -124,6 +124,12 @@ class Adaptive:
 
     Raises:
         SceneError: A number is out of range.
+
+    Example:
+        >>> steps = ub.Adaptive(tolerance=1e-4, stops=[0.5])
+        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=steps)
+        >>> 0.5 in run.times, bool(run.time_error < 0.01)
+        (True, True)
     """
 
     tolerance: float
