@@ -67,7 +67,7 @@ SOFT = 1e-3
 
 
 class Path(Solution):
-    """A path of equilibria: a solution whose times are load factors.
+    """Equilibrium path: a solution whose times are load factors.
 
     Attributes:
         critical: Limit and bifurcation points, in the order in which they were passed.

@@ -38,7 +38,7 @@ TOGETHER = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Beam:
-    """A beam with straight cells along a curve; straight from ``a`` to ``b`` by default.
+    """Beam with straight cells along a curve, by default along the line from ``a`` to ``b``.
 
     Args:
         a: First end; m.
@@ -185,12 +185,12 @@ class Beam:
 
     @property
     def start(self) -> Place:
-        """First end."""
+        """Place at the first end, ``s = 0``."""
         return Place(self, 0.0)
 
     @property
     def end(self) -> Place:
-        """Last end."""
+        """Place at the last end, ``s = 1``."""
         return Place(self, 1.0)
 
     def vertices(self, attached: Sequence[float]) -> list[float]:

@@ -19,7 +19,7 @@ from ufl_beam.model.beams import Place, Point
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A rigid body; anything may be attached to any point of it.
+    """Rigid body; joints, connectors and loads may act at any of its points.
 
     Args:
         center: Centre of mass in the undeformed scene; m.
@@ -92,7 +92,7 @@ GROUND = Body((0.0, 0.0), name="ground")
 
 
 def ground(x: float, y: float) -> Spot:
-    """The point (x, y) of the ground; m.
+    """Return the point (x, y) of the ground; m.
 
     Example:
         >>> pivot = ub.Revolute(ub.ground(0, 0), beam.start)

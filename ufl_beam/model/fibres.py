@@ -16,7 +16,7 @@ from ufl_beam.model.material_laws import Hardening, Layout, Softening
 
 @dataclass(frozen=True)
 class Fibres:
-    """Material law of the fibres of a section and their number, P(93).
+    """Number and material law of the fibres of a section, P(93).
 
     Args:
         law: Of each fibre; stresses in Pa.  A random limit is drawn for each fibre of each cell.
@@ -114,7 +114,7 @@ class PlacedFibres:
 
     @property
     def EA(self) -> float:
-        """Axial stiffness; N."""
+        """Axial stiffness, the sum over all fibres; N."""
         return float(self.E * self.A.sum())
 
     @property

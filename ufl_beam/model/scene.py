@@ -52,7 +52,7 @@ from ufl_beam.model.supports import COMPONENTS, Support
 
 @dataclass(frozen=True, eq=False)
 class PointMass:
-    """Mass, and rotary inertia, fixed to a place.
+    """Point mass, with rotary inertia, fixed to a place.
 
     Args:
         place: Where.
@@ -77,7 +77,7 @@ class PointMass:
 
 @dataclass(frozen=True, eq=False)
 class Velocity:
-    """Initial motion of beams and bodies as one rigid body.
+    """Initial velocity of beams and bodies that move as one rigid body.
 
     Args:
         beams: The beams and bodies that move so.
@@ -120,7 +120,7 @@ class Velocity:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Beams and bodies, and what joins, holds, loads and moves them.
+    """Model: beams and bodies with joints, supports, loads, masses and connectors.
 
     Args:
         beams: The beams.

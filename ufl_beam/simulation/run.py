@@ -51,7 +51,7 @@ def simulate(
     progress: bool = True,
     comm: MPI.Intracomm | None = None,
 ) -> Solution:
-    """Simulate a scene.
+    """Simulate the motion of a scene in time, or its equilibria under growing loads.
 
     Args:
         scene: What is modelled.

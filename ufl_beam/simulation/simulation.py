@@ -132,7 +132,7 @@ class Trial(NamedTuple):
 
 
 class Simulation(StateView):
-    """A scene in motion: one state, and the step to the next.
+    """Time stepper of a scene: its present state and the step to the next.
 
     :func:`simulate` is a loop over :meth:`step_to`; use this class for loops of your own.
 

@@ -102,7 +102,7 @@ class EqualSteps:
 
 @dataclass(frozen=True)
 class Adaptive:
-    """Steps as long as the accuracy that is asked for allows; given in the place of ``dt``.
+    """Adaptive time steps of a given local error; given in the place of ``dt``.
 
     Each step estimates its own error: what its mean velocity and acceleration miss of a motion
     whose acceleration changes, and what the middle of the step misses of the loads.  As with other
