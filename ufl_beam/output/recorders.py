@@ -51,7 +51,16 @@ ROTATION = (("motion", "rad"), ("force", "N m"), ("work", "J"))
 
 
 class Recorder(ABC):
-    """Something that looks at each accepted step; all processes call it together."""
+    """Base class of recorders, which see each accepted step; called by all processes together.
+
+    Example:
+        >>> class Speed(ub.Recorder):
+        ...     largest = 0.0
+        ...     require_writable = open = close = lambda self, *simulation: None
+        ...     def write(self, simulation):
+        ...         self.largest = max(self.largest, abs(simulation.velocity(beam.end)[1]))
+        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=Speed())
+    """
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -138,7 +147,7 @@ def close_all(recorders: Sequence[Recorder]) -> None:
 
 
 class History(Recorder):
-    """Table of the motion of places and of the ledger, one row a step, complete if the run dies.
+    """Table (CSV) of the motion of places and of the energy ledger, complete after a crash.
 
     Columns: t, or the load factor of a path; u, v, psi of each place; motion, force, work of each
     connector; then the entries of the ledger.  The names of the columns end in their units.
@@ -155,6 +164,12 @@ class History(Recorder):
 
     Raises:
         SceneError: ``every`` or ``most`` is no whole number, at least 1.
+
+    Example:
+        >>> table = ub.History("tip.csv", [beam.end])
+        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=table)
+        >>> np.loadtxt("tip.csv", delimiter=",", skiprows=1).shape[0]
+        21
     """
 
     def __init__(

@@ -58,7 +58,7 @@ Shorter ones are nearer to it, but magnify the velocities of supports that do no
 
 
 class Simulation(StateView):
-    """A scene in motion: one state, and the step to the next.
+    """Time stepper of a scene: its present state and the step to the next.
 
     :func:`simulate` is a loop over :meth:`step_to`; use this class for loops of your own.
 
@@ -81,6 +81,14 @@ class Simulation(StateView):
         parts: Number of parts that steps were cut into, those not cut included.
         together: Calls that raise on all processes of a shared scene what they raise on one.
         last_dt: Length of the last accepted step; s.
+
+    Example:
+        >>> simulation = ub.Simulation(scene, ub.Midpoint())
+        >>> while simulation.t < 1:
+        ...     simulation.step_to(simulation.t + 0.05)
+        >>> print((1e3 * simulation.displacement(beam.end)).round(1))  # mm, mm, mrad
+        [ -0.1 -18.9 -14.3]
+        >>> simulation.close()
     """
 
     def __init__(

@@ -245,8 +245,10 @@ class Solver:
             snes.solve(None, self._x)
             reason = int(snes.getConvergedReason())
         except PETSc.Error as error:
-            cause = error.__cause__
-            if cause is not None and not isinstance(cause, PETSc.Error):
+            cause: BaseException = error
+            while cause.__cause__ is not None:
+                cause = cause.__cause__
+            if getattr(cause, "ierr", 0) != lib.OF_LIBRARY:
                 raise cause from None
             reason = int(lib.SINGULAR)  # KLU stops PETSc where it finds no pivot
         if reason <= 0:

@@ -7,7 +7,7 @@ from typing import Any
 
 from petsc4py import PETSc
 
-from ufl_beam.compiled.c_library import doubles, ffi
+from ufl_beam.compiled.c_library import doubles, ffi, lib
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.dof_numbering import Share
 from ufl_beam.solvers.static_condensation import Elimination
@@ -62,7 +62,9 @@ class ChainsFirst:
         self._matrix.stateIncrease()
         try:
             self._factors.setUp()
-        except PETSc.Error:
+        except PETSc.Error as error:
+            if error.ierr != lib.OF_LIBRARY:
+                raise
             # KLU says so of a matrix that is singular; its next factorisation does not mind.
             return False
         return int(self._factors.getFailedReason()) == GOOD

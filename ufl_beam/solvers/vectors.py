@@ -3,16 +3,11 @@
 
 from __future__ import annotations
 
-import ctypes
-
 from petsc4py import PETSc
 
-import numpy as np
-
 from ufl_beam.arrays import Array
+from ufl_beam.compiled.c_library import ffi, petsc
 from ufl_beam.discretization.dof_numbering import Share
-
-_PETSC = ctypes.CDLL(PETSc.__file__)
 
 
 class Vectors:
@@ -60,8 +55,7 @@ class Vectors:
 
 def unlock(vector: PETSc.Vec) -> None:
     """Let a vector be written again that PETSc keeps locked after a linear solve has failed."""
-    at, state = ctypes.c_void_p(vector.handle), np.zeros(1, dtype=PETSc.IntType)
-    at_state = ctypes.c_void_p(state.ctypes.data)
-    _PETSC.VecLockGet(at, at_state)
-    for _ in range(max(0, int(state[0]))):
-        _PETSC.VecLockReadPop(at)
+    state = ffi.new("petsc_int *")
+    petsc("VecLockGet", vector, state)
+    for _ in range(state[0]):
+        petsc("VecLockReadPop", vector)

@@ -127,7 +127,7 @@ class Guides(Links):
         self._s = self._s0.copy()
 
     def loops(self) -> None:
-        """None."""
+        """None: guide curves are evaluated in Python."""
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the forces, and the distances."""
@@ -138,7 +138,7 @@ class Guides(Links):
         r[self._forces_at] += distance
 
     def add_tangent(self, q1: Array) -> None:
-        """Add the derivatives."""
+        """Add the derivatives of forces and constraints to the tangent."""
         _, n, m, dm = self._frames(q1)
         λ, data = self.force(q1), self._A.data
         for k in range(2):
@@ -182,7 +182,7 @@ class Guides(Links):
     # -- the state -----------------------------------------------------------------------------
 
     def add_state(self, q: Array) -> None:
-        """Nothing is stored."""
+        """Add nothing: guides store no energy."""
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The points on the curves, their parameters, and the steps of these for tangents."""
