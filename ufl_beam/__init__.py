@@ -112,7 +112,7 @@ from ufl_beam.simulation.run import say, simulate
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution, load
 from ufl_beam.simulation.step_control import Adaptive
-from ufl_beam.solvers.newton import Newton
+from ufl_beam.solvers.newton_options import Newton
 from ufl_beam.terms.energy_ledger import Energy
 from ufl_beam.version import version
 

@@ -21,7 +21,7 @@ PACKAGE = os.path.join(os.path.dirname(__file__), "")
 
 
 class SceneError(ValueError):
-    """The scene or the call is wrong; raised before any mesh exists.
+    """Error in a scene or a call; raised before any mesh exists.
 
     The message says which object, what is wrong and what to do.
 
@@ -33,7 +33,7 @@ class SceneError(ValueError):
 
 
 class ModelWarning(UserWarning):
-    """A scene or a call that is likely, but not surely, wrong.
+    """Warning about a scene or a call that is likely, but not surely, wrong.
 
     The message says which object it is about, what is unusual and what to do.  To silence one
     that is meant: ``warnings.filterwarnings("ignore", category=ub.ModelWarning)``; to make all of
@@ -72,7 +72,7 @@ class StepFailed(Exception):
 
 
 class ConvergenceError(RuntimeError):
-    """A step found no equilibrium, even after it was cut; nothing before it is lost.
+    """No equilibrium was found for a step, even after cutting it; results so far are kept.
 
     Attributes:
         time: Time of the last accepted state, on a path its load factor; s.
@@ -118,7 +118,7 @@ class ConvergenceError(RuntimeError):
 
 
 class CopiesDiffer(RuntimeError):
-    """Processes that compute copies of one small scene have found different motions.
+    """Copies of one small scene, computed by several processes, have different motions.
 
     Example:
         >>> try:

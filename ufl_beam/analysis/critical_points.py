@@ -34,7 +34,7 @@ class Direction(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """Where a path begins, and in which direction; made by :meth:`CriticalPoint.branch`.
+    """Start and direction of a secondary path; made by :meth:`CriticalPoint.branch`.
 
     Attributes:
         state: Solution whose last state is the beginning.
@@ -56,7 +56,7 @@ class Branch:
 
 @dataclass(frozen=True, eq=False)
 class CriticalPoint:
-    """A state of a path in which its tangent stiffness is singular.
+    """Limit or bifurcation point: a state of a path with singular tangent stiffness.
 
     Attributes:
         kind: "limit" where the load factor turns, "bifurcation" where another branch begins.

@@ -16,7 +16,7 @@ from ufl_beam.errors import SceneError, require_number
 
 @dataclass(frozen=True)
 class Envelope:
-    """A law fitted to peaks; ``_95`` is the half-width of a 95 % interval, Student's, linearised.
+    """Decay law fitted to peaks; ``_95`` is the half-width of a 95 % interval (Student's t).
 
     Attributes:
         initial: A_0, the amplitude at the first peak; unit of x.
@@ -47,7 +47,7 @@ class Envelope:
 
 @dataclass(frozen=True, eq=False)
 class Decay:
-    """Decay of the peaks of a free vibration.
+    """Decay of a free vibration: peaks, logarithmic decrement and fitted laws.
 
     Attributes:
         times: Times of the n peaks; (n,); s.
@@ -125,7 +125,7 @@ class Decay:
 def damping(
     t: npt.ArrayLike, x: npt.ArrayLike, about: float = 0.0, *, prominence: float = 0.05
 ) -> Decay:
-    """Damping of a free vibration from its history; arguments and errors of :func:`peaks`.
+    """Estimate the damping of a free vibration; arguments and errors of :func:`peaks`.
 
     Raises:
         SceneError: Less than 3 peaks, or not all of them are above ``about``.
@@ -148,7 +148,7 @@ def damping(
 def peaks(
     t: npt.ArrayLike, x: npt.ArrayLike, about: float = 0.0, *, prominence: float = 0.05
 ) -> tuple[Array, Array]:
-    """Times (s) and amplitudes (unit of x) of the maxima of a vibration; (m,) each.
+    """Find times (s) and amplitudes (unit of x) of the maxima of a vibration; (m,) each.
 
     Of x and not of its magnitude: these are one period apart, wherever the equilibrium is.  Each
     is that of the parabola through three samples; an end of the history is no maximum.
@@ -186,7 +186,7 @@ def peaks(
 
 
 def logarithmic_decrement(amplitudes: npt.ArrayLike) -> tuple[float, Array]:
-    """Logarithmic decrement δ of n + 1 amplitudes: mean over n periods, and of each one, (n,).
+    """Compute the mean logarithmic decrement δ of n + 1 amplitudes, and that of each period, (n,).
 
     Raises:
         SceneError: Less than two amplitudes, or some are not positive.
@@ -210,7 +210,7 @@ def logarithmic_decrement(amplitudes: npt.ArrayLike) -> tuple[float, Array]:
 
 
 def damping_ratio(decrement: npt.ArrayLike) -> Array:
-    """Damping ratio ζ of logarithmic decrements δ of any shape; negative where vibrations grow.
+    """Compute damping ratios ζ of decrements δ of any shape; negative where vibrations grow.
 
     Example:
         >>> print(f"{ub.damping_ratio(0.1):.4f}")

@@ -174,7 +174,7 @@ class _Frame:
 
 @dataclass(frozen=True, eq=False)
 class Modes(Shapes):
-    """Small motions ``x exp(s t)`` about a state.
+    """Vibration modes ``x exp(s t)`` about a state; made by :func:`modes`.
 
     Attributes:
         exponents: s = -ζω ± iω√(1-ζ²) of each, imaginary part not negative, |s| ascending; (n,);
@@ -224,7 +224,7 @@ class Modes(Shapes):
 
 @dataclass(frozen=True, eq=False)
 class Buckling(Shapes):
-    """Shapes that the scene leaves its state with, and the factors on its loads.
+    """Buckling modes and their load factors; made by :func:`buckling`.
 
     Attributes:
         factors: Factors on the loads, |factor| ascending; negative: with loads reversed; (n,).
@@ -240,7 +240,7 @@ class Buckling(Shapes):
 
     @property
     def titles(self) -> list[str]:
-        """The factors."""
+        """Titles of pictures: the load factors."""
         return [f"loads × {factor:.4g}" for factor in self.factors]
 
     def __str__(self) -> str:
@@ -248,7 +248,7 @@ class Buckling(Shapes):
 
 
 def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None = None) -> Modes:
-    """Natural frequencies, damping ratios and shapes of small motions.
+    """Compute natural frequencies, damping ratios and shapes of small vibrations.
 
     About the undeformed, unloaded scene; or about the last state of a solution, with its section
     forces, what loads and a :class:`RotatingFrame` add, and with the elastic stiffness of what has
@@ -298,7 +298,7 @@ def buckling(
     at: Solution | None = None,
     mesh: Mesh | None = None,
 ) -> Buckling:
-    """Factors on the loads at which the scene buckles, (K + λ K') x = 0.
+    """Compute buckling load factors and modes, (K + λ K') x = 0.
 
     Loads and prescribed motions grow in proportion, from those of the state ``at`` (λ = 0; nothing
     without it) to those at the time ``t`` (λ = 1).  K' is the change of stiffness along the first,

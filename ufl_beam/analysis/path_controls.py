@@ -16,7 +16,7 @@ from ufl_beam.errors import SceneError, StepFailed, require_kind, require_number
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
-from ufl_beam.simulation.simulation import Trial
+from ufl_beam.simulation.step_solver import Trial
 
 SHORTEST = 1e-3
 """Part of a step of arc length that is gone at least beyond a bend."""
@@ -49,7 +49,7 @@ class Plane:
         return gone - 1.0
 
     def slope(self, q: Array, way: Direction) -> float:
-        """The same everywhere."""
+        """Derivative of the equation along a direction; it is the same at any state."""
         along = self._total(float(self._normal.q @ way.q)) + self._normal.t * way.t
         return along / self._reach
 
@@ -65,7 +65,7 @@ class Given:
         self._t = t
 
     def miss(self, q: Array, t: float) -> float:
-        """Return the residual."""
+        """Residual of the equation: missing change of the load factor."""
         return t - self._t
 
     def slope(self, q: Array, way: Direction) -> float:
@@ -170,7 +170,7 @@ def _require_step(step: float, what: str) -> None:
 
 @dataclass(frozen=True)
 class ArcLength:
-    """Steps of one length: the way through limit points of loads and of displacements.
+    """Arc-length control: passes limit points of loads and of displacements.
 
     The length is the root mean square of all displacements over the size of the scene, of all
     rotations (rad), and of the change of the load factor over ``factor``.
@@ -239,7 +239,7 @@ class ArcLength:
 
 @dataclass(frozen=True)
 class LoadControl:
-    """Steps of the load factor, up to the limit load.
+    """Load control: equal steps of the load factor, up to the limit load.
 
     Args:
         step: Change of the load factor; negative downwards.
@@ -278,7 +278,7 @@ class LoadControl:
 
 @dataclass(frozen=True)
 class DisplacementControl:
-    """Steps of one component of the motion of a place, through limit points of loads.
+    """Displacement control of one component at a place: passes limit points of loads.
 
     Args:
         place: Place of a beam.
@@ -340,7 +340,7 @@ class DisplacementControl:
 
 @dataclass(frozen=True)
 class DissipationControl:
-    """Steps of the energy that hinges and yielding beams dissipate, through sharp snap-backs.
+    """Dissipation control by the energy that hinges and yielding beams lose: sharp snap-backs.
 
     Softening and unloading may begin in nearly the same direction; only one of them dissipates.
 

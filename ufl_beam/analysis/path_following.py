@@ -26,9 +26,10 @@ from ufl_beam.output.output_files import take
 from ufl_beam.output.recorders import Recorder, close_all, recorders_of
 from ufl_beam.parallel import communicator
 from ufl_beam.parameter import FACTOR
-from ufl_beam.simulation.simulation import Simulation, Trial
+from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.solvers.newton import Newton
+from ufl_beam.simulation.step_solver import Trial
+from ufl_beam.solvers.newton_options import Newton
 
 ADVICE = (
     "Try a shorter step or another control: ArcLength goes through limit points of loads and of "
@@ -67,7 +68,7 @@ SOFT = 1e-3
 
 
 class Path(Solution):
-    """A path of equilibria: a solution whose times are load factors.
+    """Equilibrium path: a solution whose times are load factors.
 
     Attributes:
         critical: Limit and bifurcation points, in the order in which they were passed.

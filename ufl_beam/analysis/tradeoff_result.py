@@ -17,7 +17,7 @@ from ufl_beam.arrays import Array
 
 @dataclass(frozen=True, eq=False)
 class Tradeoff:
-    """The trade of speed for accuracy on a scene; the same on every process.
+    """Result of :func:`tradeoff`: runs, errors and the recommended setting.
 
     Attributes:
         runs: All that was run.

@@ -77,7 +77,7 @@ class _AtEnd:
 
 @dataclass(frozen=True)
 class Static(_AtEnd):
-    """Equilibrium at the end of each step; no inertia, time is the load parameter.
+    """Static equilibrium at the end of each step; time is the load parameter.
 
     The ledger counts works by the trapezoidal rule, so its imbalance is of second order in the
     step and a measure of it.  A step is cut whose forces leave a twentieth of what it stores and
@@ -262,7 +262,7 @@ class Newmark(_Accelerated):
 
 @dataclass(frozen=True)
 class GeneralizedAlpha(_Accelerated):
-    """Generalised-α: second order, with damping of high frequencies that is told.
+    """Generalised-α scheme of second order with damping of high frequencies.
 
     With the weights of Chung and Hulbert (1993), in the form of Arnold and Brüls (2007): forces and
     constraints are satisfied at the ends of the steps, and an auxiliary acceleration carries the

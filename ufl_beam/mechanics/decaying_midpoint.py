@@ -12,7 +12,7 @@ from ufl_beam.mechanics.time_schemes import Rates, require_between
 
 @dataclass(frozen=True)
 class DecayingMidpoint(ExactStep, Midway):
-    """Midpoint rule that takes energy out of high frequencies and stays of second order.
+    """Midpoint rule of second order that dissipates the energy of high frequencies.
 
     :class:`Midpoint` loses energy in proportion to the changes of strains and velocities in a step,
     which is of first order.  Here it is in proportion to how these changes change from step to
@@ -72,7 +72,7 @@ class DecayingMidpoint(ExactStep, Midway):
         return 1 / (dt**2 * keep), 1 / dt, v
 
     def rates(self, dt: float, s: Array, rates: Rates) -> tuple[Array, ...]:
-        """The velocities."""
+        """Velocities at the end of the step."""
         keep = 0.5 + self.part
         v: Array = 1 / dt * s - (0.5 - self.part) * rates.v + self._remembered(dt, rates)
         v *= 1 / keep

@@ -106,7 +106,7 @@ class ExactStep(_OverStep):
 
 @dataclass(frozen=True)
 class ExactStatic(ExactStep):
-    """Equilibrium without inertia, with an exact ledger: works are exact increments of energy.
+    """Static equilibrium with an exact ledger: works are exact increments of energy.
 
     :class:`Static` finds equilibrium at the ends of the steps and counts works by the trapezoidal
     rule; here the equation of the step is that of :class:`Midpoint`.  Inelastic material follows
@@ -213,7 +213,7 @@ class _Velocities(Midway):
         return a / dt, (1 + b) / dt, rates.v  # P(78)
 
     def rates(self, dt: float, s: Array, rates: Rates) -> tuple[Array, ...]:
-        """The velocities."""
+        """Velocities at the end of the step."""
         a, b = self._weights(dt)
         return (combined(a, s, -b, rates.v),)
 
@@ -224,7 +224,7 @@ class _Velocities(Midway):
 
 @dataclass(frozen=True)
 class Midpoint(ExactStep, _Velocities):
-    """Midpoint rule that conserves energy and momentum exactly, or loses energy as it is told.
+    """Midpoint rule that conserves energy and momentum exactly, with dissipation on request.
 
     ``alpha = beta = 0`` conserves energy, linear and angular momentum to solver tolerance at any
     step size.  Positive values take energy out of the high frequencies, never in: ``alpha`` through
@@ -289,7 +289,7 @@ class PrintedMidpoint(_OverStep, _Velocities):
     alpha = beta = 0.0
 
     def half_tangents(self, rotations: Index) -> Index:
-        """None."""
+        """No rotations: the printed scheme takes Δψ itself."""
         return rotations[:0]
 
     def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
@@ -306,5 +306,5 @@ class PrintedMidpoint(_OverStep, _Velocities):
         return s, float(np.abs(s[rotations]).max(initial=0.0))
 
     def error_weights(self) -> tuple[float, float]:
-        """The trapezoidal rule's."""
+        """Weights of the error of the trapezoidal rule."""
         return 0.0, 1 / 12

@@ -28,7 +28,7 @@ from ufl_beam.model.sections import Section
 
 @dataclass(frozen=True, eq=False)
 class Beam(Member):
-    """A beam with straight cells along a curve; straight from ``a`` to ``b`` by default.
+    """Beam with straight cells along a curve, by default along the line from ``a`` to ``b``.
 
     Args:
         a: First end; m.

@@ -47,12 +47,12 @@ class Member:
 
     @property
     def start(self) -> Place:
-        """First end."""
+        """Place at the first end, ``s = 0``."""
         return Place(self, 0.0)
 
     @property
     def end(self) -> Place:
-        """Last end."""
+        """Place at the last end, ``s = 1``."""
         return Place(self, 1.0)
 
     def vertices(self, attached: Sequence[float]) -> list[float]:
@@ -128,7 +128,7 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A rigid body; anything may be attached to any point of it.
+    """Rigid body; joints, connectors and loads may act at any of its points.
 
     Args:
         center: Centre of mass in the undeformed scene; m.
@@ -201,7 +201,7 @@ GROUND = Body((0.0, 0.0), name="ground")
 
 
 def ground(x: float, y: float) -> Spot:
-    """The point (x, y) of the ground; m.
+    """Return the point (x, y) of the ground; m.
 
     Example:
         >>> pivot = ub.Revolute(ub.ground(0, 0), beam.start)

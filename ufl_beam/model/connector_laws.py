@@ -23,7 +23,7 @@ from ufl_beam.model.time_functions import TimeFunction, require_time_function
 
 @dataclass(frozen=True)
 class Motor:
-    """The motion is given; the force that it takes is found.
+    """Prescribed relative motion of a connector; its force is unknown.
 
     Args:
         motion: In time; m or rad.  Zero, which joints use, holds it.
@@ -44,7 +44,7 @@ class Motor:
 
 @dataclass(frozen=True)
 class Actuator:
-    """The force is given; a positive one makes the motion grow.
+    """Prescribed force or moment of a connector; a positive one makes the motion grow.
 
     Args:
         force: In time; N or N m.
@@ -82,7 +82,7 @@ class Running(Protocol):
 
 @dataclass(frozen=True)
 class Controller:
-    """The force is what a function says at the beginning of each step, and constant during it.
+    """Force by a function of the running simulation, constant during each step.
 
     Args:
         force: ``force(simulation)``; N or N m; a positive one makes the motion grow.  It may ask
@@ -110,7 +110,7 @@ class Controller:
 
 @dataclass(frozen=True)
 class Spring:
-    """A spring, which may yield and break.
+    """Elastic spring of a connector, which may yield and break.
 
     Args:
         stiffness: N/m or N m/rad.
@@ -142,7 +142,7 @@ class Spring:
 
 @dataclass(frozen=True)
 class Damper:
-    """A force in proportion to the rate of the motion.
+    """Viscous damper: a force in proportion to the rate of the motion.
 
     Args:
         viscosity: N s/m or N m s/rad.
@@ -163,7 +163,7 @@ class Damper:
 
 @dataclass(frozen=True)
 class Stop:
-    """Contact where the motion leaves an interval; free inside.
+    """Elastic stop: a contact force where the motion leaves an interval.
 
     Args:
         low, high: Ends of the interval; m or rad.
@@ -199,7 +199,7 @@ class Stop:
 
 @dataclass(frozen=True)
 class ForceLaw:
-    """A force that a function of the motion and its rate gives, as a spring or damper would.
+    """Force of a connector as a function of its motion and rate.
 
     Args:
         force: ``force(motion, rate)``; arrays or numbers; N or N m; a positive one resists growth.
@@ -223,7 +223,7 @@ class ForceLaw:
 
 @dataclass(frozen=True)
 class Coulomb:
-    """Dry friction: no motion up to a limit, and the limit against the motion beyond it.
+    """Coulomb friction: sticks below a limit of the force, slides at the limit.
 
     The limit is ``force`` and ``coefficient`` times the force of a joint at the end of the step
     before.  There is no stiffness of sticking: the motion stops exactly, with its velocity.
@@ -270,7 +270,7 @@ class Coulomb:
 
 @dataclass(frozen=True)
 class RigidPlastic:
-    """No motion up to the limit of a law, which the motion follows beyond it.
+    """Rigid-plastic law: no motion below a limit of the force, flow or softening at it.
 
     There is no elastic stiffness: below the limit the motion is held exactly.  Plastic hinges of
     beams, ``Beam(hinges={s: law})``, are rotations with this law.

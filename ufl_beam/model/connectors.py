@@ -30,7 +30,7 @@ class Rigidly(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Connector:
-    """A relative motion of two anchors that follows a law; made by :func:`Turn` and its siblings.
+    """Relative motion of two anchors with a force law; made by :func:`Turn` and its siblings.
 
     The motion is zero in the undeformed scene.  The force of a connector resists its growth: it is
     positive in a spring that is stretched, and negative in a motor that drives.
@@ -102,7 +102,7 @@ class Connector:
 
 
 def Turn(a: Anchor, b: Anchor, law: Law) -> Connector:
-    """Rotation of ``b`` relative to ``a``: rotational springs, dampers, motors; rad, N m.
+    """Connector of the rotation of ``b`` relative to ``a``: springs, dampers, motors; rad, N m.
 
     Example:
         >>> soft = ub.Turn(ub.ground(0, 0), beam.start, ub.Spring(1e7))  # N m/rad
@@ -114,7 +114,7 @@ def Turn(a: Anchor, b: Anchor, law: Law) -> Connector:
 
 
 def Stretch(a: Anchor, b: Anchor, law: Law) -> Connector:
-    """Growth of the distance of ``a`` and ``b``: springs, dampers, rods that push; m, N.
+    """Connector of the distance between ``a`` and ``b``: springs, dampers, actuators; m, N.
 
     Raises:
         SceneError: Both are at the same point, so that there is no direction.
@@ -129,7 +129,7 @@ def Stretch(a: Anchor, b: Anchor, law: Law) -> Connector:
 
 
 def Slide(a: Anchor, b: Anchor, law: Law, *, axis: Point | None = None) -> Connector:
-    """Way of ``b`` along an axis that turns with ``a``; m, N.
+    """Connector of the displacement of ``b`` along an axis that turns with ``a``; m, N.
 
     Args:
         a: Whose axis it is; it may be on the ground.

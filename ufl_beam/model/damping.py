@@ -11,7 +11,7 @@ from ufl_beam.model.bodies import Member
 
 @dataclass(frozen=True)
 class Rayleigh:
-    """Forces (a0 M + a1 K) v, K being the stiffness of the undeformed scene, P(92).
+    """Rayleigh damping (a0 M + a1 K) v with the stiffness K of the undeformed scene, P(92).
 
     The damping ratio of a mode of circular frequency ω is a0/(2ω) + a1 ω/2.  It is a property of
     the structure, not of the material, and it is not objective: rigid rotation is damped too, and
@@ -45,7 +45,7 @@ class Rayleigh:
 
 @dataclass(frozen=True, eq=False)
 class KelvinVoigt:
-    """Resultants C times the rates of the strains beside the elastic ones: objective damping.
+    """Kelvin-Voigt damping: C times the strain rates, beside the elastic resultants; objective.
 
     Rigid motion is free of it; the damping ratio of a mode of circular frequency ω in small
     vibration is time ω/2, that of ``Rayleigh(stiffness=time)``.  Cells with a hinge are left out,

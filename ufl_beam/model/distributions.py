@@ -51,7 +51,7 @@ class Distribution(ABC):
 
 @dataclass(frozen=True)
 class Normal(Distribution):
-    """Gauss's distribution; values below zero become zero, such fibres yield at once.
+    """Normal distribution; negative values become zero, and such fibres yield at once.
 
     Args:
         mean: Mean; Pa for fibres, N or N m for resultants.
@@ -75,7 +75,7 @@ class Normal(Distribution):
 
 
 class TruncatedNormal(Normal):
-    """Gauss's distribution of these parameters, given that the value is positive.
+    """Normal distribution of these parameters, truncated to positive values.
 
     Example:
         >>> limit = ub.TruncatedNormal(mean=30e6, deviation=20e6, seed=1)
@@ -89,7 +89,7 @@ class TruncatedNormal(Normal):
 
 
 class Lognormal(Normal):
-    """The distribution of this mean and deviation whose logarithm is normal.
+    """Lognormal distribution of given mean and standard deviation.
 
     Example:
         >>> limit = ub.Lognormal(mean=355e6, deviation=25e6, seed=1)
@@ -104,7 +104,7 @@ class Lognormal(Normal):
 
 @dataclass(frozen=True)
 class Weibull(Distribution):
-    """Weibull's distribution.
+    """Weibull distribution of positive values, for strengths.
 
     Args:
         scale: What a part exp(-1) of the values exceeds; Pa for fibres, N or N m for resultants.

@@ -20,7 +20,7 @@ from ufl_beam.model.curves import Curve, Point, point_of
 
 @dataclass(frozen=True, eq=False)
 class Joint(Bearing):
-    """Anchors that share components of motion, or are held by connectors; see :func:`Rigid`.
+    """Joint by shared unknowns or by constraint forces; made by :func:`Rigid` and its siblings.
 
     Attributes:
         kind: Name for messages.
@@ -167,7 +167,7 @@ def RigidLink(a: Anchor, b: Anchor) -> Joint:
 
 
 def Link(a: Anchor, b: Anchor) -> Joint:
-    """Massless rigid rod with a revolute joint at both ends: the distance stays.
+    """Massless rigid rod with a revolute joint at both ends: keeps the distance.
 
     Raises:
         SceneError: Zero length.
@@ -185,7 +185,7 @@ def Link(a: Anchor, b: Anchor) -> Joint:
 
 
 def Guided(place: Anchor, curve: Curve) -> Joint:
-    """A point stays on a guide curve of the ground, free along it and free to turn.
+    """Joint that keeps a point on a guide curve of the ground, free along it and free to turn.
 
     Args:
         place: What is guided; of bodies the centre, other points by a :func:`Revolute` to a beam.
@@ -215,7 +215,7 @@ def Guided(place: Anchor, curve: Curve) -> Joint:
 
 
 def Release(a: Place, b: Anchor, *, free: str, measured: bool = False) -> Joint:
-    """Joint at one point that transmits all but some resultants of the beam of ``a``.
+    """Joint at one point that releases some of the resultants of the beam of ``a``.
 
     Args:
         a: The place on a beam whose axis says what is axial.

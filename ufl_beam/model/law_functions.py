@@ -26,7 +26,7 @@ def below(x: Values, limit: float) -> Values:
 
 @singledispatch
 def exp(x: Values) -> Values:
-    """Exponential function."""
+    """Exponential function of numbers or arrays."""
     return np.exp(x)
 
 

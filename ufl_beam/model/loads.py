@@ -42,7 +42,7 @@ class PointLoad:
 
 @dataclass(frozen=True, eq=False)
 class FollowerLoad:
-    """Force at a place that turns with the cross-section; not conservative.
+    """Follower force at a place: it turns with the cross-section and is not conservative.
 
     Args:
         place: Where.
@@ -84,7 +84,7 @@ def _check_point_load(load: PointLoad | FollowerLoad, kind: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class LineLoad:
-    """Dead force and moment along a whole beam, per undeformed length.
+    """Distributed dead force and moment along a beam, per undeformed length.
 
     Args:
         beam: Where.
@@ -144,7 +144,7 @@ class Gravity:
 
 @dataclass(frozen=True, eq=False)
 class RotatingFrame:
-    """Centrifugal and Coriolis forces on all that has mass: the scene turns steadily as a whole.
+    """Centrifugal and Coriolis forces on all masses, in a frame that turns steadily.
 
     Motions, velocities and all other loads are those that somebody sees who turns with the frame.
     In statics it gives the steady rotation, with all that it stretches and bends.

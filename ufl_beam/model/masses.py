@@ -18,7 +18,7 @@ from ufl_beam.model.curves import Point
 
 @dataclass(frozen=True, eq=False)
 class PointMass:
-    """Mass, and rotary inertia, fixed to a place.
+    """Point mass, with rotary inertia, fixed to a place.
 
     Args:
         place: Where.
@@ -43,7 +43,7 @@ class PointMass:
 
 @dataclass(frozen=True, eq=False)
 class Velocity:
-    """Initial motion of beams and bodies as one rigid body.
+    """Initial velocity of beams and bodies that move as one rigid body.
 
     Args:
         beams: The beams and bodies that move so.

@@ -36,7 +36,7 @@ class Viscosity(Protocol):
 
 @dataclass(frozen=True)
 class Perzyna:
-    """Overstress in proportion to the rate of plastic strain, P(39).
+    """Perzyna viscoplasticity: overstress in proportion to the plastic strain rate, P(39).
 
     Args:
         eta: Overstress per rate; Pa s for fibres, N s and N m² s for resultants.  Zero is
@@ -59,7 +59,7 @@ class Perzyna:
 
 @dataclass(frozen=True)
 class DuvautLions:
-    """Relaxation towards the rate-independent stress, P(45).
+    """Duvaut-Lions viscoplasticity: relaxation towards the rate-independent stress, P(45).
 
     The same law as :class:`Perzyna` with ``eta = tau (C + H)``; the relaxation time is what the
     user knows.
@@ -205,7 +205,7 @@ Far below round-off; but numbers that underflow would be forces and stiffnesses 
 
 @dataclass(frozen=True)
 class Softening:
-    """Exponential softening of a discontinuity, P(51)-P(53): a hinge that ends as a joint.
+    """Exponential softening of a hinge or crack, down to a perfect joint, P(51)-P(53).
 
     Args:
         limit: Traction at which it opens: moment of a hinge, N m; stress of a fibre, Pa.  Zero is a
@@ -257,7 +257,7 @@ class Softening:
 
 @dataclass(frozen=True)
 class LinearSoftening(Softening):
-    """Linear softening of a discontinuity, down to nothing at the opening 2 energy / limit.
+    """Linear softening of a hinge or crack, to zero at the opening 2 energy / limit.
 
     Args and errors are those of :class:`Softening`.
 

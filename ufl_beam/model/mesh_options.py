@@ -21,7 +21,7 @@ from ufl_beam.model.bodies import Member
 
 @dataclass(frozen=True)
 class Mesh:
-    """The cells that a scene is computed with; those of its beams by default.
+    """Discretization of a scene: number of cells, polynomial degree, lumped mass.
 
     Args:
         refine: Factor on the number of cells between any two places of a beam; a whole number

@@ -42,7 +42,7 @@ from ufl_beam.model.time_functions import TimeFunction, value_at
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Beams and bodies, and what joins, holds, loads and moves them.
+    """Model: beams and bodies with joints, supports, loads, masses and connectors.
 
     Args:
         beams: The beams.

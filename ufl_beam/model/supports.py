@@ -24,7 +24,7 @@ COMPONENTS = ("u", "v", "psi")
 
 @dataclass(frozen=True, eq=False)
 class Support(Bearing):
-    """Components of motion of a place that are given; made by :func:`Clamped` and its siblings.
+    """Held or prescribed motion of a place; made by :func:`Clamped` and its siblings.
 
     Attributes:
         kind: Name for messages.
@@ -67,7 +67,7 @@ def still(t: float) -> float:
 
 
 def Clamped(place: Anchor) -> Support:
-    """Holds displacement and rotation.
+    """Clamped support: holds displacement and rotation.
 
     Example:
         >>> support = ub.Clamped(beam.start)
@@ -78,7 +78,7 @@ def Clamped(place: Anchor) -> Support:
 
 
 def Pinned(place: Anchor) -> Support:
-    """Holds the displacement; the place turns freely.
+    """Pinned support: holds the displacement; the place turns freely.
 
     Example:
         >>> support = ub.Pinned(beam.start)
@@ -89,7 +89,7 @@ def Pinned(place: Anchor) -> Support:
 
 
 def Roller(place: Anchor, *, along: Point = (1.0, 0.0)) -> Support:
-    """Holds the displacement across the direction ``along``; the place rolls and turns freely.
+    """Roller support: holds the displacement across ``along``; the place rolls and turns freely.
 
     Example:
         >>> roller = ub.Roller(beam.end, along=(1, 1))
@@ -116,7 +116,7 @@ def Prescribed(
     v: float | TimeFunction | None = None,
     psi: float | TimeFunction | None = None,
 ) -> Support:
-    """Moves the named components as given: numbers, or functions of time; m, m, rad.
+    """Prescribed motion of a place by numbers or functions of time; m, m, rad.
 
     A number is reached at once in dynamics, and in proportion to the time in statics only if it is
     given as a function such as ``lambda t: 0.1 * t``.

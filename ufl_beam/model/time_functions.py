@@ -38,7 +38,7 @@ class Constant:
 
 
 def ramp(duration: float) -> TimeFunction:
-    """The time function that grows linearly from 0 to 1 within ``duration`` (s) and stays.
+    """Return the time function that grows from 0 to 1 within ``duration`` (s) and stays at 1.
 
     Example:
         >>> growth = ub.ramp(2.0)
@@ -51,7 +51,7 @@ def ramp(duration: float) -> TimeFunction:
 
 @dataclass(frozen=True)
 class Table:
-    """A time function through points, linear between them and constant outside.
+    """Time function by points, linear between them and constant outside.
 
     Args:
         times: Increasing times; s.

@@ -41,7 +41,7 @@ FREE = 0.999
 
 
 class Event(NamedTuple):
-    """Something that happened in a step.
+    """Event of a step: yielding, opening of a hinge, contact, sliding.
 
     Attributes:
         time: End of the step; s; on a path its load factor.
@@ -67,7 +67,7 @@ class Event(NamedTuple):
 
 
 class Events(Recorder):
-    """A list of what happens, for scenes with hinges, inelastic material, stops or friction.
+    """Recorder of events, for scenes with hinges, inelastic material, stops or friction.
 
     A hinge "is free" when it has dissipated 99.9 % of its energy; stops touch and let go, friction
     slides and sticks as often as they do, the rest happens once in a cell or hinge.  A hinge that
@@ -93,7 +93,7 @@ class Events(Recorder):
         self._rows: list[Row] = []
 
     def require_writable(self) -> None:
-        """Nothing is written."""
+        """Write nothing; there is no file."""
 
     def open(self, simulation: StateView) -> None:
         """Take note of the initial state."""
@@ -169,7 +169,7 @@ class Events(Recorder):
         return events
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Close nothing; there is no file."""
 
     def state(self) -> State:
         """The events so far: time, number of the cell or connector, and what."""

@@ -27,7 +27,7 @@ BLOCK = 1000
 
 @dataclass(frozen=True, eq=False)
 class HotSpot:
-    """A place whose stress is followed.
+    """Place of a beam whose stress cycles :class:`Fatigue` counts.
 
     Args:
         place: Where on a beam.
@@ -74,7 +74,7 @@ class HotSpot:
 
 
 class Fatigue(Recorder):
-    """Rainflow cycles of the stress at named places, counted while the run goes on.
+    """Recorder of the rainflow cycles of the stress at named places.
 
     Its memory does not grow with the number of steps.  Between the middle of a cell, where the
     element knows it, and the place the moment varies by the shear force.
@@ -116,7 +116,7 @@ class Fatigue(Recorder):
         self._counters: dict[HotSpot, RainflowCounter] = {}
 
     def require_writable(self) -> None:
-        """Nothing is written."""
+        """Write nothing; there is no file."""
 
     def open(self, simulation: StateView) -> None:
         """Begin to count, with the initial state."""

@@ -26,7 +26,7 @@ Ends = tuple[float, float]
 
 @dataclass(frozen=True)
 class Goodman:
-    """Equivalent range S / (1 − mean / ultimate) of cycles about a mean stress in tension.
+    """Goodman's line: equivalent range S / (1 − mean / ultimate) about a tensile mean stress.
 
     The straight line of the Haigh diagram; with the yield stress it is Soderberg's.  Compression is
     of no help.  A mean stress of ``ultimate`` breaks at once.
@@ -52,7 +52,7 @@ class Goodman:
 
 @dataclass(frozen=True)
 class Gerber:
-    """Equivalent range S / (1 − (mean / ultimate)²), a parabola in the place of Goodman's line.
+    """Gerber's parabola: equivalent range S / (1 − (mean / ultimate)²) about a mean stress.
 
     Args:
         ultimate: Ultimate stress; Pa.
@@ -86,7 +86,7 @@ def any_mean(range: Array, mean: Array) -> Array:
 
 @dataclass(frozen=True, kw_only=True)
 class SNCurve:
-    """Cycles that a stress range can be borne for: straight lines in logarithms, Basquin's law.
+    """S-N curve: cycles to failure over the stress range, by Basquin's law.
 
     Args:
         range: Stress range that is borne for ``cycles``; Pa.
@@ -150,7 +150,7 @@ class SNCurve:
 
 @dataclass(frozen=True, eq=False)
 class Cycles:
-    """Cycles of a stress history, the smallest first.
+    """Cycles of a stress history, sorted by range, the smallest first.
 
     Attributes:
         range: Their ranges; (n,); Pa.
@@ -188,7 +188,7 @@ class Cycles:
 
 
 def rainflow(series: npt.ArrayLike) -> Cycles:
-    """Rainflow cycles of a whole series, ASTM E1049-85; needs the package `rainflow`.
+    """Count the rainflow cycles of a series, ASTM E1049-85; needs the package `rainflow`.
 
     Args:
         series: Stresses, or whatever goes to and fro; (n,).

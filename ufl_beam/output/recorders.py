@@ -51,7 +51,7 @@ ROTATION = (("motion", "rad"), ("force", "N m"), ("work", "J"))
 
 
 class Recorder(ABC):
-    """Something that looks at each accepted step; all processes call it together.
+    """Base class of recorders, which see each accepted step; called by all processes together.
 
     Example:
         >>> class Speed(ub.Recorder):
@@ -147,7 +147,7 @@ def close_all(recorders: Sequence[Recorder]) -> None:
 
 
 class History(Recorder):
-    """Table of the motion of places and of the ledger, one row a step, complete if the run dies.
+    """Table (CSV) of the motion of places and of the energy ledger, complete after a crash.
 
     Columns: t, or the load factor of a path; u, v, psi of each place; motion, force, work of each
     connector; then the entries of the ledger.  The names of the columns end in their units.

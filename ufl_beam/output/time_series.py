@@ -101,7 +101,7 @@ class TimeSeries(Recorder):
             ) from None
 
     def close(self) -> None:
-        """Close the files."""
+        """Close the files of the time series."""
         writers, self._writers = self._writers, []
         for writer in writers:
             writer.close()
@@ -185,7 +185,7 @@ class VTKHDF(TimeSeries):
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """The file."""
+        """Path of the file."""
         return (self._path,)
 
     def _writer(self, fields: LineFields, complete: list[int] | None = None) -> VtkhdfWriter:

@@ -38,7 +38,7 @@ CLASSES = 40
 
 
 def plot_extremes(solution: Solution, extremes: Extremes, what: str = "M") -> Figure:
-    """The frame with the envelope of a section force: largest values in red, least in blue.
+    """Draw the envelope of a section force on the frame: maxima red, minima blue.
 
     As in :func:`plot`, on the undeformed axis; the values of each cell may be of different times.
 
@@ -76,7 +76,7 @@ def plot_extremes(solution: Solution, extremes: Extremes, what: str = "M") -> Fi
 
 
 def plot_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:
-    """Cycles of stress at a place over their range: about which mean, how many, at what cost.
+    """Draw rainflow matrix, spectrum and damage of the stress cycles at a place.
 
     On the left the rainflow matrix; in the middle how many cycles have at least a range, and the
     curve that they can be borne for; on the right which part of the damage each class does.

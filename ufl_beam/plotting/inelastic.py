@@ -48,7 +48,7 @@ FULLY_OPEN = 0.99
 
 
 def plot_moment_curvature(solution: Solution, place: Place) -> Figure:
-    """Moment M (N m) of the cell at a place against its curvature K (1/m), coloured by time.
+    """Draw the moment M (N m) of a cell against its curvature K (1/m), coloured by time.
 
     The curvature includes the jump of a hinge over the length of the cell; loops enclose what is
     dissipated per length.  A ring marks the first kept time, a dot the last one.
@@ -73,7 +73,7 @@ def plot_moment_curvature(solution: Solution, place: Place) -> Figure:
 
 
 def plot_hinge(solution: Solution, place: Place) -> Figure:
-    """Moment M (N m) of the hinge at a place against its jump (rad), coloured by time.
+    """Draw the moment M (N m) of a hinge against its jump (rad), coloured by time.
 
     The area between the path and the axis is the energy that the hinge dissipated; the title says
     how much it is (J), and how much of its fracture energy.
@@ -111,7 +111,7 @@ def plot_hinge(solution: Solution, place: Place) -> Figure:
 
 
 def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Figure:
-    """The frame at the n-th kept time, where it has yielded and where it has broken.
+    """Draw yielded cells and opened hinges on the frame at the n-th kept time.
 
     Cells that have yielded are coloured by the energy that plastic strains dissipated per length
     (J/m); in cells of fibres that includes cracks.  Hinges that have opened are circles, the larger
@@ -162,7 +162,7 @@ def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Fig
 
 
 def plot_dissipation(solution: Solution) -> Figure:
-    """Where the energy went over time (J): what was lost, by sink, as areas upon each other.
+    """Draw the energy losses over time (J) by their sinks, as stacked areas.
 
     The line above them is what was supplied, with what the scene held at the first kept time, if
     anything; the gap between is the energy in the scene, a line of its own.  The title says the

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 def plot_modes(
     shapes: Shapes, which: Sequence[int] = (), *, amplitude: float = AMPLITUDE
 ) -> Figure:
-    """Shapes side by side, in both directions from where the scene was made, grey.
+    """Draw modes side by side, in both directions from the grey undeformed scene.
 
     Args:
         shapes: Of :func:`modes` or :func:`buckling`.

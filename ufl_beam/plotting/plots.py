@@ -65,7 +65,7 @@ def plot_shapes(
     count: int = 8,
     magnify: float = 1.0,
 ) -> Figure:
-    """Successive shapes in one picture, coloured by time, or by the load factor of a path.
+    """Draw successive shapes in one picture, coloured by time or load factor.
 
     Args:
         solution: What to show.
@@ -112,7 +112,7 @@ def plot_shapes(
 def plot_history(
     solution: Solution, places: Anchor | Sequence[Anchor], *, component: str = "v"
 ) -> Figure:
-    """A component of the motion of one or more places over time.
+    """Draw a component of the motion of one or more places over time.
 
     Args:
         solution: What to show.
@@ -144,7 +144,7 @@ def plot_history(
 
 
 def plot_energy(solution: Solution) -> Figure:
-    """The ledger over time, or along a path, and below it what it does not explain.
+    """Draw the energy ledger over time or along a path, and below it its imbalance.
 
     Above: energy in the scene, solid; supplied, dashed; lost, dotted.  Below: the imbalance as a
     part of the energy that went through, with the machine precision for comparison.
@@ -280,7 +280,7 @@ def require_choice(choice: str, choices: Sequence[str] | dict[str, Any], what: s
 
 @contextmanager
 def picture(size: tuple[float, float]) -> Iterator[Figure]:
-    """A new figure in the style of this module, for pictures of your own.
+    """Open a new figure in the style of this module, for pictures of your own.
 
     Only the first process saves it, as all of them run the same script.
 

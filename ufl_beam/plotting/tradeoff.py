@@ -20,7 +20,7 @@ FAINTEST = 1e-12
 
 
 def plot_tradeoff(tradeoff: Tradeoff) -> Figure:
-    """Error over wall time of all runs, of the worst quantity; a ring marks the recommended one.
+    """Draw errors over wall times of all runs, and the recommended run in a ring.
 
     Each kind of scheme, steps and cells has a colour; the line is that of runs that no other one
     beats in both.  The error is a part of the tolerance, or, with a budget, of the quantity.

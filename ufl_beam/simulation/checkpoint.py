@@ -45,7 +45,7 @@ Content = dict[str, Any]
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """Where and how often a run writes down all that it needs to go on.
+    """Checkpoint file from which a run is restarted, and the interval of writing it.
 
     If the file exists when the run begins, it goes on from there, as the same run to the last bit:
     after a crash the same script is simply run again.

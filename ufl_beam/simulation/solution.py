@@ -78,7 +78,7 @@ FORMAT = "solution of ufl_beam, 1"
 
 
 class Solution:
-    """The motion of a scene at the times that were kept; the same on every process.
+    """Results of a run: motions and forces at the kept times; the same on every process.
 
     It can be saved, see :meth:`save`, and pickled, with what a file has.
 
@@ -480,7 +480,7 @@ class Solution:
 
     @property
     def energy(self) -> Energy:
-        """The ledger."""
+        """Energy ledger of the run."""
         groups = []
         for group in range(3):
             names = dict.fromkeys(name for entries in self._entries for name in entries[group])

@@ -15,7 +15,8 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import StepFailed, require_number, require_sequence
 
 if TYPE_CHECKING:
-    from ufl_beam.simulation.simulation import Simulation, Trial
+    from ufl_beam.simulation.simulation import Simulation
+    from ufl_beam.simulation.step_solver import Trial
 
 GROWTH = 1.5
 """A step is at most so many times as long as the one before it, whose error it may repeat."""
@@ -102,7 +103,7 @@ class EqualSteps:
 
 @dataclass(frozen=True)
 class Adaptive:
-    """Steps as long as the accuracy that is asked for allows; given in the place of ``dt``.
+    """Adaptive time steps of a given local error; given in the place of ``dt``.
 
     Each step estimates its own error: what its mean velocity and acceleration miss of a motion
     whose acceleration changes, and what the middle of the step misses of the loads.  As with other

@@ -31,7 +31,7 @@ KINDS = ("beams", "connectors", "loads", "inertia", "damping")
 
 
 class Term(Protocol):
-    """A virtual work."""
+    """Virtual work of one physical effect."""
 
     kind: str
     """Kind of its forces, one of :data:`KINDS`."""
@@ -89,15 +89,15 @@ class OfForms:
     _A: Csr
 
     def loops(self) -> tuple[Loop, Loop | None]:
-        """Two forms."""
+        """C loops over the cells, of force and tangent."""
         return loop("add_cells", self._force.cells), loop("add_cells", self._tangent.cells)
 
     def add_residual(self, q1: Array, r: Array) -> None:
-        """Add the forces."""
+        """Add the forces to the residual."""
         self._force.add(q1, r)
 
     def add_tangent(self, q1: Array) -> None:
-        """Add their derivative."""
+        """Add the derivative of the forces to the tangent."""
         self._tangent.add(q1, self._A.data)
 
 
@@ -111,11 +111,11 @@ class OfMatrix:
         return self._times.loops()
 
     def add_residual(self, q1: Array, r: Array) -> None:
-        """Add the forces."""
+        """Add the forces to the residual."""
         self._times.add_force(q1, r)
 
     def add_tangent(self, q1: Array) -> None:
-        """Add their derivative."""
+        """Add the derivative of the forces to the tangent."""
         self._times.add_tangent(q1)
 
 
@@ -181,7 +181,7 @@ class ElasticBeams(OfForms):
             self._tangents.begins = 1
 
     def loops(self) -> tuple[Loop, Loop | None]:
-        """Two forms."""
+        """C loops over the cells, of force and tangent."""
         return loop("add_cells", self._force.cells), loop("add_first_cells", self._tangents)
 
     def add_tangent(self, q1: Array) -> None:
@@ -199,7 +199,7 @@ class ElasticBeams(OfForms):
             self._ledger.lost["numerical"] += loss.value(q1)
 
     def add_state(self, q: Array) -> None:
-        """Stored energy."""
+        """Add the stored energy to the ledger."""
         self._held = self._stored.value(q)
         self._ledger.state["stored"] += self._held
 
@@ -334,11 +334,11 @@ class Inertia(OfMatrix):
         self.v_before, self.v, self.more, self.last_dt = self.v, v, tuple(more), self._dt
 
     def add_state(self, q: Array) -> None:
-        """Kinetic energy."""
+        """Add the kinetic energy to the ledger."""
         self._ledger.state["kinetic"] += self._times.square(self.v) / 2  # P(18)
 
     def remember(self, memory: Memory, q: Array) -> None:
-        """The velocities."""
+        """Save or restore velocities and the last step."""
         self.v = memory.at_dofs("velocity", self.v)
         self.v_before = memory.at_dofs("velocity before", self.v_before)
         self.last_dt = memory.number("step of velocity", self.last_dt)

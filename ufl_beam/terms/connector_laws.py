@@ -131,7 +131,7 @@ class Response(Protocol):
         """Return the internal variables; (num_links, k)."""
 
     def restore(self, rows: Array) -> None:
-        """Take over :meth:`state`."""
+        """Restore the variables that :meth:`state` returned."""
 
     def start(self, e: Array) -> None:
         """Begin at motions that no step has led to."""

@@ -72,10 +72,10 @@ class KelvinVoigtForces(OfForms):
         self._ledger.lost["damping"] += self._lost.value(q1)
 
     def add_state(self, q: Array) -> None:
-        """Nothing is stored."""
+        """Add nothing: damping stores no energy."""
 
     def remember(self, memory: Memory, q: Array) -> None:
-        """Nothing is remembered."""
+        """Save nothing: damping has no internal variables."""
 
 
 @stated
@@ -109,10 +109,10 @@ class RayleighForces(OfMatrix):
         self._ledger.lost["damping"] += self._times.square(s) / self._dt
 
     def add_state(self, q: Array) -> None:
-        """Nothing is stored."""
+        """Add nothing: damping stores no energy."""
 
     def remember(self, memory: Memory, q: Array) -> None:
-        """Nothing is remembered."""
+        """Save nothing: damping has no internal variables."""
 
 
 @damping_forces.register

@@ -62,7 +62,7 @@ class Entries(dict[str, Array]):
 
 @dataclass(frozen=True)
 class Energy:
-    """The ledger of a run.
+    """Energy ledger of a run: energy in the scene, work supplied, losses.
 
     Attributes:
         state: Arrays by name, "kinetic" and "stored"; each (n+1,); J.

@@ -27,8 +27,6 @@ class Guides(Links):
     The motion of a guide is the distance from its curve, zero when a step is accepted.
     """
 
-    kind = "connectors"
-
     def __init__(self, share: Share, here: Index, setting: Setting, A: Csr) -> None:
         super().__init__(share, here, A)
         self._laws = [link.law for link in self.links if isinstance(link.law, Guide)]
@@ -129,7 +127,7 @@ class Guides(Links):
         self._s = self._s0.copy()
 
     def loops(self) -> None:
-        """None."""
+        """None: guide curves are evaluated in Python."""
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the forces, and the distances."""
@@ -140,7 +138,7 @@ class Guides(Links):
         r[self._forces_at] += distance
 
     def add_tangent(self, q1: Array) -> None:
-        """Add the derivatives."""
+        """Add the derivatives of forces and constraints to the tangent."""
         _, n, m, dm = self._frames(q1)
         λ, data = self.force(q1), self._A.data
         for k in range(2):
@@ -165,9 +163,6 @@ class Guides(Links):
             change += weight / (12 * ε) * data
         data[:] = before + change
 
-    def demand(self) -> None:
-        """None."""
-
     def excess(self, q: Array, r: Array, force: float, moved: float) -> float:
         """Largest distance, as a part of 1 % of the scene."""
         round_off = 8 * np.spacing(self._size + np.abs(self._points + self._on0).max(axis=1))
@@ -178,39 +173,16 @@ class Guides(Links):
         """Guides take no energy."""
         return 0.0
 
-    def flows(self) -> bool:
-        """None does."""
-        return False
-
-    def shown_motion(self, q: Array) -> Array:
-        """Motions of the accepted state ``q``; (num_links,); m."""
-        return self.motion(q)
-
-    def dissipated(self) -> Array:
-        """None: guides do not yield."""
-        return np.zeros(len(self.links))
-
-    def dissipation(self, q1: Array) -> float:
-        """None: guides do no work."""
-        return 0.0
-
-    def effort(self, q1: Array) -> float:
-        """Guides take no energy."""
-        return 0.0
-
     def accept(self, q1: Array, s: Array) -> None:
         """Remember the points on the curves."""
         self._on0, t = self._nearest(self._at(q1))
         self._steps = REACH * self._size / np.linalg.norm(t, axis=1)
         self._s0 = self._s.copy()
 
-    def freeze(self) -> None:
-        """Nothing yields."""
-
     # -- the state -----------------------------------------------------------------------------
 
     def add_state(self, q: Array) -> None:
-        """Nothing is stored."""
+        """Add nothing: guides store no energy."""
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The points on the curves, their parameters, and the steps of these for tangents."""

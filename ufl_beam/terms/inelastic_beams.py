@@ -236,7 +236,7 @@ class InelasticBeams:
         self._latest.fill(np.nan)
 
     def hold(self) -> None:
-        """Take back :meth:`release`."""
+        """Close again the points that :meth:`release` opened."""
         self.points.hold()
 
     def freeze(self) -> None:
@@ -253,7 +253,7 @@ class InelasticBeams:
         self.points.enter_losses(self._ledger)
 
     def add_state(self, q: Array) -> None:
-        """Stored energy."""
+        """Add the stored energy to the ledger."""
         if q is not self._q:
             self._q = q
             strains = self._strains(q)
@@ -262,7 +262,7 @@ class InelasticBeams:
         self.points.enter_stored(self._ledger)
 
     def remember(self, memory: Memory, q: Array) -> None:
-        """Internal variables."""
+        """Save or restore the internal variables."""
         self.restore(self._cells, memory.rows("cells", *self.state()))
         self._q = q
 

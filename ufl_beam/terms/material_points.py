@@ -267,7 +267,7 @@ class Points:
         lib.release(self.points, least)
 
     def hold(self) -> None:
-        """Take back :meth:`release`."""
+        """Close again the points that :meth:`release` opened."""
         flows = self["flows"]
         flows[flows == RELEASED] = 0.0
 

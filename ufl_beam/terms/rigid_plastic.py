@@ -204,7 +204,7 @@ class RigidPlasticResponse:
         return self._rows[:, 0], self._rows[:, 1], self._rows[:, 2]
 
     def accept(self, e1: Array, work: float) -> None:
-        """Commit the slips."""
+        """Commit the slips of the step."""
         lib.commit_rigid_plastic(self._c, doubles(e1), doubles(self._sums))
         self._way_before[:] = self._way * self._slipped
         dissipated, lost, self._stored = self._sums.tolist()
@@ -234,7 +234,7 @@ class RigidPlasticResponse:
         self._slipped[(self._excess > 0) & (self._excess >= least)] = RELEASED
 
     def hold(self) -> None:
-        """Take back :meth:`release`."""
+        """Close again the slips that :meth:`release` opened."""
         self._slipped[:] = np.abs(self._way_before)
 
     # -- energies ------------------------------------------------------------------------------
@@ -282,7 +282,7 @@ class RigidPlasticResponse:
         return np.column_stack([*self._variables, stored])
 
     def restore(self, rows: Array) -> None:
-        """Take over :meth:`state`."""
+        """Restore the variables that :meth:`state` returned."""
         *variables, stored = rows.T
         for mine, values in zip(self._variables, variables, strict=True):
             mine[:] = values

@@ -86,17 +86,17 @@ class FrameForces:
         return self.force
 
     def loops(self) -> None:
-        """None."""
+        """None: frame forces are evaluated in Python."""
 
     def add_residual(self, q1: Array, r: Array) -> None:
-        """Subtract the forces."""
+        """Subtract centrifugal and Coriolis forces from the residual."""
         q: Array = self._q0 + self._share_of_end * (q1 - self._q0)
         self.force = self._growth * self._pull(self._from_centre + q)
         r -= self.force
         r += self._turn(q1 - self._q0) / self._dt
 
     def add_tangent(self, q1: Array) -> None:
-        """Subtract the derivative."""
+        """Subtract the derivative of the forces from the tangent."""
         self._A.data -= self._growth * self._share_of_end * self._S
         self._A.data += self._G / self._dt
 
