@@ -18,7 +18,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.jit import DECLARATIONS, HEADERS, compiled, text
-from ufl_beam.dolfinx_compat import TABULATE
+from ufl_beam.dolfinx_compat import TABULATE, VERSIONS
 
 T = TypeVar("T")
 
@@ -119,5 +119,15 @@ def combined(a: float, x: Array, b: float, y: Array) -> Array:
 
 
 def kernel(pointer: Any, of: Any) -> Any:
-    """An FFCx kernel, given as a function pointer of the cffi instance ``of``."""
+    """An FFCx kernel, given as a function pointer of the cffi instance ``of``.
+
+    Raises:
+        RuntimeError: It takes other arguments than ufl_beam passes.
+    """
+    expected, found = ffi.typeof("kernel *").cname, of.typeof(pointer).cname
+    if found != expected:
+        raise RuntimeError(
+            f"{VERSIONS} make kernels of the C type {found}; ufl_beam calls {expected}. It is "
+            "tested with DOLFINx 0.9 to 0.11"
+        )
     return ffi.cast("kernel *", int(of.cast("intptr_t", pointer)))

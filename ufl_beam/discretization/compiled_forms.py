@@ -8,46 +8,31 @@ silently wrong in FFCx 0.9 to 0.11.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import ufl
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, integers, kernel, lib
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.jit import compiled_form
-from ufl_beam.compiled.simd_kernels import LANES, in_lanes
+from ufl_beam.compiled.simd_kernels import LANES, in_batches, in_lanes
 from ufl_beam.dolfinx_compat import fem, pack
 
 
-def in_batches(rows: npt.NDArray[Any], lanes: int) -> npt.NDArray[Any]:
-    """Rows of numbers, one of each cell, as loops.h says; (num_batches, numbers, lanes).
-
-    Args:
-        rows: Shape (num_cells, ...).
-        lanes: Number of rows in a batch.
-    """
-    rows = rows.reshape(len(rows), math.prod(rows.shape[1:]))
-    if missing := -len(rows) % lanes:
-        rows = np.concatenate([rows, np.repeat(rows[-1:], missing, axis=0)])
-    return np.ascontiguousarray(rows.reshape(-1, lanes, rows.shape[1]).transpose(0, 2, 1))
-
-
-def vectorise(kernels: Iterable[Kernel], coordinates: Array) -> None:
+def vectorise(kernels: Sequence[Kernel], coordinates: Array) -> None:
     """Let all of some kernels compute several cells at once, or none: they may share numbers.
 
     Args:
         kernels: On the same cells.
         coordinates: Of the cells, in batches of ``LANES``.
     """
-    addresses = {kernel: kernel.address_in_lanes() for kernel in kernels}
-    known = {kernel: address for kernel, address in addresses.items() if address is not None}
-    if len(known) == len(addresses):
-        for kernel, address in known.items():
-            kernel.compute_in_lanes(address, coordinates)
+    functions = [kernel.in_lanes() for kernel in kernels]
+    if None not in functions:
+        for one, function in zip(kernels, functions, strict=True):
+            one.compute_in_lanes(function, coordinates)
 
 
 def tabulator(compiled: fem.Form) -> Any:
@@ -66,59 +51,65 @@ class Kernel:
         coordinates: Vertices of the cells; shape (num_cells, 2, 3); m.
 
     Attributes:
-        compiled: The DOLFINx form.
         cells: What ``add_cells`` of loops.c takes; a new one after :meth:`share`, :meth:`place`,
             :meth:`compute_in_lanes`.
+
+    Raises:
+        ValueError: Its cells have more numbers than C has room for, or others than FFCx packs.
     """
 
     def __init__(
         self, form: ufl.Form, unknown: fem.Function, cell_dofs: Index, coordinates: Array
     ) -> None:
-        self.compiled, self._source = compiled_form(form)
-        ufcx = self.compiled.ufcx_form
-        constants, packed = pack(self.compiled)
-        everything = form.coefficients()
-        used = [
-            everything[ufcx.original_coefficient_positions[i]] for i in range(ufcx.num_coefficients)
-        ]
-        ends = np.cumsum([f.function_space.element.space_dimension for f in used])
-        self._columns = {
-            f: slice(end - f.function_space.element.space_dimension, end)
-            for f, end in zip(used, ends, strict=True)
-        }
-        self._starts = {id(f): columns.start for f, columns in self._columns.items()}
-        self._dofs = np.ascontiguousarray(cell_dofs, dtype=np.int32)
-        self._lanes, self._in_lanes = 1, ffi.NULL
-        self._packed, self._coordinates = (in_batches(x, 1) for x in (packed, coordinates))
-        self._rows = in_batches(self._rows_of_cells(form), 1)
+        self._compiled, self._source = compiled_form(form)
+        self._tabulate, ufcx = tabulator(self._compiled), self._compiled.ufcx_form
+        self._constants, packed = pack(self._compiled)
+        positions = ufcx.original_coefficient_positions[0 : ufcx.num_coefficients]
+        self._used = [form.coefficients()[i] for i in positions]
+        sizes = [f.function_space.element.space_dimension for f in self._used]
+        ends = np.cumsum([0, *sizes]).tolist()
+        # By identity: functions of UFL compute what they hash to.
+        self._columns = {id(f): slice(*ends[i : i + 2]) for i, f in enumerate(self._used)}
         spaces = [argument.ufl_function_space() for argument in form.arguments()]
-        self._entries = math.prod(space.element.space_dimension for space in spaces)
-        self._at = self._columns[unknown].start if self.depends_on(unknown) else 0
-        self._unknowns = self._dofs.shape[1] if self.depends_on(unknown) else 0
-        self._constants = constants
+        sizes = [space.element.space_dimension for space in spaces]
+        self._entries = math.prod(sizes)
+        if self._entries > lib.MOST_ENTRIES:
+            raise ValueError(
+                f"a form on cells of {' x '.join(map(str, sizes))} degrees of freedom has "
+                f"{self._entries} entries; loops.h has room for {lib.MOST_ENTRIES}"
+            )
+        self._dofs = np.ascontiguousarray(cell_dofs, dtype=np.int32)
+        self._at, self._unknowns = 0, 0
+        if self.uses(unknown):
+            self._at, self._unknowns = self.position(unknown), self._dofs.shape[1]
+        rows = np.zeros((len(self._dofs), self._entries), dtype=np.int32)  # but see `place`
+        if len(spaces) == 1:
+            dofmap = spaces[0].dofmap
+            blocks = np.asarray(dofmap.list)[:, :, None] * dofmap.bs + np.arange(dofmap.bs)
+            rows = blocks.reshape(len(blocks), -1).astype(np.int32)
+        expected = ((len(self._dofs), n) for n in (ends[-1], self._entries, 6))
+        found = (packed.shape, rows.shape, coordinates.reshape(len(coordinates), -1).shape)
+        if tuple(expected) != found:
+            raise ValueError(
+                f"a form on {len(self._dofs)} cells, of {self._entries} entries and {ends[-1]} "
+                f"values of coefficients in each, got coefficients, rows, coordinates of {found}"
+            )
+        self._lanes, self._in_lanes = 1, ffi.NULL
+        self._packed, self._rows, self._coordinates = (
+            in_batches(x, 1) for x in (packed, rows, coordinates)
+        )
         self._prepare()
-
-    def _rows_of_cells(self, form: ufl.Form) -> Index:
-        """Entries of the vector that the cells add to; (num_cells, entries of a cell)."""
-        if not form.arguments():
-            return np.zeros((len(self._dofs), 1), dtype=np.int32)
-        dofmap = form.arguments()[0].ufl_function_space().dofmap
-        blocks = np.asarray(dofmap.list)[:, :, None] * dofmap.bs + np.arange(dofmap.bs)
-        width = blocks.shape[1] * dofmap.bs
-        return np.ascontiguousarray(blocks.reshape(len(blocks), width), dtype=np.int32)
 
     def _prepare(self) -> None:
         """Make the data of the loop over the cells."""
-        self._arrays = (
-            *map(integers, (self._dofs, self._rows)),
-            *map(doubles, (self._packed, self._constants, self._coordinates)),
-        )
+        numbers = (self._packed, self._constants, self._coordinates)
+        self._arrays = (*map(integers, (self._dofs, self._rows)), *map(doubles, numbers))
         dofs, row, packed, constants, coordinates = self._arrays
         self.cells = ffi.new(
             "cells *",
             {
-                "tabulate": tabulator(self.compiled),
-                "in_lanes": self._in_lanes,
+                "tabulate": self._tabulate,
+                "several": self._in_lanes,
                 "lanes": self._lanes,
                 "number": len(self._dofs),
                 "of_cell": self._dofs.shape[1],
@@ -134,30 +125,24 @@ class Kernel:
             },
         )
 
-    def depends_on(self, function: fem.Function) -> bool:
-        """Return whether ``function`` appears in the form."""
-        return function in self._columns
-
-    def set(self, function: fem.Function, q: Array) -> None:
-        """Give ``function`` the degrees of freedom ``q``, if it appears in the form."""
-        # By identity: functions of UFL compute what they hash to.
-        if (at := self._starts.get(id(function))) is not None:
-            lib.set_cells(self.cells, doubles(q), at)
-
     def uses(self, function: fem.Function) -> bool:
         """Return whether a function appears in the form."""
-        return id(function) in self._starts
-
-    def put(self, function: fem.Function, values: Array) -> None:
-        """Give ``function`` other values in the cells; shape (num_cells, dofs per cell)."""
-        columns = self._columns[function]
-        rows = np.broadcast_to(values, (len(self._dofs), columns.stop - columns.start))
-        self._packed[:, columns] = in_batches(rows, self._lanes)
+        return id(function) in self._columns
 
     def position(self, function: fem.Function) -> int:
         """Where the coefficients of a cell have the values of ``function``."""
-        position: int = self._columns[function].start
-        return position
+        return int(self._columns[id(function)].start)
+
+    def set(self, function: fem.Function, q: Array) -> None:
+        """Give ``function`` the degrees of freedom ``q``, if it appears in the form."""
+        if (columns := self._columns.get(id(function))) is not None:
+            lib.set_cells(self.cells, doubles(q), columns.start)
+
+    def put(self, function: fem.Function, values: Array) -> None:
+        """Give ``function`` other values in the cells; shape (num_cells, dofs per cell)."""
+        columns = self._columns[id(function)]
+        rows = np.broadcast_to(values, (len(self._dofs), columns.stop - columns.start))
+        self._packed[:, columns] = in_batches(rows, self._lanes)
 
     def share(self, other: Kernel) -> None:
         """Use the packed values of ``other``, a form of the same coefficients."""
@@ -167,24 +152,30 @@ class Kernel:
         self._prepare()
 
     def place(self, A: Csr) -> None:
-        """Let a bilinear form on the degrees of freedom of the cells add to ``A``."""
+        """Let a bilinear form on the degrees of freedom of the cells add to ``A``.
+
+        Raises:
+            ValueError: It has other entries.
+        """
         per_cell = self._dofs.shape[1]
+        if self._entries != per_cell**2:
+            raise ValueError(f"a form of {self._entries} entries on {per_cell} degrees of freedom")
         rows = np.repeat(self._dofs, per_cell, axis=1)
         positions = A.positions(rows.ravel(), np.tile(self._dofs, per_cell).ravel())
         self._rows = in_batches(positions.reshape(rows.shape), self._lanes)
         self._prepare()
 
-    def address_in_lanes(self) -> int | None:
-        """Address of what computes several cells at once; none if the compiler cannot."""
-        return in_lanes(self._source, self._entries, self._packed.shape[1], len(self._constants))
+    def in_lanes(self) -> Any:
+        """Function in C that computes several cells at once, or None."""
+        sizes = (self._entries, self._packed.shape[1], len(self._constants))
+        return in_lanes(self._source, self._tabulate, *sizes)
 
-    def compute_in_lanes(self, address: int, coordinates: Array) -> None:
+    def compute_in_lanes(self, function: Any, coordinates: Array) -> None:
         """Compute several cells at once from now on, with their coordinates in batches."""
-        self._in_lanes = ffi.cast("void (*)(const cells *, const double *, double *)", address)
         self._packed, self._rows = (
             in_batches(x[:, :, 0], LANES) for x in (self._packed, self._rows)
         )
-        self._lanes, self._coordinates = LANES, coordinates
+        self._in_lanes, self._lanes, self._coordinates = function, LANES, coordinates
         self._prepare()
 
     @property

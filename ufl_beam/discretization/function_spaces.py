@@ -11,8 +11,8 @@ import ufl
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr, coupling
-from ufl_beam.compiled.simd_kernels import LANES
-from ufl_beam.discretization.compiled_forms import Kernel, in_batches, vectorise
+from ufl_beam.compiled.simd_kernels import LANES, in_batches
+from ufl_beam.discretization.compiled_forms import Kernel, vectorise
 from ufl_beam.discretization.dof_numbering import Share
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh, space_with_dofs
 from ufl_beam.mechanics.kinematics import Axis
