@@ -60,14 +60,17 @@ def petsc(name: str, *arguments: Any) -> None:
     """Call a function of ``petsc_functions`` in loops.h; objects of petsc4py are theirs in C.
 
     Raises:
-        PETSc.Error: It returns an error.
+        RuntimeError: It returns an error.
     """
     in_c = (
         ffi.cast("void *", argument.handle) if isinstance(argument, PETSc.Object) else argument
         for argument in arguments
     )
     if error := getattr(lib.petsc, name)(*in_c):
-        raise PETSc.Error(error)
+        text, specific = ffi.new("const char **"), ffi.new("char **")
+        lib.petsc.PetscErrorMessage(error, text, specific)
+        words = (ffi.string(of[0]).decode() for of in (text, specific) if of[0])
+        raise RuntimeError(f"{name} of PETSc failed with error {error}: {': '.join(words)}")
 
 
 Loop = tuple[Any, Any]

@@ -212,6 +212,7 @@ int all_finite(int size, const double *values);
 /* Functions of PETSc, which Python finds by these names; its objects are opaque here. Each returns an
  * error, or zero, as what SNES calls does. */
 typedef struct {
+  int (*PetscErrorMessage)(int error, const char **text, char **specific);
   int (*VecGetArrayRead)(void *vec, const double **values);
   int (*VecRestoreArrayRead)(void *vec, const double **values);
   int (*VecGetArray)(void *vec, double **values);
