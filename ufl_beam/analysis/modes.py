@@ -15,6 +15,7 @@ import numpy as np
 
 from ufl_beam.analysis.linearization import SmallMotions
 from ufl_beam.arrays import Array, Complex
+from ufl_beam.collective_errors import on_first
 from ufl_beam.discretization.dof_numbering import Grid, Share
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.model_warnings import warn_of_masses
@@ -26,7 +27,6 @@ from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.joint_histories import Connection, velocity_of
-from ufl_beam.output.recorders import on_first
 from ufl_beam.output.time_series import VTKHDF, XDMF, TimeSeries
 from ufl_beam.parallel import ours
 from ufl_beam.simulation.initial_state import mesh_of
@@ -174,11 +174,17 @@ class _Frame:
 
 @dataclass(frozen=True, eq=False)
 class Modes(Shapes):
-    """Small motions ``x exp(s t)`` about a state.
+    """Vibration modes ``x exp(s t)`` about a state; made by :func:`modes`.
 
     Attributes:
         exponents: s = -ζω ± iω√(1-ζ²) of each, imaginary part not negative, |s| ascending; (n,);
             1/s.
+
+    Example:
+        >>> shapes = ub.modes(scene, 3)
+        >>> print(shapes.frequencies.round())  # Hz
+        [ 42. 286. 651.]
+        >>> figure = ub.plot_modes(shapes)
     """
 
     exponents: Complex
@@ -218,17 +224,23 @@ class Modes(Shapes):
 
 @dataclass(frozen=True, eq=False)
 class Buckling(Shapes):
-    """Shapes that the scene leaves its state with, and the factors on its loads.
+    """Buckling modes and their load factors; made by :func:`buckling`.
 
     Attributes:
         factors: Factors on the loads, |factor| ascending; negative: with loads reversed; (n,).
+
+    Example:
+        >>> load = ub.PointLoad(beam.end, force=(-1e6, 0))
+        >>> column = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+        >>> print(ub.buckling(column, 2).factors.round(1))  # on 1 MN
+        [ 8.8 96.8]
     """
 
     factors: Array
 
     @property
     def titles(self) -> list[str]:
-        """The factors."""
+        """Titles of pictures: the load factors."""
         return [f"loads × {factor:.4g}" for factor in self.factors]
 
     def __str__(self) -> str:
@@ -236,7 +248,7 @@ class Buckling(Shapes):
 
 
 def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None = None) -> Modes:
-    """Natural frequencies, damping ratios and shapes of small motions.
+    """Compute natural frequencies, damping ratios and shapes of small vibrations.
 
     About the undeformed, unloaded scene; or about the last state of a solution, with its section
     forces, what loads and a :class:`RotatingFrame` add, and with the elastic stiffness of what has
@@ -256,6 +268,11 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
 
     Raises:
         SceneError: The call or the scene is wrong, or nothing that moves has mass.
+
+    Example:
+        >>> shapes = ub.modes(scene, 3, mesh=ub.Mesh(refine=4))
+        >>> print(shapes.frequencies.round(1))  # Hz
+        [ 41.5 250.6 646.8]
     """
     require_kind(scene, Scene, "modes: scene")
     require_count(n, "modes: n")
@@ -281,7 +298,7 @@ def buckling(
     at: Solution | None = None,
     mesh: Mesh | None = None,
 ) -> Buckling:
-    """Factors on the loads at which the scene buckles, (K + λ K') x = 0.
+    """Compute buckling load factors and modes, (K + λ K') x = 0.
 
     Loads and prescribed motions grow in proportion, from those of the state ``at`` (λ = 0; nothing
     without it) to those at the time ``t`` (λ = 1).  K' is the change of stiffness along the first,
@@ -298,6 +315,13 @@ def buckling(
     Raises:
         SceneError: The call is wrong, the scene is free to move, nothing acts on it, or what acts
             has a stiffness of its own.
+
+    Example:
+        >>> push = ub.PointLoad(beam.end, force=(-1.0, 0))
+        >>> column = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
+        >>> critical = ub.buckling(column, 1, mesh=ub.Mesh(refine=4)).factors[0]
+        >>> print(f"{critical / (np.pi**2 * section.EI / (2 * 2) ** 2):.2f}")  # over Euler's load
+        1.00
     """
     require_kind(scene, Scene, "buckling: scene")
     require_count(n, "buckling: n")

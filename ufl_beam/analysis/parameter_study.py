@@ -21,9 +21,9 @@ from mpi4py.futures import MPICommExecutor
 from tqdm import tqdm
 
 from ufl_beam.analysis.study_file import Outcome, Study, numbers_of, text_of
+from ufl_beam.collective_errors import on_first
 from ufl_beam.errors import SceneError, require_sequence, require_switch, shorten
 from ufl_beam.output.output_files import require_apart, require_path, take
-from ufl_beam.output.recorders import on_first
 from ufl_beam.parallel import alone, communicator
 from ufl_beam.simulation.run import say
 
@@ -70,6 +70,15 @@ def study(
         SceneError: The call or the file is wrong, or a member returned something else than numbers
             and arrays, or not the names and shapes of the others; the file has those before.
         RuntimeError: All members failed.
+
+    Example:
+        >>> def member(length):
+        ...     beam = ub.Beam((0, 0), (length, 0), section)
+        ...     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)])
+        ...     return {"omega": ub.modes(scene, 2).omega}
+        >>> results = ub.study(member, [{"length": 2.0}, {"length": 4.0}])
+        >>> results["omega"].shape
+        (2, 2)
     """
     comm = communicator(comm, "study: comm")
     require_switch(anew, "study: anew")

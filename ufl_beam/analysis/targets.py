@@ -102,7 +102,7 @@ class Outlook:
         return max(size(d) / self.units[name] for name, d in differences.items())
 
     def seconds(self, refine: int, level: float) -> float:
-        """Wall time; s."""
+        """Predicted wall time of a run; s."""
         return self.cost.seconds(self.steps * 2**level, self.cells * refine)
 
     def settings(self) -> tuple[list[tuple[int, float]], Array, Array]:
@@ -185,7 +185,7 @@ class Tolerance:
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """A ratio."""
+        """Largest wall time (s) and largest error over tolerance."""
         return math.inf, 1.0
 
     def __str__(self) -> str:
@@ -194,7 +194,7 @@ class Tolerance:
         return "errors of " + ", ".join(f"{value:g} of {n}" for n, value in self.absolute.items())
 
     def units(self, scales: Mapping[str, float]) -> dict[str, float]:
-        """The tolerances."""
+        """Tolerance of each quantity, in its unit."""
         return {n: self.absolute.get(n, self.relative * scale) for n, scale in scales.items()}
 
     def choose(self, outlook: Outlook) -> Choice:
@@ -233,7 +233,7 @@ class Budget:
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """A time."""
+        """Largest wall time (s) and largest error over tolerance."""
         return self.seconds, math.inf
 
     def __str__(self) -> str:

@@ -9,7 +9,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from functools import lru_cache
+from itertools import accumulate
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 import ufl
@@ -19,7 +22,7 @@ from ufl_beam.compiled.c_library import doubles, ffi, integers, kernel, lib
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.jit import compiled_form
 from ufl_beam.compiled.simd_kernels import LANES, in_batches, in_lanes
-from ufl_beam.dolfinx_compat import fem, pack
+from ufl_beam.dolfinx_compat import VERSIONS, fem, pack
 
 
 def vectorise(kernels: Sequence[Kernel], coordinates: Array) -> None:
@@ -41,8 +44,63 @@ def tabulator(compiled: fem.Form) -> Any:
     return kernel(integral.tabulate_tensor_float64, compiled.module.ffi)
 
 
+class Prepared(NamedTuple):
+    """A form compiled for all scenes.
+
+    Attributes:
+        form: The DOLFINx form.
+        source: The C that FFCx wrote for it.
+        tabulate: Its kernel.
+        coefficients: Its coefficients.
+        columns: Place of the values of each, by identity, in the row of numbers of a cell.
+        constants: Values of its constants.
+        packed: Values of the coefficients in the cells that the form was stated on.
+        entries: Number of entries of the vector or matrix of a cell.
+    """
+
+    form: fem.Form
+    source: Path
+    tabulate: Any
+    coefficients: list[fem.Function]
+    columns: dict[int, slice]
+    constants: Array
+    packed: Array
+    entries: int
+
+
+@lru_cache(maxsize=512)
+def prepared(form: ufl.Form) -> Prepared:
+    """Compile a form, once in a process.
+
+    Raises:
+        ValueError: Its cells have more entries than C has room for, or others than FFCx packs.
+    """
+    compiled, source = compiled_form(form)
+    ufcx, (constants, packed) = compiled.ufcx_form, pack(compiled)
+    positions = ufcx.original_coefficient_positions[0 : ufcx.num_coefficients]
+    used = [form.coefficients()[i] for i in positions]
+    ends = [0, *accumulate(f.function_space.element.space_dimension for f in used)]
+    if packed.shape[1] != ends[-1]:
+        raise ValueError(f"{VERSIONS} pack {packed.shape[1]} values of a cell, not {ends[-1]}")
+    # By identity: functions of UFL compute what they hash to.
+    columns = {id(f): slice(*ends[i : i + 2]) for i, f in enumerate(used)}
+    sizes = [x.ufl_function_space().element.space_dimension for x in form.arguments()]
+    entries = math.prod(sizes)
+    if entries > lib.MOST_ENTRIES:
+        raise ValueError(
+            f"a form on cells of {' x '.join(map(str, sizes))} degrees of freedom has {entries} "
+            f"entries; loops.h has room for {lib.MOST_ENTRIES}"
+        )
+    tabulate = tabulator(compiled)
+    return Prepared(compiled, source, tabulate, used, columns, constants, packed, entries)
+
+
 class Kernel:
     """A compiled cell form together with the packed values of its coefficients.
+
+    A form stated on one cell is computed on all cells, with the values of its coefficients there
+    until :meth:`put` or :meth:`set` gives them others.  If its test functions are those of the
+    unknown's space, cells add to their degrees of freedom; else each to entries of its own.
 
     Args:
         form: Cell integrals with one quadrature rule.
@@ -55,60 +113,47 @@ class Kernel:
             :meth:`compute_in_lanes`.
 
     Raises:
-        ValueError: Its cells have more numbers than C has room for, or others than FFCx packs.
+        ValueError: The arrays are of other cells than each other, or than the form.
     """
 
     def __init__(
         self, form: ufl.Form, unknown: fem.Function, cell_dofs: Index, coordinates: Array
     ) -> None:
-        self._compiled, self._source = compiled_form(form)
-        self._tabulate, ufcx = tabulator(self._compiled), self._compiled.ufcx_form
-        self._constants, packed = pack(self._compiled)
-        positions = ufcx.original_coefficient_positions[0 : ufcx.num_coefficients]
-        self._used = [form.coefficients()[i] for i in positions]
-        sizes = [f.function_space.element.space_dimension for f in self._used]
-        ends = np.cumsum([0, *sizes]).tolist()
-        # By identity: functions of UFL compute what they hash to.
-        self._columns = {id(f): slice(*ends[i : i + 2]) for i, f in enumerate(self._used)}
-        spaces = [argument.ufl_function_space() for argument in form.arguments()]
-        sizes = [space.element.space_dimension for space in spaces]
-        self._entries = math.prod(sizes)
-        if self._entries > lib.MOST_ENTRIES:
-            raise ValueError(
-                f"a form on cells of {' x '.join(map(str, sizes))} degrees of freedom has "
-                f"{self._entries} entries; loops.h has room for {lib.MOST_ENTRIES}"
-            )
+        self._form = ready = prepared(form)
+        self._columns, self._entries = ready.columns, ready.entries
         self._dofs = np.ascontiguousarray(cell_dofs, dtype=np.int32)
+        self._lanes, self._in_lanes, num_cells = 1, ffi.NULL, len(cell_dofs)
+        packed = np.tile(ready.packed, (num_cells // len(ready.packed), 1))
+        spaces = [argument.ufl_function_space() for argument in form.arguments()]
+        if len(spaces) != 1:  # a functional; a matrix until it is placed
+            rows: Index = np.zeros((num_cells, self._entries), dtype=np.int32)
+        elif spaces[0] is unknown.function_space:
+            rows = self._dofs
+        else:
+            rows = np.arange(num_cells * self._entries, dtype=np.int32).reshape(-1, self._entries)
+        expected = (len(packed), (num_cells, self._entries), (num_cells, 2, 3))
+        if expected != (num_cells, rows.shape, coordinates.shape):
+            raise ValueError(
+                f"a form with {self._entries} entries of a cell, stated on {len(ready.packed)} "
+                f"cells, got rows of {rows.shape} and coordinates of {coordinates.shape}"
+            )
+        self._packed, self._coordinates, self._rows = (
+            in_batches(x, 1) for x in (packed, coordinates, rows)
+        )
         self._at, self._unknowns = 0, 0
         if self.uses(unknown):
             self._at, self._unknowns = self.position(unknown), self._dofs.shape[1]
-        rows = np.zeros((len(self._dofs), self._entries), dtype=np.int32)  # but see `place`
-        if len(spaces) == 1:
-            dofmap = spaces[0].dofmap
-            blocks = np.asarray(dofmap.list)[:, :, None] * dofmap.bs + np.arange(dofmap.bs)
-            rows = blocks.reshape(len(blocks), -1).astype(np.int32)
-        expected = ((len(self._dofs), n) for n in (ends[-1], self._entries, 6))
-        found = (packed.shape, rows.shape, coordinates.reshape(len(coordinates), -1).shape)
-        if tuple(expected) != found:
-            raise ValueError(
-                f"a form on {len(self._dofs)} cells, of {self._entries} entries and {ends[-1]} "
-                f"values of coefficients in each, got coefficients, rows, coordinates of {found}"
-            )
-        self._lanes, self._in_lanes = 1, ffi.NULL
-        self._packed, self._rows, self._coordinates = (
-            in_batches(x, 1) for x in (packed, rows, coordinates)
-        )
         self._prepare()
 
     def _prepare(self) -> None:
         """Make the data of the loop over the cells."""
-        numbers = (self._packed, self._constants, self._coordinates)
+        numbers = (self._packed, self._form.constants, self._coordinates)
         self._arrays = (*map(integers, (self._dofs, self._rows)), *map(doubles, numbers))
         dofs, row, packed, constants, coordinates = self._arrays
         self.cells = ffi.new(
             "cells *",
             {
-                "tabulate": self._tabulate,
+                "tabulate": self._form.tabulate,
                 "several": self._in_lanes,
                 "lanes": self._lanes,
                 "number": len(self._dofs),
@@ -167,8 +212,8 @@ class Kernel:
 
     def in_lanes(self) -> Any:
         """Function in C that computes several cells at once, or None."""
-        sizes = (self._entries, self._packed.shape[1], len(self._constants))
-        return in_lanes(self._source, self._tabulate, *sizes)
+        sizes = (self._entries, self._packed.shape[1], len(self._form.constants))
+        return in_lanes(self._form.source, self._form.tabulate, *sizes)
 
     def compute_in_lanes(self, function: Any, coordinates: Array) -> None:
         """Compute several cells at once from now on, with their coordinates in batches."""

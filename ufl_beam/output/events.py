@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from ufl_beam.collective_errors import on_first
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import require_function
 from ufl_beam.model.beams import Place
 from ufl_beam.model.connector_laws import Coulomb, Stop
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.plastic_hinges import law_of
-from ufl_beam.output.recorders import Recorder, on_first
+from ufl_beam.output.recorders import Recorder
 from ufl_beam.parameter import TIME, Parameter
 
 if TYPE_CHECKING:
@@ -40,13 +41,20 @@ FREE = 0.999
 
 
 class Event(NamedTuple):
-    """Something that happened in a step.
+    """Event of a step: yielding, opening of a hinge, contact, sliding.
 
     Attributes:
         time: End of the step; s; on a path its load factor.
         where: A place in the middle of a cell, that of a plastic hinge, or a connector.
         what: "yields", "opens", "is free" in a cell; "touches", "lets go", "slides", "sticks".
         parameter: Words for the time.
+
+    Example:
+        >>> events = ub.Events()
+        >>> run = ub.simulate(hinged, ub.Static(), t=(0, 1), dt=0.02, record=events)
+        >>> opening = events.found[0]
+        >>> print(f"{opening.time:.2f} s: {opening.where} {opening.what}")
+        0.10 s: beam.start (0, 0) opens
     """
 
     time: float
@@ -59,7 +67,7 @@ class Event(NamedTuple):
 
 
 class Events(Recorder):
-    """A list of what happens, for scenes with hinges, inelastic material, stops or friction.
+    """Recorder of events, for scenes with hinges, inelastic material, stops or friction.
 
     A hinge "is free" when it has dissipated 99.9 % of its energy; stops touch and let go, friction
     slides and sticks as often as they do, the rest happens once in a cell or hinge.  A hinge that
@@ -70,6 +78,11 @@ class Events(Recorder):
 
     Attributes:
         found: The events in their order, the same on all processes.
+
+    Example:
+        >>> events = ub.Events(tell=print)
+        >>> run = ub.simulate(hinged, ub.Static(), t=(0, 0.5), dt=0.02, record=events)
+        t = 0.1 s: beam.start (0, 0) opens
     """
 
     def __init__(self, tell: Callable[[Event], object] | None = None) -> None:
@@ -80,7 +93,7 @@ class Events(Recorder):
         self._rows: list[Row] = []
 
     def require_writable(self) -> None:
-        """Nothing is written."""
+        """Write nothing; there is no file."""
 
     def open(self, simulation: StateView) -> None:
         """Take note of the initial state."""
@@ -156,7 +169,7 @@ class Events(Recorder):
         return events
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Close nothing; there is no file."""
 
     def state(self) -> State:
         """The events so far: time, number of the cell or connector, and what."""

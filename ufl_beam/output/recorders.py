@@ -7,7 +7,7 @@ import csv
 import io
 import sys
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,7 +16,7 @@ from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.collective_errors import portable
+from ufl_beam.collective_errors import on_first
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError, require_count, require_kind, require_sequence
 from ufl_beam.model.bodies import Anchor, require_anchor
@@ -51,7 +51,16 @@ ROTATION = (("motion", "rad"), ("force", "N m"), ("work", "J"))
 
 
 class Recorder(ABC):
-    """Something that looks at each accepted step; all processes call it together."""
+    """Base class of recorders, which see each accepted step; called by all processes together.
+
+    Example:
+        >>> class Speed(ub.Recorder):
+        ...     largest = 0.0
+        ...     require_writable = open = close = lambda self, *simulation: None
+        ...     def write(self, simulation):
+        ...         self.largest = max(self.largest, abs(simulation.velocity(beam.end)[1]))
+        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=Speed())
+    """
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -92,20 +101,6 @@ class Recorder(ABC):
             SceneError: What was written before is not there any more.
         """
         self.state()
-
-
-def on_first(comm: MPI.Intracomm, action: Callable[[], None]) -> None:
-    """Do something on the first process; what it raises there is raised on all of them."""
-    error: BaseException | None = None
-    if comm.rank == 0:
-        try:
-            action()
-        except BaseException as caught:
-            error = caught
-    if comm.size > 1:
-        error = comm.bcast(portable(error))
-    if error is not None:
-        raise error
 
 
 def recorders_of(
@@ -152,7 +147,7 @@ def close_all(recorders: Sequence[Recorder]) -> None:
 
 
 class History(Recorder):
-    """Table of the motion of places and of the ledger, one row a step, complete if the run dies.
+    """Table (CSV) of the motion of places and of the energy ledger, complete after a crash.
 
     Columns: t, or the load factor of a path; u, v, psi of each place; motion, force, work of each
     connector; then the entries of the ledger.  The names of the columns end in their units.
@@ -169,6 +164,12 @@ class History(Recorder):
 
     Raises:
         SceneError: ``every`` or ``most`` is no whole number, at least 1.
+
+    Example:
+        >>> table = ub.History("tip.csv", [beam.end])
+        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=table)
+        >>> np.loadtxt("tip.csv", delimiter=",", skiprows=1).shape[0]
+        21
     """
 
     def __init__(

@@ -11,11 +11,12 @@ from mpi4py import MPI
 
 import numpy as np
 
+from ufl_beam.collective_errors import on_first
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError, require_count
 from ufl_beam.output.line_data import LineData, LineFields
 from ufl_beam.output.output_files import require_path, require_writable
-from ufl_beam.output.recorders import Recorder, on_first
+from ufl_beam.output.recorders import Recorder
 from ufl_beam.output.vtkhdf import VtkhdfWriter
 from ufl_beam.output.xdmf import Complete, XdmfWriter, data_path
 
@@ -100,7 +101,7 @@ class TimeSeries(Recorder):
             ) from None
 
     def close(self) -> None:
-        """Close the files."""
+        """Close the files of the time series."""
         writers, self._writers = self._writers, []
         for writer in writers:
             writer.close()
@@ -125,6 +126,12 @@ class XDMF(TimeSeries):
 
     Raises:
         SceneError: ``every`` is no whole number of steps, or the path does not end in ``.xdmf``.
+
+    Example:
+        >>> film = ub.XDMF("beam.xdmf", every=5)
+        >>> solution = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=film)
+        >>> [path.name for path in film.files]
+        ['beam.xdmf', 'beam.xdmf.bin']
     """
 
     ending = ".xdmf"
@@ -166,13 +173,19 @@ class VTKHDF(TimeSeries):
     Raises:
         SceneError: ``every`` is no whole number of steps, or the path does not end in
             ``.vtkhdf``.
+
+    Example:
+        >>> film = ub.VTKHDF("beam.vtkhdf", every=5)
+        >>> solution = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=film)
+        >>> [path.name for path in film.files]
+        ['beam.vtkhdf']
     """
 
     ending = ".vtkhdf"
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """The file."""
+        """Path of the file."""
         return (self._path,)
 
     def _writer(self, fields: LineFields, complete: list[int] | None = None) -> VtkhdfWriter:

@@ -117,7 +117,7 @@ class XdmfWriter:
             raise ValueError("not the files that were written up to there")
 
     def write(self, t: float, fields: LineFields) -> None:
-        """Append a step."""
+        """Append a step with its fields."""
         if self._writing:  # an interrupt has left a part of a step
             self._cut()
         self._writing = True
@@ -172,7 +172,7 @@ class XdmfWriter:
         self._xml.sync()
 
     def close(self) -> None:
-        """Close both files."""
+        """Close the text file and the file of numbers."""
         try:
             if self._writing:
                 self._cut()

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 def plot_modes(
     shapes: Shapes, which: Sequence[int] = (), *, amplitude: float = AMPLITUDE
 ) -> Figure:
-    """Shapes side by side, in both directions from where the scene was made, grey.
+    """Draw modes side by side, in both directions from the grey undeformed scene.
 
     Args:
         shapes: Of :func:`modes` or :func:`buckling`.
@@ -36,6 +36,9 @@ def plot_modes(
 
     Raises:
         SceneError: There is no such shape, or ``amplitude`` is not positive.
+
+    Example:
+        >>> ub.plot_modes(ub.modes(scene, 3)).savefig("modes.png")
     """
     chosen = list(which) if len(which) else list(range(len(shapes)))
     if not chosen:

@@ -44,6 +44,10 @@ def plot(
     Raises:
         SceneError: Neither a scene nor a solution; a scene whose constraints repeat; anything but
             the shape of a scene; an unknown ``what``, no such time, or ``magnify`` not positive.
+
+    Example:
+        >>> ub.plot(scene).savefig("model.png")
+        >>> ub.plot(solution, "M", magnify=10).savefig("moments.png")
     """
     raise SceneError(
         f"plot: {shown!r} is a {type(shown).__name__}; give a Scene, or the Solution of a run"

@@ -66,7 +66,7 @@ def plot_shapes(
     count: int = 8,
     magnify: float = 1.0,
 ) -> Figure:
-    """Successive shapes in one picture, coloured by time, or by the load factor of a path.
+    """Draw successive shapes in one picture, coloured by time or load factor.
 
     Args:
         solution: What to show.
@@ -79,6 +79,9 @@ def plot_shapes(
     Raises:
         SceneError: ``times`` is one number, ``count`` is less than 1, or ``magnify`` is not
             positive.
+
+    Example:
+        >>> ub.plot_shapes(solution, count=5, magnify=10).savefig("shapes.png")
     """
     require_number(count, "plot_shapes: count", at_least=1)
     if np.ndim(times) != 1:
@@ -110,7 +113,7 @@ def plot_shapes(
 def plot_history(
     solution: Solution, places: Anchor | Sequence[Anchor], *, component: str = "v"
 ) -> Figure:
-    """A component of the motion of one or more places over time.
+    """Draw a component of the motion of one or more places over time.
 
     Args:
         solution: What to show.
@@ -120,6 +123,9 @@ def plot_history(
     Raises:
         SceneError: Unknown ``component``, a place that is not in the scene, or the velocity of a
             static run.
+
+    Example:
+        >>> ub.plot_history(solution, beam.end, component="v").savefig("history.png")
     """
     require_choice(component, COMPONENTS, "plot_history: component")
     followed = (places,) if isinstance(places, Anchor) else tuple(places)
@@ -139,10 +145,13 @@ def plot_history(
 
 
 def plot_energy(solution: Solution) -> Figure:
-    """The ledger over time, or along a path, and below it what it does not explain.
+    """Draw the energy ledger over time or along a path, and below it its imbalance.
 
     Above: energy in the scene, solid; supplied, dashed; lost, dotted.  Below: the imbalance as a
     part of the energy that went through, with the machine precision for comparison.
+
+    Example:
+        >>> ub.plot_energy(solution).savefig("energy.png")
     """
     energy, precision = solution.energy, float(np.finfo(np.float64).eps)
     along = solution.progress
@@ -272,12 +281,17 @@ def require_choice(choice: str, choices: Sequence[str] | dict[str, Any], what: s
 
 @contextmanager
 def picture(size: tuple[float, float]) -> Iterator[Figure]:
-    """A new figure in the style of this module, for pictures of your own.
+    """Open a new figure in the style of this module, for pictures of your own.
 
     Only the first process saves it, as all of them run the same script.
 
     Args:
         size: Width and height; inch.
+
+    Example:
+        >>> with ub.picture((6, 4)) as figure:
+        ...     lines = figure.subplots().plot(solution.times, solution.position(beam.end)[:, 1])
+        >>> figure.savefig("drop.png")
     """
     import matplotlib as mpl
     from matplotlib.figure import Figure

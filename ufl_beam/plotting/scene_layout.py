@@ -37,7 +37,7 @@ class Setting(ABC):
     @property
     @abstractmethod
     def scene(self) -> Scene:
-        """The scene."""
+        """Scene that the picture shows."""
 
     @property
     @abstractmethod
@@ -99,7 +99,7 @@ class Model(Setting):
 
     @property
     def scene(self) -> Scene:
-        """The scene."""
+        """Scene that the picture shows."""
         return self.made
 
     @cached_property
@@ -143,7 +143,7 @@ class Stage(Setting):
 
     @cached_property
     def travels(self) -> dict[Connector, tuple[float, float]]:
-        """See :attr:`Setting.travels`."""
+        """Range of motion of each sliding connector, see :attr:`Setting.travels`."""
         return {holder: _travel(self, holder) for holder in _sliding(self.scene)}
 
 

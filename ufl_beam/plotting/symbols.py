@@ -104,7 +104,7 @@ class Footing(NamedTuple):
 
 
 def bodies(pose: Pose) -> list[Stroke]:
-    """Their outlines."""
+    """Outlines of the rigid bodies."""
     outlines = pose.stage.outlines.items()
     return [
         Stroke(pose.of_body(body, outline), EDGE, 1.6, FILLED, BACK) for body, outline in outlines

@@ -20,13 +20,18 @@ FAINTEST = 1e-12
 
 
 def plot_tradeoff(tradeoff: Tradeoff) -> Figure:
-    """Error over wall time of all runs, of the worst quantity; a ring marks the recommended one.
+    """Draw errors over wall times of all runs, and the recommended run in a ring.
 
     Each kind of scheme, steps and cells has a colour; the line is that of runs that no other one
     beats in both.  The error is a part of the tolerance, or, with a budget, of the quantity.
 
     Args:
         tradeoff: What :func:`tradeoff` returned.
+
+    Example:
+        >>> tip = {"tip": lambda run: run.position(beam.end)[-1]}
+        >>> found = ub.tradeoff(scene, tip, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance=0.01)
+        >>> ub.plot_tradeoff(found).savefig("tradeoff.png")
     """
     with picture((9.0, 6.0)) as figure:
         axes = figure.subplots()

@@ -68,6 +68,10 @@ class Newton:
             ``PETSC_OPTIONS`` they have the prefix ``ub_``.  With any of them Newton's method is
             that of PETSc, else one in C that does the same, faster where cells are few.  A
             ``snes_linesearch_type`` takes the place of the search that follows full steps.
+
+    Example:
+        >>> newton = ub.Newton(rtol=1e-12, petsc={"snes_linesearch_type": "bt"})
+        >>> run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, newton=newton)
     """
 
     rtol: float = 1e-10

@@ -42,7 +42,7 @@ class Bordered:
         pc.setFailedReason(self._factors.getFailedReason())
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Solve."""
+        """Solve the bordered system for a right-hand side."""
         self._factors.apply(b, y)
         self._factors.apply(self._rate, self._z)
         self._correct(y, self._z)

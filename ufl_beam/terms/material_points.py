@@ -15,6 +15,7 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, in_order, integers, lib, names
 from ufl_beam.discretization.compiled_functions import Pointwise
+from ufl_beam.discretization.function_spaces import stated
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model import material_laws
 from ufl_beam.model.material_laws import Bulk, Layout, Softening
@@ -47,6 +48,11 @@ def expect_entries(layout: Layout, scheme: Scheme, ledger: Ledger) -> None:
     if scheme.loss or (layout.softening is not None and scheme.theta < 1):
         # In the middle of a step no stress is left in what has broken, but perhaps at its ends.
         ledger.lost["numerical"] += 0.0
+
+
+def point_forms(softening: Softening | None, scheme: Scheme) -> PointForms:
+    """Compiled laws of points, made once in a process; numbers of ``softening`` do not matter."""
+    return _point_forms(softening and softening.of(1.0, 1.0), scheme)
 
 
 class PointForms:
@@ -104,6 +110,8 @@ class PointForms:
         }
         self.end = pointwise.compile(*in_order("point_output", end))
 
+
+_point_forms = stated(PointForms)
 
 OPENED, RELIEF, HOLD, OVER = (lib.OPENED, lib.RELIEF, lib.HOLD, lib.OVER)
 """Entries of :attr:`Course.flags`."""
@@ -175,7 +183,7 @@ class Points:
         course: Course | None = None,
     ) -> None:
         course = course or Course()
-        self._forms = PointForms(layout.softening, scheme)
+        self._forms = point_forms(layout.softening, scheme)
         self._layout, self._storage, self._loss = layout, storage, scheme.loss
         self._yields, self.softens = layout.yields, layout.softening is not None
         self._at = {name: storage[:, :, i] for i, name in enumerate(INPUTS)}
@@ -259,7 +267,7 @@ class Points:
         lib.release(self.points, least)
 
     def hold(self) -> None:
-        """Take back :meth:`release`."""
+        """Close again the points that :meth:`release` opened."""
         flows = self["flows"]
         flows[flows == RELEASED] = 0.0
 
