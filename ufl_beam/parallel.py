@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import ctypes
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -51,7 +50,4 @@ def in_study() -> bool:
 
 def give_back_memory() -> None:
     """Let the system have what was needed for a while, where the C library keeps it."""
-    if sys.platform == "linux":
-        trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
-        if trim is not None:
-            trim(0)
+    getattr(ctypes.CDLL(None), "malloc_trim", lambda _: None)(0)

@@ -14,8 +14,8 @@ import ufl
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr, coupling
-from ufl_beam.compiled.simd_kernels import LANES
-from ufl_beam.discretization.compiled_forms import Kernel, in_batches, stated, vectorise
+from ufl_beam.compiled.simd_kernels import LANES, in_batches
+from ufl_beam.discretization.compiled_forms import Kernel, stated, vectorise
 from ufl_beam.discretization.dof_numbering import Share
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
 from ufl_beam.mechanics.kinematics import Axis
