@@ -16,7 +16,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.collective_errors import on_first
 from ufl_beam.compiled.csr import Product
 from ufl_beam.discretization.dof_numbering import Grid, Share
-from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.discretization.function_spaces import Fields, Strains, mass_matrix
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import Anchor, Member, Place, Spot
@@ -42,9 +42,8 @@ from ufl_beam.output.state_view import StateView
 from ufl_beam.parallel import ours
 from ufl_beam.parameter import TIME
 from ufl_beam.simulation.opened_hinges import Opened, cells_in_words, percent
-from ufl_beam.terms.beams import SectionForces, mass_matrix
+from ufl_beam.terms.beams import SectionForces
 from ufl_beam.terms.energy_ledger import Energy
-from ufl_beam.terms.inelastic_beams import Strains
 from ufl_beam.version import version
 
 LEDGER = ("state", "supplied", "lost")
