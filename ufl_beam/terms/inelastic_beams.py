@@ -22,7 +22,7 @@ from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.fibres import Layout
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.material_points import INPUTS, Points
+from ufl_beam.terms.material_points import Points, inputs
 from ufl_beam.terms.openings import Course
 from ufl_beam.terms.tangent_derivatives import CellTangent
 
@@ -97,13 +97,14 @@ class InelasticBeams:
         self._strains = Strains(fields)
         cells, n = len(fields.order), len(layout.weights)
         # Internal variables and numbers of the points: one function in their quadrature space.
-        self._variables = fields.variables(n * len(INPUTS))
+        width = len(inputs(layout.statement))
+        self._variables = fields.variables(n * width)
         self.points = Points(
             layout,
             fields.share.grid.keys(self._cells),
             fields.share.cell_lengths()[fields.order],
             scheme,
-            self._variables.x.array.reshape(cells, n, len(INPUTS)),
+            self._variables.x.array.reshape(cells, n, width),
             course,
         )
 

@@ -26,11 +26,12 @@ law_functions.where.register(Condition, ufl.conditional)
 law_functions.below.register(Expr, ufl.lt)
 law_functions.exp.register(Expr, ufl.exp)
 
-INPUTS = (
-    *names("point_input"),
-    *("dt", "limit", "H", "B", "eta", "softening limit", "softening energy"),
-)
-"""Inputs of the law of a point, in the order of their storage; the first ones are in loops.h."""
+
+def inputs(bulk: type[Bulk]) -> tuple[str, ...]:
+    """Inputs of the law of a point, as they are stored; the first ones are those of loops.h."""
+    others = ("dt", *bulk.numbers(), "softening limit", "softening energy")
+    return (*names("point_input"), *others)
+
 
 SPENT, NOTHING = 1e-6, 1e-30
 """Part of its limit below which an open hinge counts as a joint; factor of its stiffness then."""
@@ -51,15 +52,16 @@ def expect_entries(layout: Layout, scheme: Scheme, ledger: Ledger) -> None:
         ledger.lost["numerical"] += 0.0
 
 
-def point_forms(softening: Softening | None, scheme: Scheme) -> PointForms:
+def point_forms(bulk: type[Bulk], softening: Softening | None, scheme: Scheme) -> PointForms:
     """Compiled laws of points, made once in a process; numbers of ``softening`` do not matter."""
-    return _point_forms(softening and softening.of(1.0, 1.0), scheme)
+    return _point_forms(bulk, softening and softening.of(1.0, 1.0), scheme)
 
 
 class PointForms:
     """Compiled laws: C functions from the inputs of a point to what the loops need.
 
     Args:
+        statement: Law of the bulk.
         softening: Law of the discontinuities, if points can break; its numbers do not matter.
         scheme: The time scheme.
 
@@ -71,13 +73,13 @@ class PointForms:
         end: What the end of the step brings, see ``point_output`` in loops.h.
     """
 
-    def __init__(self, softening: Softening | None, scheme: Scheme) -> None:
-        self._pointwise = pointwise = Pointwise(INPUTS)
+    def __init__(self, statement: type[Bulk], softening: Softening | None, scheme: Scheme) -> None:
+        self._pointwise = pointwise = Pointwise(inputs(statement))
         at = pointwise.at
         strain, a = ufl.variable(at["strain"]), ufl.variable(at["growth"])
         s, p, ξ, length = (at[n] for n in ("direction", "plastic", "accumulated", "length"))
         θ, dt = at["theta"], at["dt"]
-        bulk = Bulk(at["stiffness"], at["limit"], at["H"], at["B"], at["eta"])
+        bulk = statement(at["stiffness"], *(at[name] for name in statement.numbers()))
 
         # The incompatible mode: a jump relaxes the strain of the bulk by jump over length.
         relieved = at["jump"] / length
@@ -126,7 +128,7 @@ class Points:
         keys: For each cell two numbers that random limits depend on, besides their seed.
         length: Of the cells; (cells,); m.
         scheme: The time scheme.
-        storage: Zeros, for all that is known of the points; (cells, n, len(INPUTS)).
+        storage: Zeros, for all that is known of the points; (cells, n, number of inputs).
         course: Shared by all points of a scene.
 
     Attributes:
@@ -153,13 +155,13 @@ class Points:
         course: Course | None = None,
     ) -> None:
         course = course or Course()
-        self._forms = point_forms(layout.softening, scheme)
+        self._forms = point_forms(layout.statement, layout.softening, scheme)
         self._layout, self._storage, self._loss = layout, storage, scheme.loss
         self._yields, self.softens = layout.yields, layout.softening is not None
-        self._at = {name: storage[:, :, i] for i, name in enumerate(INPUTS)}
+        self._at = {name: storage[:, :, i] for i, name in enumerate(inputs(layout.statement))}
         self._bulk = bulk = layout.bulk(keys)
         self._at["stiffness"][:] = bulk.C
-        for name in ("limit", "H", "B", "eta"):
+        for name in bulk.numbers():
             self._at[name][:] = getattr(bulk, name)
         self._at["length"][:] = length[:, None]
         self._at["theta"][:] = scheme.theta
