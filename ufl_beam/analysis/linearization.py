@@ -41,10 +41,9 @@ class _Standstill(Static):
 
     dynamic = True
     slips = False
+    has_mean_velocity = True
+    rings = False
     kept: tuple[str, ...] = ()
-
-    def require(self, scene: Scene) -> None:
-        """It can do all scenes."""
 
     def half_tangents(self, rotations: Index) -> Index:
         """None."""

@@ -13,7 +13,7 @@ from ufl_beam.analysis.critical_points import Direction
 from ufl_beam.analysis.path_corrector import Walk
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, StepFailed, require_kind, require_number
-from ufl_beam.model.beams import Place
+from ufl_beam.model.bodies import Place
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.simulation.step_solver import Trial

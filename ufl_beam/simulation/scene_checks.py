@@ -18,6 +18,7 @@ from ufl_beam.model.constraint_checks import (
     require_inertia,
     require_masses,
     require_no_mechanism,
+    require_rates,
 )
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
@@ -43,7 +44,7 @@ def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh) -> Grid:
         warn_of_masses(scene)
         if scene.initial:
             warn_of_origin(scene)
-        scheme.require(scene)
+        require_rates(scene, scheme)
     else:
         require_no_mechanism(scene)
     require_independent(scene)

@@ -14,8 +14,7 @@ from ufl_beam.collective_errors import on_first
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError
-from ufl_beam.model.beams import Beam, Place
-from ufl_beam.model.bodies import Anchor, Spot
+from ufl_beam.model.bodies import Anchor, Member, Place, Spot
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
@@ -208,7 +207,7 @@ class Solution:
         connections = np.array(self._kept.connections or np.zeros((0, 0, 5)))
         return of_joint(self, joint, connections[..., 1])
 
-    def shape(self, beam: Beam, n: int = -1) -> Array:
+    def shape(self, beam: Member, n: int = -1) -> Array:
         """Coordinates of the vertices of a beam at the n-th kept time; (num_vertices, 2); m."""
         vertices, grid = self.grid.vertices_of(beam), self.grid
         return np.asarray(grid.points[vertices] + self._kept.q[n][grid.dofs[vertices, :2]])
@@ -232,7 +231,7 @@ class Solution:
             raise SceneError(f"reaction: {support} is not in the scene")
         return np.array(self._kept.reactions)[:, self.scene.supports.index(support)]
 
-    def section_forces(self, beam: Beam, n: int = -1) -> Array:
+    def section_forces(self, beam: Member, n: int = -1) -> Array:
         """(N, V, M) in the cells of a beam at the n-th kept time; (num_cells, 3); N, N, N m."""
         return self._cells.forces(n)[self.grid.cells_of(beam)]
 
@@ -249,7 +248,7 @@ class Solution:
 
     # -- material ------------------------------------------------------------------------------
 
-    def strains(self, beam: Beam, n: int = -1) -> Array:
+    def strains(self, beam: Member, n: int = -1) -> Array:
         """(Σ, Γ, K) in the cells of a beam at the n-th kept time; (num_cells, 3); 1, 1, 1/m.
 
         The curvature includes the jump of a hinge over the length of its cell.
@@ -261,7 +260,7 @@ class Solution:
         cell = self.grid.cell(place)
         return np.array([self._cells.strains(n)[cell] for n in range(len(self))])
 
-    def material(self, beam: Beam, n: int = -1) -> Material:
+    def material(self, beam: Member, n: int = -1) -> Material:
         """Forces, jumps and dissipated energies in the cells of a beam at the n-th kept time.
 
         Raises:
@@ -292,7 +291,7 @@ class Solution:
         """The cells whose embedded hinge or cracks opened in the run."""
         return Opened(self.grid, self._kept.material)
 
-    def hinge_place_error(self) -> dict[Beam, float]:
+    def hinge_place_error(self) -> dict[Member, float]:
         """Largest part of its limit by which the place of an embedded hinge shifts it, by beam.
 
         A hinge of ``Section(hinge=)`` is in the middle of its cell of length h and opens where the

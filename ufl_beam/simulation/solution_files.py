@@ -12,10 +12,9 @@ from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError
-from ufl_beam.model.beams import Beam, Curve
-from ufl_beam.model.bodies import Anchor
+from ufl_beam.model.bodies import Anchor, Member
 from ufl_beam.model.connector_laws import Controller, ForceLaw, Guide
-from ufl_beam.model.plane_curves import nearest, parameter_step
+from ufl_beam.model.curves import Curve, nearest, parameter_step
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.saved_functions import SavedCurve, SavedFunction
 from ufl_beam.output.saved_scene import from_data, lost, to_data
@@ -121,7 +120,7 @@ class UsedFunctions:
 
     def __call__(self, owner: Any, field: str, function: Any) -> Any:
         """Return the record for a function that is a field of ``owner``."""
-        if field == "curve" and isinstance(owner, Beam):
+        if field == "curve" and isinstance(owner, Member):
             return SavedCurve.of(function, 0.0, 1.0, self._grid.parameters(owner))
         if field == "curve":
             return self._used_curve(function)

@@ -12,7 +12,7 @@ from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.model.connector_laws import Guide
-from ufl_beam.model.plane_curves import REACH, nearest, parameter_step, tangent
+from ufl_beam.model.curves import REACH, nearest, parameter_step, tangent
 from ufl_beam.terms.connector_laws import Setting
 from ufl_beam.terms.links import Links
 
