@@ -22,15 +22,16 @@ from ufl_beam.model.connector_laws import Actuator, Controller, Motor
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.time_functions import TimeFunction
+from ufl_beam.output.archive import below
 from ufl_beam.output.output_files import take
 from ufl_beam.output.recorders import Recorder, close_all, recorders_of
 from ufl_beam.parallel import communicator
 from ufl_beam.parameter import FACTOR
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.solution_files import arrays_of, below
+from ufl_beam.simulation.solution_files import arrays_of
 from ufl_beam.simulation.solution_files import take as take_solution
-from ufl_beam.simulation.step_solver import Trial
+from ufl_beam.simulation.step_cutting import Trial
 from ufl_beam.solvers.newton_options import Newton
 
 ADVICE = (

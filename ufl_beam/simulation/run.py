@@ -92,6 +92,8 @@ def simulate(
     _require_step(dt, scheme, (t0, t1))
     require_count(every, "simulate: every")
     require_count(most, "simulate: most")
+    if start is not None:
+        require_kind(start, Solution, "start")
     if checkpoint is not None:
         require_kind(checkpoint, Checkpoint, "simulate: checkpoint")
     kept = [] if checkpoint is None else [("checkpoint", checkpoint.files)]
@@ -127,6 +129,11 @@ def simulate(
             else EqualSteps(simulation.t, t1, dt)
         )
 
+        def go_on(keeper: Keeper) -> None:
+            states = keeper.resume(simulation, pace, t1)
+            for recorder, state in zip(recorders, states, strict=False):
+                recorder.resume(simulation, state)
+
         def after_step() -> None:
             if recorders or keeper is not None:
                 simulation.settle()  # before anything is written
@@ -145,7 +152,7 @@ def simulate(
         stack.enter_context(simulation.partial_results())
         solution.every = every
         if keeper is not None and keeper.found:
-            simulation.together(keeper.resume, simulation, pace, recorders, t1)
+            simulation.together(go_on, keeper)
             say(f"checkpoint {keeper.path}: the run goes on from t = {simulation.t:.9g} s")
             begin -= solution.seconds
         else:
@@ -169,7 +176,6 @@ def _end_of(start: Solution | None) -> str:
     """A checksum of what a run begins with."""
     if start is None:
         return "nothing"
-    require_kind(start, Solution, "start")
     return digest_of({"q": start.q[-1:], "v": start.v[-1:], **start.internal})
 
 

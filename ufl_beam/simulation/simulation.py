@@ -42,8 +42,8 @@ from ufl_beam.simulation.initial_state import initial_state, mesh_of
 from ufl_beam.simulation.replicas import Copies
 from ufl_beam.simulation.scene_checks import checked_grid
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.step_cutting import go_in_parts
-from ufl_beam.simulation.step_solver import StepSolver, Trial
+from ufl_beam.simulation.step_cutting import Trial, go_in_parts
+from ufl_beam.simulation.step_solver import StepSolver
 from ufl_beam.solvers.equation import Border
 from ufl_beam.solvers.newton_options import Newton
 
@@ -117,6 +117,8 @@ class Simulation(StateView):
         require_kind(newton, Newton, "newton")
         if not (isinstance(kind, type) and issubclass(kind, Solution)):
             raise SceneError(f"kind = {shorten(kind)} must be a class of solutions, such as Path")
+        if start is not None:
+            require_kind(start, Solution, "start")
         grid = checked_grid(scene, scheme, mesh_of(start, mesh))
         shared = len(grid.cells) >= comm.size * SMALLEST_SHARE
         share = Share(grid, comm if shared else MPI.COMM_SELF)

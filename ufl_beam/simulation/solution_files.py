@@ -16,6 +16,7 @@ from ufl_beam.model.bodies import Anchor, Member
 from ufl_beam.model.connector_laws import Controller, ForceLaw, Guide
 from ufl_beam.model.curves import Curve, nearest, parameter_step
 from ufl_beam.model.scene import Scene
+from ufl_beam.output.archive import above, below
 from ufl_beam.output.saved_functions import SavedCurve, SavedFunction
 from ufl_beam.output.saved_scene import from_data, lost, to_data
 from ufl_beam.version import version
@@ -69,9 +70,8 @@ def text_of(solution: Saved) -> dict[str, Any]:
 def arrays_of(solution: Saved) -> State:
     """Return what is saved as arrays."""
     counts = {"counts": np.array([solution.parts, solution.iterations])}
-    history = {f"history/{name}": values for name, values in solution.history().items()}
-    internal = {f"internal/{name}": values for name, values in solution.internal.items()}
-    return {**counts, **history, **internal}
+    history = above("history/", solution.history())
+    return {**counts, **history, **above("internal/", solution.internal)}
 
 
 def take(solution: Saved, text: dict[str, Any], arrays: State) -> None:
@@ -81,12 +81,6 @@ def take(solution: Saved, text: dict[str, Any], arrays: State) -> None:
     solution.parts, solution.iterations = (int(n) for n in arrays["counts"])
     for name in NAMED:
         setattr(solution, name, text[name])
-
-
-def below(prefix: str, arrays: State) -> State:
-    """Return the arrays whose names begin with a prefix, without it."""
-    found = ((name, values) for name, values in arrays.items() if name.startswith(prefix))
-    return {name.removeprefix(prefix): values for name, values in found}
 
 
 def grid_of(text: dict[str, Any]) -> Grid:
