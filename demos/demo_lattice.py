@@ -112,14 +112,14 @@ files = ub.XDMF(output / "lattice.xdmf", every=quarter)
 
 solution, seconds = simulation.solution, []
 files.open(simulation)
-solution.keep(simulation)
+simulation.keep()
 for n in range(1, steps + 1):
     begin = time.perf_counter()
     simulation.step_to(n * end / steps)
     seconds.append(time.perf_counter() - begin)
     files.write(simulation)
     if n % quarter == 0:
-        solution.keep(simulation)
+        simulation.keep()
 files.close()
 simulation.close()
 

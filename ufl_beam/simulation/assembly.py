@@ -12,6 +12,7 @@ from ufl_beam.collective_errors import Agreement
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.dof_numbering import Share
 from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.discretization.state_io import NOWHERE, Restoring, Saving, State
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.connector_laws import Controller, Coulomb
 from ufl_beam.model.connectors import Connector
@@ -76,6 +77,46 @@ class Assembly:
     def remembering(self) -> list[InelasticBeams | Links]:
         """Terms with internal variables."""
         return [*self.inelastic, *self.couplings]
+
+    def internal_variables(self, q: Array) -> State:
+        """Return what a run that starts here takes over: internal variables, reactions, rates."""
+        memory = Saving(self.equation.share)
+        for one in self.remembering:
+            one.remember(memory, q)
+        if self.supports.work or any(isinstance(link.law, Coulomb) for link in self.asked):
+            self.supports.carry_on(memory, q)
+        if self.inertia is not None:
+            self.inertia.carry_on(memory, len(self.inertia.more))
+        return memory.state()
+
+    def take_over(self, q: Array, internal: State, *, same: bool) -> None:
+        """Take over :meth:`internal_variables` of another run.
+
+        Args:
+            q: The initial configuration at the local degrees of freedom.
+            internal: What the other run has passed on.
+            same: Whether no force has changed since, so that accelerations are what they were.
+        """
+        memory = Restoring(self.equation.share, internal)
+        for one in self.remembering:
+            one.remember(memory, NOWHERE)
+        if "reactions" in internal:
+            self.supports.carry_on(memory, q)
+        if self.inertia is not None and same:
+            known = sum(name in internal for name in self.inertia.scheme.kept)
+            self.inertia.carry_on(memory, known)
+
+    def bear(self, force: Array, loads: list[Array]) -> None:
+        """Set the reactions to those of the initial state of a static run.
+
+        Args:
+            force: The internal forces of that state.
+            loads: The loads that it is in equilibrium with; none if nothing acts yet.
+        """
+        r = np.asarray(force - sum(loads))
+        self.supports.enter(r)
+        self.supports.hold(self.equation.share.added(r))
+        self.supports.take()
 
 
 def assemble(share: Share, scheme: Scheme, v: Array, together: Agreement) -> Assembly:
