@@ -15,6 +15,7 @@ import numpy as np
 
 from ufl_beam.analysis.linearization import SmallMotions
 from ufl_beam.arrays import Array, Complex
+from ufl_beam.collective_errors import on_first
 from ufl_beam.discretization.dof_numbering import Grid, Share
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.model_warnings import warn_of_masses
@@ -26,7 +27,6 @@ from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.joint_histories import Connection, velocity_of
-from ufl_beam.output.recorders import on_first
 from ufl_beam.output.time_series import VTKHDF, XDMF, TimeSeries
 from ufl_beam.parallel import ours
 from ufl_beam.simulation.initial_state import mesh_of

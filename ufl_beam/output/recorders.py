@@ -7,7 +7,7 @@ import csv
 import io
 import sys
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,7 +16,7 @@ from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.collective_errors import portable
+from ufl_beam.collective_errors import on_first
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError, require_count, require_kind, require_sequence
 from ufl_beam.model.bodies import Anchor, require_anchor
@@ -101,20 +101,6 @@ class Recorder(ABC):
             SceneError: What was written before is not there any more.
         """
         self.state()
-
-
-def on_first(comm: MPI.Intracomm, action: Callable[[], None]) -> None:
-    """Do something on the first process; what it raises there is raised on all of them."""
-    error: BaseException | None = None
-    if comm.rank == 0:
-        try:
-            action()
-        except BaseException as caught:
-            error = caught
-    if comm.size > 1:
-        error = comm.bcast(portable(error))
-    if error is not None:
-        raise error
 
 
 def recorders_of(

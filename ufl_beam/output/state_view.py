@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
 
 from mpi4py import MPI
@@ -22,10 +21,9 @@ from ufl_beam.model.supports import Support
 from ufl_beam.output.joint_histories import Connection, links_of, motion_of, velocity_of
 from ufl_beam.parameter import Parameter
 from ufl_beam.terms.beams import Inertia, SectionForces
-from ufl_beam.terms.connectors import Couplings
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.guide_curves import Guides
 from ufl_beam.terms.inelastic_beams import InelasticBeams
+from ufl_beam.terms.links import Links
 from ufl_beam.terms.supports import Supports
 
 NO_REACTIONS = np.zeros((0, 3))
@@ -62,7 +60,7 @@ class StateView:
     supports: Supports
     inertia: Inertia
     reactions_known: bool = False
-    couplings: list[Couplings | Guides]
+    couplings: list[Links]
     inelastic: list[InelasticBeams]
     _has_inelastic: bool
 
@@ -167,15 +165,6 @@ class StateView:
         links = self.scene.links
         numbers = [n for n in links_of(self.scene, joint) if not links[n].turns]
         return float(np.linalg.norm(self.connections()[numbers, 1]))
-
-    def rates(self, links: Sequence[Connector]) -> Array:
-        """Rates of the relative motions of one kind of connectors now; m/s or rad/s."""
-        rates = np.zeros(len(links))
-        for v in self.velocities():
-            for coupling in self.couplings:
-                if isinstance(coupling, Couplings) and coupling.links == list(links):
-                    rates += coupling.rates(self.q, v)
-        return rates
 
     def section_forces(self) -> Array:
         """(N, V, M) in all cells; (num_cells, 3); N, N, N m; all processes call it together."""

@@ -11,11 +11,12 @@ from mpi4py import MPI
 
 import numpy as np
 
+from ufl_beam.collective_errors import on_first
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError, require_count
 from ufl_beam.output.line_data import LineData, LineFields
 from ufl_beam.output.output_files import require_path, require_writable
-from ufl_beam.output.recorders import Recorder, on_first
+from ufl_beam.output.recorders import Recorder
 from ufl_beam.output.vtkhdf import VtkhdfWriter
 from ufl_beam.output.xdmf import Complete, XdmfWriter, data_path
 

@@ -8,7 +8,8 @@ import ufl
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.csr import Csr, Product
-from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.discretization.compiled_forms import stated
+from ufl_beam.discretization.function_spaces import Element, Fields
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.kinematics import split, turn
 from ufl_beam.mechanics.time_schemes import Scheme, Step
@@ -17,15 +18,15 @@ from ufl_beam.terms.beams import mass_matrix
 from ufl_beam.terms.energy_ledger import Ledger
 
 
+@stated
+def _turned_mass(of: Element) -> ufl.Form:
+    (u, _), (w_u, _) = split(ufl.TrialFunction(of.space)), split(of.w)
+    return of.inertia[0] * ufl.dot(turn(u), w_u) * of.dx_of_mass()
+
+
 def turned_mass_matrix(fields: Fields) -> Csr:
     """Mass times a quarter turn of velocities, so that 2 Ω of it times them is Coriolis' force."""
-    share = fields.share
-    (u, _), (w_u, _) = (split(f(fields.space)) for f in (ufl.TrialFunction, ufl.TestFunction))
-    G = fields.matrix()
-    work = fields.inertia()[0] * ufl.dot(turn(u), w_u) * fields.dx_of_mass()
-    kernel = fields.kernel(work, fields.configuration())
-    kernel.place(G)
-    kernel.add(np.zeros(share.size), G.data)
+    share, G = fields.share, fields.assembled(_turned_mass(fields.element))
     scene = share.grid.scene
     lumps = [(share.at(one.place), one.mass) for one in scene.masses]
     lumps += [(share.at(one.middle), one.mass) for one in scene.bodies]
