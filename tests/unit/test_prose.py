@@ -29,7 +29,7 @@ def docstrings(tree, owner):
 DOCSTRINGS = {
     name: text
     for path in sorted((ROOT / "ufl_beam").rglob("*.py"))
-    for name, text in docstrings(ast.parse(path.read_text(encoding="utf-8")), path.stem)
+    for name, text in docstrings(ast.parse(path.read_text("utf-8")), path.relative_to(ROOT))
 }
 
 
