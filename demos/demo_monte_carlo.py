@@ -1,5 +1,5 @@
 # %% [markdown]
-# # Monte Carlo: what a frame of mean strength does not tell
+# # Monte Carlo: a frame with random strength
 #
 # A portal frame takes a blow that bends its columns beyond yield, and stands askew ever after.  How
 # far, that depends on yield stresses, which scatter from one place of the columns to the next.  The
@@ -7,7 +7,7 @@
 # stresses of its own.  They tell two things that the one cannot: by how much the drift scatters,
 # and that frames with scatter **dissipate more**, in the mean and nearly each of them.
 #
-# This demo emphasises
+# This demo shows
 #
 # * `ub.study`, which calls one function for many cases: one after the other here, several at a time
 #   under `mpirun`, with the same results to the last bit,
@@ -206,7 +206,7 @@ names = sorted(str(path) for path in output.glob("monte_carlo*"))
 ub.say("\npictures and data:", *names, sep="\n  ")
 
 # %% [markdown]
-# ## What the agreement proves
+# ## Verification
 #
 # The ledger of every member closes and no step was cut, so that none of the scatter is numerical.
 # From ten members on, the interval of the mean energy excludes the frame of mean strength; that of

@@ -6,7 +6,7 @@
 # So its natural frequencies depend on the speed, and so do the speeds at which something that comes
 # once, twice, ... per revolution meets one of them: a Campbell diagram shows both.
 #
-# This demo emphasises
+# This demo shows
 #
 # * `ub.RotatingFrame`, a load that makes the steady rotation a state of equilibrium,
 # * `ub.modes(scene, n, at=steady)`: frequencies, damping ratios and shapes about that state,
@@ -127,7 +127,7 @@ fast.write(output / "rotating_beam.xdmf")  # the k-th shape at time k, for ParaV
 ub.say("\npictures:", *sorted(str(p) for p in output.glob("rotating_beam*.png")), sep="\n  ")
 
 # %% [markdown]
-# ## What the agreement proves
+# ## Verification
 #
 # The computed frequencies stay below the bound, and near it: only where the speed is large, and
 # most in the first mode, does the shape change.  The damping ratios of the second and third mode

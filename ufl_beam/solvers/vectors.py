@@ -22,7 +22,7 @@ class Vectors:
         self.parallel = share.comm.size > 1
 
     def new(self) -> PETSc.Vec:
-        """Make a vector."""
+        """Make a vector of the unknowns, shared like them."""
         share = self._share
         if not self.parallel:
             return PETSc.Vec().createSeq(share.size)
