@@ -12,8 +12,9 @@ import ufl
 
 import ufl_beam as ub
 from ufl_beam.discretization import compiled_forms
-from ufl_beam.discretization.dof_numbering import Grid, Share
+from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.discretization.partition import Share
 from ufl_beam.dolfinx_compat import fem, line_mesh, space_with_dofs
 from ufl_beam.mechanics.kinematics import Axis, strain
 

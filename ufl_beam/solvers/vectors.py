@@ -7,7 +7,7 @@ from petsc4py import PETSc
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import ffi, petsc
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.partition import Share
 
 
 class Vectors:

@@ -13,8 +13,8 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import stated
-from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import Element, Fields, Strains
+from ufl_beam.discretization.partition import Numbering
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError
@@ -27,7 +27,7 @@ from ufl_beam.terms.openings import Course
 from ufl_beam.terms.tangent_derivatives import CellTangent
 
 
-def inelastic_cells(grid: Grid) -> list[tuple[Layout, Index]]:
+def inelastic_cells(grid: Numbering) -> list[tuple[Layout, Index]]:
     """Layouts of material points, and the cells (numbers of the grid) that have them.
 
     Raises:

@@ -20,7 +20,7 @@ from ufl_beam.model import law_functions
 from ufl_beam.model.fibres import Layout
 from ufl_beam.model.material_laws import Bulk, Softening
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.openings import Course
+from ufl_beam.terms.openings import NOTHING, RELEASED, SPENT, Course
 
 law_functions.where.register(Condition, ufl.conditional)
 law_functions.below.register(Expr, ufl.lt)
@@ -32,9 +32,6 @@ def inputs(bulk: type[Bulk]) -> tuple[str, ...]:
     others = ("dt", *bulk.numbers(), "softening limit", "softening energy")
     return (*names("point_input"), *others)
 
-
-SPENT, NOTHING = 1e-6, 1e-30
-"""Part of its limit below which an open hinge counts as a joint; factor of its stiffness then."""
 
 STATE = ("plastic", "accumulated", "jump", "opening", "before", "traction", "flows")
 """The internal variables, and what else of an accepted state the next step depends on."""
@@ -115,9 +112,6 @@ class PointForms:
 
 
 _point_forms = stated(PointForms)
-
-RELEASED = float(lib.RELEASED)
-"""Value of "flows" of a point that may open in this step although it did not flow in the last."""
 
 
 class Points:

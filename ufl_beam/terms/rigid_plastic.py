@@ -26,8 +26,7 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.material_laws import Hardening, HardeningBulk, Softening
 from ufl_beam.model.plastic_hinges import law_of
 from ufl_beam.terms.connector_responses import Rows, Setting, respond
-from ufl_beam.terms.material_points import NOTHING, RELEASED, SPENT
-from ufl_beam.terms.openings import Openable
+from ufl_beam.terms.openings import NOTHING, RELEASED, SPENT, Openable
 
 INPUTS = (
     *names("slip_input", "slip_"),
