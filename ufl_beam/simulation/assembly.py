@@ -20,17 +20,21 @@ from ufl_beam.model.constraint_checks import friction_repeats
 from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.simulation.step_equation import StepEquation
+from ufl_beam.solvers.c_equation import CEquation
+from ufl_beam.solvers.equation import Equation
 from ufl_beam.terms.algorithmic_damping import numerical_forces
-from ufl_beam.terms.beams import Cells, ElasticBeams, Inertia, Term
-from ufl_beam.terms.connector_laws import Setting
+from ufl_beam.terms.base import Cells, Term
+from ufl_beam.terms.beams import ElasticBeams, Inertia
+from ufl_beam.terms.connector_responses import Setting
 from ufl_beam.terms.connectors import couplings
 from ufl_beam.terms.damping import damping_forces
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.guide_curves import guides
 from ufl_beam.terms.inelastic_beams import InelasticBeams, inelastic_cells
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.loads import DeadLoads, FollowerLoads
-from ufl_beam.terms.material_points import Course, expect_entries
-from ufl_beam.terms.openings import Openable, Openings
+from ufl_beam.terms.material_points import expect_entries
+from ufl_beam.terms.openings import Course, Openable, Openings
 from ufl_beam.terms.rotating_frame import FrameForces
 from ufl_beam.terms.supports import Supports
 
@@ -75,6 +79,13 @@ class Assembly:
     def remembering(self) -> list[InelasticBeams | Links]:
         """Terms with internal variables."""
         return [*self.inelastic, *self.couplings]
+
+    def compiled(self) -> Equation:
+        """Return the equation in C, or as it is where several processes or axes need Python."""
+        python = self.equation
+        if python.share.comm.size > 1 or self.supports.turned:
+            return python
+        return CEquation(python, self.beams, self.couplings, python.others, self.supports)
 
     def internal_variables(self, q: Array) -> State:
         """Return what a run that starts here takes over: internal variables, reactions, rates."""
@@ -150,7 +161,7 @@ def assemble(share: Share, scheme: Scheme, v: Array, together: Agreement) -> Ass
     asked = {link: 0.0 for link in scene.links if isinstance(link.law, Controller | Coulomb)}
     rates = dict(asked)
     connectors = Setting(asked, rates, scene.size, scheme, ledger, friction_repeats(scene), course)
-    coupled = together(couplings, share, connectors, A)
+    coupled = together(lambda: [*couplings(share, connectors, A), *guides(share, scheme, A)])
     openings = Openings.of(course, _openable(inelastic, coupled), share.comm)
 
     loads = _loads(scene, fields, scheme, ledger, A)

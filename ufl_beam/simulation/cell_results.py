@@ -13,11 +13,14 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Product
 from ufl_beam.discretization.dof_numbering import Grid, Share
-from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.discretization.function_spaces import (
+    Fields,
+    SectionForces,
+    Strains,
+    mass_matrix,
+)
 from ufl_beam.errors import SceneError
 from ufl_beam.simulation.kept_states import KeptStates
-from ufl_beam.terms.beams import SectionForces, mass_matrix
-from ufl_beam.terms.inelastic_beams import Strains
 
 
 class Material(NamedTuple):

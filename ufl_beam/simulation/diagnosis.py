@@ -19,7 +19,7 @@ from ufl_beam.parameter import Parameter
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.solvers.null_vectors import SINGULAR, free_matrix, null_vector
-from ufl_beam.terms.beams import KINDS
+from ufl_beam.terms.base import KINDS
 from ufl_beam.terms.inelastic_beams import InelasticBeams
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.supports import Supports

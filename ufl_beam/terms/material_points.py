@@ -20,6 +20,7 @@ from ufl_beam.model import law_functions
 from ufl_beam.model.fibres import Layout
 from ufl_beam.model.material_laws import Bulk, Softening
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.openings import Course
 
 law_functions.where.register(Condition, ufl.conditional)
 law_functions.below.register(Expr, ufl.lt)
@@ -113,39 +114,8 @@ class PointForms:
 
 _point_forms = stated(PointForms)
 
-OPENED, RELIEF, HOLD, OVER = (lib.OPENED, lib.RELIEF, lib.HOLD, lib.OVER)
-"""Entries of :attr:`Course.flags`."""
-
 RELEASED = float(lib.RELEASED)
 """Value of "flows" of a point that may open in this step although it did not flow in the last."""
-
-
-class Course:
-    """Flags that all points of a scene share in a step.
-
-    Attributes:
-        flags: Of the present search for an equilibrium; (4,), int32.  OPENED: a point has opened.
-            RELIEF: points that do not open answer elastically.  HOLD: points that do not flow stay
-            closed.  OVER: one of them has borne more than its limit.
-    """
-
-    def __init__(self) -> None:
-        self.flags: Index = np.zeros(lib.COURSE_FLAGS, dtype=np.int32)
-        self._first: tuple[Index, Index] = (self.flags.copy(), self.flags.copy())
-        self._first[True][HOLD] = 1
-
-    def begin(self, hold: bool) -> None:
-        """Begin a search for an equilibrium."""
-        self.flags[:] = self._first[hold]
-
-    @property
-    def opened(self) -> bool:
-        """True if a point of this process has opened."""
-        return bool(self.flags[OPENED])
-
-    def relieve(self, relief: bool) -> None:
-        """Let points that do not open answer elastically, or no more."""
-        self.flags[RELIEF] = relief
 
 
 class Points:

@@ -25,7 +25,7 @@ from ufl_beam.model.connector_laws import RigidPlastic
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.material_laws import Bulk, Hardening, Softening
 from ufl_beam.model.plastic_hinges import law_of
-from ufl_beam.terms.connector_laws import Rows, Setting
+from ufl_beam.terms.connector_responses import Rows, Setting, respond
 from ufl_beam.terms.material_points import NOTHING, RELEASED, SPENT
 from ufl_beam.terms.openings import Openable
 
@@ -152,6 +152,7 @@ def slip_forms(law: Softening | Hardening, scheme: Scheme) -> SlipForms:
     return _slip_forms(Hardening(1.0) if isinstance(law, Hardening) else law.of(1.0, 1.0), scheme)
 
 
+@respond.register(RigidPlastic)
 class RigidPlasticResponse:
     """Rigid-plastic connectors whose laws are of one kind."""
 
