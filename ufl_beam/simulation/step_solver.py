@@ -76,11 +76,11 @@ class StepSolver:
             StepFailed: There is no equilibrium, or it is too far away.
         """
         loads = self._equation.load_forces()
-        solve = partial(self.newton.solve, loads=loads, like_last=like_last)
         try:
             if self._openings is None:
-                q1 = solve(guess)
+                q1 = self.newton.solve(guess, loads, like_last)
             else:
+                solve = partial(self.newton.solve, loads=loads, like_last=like_last)
                 q1 = self._openings.solve(guess, solve, partial(self._equation.begin, step))
         except StepFailed:
             try:
