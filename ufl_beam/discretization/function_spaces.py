@@ -16,7 +16,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr, coupling
 from ufl_beam.compiled.simd_kernels import LANES, in_batches
 from ufl_beam.discretization.compiled_forms import Kernel, stated, vectorise
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.partition import Share
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
 from ufl_beam.mechanics.kinematics import Axis, split, strain
 from ufl_beam.model.mesh_options import Mesh
@@ -234,7 +234,7 @@ class Strains:
 
     def __call__(self, q: Array) -> Array:
         """Strains at ``q``, in the order of the mesh, point after point; 1, 1, 1/m."""
-        return self._weighted(q) / self._weights
+        return np.asarray(self._weighted(q) / self._weights)
 
     def mean(self, q: Array) -> Array:
         """Means of the cells at ``q``, in the order of the mesh; (num_cells, 3); 1, 1, 1/m."""

@@ -10,8 +10,9 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.discretization.dof_numbering import Grid, Share
+from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import Fields, SectionForces
+from ufl_beam.discretization.partition import Share
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.bodies import Anchor
 from ufl_beam.model.connectors import Connector

@@ -10,8 +10,8 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.collective_errors import Agreement
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.dof_numbering import Share
 from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import NOWHERE, Restoring, Saving, State
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.connector_laws import Controller, Coulomb

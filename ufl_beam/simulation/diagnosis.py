@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.discretization.dof_numbering import Grid, Share
+from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import ConvergenceError, StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.scene import Scene

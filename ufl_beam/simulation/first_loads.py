@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.loads import RotatingFrame

@@ -16,8 +16,8 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.collective_errors import Agreement
 from ufl_beam.compiled.c_library import extrapolated
-from ufl_beam.discretization.dof_numbering import Share
 from ufl_beam.discretization.model_warnings import warn_of_jumps
+from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory, Restoring, Saving, State
 from ufl_beam.errors import (
     ModelWarning,

@@ -13,7 +13,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.collective_errors import Agreement
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed, require_number, require_sequence
 from ufl_beam.model.scene import Scene
 from ufl_beam.simulation.step_cutting import Trial

@@ -10,7 +10,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.csr import Csr, Product
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.solvers.equation import PythonEquation

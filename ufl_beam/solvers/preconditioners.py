@@ -9,8 +9,8 @@ from petsc4py import PETSc
 
 from ufl_beam.compiled.c_library import doubles, ffi, lib
 from ufl_beam.compiled.csr import Csr
+from ufl_beam.discretization.partition import Share
 from ufl_beam.solvers.static_condensation import Elimination
-from ufl_beam.solvers.unknowns import Unknowns
 
 GOOD = int(PETSc.PC.FailedReason.NOERROR)
 BAD_PIVOT = int(PETSc.PC.FailedReason.FACTOR_NUMERIC_ZEROPIVOT)
@@ -27,7 +27,7 @@ class ChainsFirst:
         package: What factors the matrix that is left.
     """
 
-    def __init__(self, share: Unknowns, A: Csr, package: str) -> None:
+    def __init__(self, share: Share, A: Csr, package: str) -> None:
         self._elimination = left = Elimination(share, A)
         self._good = False
         arrays = (left.indptr.astype(PETSc.IntType), left.indices.astype(PETSc.IntType), left.data)

@@ -15,7 +15,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, integers, lib, loop
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import Kernel, stated
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem, line_mesh
 from ufl_beam.mechanics.relative_motions import MOTIONS, Numbers, Pair

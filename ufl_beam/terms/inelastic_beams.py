@@ -13,8 +13,8 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import stated
-from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import Element, Fields, Strains
+from ufl_beam.discretization.partition import Numbering
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError
@@ -22,12 +22,12 @@ from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.fibres import Layout
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.material_points import INPUTS, Points
+from ufl_beam.terms.material_points import Points, inputs
 from ufl_beam.terms.openings import Course
 from ufl_beam.terms.tangent_derivatives import CellTangent
 
 
-def inelastic_cells(grid: Grid) -> list[tuple[Layout, Index]]:
+def inelastic_cells(grid: Numbering) -> list[tuple[Layout, Index]]:
     """Layouts of material points, and the cells (numbers of the grid) that have them.
 
     Raises:
@@ -97,13 +97,14 @@ class InelasticBeams:
         self._strains = Strains(fields)
         cells, n = len(fields.order), len(layout.weights)
         # Internal variables and numbers of the points: one function in their quadrature space.
-        self._variables = fields.variables(n * len(INPUTS))
+        width = len(inputs(layout.statement))
+        self._variables = fields.variables(n * width)
         self.points = Points(
             layout,
             fields.share.grid.keys(self._cells),
             fields.share.cell_lengths()[fields.order],
             scheme,
-            self._variables.x.array.reshape(cells, n, len(INPUTS)),
+            self._variables.x.array.reshape(cells, n, width),
             course,
         )
 

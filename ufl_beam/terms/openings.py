@@ -41,6 +41,13 @@ OPENED, RELIEF, HOLD, OVER = (lib.OPENED, lib.RELIEF, lib.HOLD, lib.OVER)
 """Entries of :attr:`Course.flags`."""
 
 
+SPENT, NOTHING = 1e-6, 1e-30
+"""Part of its limit below which an open hinge counts as a joint; factor of its stiffness then."""
+
+RELEASED = float(lib.RELEASED)
+"""Value of "flows" of a point that may open in this step although it did not flow in the last."""
+
+
 class Course:
     """Flags that all points of a scene share in a step.
 

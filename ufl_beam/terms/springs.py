@@ -14,7 +14,7 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.fibres import Layout
 from ufl_beam.model.material_laws import Hardening
 from ufl_beam.terms.connector_responses import Rows, Setting, respond
-from ufl_beam.terms.material_points import INPUTS, Points, expect_entries
+from ufl_beam.terms.material_points import Points, expect_entries, inputs
 
 
 @respond.register(Spring)
@@ -35,7 +35,7 @@ class _Sprung:
         )
         number = len(links)
         keys = [(0, i) for i in range(number)]
-        storage = np.zeros((number, 1, len(INPUTS)))
+        storage = np.zeros((number, 1, len(inputs(layout.statement))))
         self.points = Points(layout, keys, np.ones(number), setting.scheme, storage, setting.course)
         self._ledger = setting.ledger
         expect_entries(layout, setting.scheme, setting.ledger)
