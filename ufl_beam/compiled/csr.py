@@ -4,58 +4,31 @@
 from __future__ import annotations
 
 from copy import copy
-from typing import Any, Protocol
 
 from petsc4py import PETSc
 
 import numpy as np
-import numpy.typing as npt
 from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, integers, lib, loop
 
 
-class Structure(Protocol):
-    """A matrix by rows, the columns of each in order."""
+class Csr:
+    """A matrix in which PETSc and the loops in C find the entries.
 
-    data: npt.NDArray[Any]
-    indices: npt.NDArray[Any]
-    indptr: npt.NDArray[Any]
-
-
-def coupling(size: int, *coupled: Index) -> Structure:
-    """A matrix of zeros with a diagonal, and entries for what stands in a row.
+    SciPy chooses the type of indices by itself; C needs those of 32 bits.
 
     Args:
-        size: Number of degrees of freedom.
-        coupled: Degrees of freedom of cells, or of what else couples some; (number, some).
-    """
-    groups = [np.arange(size, dtype=np.int32)[:, None], *coupled]
-    lengths = np.concatenate([np.full(len(rows), rows.shape[1]) for rows in groups])
-    columns = np.concatenate([rows.ravel() for rows in groups]).astype(np.int32)
-    ends = np.append(0, np.cumsum(lengths))
-    parts = csr_array((np.ones(len(columns), np.bool_), columns, ends), shape=(len(lengths), size))
-    matrix = parts.T.tocsr() @ parts
-    matrix.sort_indices()
-    arrays = (np.zeros(matrix.nnz), matrix.indices, matrix.indptr)
-    zeros: Structure = csr_array(arrays, shape=matrix.shape)
-    return zeros
-
-
-class Csr:
-    """The arrays of a matrix, in which PETSc and the loops in C find the entries.
-
-    Attributes:
         data: Its entries, row after row.
-        indices: Column of each entry.
+        indices: Column of each entry, those of a row in order.
         indptr: First entry of each row, and the number of entries.
     """
 
-    def __init__(self, matrix: Structure) -> None:
-        self.data: Array = matrix.data
-        self.indices = matrix.indices.astype(np.int32, copy=False)
-        self.indptr = matrix.indptr.astype(np.int32, copy=False)
+    def __init__(self, data: Array, indices: Index, indptr: Index) -> None:
+        self.data = data
+        self.indices = indices.astype(np.int32, copy=False)
+        self.indptr = indptr.astype(np.int32, copy=False)
 
     def zeros_like(self) -> Csr:
         """A matrix of the same structure, which is stored once."""
@@ -83,13 +56,28 @@ class Csr:
 
     def petsc(self) -> PETSc.Mat:
         """PETSc matrix on this process with the same arrays: no copy, before or after."""
-        indptr = self.indptr.astype(PETSc.IntType, copy=False)
-        indices = self.indices.astype(PETSc.IntType, copy=False)
-        matrix = PETSc.Mat().createAIJWithArrays(
-            self.size, (indptr, indices, self.data), comm=PETSc.COMM_SELF
-        )
+        indptr, indices = (x.astype(PETSc.IntType, copy=False) for x in (self.indptr, self.indices))
+        arrays = (indptr, indices, self.data)
+        matrix = PETSc.Mat().createAIJWithArrays(self.size, arrays, comm=PETSc.COMM_SELF)
         matrix.assemble()
         return matrix
+
+
+def coupling(size: int, *coupled: Index) -> Csr:
+    """A matrix of zeros with a diagonal, and entries for what stands in a row.
+
+    Args:
+        size: Number of degrees of freedom.
+        coupled: Degrees of freedom of cells, or of what else couples some; (number, some).
+    """
+    groups = [np.arange(size, dtype=np.int32)[:, None], *coupled]
+    lengths = np.concatenate([np.full(len(rows), rows.shape[1]) for rows in groups])
+    columns = np.concatenate([rows.ravel() for rows in groups]).astype(np.int32)
+    ends = np.append(0, np.cumsum(lengths))
+    parts = csr_array((np.ones(len(columns), np.bool_), columns, ends), shape=(len(lengths), size))
+    matrix = parts.T.tocsr() @ parts
+    matrix.sort_indices()
+    return Csr(np.zeros(matrix.nnz), matrix.indices, matrix.indptr)
 
 
 def as_slice(index: Index) -> Index | slice:
