@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ufl_beam.arrays import Array
+Array = npt.NDArray[np.float64]
 
 try:
     from mpi4py import MPI
@@ -34,7 +34,6 @@ __all__ = [
     "TABULATE",
     "VERSION",
     "VERSIONS",
-    "Array",
     "cell_coordinates",
     "compile_form",
     "cpp",

@@ -13,7 +13,7 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError, require_kind, require_number, require_sequence
-from ufl_beam.model.beams import Place
+from ufl_beam.model.bodies import Place
 from ufl_beam.output.rainflow import Cycles, RainflowCounter, SNCurve, library
 from ufl_beam.output.recorders import Recorder
 

@@ -11,20 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.model.beams import Beam, Place
-from ufl_beam.model.bodies import Anchor, Body
-from ufl_beam.model.loads import (
-    FollowerLoad,
-    Gravity,
-    LineLoad,
-    Load,
-    PointLoad,
-    RotatingFrame,
-    TimeFunction,
-    steady,
-)
-from ufl_beam.model.scene import Velocity
+from ufl_beam.model.bodies import Anchor, Body, Member, Place
+from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame
+from ufl_beam.model.masses import Velocity
 from ufl_beam.model.supports import COMPONENTS, Support
+from ufl_beam.model.time_functions import TimeFunction, steady
 from ufl_beam.plotting.connector_glyphs import GREEN, RED, WHITE
 from ufl_beam.plotting.labels import Label, Spot
 from ufl_beam.plotting.plots import with_unit
@@ -57,7 +48,7 @@ class Bench(NamedTuple):
 
     unit: float
     points: float
-    axes: dict[Beam, Array]
+    axes: dict[Member, Array]
     ways: Callable[[Anchor], Array]
     largest: tuple[float, float, float]
     stacks: dict[object, float]
@@ -231,7 +222,7 @@ def _(load: LineLoad, bench: Bench) -> Words:
 
 
 def _comb(
-    beam: Beam, way: Array, part: float, bench: Bench
+    beam: Member, way: Array, part: float, bench: Bench
 ) -> tuple[list[Stroke], tuple[Spot, ...]]:
     """Arrows that end on a beam, and the line that they begin at."""
     axis, unit = bench.axes[beam], bench.unit
@@ -250,7 +241,7 @@ def _comb(
 
 
 def _flow(
-    beam: Beam, way: Array, part: float, bench: Bench
+    beam: Member, way: Array, part: float, bench: Bench
 ) -> tuple[list[Stroke], tuple[Spot, ...]]:
     """Arrows along a beam, beside it."""
     axis, unit = bench.axes[beam], bench.unit
@@ -348,7 +339,7 @@ def velocity_symbol(velocity: Velocity, bench: Bench) -> Words:
     return strokes, labels
 
 
-def _points_of(one: Beam | Body, bench: Bench) -> Array:
+def _points_of(one: Member | Body, bench: Bench) -> Array:
     """Points at which the velocity is shown; (n, 2); m."""
     if isinstance(one, Body):
         return np.array([one.center])

@@ -17,8 +17,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_number
-from ufl_beam.model.beams import Beam
-from ufl_beam.model.bodies import Anchor
+from ufl_beam.model.bodies import Anchor, Member
 from ufl_beam.model.material_laws import HingeLaw
 from ufl_beam.model.plastic_hinges import law_of, place_of
 from ufl_beam.parallel import ours
@@ -208,7 +207,7 @@ class OpenHinge(NamedTuple):
             hardens.
     """
 
-    beam: Beam
+    beam: Member
     at: Array
     part: float
 

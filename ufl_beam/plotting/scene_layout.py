@@ -12,11 +12,10 @@ from functools import cached_property
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.model.beams import Curve
 from ufl_beam.model.bodies import GROUND, Anchor, Body, Spot
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.plane_curves import nearest, parameter_step, tangent
+from ufl_beam.model.curves import Curve, nearest, parameter_step, tangent
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.joint_histories import motion_of, turned
 from ufl_beam.output.wireframe import spots_of
