@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from ufl_beam.compiled import c_library, jit
+from ufl_beam.compiled import c_library, jit, simd_kernels
 
 pytestmark = pytest.mark.serial  # nothing here depends on the number of processes
 
@@ -50,7 +50,7 @@ def lanes_source():
     defined = [f"#define {name} {size}" for name, size in sizes.items()]
     head = [jit.HEADERS, jit.DECLARATIONS, *defined, jit.text("lanes.h")]
     # The only function that other files call is declared in no header: cffi reads it as text.
-    return "\n".join([*head, KERNEL, "void *address(void);", jit.text("lanes.c")])
+    return "\n".join([*head, KERNEL, simd_kernels.INTERFACE, jit.text("lanes.c")])
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.jit import DECLARATIONS, HEADERS, compiled, text
-from ufl_beam.dolfinx_compat import TABULATE, VERSIONS
+from ufl_beam.dolfinx_compat import VERSIONS
 
 T = TypeVar("T")
 
@@ -32,14 +32,7 @@ extern "Python" double missed_in_python(void *self, const double *q, const doubl
 """
 
 
-_SOURCE = "\n".join(
-    [
-        HEADERS,
-        f"#define CALL(f, e, w, c, x) f(e, w, c, x, 0, 0{TABULATE[1]})",
-        DECLARATIONS,
-        *(text(f"{name}.c") for name in SOURCES),
-    ]
-)
+_SOURCE = "\n".join([HEADERS, DECLARATIONS, *(text(f"{name}.c") for name in SOURCES)])
 module = compiled(
     "ufl_beam_loops",
     DECLARATIONS + _CALLBACKS,

@@ -26,7 +26,13 @@ import ufl
 from ufl_beam.compiled.code_cache import kept
 from ufl_beam.dolfinx_compat import TABULATE, compile_form, fem, form_key
 
-HEADERS = "\n".join(f"#include <{name}.h>" for name in ("float", "math", "stdint", "string"))
+HEADERS = "\n".join(
+    [
+        *(f"#include <{name}.h>" for name in ("float", "math", "stdint", "string")),
+        f"#define CALL(f, e, w, c, x) f(e, w, c, x, 0, 0{TABULATE[1]})",
+    ]
+)
+"""What all files of C begin with; CALL calls a kernel of FFCx."""
 
 
 def text(name: str) -> str:

@@ -35,10 +35,10 @@ def vectorise(kernels: Sequence[Kernel], coordinates: Array) -> None:
         kernels: On the same cells.
         coordinates: Of the cells, in batches of ``LANES``.
     """
-    functions = [kernel.in_lanes() for kernel in kernels]
-    if None not in functions:
-        for one, function in zip(kernels, functions, strict=True):
-            one.compute_in_lanes(function, coordinates)
+    addresses = [kernel.address_in_lanes() for kernel in kernels]
+    if None not in addresses:
+        for one, address in zip(kernels, addresses, strict=True):
+            one.compute_in_lanes(address, coordinates)
 
 
 def tabulator(compiled: fem.Form) -> Any:
@@ -229,17 +229,18 @@ class Kernel:
         self._rows = in_batches(positions.reshape(rows.shape), self._lanes)
         self._prepare()
 
-    def in_lanes(self) -> Any:
-        """Function in C that computes several cells at once, or None."""
+    def address_in_lanes(self) -> int | None:
+        """Address of what computes several cells at once, or None."""
         sizes = (self._entries, self._packed.shape[1], len(self._form.constants))
-        return in_lanes(self._form.source, self._form.tabulate, *sizes)
+        return in_lanes(self._form.source, int(ffi.cast("intptr_t", self._form.tabulate)), sizes)
 
-    def compute_in_lanes(self, function: Any, coordinates: Array) -> None:
+    def compute_in_lanes(self, address: int | None, coordinates: Array) -> None:
         """Compute several cells at once from now on, with their coordinates in batches."""
         self._packed, self._rows = (
             in_batches(x[:, :, 0], LANES) for x in (self._packed, self._rows)
         )
-        self._in_lanes, self._lanes, self._coordinates = function, LANES, coordinates
+        self._in_lanes = ffi.cast("in_lanes *", address)
+        self._lanes, self._coordinates = LANES, coordinates
         self._prepare()
 
     @property
