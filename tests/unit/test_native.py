@@ -49,7 +49,7 @@ def lanes_source():
     sizes = {"LANES": 4, "ENTRIES": 1, "WIDTH": 1, "CONSTANTS": 1}
     defined = [f"#define {name} {size}" for name, size in sizes.items()]
     head = [jit.HEADERS, jit.DECLARATIONS, *defined, jit.text("lanes.h")]
-    # The only function that other files call is declared in no header: cffi reads it as text.
+    # The functions that Python calls are declared in no header: cffi reads them as text.
     return "\n".join([*head, KERNEL, simd_kernels.INTERFACE, jit.text("lanes.c")])
 
 

@@ -22,7 +22,7 @@ from ufl_beam.dolfinx_compat import VERSIONS
 
 T = TypeVar("T")
 
-SOURCES = ("loops", "rigid_plastic", "elimination", "newton")
+SOURCES = ("loops", "material_points", "rigid_plastic", "connectors", "elimination", "newton")
 """Files of C beside this one; they are one translation unit."""
 
 _CALLBACKS = """
