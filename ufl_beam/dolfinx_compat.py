@@ -69,7 +69,7 @@ if all(
     # log gets a handler that shows nothing if a warning comes before this line, as with -W always.
     logging.captureWarnings(False)
 
-if VERSION > (0, 11):
+if VERSION > (0, 11) and MPI.COMM_WORLD.rank == 0:
     warnings.warn(
         f"ufl_beam is tested with DOLFINx 0.9 to 0.11, and not with {dolfinx.__version__}",
         RuntimeWarning,

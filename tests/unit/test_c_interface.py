@@ -130,7 +130,12 @@ def test_kernels_of_another_type_are_refused():
         c_library.kernel(pointer, of)
 
 
-# -- sizes ---------------------------------------------------------------------------------------
+# -- sizes and types -----------------------------------------------------------------------------
+
+
+def test_integers_of_another_size_are_refused():
+    with pytest.raises(TypeError, match="32 bits, not int64"):
+        c_library.integers(np.arange(3))
 
 
 def kernel(degree=1, cells=2, coordinates=None):

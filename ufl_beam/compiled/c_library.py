@@ -16,7 +16,7 @@ from petsc4py import PETSc
 
 import numpy as np
 
-from ufl_beam.arrays import Array
+from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.jit import DECLARATIONS, HEADERS, compiled, text
 from ufl_beam.dolfinx_compat import VERSIONS
 
@@ -78,8 +78,12 @@ def loop(name: str, data: Any) -> Loop:
 doubles = partial(ffi.from_buffer, ffi.typeof("double[]"))
 """Pointer to a contiguous array of float64; it keeps the array alive."""
 
-integers = partial(ffi.from_buffer, ffi.typeof("int32_t[]"))
-"""Pointer to a contiguous array of int32; it keeps the array alive."""
+
+def integers(array: Index) -> Any:
+    """Pointer to a contiguous array of int32; it keeps the array alive."""
+    if array.dtype != np.int32:
+        raise TypeError(f"C takes integers of 32 bits, not {array.dtype}")
+    return ffi.from_buffer("int32_t[]", array)
 
 
 def names(enum: str, prefix: str = "") -> tuple[str, ...]:
