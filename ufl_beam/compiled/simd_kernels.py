@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""FFCx's kernels for several cells at once: one cell in each lane of the processor's vectors.
+"""SIMD versions of FFCx's kernels: several cells at once, one in each lane of a vector.
 
-Kernels are long straight lines of arithmetic on the numbers of one cell.  Their text is compiled
-once more with vectors in the place of numbers, which GCC and Clang know as types.  The loop over
-the cells is that of :mod:`ufl_beam.compiled.c_library`.
+Kernels are straight-line arithmetic on the numbers of one cell.  Their text is compiled once more
+with vector types of GCC and Clang in the place of numbers, and compared with FFCx's kernel.
 """
 
 from __future__ import annotations
@@ -25,11 +24,11 @@ from ufl_beam.dolfinx_compat import VERSIONS
 LOGGER = logging.getLogger("ufl_beam")
 
 LANES = 4
-"""Cells that are computed at once: as many as AVX has room for.  On what has less, vectors are made
-of several; eight of AVX-512 are hardly faster, and more often too many."""
+"""Cells that are computed at once, as many as AVX has room for; compilers split vectors for less.
+Eight (AVX-512) are hardly faster."""
 
 FUNCTIONS = {"sin", "cos", "sqrt", "fabs", "pow"}
-"""Functions of which lanes.h has a version for vectors; powers with whole exponents."""
+"""Functions that lanes.h has for vectors; powers with integer exponents."""
 
 INTERFACE = """
 void *address(void);
@@ -42,20 +41,20 @@ _NUMBER = r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?"
 
 
 def in_vectors(kernel: str) -> str:
-    """The text of a kernel of FFCx with vectors in the place of numbers.
+    """Rewrite the text of a kernel of FFCx with vectors in the place of numbers.
 
     Args:
         kernel: Its definition in C.
 
     Raises:
-        Refused: It asks for functions that lanes.h has not.
+        Refused: It calls functions that lanes.h does not have.
     """
     body = kernel[kernel.index("{") :]
     called = re.findall(r"\b(?!for\b)([a-z_]\w*)\(", body)
     whole = re.findall(r"\bpow\([\w\[\]]+, -?\d+\)", body)
     missing = sorted(set(called) - FUNCTIONS)
     if len(whole) < called.count("pow"):
-        missing.append("pow with a broken exponent")
+        missing.append("pow with a fractional exponent")
     if missing:
         raise Refused(f"lanes.h has no {', '.join(missing)}")
     lines = []
@@ -89,7 +88,7 @@ def written(source: Path) -> str:
 
 
 def in_batches(rows: npt.NDArray[Any], lanes: int) -> npt.NDArray[Any]:
-    """Rows of numbers, one of each cell, as loops.h says; (num_batches, numbers, lanes).
+    """Arrange numbers of cells in batches, see loops.h; (num_batches, numbers, lanes).
 
     Args:
         rows: Shape (num_cells, ...).
@@ -102,7 +101,7 @@ def in_batches(rows: npt.NDArray[Any], lanes: int) -> npt.NDArray[Any]:
 
 
 AGREEMENT = 1e-12
-"""Difference of a kernel in vectors from FFCx's, as a part of the largest entry of a cell."""
+"""Tolerance on the difference from FFCx's kernel, relative to the largest entry of a cell."""
 
 
 def require_agreement(module: ModuleType, kernel: int, sizes: tuple[int, int, int]) -> None:
@@ -141,7 +140,7 @@ _addresses: dict[tuple[str, int, int, int], int | None] = {}
 
 
 def in_lanes(source: Path, kernel: int, sizes: tuple[int, int, int]) -> int | None:
-    """Address of what computes several cells of a compiled form at once; None if nothing does.
+    """Return the address of the SIMD loop of a compiled form, or None where there is none.
 
     Args:
         source: The C that FFCx wrote for a cell form.
@@ -160,7 +159,7 @@ def in_lanes(source: Path, kernel: int, sizes: tuple[int, int, int]) -> int | No
 
 
 def _compiled(source: Path, kernel: int, sizes: tuple[int, int, int]) -> ModuleType:
-    """The module with the loop over the cells."""
+    """Compile or load the module with the loop over the cells."""
     names = ("LANES", "ENTRIES", "WIDTH", "CONSTANTS")
     defined = [f"#define {x} {n}" for x, n in zip(names, (LANES, *sizes), strict=True)]
     head, loop = "\n".join([HEADERS, DECLARATIONS, *defined, text("lanes.h")]), text("lanes.c")

@@ -29,7 +29,7 @@ from ufl_beam.dolfinx_compat import VERSIONS, fem, line_mesh, pack
 
 
 def vectorise(kernels: Sequence[Kernel], coordinates: Array) -> None:
-    """Let all of some kernels compute several cells at once, or none: they may share numbers.
+    """Switch kernels to SIMD, all of them or none: they may share numbers.
 
     Args:
         kernels: On the same cells.
@@ -42,7 +42,7 @@ def vectorise(kernels: Sequence[Kernel], coordinates: Array) -> None:
 
 
 def tabulator(compiled: fem.Form) -> Any:
-    """The C function of a compiled cell form; it lives as long as the form."""
+    """Return the C function of a compiled cell form; it lives as long as the form."""
     integral = compiled.ufcx_form.form_integrals[0]
     return kernel(integral.tabulate_tensor_float64, compiled.module.ffi)
 
@@ -128,7 +128,7 @@ class Kernel:
         coordinates: Vertices of the cells; shape (num_cells, 2, 3); m.
 
     Attributes:
-        cells: What ``add_cells`` of loops.c takes; a new one after :meth:`share`, :meth:`place`,
+        cells: Argument of ``add_cells`` of loops.c; a new one after :meth:`share`, :meth:`place`,
             :meth:`compute_in_lanes`.
 
     Raises:
@@ -194,7 +194,7 @@ class Kernel:
         return id(function) in self._columns
 
     def position(self, function: fem.Function) -> int:
-        """Where the coefficients of a cell have the values of ``function``."""
+        """Return the column of the first value of ``function`` among the coefficients of a cell."""
         return int(self._columns[id(function)].start)
 
     def set(self, function: fem.Function, q: Array) -> None:
@@ -230,12 +230,12 @@ class Kernel:
         self._prepare()
 
     def address_in_lanes(self) -> int | None:
-        """Address of what computes several cells at once, or None."""
+        """Return the address of the SIMD loop, or None."""
         sizes = (self._entries, self._packed.shape[1], len(self._form.constants))
         return in_lanes(self._form.source, int(ffi.cast("intptr_t", self._form.tabulate)), sizes)
 
     def compute_in_lanes(self, address: int | None, coordinates: Array) -> None:
-        """Compute several cells at once from now on, with their coordinates in batches."""
+        """Use the SIMD loop from now on, with coordinates in batches."""
         self._packed, self._rows = (
             in_batches(x[:, :, 0], LANES) for x in (self._packed, self._rows)
         )
@@ -245,7 +245,7 @@ class Kernel:
 
     @property
     def vectorised(self) -> bool:
-        """True if several cells are computed at once."""
+        """True with the SIMD loop."""
         return self._lanes > 1
 
     def add(self, q: Array, b: Array) -> None:
@@ -253,7 +253,7 @@ class Kernel:
         lib.add_cells(self.cells, doubles(q), doubles(b))
 
     def value(self, q: Array) -> float:
-        """Value of the functional at the unknown ``q``."""
+        """Return the value of the functional at the unknown ``q``."""
         value: float = lib.value_of_cells(self.cells, doubles(q))
         return value
 

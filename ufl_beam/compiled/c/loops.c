@@ -82,10 +82,11 @@ void subtract_vector(void *self, const double *q, double *b)
 }
 
 /* Where a matrix holds the entries (row, column); whether it has them all. */
-int find_entries(const int32_t *indptr, const int32_t *indices, int number, const int32_t *row,
-                 const int32_t *column, int32_t *found)
+int find_entries(int rows, const int32_t *indptr, const int32_t *indices, int number,
+                 const int32_t *row, const int32_t *column, int32_t *found)
 {
   for (int k = 0; k < number; ++k) {
+    if (row[k] < 0 || row[k] >= rows) return 0;
     int32_t low = indptr[row[k]], high = indptr[row[k] + 1];
     while (high - low > 1) { /* columns are in order */
       const int32_t middle = low + (high - low) / 2;

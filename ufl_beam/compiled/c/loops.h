@@ -65,8 +65,8 @@ void add_first_cells(void *self, const double *q, double *b);
 void subtract_vector(void *self, const double *q, double *b);
 void add_step_force(void *self, const double *q, double *r);
 void add_step_tangent(void *self, const double *q, double *tangent);
-int find_entries(const int32_t *indptr, const int32_t *indices, int number, const int32_t *row,
-                 const int32_t *column, int32_t *found);
+int find_entries(int rows, const int32_t *indptr, const int32_t *indices, int number,
+                 const int32_t *row, const int32_t *column, int32_t *found);
 void add_product(int rows, const int32_t *indptr, const int32_t *indices, const double *data,
                  const double *x, double *y);
 double quadratic_form(int rows, const int32_t *indptr, const int32_t *indices, const double *data,
