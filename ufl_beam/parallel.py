@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -46,8 +45,3 @@ def alone() -> Iterator[None]:
 def in_study() -> bool:
     """Return whether this is a member of a study, which shows no progress of its own."""
     return _OURS.get() != MPI.COMM_WORLD
-
-
-def give_back_memory() -> None:
-    """Let the system have what was needed for a while, where the C library keeps it."""
-    getattr(ctypes.CDLL(None), "malloc_trim", lambda _: None)(0)

@@ -14,8 +14,8 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.simulation.simulation import Simulation
-from ufl_beam.simulation.step_solver import Trial
-from ufl_beam.terms.beams import Term
+from ufl_beam.simulation.step_cutting import Trial
+from ufl_beam.terms.base import Term
 
 FARTHEST = 30
 """Times a way is doubled until something dissipates on it."""

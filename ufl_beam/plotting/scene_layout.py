@@ -69,7 +69,7 @@ class Setting(ABC):
         """Offsets of connectors that share their line, or their pin, with others."""
         alike: dict[tuple[bool, frozenset[object]], list[Connector | None]] = {}
         for joint in self.scene.joints:
-            if joint.kind in ("Prismatic", "RigidLink", "Link"):
+            if joint.look in ("Prismatic", "RigidLink", "Link"):
                 alike[False, frozenset(joint.places)] = [None]
         for c in self.scene.connectors:
             ends: tuple[object, ...] = (c.b.point,) if c.turns else (c.a, c.b)
@@ -198,7 +198,7 @@ def _lane(k: int, count: int, joint: bool, turns: bool) -> float:
 
 def _sliding(scene: Scene) -> list[Connector]:
     """Connectors that hold what slides on a rail or a guide curve."""
-    return [j.holders[0] for j in scene.joints if j.kind in ("Prismatic", "Guided")]
+    return [j.holders[0] for j in scene.joints if j.look in ("Prismatic", "Guided")]
 
 
 def _along(holder: Connector) -> tuple[float, float]:

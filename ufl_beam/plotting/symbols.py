@@ -128,8 +128,8 @@ def centres(pose: Pose) -> Iterator[Stroke]:
 def rods(pose: Pose) -> Iterator[Stroke]:
     """Rigid links, thick, and links, thin."""
     for joint in pose.stage.scene.joints:
-        if joint.kind in ("RigidLink", "Link"):
-            weight = 6.0 if joint.kind == "RigidLink" else 2.6
+        if joint.look in ("RigidLink", "Link"):
+            weight = 6.0 if joint.look == "RigidLink" else 2.6
             ends = np.array([pose.at(place) for place in joint.places])
             yield Stroke(ends, "#4A4A4A", weight)
 
@@ -137,14 +137,14 @@ def rods(pose: Pose) -> Iterator[Stroke]:
 def pins(pose: Pose) -> Iterator[Pin]:
     """Circles where joints turn, squares where they do not."""
     for joint in pose.stage.scene.joints:
-        yield from _PINS[joint.kind](pose, joint)
+        yield from _PINS[joint.look](pose, joint)
 
 
 def rails(pose: Pose) -> Iterator[Stroke]:
     """Rails, guide curves, and the blocks on them."""
     for joint in pose.stage.scene.joints:
-        if joint.kind in _RAILS:
-            yield from _RAILS[joint.kind](pose, joint)
+        if joint.look in _RAILS:
+            yield from _RAILS[joint.look](pose, joint)
 
 
 # -- connectors --------------------------------------------------------------------------------
