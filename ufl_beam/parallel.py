@@ -49,6 +49,12 @@ def in_study() -> bool:
     return _OURS.get() != MPI.COMM_WORLD
 
 
+def say(*words: object, sep: str = " ") -> None:
+    """Print from the first process only, as scripts do that may run under ``mpirun``."""
+    if ours().rank == 0:
+        print(*words, sep=sep, flush=True)  # noqa: T201
+
+
 def give_back_memory() -> None:
     """Let the system have what was needed for a while, where the C library keeps it."""
     if sys.platform == "linux":

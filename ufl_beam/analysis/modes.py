@@ -14,11 +14,11 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.analysis.linearization import SmallMotions
-from ufl_beam.arrays import Array, Complex
+from ufl_beam.arrays import Array, Complex, State
+from ufl_beam.collective_errors import on_first
 from ufl_beam.discretization.dof_numbering import Grid, Share
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.model_warnings import warn_of_masses
-from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError, require_count, require_kind, require_number
 from ufl_beam.model.bodies import Anchor
 from ufl_beam.model.constraint_checks import require_no_mechanism
@@ -26,7 +26,6 @@ from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.joint_histories import Connection, velocity_of
-from ufl_beam.output.recorders import on_first
 from ufl_beam.output.time_series import VTKHDF, XDMF, TimeSeries
 from ufl_beam.parallel import ours
 from ufl_beam.simulation.initial_state import mesh_of

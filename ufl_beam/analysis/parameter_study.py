@@ -21,11 +21,10 @@ from mpi4py.futures import MPICommExecutor
 from tqdm import tqdm
 
 from ufl_beam.analysis.study_file import Outcome, Study, numbers_of, text_of
+from ufl_beam.collective_errors import on_first
 from ufl_beam.errors import SceneError, require_sequence, require_switch, shorten
 from ufl_beam.output.output_files import require_apart, require_path, take
-from ufl_beam.output.recorders import on_first
-from ufl_beam.parallel import alone, communicator
-from ufl_beam.simulation.run import say
+from ufl_beam.parallel import alone, communicator, say
 
 Case = dict[str, Any]
 Member = Callable[..., dict[str, Any]]

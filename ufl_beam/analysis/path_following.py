@@ -14,8 +14,7 @@ import numpy as np
 from ufl_beam.analysis.critical_points import Branch, CriticalPoint, Direction, Stiffness
 from ufl_beam.analysis.path_controls import Control, Given
 from ufl_beam.analysis.path_corrector import Walk
-from ufl_beam.arrays import Array
-from ufl_beam.discretization.state_io import State
+from ufl_beam.arrays import Array, State
 from ufl_beam.errors import SceneError, StepFailed, require_count, require_function, require_kind
 from ufl_beam.mechanics.classical import Static
 from ufl_beam.model.connector_laws import Actuator, Controller, Motor

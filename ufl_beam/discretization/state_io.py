@@ -13,10 +13,8 @@ from typing import Protocol
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
+from ufl_beam.arrays import State as State
 from ufl_beam.discretization.dof_numbering import Share
-
-State = dict[str, Array]
-"""Arrays of a state, by name."""
 
 NOWHERE: Array = np.empty(0)
 """In the place of a configuration: of what is remembered, strains and stored energies are not that

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ufl_beam.discretization.state_io import State
+from ufl_beam.arrays import State
 from ufl_beam.errors import SceneError
 from ufl_beam.output.output_files import replace_file, require_writable
 

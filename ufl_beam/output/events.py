@@ -4,22 +4,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from ufl_beam.discretization.state_io import State
+from ufl_beam.arrays import State
+from ufl_beam.collective_errors import on_first
 from ufl_beam.errors import require_function
 from ufl_beam.model.beams import Place
 from ufl_beam.model.connector_laws import Coulomb, Stop
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.plastic_hinges import law_of
-from ufl_beam.output.recorders import Recorder, on_first
+from ufl_beam.output.recorders import Recorded, Recorder
 from ufl_beam.parameter import TIME, Parameter
-
-if TYPE_CHECKING:
-    from ufl_beam.output.state_view import StateView
 
 Flags = npt.NDArray[np.bool_]
 
@@ -75,19 +73,16 @@ class Events(Recorder):
     def __init__(self, tell: Callable[[Event], object] | None = None) -> None:
         if tell is not None:
             require_function(tell, "Events: tell", "an Event")
-        self._tell = tell
+        self._tell = tell or (lambda event: None)
         self.found: list[Event] = []
         self._rows: list[Row] = []
 
-    def require_writable(self) -> None:
-        """Nothing is written."""
-
-    def open(self, simulation: StateView) -> None:
+    def open(self, simulation: Recorded) -> None:
         """Take note of the initial state."""
         self.found, self._rows = [], []
         self._watch(simulation)
 
-    def _watch(self, simulation: StateView) -> None:
+    def _watch(self, simulation: Recorded) -> None:
         """Find the events that a scene may have, and those before the run."""
         grid = simulation.grid
         in_cells = [law for beam in simulation.scene.beams for law in grid.hinges(beam)]
@@ -100,7 +95,7 @@ class Events(Recorder):
         self._links = [i for i, link in enumerate(links) if type(link.law) in BETWEEN]
         self._flags = self._look(simulation)
 
-    def _look(self, simulation: StateView) -> tuple[Flags, list[bool]]:
+    def _look(self, simulation: Recorded) -> tuple[Flags, list[bool]]:
         """Return the events of each cell and hinge, and the state of each connector."""
         in_cells = np.zeros((len(self._enough), len(IN_CELLS)), dtype=bool)
         for cells, rows in simulation.material():
@@ -115,15 +110,12 @@ class Events(Recorder):
         if not self._links:
             return in_cells, []
         forces = np.abs(simulation.connections()[self._links, 1])
-        limits = [self._limit(simulation, link) for link in self._links]
+        # Forces above which they touch, or slide; the limit of friction is known to some digits
+        links = (simulation.scene.links[link] for link in self._links)
+        limits = [(1 - 1e-9) * simulation.asked.get(link, 0.0) for link in links]
         return in_cells, [bool(goes_on) for goes_on in forces > limits]
 
-    def _limit(self, simulation: StateView, link: int) -> float:
-        """Force of a connector above which it touches, or slides; N or N m."""
-        # A force at the limit of friction is known to some digits.
-        return (1 - 1e-9) * simulation.asked.get(simulation.scene.links[link], 0.0)
-
-    def write(self, simulation: StateView) -> None:
+    def write(self, simulation: Recorded) -> None:
         """Note what has changed in the step."""
         flags = self._look(simulation)
         (cells, goes_on), (cells_before, went_on) = flags, self._flags
@@ -136,15 +128,10 @@ class Events(Recorder):
                 begins, ends = BETWEEN[type(simulation.scene.links[link].law)]
                 new.append((simulation.t, link, begins if now else ends))
         events = self._add(simulation, new)
-        if self._tell is not None and events:
-            on_first(simulation.comm, lambda: self._tell_all(events))
+        if events:
+            on_first(simulation.comm, lambda: [self._tell(event) for event in events])
 
-    def _tell_all(self, events: list[Event]) -> None:
-        for event in events:
-            if self._tell is not None:
-                self._tell(event)
-
-    def _add(self, simulation: StateView, rows: list[Row]) -> list[Event]:
+    def _add(self, simulation: Recorded, rows: list[Row]) -> list[Event]:
         links, grid = simulation.scene.links, simulation.grid
         named = simulation.parameter
         events = [
@@ -155,14 +142,11 @@ class Events(Recorder):
         self.found += events
         return events
 
-    def close(self) -> None:
-        """Nothing is open."""
-
     def state(self) -> State:
         """The events so far: time, number of the cell or connector, and what."""
         return {"events": np.array([(t, n, ALL.index(what)) for t, n, what in self._rows])}
 
-    def resume(self, simulation: StateView, state: State) -> None:
+    def resume(self, simulation: Recorded, state: State) -> None:
         """Go on after those events."""
         self.found, self._rows = [], []
         self._add(simulation, [(float(t), int(n), ALL[int(k)]) for t, n, k in state["events"]])

@@ -3,20 +3,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Index
-from ufl_beam.discretization.state_io import State
+from ufl_beam.arrays import Array, Index, State
+from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import SceneError
 from ufl_beam.model.beams import Beam
 from ufl_beam.model.bodies import Body
-from ufl_beam.output.recorders import Recorder
-
-if TYPE_CHECKING:
-    from ufl_beam.discretization.dof_numbering import Grid
-    from ufl_beam.output.state_view import StateView
+from ufl_beam.output.recorders import Recorded, Recorder
 
 
 class Extent(NamedTuple):
@@ -60,31 +56,22 @@ class Extremes(Recorder):
     Each step counts, whatever the solution keeps; memory does not grow.
     """
 
-    def require_writable(self) -> None:
-        """Nothing is written."""
-
-    def open(self, simulation: StateView) -> None:
+    def open(self, simulation: Recorded) -> None:
         """Begin with the initial state."""
         self._grid: Grid = simulation.grid
         self._forces, self._q = (Extent.around(x, simulation.t) for x in _state(simulation))
 
-    def write(self, simulation: StateView) -> None:
+    def write(self, simulation: Recorded) -> None:
         """Take in the state."""
         for extent, values in zip((self._forces, self._q), _state(simulation), strict=True):
             extent.widen(values, simulation.t)
 
-    def close(self) -> None:
-        """Nothing is to be closed."""
-
     def state(self) -> State:
         """The extremes."""
-        names = Extent._fields
-        return {
-            **{f"forces {name}": values for name, values in zip(names, self._forces, strict=True)},
-            **{f"q {name}": values for name, values in zip(names, self._q, strict=True)},
-        }
+        extents = ("forces", self._forces), ("q", self._q)
+        return {f"{of} {name}": x for of, extent in extents for name, x in extent._asdict().items()}
 
-    def resume(self, simulation: StateView, state: State) -> None:
+    def resume(self, simulation: Recorded, state: State) -> None:
         """Go on after a :meth:`state`."""
         self._grid = simulation.grid
         self._forces, self._q = (
@@ -122,6 +109,6 @@ class Extremes(Recorder):
         return self._q.of(dofs)
 
 
-def _state(simulation: StateView) -> tuple[Array, Array]:
+def _state(simulation: Recorded) -> tuple[Array, Array]:
     """Section forces of all cells, and the configuration, the same on every process."""
     return simulation.section_forces(), simulation.share.gather(simulation.q)

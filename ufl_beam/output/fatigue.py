@@ -6,20 +6,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ufl_beam.arrays import Array
-from ufl_beam.discretization.state_io import State
+from ufl_beam.arrays import Array, State
+from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import SceneError, require_kind, require_number, require_sequence
 from ufl_beam.model.beams import Place
 from ufl_beam.output.rainflow import Cycles, RainflowCounter, SNCurve, library
-from ufl_beam.output.recorders import Recorder
-
-if TYPE_CHECKING:
-    from ufl_beam.discretization.dof_numbering import Grid
-    from ufl_beam.output.state_view import StateView
+from ufl_beam.output.recorders import Recorded, Recorder
 
 BLOCK = 1000
 """Steps that are collected before their cycles are counted."""
@@ -100,10 +95,7 @@ class Fatigue(Recorder):
         self._resolution = resolution or curve.range / 100
         self._counters: dict[HotSpot, RainflowCounter] = {}
 
-    def require_writable(self) -> None:
-        """Nothing is written."""
-
-    def open(self, simulation: StateView) -> None:
+    def open(self, simulation: Recorded) -> None:
         """Begin to count, with the initial state."""
         self._prepare(simulation.grid)
         self._begin = simulation.t
@@ -116,7 +108,7 @@ class Fatigue(Recorder):
         self._counters = {spot: RainflowCounter(self._resolution) for spot in self.spots}
         self._block, self._filled = np.empty((len(self.spots), 3, BLOCK)), 0
 
-    def write(self, simulation: StateView) -> None:
+    def write(self, simulation: Recorded) -> None:
         """Note the section forces, and count now and then."""
         self._block[..., self._filled] = simulation.section_forces()[self._cells]
         self._filled += 1
@@ -146,7 +138,7 @@ class Fatigue(Recorder):
             state[f"counted {i}"], state[f"waiting {i}"] = counter.state()
         return state
 
-    def resume(self, simulation: StateView, state: State) -> None:
+    def resume(self, simulation: Recorded, state: State) -> None:
         """Go on after a :meth:`state`."""
         self._prepare(simulation.grid)
         self._begin, self._end = map(float, state["duration"])

@@ -5,22 +5,20 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.discretization.state_io import State
+from ufl_beam.arrays import State
+from ufl_beam.collective_errors import on_first
 from ufl_beam.errors import SceneError, require_count
 from ufl_beam.output.line_data import LineData, LineFields
-from ufl_beam.output.output_files import require_path, require_writable
-from ufl_beam.output.recorders import Recorder, on_first
+from ufl_beam.output.output_files import require_path
+from ufl_beam.output.recorders import Recorded, Recorder
 from ufl_beam.output.vtkhdf import VtkhdfWriter
 from ufl_beam.output.xdmf import Complete, XdmfWriter, data_path
-
-if TYPE_CHECKING:
-    from ufl_beam.output.state_view import StateView
 
 
 class TimeSeries(Recorder):
@@ -37,18 +35,13 @@ class TimeSeries(Recorder):
             raise SceneError(f"{kind} {path}: the name of the file must end in {self.ending}")
         self._writers: list[Any] = []
 
-    def require_writable(self) -> None:
-        """Raise :class:`SceneError` if a file cannot be written."""
-        for path in self.files:
-            require_writable(path)
-
-    def open(self, simulation: StateView) -> None:
+    def open(self, simulation: Recorded) -> None:
         """Write the mesh and the initial state."""
         self._count = 0
         fields = self._prepare(simulation)
         on_first(simulation.comm, lambda: self._begin(simulation.t, fields))
 
-    def _prepare(self, simulation: StateView) -> LineFields:
+    def _prepare(self, simulation: Recorded) -> LineFields:
         """Note the mesh; the fields of the present state."""
         self._comm: MPI.Intracomm = simulation.comm
         self._lines = LineData(simulation)
@@ -63,7 +56,7 @@ class TimeSeries(Recorder):
     def _writer(self, fields: LineFields, complete: list[int] | None = None) -> Any:
         """Make the writer of a file, or of one that is complete up to some sizes."""
 
-    def write(self, simulation: StateView) -> None:
+    def write(self, simulation: Recorded) -> None:
         """Write the state, every so many steps."""
         self._count += 1
         if self._count % self._every == 0:
@@ -84,7 +77,7 @@ class TimeSeries(Recorder):
         for writer in self._writers:
             writer.sync()
 
-    def resume(self, simulation: StateView, state: State) -> None:
+    def resume(self, simulation: Recorded, state: State) -> None:
         """Cut off what was written after the state, and go on."""
         self._count, *sizes = (int(n) for n in state["sizes"])
         fields = self._prepare(simulation)

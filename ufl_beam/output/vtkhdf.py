@@ -12,15 +12,17 @@ from __future__ import annotations
 import errno
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.output.line_data import LineFields
 from ufl_beam.output.output_files import OutputFile, failure, is_at, removed, warn_of_removal
+
+Fields = Sequence[Mapping[str, Array]]
+"""At points and in cells, by name."""
 
 LAYOUT = (2, 0)
 """Of the format; VTK 9.3 warns of later ones."""
@@ -66,7 +68,7 @@ class VtkhdfWriter:
         points: Array,
         cells: Index,
         constant: Mapping[str, Array],
-        fields: LineFields,
+        fields: Fields,
         steps: int | None = None,
     ) -> None:
         import h5py
@@ -102,7 +104,7 @@ class VtkhdfWriter:
 
     # -- data sets -----------------------------------------------------------------------------
 
-    def _is_same(self, mesh: Mapping[str, Array], fields: LineFields) -> bool:
+    def _is_same(self, mesh: Mapping[str, Array], fields: Fields) -> bool:
         """Return whether the file has this mesh, these fields, and enough steps."""
         try:
             root = self._file["VTKHDF"]
@@ -119,7 +121,7 @@ class VtkhdfWriter:
         except KeyError:
             return False
 
-    def _find(self, fields: LineFields) -> None:
+    def _find(self, fields: Fields) -> None:
         """Note the data sets that grow, and by how many rows a step."""
         root, steps = self._file["VTKHDF"], self._file["VTKHDF/Steps"]
         self._attributes = steps.attrs
@@ -141,7 +143,7 @@ class VtkhdfWriter:
 
     # -- steps ---------------------------------------------------------------------------------
 
-    def write(self, t: float, fields: LineFields) -> None:
+    def write(self, t: float, fields: Fields) -> None:
         """Append a step."""
         n = self.steps
         numbers = (*(n * count for count in self._counts), 0, 0, 1)
@@ -210,7 +212,7 @@ class VtkhdfWriter:
             warn_of_removal(self._path)
 
 
-def _empty_file(mesh: Mapping[str, Array], constant: list[str], fields: LineFields) -> bytes:
+def _empty_file(mesh: Mapping[str, Array], constant: list[str], fields: Fields) -> bytes:
     """A file without steps, made in memory."""
     import h5py
 

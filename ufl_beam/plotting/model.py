@@ -11,7 +11,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.wireframe import spots_of
+from ufl_beam.output.line_data import spots_of
 from ufl_beam.plotting.captions import (
     counted,
     damping_in_words,

@@ -19,7 +19,7 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.plane_curves import nearest, parameter_step, tangent
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.joint_histories import motion_of, turned
-from ufl_beam.output.wireframe import spots_of
+from ufl_beam.output.line_data import spots_of
 from ufl_beam.simulation.solution import Solution
 
 

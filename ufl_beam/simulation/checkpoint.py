@@ -24,10 +24,11 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.arrays import Array
+from ufl_beam.collective_errors import on_first
 from ufl_beam.errors import SceneError, require_count, require_number, require_sequence, shorten
 from ufl_beam.file_locks import Lock
 from ufl_beam.output.output_files import require_path
-from ufl_beam.output.recorders import Recorder, on_first
+from ufl_beam.output.recorders import Recorder
 from ufl_beam.simulation.fingerprint import CODE, Description, difference, has_state, kind_of
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.step_control import Pace

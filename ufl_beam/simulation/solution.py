@@ -13,6 +13,7 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
+from ufl_beam.collective_errors import on_first
 from ufl_beam.compiled.csr import Product
 from ufl_beam.discretization.dof_numbering import Grid, Share
 from ufl_beam.discretization.function_spaces import Fields
@@ -36,7 +37,6 @@ from ufl_beam.output.joint_histories import (
     velocity_of,
 )
 from ufl_beam.output.output_files import require_path
-from ufl_beam.output.recorders import on_first
 from ufl_beam.output.saved_functions import SavedCurve, SavedFunction
 from ufl_beam.output.saved_scene import from_data, lost, to_data
 from ufl_beam.output.state_view import StateView
