@@ -305,7 +305,7 @@ def test_a_vibration():
     size = np.abs(history(fine)).max()
     assert np.abs(found.best.values["tip"] - history(fine)).max() < 0.02 * size
     assert found.crosses["tip"].cells.order == pytest.approx(2.0, abs=0.3)
-    assert len({run.rung for run in found.runs}) == len(found.runs)
+    assert len({run.refinement for run in found.runs}) == len(found.runs)
     texts = COMM.allgather(str(found))
     assert len(set(texts)) == 1
     ub.plot_tradeoff(found)

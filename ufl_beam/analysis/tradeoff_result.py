@@ -3,16 +3,109 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, fields, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ufl_beam.analysis.refinement_runs import Run, keywords
 from ufl_beam.analysis.richardson import Cross, pareto, size
-from ufl_beam.analysis.targets import Goal
+from ufl_beam.analysis.targets import Target
 from ufl_beam.arrays import Array
+from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.model.mesh_options import Mesh
+from ufl_beam.simulation.step_control import Adaptive
+from ufl_beam.solvers.newton import Newton
+
+
+@dataclass(frozen=True)
+class Dials:
+    """Setting of a run, the arguments of :func:`simulate`.
+
+    Attributes:
+        scheme: The time scheme.
+        dt: Step; s; or adaptive steps.
+        mesh: The cells.
+        newton: How exactly equilibria are found.
+    """
+
+    scheme: Scheme
+    dt: float | Adaptive
+    mesh: Mesh
+    newton: Newton
+
+    def finer(self, refine: int, level: float, t: tuple[float, float]) -> Dials:
+        """Each cell in ``refine`` parts, steps about ``2**level`` times as many.
+
+        The error of an adaptive step is of third order, so that their number goes with the cube
+        root of the tolerance.
+        """
+        if refine == 1 and level == 0:
+            return self  # as it was given, to be checked as such
+        dt = self.dt
+        if isinstance(dt, Adaptive):
+            finer: float | Adaptive = replace(dt, tolerance=dt.tolerance / 8**level)
+        else:
+            number = max(1, math.ceil((t[1] - t[0]) / dt * (1 - 1e-9)))
+            finer = (t[1] - t[0]) / round(number * 2**level)
+        return replace(self, dt=finer, mesh=replace(self.mesh, refine=self.mesh.refine * refine))
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """Arguments of :func:`simulate`, by name."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    def __str__(self) -> str:
+        return ", ".join(map(_in_words, self.arguments.values()))
+
+
+def _in_words(value: Any) -> str:
+    """A number, or the fields of a record that are not as by default."""
+    if isinstance(value, float | int):
+        return f"dt={value:.4g}"
+    given = {field.name: (getattr(value, field.name), field.default) for field in fields(value)}
+    shown = (
+        f"{name}={one:.4g}" if isinstance(one, float) else f"{name}={one}"
+        for name, (one, default) in given.items()
+        if one and one != default
+    )  # fmt: skip
+    return f"{type(value).__name__}({', '.join(shown)})"
+
+
+class Refinement(NamedTuple):
+    """Family of dials and how much finer than its coarsest setting a run is."""
+
+    family: int  # number of the dials that it begins with
+    refine: int  # parts of each cell
+    level: float  # steps are about 2**level times as many
+    newton: int = 0  # number of the tolerances
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Result of a run, and its cost.
+
+    Attributes:
+        refinement: How fine it is.
+        dials: With which dials.
+        values: The quantities.
+        seconds: Wall time, building the scene included, compiling not; s; the median of three
+            if it is short.
+        steps: Steps that were taken.
+        cells: Number of cells.
+        iterations: Newton iterations per step.
+        spent: Wall time of all repetitions; s.
+    """
+
+    refinement: Refinement
+    dials: Dials
+    values: dict[str, Array]
+    seconds: float
+    steps: float
+    cells: float
+    iterations: float
+    spent: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +119,7 @@ class Tradeoff:
         crosses: How each quantity converges with the recommended kind of dials.
         units: The tolerances, in the unit of each quantity; with a budget, the sizes of the
             quantities.
-        goal: What was asked.
+        target: What was asked.
         families: The kinds of dials, in words.
         notes: What else should be known.
         spent: Wall time of all runs, repetitions and compiling included; s.
@@ -37,7 +130,7 @@ class Tradeoff:
     t: tuple[float, float]
     crosses: Mapping[str, Cross]
     units: dict[str, float]
-    goal: Goal
+    target: Target
     families: tuple[str, ...]
     notes: tuple[str, ...]
     spent: float
@@ -45,7 +138,7 @@ class Tradeoff:
     @property
     def recommended(self) -> dict[str, Any]:
         """Arguments for ``ub.simulate(scene, **recommended)``: scheme, t, dt, mesh, newton."""
-        return {"t": self.t, **keywords(self.best.dials)}
+        return {"t": self.t, **self.best.dials.arguments}
 
     @property
     def limit(self) -> dict[str, Array]:
@@ -54,7 +147,7 @@ class Tradeoff:
 
     @property
     def uncertainty(self) -> dict[str, float]:
-        """Of the limits; unit of each quantity."""
+        """Uncertainty of the limits; unit of each quantity."""
         return {name: cross.uncertainty for name, cross in self.crosses.items()}
 
     def errors(self, run: Run) -> dict[str, float]:
@@ -73,16 +166,12 @@ class Tradeoff:
         return [self.runs[k] for k in pareto(seconds, ratios)]
 
     def __str__(self) -> str:
-        names = list(self.limit)
-        front = self.front
-        rows = [["", "seconds", "steps", "cells", "iterations", *names, "dials"]]
-        for run in sorted({*front, self.best}, key=lambda run: run.seconds):
-            mark = "=>" if run is self.best else ""
-            errors = self.errors(run)
+        rows = [["", "seconds", "steps", "cells", "iterations", *self.limit, "dials"]]
+        for run in sorted({*self.front, self.best}, key=lambda run: run.seconds):
             rows.append([
-                mark, f"{run.seconds:.3g}", f"{run.steps:.0f}", f"{run.cells:.0f}",
-                f"{run.iterations:.2f}", *(f"{errors[name]:.2g}" for name in names),
-                str(run.dials),
+                "=>" if run is self.best else "", f"{run.seconds:.3g}", f"{run.steps:.0f}",
+                f"{run.cells:.0f}", f"{run.iterations:.2f}",
+                *(f"{error:.2g}" for error in self.errors(run).values()), str(run.dials),
             ])  # fmt: skip
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         lines = [
@@ -98,6 +187,6 @@ class Tradeoff:
             f"{self.spent / self.best.seconds:.2g} times the recommended one"
         )
         return "\n".join([
-            f"trade-off for {self.goal}; errors are distances from the extrapolated limit", *lines,
-            *self.notes, f"recommended: {self.best.dials}: {self.best.seconds:.3g} s",
+            f"trade-off for {self.target}; errors are distances from the extrapolated limit",
+            *lines, *self.notes, f"recommended: {self.best.dials}: {self.best.seconds:.3g} s",
         ])  # fmt: skip

@@ -33,7 +33,7 @@ def plot_tradeoff(tradeoff: Tradeoff) -> Figure:
         styles = cycle(product("os^", (BLUE, RED, GREEN, ORANGE, PINK, SKY)))
         for family, (name, style) in enumerate(zip(tradeoff.families, styles, strict=False)):
             marker, color = style
-            runs = [run for run in tradeoff.runs if run.rung.family == family]
+            runs = [run for run in tradeoff.runs if run.refinement.family == family]
             axes.scatter(
                 [run.seconds for run in runs],
                 [max(tradeoff.ratio(run), FAINTEST) for run in runs],
@@ -46,9 +46,9 @@ def plot_tradeoff(tradeoff: Tradeoff) -> Figure:
         best = (tradeoff.best.seconds, max(tradeoff.ratio(tradeoff.best), FAINTEST))
         axes.plot(*best, "o", ms=18, mfc="none", mec=INK, mew=1.8, zorder=4)
         axes.set(xscale="log", yscale="log", xlabel="wall time of a run (s)")
-        axes.set_ylabel(f"error ({tradeoff.goal.measure})")
+        axes.set_ylabel(f"error ({tradeoff.target.measure})")
         axes.set_title(f"recommended: {tradeoff.best.dials}", loc="left", fontsize=11)
-        time, ratio = tradeoff.goal.bounds
+        time, ratio = tradeoff.target.bounds
         for draw, bound in ((axes.axvline, time), (axes.axhline, ratio)):
             if np.isfinite(bound):
                 draw(bound, color=GREY, ls="--", lw=1.2, zorder=1)
