@@ -14,17 +14,12 @@ from ufl_beam.model.connector_laws import Coulomb, Damper, Law, RigidPlastic, Sp
 from ufl_beam.model.damping import Damping, KelvinVoigt, Rayleigh
 from ufl_beam.model.material_laws import HingeLaw
 from ufl_beam.model.scene import Scene
-from ufl_beam.plotting.plots import with_unit
+from ufl_beam.plotting.style import with_unit
 
 
 @singledispatch
 def law_in_words(law: Law, turns: bool) -> str:
-    """A law and its size.
-
-    Args:
-        law: Of a connector.
-        turns: Whether its motion is a rotation.
-    """
+    """Describe the law of a connector, which turns or not, and its size."""
     return type(law).__name__.lower()
 
 
@@ -90,13 +85,13 @@ def _(damping: KelvinVoigt) -> str:
 
 def names_of(scene: Scene) -> dict[Beam | Body, str]:
     """Names of beams and bodies; equal ones with their number in the scene."""
-    named: dict[Beam | Body, str] = {}
     groups: tuple[Sequence[Beam | Body], ...] = (scene.beams, scene.bodies)
-    for parts in groups:
-        known = Counter(part.name for part in parts)
-        for k, part in enumerate(parts):
-            named[part] = f"{part.name} {k}" if known[part.name] > 1 else part.name
-    return named
+    known = [Counter(part.name for part in parts) for parts in groups]
+    return {
+        part: f"{part.name} {k}" if known[g][part.name] > 1 else part.name
+        for g, parts in enumerate(groups)
+        for k, part in enumerate(parts)
+    }
 
 
 def counted(number: int, one: str, many: str = "") -> str:

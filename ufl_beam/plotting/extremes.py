@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pictures of what long runs keep: envelopes on the frame, cycles of stress and their damage.
-
-They look like those of :mod:`ufl_beam.plotting.plots`, and need no screen either.
-"""
+"""Pictures of recorders: envelopes on the frame, cycles of stress and their damage."""
 
 from __future__ import annotations
 
@@ -14,17 +11,16 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import Fatigue, HotSpot
-from ufl_beam.plotting.connector_glyphs import BLUE, INK, RED
 from ufl_beam.plotting.diagrams import draw_diagrams, finish
-from ufl_beam.plotting.plots import (
+from ufl_beam.plotting.drawing import draw_axes, draw_symbols, plane_size, plane_stage
+from ufl_beam.plotting.style import (
+    BLUE,
+    INK,
+    RED,
     RESULTANTS,
-    draw_axes,
     draw_bar,
-    draw_symbols,
     picture,
     plane_axes,
-    plane_size,
-    plane_stage,
     require_choice,
 )
 from ufl_beam.simulation.solution import Solution
