@@ -1,5 +1,22 @@
 # SPDX-License-Identifier: MIT
-"""Planar flexible multibody dynamics with geometrically exact beams.  Units are SI."""
+"""Planar flexible multibody dynamics with geometrically exact beams.  Units are SI.
+
+The examples in docstrings, which are run as tests, use the names of this one: a cantilever, and
+one with a plastic hinge at its clamped end that has opened.
+
+Example:
+    >>> import numpy as np
+    >>> import ufl_beam as ub
+    >>> section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
+    >>> beam = ub.Beam((0, 0), (2, 0), section, cells=4)
+    >>> force = ub.PointLoad(beam.end, force=(0, -1e5), time=lambda t: t)
+    >>> scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[force])
+    >>> solution = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05)
+    >>> weak = ub.Beam((0, 0), (2, 0), section, hinges={0.0: ub.Softening(5e4, energy=1e3)})
+    >>> down = ub.Prescribed(weak.end, v=lambda t: -0.05 * t)
+    >>> hinged = ub.Scene([weak], supports=[ub.Clamped(weak.start), down])
+    >>> broken = ub.simulate(hinged, ub.Static(), t=(0, 1), dt=0.02)
+"""
 
 from ufl_beam import dolfinx_compat  # noqa: F401 - first, because it explains what is not installed
 

@@ -50,7 +50,12 @@ def in_study() -> bool:
 
 
 def say(*words: object, sep: str = " ") -> None:
-    """Print from the first process only, as scripts do that may run under ``mpirun``."""
+    """Print from the first process only, as scripts do that may run under ``mpirun``.
+
+    Example:
+        >>> ub.say("steps:", len(solution.times) - 1)  # once, on any number of processes
+        steps: 20
+    """
     if ours().rank == 0:
         print(*words, sep=sep, flush=True)  # noqa: T201
 

@@ -6,7 +6,7 @@ import statistics
 from typing import NamedTuple
 
 import numpy as np
-from reference import known
+from problems import known
 
 PEERS = ("exudyn", "opensees")
 

@@ -10,11 +10,11 @@ run or, if that is kept, the next coarser one from it, and the ratio of successi
 
 import json
 import sys
-from pathlib import Path
 
+import in_ufl_beam
 import numpy as np
+from problems import REFERENCE
 
-FILE = Path(__file__).with_name("reference.json")
 FINEST = {  # cells, dt (s), what else
     "P2": (2048, 5e-4, {}),
     "P3": (512, 1.25e-4, {"end": 1.2}),
@@ -23,16 +23,7 @@ FINEST = {  # cells, dt (s), what else
 }
 
 
-def known(problem):
-    """What is kept of a problem: arrays by name, or nothing before it was computed."""
-    kept = json.loads(FILE.read_text()) if FILE.exists() else {}
-    values = kept.get(problem, {}).get("values", {})
-    return {name: np.array(value) for name, value in values.items()}
-
-
 def compute(problem):
-    import in_ufl_beam
-
     cells, dt, more = FINEST[problem]
     runs = [
         {
@@ -59,10 +50,10 @@ def main(*problems):
     for problem in problems or FINEST:
         entry = compute(problem)
         print(problem, {k: v for k, v in entry.items() if k != "values"}, flush=True)
-        kept = json.loads(FILE.read_text()) if FILE.exists() else {}
+        kept = json.loads(REFERENCE.read_text()) if REFERENCE.exists() else {}
         kept[problem] = entry
         lines = (f"{json.dumps(name)}: {json.dumps(kept[name])}" for name in sorted(kept))
-        FILE.write_text("{\n" + ",\n".join(lines) + "\n}\n")
+        REFERENCE.write_text("{\n" + ",\n".join(lines) + "\n}\n")
 
 
 if __name__ == "__main__":

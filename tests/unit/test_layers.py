@@ -32,6 +32,9 @@ ROOMS = [
 The first one is the ground: modules that stand beside the rooms.
 """
 
+FLOORS = 31
+"""Longest chain of imports at most."""
+
 MACHINERY = {"basix", "cffi", "dolfinx", "ffcx", "mpi4py", "petsc4py", "ufl"}
 
 PETSC = {"compiled", "solvers", "dolfinx_compat"}
@@ -63,6 +66,12 @@ def imports(module):
 def siblings(module):
     """Modules of the package that a module imports."""
     return {n.removeprefix("ufl_beam.") for n in imports(module) if n.startswith("ufl_beam.")}
+
+
+@cache
+def floor(module):
+    """Length of the longest chain of imports that ends with the module."""
+    return 1 + max((floor(one) for one in siblings(module)), default=0)
 
 
 def outside(module):
@@ -103,6 +112,17 @@ def test_imports_point_down(module):
 def test_imports_have_no_cycles():
     for module in FILES:
         assert module not in set().union(*(reach(m) for m in siblings(module))), module
+
+
+def test_floors():
+    """Print the import graph from the ground up, `pytest -s`; and limit its height."""
+    height = max(map(floor, FILES))
+    for level in range(1, height + 1):
+        print(f"\nfloor {level}")
+        for module in (m for m in FILES if floor(m) == level):
+            print(f"  {module}: {', '.join(sorted(siblings(module))) or '-'}")
+    assert len(ROOMS) - 1 <= 10
+    assert height <= FLOORS
 
 
 @pytest.mark.parametrize("module", [m for m in FILES if m != "dolfinx_compat"])

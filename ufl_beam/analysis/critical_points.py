@@ -34,11 +34,20 @@ class Direction(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """Where a path begins, and in which direction; made by :meth:`CriticalPoint.branch`.
+    """Start and direction of a secondary path; made by :meth:`CriticalPoint.branch`.
 
     Attributes:
         state: Solution whose last state is the beginning.
         mode: Direction at all degrees of freedom, in the order of the grid.
+
+    Example:
+        >>> push = ub.PointLoad(beam.end, force=(-2e7, 0), time=lambda t: t)
+        >>> column = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
+        >>> straight = ub.follow(column, ub.LoadControl(0.05), steps=10)
+        >>> buckled = straight.critical[0].branch()
+        >>> bent = ub.follow(column, ub.ArcLength(0.05), start=buckled, steps=5)
+        >>> bool(abs(bent.displacement(beam.end)[-1, 1]) > 0.5)  # m
+        True
     """
 
     state: Solution
@@ -47,7 +56,7 @@ class Branch:
 
 @dataclass(frozen=True, eq=False)
 class CriticalPoint:
-    """A state of a path in which its tangent stiffness is singular.
+    """Limit or bifurcation point: a state of a path with singular tangent stiffness.
 
     Attributes:
         kind: "limit" where the load factor turns, "bifurcation" where another branch begins.
@@ -56,6 +65,13 @@ class CriticalPoint:
         state: The state alone, as a solution.
         mode: What moves without a change of load; root mean square 1 of displacements over the
             size of the scene, and of rotations; all degrees of freedom in the order of the grid.
+
+    Example:
+        >>> push = ub.PointLoad(beam.end, force=(-2e7, 0), time=lambda t: t)
+        >>> column = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
+        >>> point = ub.follow(column, ub.LoadControl(0.05), steps=10).critical[0]
+        >>> print(point.kind, round(point.factor, 2))
+        bifurcation 0.44
     """
 
     kind: str

@@ -173,11 +173,17 @@ class _Frame:
 
 @dataclass(frozen=True, eq=False)
 class Modes(Shapes):
-    """Small motions ``x exp(s t)`` about a state.
+    """Vibration modes ``x exp(s t)`` about a state; made by :func:`modes`.
 
     Attributes:
         exponents: s = -ζω ± iω√(1-ζ²) of each, imaginary part not negative, |s| ascending; (n,);
             1/s.
+
+    Example:
+        >>> shapes = ub.modes(scene, 3)
+        >>> print(shapes.frequencies.round())  # Hz
+        [ 42. 286. 651.]
+        >>> figure = ub.plot_modes(shapes)
     """
 
     exponents: Complex
@@ -217,17 +223,23 @@ class Modes(Shapes):
 
 @dataclass(frozen=True, eq=False)
 class Buckling(Shapes):
-    """Shapes that the scene leaves its state with, and the factors on its loads.
+    """Buckling modes and their load factors; made by :func:`buckling`.
 
     Attributes:
         factors: Factors on the loads, |factor| ascending; negative: with loads reversed; (n,).
+
+    Example:
+        >>> load = ub.PointLoad(beam.end, force=(-1e6, 0))
+        >>> column = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+        >>> print(ub.buckling(column, 2).factors.round(1))  # on 1 MN
+        [ 8.8 96.8]
     """
 
     factors: Array
 
     @property
     def titles(self) -> list[str]:
-        """The factors."""
+        """Titles of pictures: the load factors."""
         return [f"loads × {factor:.4g}" for factor in self.factors]
 
     def __str__(self) -> str:
@@ -235,7 +247,7 @@ class Buckling(Shapes):
 
 
 def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None = None) -> Modes:
-    """Natural frequencies, damping ratios and shapes of small motions.
+    """Compute natural frequencies, damping ratios and shapes of small vibrations.
 
     About the undeformed, unloaded scene; or about the last state of a solution, with its section
     forces, what loads and a :class:`RotatingFrame` add, and with the elastic stiffness of what has
@@ -255,6 +267,11 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
 
     Raises:
         SceneError: The call or the scene is wrong, or nothing that moves has mass.
+
+    Example:
+        >>> shapes = ub.modes(scene, 3, mesh=ub.Mesh(refine=4))
+        >>> print(shapes.frequencies.round(1))  # Hz
+        [ 41.5 250.6 646.8]
     """
     require_kind(scene, Scene, "modes: scene")
     require_count(n, "modes: n")
@@ -280,7 +297,7 @@ def buckling(
     at: Solution | None = None,
     mesh: Mesh | None = None,
 ) -> Buckling:
-    """Factors on the loads at which the scene buckles, (K + λ K') x = 0.
+    """Compute buckling load factors and modes, (K + λ K') x = 0.
 
     Loads and prescribed motions grow in proportion, from those of the state ``at`` (λ = 0; nothing
     without it) to those at the time ``t`` (λ = 1).  K' is the change of stiffness along the first,
@@ -297,6 +314,13 @@ def buckling(
     Raises:
         SceneError: The call is wrong, the scene is free to move, nothing acts on it, or what acts
             has a stiffness of its own.
+
+    Example:
+        >>> push = ub.PointLoad(beam.end, force=(-1.0, 0))
+        >>> column = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
+        >>> critical = ub.buckling(column, 1, mesh=ub.Mesh(refine=4)).factors[0]
+        >>> print(f"{critical / (np.pi**2 * section.EI / (2 * 2) ** 2):.2f}")  # over Euler's load
+        1.00
     """
     require_kind(scene, Scene, "buckling: scene")
     require_count(n, "buckling: n")

@@ -69,6 +69,15 @@ def study(
         SceneError: The call or the file is wrong, or a member returned something else than numbers
             and arrays, or not the names and shapes of the others; the file has those before.
         RuntimeError: All members failed.
+
+    Example:
+        >>> def member(length):
+        ...     beam = ub.Beam((0, 0), (length, 0), section)
+        ...     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)])
+        ...     return {"omega": ub.modes(scene, 2).omega}
+        >>> results = ub.study(member, [{"length": 2.0}, {"length": 4.0}])
+        >>> results["omega"].shape
+        (2, 2)
     """
     comm = communicator(comm, "study: comm")
     require_switch(anew, "study: anew")

@@ -49,7 +49,7 @@ class Plane:
         return gone - 1.0
 
     def slope(self, q: Array, way: Direction) -> float:
-        """The same everywhere."""
+        """Derivative of the equation along a direction; it is the same at any state."""
         along = self._total(float(self._normal.q @ way.q)) + self._normal.t * way.t
         return along / self._reach
 
@@ -65,7 +65,7 @@ class Given:
         self._t = t
 
     def miss(self, q: Array, t: float) -> float:
-        """Return the residual."""
+        """Residual of the equation: missing change of the load factor."""
         return t - self._t
 
     def slope(self, q: Array, way: Direction) -> float:
@@ -170,7 +170,7 @@ def _require_step(step: float, what: str) -> None:
 
 @dataclass(frozen=True)
 class ArcLength:
-    """Steps of one length: the way through limit points of loads and of displacements.
+    """Arc-length control: passes limit points of loads and of displacements.
 
     The length is the root mean square of all displacements over the size of the scene, of all
     rotations (rad), and of the change of the load factor over ``factor``.
@@ -181,6 +181,15 @@ class ArcLength:
 
     Raises:
         SceneError: No step, or ``factor`` is not positive.
+
+    Example:
+        >>> rod = ub.Section.circle(d=0.05, E=210e9, nu=0.3)
+        >>> arch = ub.Beam.polyline([(0, 0), (2, 0.2), (4, 0)], rod)
+        >>> down = ub.PointLoad(arch.at(0.5), force=(0, -1e5), time=lambda t: t)
+        >>> shallow = ub.Scene([arch], [], [ub.Pinned(arch.start), ub.Pinned(arch.end)], [down])
+        >>> path = ub.follow(shallow, ub.ArcLength(0.1), steps=40)  # it snaps through
+        >>> print([round(point.factor, 2) for point in path.critical if point.kind == "limit"])
+        [0.56, -0.14]
     """
 
     step: float
@@ -230,13 +239,18 @@ class ArcLength:
 
 @dataclass(frozen=True)
 class LoadControl:
-    """Steps of the load factor, up to the limit load.
+    """Load control: equal steps of the load factor, up to the limit load.
 
     Args:
         step: Change of the load factor; negative downwards.
 
     Raises:
         SceneError: No step.
+
+    Example:
+        >>> path = ub.follow(scene, ub.LoadControl(0.25), steps=4)
+        >>> print(path.factor)
+        [0.   0.25 0.5  0.75 1.  ]
     """
 
     step: float
@@ -264,7 +278,7 @@ class LoadControl:
 
 @dataclass(frozen=True)
 class DisplacementControl:
-    """Steps of one component of the motion of a place, through limit points of loads.
+    """Displacement control of one component at a place: passes limit points of loads.
 
     Args:
         place: Place of a beam.
@@ -273,6 +287,12 @@ class DisplacementControl:
 
     Raises:
         SceneError: Not a place of a beam, another component, no step.
+
+    Example:
+        >>> control = ub.DisplacementControl(beam.end, "v", -0.05)
+        >>> path = ub.follow(scene, control, steps=4)
+        >>> print(path.displacement(beam.end)[:, 1].round(6))
+        [ 0.   -0.05 -0.1  -0.15 -0.2 ]
     """
 
     place: Place
@@ -320,7 +340,7 @@ class DisplacementControl:
 
 @dataclass(frozen=True)
 class DissipationControl:
-    """Steps of the energy that hinges and yielding beams dissipate, through sharp snap-backs.
+    """Dissipation control by the energy that hinges and yielding beams lose: sharp snap-backs.
 
     Softening and unloading may begin in nearly the same direction; only one of them dissipates.
 
@@ -330,6 +350,13 @@ class DissipationControl:
 
     Raises:
         SceneError: ``step`` is not positive.
+
+    Example:
+        >>> pull = ub.PointLoad(weak.end, force=(0, -1e5), time=lambda t: t)
+        >>> pulled = ub.Scene([weak], supports=[ub.Clamped(weak.start)], loads=[pull])
+        >>> path = ub.follow(pulled, ub.DissipationControl(50.0), steps=15)
+        >>> print(path.factor.max().round(2))  # at the limit of the hinge
+        0.25
     """
 
     step: float

@@ -66,10 +66,15 @@ SOFT = 1e-3
 
 
 class Path(Solution):
-    """A path of equilibria: a solution whose times are load factors.
+    """Equilibrium path: a solution whose times are load factors.
 
     Attributes:
         critical: Limit and bifurcation points, in the order in which they were passed.
+
+    Example:
+        >>> path = ub.follow(scene, ub.LoadControl(0.5), steps=4)
+        >>> print(path.factor, path.critical)
+        [0.  0.5 1.  1.5 2. ] []
     """
 
     critical: Sequence[CriticalPoint] = ()
@@ -387,6 +392,11 @@ def follow(
     Raises:
         SceneError: The call or the scene is wrong; nothing was computed.
         ConvergenceError: A step failed; it carries the path so far.
+
+    Example:
+        >>> path = ub.follow(scene, ub.LoadControl(0.5), until=lambda now: now.t >= 2)
+        >>> print(path.factor)
+        [0.  0.5 1.  1.5 2. ]
     """
     comm = communicator(comm, "follow: comm")
     if until is not None:

@@ -36,7 +36,7 @@ MIXED = 0.5
 
 
 def size(values: Array) -> float:
-    """Largest magnitude."""
+    """Largest magnitude of an array; 0 if it is empty."""
     return float(np.abs(values).max(initial=0.0))
 
 

@@ -32,6 +32,11 @@ class Study:
         results: What it returned; (len(cases), ...) each.
         failed: Number of a case that failed, and its error.
         seconds: Wall time of each member; (len(cases),); s.
+
+    Example:
+        >>> results = ub.study(lambda n: {"square": n**2}, [{"n": 3}, {"n": 4}])
+        >>> print(results["square"], results.failed)
+        [ 9. 16.] {}
     """
 
     member: str

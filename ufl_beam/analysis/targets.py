@@ -138,7 +138,7 @@ class Tolerance:
         return "errors of " + ", ".join(f"{value:g} of {n}" for n, value in self.absolute.items())
 
     def units(self, scales: Mapping[str, float]) -> dict[str, float]:
-        """The tolerances."""
+        """Tolerance of each quantity, in its unit."""
         return {n: self.absolute.get(n, self.relative * scale) for n, scale in scales.items()}
 
     def choose(self, prediction: Prediction) -> Choice:
@@ -176,7 +176,7 @@ class Budget:
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """A time; s."""
+        """Largest wall time (s) and largest error over tolerance."""
         return self.seconds, math.inf
 
     def __str__(self) -> str:

@@ -97,6 +97,11 @@ def tradeoff(
         SceneError: The call is wrong, or no kind of dials can be used for the scene.
         TradeoffError: Self-convergence is not seen, or it would take too long; it says what was
             seen and has the runs.
+
+    Example:
+        >>> tip = {"tip": lambda run: run.position(beam.end)[-1]}
+        >>> found = ub.tradeoff(scene, tip, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance=0.01)
+        >>> run = ub.simulate(scene, **found.recommended)
     """
     require_kind(quantities, Mapping, "tradeoff: quantities")
     if not quantities:

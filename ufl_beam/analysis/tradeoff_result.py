@@ -110,7 +110,7 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Tradeoff:
-    """The trade of speed for accuracy on a scene; the same on every process.
+    """Result of :func:`tradeoff`: runs, errors and the recommended setting.
 
     Attributes:
         runs: All that was run.
@@ -123,6 +123,12 @@ class Tradeoff:
         families: The kinds of dials, in words.
         notes: What else should be known.
         spent: Wall time of all runs, repetitions and compiling included; s.
+
+    Example:
+        >>> tip = {"tip": lambda run: run.position(beam.end)[-1]}
+        >>> found = ub.tradeoff(scene, tip, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance=0.01)
+        >>> found.ratio(found.best) <= 1  # largest error over the tolerance
+        True
     """
 
     runs: tuple[Run, ...]

@@ -7,14 +7,20 @@ date on the way and know beforehand where the entries of its matrix go.
 
 from __future__ import annotations
 
+import ctypes
+from collections.abc import Mapping
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
+
+from petsc4py import PETSc
 
 import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.jit import DECLARATIONS, HEADERS, compiled, text
 from ufl_beam.dolfinx_compat import TABULATE
+
+T = TypeVar("T")
 
 SOURCES = ("loops", "rigid_plastic", "elimination", "newton")
 """Files of C beside this one; they are one translation unit."""
@@ -34,15 +40,34 @@ _SOURCE = "\n".join(
         *(text(f"{name}.c") for name in SOURCES),
     ]
 )
-_module = compiled(
+module = compiled(
     "ufl_beam_loops",
     DECLARATIONS + _CALLBACKS,
     lambda: _SOURCE,
     made_of=[_SOURCE],
     flags=["-O3"],
 )
-ffi: Any = _module.ffi
-lib: Any = _module.lib
+ffi: Any = module.ffi
+lib: Any = module.lib
+
+_PETSC = ctypes.CDLL(PETSc.__file__)  # petsc4py, which has loaded PETSc
+for _name, _field in ffi.typeof("petsc_functions").fields:
+    _address = ctypes.cast(getattr(_PETSC, _name), ctypes.c_void_p).value
+    setattr(lib.petsc, _name, ffi.cast(_field.type, _address))
+
+
+def petsc(name: str, *arguments: Any) -> None:
+    """Call a function of ``petsc_functions`` in loops.h; objects of petsc4py are theirs in C.
+
+    Raises:
+        PETSc.Error: It returns an error.
+    """
+    in_c = (
+        ffi.cast("void *", argument.handle) if isinstance(argument, PETSc.Object) else argument
+        for argument in arguments
+    )
+    if error := getattr(lib.petsc, name)(*in_c):
+        raise PETSc.Error(error)
 
 
 Loop = tuple[Any, Any]
@@ -59,6 +84,24 @@ doubles = partial(ffi.from_buffer, ffi.typeof("double[]"))
 
 integers = partial(ffi.from_buffer, ffi.typeof("int32_t[]"))
 """Pointer to a contiguous array of int32; it keeps the array alive."""
+
+
+def names(enum: str, prefix: str = "") -> tuple[str, ...]:
+    """Names in an enum of loops.h, in order, without its last one, which is their number."""
+    elements = ffi.typeof(f"enum {enum}").elements
+    return tuple(elements[i].lower().removeprefix(prefix) for i in range(len(elements) - 1))
+
+
+def in_order(enum: str, values: Mapping[str, T], prefix: str = "") -> list[T]:
+    """Values in the order of an enum of loops.h, by its names; see :func:`names`.
+
+    Raises:
+        ValueError: Python and C do not name the same.
+    """
+    expected = names(enum, prefix)
+    if set(values) != set(expected):
+        raise ValueError(f"{enum} is {expected} in loops.h, and {tuple(values)} in Python")
+    return [values[name] for name in expected]
 
 
 def extrapolated(x: Array, y: Array, ratio: float) -> Array:

@@ -65,7 +65,7 @@ class Csr:
 
     @property
     def size(self) -> int:
-        """Number of rows."""
+        """Number of rows of the matrix."""
         return len(self.indptr) - 1
 
     def rows(self) -> Index:

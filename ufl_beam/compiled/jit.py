@@ -81,7 +81,7 @@ def compiled(
     Raises:
         CompilerError: The compiler is missing, or refuses.
     """
-    flags = [*flags, *EXTRA]
+    flags = [*flags, "-fvisibility=hidden", *EXTRA]
     name = f"{stem}_{_digest(declarations, *made_of, *flags, sys.version)}"
 
     def build(directory: Path) -> ModuleType:
@@ -107,7 +107,9 @@ def compiled(
         spec.loader.exec_module(module)
         return module
 
-    return kept(name, build, load)[0]
+    module, directory = kept(name, build, load)
+    module.__file__ = str(directory / Path(str(module.__file__)).name)  # it was built elsewhere
+    return module
 
 
 def compiled_form(form: ufl.Form) -> tuple[fem.Form, Path]:

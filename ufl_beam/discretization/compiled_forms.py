@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Any
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -56,8 +58,48 @@ def tabulator(compiled: fem.Form) -> Any:
     return kernel(integral.tabulate_tensor_float64, compiled.module.ffi)
 
 
+class Prepared(NamedTuple):
+    """A form compiled for all scenes.
+
+    Attributes:
+        form: The DOLFINx form.
+        source: The C that FFCx wrote for it.
+        columns: Place of the values of each coefficient in the row of numbers of a cell.
+        constants: Values of its constants.
+        packed: Values of the coefficients in the cells that the form was stated on.
+        entries: Number of entries of the vector or matrix of a cell.
+    """
+
+    form: fem.Form
+    source: Path
+    columns: dict[fem.Function, slice]
+    constants: Array
+    packed: Array
+    entries: int
+
+
+@lru_cache(maxsize=512)
+def prepared(form: ufl.Form) -> Prepared:
+    """Compile a form, once in a process."""
+    compiled, source = compiled_form(form)
+    ufcx, everything = compiled.ufcx_form, form.coefficients()
+    constants, packed = pack(compiled)
+    columns, start = {}, 0
+    for i in range(ufcx.num_coefficients):
+        function = everything[ufcx.original_coefficient_positions[i]]
+        end = start + function.function_space.element.space_dimension
+        columns[function], start = slice(start, end), end
+    spaces = [argument.ufl_function_space() for argument in form.arguments()]
+    entries = math.prod(space.element.space_dimension for space in spaces)
+    return Prepared(compiled, source, columns, constants, packed, entries)
+
+
 class Kernel:
     """A compiled cell form together with the packed values of its coefficients.
+
+    A form stated on one cell is computed on all cells, with the values of its coefficients there
+    until :meth:`put` or :meth:`set` gives them others.  If its test functions are those of the
+    unknown's space, cells add to their degrees of freedom; else each to entries of its own.
 
     Args:
         form: Cell integrals with one quadrature rule.
@@ -74,38 +116,27 @@ class Kernel:
     def __init__(
         self, form: ufl.Form, unknown: fem.Function, cell_dofs: Index, coordinates: Array
     ) -> None:
-        self.compiled, self._source = compiled_form(form)
-        ufcx = self.compiled.ufcx_form
-        constants, packed = pack(self.compiled)
-        everything = form.coefficients()
-        used = [
-            everything[ufcx.original_coefficient_positions[i]] for i in range(ufcx.num_coefficients)
-        ]
-        ends = np.cumsum([f.function_space.element.space_dimension for f in used])
-        self._columns = {
-            f: slice(end - f.function_space.element.space_dimension, end)
-            for f, end in zip(used, ends, strict=True)
-        }
+        ready = prepared(form)
+        self.compiled, self._source, self._columns = ready.form, ready.source, ready.columns
         self._starts = {id(f): columns.start for f, columns in self._columns.items()}
+        self._constants, self._entries = ready.constants, ready.entries
         self._dofs = np.ascontiguousarray(cell_dofs, dtype=np.int32)
-        self._lanes, self._in_lanes = 1, ffi.NULL
-        self._packed, self._coordinates = (in_batches(x, 1) for x in (packed, coordinates))
-        self._rows = in_batches(self._rows_of_cells(form), 1)
+        self._lanes, self._in_lanes, num_cells = 1, ffi.NULL, len(cell_dofs)
+        packed = np.tile(ready.packed, (num_cells // len(ready.packed), 1))
         spaces = [argument.ufl_function_space() for argument in form.arguments()]
-        self._entries = math.prod(space.element.space_dimension for space in spaces)
+        if not spaces:
+            rows: Index = np.zeros((num_cells, 1), dtype=np.int32)
+        elif spaces[0] is unknown.function_space:
+            rows = self._dofs
+        else:
+            width = spaces[0].element.space_dimension
+            rows = np.arange(num_cells * width, dtype=np.int32).reshape(num_cells, width)
+        self._packed, self._coordinates, self._rows = (
+            in_batches(x, 1) for x in (packed, coordinates, rows)
+        )
         self._at = self._columns[unknown].start if self.depends_on(unknown) else 0
         self._unknowns = self._dofs.shape[1] if self.depends_on(unknown) else 0
-        self._constants = constants
         self._prepare()
-
-    def _rows_of_cells(self, form: ufl.Form) -> Index:
-        """Entries of the vector that the cells add to; (num_cells, entries of a cell)."""
-        if not form.arguments():
-            return np.zeros((len(self._dofs), 1), dtype=np.int32)
-        dofmap = form.arguments()[0].ufl_function_space().dofmap
-        blocks = np.asarray(dofmap.list)[:, :, None] * dofmap.bs + np.arange(dofmap.bs)
-        width = blocks.shape[1] * dofmap.bs
-        return np.ascontiguousarray(blocks.reshape(len(blocks), width), dtype=np.int32)
 
     def _prepare(self) -> None:
         """Make the data of the loop over the cells."""

@@ -52,23 +52,23 @@ class Saving:
         self._rows: defaultdict[str, list[Array]] = defaultdict(list)
 
     def number(self, name: str, value: float) -> float:
-        """See :class:`Memory`."""
+        """Save a number that is the same on all processes."""
         self._sum(name, 1, np.zeros(int(self._share.comm.rank == 0), dtype=int), np.array([value]))
         return value
 
     def total(self, name: str, value: float) -> float:
-        """See :class:`Memory`."""
+        """Save the sum of a number over all processes."""
         self._sum(name, 1, np.zeros(1, dtype=int), np.array([value]))
         return value
 
     def at_dofs(self, name: str, values: Array) -> Array:
-        """See :class:`Memory`."""
+        """Save values at the owned degrees of freedom."""
         share = self._share
         self._sum(name, share.grid.size, share.dofs[: share.num_owned], values)
         return values
 
     def added(self, name: str, values: Array) -> Array:
-        """See :class:`Memory`."""
+        """Save the sum of contributions to degrees of freedom."""
         self._sum(name, self._share.grid.size, self._share.dofs, values)
         return values
 
@@ -76,7 +76,7 @@ class Saving:
         self._sums[name] = size, where, values[: len(where)].copy()
 
     def rows(self, name: str, numbers: Index, rows: Array) -> Array:
-        """See :class:`Memory`."""
+        """Save numbered rows of a table."""
         self._rows[f"{name}, {rows.shape[1]}"].append(np.column_stack([numbers, rows]))
         return rows
 
@@ -105,7 +105,7 @@ class Restoring:
         self._share, self._state = share, state
 
     def number(self, name: str, value: float) -> float:
-        """See :class:`Memory`."""
+        """Return the number that was saved."""
         return float(self._state[name][0])
 
     def total(self, name: str, value: float) -> float:
@@ -113,7 +113,7 @@ class Restoring:
         return self.number(name, value) if self._share.comm.rank == 0 else 0.0
 
     def at_dofs(self, name: str, values: Array) -> Array:
-        """See :class:`Memory`."""
+        """Return the saved values at the local degrees of freedom."""
         return np.asarray(self._state[name][self._share.dofs])
 
     def added(self, name: str, values: Array) -> Array:
@@ -123,7 +123,7 @@ class Restoring:
         return values
 
     def rows(self, name: str, numbers: Index, rows: Array) -> Array:
-        """See :class:`Memory`."""
+        """Return the saved rows of these numbers."""
         table = self._state.get(f"{name}, {rows.shape[1]}")
         if table is None:
             return rows

@@ -73,11 +73,16 @@ class _AtEnd:
 
 @dataclass(frozen=True)
 class Static(_AtEnd):
-    """Equilibrium at the end of each step; no inertia, time is the load parameter.
+    """Static equilibrium at the end of each step; time is the load parameter.
 
     The ledger counts works by the trapezoidal rule, so its imbalance is of second order in the
     step and a measure of it.  A step is cut whose forces leave a twentieth of what it stores and
     dissipates unexplained, for it may have leapt to another branch of equilibria.
+
+    Example:
+        >>> run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1)
+        >>> print(run.reaction(scene.supports[0])[-1, 1:].round(-2))  # N, N m
+        [100000. 200000.]
     """
 
     dynamic = False
@@ -237,6 +242,11 @@ class Newmark(_Accelerated):
         SceneError: A number is out of range.  A run raises it if the scene has joints held by
             multipliers, motors or moving supports while nothing is damped; dry friction, or a
             rotating frame.
+
+    Example:
+        >>> run = ub.simulate(scene, ub.Newmark(), t=(0, 1), dt=0.05)
+        >>> np.allclose(run.position(beam.end)[-1], solution.position(beam.end)[-1], atol=1e-3)
+        True
     """
 
     gamma: float = 0.5
@@ -262,7 +272,7 @@ class Newmark(_Accelerated):
 
 @dataclass(frozen=True)
 class GeneralizedAlpha(_Accelerated):
-    """Generalised-α: second order, with damping of high frequencies that is told.
+    """Generalised-α scheme of second order with damping of high frequencies.
 
     With the weights of Chung and Hulbert (1993), in the form of Arnold and Brüls (2007): forces and
     constraints are satisfied at the ends of the steps, and an auxiliary acceleration carries the
@@ -278,6 +288,11 @@ class GeneralizedAlpha(_Accelerated):
 
     Raises:
         SceneError: A number outside [0, 1].  A run raises it for what :class:`Newmark` lists.
+
+    Example:
+        >>> run = ub.simulate(scene, ub.GeneralizedAlpha(rho_inf=0.8), t=(0, 1), dt=0.05)
+        >>> np.allclose(run.position(beam.end)[-1], solution.position(beam.end)[-1], atol=1e-3)
+        True
     """
 
     rho_inf: float = 0.8

@@ -100,7 +100,7 @@ class _ExactStep(_OverStep):
 
 @dataclass(frozen=True)
 class ExactStatic(_ExactStep):
-    """Equilibrium without inertia, with an exact ledger: works are exact increments of energy.
+    """Static equilibrium with an exact ledger: works are exact increments of energy.
 
     :class:`Static` finds equilibrium at the ends of the steps and counts works by the trapezoidal
     rule; here the equation of the step is that of :class:`Midpoint`.  Inelastic material follows
@@ -118,6 +118,11 @@ class ExactStatic(_ExactStep):
 
     Raises:
         SceneError: A number outside [1/2, 1].
+
+    Example:
+        >>> run = ub.simulate(scene, ub.ExactStatic(), t=(0, 1), dt=0.1)
+        >>> bool(run.energy.worst < 1e-9)
+        True
     """
 
     theta: float = 1.0
@@ -214,7 +219,7 @@ class _Velocities(_Midway):
 
 @dataclass(frozen=True)
 class Midpoint(_ExactStep, _Velocities):
-    """Midpoint rule that conserves energy and momentum exactly, or loses energy as it is told.
+    """Midpoint rule that conserves energy and momentum exactly, with dissipation on request.
 
     ``alpha = beta = 0`` conserves energy, linear and angular momentum to solver tolerance at any
     step size.  Positive values take energy out of the high frequencies, never in: ``alpha`` through
@@ -236,6 +241,12 @@ class Midpoint(_ExactStep, _Velocities):
 
     Equations:
         P(77)-P(91); P(82) corrected, see docs/errata.md.
+
+    Example:
+        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05)
+        >>> lossy = ub.simulate(scene, ub.Midpoint(alpha=0.05, beta=0.05), t=(0, 1), dt=0.05)
+        >>> bool(run.energy.worst < 1e-9), bool(lossy.energy.lost["numerical"][-1] > 0)
+        (True, True)
     """
 
     alpha: float = 0.0
@@ -261,12 +272,19 @@ class PrintedMidpoint(_OverStep, _Velocities):
 
     Equations:
         P(77)-P(84), with the sign of P(79) mended; see docs/errata.md.
+
+    Example:
+        >>> free = ub.Scene([beam], initial=[ub.Velocity((beam,), angular=10.0)])
+        >>> printed = ub.simulate(free, ub.PrintedMidpoint(), t=(0, 1), dt=0.1)
+        >>> exact = ub.simulate(free, ub.Midpoint(), t=(0, 1), dt=0.1)
+        >>> bool(printed.energy.worst > 1e-5), bool(exact.energy.worst < 1e-9)
+        (True, True)
     """
 
     alpha = beta = 0.0
 
     def half_tangents(self, rotations: Index) -> Index:
-        """None."""
+        """No rotations: the printed scheme takes Δψ itself."""
         return rotations[:0]
 
     def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
@@ -283,13 +301,13 @@ class PrintedMidpoint(_OverStep, _Velocities):
         return s, float(np.abs(s[rotations]).max(initial=0.0))
 
     def error_weights(self) -> tuple[float, float]:
-        """The trapezoidal rule's."""
+        """Weights of the error of the trapezoidal rule."""
         return 0.0, 1 / 12
 
 
 @dataclass(frozen=True)
 class DecayingMidpoint(_ExactStep, _Midway):
-    """Midpoint rule that takes energy out of high frequencies and stays of second order.
+    """Midpoint rule of second order that dissipates the energy of high frequencies.
 
     :class:`Midpoint` loses energy in proportion to the changes of strains and velocities in a step,
     which is of first order.  Here it is in proportion to how these changes change from step to
@@ -313,6 +331,11 @@ class DecayingMidpoint(_ExactStep, _Midway):
 
     Raises:
         SceneError: A number outside [1/3, 1].
+
+    Example:
+        >>> run = ub.simulate(scene, ub.DecayingMidpoint(rho_inf=0.5), t=(0, 1), dt=0.05)
+        >>> bool(run.energy.lost["numerical"][-1] > 0), bool(run.energy.worst < 1e-9)
+        (True, True)
     """
 
     rho_inf: float = 0.5
@@ -344,7 +367,7 @@ class DecayingMidpoint(_ExactStep, _Midway):
         return 1 / (dt**2 * keep), 1 / dt, v
 
     def rates(self, dt: float, s: Array, rates: Rates) -> tuple[Array, ...]:
-        """The velocities."""
+        """Velocities at the end of the step."""
         keep = 0.5 + self.part
         v: Array = 1 / dt * s - (0.5 - self.part) * rates.v + self._remembered(dt, rates)
         v *= 1 / keep

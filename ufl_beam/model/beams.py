@@ -38,7 +38,7 @@ TOGETHER = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Beam:
-    """A beam with straight cells along a curve; straight from ``a`` to ``b`` by default.
+    """Beam with straight cells along a curve, by default along the line from ``a`` to ``b``.
 
     Args:
         a: First end; m.
@@ -58,6 +58,12 @@ class Beam:
     Raises:
         SceneError: Zero length, ``cells < 1``, coordinates that are no finite numbers, or hinges in
             a section of fibres.
+
+    Example:
+        >>> column = ub.Beam((0, 0), (0, 3), section, cells=6, name="column")
+        >>> arch = ub.Beam.arc((0, 0), 5.0, (0, np.pi), section, cells=20, name="arch")
+        >>> print(column.end, "and", arch.start)
+        column.end (0, 3) and arch.start (5, 0)
     """
 
     a: Point
@@ -179,12 +185,12 @@ class Beam:
 
     @property
     def start(self) -> Place:
-        """First end."""
+        """Place at the first end, ``s = 0``."""
         return Place(self, 0.0)
 
     @property
     def end(self) -> Place:
-        """Last end."""
+        """Place at the last end, ``s = 1``."""
         return Place(self, 1.0)
 
     def vertices(self, attached: Sequence[float]) -> list[float]:
@@ -211,6 +217,13 @@ class Place:
         s: Parameter of its axis, from 0 to 1.
         beyond: Whether the cross-section beyond the plastic hinge at ``s`` is meant, the one that
             no joint, support or load is attached to.
+
+    Example:
+        >>> middle = beam.at(0.5)
+        >>> print(middle.point, middle.direction)
+        (1.0, 0.0) (1.0, 0.0)
+        >>> print((1e3 * solution.displacement(middle)[-1, 1:]).round(1))  # mm, mrad
+        [ -5.9 -10.7]
     """
 
     beam: Beam

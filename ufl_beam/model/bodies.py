@@ -19,7 +19,7 @@ from ufl_beam.model.beams import Place, Point
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A rigid body; anything may be attached to any point of it.
+    """Rigid body; joints, connectors and loads may act at any of its points.
 
     Args:
         center: Centre of mass in the undeformed scene; m.
@@ -29,6 +29,12 @@ class Body:
 
     Raises:
         SceneError: Coordinates that are no finite numbers, a negative mass or inertia.
+
+    Example:
+        >>> rotor = ub.Body((2, 0), mass=50.0, inertia=4.0, name="rotor")
+        >>> joint = ub.Revolute(beam.end, rotor.at(2, 0))
+        >>> print(joint)
+        Revolute(beam.end (2, 0), rotor (2, 0))
     """
 
     center: Point
@@ -60,6 +66,12 @@ class Spot:
     Attributes:
         body: The body, by identity.
         point: Coordinates in the undeformed scene; m.
+
+    Example:
+        >>> wheel = ub.Body((0, 0), mass=10.0, inertia=0.5, name="wheel")
+        >>> rim = wheel.at(0.3, 0.0)
+        >>> print(rim)
+        wheel (0.3, 0)
     """
 
     body: Body
@@ -80,7 +92,12 @@ GROUND = Body((0.0, 0.0), name="ground")
 
 
 def ground(x: float, y: float) -> Spot:
-    """The point (x, y) of the ground; m."""
+    """Return the point (x, y) of the ground; m.
+
+    Example:
+        >>> pivot = ub.Revolute(ub.ground(0, 0), beam.start)
+        >>> pendulum = ub.Scene([beam], joints=[pivot], loads=[ub.Gravity()])
+    """
     return Spot(GROUND, (x, y))
 
 

@@ -16,7 +16,7 @@ from ufl_beam.model.material_laws import Hardening, Layout, Softening
 
 @dataclass(frozen=True)
 class Fibres:
-    """Material law of the fibres of a section and their number, P(93).
+    """Number and material law of the fibres of a section, P(93).
 
     Args:
         law: Of each fibre; stresses in Pa.  A random limit is drawn for each fibre of each cell.
@@ -26,6 +26,12 @@ class Fibres:
 
     Raises:
         SceneError: A law is none, or ``number`` is no whole number from 1.
+
+    Example:
+        >>> steel = ub.Fibres(ub.Hardening(355e6, modulus=2e9), number=16)
+        >>> layered = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, fibres=steel)
+        >>> print(f"{layered.EI:.3g}")  # of 16 layers; N m²
+        1.39e+07
     """
 
     law: Hardening
@@ -108,7 +114,7 @@ class PlacedFibres:
 
     @property
     def EA(self) -> float:
-        """Axial stiffness; N."""
+        """Axial stiffness, the sum over all fibres; N."""
         return float(self.E * self.A.sum())
 
     @property

@@ -41,14 +41,20 @@ class Constant:
 
 
 def ramp(duration: float) -> TimeFunction:
-    """The time function that grows linearly from 0 to 1 within ``duration`` (s) and stays."""
+    """Return the time function that grows from 0 to 1 within ``duration`` (s) and stays at 1.
+
+    Example:
+        >>> growth = ub.ramp(2.0)
+        >>> growth(0.5), growth(2.0), growth(9.0)
+        (0.25, 1.0, 1.0)
+    """
     require_number(duration, "ramp: duration", positive=True)
     return Table((0.0, duration), (0.0, 1.0))
 
 
 @dataclass(frozen=True)
 class Table:
-    """A time function through points, linear between them and constant outside.
+    """Time function by points, linear between them and constant outside.
 
     Args:
         times: Increasing times; s.
@@ -56,6 +62,11 @@ class Table:
 
     Raises:
         SceneError: Different lengths, or times that do not increase.
+
+    Example:
+        >>> pulse = ub.Table([0, 0.1, 0.2], [0, 5, 0])
+        >>> print(pulse(0.05), pulse(0.1), pulse(1.0))
+        2.5 5.0 0.0
     """
 
     times: Sequence[float]
@@ -125,6 +136,13 @@ class PointLoad:
         force: (F_x, F_y); N.
         moment: Counter-clockwise; N m.
         time: Factor at time t.
+
+    Example:
+        >>> load = ub.PointLoad(beam.end, force=(0, -1e5), time=ub.Table([0, 0.5, 1], [0, 1, 0]))
+        >>> loaded = ub.Scene([beam], supports=scene.supports, loads=[load])
+        >>> run = ub.simulate(loaded, ub.Static(), t=(0, 1), dt=0.5)
+        >>> print(run.section_forces_at(beam.start)[1].round())  # N, V, M at t = 0.5 s
+        [    312. -100000. -174990.]
     """
 
     place: Anchor
@@ -141,13 +159,20 @@ class PointLoad:
 
 @dataclass(frozen=True, eq=False)
 class FollowerLoad:
-    """Force at a place that turns with the cross-section; not conservative.
+    """Follower force at a place: it turns with the cross-section and is not conservative.
 
     Args:
         place: Where.
         force: (F_x, F_y) before any rotation; N.
         moment: Counter-clockwise; N m.
         time: Factor at time t.
+
+    Example:
+        >>> thrust = ub.FollowerLoad(beam.end, force=(0, -1e5), time=lambda t: t)
+        >>> pushed = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[thrust])
+        >>> run = ub.simulate(pushed, ub.Static(), t=(0, 1), dt=0.25)
+        >>> bool(run.reaction(pushed.supports[0])[-1, 0] > 1e3)  # N: the force has turned
+        True
     """
 
     place: Anchor
@@ -176,13 +201,20 @@ def _check_point_load(load: PointLoad | FollowerLoad, kind: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class LineLoad:
-    """Dead force and moment along a whole beam, per undeformed length.
+    """Distributed dead force and moment along a beam, per undeformed length.
 
     Args:
         beam: Where.
         force: (f_x, f_y); N/m.
         moment: Counter-clockwise; N m/m.
         time: Factor at time t.
+
+    Example:
+        >>> snow = ub.LineLoad(beam, force=(0, -1e3))
+        >>> loaded = ub.Scene([beam], supports=scene.supports, loads=[snow])
+        >>> run = ub.simulate(loaded, ub.Static(), t=(0, 1), dt=1.0)
+        >>> print(run.reaction(loaded.supports[0])[-1, 1:].round())  # N, N m
+        [2000. 2000.]
     """
 
     beam: Beam
@@ -208,6 +240,12 @@ class Gravity:
     Args:
         acceleration: (g_x, g_y); m/s².
         time: Factor at time t.
+
+    Example:
+        >>> hanging = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.Gravity()])
+        >>> run = ub.simulate(hanging, ub.Static(), t=(0, 1), dt=1.0)
+        >>> print(run.reaction(hanging.supports[0])[-1, 1].round())  # weight, 2 m of 157 kg/m; N
+        3080.0
     """
 
     acceleration: tuple[float, float] = (0.0, -9.81)
@@ -223,7 +261,7 @@ class Gravity:
 
 @dataclass(frozen=True, eq=False)
 class RotatingFrame:
-    """Centrifugal and Coriolis forces on all that has mass: the scene turns steadily as a whole.
+    """Centrifugal and Coriolis forces on all masses, in a frame that turns steadily.
 
     Motions, velocities and all other loads are those that somebody sees who turns with the frame.
     In statics it gives the steady rotation, with all that it stretches and bends.
@@ -231,6 +269,12 @@ class RotatingFrame:
     Args:
         rate: Angular velocity of the frame, counter-clockwise; rad/s.
         about: The point that stays in place; m.
+
+    Example:
+        >>> blade = ub.Scene([beam], supports=scene.supports, loads=[ub.RotatingFrame(rate=50.0)])
+        >>> turning = ub.simulate(blade, ub.Static(), t=(0, 1), dt=1.0)
+        >>> bool(ub.modes(blade, 1, at=turning).omega > ub.modes(scene, 1).omega)  # stiffer
+        True
     """
 
     rate: float

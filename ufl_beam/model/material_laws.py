@@ -39,7 +39,7 @@ def below(x: Values, limit: float) -> Values:
 
 @singledispatch
 def exp(x: Values) -> Values:
-    """Exponential function."""
+    """Exponential function of numbers or arrays."""
     return np.exp(x)
 
 
@@ -71,11 +71,15 @@ class Viscosity(Protocol):
 
 @dataclass(frozen=True)
 class Perzyna:
-    """Overstress in proportion to the rate of plastic strain, P(39).
+    """Perzyna viscoplasticity: overstress in proportion to the plastic strain rate, P(39).
 
     Args:
         eta: Overstress per rate; Pa s for fibres, N s and N m² s for resultants.  Zero is
             rate-independent, infinity elastic.
+
+    Example:
+        >>> law = ub.Hardening(250e6, modulus=2e9, viscosity=ub.Perzyna(eta=1e6))  # Pa, Pa s
+        >>> viscous = ub.Fibres(law, number=10)
     """
 
     eta: float
@@ -90,13 +94,17 @@ class Perzyna:
 
 @dataclass(frozen=True)
 class DuvautLions:
-    """Relaxation towards the rate-independent stress, P(45).
+    """Duvaut-Lions viscoplasticity: relaxation towards the rate-independent stress, P(45).
 
     The same law as :class:`Perzyna` with ``eta = tau (C + H)``; the relaxation time is what the
     user knows.
 
     Args:
         tau: Relaxation time; s.  Zero is rate-independent, infinity elastic.
+
+    Example:
+        >>> law = ub.Hardening(250e6, modulus=2e9, viscosity=ub.DuvautLions(tau=1e-3))  # Pa, s
+        >>> viscous = ub.Fibres(law, number=10)
     """
 
     tau: float
@@ -122,6 +130,10 @@ class Hardening:
 
     Raises:
         SceneError: A number is negative or none; infinity is allowed for the limit.
+
+    Example:
+        >>> law = ub.Hardening(3e5, modulus=1e6)  # N m, N m²
+        >>> yielding = ub.Section(EA=4e9, GA=1e9, EI=1.4e7, rhoA=157.0, bending=law)
     """
 
     limit: Any
@@ -228,7 +240,7 @@ Far below round-off; but numbers that underflow would be forces and stiffnesses 
 
 @dataclass(frozen=True)
 class Softening:
-    """Exponential softening of a discontinuity, P(51)-P(53): a hinge that ends as a joint.
+    """Exponential softening of a hinge or crack, down to a perfect joint, P(51)-P(53).
 
     Args:
         limit: Traction at which it opens: moment of a hinge, N m; stress of a fibre, Pa.  Zero is a
@@ -237,6 +249,11 @@ class Softening:
 
     Raises:
         SceneError: A negative limit, or an energy that is not positive.
+
+    Example:
+        >>> law = ub.Softening(limit=5e4, energy=1e3)  # N m, J
+        >>> print(law.traction(np.array([0.0, 0.02, 0.04])).round())  # after openings in rad; N m
+        [50000. 18394.  6767.]
     """
 
     limit: float
@@ -275,9 +292,14 @@ class Softening:
 
 @dataclass(frozen=True)
 class LinearSoftening(Softening):
-    """Linear softening of a discontinuity, down to nothing at the opening 2 energy / limit.
+    """Linear softening of a hinge or crack, to zero at the opening 2 energy / limit.
 
     Args and errors are those of :class:`Softening`.
+
+    Example:
+        >>> law = ub.LinearSoftening(limit=5e4, energy=1e3)  # N m, J
+        >>> print(law.traction(np.array([0.0, 0.02, 0.04])))  # after openings in rad; N m
+        [50000. 25000.     0.]
     """
 
     def traction(self, ξ: Values) -> Values:

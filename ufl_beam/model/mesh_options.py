@@ -21,7 +21,7 @@ from ufl_beam.model.beams import Beam
 
 @dataclass(frozen=True)
 class Mesh:
-    """The cells that a scene is computed with; those of its beams by default.
+    """Discretization of a scene: number of cells, polynomial degree, lumped mass.
 
     Args:
         refine: Factor on the number of cells between any two places of a beam; a whole number
@@ -33,6 +33,12 @@ class Mesh:
 
     Raises:
         SceneError: A number that makes no mesh.
+
+    Example:
+        >>> fine = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, mesh=ub.Mesh(refine=4))
+        >>> cubic = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, mesh=ub.Mesh(degree=3))
+        >>> print(len(fine.shape(beam)), len(cubic.shape(beam)))
+        17 5
     """
 
     refine: int | Fraction = 1

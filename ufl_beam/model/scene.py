@@ -52,12 +52,17 @@ from ufl_beam.model.supports import COMPONENTS, Support
 
 @dataclass(frozen=True, eq=False)
 class PointMass:
-    """Mass, and rotary inertia, fixed to a place.
+    """Point mass, with rotary inertia, fixed to a place.
 
     Args:
         place: Where.
         mass: kg.
         inertia: About the place; kg m².
+
+    Example:
+        >>> heavy = ub.Scene([beam], [], scene.supports, masses=[ub.PointMass(beam.end, 300.0)])
+        >>> bool(ub.modes(heavy, 1).omega < ub.modes(scene, 1).omega)
+        True
     """
 
     place: Anchor
@@ -72,13 +77,18 @@ class PointMass:
 
 @dataclass(frozen=True, eq=False)
 class Velocity:
-    """Initial motion of beams and bodies as one rigid body.
+    """Initial velocity of beams and bodies that move as one rigid body.
 
     Args:
         beams: The beams and bodies that move so.
         linear: Velocity of the point ``about``; m/s.
         angular: Angular velocity; rad/s.
         about: Point of the undeformed scene, by default the origin; m.
+
+    Example:
+        >>> spin = ub.Velocity((beam,), linear=(1.0, 0.0), angular=2.0)
+        >>> spin.at(0.0, 3.0)  # of the point (0, 3); m/s, m/s, rad/s
+        (-5.0, 0.0, 2.0)
     """
 
     beams: tuple[Beam | Body, ...]
@@ -110,7 +120,7 @@ class Velocity:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Beams and bodies, and what joins, holds, loads and moves them.
+    """Model: beams and bodies with joints, supports, loads, masses and connectors.
 
     Args:
         beams: The beams.
@@ -128,6 +138,10 @@ class Scene:
 
     Raises:
         SceneError: The parts do not fit together; the message names them.
+
+    Example:
+        >>> frame = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.Gravity()])
+        >>> figure = ub.plot(frame)  # check it by eye before the run
     """
 
     beams: Sequence[Beam] = ()

@@ -46,6 +46,13 @@ class Section:
     Raises:
         SceneError: A stiffness is not positive, a number is not finite, a law is none, or laws of
             resultants stand beside fibres.
+
+    Example:
+        >>> plate = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
+        >>> pipe = ub.Section.tube(d=0.2, t=0.01, E=210e9, nu=0.3, rho=7850.0)
+        >>> own = ub.Section(EA=4.2e9, GA=1.3e9, EI=1.4e7, rhoA=157.0, rhoI=0.5)
+        >>> print(f"{plate.EI:.3g} {pipe.EI:.3g} {own.EI:.3g}")  # N m²
+        1.4e+07 5.67e+06 1.4e+07
     """
 
     EA: float

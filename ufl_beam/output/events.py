@@ -38,13 +38,20 @@ FREE = 0.999
 
 
 class Event(NamedTuple):
-    """Something that happened in a step.
+    """Event of a step: yielding, opening of a hinge, contact, sliding.
 
     Attributes:
         time: End of the step; s; on a path its load factor.
         where: A place in the middle of a cell, that of a plastic hinge, or a connector.
         what: "yields", "opens", "is free" in a cell; "touches", "lets go", "slides", "sticks".
         parameter: Words for the time.
+
+    Example:
+        >>> events = ub.Events()
+        >>> run = ub.simulate(hinged, ub.Static(), t=(0, 1), dt=0.02, record=events)
+        >>> opening = events.found[0]
+        >>> print(f"{opening.time:.2f} s: {opening.where} {opening.what}")
+        0.10 s: beam.start (0, 0) opens
     """
 
     time: float
@@ -57,7 +64,7 @@ class Event(NamedTuple):
 
 
 class Events(Recorder):
-    """A list of what happens, for scenes with hinges, inelastic material, stops or friction.
+    """Recorder of events, for scenes with hinges, inelastic material, stops or friction.
 
     A hinge "is free" when it has dissipated 99.9 % of its energy; stops touch and let go, friction
     slides and sticks as often as they do, the rest happens once in a cell or hinge.  A hinge that
@@ -68,6 +75,11 @@ class Events(Recorder):
 
     Attributes:
         found: The events in their order, the same on all processes.
+
+    Example:
+        >>> events = ub.Events(tell=print)
+        >>> run = ub.simulate(hinged, ub.Static(), t=(0, 0.5), dt=0.02, record=events)
+        t = 0.1 s: beam.start (0, 0) opens
     """
 
     def __init__(self, tell: Callable[[Event], object] | None = None) -> None:

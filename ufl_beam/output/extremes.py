@@ -16,13 +16,20 @@ from ufl_beam.output.recorders import Recorded, Recorder
 
 
 class Extent(NamedTuple):
-    """From where to where values went, all arrays of the shape of the values.
+    """Smallest and largest values of a run and their times; arrays of one shape.
 
     Attributes:
         low: The least values.
         high: The largest values.
         time_low: When the least were reached first; s.
         time_high: When the largest were reached first; s.
+
+    Example:
+        >>> extremes = ub.Extremes()
+        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=extremes)
+        >>> v = extremes.displacement(beam).of((-1, 1))
+        >>> print(v.low.round(3), v.time_low)  # m, s
+        -0.019 1.0
     """
 
     low: Array
@@ -32,11 +39,11 @@ class Extent(NamedTuple):
 
     @classmethod
     def around(cls, values: Array, t: float) -> Extent:
-        """That of one time."""
+        """Return the range of the values of one time."""
         return cls(values.copy(), values.copy(), *np.full((2, *values.shape), t))
 
     def widen(self, values: Array, t: float) -> None:
-        """Take in the values of a time."""
+        """Extend the range by the values of a time."""
         for reached, when, beyond in (
             (self.low, self.time_low, values < self.low),
             (self.high, self.time_high, values > self.high),
@@ -46,14 +53,20 @@ class Extent(NamedTuple):
                 when[beyond] = t
 
     def of(self, rows: Index) -> Extent:
-        """That of some of the values."""
+        """Return the range of some of the values."""
         return Extent(*(values[rows] for values in self))
 
 
 class Extremes(Recorder):
-    """Running extremes of the section forces in all cells and of the motion of all nodes.
+    """Recorder of the extremes of section forces in all cells and of motions of all nodes.
 
     Each step counts, whatever the solution keeps; memory does not grow.
+
+    Example:
+        >>> extremes = ub.Extremes()
+        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=extremes)
+        >>> print(extremes.section_forces(beam).low[:, 2].round(-3))  # least M in the cells; N m
+        [-175000. -125000.  -75000.  -25000.]
     """
 
     def open(self, simulation: Recorded) -> None:
@@ -67,7 +80,7 @@ class Extremes(Recorder):
             extent.widen(values, simulation.t)
 
     def state(self) -> State:
-        """The extremes."""
+        """Return the extremes so far, by name."""
         extents = ("forces", self._forces), ("q", self._q)
         return {f"{of} {name}": x for of, extent in extents for name, x in extent._asdict().items()}
 

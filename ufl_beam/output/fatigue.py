@@ -22,7 +22,7 @@ BLOCK = 1000
 
 @dataclass(frozen=True, eq=False)
 class HotSpot:
-    """A place whose stress is followed.
+    """Place of a beam whose stress cycles :class:`Fatigue` counts.
 
     Args:
         place: Where on a beam.
@@ -30,6 +30,12 @@ class HotSpot:
 
     Raises:
         SceneError: The place is none, or the stress no function.
+
+    Example:
+        >>> nominal = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9, factor=1.5)
+        >>> own = ub.HotSpot(beam.start, lambda N, V, M: N / 0.02 - 0.1 * M / 6.67e-5)
+        >>> np.allclose(nominal.stress(0.0, 0.0, 1e4), 1.5 * own.stress(0.0, 0.0, 1e4), rtol=1e-3)
+        True
     """
 
     place: Place
@@ -63,7 +69,7 @@ class HotSpot:
 
 
 class Fatigue(Recorder):
-    """Rainflow cycles of the stress at named places, counted while the run goes on.
+    """Recorder of the rainflow cycles of the stress at named places.
 
     Its memory does not grow with the number of steps.  Between the middle of a cell, where the
     element knows it, and the place the moment varies by the shear force.
@@ -77,6 +83,15 @@ class Fatigue(Recorder):
     Raises:
         SceneError: A spot or the curve is none, or the resolution is not positive.
         ImportError: The package `rainflow`, which counts, is missing.
+
+    Example:
+        >>> spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
+        >>> fatigue = ub.Fatigue(spot, ub.SNCurve.eurocode(71e6))
+        >>> shake = ub.PointLoad(beam.end, force=(0, 5e4), time=np.sin)
+        >>> shaken = ub.Scene([beam], supports=scene.supports, loads=[shake])
+        >>> run = ub.simulate(shaken, ub.Static(), t=(0, 20), dt=0.2, record=fatigue)
+        >>> print(f"life: {fatigue.life(spot):.0e} s")
+        life: 2e+05 s
     """
 
     def __init__(

@@ -30,7 +30,7 @@ CONNECTOR = ("motion", "force", "work")
 
 
 class History(Recorder):
-    """Table of the motion of places and of the ledger, one row a step, complete if the run dies.
+    """Table (CSV) of the motion of places and of the energy ledger, complete after a crash.
 
     Columns: t, or the load factor of a path; u, v, psi of each place; motion, force, work of each
     connector; then the entries of the ledger.  The names of the columns end in their units.
@@ -47,6 +47,12 @@ class History(Recorder):
 
     Raises:
         SceneError: ``every`` or ``most`` is no whole number, at least 1.
+
+    Example:
+        >>> table = ub.History("tip.csv", [beam.end])
+        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=table)
+        >>> np.loadtxt("tip.csv", delimiter=",", skiprows=1).shape[0]
+        21
     """
 
     def __init__(

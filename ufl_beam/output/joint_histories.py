@@ -31,7 +31,7 @@ class Motion(Protocol):
 
     @property
     def times(self) -> Array:
-        """Times; (n+1,); s."""
+        """Times that were kept; (n+1,); s."""
 
     def displacement(self, place: Anchor) -> Array:
         """Return (u, v, ψ) of a place; (n+1, 3); m, m, rad."""

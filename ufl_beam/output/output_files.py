@@ -124,7 +124,7 @@ class OutputFile:
 
     @property
     def size(self) -> int:
-        """Its length; bytes."""
+        """Length of the file; bytes."""
         return os.fstat(self._file).st_size
 
     def put(self, at: int, data: bytes | bytearray) -> None:

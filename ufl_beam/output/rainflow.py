@@ -26,13 +26,18 @@ Ends = tuple[float, float]
 
 @dataclass(frozen=True)
 class Goodman:
-    """Equivalent range S / (1 − mean / ultimate) of cycles about a mean stress in tension.
+    """Goodman's line: equivalent range S / (1 − mean / ultimate) about a tensile mean stress.
 
     The straight line of the Haigh diagram; with the yield stress it is Soderberg's.  Compression is
     of no help.  A mean stress of ``ultimate`` breaks at once.
 
     Args:
         ultimate: Ultimate stress; Pa.
+
+    Example:
+        >>> curve = ub.SNCurve(range=71e6, mean=ub.Goodman(ultimate=500e6))
+        >>> print(curve.endurance(71e6, mean=0.0), curve.endurance(71e6, mean=250e6))
+        2000000.0 250000.0
     """
 
     ultimate: float
@@ -47,10 +52,15 @@ class Goodman:
 
 @dataclass(frozen=True)
 class Gerber:
-    """Equivalent range S / (1 − (mean / ultimate)²), a parabola in the place of Goodman's line.
+    """Gerber's parabola: equivalent range S / (1 − (mean / ultimate)²) about a mean stress.
 
     Args:
         ultimate: Ultimate stress; Pa.
+
+    Example:
+        >>> welded, machined = ub.SNCurve(range=71e6), ub.SNCurve(range=71e6, mean=ub.Gerber(500e6))
+        >>> bool(machined.endurance(100e6, mean=200e6) < welded.endurance(100e6, mean=200e6))
+        True
     """
 
     ultimate: float
@@ -76,7 +86,7 @@ def any_mean(range: Array, mean: Array) -> Array:
 
 @dataclass(frozen=True, kw_only=True)
 class SNCurve:
-    """Cycles that a stress range can be borne for: straight lines in logarithms, Basquin's law.
+    """S-N curve: cycles to failure over the stress range, by Basquin's law.
 
     Args:
         range: Stress range that is borne for ``cycles``; Pa.
@@ -89,6 +99,11 @@ class SNCurve:
 
     Raises:
         SceneError: A number is not positive, or ``limit`` is less than ``knee``.
+
+    Example:
+        >>> curve = ub.SNCurve.eurocode(71e6)
+        >>> print(curve.endurance([142e6, 71e6, 10e6]))  # cycles to failure
+        [ 250000. 2000000.      inf]
     """
 
     range: float
@@ -135,12 +150,19 @@ class SNCurve:
 
 @dataclass(frozen=True, eq=False)
 class Cycles:
-    """Cycles of a stress history, the smallest first.
+    """Cycles of a stress history, sorted by range, the smallest first.
 
     Attributes:
         range: Their ranges; (n,); Pa.
         mean: Their mean stresses; (n,); Pa.
         count: How many there were, halves included; (n,).
+
+    Example:
+        >>> cycles = ub.rainflow([0, 100e6, -50e6, 80e6, 0])  # Pa
+        >>> print(cycles.range / 1e6, cycles.count)
+        [ 80. 100. 130. 150.] [0.5 0.5 0.5 0.5]
+        >>> print(f"{cycles.damage(ub.SNCurve.eurocode(71e6)):.2e}")
+        4.95e-06
     """
 
     range: Array
@@ -166,7 +188,7 @@ class Cycles:
 
 
 def rainflow(series: npt.ArrayLike) -> Cycles:
-    """Rainflow cycles of a whole series, ASTM E1049-85; needs the package `rainflow`.
+    """Count the rainflow cycles of a series, ASTM E1049-85; needs the package `rainflow`.
 
     Args:
         series: Stresses, or whatever goes to and fro; (n,).
@@ -174,6 +196,11 @@ def rainflow(series: npt.ArrayLike) -> Cycles:
     Raises:
         SceneError: It is not one row of finite numbers.
         ImportError: The package is missing.
+
+    Example:
+        >>> cycles = ub.rainflow([0, 3, 1, 2, 0])
+        >>> print(cycles.range, cycles.mean, cycles.count)
+        [1. 3.] [1.5 1.5] [1. 1.]
     """
     values = require_row(series, "rainflow: series")
     counts: defaultdict[Ends, float] = defaultdict(float)

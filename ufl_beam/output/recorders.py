@@ -69,7 +69,16 @@ class Recorded(Protocol):
 
 
 class Recorder(ABC):
-    """Observer of the accepted steps of a run; all processes call it together."""
+    """Base class of recorders, which see each accepted step; called by all processes together.
+
+    Example:
+        >>> class Speed(ub.Recorder):
+        ...     largest = 0.0
+        ...     require_writable = open = close = lambda self, *simulation: None
+        ...     def write(self, simulation):
+        ...         self.largest = max(self.largest, abs(simulation.velocity(beam.end)[1]))
+        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=Speed())
+    """
 
     @property
     def files(self) -> tuple[Path, ...]:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
 
 from mpi4py import MPI
@@ -167,15 +166,6 @@ class StateView:
         links = self.scene.links
         numbers = [n for n in links_of(self.scene, joint) if not links[n].turns]
         return float(np.linalg.norm(self.connections()[numbers, 1]))
-
-    def rates(self, links: Sequence[Connector]) -> Array:
-        """Rates of the relative motions of one kind of connectors now; m/s or rad/s."""
-        rates = np.zeros(len(links))
-        for v in self.velocities():
-            for coupling in self.couplings:
-                if isinstance(coupling, Couplings) and coupling.links == list(links):
-                    rates += coupling.rates(self.q, v)
-        return rates
 
     def section_forces(self) -> Array:
         """(N, V, M) in all cells; (num_cells, 3); N, N, N m; all processes call it together."""

@@ -93,7 +93,7 @@ class TimeSeries(Recorder):
             ) from None
 
     def close(self) -> None:
-        """Close the files."""
+        """Close the files of the time series."""
         writers, self._writers = self._writers, []
         for writer in writers:
             writer.close()
@@ -118,6 +118,12 @@ class XDMF(TimeSeries):
 
     Raises:
         SceneError: ``every`` is no whole number of steps, or the path does not end in ``.xdmf``.
+
+    Example:
+        >>> film = ub.XDMF("beam.xdmf", every=5)
+        >>> solution = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=film)
+        >>> [path.name for path in film.files]
+        ['beam.xdmf', 'beam.xdmf.bin']
     """
 
     ending = ".xdmf"
@@ -159,13 +165,19 @@ class VTKHDF(TimeSeries):
     Raises:
         SceneError: ``every`` is no whole number of steps, or the path does not end in
             ``.vtkhdf``.
+
+    Example:
+        >>> film = ub.VTKHDF("beam.vtkhdf", every=5)
+        >>> solution = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=film)
+        >>> [path.name for path in film.files]
+        ['beam.vtkhdf']
     """
 
     ending = ".vtkhdf"
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """The file."""
+        """Path of the file."""
         return (self._path,)
 
     def _writer(self, fields: LineFields, complete: list[int] | None = None) -> VtkhdfWriter:

@@ -144,7 +144,7 @@ class VtkhdfWriter:
     # -- steps ---------------------------------------------------------------------------------
 
     def write(self, t: float, fields: Fields) -> None:
-        """Append a step."""
+        """Append a step with its fields."""
         n = self.steps
         numbers = (*(n * count for count in self._counts), 0, 0, 1)
         rows: list[Any] = [*(values for by_name in fields for values in by_name.values()), *numbers]

@@ -109,7 +109,7 @@ class XdmfWriter:
             raise ValueError("not the files that were written up to there")
 
     def write(self, t: float, fields: Sequence[Mapping[str, Array]]) -> None:
-        """Append a step; ``fields`` are those at points and in cells, by name."""
+        """Append a step with its fields."""
         if self._writing:  # an interrupt has left a part of a step
             self._cut()
         self._writing = True
@@ -161,7 +161,7 @@ class XdmfWriter:
         self._xml.sync()
 
     def close(self) -> None:
-        """Close both files."""
+        """Close the text file and the file of numbers."""
         try:
             if self._writing:
                 self._cut()

@@ -31,7 +31,7 @@ LEAST_ERROR = 1e-12
 def plot_modes(
     shapes: Shapes, which: Sequence[int] = (), *, amplitude: float = AMPLITUDE
 ) -> Figure:
-    """Shapes side by side, in both directions from where the scene was made, grey.
+    """Draw modes side by side, in both directions from the grey undeformed scene.
 
     Args:
         shapes: Of :func:`modes` or :func:`buckling`.
@@ -40,6 +40,9 @@ def plot_modes(
 
     Raises:
         SceneError: There is no such shape, or ``amplitude`` is not positive.
+
+    Example:
+        >>> ub.plot_modes(ub.modes(scene, 3)).savefig("modes.png")
     """
     chosen = list(which) if len(which) else list(range(len(shapes)))
     if not chosen:
@@ -75,13 +78,18 @@ def plot_modes(
 
 
 def plot_tradeoff(tradeoff: Tradeoff) -> Figure:
-    """Error over wall time of all runs, of the worst quantity; a ring marks the recommended one.
+    """Draw errors over wall times of all runs, and the recommended run in a ring.
 
     Each kind of scheme, steps and cells has a colour; the line is that of runs that no other one
     beats in both.  The error is a part of the tolerance, or, with a budget, of the quantity.
 
     Args:
         tradeoff: What :func:`tradeoff` returned.
+
+    Example:
+        >>> tip = {"tip": lambda run: run.position(beam.end)[-1]}
+        >>> found = ub.tradeoff(scene, tip, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance=0.01)
+        >>> ub.plot_tradeoff(found).savefig("tradeoff.png")
     """
     with picture((9.0, 6.0)) as figure:
         axes = figure.subplots()

@@ -34,7 +34,7 @@ CLASSES = 40
 
 
 def plot_extremes(solution: Solution, extremes: Extremes, what: str = "M") -> Figure:
-    """The frame with the envelope of a section force: largest values in red, least in blue.
+    """Draw the envelope of a section force on the frame: maxima red, minima blue.
 
     As in :func:`plot`, on the undeformed axis; the values of each cell may be of different times.
 
@@ -45,6 +45,11 @@ def plot_extremes(solution: Solution, extremes: Extremes, what: str = "M") -> Fi
 
     Raises:
         SceneError: Unknown ``what``, or the extremes are of another scene or of no run.
+
+    Example:
+        >>> extremes = ub.Extremes()
+        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=extremes)
+        >>> ub.plot_extremes(run, extremes, "M").savefig("extremes.png")
     """
     require_choice(what, RESULTANTS, "plot_extremes: what")
     index, points = list(RESULTANTS).index(what), solution.grid.points
@@ -67,7 +72,7 @@ def plot_extremes(solution: Solution, extremes: Extremes, what: str = "M") -> Fi
 
 
 def plot_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:
-    """Cycles of stress at a place over their range: about which mean, how many, at what cost.
+    """Draw rainflow matrix, spectrum and damage of the stress cycles at a place.
 
     On the left the rainflow matrix; in the middle how many cycles have at least a range, and the
     curve that they can be borne for; on the right which part of the damage each class does.
@@ -78,6 +83,14 @@ def plot_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:
 
     Raises:
         SceneError: The spot is none of them, nothing was run, or the stress never turned.
+
+    Example:
+        >>> spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
+        >>> fatigue = ub.Fatigue(spot, ub.SNCurve.eurocode(71e6))
+        >>> shake = ub.PointLoad(beam.end, force=(0, 5e4), time=np.sin)
+        >>> shaken = ub.Scene([beam], supports=scene.supports, loads=[shake])
+        >>> run = ub.simulate(shaken, ub.Static(), t=(0, 20), dt=0.2, record=fatigue)
+        >>> ub.plot_cycles(fatigue, spot).savefig("cycles.png")
     """
     cycles, curve = fatigue.cycles(spot), fatigue.curve
     if not len(cycles.range):

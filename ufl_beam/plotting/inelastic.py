@@ -47,7 +47,7 @@ FULLY_OPEN = 0.99
 
 
 def plot_moment_curvature(solution: Solution, place: Place) -> Figure:
-    """Moment M (N m) of the cell at a place against its curvature K (1/m), coloured by time.
+    """Draw the moment M (N m) of a cell against its curvature K (1/m), coloured by time.
 
     The curvature includes the jump of a hinge over the length of the cell; loops enclose what is
     dissipated per length.  A ring marks the first kept time, a dot the last one.
@@ -58,6 +58,9 @@ def plot_moment_curvature(solution: Solution, place: Place) -> Figure:
 
     Raises:
         SceneError: The scene is elastic, or the beam of the place is not in it.
+
+    Example:
+        >>> ub.plot_moment_curvature(broken, weak.start).savefig("loops.png")
     """
     M, K = solution.material_at(place).forces[:, 2], solution.strains_at(place)[:, 2]
     with picture((8.0, 5.4)) as figure:
@@ -69,7 +72,7 @@ def plot_moment_curvature(solution: Solution, place: Place) -> Figure:
 
 
 def plot_hinge(solution: Solution, place: Place) -> Figure:
-    """Moment M (N m) of the hinge at a place against its jump (rad), coloured by time.
+    """Draw the moment M (N m) of a hinge against its jump (rad), coloured by time.
 
     The area between the path and the axis is the energy that the hinge dissipated; the title says
     how much it is (J), and how much of its fracture energy.
@@ -82,6 +85,9 @@ def plot_hinge(solution: Solution, place: Place) -> Figure:
     Raises:
         SceneError: The scene is elastic, there is no hinge, or the beam of the place is not in the
             scene.
+
+    Example:
+        >>> ub.plot_hinge(broken, weak.start).savefig("hinge.png")
     """
     kept, grid = solution.material_at(place), solution.grid
     hinge = grid.hinge_at(place)
@@ -104,7 +110,7 @@ def plot_hinge(solution: Solution, place: Place) -> Figure:
 
 
 def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Figure:
-    """The frame at the n-th kept time, where it has yielded and where it has broken.
+    """Draw yielded cells and opened hinges on the frame at the n-th kept time.
 
     Cells that have yielded are coloured by the energy that plastic strains dissipated per length
     (J/m); in cells of fibres that includes cracks.  Hinges that have opened are circles, the larger
@@ -117,6 +123,9 @@ def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Fig
 
     Raises:
         SceneError: The scene is elastic, no such time, or ``magnify`` is not positive.
+
+    Example:
+        >>> ub.plot_damage(broken).savefig("damage.png")
     """
     from matplotlib.collections import LineCollection
 
@@ -160,7 +169,7 @@ def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Fig
 
 
 def plot_dissipation(solution: Solution) -> Figure:
-    """Where the energy went over time (J): what was lost, by sink, as areas upon each other.
+    """Draw the energy losses over time (J) by their sinks, as stacked areas.
 
     The line above them is what was supplied, with what the scene held at the first kept time, if
     anything; the gap between is the energy in the scene, a line of its own.  The title says the
@@ -168,6 +177,9 @@ def plot_dissipation(solution: Solution) -> Figure:
 
     Raises:
         SceneError: The scene is elastic, and has no connectors.
+
+    Example:
+        >>> ub.plot_dissipation(broken).savefig("dissipation.png")
     """
     if not solution.scene.connectors:
         if not solution.scene.beams:

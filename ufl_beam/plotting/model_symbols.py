@@ -59,7 +59,7 @@ class Drawing:
         self.labels += labels
 
     def everything(self) -> Iterator[Stroke]:
-        """All strokes."""
+        """Iterate over all strokes of the drawing."""
         for group in self.strokes.values():
             yield from group
 
@@ -89,7 +89,7 @@ class Subject(NamedTuple):
 
     @property
     def cells(self) -> int:
-        """Number of cells."""
+        """Number of cells that are drawn."""
         return sum(len(axis) - 1 for axis in self.axes.values())
 
 

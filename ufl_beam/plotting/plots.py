@@ -46,7 +46,7 @@ COMPONENTS = {
 def plot_shapes(
     solution: Solution, times: Sequence[float] = (), *, count: int = 8, magnify: float = 1.0
 ) -> Figure:
-    """Successive shapes in one picture, coloured by time, or by the load factor of a path.
+    """Draw successive shapes in one picture, coloured by time or load factor.
 
     Args:
         solution: What to show.
@@ -59,6 +59,9 @@ def plot_shapes(
     Raises:
         SceneError: ``times`` is one number, ``count`` is less than 1, or ``magnify`` is not
             positive.
+
+    Example:
+        >>> ub.plot_shapes(solution, count=5, magnify=10).savefig("shapes.png")
     """
     require_number(count, "plot_shapes: count", at_least=1)
     if np.ndim(times) != 1:
@@ -89,7 +92,7 @@ def plot_shapes(
 def plot_history(
     solution: Solution, places: Anchor | Sequence[Anchor], *, component: str = "v"
 ) -> Figure:
-    """A component of the motion of one or more places over time.
+    """Draw a component of the motion of one or more places over time.
 
     Args:
         solution: What to show.
@@ -99,6 +102,9 @@ def plot_history(
     Raises:
         SceneError: Unknown ``component``, a place that is not in the scene, or the velocity of a
             static run.
+
+    Example:
+        >>> ub.plot_history(solution, beam.end, component="v").savefig("history.png")
     """
     require_choice(component, COMPONENTS, "plot_history: component")
     followed = (places,) if isinstance(places, Anchor) else tuple(places)
@@ -118,10 +124,13 @@ def plot_history(
 
 
 def plot_energy(solution: Solution) -> Figure:
-    """The ledger over time, or along a path, and below it what it does not explain.
+    """Draw the energy ledger over time or along a path, and below it its imbalance.
 
     Above: energy in the scene, solid; supplied, dashed; lost, dotted.  Below: the imbalance as a
     part of the energy that went through, with the machine precision for comparison.
+
+    Example:
+        >>> ub.plot_energy(solution).savefig("energy.png")
     """
     energy, precision = solution.energy, float(np.finfo(np.float64).eps)
     along = solution.progress

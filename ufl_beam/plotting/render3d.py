@@ -35,7 +35,7 @@ def render(
     magnify: float = 1.0,
     size: tuple[int, int] = (1600, 900),
 ) -> None:
-    """Write a picture of the frame at the n-th kept time as a solid body.
+    """Write a rendered picture of the frame at the n-th kept time.
 
     In the plane, beams have the depth of their section; across, they have the same depth, or a
     visible one if they are slender.  Bodies are plates, see :func:`plot`.  Orange pins are hinges
@@ -54,6 +54,9 @@ def render(
         SceneError: A wrong argument; the message says which.
         ImportError: PyVista is missing.
         RuntimeError: There is neither a screen nor Xvfb.
+
+    Example:
+        >>> ub.render(solution, "beam.png", color="M", size=(640, 360))
     """
     from matplotlib.image import imsave
 
@@ -77,7 +80,7 @@ def animate(
     magnify: float = 1.0,
     size: tuple[int, int] = (960, 544),
 ) -> None:
-    """Write a film of the whole motion.
+    """Write an animation of the whole motion as GIF or MP4.
 
     The camera stands still and sees all of the motion; colours mean the same in all frames.  Works
     without a screen: where VTK cannot (before 9.4), an Xvfb is started for the time being.
@@ -96,6 +99,9 @@ def animate(
         SceneError: A wrong argument; the message says which.
         ImportError: PyVista, imageio or imageio-ffmpeg is missing.
         RuntimeError: There is neither a screen nor Xvfb.
+
+    Example:
+        >>> ub.animate(solution, "beam.gif", fps=5, seconds=0.4, size=(320, 192))
     """
     look = Look(solution, color, thickness, magnify, size)
     path = require_suffix(path, (".gif", ".mp4"))

@@ -140,7 +140,7 @@ class Stage(Setting):
 
     @cached_property
     def travels(self) -> dict[Connector, Range]:
-        """See :attr:`Setting.travels`."""
+        """Range of motion of each sliding connector, see :attr:`Setting.travels`."""
         return {holder: self._travel(holder) for holder in self.sliding}
 
     def _travel(self, holder: Connector) -> Range:

@@ -93,12 +93,17 @@ def require_choice(choice: str, choices: Iterable[str], what: str) -> None:
 
 @contextmanager
 def picture(size: tuple[float, float]) -> Iterator[Figure]:
-    """A new figure in the style of this package, for pictures of your own.
+    """Open a new figure in the style of this package, for pictures of your own.
 
     Only the first process saves it, as all of them run the same script.
 
     Args:
         size: Width and height; inch.
+
+    Example:
+        >>> with ub.picture((6, 4)) as figure:
+        ...     lines = figure.subplots().plot(solution.times, solution.position(beam.end)[:, 1])
+        >>> figure.savefig("drop.png")
     """
     import matplotlib as mpl
     from matplotlib.figure import Figure

@@ -63,7 +63,7 @@ class Footing(NamedTuple):
 
 
 def bodies(pose: Pose) -> list[Stroke]:
-    """Outlines of all bodies."""
+    """Outlines of the rigid bodies."""
     outlines = pose.stage.outlines.items()
     return [Stroke(pose.of_body(body, line), EDGE, 1.6, FILLED, BACK) for body, line in outlines]
 

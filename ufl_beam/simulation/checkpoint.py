@@ -45,7 +45,7 @@ Content = dict[str, Any]
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """Where and how often a run writes down all that it needs to go on.
+    """Checkpoint file from which a run is restarted, and the interval of writing it.
 
     If the file exists when the run begins, it goes on from there, as the same run to the last bit:
     after a crash the same script is simply run again.
@@ -60,6 +60,12 @@ class Checkpoint:
 
     Raises:
         SceneError: Neither ``every`` nor ``minutes``, or a bad number; no state in ``also``.
+
+    Example:
+        >>> backup = ub.Checkpoint("run.checkpoint", every=1000)
+        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, checkpoint=backup)
+        >>> [path.name for path in backup.files]
+        ['run.checkpoint', 'run.checkpoint.part']
     """
 
     path: str | Path

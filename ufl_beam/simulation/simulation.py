@@ -132,7 +132,7 @@ class Trial(NamedTuple):
 
 
 class Simulation(StateView):
-    """A scene in motion: one state, and the step to the next.
+    """Time stepper of a scene: its present state and the step to the next.
 
     :func:`simulate` is a loop over :meth:`step_to`; use this class for loops of your own.
 
@@ -154,6 +154,14 @@ class Simulation(StateView):
         parts: Number of parts that steps were cut into, those not cut included.
         together: Calls that raise on all processes of a shared scene what they raise on one.
         last_dt: Length of the last accepted step; s.
+
+    Example:
+        >>> simulation = ub.Simulation(scene, ub.Midpoint())
+        >>> while simulation.t < 1:
+        ...     simulation.step_to(simulation.t + 0.05)
+        >>> print((1e3 * simulation.displacement(beam.end)).round(1))  # mm, mm, mrad
+        [ -0.1 -18.9 -14.3]
+        >>> simulation.close()
     """
 
     def __init__(
@@ -209,7 +217,15 @@ class Simulation(StateView):
         self._numerical: list[Term] = []
         self._make_beams()
         self.force = np.zeros(self.share.size)
-        setting = Setting(self, scheme, self.ledger, friction_repeats(scene), self._course)
+        self._asking = [
+            (link, link.law) for link in scene.links if isinstance(link.law, Controller | Coulomb)
+        ]
+        self.asked: dict[Connector, float] = dict.fromkeys((link for link, _ in self._asking), 0.0)
+        self._sliding = dict.fromkeys(self.asked, 0.0)
+        setting = Setting(
+            self.asked, self._sliding, scene.size, scheme, self.ledger, friction_repeats(scene),
+            self._course,
+        )  # fmt: skip
         self.couplings = self.together(couplings, self.share, setting, self._A)
         self._openings = Openings.of(self._course, self._openable(), self.share.comm)
         self.loads = self._make_loads()
@@ -242,10 +258,11 @@ class Simulation(StateView):
                 self.inertia.carry_on(memory, known)
         self._q_before: Array = self.q
         self.last_dt: float = math.inf
-        self._asking = [
-            (link, link.law) for link in scene.links if isinstance(link.law, Controller | Coulomb)
+        self._rubbing = [
+            one
+            for one in self.couplings
+            if isinstance(one, Couplings) and isinstance(one.links[0].law, Coulomb)
         ]
-        self.asked: dict[Connector, float] = dict.fromkeys((link for link, _ in self._asking), 0.0)
         self._rotations = self.share.rotations()
         self._multipliers = as_slice(self.share.multipliers())
         for term in self.terms:
@@ -694,7 +711,10 @@ class Simulation(StateView):
 
         All processes ask together, whoever computes the connector.
         """
-        self.asked = {link: law.ask(self, link) for link, law in self._asking}
+        self.asked.update({link: law.ask(self, link) for link, law in self._asking})
+        for coupling in self._rubbing if has_inertia(self.scheme) else ():
+            rates = coupling.rates(self.q, self.inertia.v)
+            self._sliding.update(zip(coupling.links, rates, strict=True))
 
     def _require_small(self, turn: float) -> None:
         """Raise if a node of any process turns too far in the step."""

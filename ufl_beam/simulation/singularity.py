@@ -54,7 +54,7 @@ class Failed(Protocol):
 
     @property
     def tangent(self) -> Csr:
-        """The latest tangent."""
+        """Latest tangent of the failed step."""
 
     def respond_at(self, q1: Array) -> bool:
         """Evaluate forces and tangent at ``q1``; return whether all processes can."""

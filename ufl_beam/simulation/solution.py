@@ -79,7 +79,7 @@ FORMAT = "solution of ufl_beam, 1"
 
 
 class Solution:
-    """The motion of a scene at the times that were kept; the same on every process.
+    """Results of a run: motions and forces at the kept times; the same on every process.
 
     It can be saved, see :meth:`save`, and pickled, with what a file has.
 
@@ -95,6 +95,14 @@ class Solution:
         parameter: Words for :attr:`times`, which are load factors in a path.
         open_ledger: How far the energy ledger is open, in words; empty if it closes as claimed.
         internal: What cells and connectors remember at the end of the run.
+
+    Example:
+        >>> print((1e3 * solution.displacement(beam.end)[-1]).round(1))  # mm, mm, mrad, at t = 1 s
+        [ -0.1 -18.9 -14.3]
+        >>> print(solution.section_forces(beam)[:, 2].round(-3))  # M in the cells; N m
+        [-175000. -125000.  -75000.  -25000.]
+        >>> print(solution.reaction(scene.supports[0])[-1, 1:].round(-4))  # N, N m
+        [100000. 200000.]
     """
 
     parameter = TIME
@@ -473,7 +481,7 @@ class Solution:
 
     @property
     def energy(self) -> Energy:
-        """The ledger."""
+        """Energy ledger of the run."""
         groups = []
         for group in range(3):
             names = dict.fromkeys(name for entries in self._entries for name in entries[group])
@@ -547,6 +555,12 @@ def load(path: str | Path) -> Solution:
     Raises:
         SceneError: There is no such file, or it holds no solution, or is damaged, or is of a
             version that numbers degrees of freedom otherwise.
+
+    Example:
+        >>> solution.save("beam.h5")
+        >>> loaded = ub.load("beam.h5")
+        >>> bool((loaded.q == solution.q).all())
+        True
     """
     file = require_path(path, "load")
     text, arrays = read(file, FORMAT)

@@ -8,7 +8,6 @@ Where several processes share a scene, and where supports are at an angle, SNES 
 
 from __future__ import annotations
 
-import ctypes
 import math
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -18,23 +17,12 @@ from petsc4py import PETSc
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import doubles, ffi, integers, lib
+from ufl_beam.compiled.c_library import doubles, ffi, integers, lib, petsc
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.terms.beams import Beams, Term
 from ufl_beam.terms.connectors import Couplings
 from ufl_beam.terms.guide_curves import Guides
 from ufl_beam.terms.supports import Supports
-
-_PETSC = ctypes.CDLL(PETSc.__file__)
-"""PETSc itself, which petsc4py has loaded."""
-
-CALLED = (
-    *("VecGetArrayRead", "VecRestoreArrayRead", "VecGetArray", "VecRestoreArray"),
-    *("MatSeqAIJGetArray", "MatSeqAIJRestoreArray"),
-    *("SNESSetIterationNumber", "SNESSetConvergedReason"),
-    *("PCSetUp", "PCGetFailedReason", "PCApply"),
-)
-"""Functions of PETSc that the callbacks call, in the order of ``petsc`` in loops.h."""
 
 Add = Callable[[Array, Array], None]
 
@@ -138,16 +126,13 @@ class Equation:
         loops = [self._loops_of(term) for term in (*inner, *others)]
         self._forces = ffi.new("call[]", [force for force, _ in loops])
         self._stiffnesses = ffi.new("call[]", [s for _, s in loops if s is not None])
-        self._petsc = ffi.new("petsc *")
-        for (name, field), function in zip(ffi.typeof("petsc").fields, CALLED, strict=True):
-            setattr(self._petsc, name, ffi.cast(field.type, _address(function)))
         self._alive = [
             *map(doubles, (force, A.data, supports.reactions, supports.pivots)),
             *(integers(x.astype(np.int32)) for x in (supports.dofs, *supports.entries)),
         ]
         self._supports, self._terms = supports, (*inner, *others)
         self.c = c = ffi.new("equation *")
-        c.petsc, c.size, c.entries = self._petsc, self._size, self._entries
+        c.size, c.entries = self._size, self._entries
         c.inner, c.forces, c.stiffnesses = len(inner), len(loops), len(self._stiffnesses)
         c.force, c.stiffness = self._forces, self._stiffnesses
         c.inner_force, c.tangent, c.reactions, c.pivots, c.hold, c.zero, c.pivot = self._alive
@@ -187,43 +172,26 @@ class Equation:
 
     def attach(self, snes: PETSc.SNES, f: PETSc.Vec, matrix: PETSc.Mat) -> None:
         """Let SNES call the functions in C."""
-        at, at_f, at_matrix = (ctypes.c_void_p(one.handle) for one in (snes, f, matrix))
         function, jacobian, test = map(_in_c, ("snes_function", "snes_jacobian", "snes_test"))
-        me = _pointer(self.c)
-        _PETSC.SNESSetFunction(at, at_f, function, me)
-        _PETSC.SNESSetJacobian(at, at_matrix, at_matrix, jacobian, me)
-        _PETSC.SNESSetConvergenceTest(at, test, me, None)
+        petsc("SNESSetFunction", snes, f, function, self.c)
+        petsc("SNESSetJacobian", snes, matrix, matrix, jacobian, self.c)
+        petsc("SNESSetConvergenceTest", snes, test, self.c, ffi.NULL)
 
     def drive(self, snes: PETSc.SNES) -> None:
         """Let SNES leave Newton's method to the one in C."""
-        at = ctypes.c_void_p(snes.handle)
         snes.setType("shell")
-        _PETSC.SNESShellSetContext(at, _pointer(self.c))
-        _PETSC.SNESShellSetSolve(at, _in_c("snes_newton"))
+        petsc("SNESShellSetContext", snes, self.c)
+        petsc("SNESShellSetSolve", snes, _in_c("snes_newton"))
 
 
 def unlock(vector: PETSc.Vec) -> None:
     """Let a vector be written again that PETSc keeps locked after a linear solve has failed."""
-    at, state = ctypes.c_void_p(vector.handle), np.zeros(1, dtype=PETSc.IntType)
-    at_state = ctypes.c_void_p(state.ctypes.data)
-    _PETSC.VecLockGet(at, at_state)
-    for _ in range(max(0, int(state[0]))):
-        _PETSC.VecLockReadPop(at)
+    state = ffi.new("petsc_int *")
+    petsc("VecLockGet", vector, state)
+    for _ in range(state[0]):
+        petsc("VecLockReadPop", vector)
 
 
-def _address(function: str) -> int | None:
-    """Where a function of PETSc is."""
-    return ctypes.cast(getattr(_PETSC, function), ctypes.c_void_p).value
-
-
-def _pointer(at: Any) -> ctypes.c_void_p:
-    """A pointer of cffi as one of ctypes."""
-    return ctypes.c_void_p(int(ffi.cast("intptr_t", at)))
-
-
-def _in_c(name: str) -> ctypes.c_void_p:
-    """Where a function of ours is."""
-    return _pointer(ffi.addressof(lib, name))
-
-
-lib.shell_context = ffi.cast("int (*)(void *, void *)", _address("SNESShellGetContext"))
+def _in_c(name: str) -> Any:
+    """Pointer to a function of ours."""
+    return ffi.addressof(lib, name)

@@ -68,6 +68,10 @@ class Newton:
             ``PETSC_OPTIONS`` they have the prefix ``ub_``.  With any of them Newton's method is
             that of PETSc, else one in C that does the same, faster where cells are few.  A
             ``snes_linesearch_type`` takes the place of the search that follows full steps.
+
+    Example:
+        >>> newton = ub.Newton(rtol=1e-12, petsc={"snes_linesearch_type": "bt"})
+        >>> run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, newton=newton)
     """
 
     rtol: float = 1e-10
@@ -589,8 +593,10 @@ class Solver:
             snes.solve(None, self._x)
             reason = int(snes.getConvergedReason())
         except PETSc.Error as error:
-            cause = error.__cause__
-            if cause is not None and not isinstance(cause, PETSc.Error):
+            cause: BaseException = error
+            while cause.__cause__ is not None:
+                cause = cause.__cause__
+            if getattr(cause, "ierr", 0) != lib.OF_LIBRARY:
                 raise cause from None
             reason = int(lib.SINGULAR)  # KLU stops PETSc where it finds no pivot
         if self._equation is not None:

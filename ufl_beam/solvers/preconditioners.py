@@ -8,7 +8,7 @@ from typing import Any
 
 from petsc4py import PETSc
 
-from ufl_beam.compiled.c_library import doubles, ffi
+from ufl_beam.compiled.c_library import doubles, ffi, lib
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.dof_numbering import Share
 from ufl_beam.solvers.static_condensation import Elimination
@@ -42,7 +42,7 @@ class Bordered:
         pc.setFailedReason(self._factors.getFailedReason())
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Solve."""
+        """Solve the bordered system for a right-hand side."""
         self._factors.apply(b, y)
         self._factors.apply(self._rate, self._z)
         self._correct(y, self._z)
@@ -94,7 +94,9 @@ class ChainsFirst:
         self._matrix.stateIncrease()
         try:
             self._factors.setUp()
-        except PETSc.Error:
+        except PETSc.Error as error:
+            if error.ierr != lib.OF_LIBRARY:
+                raise
             # KLU says so of a matrix that is singular; its next factorisation does not mind.
             return False
         return int(self._factors.getFailedReason()) == GOOD

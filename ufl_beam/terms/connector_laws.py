@@ -7,7 +7,7 @@ held has a row about e, all other laws have one about λ, linear in e around the
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import singledispatch
 from typing import Any, NamedTuple, Protocol
 
@@ -30,7 +30,6 @@ from ufl_beam.model.connector_laws import (
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.loads import value_at
 from ufl_beam.model.material_laws import Hardening, Layout
-from ufl_beam.model.scene import Scene
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.material_points import INPUTS, Course, Points, expect_entries
 from ufl_beam.terms.openings import Openable
@@ -45,33 +44,22 @@ Rows = tuple[Any, Any, Any]
 """α, β, γ of some connectors: arrays or numbers."""
 
 
-class Running(Protocol):
-    """A simulation, as far as laws of connectors need it.
-
-    Attributes:
-        scene: What is modelled.
-        asked: Forces of controllers, and limits of friction, in the step; N or N m.
-    """
-
-    scene: Scene
-    asked: dict[Connector, float]
-
-    def rates(self, links: Sequence[Connector]) -> Array:
-        """Return the rates of relative motions; (num_links,); m/s or rad/s."""
-
-
 class Setting(NamedTuple):
     """Arguments that all responses are made with.
 
     Attributes:
-        simulation: Whom controllers and friction ask.
+        asked: Forces of controllers, and limits of friction, in the present step; N or N m.
+        rates: Rates of relative motions with friction as the step begins; m/s or rad/s.
+        size: Size of the scene; m.
         scheme: Says what acts in a step.
         ledger: Takes energies and works.
         friction_repeats: Whether places that stick may hold what is held already.
         course: Flags that all points of the scene share.
     """
 
-    simulation: Running
+    asked: Mapping[Connector, float]
+    rates: Mapping[Connector, float]
+    size: float
     scheme: Scheme
     ledger: Ledger
     friction_repeats: bool
@@ -142,7 +130,7 @@ class Response(Protocol):
         """Return the internal variables; (num_links, k)."""
 
     def restore(self, rows: Array) -> None:
-        """Take over :meth:`state`."""
+        """Restore the variables that :meth:`state` returned."""
 
     def start(self, e: Array) -> None:
         """Begin at motions that no step has led to."""
@@ -327,7 +315,7 @@ class _Controlled(_Pushed):
     _entry = "controllers"
 
     def _wanted(self, link: Any, step: Step) -> float:
-        return self._setting.simulation.asked[link]
+        return self._setting.asked[link]
 
 
 @respond.register(Damper)
@@ -352,8 +340,7 @@ class _Asked(_Working):
     _entry = "functions"
 
     def _prepare(self) -> None:
-        size = self._setting.simulation.scene.size
-        self._small = 1e-3 * np.where([c.turns for c in self._links], 1.0, size)
+        self._small = 1e-3 * np.where([c.turns for c in self._links], 1.0, self._setting.size)
 
     def _forces(self, e1: Array) -> Array:
         middle: Array = self._setting.scheme.average(self._e0, e1)
@@ -396,10 +383,9 @@ class _Rubbing(_Working):
     _entry = "friction"
 
     def _prepare(self) -> None:
-        size = self._setting.simulation.scene.size
         self._slip: Array = np.zeros(len(self._links))
         self._accepted: Array = self._slip
-        lengths = np.where([c.turns for c in self._links], 1.0, size)
+        lengths = np.where([c.turns for c in self._links], 1.0, self._setting.size)
         self._tiny = 1e-14 * lengths
         self._softness = (CREEP if self._setting.friction_repeats else 0.0) * lengths
 
@@ -412,11 +398,12 @@ class _Rubbing(_Working):
         self._slip = self._accepted = rows[:, 0].copy()
 
     def _note(self, step: Step) -> None:
-        simulation = self._setting.simulation
-        self._limit = limit = np.array([simulation.asked[link] for link in self._links])
+        setting = self._setting
+        self._limit = limit = np.array([setting.asked[link] for link in self._links])
         self._creep = self._softness / np.where(limit > 0, limit, np.inf)
         # With this way the velocity at the end is zero; with none, that before would come back.
-        self._way = self._setting.scheme.way_to_rest(step.dt) * simulation.rates(self._links)
+        rates = np.array([setting.rates[link] for link in self._links])
+        self._way = setting.scheme.way_to_rest(step.dt) * rates
         self.again()
 
     def again(self) -> None:

@@ -129,7 +129,7 @@ class Guides(Links):
         self._s = self._s0.copy()
 
     def loops(self) -> None:
-        """None."""
+        """None: guide curves are evaluated in Python."""
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the forces, and the distances."""
@@ -140,7 +140,7 @@ class Guides(Links):
         r[self._forces_at] += distance
 
     def add_tangent(self, q1: Array) -> None:
-        """Add the derivatives."""
+        """Add the derivatives of forces and constraints to the tangent."""
         _, n, m, dm = self._frames(q1)
         λ, data = self.force(q1), self._A.data
         for k in range(2):
@@ -166,7 +166,7 @@ class Guides(Links):
         data[:] = before + change
 
     def demand(self) -> None:
-        """None."""
+        """Prescribe no motion: guides are fixed."""
 
     def excess(self, q: Array, r: Array, force: float, moved: float) -> float:
         """Largest distance, as a part of 1 % of the scene."""
@@ -179,7 +179,7 @@ class Guides(Links):
         return 0.0
 
     def flows(self) -> bool:
-        """None does."""
+        """False: no plastic flow in guides."""
         return False
 
     def shown_motion(self, q: Array) -> Array:
@@ -205,12 +205,12 @@ class Guides(Links):
         self._s0 = self._s.copy()
 
     def freeze(self) -> None:
-        """Nothing yields."""
+        """Change nothing: guides do not yield."""
 
     # -- the state -----------------------------------------------------------------------------
 
     def add_state(self, q: Array) -> None:
-        """Nothing is stored."""
+        """Add nothing: guides store no energy."""
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The points on the curves, their parameters, and the steps of these for tangents."""

@@ -66,7 +66,7 @@ class DeadLoads:
         self._values = self._in_c.values = doubles(self.force)
 
     def loops(self) -> tuple[Loop, Loop | None]:
-        """A vector."""
+        """C loop that subtracts the load vector; no tangent."""
         return loop("subtract_vector", self._in_c), None
 
     def carry_on(self, t: float, q: Array) -> Array:
@@ -86,7 +86,7 @@ class DeadLoads:
         return force
 
     def add_residual(self, q1: Array, r: Array) -> None:
-        """Subtract the loads."""
+        """Subtract the loads from the residual."""
         r -= self.force
 
     def add_tangent(self, q1: Array) -> None:
@@ -180,10 +180,10 @@ class FollowerLoads:
         return cos * x - sin * y, sin * x + cos * y
 
     def loops(self) -> None:
-        """None."""
+        """None: follower loads are evaluated in Python."""
 
     def add_residual(self, q1: Array, r: Array) -> None:
-        """Subtract the loads."""
+        """Subtract the loads from the residual."""
         self.force = self._in_plane(q1)
         r -= self.force
 

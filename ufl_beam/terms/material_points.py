@@ -13,8 +13,9 @@ from ufl.conditional import Condition
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import doubles, ffi, integers, lib
+from ufl_beam.compiled.c_library import doubles, ffi, in_order, integers, lib, names
 from ufl_beam.discretization.compiled_functions import Pointwise
+from ufl_beam.discretization.function_spaces import stated
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model import material_laws
 from ufl_beam.model.material_laws import Bulk, Layout, Softening
@@ -25,21 +26,15 @@ material_laws.below.register(Expr, ufl.lt)
 material_laws.exp.register(Expr, ufl.exp)
 
 INPUTS = (
-    # what an iterate changes: strain at the end, growth of the opening and its direction
-    *("strain", "growth", "direction"),
-    # the state at t_n: resistance, strain, plastic strain and its sum, jump and its sum
-    *("traction", "before", "p", "ξ", "jump", "opening"),
-    # 1 if the opening grew in the last step, 2 if it may in this one, else 0
-    "flows",
-    # numbers of the point; the order of these so far is that of loops.c
-    *("C", "length", "θ", "dt", "limit", "H", "B", "eta", "softening limit", "softening energy"),
+    *names("point_input"),
+    *("dt", "limit", "H", "B", "eta", "softening limit", "softening energy"),
 )
-"""Inputs of the law of a point, in the order of their storage."""
+"""Inputs of the law of a point, in the order of their storage; the first ones are in loops.h."""
 
 SPENT, NOTHING = 1e-6, 1e-30
 """Part of its limit below which an open hinge counts as a joint; factor of its stiffness then."""
 
-STATE = ("p", "ξ", "jump", "opening", "before", "traction", "flows")
+STATE = ("plastic", "accumulated", "jump", "opening", "before", "traction", "flows")
 """The internal variables, and what else of an accepted state the next step depends on."""
 
 
@@ -55,6 +50,11 @@ def expect_entries(layout: Layout, scheme: Scheme, ledger: Ledger) -> None:
         ledger.lost["numerical"] += 0.0
 
 
+def point_forms(softening: Softening | None, scheme: Scheme) -> PointForms:
+    """Compiled laws of points, made once in a process; numbers of ``softening`` do not matter."""
+    return _point_forms(softening and softening.of(1.0, 1.0), scheme)
+
+
 class PointForms:
     """Compiled laws: C functions from the inputs of a point to what the loops need.
 
@@ -67,15 +67,16 @@ class PointForms:
         opening: The same of a point that opens, its growth being known.
         excess: What the bulk bears more than the discontinuity resists, and its derivative by the
             growth.
-        end: What the end of the step brings; the order is that of loops.c.
+        end: What the end of the step brings, see ``point_output`` in loops.h.
     """
 
     def __init__(self, softening: Softening | None, scheme: Scheme) -> None:
         self._pointwise = pointwise = Pointwise(INPUTS)
         at = pointwise.at
         strain, a = ufl.variable(at["strain"]), ufl.variable(at["growth"])
-        s, p, ξ, length, θ, dt = (at[n] for n in ("direction", "p", "ξ", "length", "θ", "dt"))
-        bulk = Bulk(at["C"], at["limit"], at["H"], at["B"], at["eta"])
+        s, p, ξ, length = (at[n] for n in ("direction", "plastic", "accumulated", "length"))
+        θ, dt = at["theta"], at["dt"]
+        bulk = Bulk(at["stiffness"], at["limit"], at["H"], at["B"], at["eta"])
 
         # The incompatible mode: a jump relaxes the strain of the bulk by jump over length.
         relieved = at["jump"] / length
@@ -97,22 +98,25 @@ class PointForms:
             self.excess = pointwise.compile(excess, ufl.diff(excess, a))
             broken = a * law.mean_traction(at["opening"], a)
             traction = law.traction(at["opening"] + a)
-        self.end = pointwise.compile(
-            dp,
-            bulk.dissipation(dp, dt),
-            broken,
-            bulk.elastic_energy(e1 - e0) + bulk.hardening_energy(dp, dp),
-            bulk.elastic_energy(e1),
-            bulk.hardening_energy(p + dp, ξ + abs(dp)),
-            bulk.stress(e1, 0),
-            traction,
-        )
+        end = {
+            "flow": dp,
+            "worked": bulk.dissipation(dp, dt),
+            "broken": broken,
+            "lost": bulk.elastic_energy(e1 - e0) + bulk.hardening_energy(dp, dp),
+            "elastic": bulk.elastic_energy(e1),
+            "hardening": bulk.hardening_energy(p + dp, ξ + abs(dp)),
+            "stress": bulk.stress(e1, 0),
+            "resistance": traction,
+        }
+        self.end = pointwise.compile(*in_order("point_output", end))
 
 
-OPENED, RELIEF, HOLD, OVER = range(4)
-"""Entries of :attr:`Course.flags`; the order in loops.c."""
+_point_forms = stated(PointForms)
 
-RELEASED = 2.0
+OPENED, RELIEF, HOLD, OVER = (lib.OPENED, lib.RELIEF, lib.HOLD, lib.OVER)
+"""Entries of :attr:`Course.flags`."""
+
+RELEASED = float(lib.RELEASED)
 """Value of "flows" of a point that may open in this step although it did not flow in the last."""
 
 
@@ -126,7 +130,7 @@ class Course:
     """
 
     def __init__(self) -> None:
-        self.flags: Index = np.zeros(4, dtype=np.int32)
+        self.flags: Index = np.zeros(lib.COURSE_FLAGS, dtype=np.int32)
         self._first: tuple[Index, Index] = (self.flags.copy(), self.flags.copy())
         self._first[True][HOLD] = 1
 
@@ -179,16 +183,16 @@ class Points:
         course: Course | None = None,
     ) -> None:
         course = course or Course()
-        self._forms = PointForms(layout.softening, scheme)
+        self._forms = point_forms(layout.softening, scheme)
         self._layout, self._storage, self._loss = layout, storage, scheme.loss
         self._yields, self.softens = layout.yields, layout.softening is not None
         self._at = {name: storage[:, :, i] for i, name in enumerate(INPUTS)}
         self._bulk = bulk = layout.bulk(keys)
-        numbers = {"C": bulk.C, "limit": bulk.limit, "H": bulk.H, "B": bulk.B, "eta": bulk.eta}
-        for name, value in numbers.items():
-            self._at[name][:] = value
+        self._at["stiffness"][:] = bulk.C
+        for name in ("limit", "H", "B", "eta"):
+            self._at[name][:] = getattr(bulk, name)
         self._at["length"][:] = length[:, None]
-        self._at["θ"][:] = scheme.theta
+        self._at["theta"][:] = scheme.theta
         self._steps = self._at["dt"]
         self._steps[:] = self._dt = 1.0
         self._at["softening energy"][:] = 1.0
@@ -199,7 +203,7 @@ class Points:
                 self._at[f"softening {name}"][:, layout.breaking] = value
             self._resist()
 
-        cells, n, _ = storage.shape
+        cells = len(storage)
         self.kept, self.sums = np.zeros((cells, 6)), np.zeros(7)
         self.r, self.D = np.zeros((cells, 3)), np.zeros((cells, 9))
         self._e0, self.strains = np.zeros((cells, 3)), np.zeros((cells, 3))
@@ -219,7 +223,7 @@ class Points:
         c.B, c.weight, c.rest, c.length = self._alive[:4]
         c.e0, c.e1, c.w, c.r, c.D, c.kept, c.sum, c.course, c.over = self._alive[4:]
         c.bulk, c.opening, c.excess, c.end = forms.bulk, forms.opening, forms.excess, forms.end
-        c.cells, c.of_cell, c.theta = cells, n, scheme.theta
+        c.cells, c.of_cell, c.width, c.theta = *storage.shape, scheme.theta
 
     def __getitem__(self, name: str) -> Array:
         """Return the values of an input at the points, by its name; a view; (cells, n)."""
@@ -263,7 +267,7 @@ class Points:
         lib.release(self.points, least)
 
     def hold(self) -> None:
-        """Take back :meth:`release`."""
+        """Close again the points that :meth:`release` opened."""
         flows = self["flows"]
         flows[flows == RELEASED] = 0.0
 
@@ -273,9 +277,9 @@ class Points:
         Args:
             change: Small changes of the strains of the cells; (cells, 3).
         """
-        layout, stiffness = self._layout, self._at["θ"][0, 0] * self._at["C"]
+        layout, stiffness = self._layout, self._at["theta"][0, 0] * self._at["stiffness"]
         by_point = change @ layout.strains.T
-        elastic = self._at["θ"][0, 0] * change**2 @ layout.rest
+        elastic = self._at["theta"][0, 0] * change**2 @ layout.rest
         elastic += (stiffness * by_point**2) @ layout.weights
         now = np.einsum("ci,cij,cj->c", change, self.D.reshape(-1, 3, 3), change)
         return np.asarray(np.divide(now, elastic, out=np.ones(len(now)), where=elastic > 0))
@@ -318,7 +322,7 @@ class Points:
         if softening is not None:
             borne, limit = (self[name][:, breaking] for name in ("traction", "softening limit"))
             spent = np.isfinite(limit) & (borne <= SPENT * limit)
-            self["C"][:, breaking] *= np.where(spent, NOTHING, 1.0)
+            self["stiffness"][:, breaking] *= np.where(spent, NOTHING, 1.0)
         self["traction"][:] = self["limit"][:] = np.inf
 
     # -- the ledger ----------------------------------------------------------------------------
@@ -368,9 +372,10 @@ class Points:
         e = strains @ layout.strains.T - self["jump"] / self["length"]
         volume = layout.weights * length
         self.kept[:, :3] = (
-            layout.rest * strains + (layout.weights * bulk.stress(e, self["p"])) @ layout.strains
+            layout.rest * strains
+            + (layout.weights * bulk.stress(e, self["plastic"])) @ layout.strains
         )
-        self.sums[3] = np.sum(volume * bulk.elastic_energy(e - self["p"])) + np.sum(
+        self.sums[3] = np.sum(volume * bulk.elastic_energy(e - self["plastic"])) + np.sum(
             strains**2 @ layout.rest / 2 * length[:, 0]
         )
-        self.sums[4] = np.sum(volume * bulk.hardening_energy(self["p"], self["ξ"]))
+        self.sums[4] = np.sum(volume * bulk.hardening_energy(self["plastic"], self["accumulated"]))

@@ -46,7 +46,7 @@ class Openable(Protocol):
         """Let held places open from now on whose excess is at least so large."""
 
     def hold(self) -> None:
-        """Take back :meth:`release`."""
+        """Close again the points that :meth:`release` opened."""
 
 
 class Openings:

@@ -17,8 +17,9 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import doubles, ffi, integers, lib
+from ufl_beam.compiled.c_library import doubles, ffi, in_order, integers, lib, names
 from ufl_beam.discretization.compiled_functions import Pointwise
+from ufl_beam.discretization.function_spaces import stated
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.beams import Place
 from ufl_beam.model.connector_laws import RigidPlastic
@@ -30,12 +31,11 @@ from ufl_beam.terms.material_points import NOTHING, RELEASED, SPENT
 from ufl_beam.terms.openings import Openable
 
 INPUTS = (
-    *("slip", "direction", "slipped", "start"),
+    *names("slip_input", "slip_"),
     *("θ", "dt", "limit", "energy", "H", "B", "eta"),
 )
 """Inputs of the compiled laws: the slip of the step and its direction (1 or -1); accumulated slip
-and motion at t_n; numbers of the scheme and the law.  The first four are those of rigid_plastic.c.
-"""
+and motion at t_n, which loops.h names as well; numbers of the scheme and the law."""
 
 
 class Slip(NamedTuple):
@@ -129,19 +129,28 @@ def _slope(link: Connector, size: float) -> float:
 
 
 class SlipForms:
-    """Compiled laws of slip: C functions of :data:`INPUTS`.
+    """Compiled laws of slip: C functions of :data:`INPUTS`; see :func:`slip_forms`.
 
     Attributes:
         force: Force in the step, and its derivative by the slip.
-        end: Numbers that the end of the step brings; the order is that of rigid_plastic.c.
+        end: Numbers that the end of the step brings, see ``slip_output`` in loops.h.
     """
 
     def __init__(self, law: Softening | Hardening, scheme: Scheme) -> None:
         self._pointwise = pointwise = Pointwise(INPUTS)
         at = {**pointwise.at, "slip": ufl.variable(pointwise.at["slip"])}
-        force, *end = slip(law, at, scheme)
+        end = slip(law, at, scheme)._asdict()
+        force = end.pop("force")
         self.force = pointwise.compile(force, ufl.diff(force, at["slip"]))
-        self.end = pointwise.compile(*end)
+        self.end = pointwise.compile(*in_order("slip_output", end, "slip_"))
+
+
+_slip_forms = stated(SlipForms)
+
+
+def slip_forms(law: Softening | Hardening, scheme: Scheme) -> SlipForms:
+    """Compiled laws of slip, made once in a process; numbers of ``law`` do not matter."""
+    return _slip_forms(Hardening(1.0) if isinstance(law, Hardening) else law.of(1.0, 1.0), scheme)
 
 
 class RigidPlasticResponse:
@@ -158,7 +167,7 @@ class RigidPlasticResponse:
             ledger.state["hardening"] += 0.0
             if setting.scheme.loss:
                 ledger.lost["numerical"] += 0.0
-        self._forms = SlipForms(law.law, setting.scheme)
+        self._forms = slip_forms(law.law, setting.scheme)
         self._storage = np.zeros((n, len(INPUTS)))
         self._at = {name: self._storage[:, i] for i, name in enumerate(INPUTS)}
         for i, link in enumerate(links):
@@ -170,7 +179,7 @@ class RigidPlasticResponse:
         self._rows, self._sums, self._stored = np.zeros((n, 3)), np.zeros(3), 0.0
         self.dissipated: Array = np.zeros(n)
         self._excess = np.zeros(n)
-        self._slope = np.array([_slope(link, setting.simulation.scene.size) for link in links])
+        self._slope = np.array([_slope(link, setting.size) for link in links])
         self._c = c = ffi.new("rigid_plastic *")
         c.force, c.end, c.number, c.width = self._forms.force, self._forms.end, n, len(INPUTS)
         arrays = (self._storage, self._limit, self._back_force, self.dissipated, self._rows)
@@ -196,7 +205,7 @@ class RigidPlasticResponse:
         return self._rows[:, 0], self._rows[:, 1], self._rows[:, 2]
 
     def accept(self, e1: Array, work: float) -> None:
-        """Commit the slips."""
+        """Commit the slips of the step."""
         lib.commit_rigid_plastic(self._c, doubles(e1), doubles(self._sums))
         self._way_before[:] = self._way * self._slipped
         dissipated, lost, self._stored = self._sums.tolist()
@@ -226,7 +235,7 @@ class RigidPlasticResponse:
         self._slipped[(self._excess > 0) & (self._excess >= least)] = RELEASED
 
     def hold(self) -> None:
-        """Take back :meth:`release`."""
+        """Close again the slips that :meth:`release` opened."""
         self._slipped[:] = np.abs(self._way_before)
 
     # -- energies ------------------------------------------------------------------------------
@@ -274,7 +283,7 @@ class RigidPlasticResponse:
         return np.column_stack([*self._variables, stored])
 
     def restore(self, rows: Array) -> None:
-        """Take over :meth:`state`."""
+        """Restore the variables that :meth:`state` returned."""
         *variables, stored = rows.T
         for mine, values in zip(self._variables, variables, strict=True):
             mine[:] = values

@@ -167,7 +167,7 @@ class Supports:
         self._before = self.reactions.copy()
 
     def carry_on(self, memory: Memory, q: Array) -> None:
-        """The reactions."""
+        """Save or restore the reactions."""
         reactions: Array = np.zeros(len(q))
         reactions[self._held] = self._before if self._motions else self.reactions
         self.reactions[:] = memory.at_dofs("reactions", reactions)[self._held]

@@ -201,21 +201,6 @@ int has_its_digits(double sum)
 
 /* -- material points ------------------------------------------------------------------------- */
 
-/* What a point is about; the order of INPUTS in material_points.py. */
-enum {
-  STRAIN, GROWTH, DIRECTION, TRACTION, BEFORE, PLASTIC, ACCUMULATED, JUMP, OPENING, FLOWS,
-  STIFFNESS, LENGTH, THETA, WIDTH = 20
-};
-
-/* Values of FLOWS: did not grow in the last step, grew in it, may open in this one; see material_points.py. */
-enum { CLOSED, FLOWING, RELEASED };
-
-/* What the kernel of the end of a step says; the order in material_points.py. */
-enum { FLOW, WORKED, BROKEN, LOST, ELASTIC, HARDENING, STRESS, RESISTANCE, SAID };
-
-/* Flags that all points of a scene share in a step; see Course in material_points.py. */
-enum { OPENED, RELIEF, HOLD, OVER };
-
 static const double unit_cell[6] = {0, 0, 0, 1, 0, 0};
 
 static void ask(kernel *tabulate, const double *w, int answers, double *e)
@@ -275,7 +260,7 @@ void respond(const points *p)
       r[k] = p->rest[k] * ((1 - p->theta) * e0[k] + p->theta * e1[k]);
       D[4 * k] = p->rest[k] * p->theta;
     }
-    for (int i = 0; i < p->of_cell; ++i, w += WIDTH) {
+    for (int i = 0; i < p->of_cell; ++i, w += p->width) {
       const double *b = p->B + 3 * i;
       w[STRAIN] = b[0] * e1[0] + b[1] * e1[1] + b[2] * e1[2];
       w[GROWTH] = w[DIRECTION] = 0;
@@ -304,7 +289,7 @@ void respond(const points *p)
 void release(const points *p, double least)
 {
   double s[2], *w = p->w;
-  for (int i = 0; i < p->cells * p->of_cell; ++i, w += WIDTH) {
+  for (int i = 0; i < p->cells * p->of_cell; ++i, w += p->width) {
     if (w[FLOWS] != CLOSED || !(w[TRACTION] < INFINITY)) continue;
     ask(p->bulk, w, 2, s);
     if (fabs(s[0]) > w[TRACTION] && fabs(s[0]) / w[TRACTION] - 1 >= least) w[FLOWS] = RELEASED;
@@ -463,7 +448,7 @@ double commit_couplings(const couplings *c, const double *q, double dt)
  */
 void commit(const points *p)
 {
-  double s[SAID], *e0 = p->e0, *w = p->w, *kept = p->kept, *sum = p->sum;
+  double s[POINT_OUTPUTS], *e0 = p->e0, *w = p->w, *kept = p->kept, *sum = p->sum;
   const double *e1 = p->e1, *rest = p->rest, *length = p->length, *weight = p->weight;
   memset(sum, 0, 7 * sizeof *sum);
   for (int c = 0; c < p->cells; ++c, e0 += 3, e1 += 3, kept += 6) {
@@ -475,9 +460,9 @@ void commit(const points *p)
       sum[3] += rest[k] * e1[k] * e1[k] / 2 * length[c];
       e0[k] = e1[k];
     }
-    for (int i = 0; i < p->of_cell; ++i, w += WIDTH) {
+    for (int i = 0; i < p->of_cell; ++i, w += p->width) {
       double volume = weight[i] * length[c];
-      ask(p->end, w, SAID, s);
+      ask(p->end, w, POINT_OUTPUTS, s);
       const double before = w[STIFFNESS] * (w[BEFORE] - w[JUMP] / w[LENGTH] - w[PLASTIC]);
       const double change = s[STRESS] - before;
       const double hardened = s[LOST] - change / w[STIFFNESS] * change / 2;
@@ -505,7 +490,7 @@ void commit(const points *p)
       sum[4] += volume * s[HARDENING];
       for (int k = 0; k < 3; ++k) kept[k] += weight[i] * s[STRESS] * p->B[3 * i + k];
     }
-    kept[3] = w[JUMP - WIDTH];
+    kept[3] = w[JUMP - p->width];
     kept[4] += plastic;
     kept[5] += broken;
     sum[0] += plastic;
