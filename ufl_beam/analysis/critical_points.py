@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import block_array, coo_array, csr_array, diags_array
@@ -16,20 +15,28 @@ from ufl_beam.errors import SceneError, StepFailed
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers.factorization import Factorisation, SingularMatrix
 
-ITERATIONS = 50
+INVERSE_ITERATIONS = 50
 """Inverse iterations in which a mode is sought."""
 
 
-class Direction(NamedTuple):
-    """A direction of a path.
-
-    Attributes:
-        q: Of the configuration; m, m, rad.
-        t: Of the load factor.
-    """
+@dataclass(frozen=True, eq=False)
+class Direction:
+    """Direction of a path: change of the configuration (m, m, rad) and of the load factor."""
 
     q: Array
     t: float
+
+    def __neg__(self) -> Direction:
+        return Direction(-self.q, -self.t)
+
+    def __add__(self, other: Direction) -> Direction:
+        return Direction(self.q + other.q, self.t + other.t)
+
+    def __rmul__(self, factor: float) -> Direction:
+        return Direction(factor * self.q, factor * self.t)
+
+    def __truediv__(self, divisor: float) -> Direction:
+        return Direction(np.asarray(self.q / divisor), self.t / divisor)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,14 +120,11 @@ def metric(share: Share) -> Array:
 class Stiffness:
     """The tangent stiffness of the whole scene, factored by every process.
 
-    Args:
-        share: The degrees of freedom of this process.
-        A: Its part of the tangent.
-        held: Local degrees of freedom that supports hold.
-        rate: Its part of the residual's derivative by the load factor.
+    Of this process are its part A of the tangent, the local degrees of freedom that supports hold,
+    and its part of the residual's derivative by the load factor, ``rate``.
 
     Attributes:
-        symmetric: Whether it is; follower loads make it unsymmetric.
+        symmetric: False with follower loads.
         negative: Number of negative eigenvalues of the stiffness that is left when the forces of
             connectors are eliminated and constraints fulfilled.  Where it is not symmetric: 1 if
             its determinant is negative, else 0.
@@ -201,15 +205,11 @@ class Stiffness:
         return values
 
     def softest(self, weights: Array) -> tuple[float, Array]:
-        """The eigenvalue nearest to zero, N m, and its mode of unit size; (grid.size,).
-
-        Args:
-            weights: :func:`metric` of all degrees of freedom, in the order of the grid.
-        """
+        """The eigenvalue nearest to zero, N m, and its mode of unit size in a :func:`metric`."""
         w = weights[self._free]
         mode = np.random.default_rng(0).normal(size=len(w)) / np.sqrt(np.maximum(w, w.max()))
         λ = np.inf
-        for _ in range(ITERATIONS):
+        for _ in range(INVERSE_ITERATIONS):
             mode = self._solve(w * mode)
             mode /= np.sqrt(w @ mode**2)
             before, λ = λ, float(mode @ (self._K @ mode))

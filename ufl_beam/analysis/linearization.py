@@ -82,11 +82,7 @@ class SmallMotions:
     """
 
     def __init__(
-        self,
-        scene: Scene,
-        at: Solution | None,
-        t: float | None = None,
-        mesh: Mesh | None = None,
+        self, scene: Scene, at: Solution | None, t: float | None = None, mesh: Mesh | None = None
     ) -> None:
         time = 0.0 if at is None else float(at.times[-1])
         # Each process does the same: no answer depends on their number.
@@ -129,9 +125,8 @@ class SmallMotions:
 
     def _axes(self) -> csr_array:
         """Columns: the components of motion, in the axes of supports."""
-        turned = [support for support in self.scene.supports if support.angle]
         Q = eye_array(self.grid.size, format="lil")
-        for support in turned:
+        for support in (support for support in self.scene.supports if support.angle):
             i, j = self.grid.node(support.place)[:2]
             c, s = math.cos(support.angle), math.sin(support.angle)
             Q[i, i], Q[i, j], Q[j, i], Q[j, j] = c, -s, s, c
@@ -157,14 +152,8 @@ class SmallMotions:
         C = (self._reduced(self._derivative(self.q, τ)) - K) * τ
         nothing = ROUND_OFF * abs(K).max()
         symmetric = abs(K - K.T).max() <= nothing
-        solve = partial(
-            eigensolvers.linear,
-            (K + K.T) / 2 if symmetric else K,
-            M,
-            n,
-            most=self.most,
-            definite=symmetric,
-        )
+        matrix = (K + K.T) / 2 if symmetric else K
+        solve = partial(eigensolvers.linear, matrix, M, n, most=self.most, definite=symmetric)
         values, x = solve(shift=-SHIFT * low)
         works = self._works(x)
         zero = self._unresisted(x, works)
@@ -194,13 +183,9 @@ class SmallMotions:
         return np.asarray(np.abs(works) <= ZERO * sizes)
 
     def _damped(self, C: csr_array, free: Array, n: int, lowest: float) -> tuple[Complex, Complex]:
-        """Exponents and motions with velocity-dependent forces.
+        """At least n exponents and motions with velocity-dependent forces, whose matrix is C.
 
-        Args:
-            C: Their matrix.
-            free: Motions that nothing resists, in columns.
-            n: How many at least.
-            lowest: The first frequency; rad/s.
+        Nothing resists the motions ``free``, in columns; ``lowest`` is the first frequency; rad/s.
         """
         # Zero is a double exponent, of drifts, and no solver finds it well.  Where velocities make
         # of them but a force like inertia, they are excluded as by constraints, and known: drifts

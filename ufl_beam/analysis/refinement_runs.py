@@ -30,16 +30,12 @@ SHORT_RUN = 0.1
 
 
 class RefinementRuns:
-    """All runs of a trade-off.
+    """All runs of a trade-off, see :func:`tradeoff`.
 
     Args:
-        scene: What is simulated.
-        quantities: What is asked of each run.
-        t: Beginning and end; s.
         families: Coarsest dials to begin with.
         newtons: Tolerances of Newton's method; runs have the first unless they say so.
         most: Wall time that all runs together may take; s.
-        comm: Processes that share the runs.
 
     Attributes:
         runs: Those that are done.

@@ -42,49 +42,31 @@ def size(values: Array) -> float:
 
 @dataclass(frozen=True)
 class Convergence:
-    """Convergence of a quantity with one dial, from three levels.
+    """Convergence of a quantity with one dial, from three levels."""
 
-    Attributes:
-        finest: The finest of the three levels.
-        differences: Size of the change from the first level to the second, and to the third.
-        order: Observed.
-        aligned: Whether both changes are of one direction; if not, nothing is extrapolated.
-        used: Order that errors are predicted with, not above that of the method; 0 where changes
-            are negligible.
-        method: Order of the method; with it errors grow towards levels coarser than the three.
-        error: Of the finest level; where changes are negligible, of every level.
-        rest: What the finest level lacks of the limit, with its sign.
-        safety: Factor by which ``error`` may be wrong.
-    """
-
-    finest: int
-    differences: tuple[float, float]
-    order: float
-    aligned: bool
-    used: float
-    method: float
-    error: float
-    rest: Array
-    safety: float
+    finest: int  # the finest of the three levels
+    differences: tuple[float, float]  # sizes of the changes from level to level
+    order: float  # observed
+    aligned: bool  # whether both changes are of one direction; if not, nothing is extrapolated
+    used: float  # order for predictions, at most that of the method; 0: no changes
+    method: float  # order of the method; with it errors grow towards levels coarser than the three
+    error: float  # of the finest level; where changes are negligible, of every level
+    rest: Array  # what the finest level lacks of the limit, with its sign
+    safety: float  # factor by which ``error`` may be wrong
 
     @classmethod
     def of(
         cls, values: tuple[Array, Array, Array], finest: int, method: float, floor: float
     ) -> Convergence:
-        """From the values on three levels, the finest last.
+        """From the values on three levels up to the finest; changes up to ``floor`` do not count.
 
-        Args:
-            values: Of the quantity.
-            finest: The last of their levels.
-            method: Order that the method has in theory.
-            floor: Changes up to here are negligible; unit of the quantity.
+        ``method`` is the order that the method has in theory.
         """
         first, second = values[1] - values[0], values[2] - values[1]
         a, b = size(first), size(second)
         if max(a, b) <= floor:
-            return cls(
-                finest, (a, b), 0.0, False, 0.0, method, max(a, b), np.asarray(0 * second), UNSURE
-            )
+            nothing = np.asarray(0 * second)
+            return cls(finest, (a, b), 0.0, False, 0.0, method, max(a, b), nothing, UNSURE)
         order = math.log2(a / b) if min(a, b) > 0 else math.copysign(math.inf, a - b)
         lengths = np.linalg.norm(first) * np.linalg.norm(second)
         aligned = bool(np.vdot(first, second) >= ALIGNED * lengths)
@@ -117,19 +99,12 @@ class Convergence:
 
 @dataclass(frozen=True)
 class Cross:
-    """Self-convergence of a quantity with cells and with steps, one by one and together.
+    """Self-convergence of a quantity with cells and with steps, one by one and together."""
 
-    Attributes:
-        cells: With the cells.
-        steps: With the steps.
-        limit: Extrapolated value.
-        mixed: What refining both changes that refining each does not, extrapolated.
-    """
-
-    cells: Convergence
-    steps: Convergence
-    limit: Array
-    mixed: float
+    cells: Convergence  # with the cells
+    steps: Convergence  # with the steps
+    limit: Array  # extrapolated value
+    mixed: float  # what refining both changes that refining each does not, extrapolated
 
     @staticmethod
     def levels(base: Level) -> list[Level]:

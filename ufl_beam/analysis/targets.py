@@ -92,7 +92,7 @@ class Prediction:
 
 
 class Target(Protocol):
-    """Tolerance or budget."""
+    """Target of a trade-off, a tolerance or a budget."""
 
     negligible: float  # part of the unit of a quantity up to which changes need not converge
     measure: str  # words for the sizes that errors are parts of

@@ -21,19 +21,12 @@ from ufl_beam.solvers.newton import Newton
 
 @dataclass(frozen=True)
 class Dials:
-    """Setting of a run, the arguments of :func:`simulate`.
+    """Setting of a run, the arguments of :func:`simulate`."""
 
-    Attributes:
-        scheme: The time scheme.
-        dt: Step; s; or adaptive steps.
-        mesh: The cells.
-        newton: How exactly equilibria are found.
-    """
-
-    scheme: Scheme
-    dt: float | Adaptive
-    mesh: Mesh
-    newton: Newton
+    scheme: Scheme  # the time scheme
+    dt: float | Adaptive  # step; s; or adaptive steps
+    mesh: Mesh  # the cells
+    newton: Newton  # how exactly equilibria are found
 
     def finer(self, refine: int, level: float, t: tuple[float, float]) -> Dials:
         """Each cell in ``refine`` parts, steps about ``2**level`` times as many.
@@ -84,28 +77,16 @@ class Refinement(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """Result of a run, and its cost.
+    """Result of a run, and its cost."""
 
-    Attributes:
-        refinement: How fine it is.
-        dials: With which dials.
-        values: The quantities.
-        seconds: Wall time, building the scene included, compiling not; s; the median of three
-            if it is short.
-        steps: Steps that were taken.
-        cells: Number of cells.
-        iterations: Newton iterations per step.
-        spent: Wall time of all repetitions; s.
-    """
-
-    refinement: Refinement
-    dials: Dials
-    values: dict[str, Array]
-    seconds: float
-    steps: float
-    cells: float
-    iterations: float
-    spent: float
+    refinement: Refinement  # how fine it is
+    dials: Dials  # with which dials
+    values: dict[str, Array]  # the quantities
+    seconds: float  # wall time without compiling; s; the median of three if it is short
+    steps: float  # steps that were taken
+    cells: float  # number of cells
+    iterations: float  # newton iterations per step
+    spent: float  # wall time of all repetitions; s
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,14 +38,11 @@ def require_writable(path: Path) -> None:
             why = f": there is no directory {path.parent}; make it first"
         else:
             new = not path.exists()
-            with path.open("ab"):
-                pass
+            path.open("ab").close()
             if new:
                 path.unlink()
-    except OSError as error:
-        why = f" cannot be written: {error.strerror}"
-    except ValueError as error:  # a null character
-        why = f" cannot be written: {error}"
+    except (OSError, ValueError) as error:  # a ValueError at a null character
+        why = f" cannot be written: {getattr(error, 'strerror', error)}"
     if why:
         raise SceneError(f"output {path}{why}")
 
@@ -54,11 +51,7 @@ def require_apart(outputs: Sequence[Output], call: str) -> None:
     """Raise :class:`SceneError` if two outputs, or an outer run's and one of these, share a file.
 
     Files are compared as the file system knows them: through symbolic and hard links.  Devices
-    such as ``/dev/null`` may be shared.
-
-    Args:
-        outputs: Those of a run that is about to begin.
-        call: Name for messages.
+    such as ``/dev/null`` may be shared.  Messages name the ``call``.
     """
     owners: dict[object, str] = {}
     for owner, paths in (*_in_use, *outputs):
@@ -100,17 +93,9 @@ def take(outputs: Iterable[Output]) -> Callable[[], None]:
 
 
 class OutputFile:
-    """A file that is written at given positions; an error in writing names it.
+    """File that is written at given positions; an :class:`OSError` names it.
 
-    Args:
-        path: The file.
-        new: Whether it is emptied, or made; else it is opened as it is.
-
-    Attributes:
-        path: The file.
-
-    Raises:
-        OSError: It cannot be opened.
+    A ``new`` one is emptied, or made; else it is opened as it is.
     """
 
     def __init__(self, path: Path, *, new: bool = True) -> None:
@@ -128,18 +113,13 @@ class OutputFile:
         return os.fstat(self._file).st_size
 
     def put(self, at: int, data: bytes | bytearray) -> None:
-        """Write at a position.
-
-        Raises:
-            OSError: There is no space, or the device fails.
-        """
+        """Write at a position of the file."""
         rest = memoryview(data)
         try:
             while rest:
-                if self._regular:
-                    done = os.pwrite(self._file, rest, at)
-                else:  # pipes and terminals have no positions
-                    done = os.write(self._file, rest)
+                # Pipes and terminals have no positions.
+                file, put = self._file, self._regular
+                done = os.pwrite(file, rest, at) if put else os.write(file, rest)
                 rest, at = rest[done:], at + done
         except OSError as error:
             raise failure(error, self.path) from None
@@ -195,11 +175,10 @@ def replace_file(path: Path, data: bytes) -> None:
             file.flush()
             os.fsync(file.fileno())
         os.replace(part, path)
-    except OSError as error:
+    except BaseException as error:
         part.unlink(missing_ok=True)
-        raise failure(error, path) from None
-    except BaseException:
-        part.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise failure(error, path) from None
         raise
 
 

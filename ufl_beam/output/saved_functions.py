@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_left
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -17,17 +18,11 @@ SAMPLES = 1000
 
 @dataclass(frozen=True)
 class SavedFunction:
-    """A function of time that is known at some times.
+    """A function of time that is known at some times."""
 
-    Attributes:
-        name: That of the function.
-        times: Ascending; s.
-        values: One for each time.
-    """
-
-    name: str
-    times: tuple[float, ...]
-    values: tuple[float, ...]
+    name: str  # that of the function
+    times: tuple[float, ...]  # ascending; s
+    values: tuple[float, ...]  # one for each time
 
     @classmethod
     def of(cls, function: Callable[[float], float], times: Iterable[float]) -> SavedFunction:
@@ -41,11 +36,7 @@ class SavedFunction:
         return cls(name_of(function), tuple(known), tuple(known.values()))
 
     def __call__(self, t: float) -> float:
-        """The value at one of the times.
-
-        Raises:
-            SceneError: The function is not known at this time.
-        """
+        """The value at one of the times, or :class:`SceneError` at others."""
         n = bisect_left(self.times, t)
         if n == len(self.times) or self.times[n] != t:
             raise SceneError(
@@ -57,17 +48,11 @@ class SavedFunction:
 
 @dataclass(frozen=True)
 class SavedCurve:
-    """A curve that is known at some parameters, cubic between them and straight beyond.
+    """A curve that is known at some parameters, cubic between them and straight beyond."""
 
-    Attributes:
-        name: That of the function.
-        s: Ascending parameters, at least two.
-        points: One for each; m.
-    """
-
-    name: str
-    s: tuple[float, ...]
-    points: tuple[Point, ...]
+    name: str  # that of the function
+    s: tuple[float, ...]  # ascending parameters, at least two
+    points: tuple[Point, ...]  # one for each; m
 
     @classmethod
     def of(
@@ -89,35 +74,24 @@ class SavedCurve:
         n = bisect_left(self.s, s)
         if n < len(self.s) and self.s[n] == s:
             return self.points[n]
-        inside = 0 < n < len(self.s)
-        first = min(max(n - (2 if inside else 1), 0), max(len(self.s) - (4 if inside else 2), 0))
-        near = range(first, min(first + (4 if inside else 2), len(self.s)))
+        count = 4 if 0 < n < len(self.s) else 2
+        first = max(min(n - count // 2, len(self.s) - count), 0)
         x = y = 0.0
+        near = range(first, min(first + count, len(self.s)))
         for i in near:
-            weight = 1.0
-            for j in near:
-                if j != i:
-                    weight *= (s - self.s[j]) / (self.s[i] - self.s[j])
+            weight = math.prod((s - self.s[j]) / (self.s[i] - self.s[j]) for j in near if j != i)
             x, y = x + weight * self.points[i][0], y + weight * self.points[i][1]
         return x, y
 
 
 @dataclass(frozen=True)
 class LostFunction:
-    """A function that cannot be saved, such as a controller.
+    """A function that cannot be saved, such as a controller."""
 
-    Attributes:
-        name: That of the function.
-    """
-
-    name: str
+    name: str  # that of the function
 
     def __call__(self, *arguments: object) -> NoReturn:
-        """Say that it is not there.
-
-        Raises:
-            SceneError: Always.
-        """
+        """Raise :class:`SceneError`, as the function is not there."""
         raise SceneError(
             f"the function {self.name} is not in the file of the solution, which has results and "
             "numbers; build the scene with the function to simulate it"

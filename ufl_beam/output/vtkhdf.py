@@ -48,10 +48,10 @@ class VtkhdfWriter:
 
     Args:
         path: The file.
-        points: (n, 3); m.
+        points: Points of all lines; (n, 3); m.
         cells: Both points of each line; (m, 2).
         constant: Fields in cells that do not change, by name; (m,).
-        fields: Those of any step: their names and shapes.
+        fields: Fields of any step: their names and shapes.
         steps: Number of steps of a file of the same mesh to go on from; later ones are cut off.
 
     Raises:

@@ -113,7 +113,7 @@ class Shown(Motion, Protocol):
 
     @property
     def q(self) -> Array:
-        """Configurations; (n+1, grid.size)."""
+        """Configurations at all kept times; (n+1, grid.size)."""
 
 
 class Stage(Setting):
@@ -158,15 +158,10 @@ class Stage(Setting):
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """Scene at one time, as it is drawn.
+    """Scene at one time, as it is drawn."""
 
-    Attributes:
-        stage: What is shown.
-        motion: Displacement and rotation of an anchor, not magnified; (3,); m, m, rad.
-    """
-
-    stage: Setting
-    motion: Callable[[Anchor], Array]
+    stage: Setting  # what is shown
+    motion: Callable[[Anchor], Array]  # (u, v, ψ) of an anchor, not magnified; (3,); m, m, rad
 
     def at(self, anchor: Anchor) -> Array:
         """Coordinates of an anchor; (2,); m."""
