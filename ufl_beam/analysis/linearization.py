@@ -34,9 +34,9 @@ AT_REST = 1e300
 
 
 class _Standstill(Static):
-    """Everything is taken where it is, and there is inertia: what small motions begin with.
+    """Scheme of small motions: all terms, inertia included, are taken at the present state.
 
-    Nothing steps with this scheme.
+    Nothing steps with it: nothing accelerates, and velocities are differences over ``dt``.
     """
 
     dynamic = True
@@ -44,30 +44,24 @@ class _Standstill(Static):
     kept: tuple[str, ...] = ()
 
     def require(self, scene: Scene) -> None:
-        """It can do all scenes."""
+        pass
 
     def half_tangents(self, rotations: Index) -> Index:
-        """None."""
         return rotations[:0]
 
     def inertia(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
-        """Nothing accelerates."""
         return 1 / dt**2, 0.0, rates.v
 
     def velocity(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
-        """Velocities are differences over ``dt``."""
         return 1 / dt, 0.0, rates.v
 
     def rates(self, dt: float, s: Array, rates: Rates) -> tuple[Array, ...]:
-        """Velocities are differences over ``dt``."""
         return (np.asarray(s / dt),)
 
     def slip(self, dt: float, change: Array, rates: Rates) -> Array:
-        """None."""
         return 0 * change
 
     def error_weights(self) -> tuple[float, float]:
-        """None are known."""
         return 0.5, 0.0
 
 

@@ -53,10 +53,15 @@ class Shapes(ABC):
     q: Array
     shapes: Array | Complex
 
+    word = "shape"
+
     @property
     @abstractmethod
     def titles(self) -> list[str]:
         """Captions of the shapes."""
+
+    def __str__(self) -> str:
+        return "\n".join(f"{self.word} {k}: {title}" for k, title in enumerate(self.titles))
 
     def __len__(self) -> int:
         return int(self.shapes.shape[1])
@@ -139,7 +144,9 @@ class Shapes(ABC):
 
 
 class _Frame:
-    """A state with one shape, as recorders look at a simulation."""
+    """State with one shape, as recorders read a simulation; histories of connectors are zero."""
+
+    may_break = False
 
     def __init__(
         self, shapes: Shapes, share: Share, forces: SectionForces, t: float, change: Array
@@ -148,23 +155,14 @@ class _Frame:
         self.q, self.t = shapes.q + change, t
         self._forces, self._state, self._change = forces, shapes.q, change
 
-    may_break = False
-    """True if something yields; modes are elastic."""
-
     def velocities(self) -> list[Array]:
-        """Shapes have none."""
-        return []
-
-    def material(self) -> list[Any]:
-        """Nothing yields."""
         return []
 
     def connections(self) -> Array:
-        """Return nothing: histories of connectors are left out."""
         return np.zeros((len(self.scene.links), len(Connection._fields)))
 
     def section_forces(self) -> Array:
-        """Those of the shape alone: a derivative, by a small difference."""
+        """Section forces of the shape alone: a derivative, by a small difference."""
         ends, ε = np.empty((2, len(self.grid.cells), 3)), 1e-5
         for sign, end in zip((1.0, -1.0), ends, strict=True):
             self._forces.write(self._state + sign * ε * self._change, end)
@@ -187,6 +185,7 @@ class Modes(Shapes):
     """
 
     exponents: Complex
+    word = "mode"
 
     @property
     def omega(self) -> Array:
@@ -213,12 +212,10 @@ class Modes(Shapes):
     @property
     def titles(self) -> list[str]:
         """Frequency, and the damping ratio if there is damping."""
-        pairs = zip(self.frequencies, self.damping, strict=True)
-        damped = [f", ζ = {ζ:.3g}" if abs(ζ) > 1e-6 else "" for _, ζ in pairs]
-        return [f"{f:.4g} Hz{more}" for f, more in zip(self.frequencies, damped, strict=True)]
-
-    def __str__(self) -> str:
-        return "\n".join(f"mode {k}: {title}" for k, title in enumerate(self.titles))
+        return [
+            f"{f:.4g} Hz" + (f", ζ = {ζ:.3g}" if abs(ζ) > 1e-6 else "")
+            for f, ζ in zip(self.frequencies, self.damping, strict=True)
+        ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,9 +238,6 @@ class Buckling(Shapes):
     def titles(self) -> list[str]:
         """Titles of pictures: the load factors."""
         return [f"loads × {factor:.4g}" for factor in self.factors]
-
-    def __str__(self) -> str:
-        return "\n".join(f"shape {k}: {title}" for k, title in enumerate(self.titles))
 
 
 def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None = None) -> Modes:
@@ -290,12 +284,7 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
 
 
 def buckling(
-    scene: Scene,
-    n: int,
-    *,
-    t: float = 1.0,
-    at: Solution | None = None,
-    mesh: Mesh | None = None,
+    scene: Scene, n: int, *, t: float = 1.0, at: Solution | None = None, mesh: Mesh | None = None
 ) -> Buckling:
     """Compute buckling load factors and modes, (K + λ K') x = 0.
 

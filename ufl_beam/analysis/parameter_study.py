@@ -83,7 +83,10 @@ def study(
     require_switch(anew, "study: anew")
     require_switch(progress, "study: progress")
     name = getattr(member, "__name__", type(member).__name__)
-    outputs = [] if path is None else [("study", _files_of(require_path(path, "study")))]
+    outputs = []
+    if path is not None:
+        path = require_path(path, "study")
+        outputs.append(("study", (path, path.with_name(f"{path.name}.part"))))
     todo: dict[str, Case] = {}
     records: dict[str, tuple[Outcome, float]] = {}
     result: Study | None = None
@@ -99,7 +102,7 @@ def study(
         if not todo:
             raise SceneError("study: cases is empty")
         require_apart(outputs, "study")
-        if path is not None and Path(path).exists():
+        if path is not None and path.exists():
             old = Study.load(path)
             if old.member != name and not anew:
                 raise SceneError(f"study {path} is one of {old.member}, not of {name}")
@@ -117,13 +120,8 @@ def study(
     def gather() -> None:
         nonlocal result
         missing = {key: case for key, case in todo.items() if key not in records}
-        bar = tqdm(
-            total=len(todo),
-            initial=len(todo) - len(missing),
-            unit="member",
-            disable=None if progress else True,
-        )
-        next_save = 0.0
+        next_save, quiet, done = 0.0, None if progress else True, len(todo) - len(missing)
+        bar = tqdm(total=len(todo), initial=done, unit="member", disable=quiet)
         try:
             with bar, closing(_outcomes(comm, member, missing)) as outcomes:
                 for key, outcome, seconds in outcomes:
@@ -155,11 +153,6 @@ def study(
         result = comm.bcast(result)
     assert result is not None
     return result
-
-
-def _files_of(path: Path) -> tuple[Path, ...]:
-    """The file of a study, and the one that takes its place."""
-    return path, path.parent / f"{path.name}.part"
 
 
 def _outcomes(

@@ -65,8 +65,7 @@ class Path(Solution):
         for k, one in enumerate(text["critical"]):
             state, prefix = Solution(self.scene, self.grid), f"critical/{k}/state/"
             state._take(
-                text,
-                {n.removeprefix(prefix): a for n, a in arrays.items() if n.startswith(prefix)},
+                text, {n.removeprefix(prefix): a for n, a in arrays.items() if n.startswith(prefix)}
             )
             critical.append(CriticalPoint(**one, state=state, mode=arrays[f"critical/{k}/mode"]))
         self.critical = critical

@@ -126,10 +126,8 @@ class PathStepper:
                 if self._part < SMALLEST_STEP_PART:
                     simulation.give_up(failure, self._tried(), ADVICE)
         count = simulation.iterations - iterations
-        part, self._part = (
-            self._part,
-            min(1.0, self._part * min(2.0, TARGET_ITERATIONS / max(count, 1))),
-        )
+        part, longer = self._part, min(2.0, TARGET_ITERATIONS / max(count, 1))
+        self._part = min(1.0, part * longer)
         try:
             self._accept(found, part)
         except StepFailed as failure:

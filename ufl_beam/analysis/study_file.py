@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -49,18 +50,13 @@ class Study:
     def of(cls, member: str, records: dict[str, tuple[Outcome, float]]) -> Study:
         """From outcome and seconds of each case, cases as :func:`text_of`."""
         outcomes = [outcome for outcome, _ in records.values()]
+        failed = {i: outcome for i, outcome in enumerate(outcomes) if isinstance(outcome, str)}
         first: dict[str, Array] = next((row for row in outcomes if not isinstance(row, str)), {})
         none = {name: np.full_like(first[name], np.nan) for name in sorted(first)}
-        return cls(
-            member,
-            tuple(map(json.loads, records)),
-            {
-                k: np.array([none[k] if isinstance(o, str) else o[k] for o in outcomes])
-                for k in none
-            },
-            {i: outcome for i, outcome in enumerate(outcomes) if isinstance(outcome, str)},
-            np.array([seconds for _, seconds in records.values()]),
-        )
+        rows = [none if isinstance(outcome, str) else outcome for outcome in outcomes]
+        results = {name: np.array([row[name] for row in rows]) for name in none}
+        seconds = np.array([seconds for _, seconds in records.values()])
+        return cls(member, tuple(map(json.loads, records)), results, failed, seconds)
 
     def records(self) -> dict[str, tuple[Outcome, float]]:
         """Return the data that :meth:`of` makes this study from."""
@@ -102,9 +98,7 @@ class Study:
                 file.create_dataset("cases", data=[*map(text_of, self.cases)], dtype=text)
                 file.create_dataset("errors", data=errors, dtype=text)
                 file["seconds"] = self.seconds
-                results = file.create_group("results")
-                for name, values in self.results.items():
-                    results[name] = values
+                file.create_group("results").update(self.results)
             os.replace(part, path)
         except OSError as error:
             raise SceneError(f"study {path} cannot be written: {error}") from None
@@ -132,9 +126,8 @@ class Study:
                     file["seconds"][()],
                 )
         except (OSError, KeyError, ValueError) as error:
-            raise SceneError(
-                f"study {path}: the file holds no study, or is damaged: {error}"
-            ) from None
+            why = f"the file holds no study, or is damaged: {error}"
+            raise SceneError(f"study {path}: {why}") from None
 
 
 def text_of(case: dict[str, Any], what: str = "case") -> str:
@@ -167,10 +160,9 @@ def numbers_of(case: dict[str, Any], returned: Any) -> dict[str, Array]:
     for name, value in returned.items():
         if not isinstance(name, str) or name in {"", "."} or "/" in name:
             raise SceneError(f"study: {case} returned {name!r}, which is no name of a result")
-        try:
+        array = np.asarray(None)  # stays so if rows have different lengths
+        with suppress(ValueError):
             array = np.asarray(value)
-        except ValueError:  # rows of different lengths
-            array = np.asarray(None)
         if array.dtype.kind not in "biuf":
             raise SceneError(
                 f"study: {case} returned {name} = {value!r}, which is no number or array of them"

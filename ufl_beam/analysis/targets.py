@@ -209,9 +209,7 @@ class Budget:
 
 
 def target_of(
-    quantities: Collection[str],
-    tolerance: float | Mapping[str, float] | None,
-    budget: float | None,
+    quantities: Collection[str], tolerance: float | Mapping[str, float] | None, budget: float | None
 ) -> Target:
     """Return the target that a call gives for quantities, checked."""
     if (tolerance is None) == (budget is None):

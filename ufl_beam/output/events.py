@@ -155,7 +155,7 @@ class Events(Recorder):
         return events
 
     def state(self) -> State:
-        """The events so far: time, number of the cell or connector, and what."""
+        """The events so far: time, number of the cell or connector, and kind."""
         return {"events": np.array([(t, n, ALL.index(what)) for t, n, what in self._rows])}
 
     def resume(self, simulation: Recorded, state: State) -> None:

@@ -97,10 +97,8 @@ class Fatigue(Recorder):
     def __init__(
         self, spots: Sequence[HotSpot] | HotSpot, curve: SNCurve, *, resolution: float = 0.0
     ) -> None:
-        one = isinstance(spots, HotSpot)
-        self.spots: tuple[HotSpot, ...] = (
-            (spots,) if one else require_sequence(spots, "Fatigue: spots")
-        )
+        several = (spots,) if isinstance(spots, HotSpot) else spots
+        self.spots: tuple[HotSpot, ...] = require_sequence(several, "Fatigue: spots")
         for i, spot in enumerate(self.spots):
             require_kind(spot, HotSpot, f"Fatigue: spots[{i}]")
         require_kind(curve, SNCurve, "Fatigue: curve")

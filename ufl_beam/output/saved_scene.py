@@ -71,11 +71,7 @@ def lost(owner: Any, field: str, function: Any) -> LostFunction:
 
 
 def to_data(value: Any, sampling: Sampling = lost) -> Data:
-    """Describe a scene, or another record.
-
-    Args:
-        value: The record.
-        sampling: What stands for functions of a user.
+    """Describe a scene, or another record, with a sampling of the functions of a user.
 
     Raises:
         SceneError: Something in it is neither a record of the package nor a function.
@@ -85,12 +81,10 @@ def to_data(value: Any, sampling: Sampling = lost) -> Data:
     numbers: dict[int, tuple[int, Any]] = {}
 
     def describe(value: Any, owner: Any, field: str) -> Data:
-        if value is None or isinstance(value, bool | str):
+        if isinstance(value, np.generic):
+            value = value.item()
+        if value is None or isinstance(value, bool | str | int | float):
             return value
-        if isinstance(value, int | np.integer):
-            return int(value)
-        if isinstance(value, float | np.floating):
-            return float(value)
         if isinstance(value, Fraction):
             return {"fraction": str(value)}
         if isinstance(value, np.ndarray):
@@ -98,13 +92,10 @@ def to_data(value: Any, sampling: Sampling = lost) -> Data:
         if isinstance(value, tuple | list):
             return [describe(one, owner, field) for one in value]
         if isinstance(value, Mapping):
-            pairs = (
-                (describe(k, owner, field), describe(v, owner, field)) for k, v in value.items()
-            )
-            return {"mapping": [*map(list, pairs)]}
-        for name, known in KNOWN.items():
-            if value is known:
-                return {"known": name}
+            pairs = [[describe(x, owner, field) for x in pair] for pair in value.items()]
+            return {"mapping": pairs}
+        for name in (name for name, known in KNOWN.items() if value is known):
+            return {"known": name}
         if id(value) not in numbers:
             record = value
             if RECORDS.get(type(value).__name__) is not type(value):

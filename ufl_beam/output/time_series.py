@@ -63,14 +63,10 @@ class TimeSeries(Recorder):
             fields = self._lines.fields(simulation)
             on_first(self._comm, lambda: self._writers[0].write(simulation.t, fields))
 
-    @abstractmethod
-    def _complete(self, writer: Any) -> list[int]:
-        """Sizes of what is complete in the files of a writer."""
-
     def state(self) -> State:
         """The number of steps, and the sizes of what is complete; that is on the disk."""
         on_first(self._comm, self._sync)
-        sizes = [n for writer in self._writers for n in self._complete(writer)]
+        sizes = [n for writer in self._writers for n in writer.complete]
         return {"sizes": np.array([self._count, *sizes], dtype=float)}
 
     def _sync(self) -> None:
@@ -148,9 +144,6 @@ class XDMF(TimeSeries):
         sizes = None if complete is None else Complete(*complete)
         return XdmfWriter(self._path, lines.points, lines.cells, {"part": lines.parts}, sizes)
 
-    def _complete(self, writer: XdmfWriter) -> list[int]:
-        return [*writer.complete]
-
 
 class VTKHDF(TimeSeries):
     """Time series for ParaView, VTK and PyVista in one HDF5 file, with the fields of :class:`XDMF`.
@@ -184,6 +177,3 @@ class VTKHDF(TimeSeries):
         lines, steps = self._lines, None if complete is None else complete[0]
         mesh = lines.points, lines.cells, {"part": lines.parts}
         return VtkhdfWriter(self._path, *mesh, fields, steps)
-
-    def _complete(self, writer: VtkhdfWriter) -> list[int]:
-        return [writer.steps]

@@ -102,22 +102,24 @@ class VtkhdfWriter:
         self._find(fields)
         self._cut()
 
+    @property
+    def complete(self) -> tuple[int]:
+        """Number of complete steps, for a checkpoint."""
+        return (self.steps,)
+
     # -- data sets -----------------------------------------------------------------------------
 
     def _is_same(self, mesh: Mapping[str, Array], fields: Fields) -> bool:
         """Return whether the file has this mesh, these fields, and enough steps."""
         try:
             root = self._file["VTKHDF"]
-            return (
-                int(root["Steps"].attrs["NSteps"]) >= self.steps
-                and all(np.array_equal(root[name][()], values) for name, values in mesh.items())
-                and all(
-                    root[kind][name].shape[1:] == values.shape[1:]
-                    and len(root[kind][name]) >= self.steps * len(values)
-                    for kind, by_name in zip(KINDS, fields, strict=True)
-                    for name, values in by_name.items()
-                )
-            )
+            same = [np.array_equal(root[name][()], values) for name, values in mesh.items()]
+            for kind, by_name in zip(KINDS, fields, strict=True):
+                for name, values in by_name.items():
+                    length, *shape = root[kind][name].shape
+                    same.append(tuple(shape) == values.shape[1:])
+                    same.append(length >= self.steps * len(values))
+            return all(same) and int(root["Steps"].attrs["NSteps"]) >= self.steps
         except KeyError:
             return False
 

@@ -12,15 +12,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.model.beams import Beam
-from ufl_beam.plotting.drawing import (
-    draw_axes,
-    draw_symbols,
-    draw_undeformed,
-    make_room,
-    moved_points,
-    plane_size,
-    plane_stage,
-)
+from ufl_beam.plotting import drawing
 from ufl_beam.plotting.labels import Label, Spot, leader_of, place
 from ufl_beam.plotting.style import (
     BLUE,
@@ -55,20 +47,20 @@ AROUND, LEAST, MOST = (1.0, 1.2), (3.6, 2.6), (9.0, 6.8)
 def plot_state(solution: Solution, what: str, *, n: int, magnify: float) -> Figure:
     """The frame at the n-th kept time, with the diagram of a section force; see :func:`plot`."""
     require_choice(what, ("shape", *RESULTANTS), "plot: what")
-    points = moved_points(solution, n, magnify)
-    stage = plane_stage(solution, [n], magnify)
+    points = drawing.moved_points(solution, n, magnify)
+    stage = drawing.plane_stage(solution, [n], magnify)
     pose = stage.pose(n)
     name = f"{RESULTANTS[what][0]} {what}" if what in RESULTANTS else "shape"
     time = solution.parameter.at(solution.times[n])
-    with picture(plane_size(solution.grid.points, points, pose.points())) as figure:
+    with picture(drawing.plane_size(solution.grid.points, points, pose.points())) as figure:
         axes = plane_axes(figure, f"{name} at {time}{magnified(magnify)}")
-        draw_undeformed(axes, solution, stage)
+        drawing.draw_undeformed(axes, solution, stage)
         extremes: list[Extreme] = []
         if what in RESULTANTS:
             values = [_values(solution, beam, what, n) for beam in solution.scene.beams]
             extremes = draw_diagrams(axes, solution, what, [values], points)
-        draw_axes(axes, solution, points, color=INK, linewidth=2.6, zorder=4)
-        draw_symbols(axes, pose)
+        drawing.draw_axes(axes, solution, points, color=INK, linewidth=2.6, zorder=4)
+        drawing.draw_symbols(axes, pose)
         finish(figure, axes, extremes)
     return figure
 
@@ -190,7 +182,7 @@ def finish(figure: Figure, axes: Axes, extremes: Sequence[Extreme] = ()) -> None
             text.remove()
         written = _write(figure, axes, extremes)
         axes.dataLim.set(without_texts)
-        make_room(figure, axes)
+        drawing.make_room(figure, axes)
         _fit(figure, axes)
 
 

@@ -241,27 +241,20 @@ class _Ways:
     """Directions in which beams leave a place, of all beams that meet there."""
 
     def __init__(self, scene: Scene, axes_of: dict[Beam, Array]) -> None:
-        self._size, self._axes = scene.size, axes_of
+        self._near, self._axes = 1e-7 * scene.size, axes_of
         ends: Array = np.reshape([(x[0], x[1], x[-1], x[-2]) for x in axes_of.values()], (-1, 2, 2))
-        keys = np.round(ends[:, 0] / self._size, 7)
         ways = ends[:, 1] - ends[:, 0]
-        ways /= np.linalg.norm(ways, axis=1)[:, None]
-        self._found: defaultdict[tuple[float, float], list[Array]] = defaultdict(list)
-        for k, key in enumerate(keys):
-            self._found[float(key[0]), float(key[1])].append(np.asarray(ways[k]))
-
-    def _key(self, point: tuple[float, float]) -> tuple[float, float]:
-        x, y = np.round(np.array(point) / self._size, 7)
-        return float(x), float(y)
+        self._ends, self._ways = ends[:, 0], ways / np.linalg.norm(ways, axis=1)[:, None]
 
     def __call__(self, anchor: Anchor) -> Array:
         """Unit vectors; (n, 2)."""
-        found = list(self._found.get(self._key(anchor.point), ()))
+        found = self._ways[np.abs(self._ends - anchor.point).max(axis=1) < self._near]
         if isinstance(anchor, Place) and 0.0 < anchor.s < 1.0:
             axis = self._axes[anchor.beam]
             k = int(np.argmin(np.linalg.norm(axis - anchor.point, axis=1)))
-            found += [_direction(axis[k], axis[j]) for j in (k - 1, k + 1) if 0 <= j < len(axis)]
-        return np.reshape(found, (-1, 2))
+            more = [_direction(axis[k], axis[j]) for j in (k - 1, k + 1) if 0 <= j < len(axis)]
+            found = np.vstack([found, *more])
+        return np.asarray(found)
 
 
 def _direction(start: Array, end: Array) -> Array:

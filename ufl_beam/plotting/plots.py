@@ -14,20 +14,7 @@ import numpy as np
 
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.model.bodies import Anchor
-from ufl_beam.plotting import drawing, symbols
-from ufl_beam.plotting.style import (
-    GREY,
-    INK,
-    RED,
-    color_cycle,
-    draw_bar,
-    magnified,
-    picture,
-    plane_axes,
-    require_choice,
-    scale,
-    time_axes,
-)
+from ufl_beam.plotting import drawing, style, symbols
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
@@ -75,9 +62,9 @@ def plot_shapes(
     stage = drawing.plane_stage(solution, chosen, magnify)
     poses = [stage.pose(n) for n in chosen]
     everything = (solution.grid.points, *shapes, *(pose.points() for pose in poses))
-    with picture(drawing.plane_size(*everything)) as figure:
-        of_time = scale("viridis", 0.0, 0.88, kept[chosen].min(), kept[chosen].max())
-        axes = plane_axes(figure, magnified(magnify, ""))
+    with style.picture(drawing.plane_size(*everything)) as figure:
+        of_time = style.scale("viridis", 0.0, 0.88, kept[chosen].min(), kept[chosen].max())
+        axes = style.plane_axes(figure, style.magnified(magnify, ""))
         drawing.draw_undeformed(axes, solution, stage)
         for n, points, pose in zip(chosen, shapes, poses, strict=True):
             color = of_time.to_rgba(kept[n])
@@ -85,7 +72,7 @@ def plot_shapes(
             drawing.draw_axes(axes, solution, points, color=color, linewidth=2.2, zorder=3)
             drawing.draw_masses(axes, pose, color)
         drawing.draw_fixings(axes, poses[-1])
-        draw_bar(figure, axes, of_time, solution.parameter.name)
+        style.draw_bar(figure, axes, of_time, solution.parameter.name)
     return figure
 
 
@@ -106,15 +93,15 @@ def plot_history(
     Example:
         >>> ub.plot_history(solution, beam.end, component="v").savefig("history.png")
     """
-    require_choice(component, COMPONENTS, "plot_history: component")
+    style.require_choice(component, COMPONENTS, "plot_history: component")
     followed = (places,) if isinstance(places, Anchor) else tuple(places)
     number = list(COMPONENTS).index(component)
     motion = solution.displacement if number < 3 else solution.velocity
     quantity, unit = COMPONENTS[component]
-    with picture((8.0, 4.2)) as figure:
-        axes = time_axes(figure.add_subplot())
-        axes.axhline(0.0, color=GREY, linewidth=1.0, zorder=1)
-        for place, color in zip(followed, color_cycle(len(followed)), strict=True):
+    with style.picture((8.0, 4.2)) as figure:
+        axes = style.time_axes(figure.add_subplot())
+        axes.axhline(0.0, color=style.GREY, linewidth=1.0, zorder=1)
+        for place, color in zip(followed, style.color_cycle(len(followed)), strict=True):
             values = motion(place)[:, number % 3]
             axes.plot(solution.times, values, color=color, label=str(place))
         axes.set_ylabel(f"{quantity} {component.replace('psi', 'ψ')} ({unit})")
@@ -139,17 +126,21 @@ def plot_energy(solution: Solution) -> Figure:
         for group, line in ((energy.state, "-"), (energy.supplied, "--"), (energy.lost, ":"))
         for name, values in group.items()
     ]
-    with picture((8.0, 6.0)) as figure:
-        ledger, check = map(time_axes, figure.subplots(2, 1, sharex=True, height_ratios=(2.4, 1)))
-        for (name, values, line), color in zip(entries, color_cycle(len(entries)), strict=True):
+    with style.picture((8.0, 6.0)) as figure:
+        ledger, check = map(
+            style.time_axes, figure.subplots(2, 1, sharex=True, height_ratios=(2.4, 1))
+        )
+        for (name, values, line), color in zip(
+            entries, style.color_cycle(len(entries)), strict=True
+        ):
             ledger.plot(along, values, line, color=color, label=name)
         ledger.set_ylabel("energy (J)")
-        ledger.plot(along, energy.total, color=INK, linewidth=1.2, label="in the scene")
+        ledger.plot(along, energy.total, color=style.INK, linewidth=1.2, label="in the scene")
         figure.legend(loc="outside upper left", ncols=5)
         part = np.abs(energy.imbalance) / (energy.throughput or 1.0)
         # Where the balance is exact, the logarithm is not: such points stand at the lower edge.
-        check.semilogy(along, np.maximum(part, 1e-2 * precision), color=RED, linewidth=1.2)
-        check.axhline(precision, color=GREY, linewidth=1.0, zorder=1)
+        check.semilogy(along, np.maximum(part, 1e-2 * precision), color=style.RED, linewidth=1.2)
+        check.axhline(precision, color=style.GREY, linewidth=1.0, zorder=1)
         check.annotate(
             "machine precision", (1.0, precision), (0, -3), va="top", ha="right", fontsize=11,
             xycoords=check.get_yaxis_transform(), textcoords="offset points", color="#777777",

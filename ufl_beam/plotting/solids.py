@@ -14,23 +14,13 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import require_number
 from ufl_beam.model.beams import Beam, Place
 from ufl_beam.model.bodies import Anchor
-from ufl_beam.plotting import symbols
+from ufl_beam.plotting import style, symbols
 from ufl_beam.plotting.drawing import OpenHinge, moved_points
 from ufl_beam.plotting.scene_layout import Pose, Stage
-from ufl_beam.plotting.style import (
-    FRONT,
-    INK,
-    MIDDLE,
-    ORANGE,
-    RESULTANTS,
-    Stroke,
-    decimal_prefix,
-    require_choice,
-)
 from ufl_beam.plotting.symbols import FILLED, Pin
 from ufl_beam.simulation.solution import Solution
 
-QUANTITIES = {**RESULTANTS, "rotation": ("rotation", "rad")}
+QUANTITIES = {**style.RESULTANTS, "rotation": ("rotation", "rad")}
 
 
 @dataclass(frozen=True)
@@ -44,7 +34,7 @@ class Look:
     size: tuple[int, int]
 
     def __post_init__(self) -> None:
-        require_choice(self.color, QUANTITIES, "color")
+        style.require_choice(self.color, QUANTITIES, "color")
         require_number(self.thickness, "thickness", positive=True)
         require_number(self.magnify, "magnify", positive=True)
         for pixels in self.size:
@@ -90,7 +80,7 @@ class Look:
         if self.color == "rotation":
             dofs = self.solution.grid.dofs[self.solution.grid.vertices_of(beam), 2]
             return np.asarray(self.solution.q[n][dofs])
-        return self.solution.section_forces(beam, n)[:, list(RESULTANTS).index(self.color)]
+        return self.solution.section_forces(beam, n)[:, list(style.RESULTANTS).index(self.color)]
 
     def corners(self, beam: Beam, n: int, points: Array) -> Array:
         """Corners of all cross-sections of a beam; (4 num_vertices, 3); m.
@@ -129,7 +119,7 @@ class Solids:
     def add_beams(self, n: int, points: Array, largest: float) -> None:
         """The beams in colour, the undeformed axes in grey, and the colour bar."""
         quantity, unit = QUANTITIES[self._look.color]
-        factor, prefix = decimal_prefix(largest)
+        factor, prefix = style.decimal_prefix(largest)
         limit = largest / factor or 1.0
         letter = "" if self._look.color == "rotation" else f" {self._look.color}"
         title = f"{quantity}{letter} ({prefix}{unit})"
@@ -164,8 +154,8 @@ class Solids:
 
     def add_text(self, text: str, position: tuple[float, float]) -> None:
         """A text at a position in parts of the picture; another one replaces it."""
-        style = {"font_size": self._look.size[1] // 40, "color": "black", "viewport": True}
-        self._plotter.add_text(text, position=position, name=str(position), **style)
+        look = {"font_size": self._look.size[1] // 40, "color": "black", "viewport": True}
+        self._plotter.add_text(text, position=position, name=str(position), **look)
 
     def _add(self, parts: list[Any], color: str, name: str) -> None:
         if parts:
@@ -184,14 +174,14 @@ class Solids:
         found: dict[str, list[Any]] = {}
         lines: dict[tuple[str, float], list[Array]] = {}
 
-        def add(strokes: Iterable[Stroke], half: float) -> None:
+        def add(strokes: Iterable[style.Stroke], half: float) -> None:
             for points, color, weight, fill, layer in strokes:
-                base = front if layer == FRONT else half
-                low, high = (-half, half) if layer <= MIDDLE else (base, 1.1 * base)
+                base = front if layer == style.FRONT else half
+                low, high = (-half, half) if layer <= style.MIDDLE else (base, 1.1 * base)
                 if fill is not None:
                     found.setdefault(fill, []).append(self._extruded(points, low, high))
                 if fill != FILLED:
-                    z = 0.0 if fill is None and layer <= MIDDLE else high
+                    z = 0.0 if fill is None and layer <= style.MIDDLE else high
                     lines.setdefault((color, weight), []).append(np.insert(points, 2, z, axis=1))
 
         add(symbols.bodies(pose), 0.4 * body)
@@ -221,12 +211,12 @@ class Solids:
         pins = [self._cylinder(pin) for pin in symbols.pins(pose)]
         self._add(pins, "#707070", "joints")
         orange = (Pin(hinge.at, True, (hinge.beam.start,)) for hinge in hinges)
-        self._add([*map(self._cylinder, orange)], ORANGE, "hinges")
+        self._add([*map(self._cylinder, orange)], style.ORANGE, "hinges")
         balls = [
             self._pyvista.Sphere(radius=1.1 * symbol, center=(*pose.at(mass.place), 0.0))
             for mass in solution.scene.masses
         ]
-        self._add(balls, INK, "masses")
+        self._add(balls, style.INK, "masses")
         blocks: dict[str, list[Any]] = {}
         for at, angle, outlines, color, place in symbols.footings(pose):
             half = 0.6 * self._look.around([place])[1]
