@@ -52,14 +52,10 @@ from ufl_beam.errors import (
     TradeoffError,
 )
 from ufl_beam.mechanics.classical import GeneralizedAlpha, Newmark, Static
-from ufl_beam.mechanics.energy_momentum import (
-    DecayingMidpoint,
-    ExactStatic,
-    Midpoint,
-    PrintedMidpoint,
-)
-from ufl_beam.model.beams import Beam, Place
-from ufl_beam.model.bodies import Body, Spot, ground
+from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
+from ufl_beam.mechanics.energy_momentum import ExactStatic, Midpoint, PrintedMidpoint
+from ufl_beam.model.beams import Beam
+from ufl_beam.model.bodies import Body, Place, Spot, ground
 from ufl_beam.model.connector_laws import (
     Actuator,
     Controller,
@@ -85,20 +81,14 @@ from ufl_beam.model.joints import (
     Rigid,
     RigidLink,
 )
-from ufl_beam.model.loads import (
-    FollowerLoad,
-    Gravity,
-    LineLoad,
-    PointLoad,
-    RotatingFrame,
-    Table,
-    ramp,
-)
+from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, PointLoad, RotatingFrame
+from ufl_beam.model.masses import PointMass, Velocity
 from ufl_beam.model.material_laws import DuvautLions, Hardening, LinearSoftening, Perzyna, Softening
 from ufl_beam.model.mesh_options import Mesh
-from ufl_beam.model.scene import PointMass, Scene, Velocity
+from ufl_beam.model.scene import Scene
 from ufl_beam.model.sections import Section
 from ufl_beam.model.supports import Clamped, Pinned, Prescribed, Roller, Support
+from ufl_beam.model.time_functions import Table, ramp
 from ufl_beam.output.events import Event, Events
 from ufl_beam.output.extremes import Extent, Extremes
 from ufl_beam.output.fatigue import Fatigue, HotSpot
@@ -123,7 +113,7 @@ from ufl_beam.simulation.run import simulate
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution, load
 from ufl_beam.simulation.step_control import Adaptive
-from ufl_beam.solvers.newton import Newton
+from ufl_beam.solvers.newton_options import Newton
 from ufl_beam.terms.energy_ledger import Energy
 from ufl_beam.version import version
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ufl_beam.arrays import Array
+Array = npt.NDArray[np.float64]
 
 try:
     import petsc4py  # noqa: F401 - solvers need it
@@ -32,7 +32,6 @@ except ImportError as error:  # pragma: no cover - depends on the machine
 __all__ = [
     "TABULATE",
     "VERSION",
-    "Array",
     "cell_coordinates",
     "compile_form",
     "cpp",

@@ -9,7 +9,8 @@ import pytest
 from scipy.integrate import quad
 
 import ufl_beam as ub
-from ufl_beam.model.material_laws import Bulk, Layout, positive, sign
+from ufl_beam.model.fibres import Layout
+from ufl_beam.model.material_laws import Bulk, positive, sign
 
 C, LIMIT, H, B, ETA = 200.0, 3.0, 20.0, 10.0, 0.5
 """Numbers of a test material: yields at a strain of 0.015."""

@@ -266,4 +266,4 @@ def test_places_are_free_where_holding_them_leads_nowhere():
 def test_no_search_where_nothing_opens():
     """There is no object for it."""
     _, scene = pushed()
-    assert ub.Simulation(scene, ub.Static())._openings is None
+    assert ub.Simulation(scene, ub.Static())._assembly.openings is None

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.model.material_laws import Layout
+from ufl_beam.model.fibres import Layout
 from ufl_beam.terms.material_points import INPUTS, Points
 
 C, LENGTH = 200.0, 0.5

@@ -41,10 +41,9 @@ class _Standstill(Static):
 
     dynamic = True
     slips = False
+    has_mean_velocity = True
+    rings = False
     kept: tuple[str, ...] = ()
-
-    def require(self, scene: Scene) -> None:
-        pass
 
     def half_tangents(self, rotations: Index) -> Index:
         return rotations[:0]
@@ -169,7 +168,7 @@ class SmallMotions:
     def _works(self, x: Array) -> Array:
         """Compute works of the stiffness on motions, in columns, to the digits of strains; J."""
         right, left = self._with_laws()
-        return self._simulation.stiffness_works(self.q, right @ x, left.T @ x)
+        return self._simulation.equation.stiffness_works(self.q, right @ x, left.T @ x)
 
     def _unresisted(self, x: Array, works: Array) -> npt.NDArray[np.bool_]:
         """Return which motions no stiffness resists, up to round-off; (n,)."""
@@ -218,11 +217,13 @@ class SmallMotions:
         """At least n factors, if there are so many, and shapes."""
         u = self._path()
         right, left = self._with_laws()
-        change = csr_array(left @ self._matrix(self._simulation.tangent_change(self.q, u)) @ right)
+        change = csr_array(
+            left @ self._matrix(self._simulation.equation.tangent_change(self.q, u)) @ right
+        )
         factors, x = eigensolvers.linear(self.K, -change, n, most=self.K.shape[0], definite=False)
         x = x[:, np.abs(factors) < 1e9 * np.abs(factors).min(initial=np.inf)]
         # Among the shapes that were found, by works whose round-off is that of strains.
-        works = self._simulation.tangent_works(self.q, u, right @ x, left.T @ x)
+        works = self._simulation.equation.tangent_works(self.q, u, right @ x, left.T @ x)
         factors, mix = eigensolvers.small(works[0], -works[1])
         return factors, (x @ mix).astype(complex)
 

@@ -13,10 +13,10 @@ from ufl_beam.analysis.critical_points import Direction
 from ufl_beam.analysis.path_corrector import Control, PathCorrector
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, StepFailed, require_kind, require_number
-from ufl_beam.model.beams import Place
+from ufl_beam.model.bodies import Place
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
-from ufl_beam.simulation.simulation import Trial
+from ufl_beam.simulation.step_solver import Trial
 
 LEAST_REST = 1e-3
 """Part of a step of arc length that is gone at least beyond a kink."""

@@ -16,7 +16,8 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.model.scene import Scene
-from ufl_beam.simulation.simulation import Simulation, Trial
+from ufl_beam.simulation.simulation import Simulation
+from ufl_beam.simulation.step_solver import Trial
 from ufl_beam.terms.beams import Term
 
 MOST_DOUBLINGS = 30
@@ -105,8 +106,9 @@ class PathCorrector:
 
     def dissipation(self, q: Array) -> float:
         """Energy that beams and springs dissipate in the step to ``q``; J."""
-        terms = (*self.simulation.inelastic, *self.simulation.couplings)
-        return self.share.total(sum(one.dissipation(q) for one in terms))
+        in_cells = sum(one.dissipation(q) for one in self.simulation.inelastic)
+        here = sum((one.dissipation(q) for one in self.simulation.couplings), in_cells)
+        return self.share.total(here)
 
     def predict_dissipation(self, energy: float) -> Direction:
         """Predictor of a step in which so much energy (J) is dissipated, if nothing gives way.
@@ -215,7 +217,7 @@ class PathCorrector:
         simulation.supports.enter(r)
         rates = (self._moved(self.t + ε) - self._moved(self.t - ε)) / (2 * ε)
         self._rates = np.asarray(rates, dtype=np.float64)
-        self._A = simulation.tangent_at(x, self._rates, r)
+        self._A = simulation.equation.tangent_at(x, self._rates, r)
 
     def correct(self, y: Array, z: Array) -> None:
         """By the equation of the control, linearised."""

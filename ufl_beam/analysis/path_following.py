@@ -18,16 +18,16 @@ from ufl_beam.arrays import Array, State
 from ufl_beam.errors import SceneError, require_count, require_function, require_kind
 from ufl_beam.mechanics.classical import Static
 from ufl_beam.model.connector_laws import Actuator, Controller, Motor
-from ufl_beam.model.loads import TimeFunction
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
+from ufl_beam.model.time_functions import TimeFunction
 from ufl_beam.output.output_files import take
 from ufl_beam.output.recorders import Recorder, close_all, recorders_of
 from ufl_beam.parallel import communicator
 from ufl_beam.parameter import FACTOR
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.solvers.newton import Newton
+from ufl_beam.solvers.newton_options import Newton
 
 
 class Path(Solution):

@@ -21,7 +21,7 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.parallel import alone
 from ufl_beam.simulation.run import simulate
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.solvers.newton import Newton
+from ufl_beam.solvers.newton_options import Newton
 
 Quantity = Callable[[Solution], npt.ArrayLike]
 

@@ -31,7 +31,7 @@ from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.parallel import communicator
 from ufl_beam.simulation.step_control import Adaptive
-from ufl_beam.solvers.newton import Newton
+from ufl_beam.solvers.newton_options import Newton
 
 NEWTON_SHARE = 0.1
 """Part of the error that another tolerance of Newton's method may change."""

@@ -16,7 +16,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.simulation.step_control import Adaptive
-from ufl_beam.solvers.newton import Newton
+from ufl_beam.solvers.newton_options import Newton
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""UFL forms compiled for the hot loop: packed once, refreshed only where something changed.
+"""UFL forms and functions of points, compiled for the hot loop.
+
+Forms are packed once, and refreshed only where something changed.
 
 A form is compiled with one quadrature rule: forms that mix a one-point rule with another are
 silently wrong in FFCx 0.9 to 0.11.
@@ -8,21 +10,22 @@ silently wrong in FFCx 0.9 to 0.11.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, ParamSpec, Protocol, TypeVar, cast
 
+import basix.ufl
 import numpy as np
 import numpy.typing as npt
 import ufl
+from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, integers, kernel, lib
-from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.jit import compiled_form
 from ufl_beam.compiled.simd_kernels import LANES, in_lanes
-from ufl_beam.dolfinx_compat import fem, pack
+from ufl_beam.dolfinx_compat import fem, line_mesh, pack
 
 
 def in_batches(rows: npt.NDArray[Any], lanes: int) -> npt.NDArray[Any]:
@@ -56,6 +59,15 @@ def tabulator(compiled: fem.Form) -> Any:
     """The C function of a compiled cell form; it lives as long as the form."""
     integral = compiled.ufcx_form.form_integrals[0]
     return kernel(integral.tabulate_tensor_float64, compiled.module.ffi)
+
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def stated(function: Callable[P, T]) -> Callable[P, T]:
+    """Call a function that states forms once in a process with the same arguments."""
+    return cast("Callable[P, T]", lru_cache(maxsize=128)(function))
 
 
 class Prepared(NamedTuple):
@@ -92,6 +104,13 @@ def prepared(form: ufl.Form) -> Prepared:
     spaces = [argument.ufl_function_space() for argument in form.arguments()]
     entries = math.prod(space.element.space_dimension for space in spaces)
     return Prepared(compiled, source, columns, constants, packed, entries)
+
+
+class Entries(Protocol):
+    """Matrix of a fixed pattern, see :class:`Csr`."""
+
+    def positions(self, rows: Index, columns: Index) -> Index:
+        """Positions of entries in its data."""
 
 
 class Kernel:
@@ -197,7 +216,7 @@ class Kernel:
         self._packed = other._packed
         self._prepare()
 
-    def place(self, A: Csr) -> None:
+    def place(self, A: Entries) -> None:
         """Let a bilinear form on the degrees of freedom of the cells add to ``A``."""
         per_cell = self._dofs.shape[1]
         rows = np.repeat(self._dofs, per_cell, axis=1)
@@ -231,3 +250,34 @@ class Kernel:
         """Value of the functional at the unknown ``q``."""
         value: float = lib.value_of_cells(self.cells, doubles(q))
         return value
+
+
+class Pointwise:
+    """Compiler of functions from the numbers of a point to other numbers.
+
+    A form on a cell of unit length with one quadrature point is such a function.
+
+    Args:
+        inputs: Names of the numbers that functions depend on, in the order of their storage.
+
+    Attributes:
+        at: UFL symbols of the inputs, by name.
+    """
+
+    def __init__(self, inputs: Sequence[str]) -> None:
+        self._cell = line_mesh(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0, 1]]))
+        self._alive: list[fem.Form] = []
+        x = fem.Function(self._values(len(inputs)))
+        self.at: dict[str, Expr] = {name: x[i] for i, name in enumerate(inputs)}
+
+    def compile(self, *outputs: Expr) -> Any:
+        """Compile a function to C; the C lives as long as this object."""
+        z = ufl.TestFunction(self._values(len(outputs)))
+        dx = ufl.Measure("dx", domain=self._cell, metadata={"quadrature_degree": 1})
+        form, _ = compiled_form(ufl.dot(ufl.as_vector(outputs), z) * dx)
+        self._alive.append(form)
+        return tabulator(form)
+
+    def _values(self, n: int) -> fem.FunctionSpace:
+        element = basix.ufl.quadrature_element("interval", value_shape=(n,), degree=1)
+        return fem.functionspace(self._cell, element)

@@ -6,9 +6,7 @@ Forms depend on nothing of a scene: they are stated on one cell, and compiled on
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cached_property, lru_cache
-from typing import ParamSpec, TypeVar, cast
+from functools import cached_property
 
 import basix.ufl
 import numpy as np
@@ -17,19 +15,11 @@ import ufl
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr, coupling
 from ufl_beam.compiled.simd_kernels import LANES
-from ufl_beam.discretization.compiled_forms import Kernel, in_batches, vectorise
+from ufl_beam.discretization.compiled_forms import Kernel, in_batches, stated, vectorise
 from ufl_beam.discretization.dof_numbering import Share
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
 from ufl_beam.mechanics.kinematics import Axis
 from ufl_beam.model.mesh_options import Mesh
-
-P = ParamSpec("P")
-T = TypeVar("T")
-
-
-def stated(function: Callable[P, T]) -> Callable[P, T]:
-    """Call a function that states forms once in a process with the same arguments."""
-    return cast("Callable[P, T]", lru_cache(maxsize=128)(function))
 
 
 class Element:

@@ -15,11 +15,15 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.mechanics import kinematics
 from ufl_beam.mechanics.kinematics import Axis
-from ufl_beam.mechanics.time_schemes import Constant, Rates, Step, require_between, scaled
-from ufl_beam.model.connector_laws import Coulomb, Guide, Motor
-from ufl_beam.model.loads import RotatingFrame
-from ufl_beam.model.material_laws import Softening, Values
-from ufl_beam.model.scene import Scene
+from ufl_beam.mechanics.time_schemes import (
+    Constant,
+    Opening,
+    Rates,
+    Step,
+    Values,
+    require_between,
+    scaled,
+)
 
 
 class _AtEnd:
@@ -29,7 +33,7 @@ class _AtEnd:
     theta = 1.0
     loss = 0.0
 
-    def resistance(self, softening: Softening, opening: Array, growth: Values) -> Values:
+    def resistance(self, softening: Opening, opening: Array, growth: Values) -> Values:
         """The traction at the end of the step."""
         return softening.traction(opening + growth)
 
@@ -131,6 +135,7 @@ class _Accelerated(_AtEnd):
     dynamic = True
     slack = math.inf
     slips = False
+    has_mean_velocity = False
     weights: Weights
     kept: tuple[str, ...]
 
@@ -142,29 +147,14 @@ class _Accelerated(_AtEnd):
         """None."""
         return rotations[:0]
 
-    def require(self, scene: Scene) -> None:
-        """Raise :class:`SceneError` if something is held or moved that would ring for ever.
+    @property
+    def rings(self) -> bool:
+        """Accelerations of a motion that is given follow from Newmark's formulas alone.
 
-        Accelerations of a motion that is given follow from Newmark's formulas alone, and of what
-        these make of an error only γ > 1/2 takes anything.
+        Of what these make of an error only γ > 1/2 takes anything.
         """
-        name = type(self).__name__
-        for owner, what in [*((c, c.law) for c in scene.links), *((x, x) for x in scene.loads)]:
-            if isinstance(what, Coulomb | RotatingFrame):
-                raise SceneError(
-                    f"{name}: {owner} needs the mean velocity of a step, and forces act at its end "
-                    "here; use Midpoint() or DecayingMidpoint()"
-                )
         _, _, γ, β = self.weights
-        if 2 * β > γ > 0.5:
-            return
-        given = [str(c) for c in scene.links if isinstance(c.law, Motor | Guide)]
-        given += [f"the support of {s.place}" for s in scene.supports if s.moving]
-        if given:
-            raise SceneError(
-                f"{name}: {given[0]} prescribes a motion, whose accelerations ring for ever "
-                "without numerical damping; use GeneralizedAlpha(0.8), or Midpoint()"
-            )
+        return not 2 * β > γ > 0.5
 
     def _beginning(self, dt: float, rates: Rates) -> tuple[Weights, Array | float, Array | float]:
         """The weights of the step; a and ü at its beginning.

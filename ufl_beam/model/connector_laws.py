@@ -16,9 +16,9 @@ from ufl_beam.errors import (
     require_number,
     require_returned,
 )
-from ufl_beam.model.beams import Curve
-from ufl_beam.model.loads import TimeFunction, require_time_function
+from ufl_beam.model.curves import Curve
 from ufl_beam.model.material_laws import Hardening, HingeLaw, Softening, require_hinge_law
+from ufl_beam.model.time_functions import TimeFunction, require_time_function
 
 
 @dataclass(frozen=True)

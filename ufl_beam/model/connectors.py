@@ -12,9 +12,9 @@ from ufl_beam.errors import (
     require_kind,
     require_vector,
 )
-from ufl_beam.model.beams import Point
 from ufl_beam.model.bodies import Anchor, arm, require_anchor
 from ufl_beam.model.connector_laws import Coulomb, Guide, Law, Motor, RigidPlastic
+from ufl_beam.model.curves import Point
 
 
 class Rigidly(NamedTuple):

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass
 
-from ufl_beam.errors import SceneError, require_kind, require_number, require_sequence
-from ufl_beam.model.beams import Beam
+from ufl_beam.errors import SceneError, require_number, require_sequence, shorten
+from ufl_beam.model.bodies import Member
 
 
 @dataclass(frozen=True)
@@ -66,14 +66,15 @@ class KelvinVoigt:
     """
 
     time: float
-    beams: tuple[Beam, ...] | None = None
+    beams: tuple[Member, ...] | None = None
 
     def __post_init__(self) -> None:
         require_number(self.time, "KelvinVoigt: time", positive=True)
         if self.beams is not None:
             object.__setattr__(self, "beams", require_sequence(self.beams, "KelvinVoigt: beams"))
             for i, beam in enumerate(self.beams):
-                require_kind(beam, Beam, f"KelvinVoigt: beams[{i}]")
+                if not isinstance(beam, Member):
+                    raise SceneError(f"KelvinVoigt: beams[{i}] = {shorten(beam)} is not a Beam")
 
 
 Damping = Rayleigh | KelvinVoigt

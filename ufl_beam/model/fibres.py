@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Fibres of a cross-section: layers across its depth, each a material point of its own."""
+"""Material points of a cross-section: its resultants, or fibres across its depth."""
 
 from __future__ import annotations
 
@@ -11,7 +11,68 @@ import numpy as np
 from ufl_beam.array_checks import require_array
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_count, require_kind
-from ufl_beam.model.material_laws import Hardening, Layout, Softening
+from ufl_beam.model.law_functions import Values
+from ufl_beam.model.material_laws import Bulk, Hardening, Softening
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Material points of a cross-section: what strains them, and what their stresses add up to.
+
+    Attributes:
+        strains: Strain of each point per strain (Σ, Γ, K) of the section; shape (n, 3).  The
+            resultants are the sum of weight times stress times the same numbers.
+        weights: Shape (n,); area of fibres, 1 for resultants.
+        stiffness: Elastic stiffness of the points; shape (n,).
+        laws: Laws and the number of points in a row that follow them.
+        rest: Stiffness (axial, shear, bending) of what has no points; shape (3,).
+        softening: Law of the discontinuities, if points can break.
+        breaking: Which points can.
+        hinges: Whether the discontinuity is one hinge, a jump of rotation.
+    """
+
+    strains: Values
+    weights: Values
+    stiffness: Values
+    laws: tuple[tuple[Hardening, int], ...]
+    rest: Values
+    softening: Softening | None
+    breaking: slice
+    hinges: bool = False
+
+    @property
+    def elastic(self) -> bool:
+        """True if nothing can happen at the points."""
+        return self.softening is None and not self.yields
+
+    @property
+    def yields(self) -> bool:
+        """True if the bulk can yield."""
+        return any(law.limit != np.inf for law, _ in self.laws)
+
+    def bulk(self, keys: list[tuple[int, int]]) -> Bulk:
+        """The laws at the points of many cells.
+
+        Args:
+            keys: For each cell two numbers that random limits depend on, besides their seed.
+        """
+        one = np.ones(len(self.weights))
+
+        def row(value: Callable[[Hardening], float]) -> Values:
+            return np.concatenate([np.full(n, value(law)) for law, n in self.laws])
+
+        H, B = row(lambda law: law.modulus), row(lambda law: law.kinematic)
+        flow = self.stiffness + H + B
+        first = np.cumsum([0, *(n for _, n in self.laws)])
+        eta, limits = one.copy(), np.empty((len(keys), len(one)))
+        for (law, n), k in zip(self.laws, first, strict=False):
+            eta[k : k + n] = law.viscosity.coefficient(flow[k : k + n])
+            limits[:, k : k + n] = (
+                [law.limit.draw(n, key) for key in keys]
+                if hasattr(law.limit, "draw")
+                else law.limit
+            )
+        return Bulk(self.stiffness, limits, H, B, eta)
 
 
 @dataclass(frozen=True)

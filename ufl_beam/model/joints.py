@@ -12,10 +12,10 @@ from ufl_beam.errors import (
     require_switch,
     require_text,
 )
-from ufl_beam.model.beams import Curve, Place, Point, point_of
-from ufl_beam.model.bodies import Anchor, carries, ground, require_anchor
+from ufl_beam.model.bodies import Anchor, Place, carries, ground, require_anchor
 from ufl_beam.model.connector_laws import HELD, Bearing, Guide
 from ufl_beam.model.connectors import Connector, _axis, _require_apart
+from ufl_beam.model.curves import Curve, Point, point_of
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,48 +9,13 @@ derives their tangents and FFCx compiles them for the time loop, see
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import singledispatch
 from typing import Any, Protocol
 
 import numpy as np
 
 from ufl_beam.errors import SceneError, is_infinite, require_kind, require_number
-
-Values = Any
-"""Array of real or complex numbers, or a UFL expression."""
-
-
-# -- what laws are written with ----------------------------------------------------------------
-
-
-@singledispatch
-def where(condition: Values, yes: Values, no: Values) -> Values:
-    """``yes`` where the condition holds, else ``no``; both are evaluated everywhere."""
-    return np.where(condition, yes, no)
-
-
-@singledispatch
-def below(x: Values, limit: float) -> Values:
-    """Return whether x is less than the limit."""
-    return x < limit
-
-
-@singledispatch
-def exp(x: Values) -> Values:
-    """Exponential function of numbers or arrays."""
-    return np.exp(x)
-
-
-def sign(x: Values) -> Values:
-    """1 or -1; 1 at zero."""
-    return where(below(x, 0.0), -1.0, 1.0)
-
-
-def positive(x: Values) -> Values:
-    """Macaulay's bracket <x>: x where it is positive, else zero."""
-    return where(below(-x, 0.0), x, 0.0)
+from ufl_beam.model.law_functions import Values, below, exp, positive, sign, where
 
 
 def _require_from_zero_to_infinity(value: float, what: str) -> None:
@@ -338,66 +303,3 @@ def require_hinge_law(law: object, owner: str) -> None:
                 f"{owner}: DuvautLions relaxes an elastic stress, and a hinge of zero length is "
                 "rigid before it flows; use Perzyna(eta)"
             )
-
-
-# -- where the points of a cross-section are ---------------------------------------------------
-
-
-@dataclass(frozen=True, eq=False)
-class Layout:
-    """Material points of a cross-section: what strains them, and what their stresses add up to.
-
-    Attributes:
-        strains: Strain of each point per strain (Σ, Γ, K) of the section; shape (n, 3).  The
-            resultants are the sum of weight times stress times the same numbers.
-        weights: Shape (n,); area of fibres, 1 for resultants.
-        stiffness: Elastic stiffness of the points; shape (n,).
-        laws: Laws and the number of points in a row that follow them.
-        rest: Stiffness (axial, shear, bending) of what has no points; shape (3,).
-        softening: Law of the discontinuities, if points can break.
-        breaking: Which points can.
-        hinges: Whether the discontinuity is one hinge, a jump of rotation.
-    """
-
-    strains: Values
-    weights: Values
-    stiffness: Values
-    laws: tuple[tuple[Hardening, int], ...]
-    rest: Values
-    softening: Softening | None
-    breaking: slice
-    hinges: bool = False
-
-    @property
-    def elastic(self) -> bool:
-        """True if nothing can happen at the points."""
-        return self.softening is None and not self.yields
-
-    @property
-    def yields(self) -> bool:
-        """True if the bulk can yield."""
-        return any(law.limit != np.inf for law, _ in self.laws)
-
-    def bulk(self, keys: list[tuple[int, int]]) -> Bulk:
-        """The laws at the points of many cells.
-
-        Args:
-            keys: For each cell two numbers that random limits depend on, besides their seed.
-        """
-        one = np.ones(len(self.weights))
-
-        def row(value: Callable[[Hardening], float]) -> Values:
-            return np.concatenate([np.full(n, value(law)) for law, n in self.laws])
-
-        H, B = row(lambda law: law.modulus), row(lambda law: law.kinematic)
-        flow = self.stiffness + H + B
-        first = np.cumsum([0, *(n for _, n in self.laws)])
-        eta, limits = one.copy(), np.empty((len(keys), len(one)))
-        for (law, n), k in zip(self.laws, first, strict=False):
-            eta[k : k + n] = law.viscosity.coefficient(flow[k : k + n])
-            limits[:, k : k + n] = (
-                [law.limit.draw(n, key) for key in keys]
-                if hasattr(law.limit, "draw")
-                else law.limit
-            )
-        return Bulk(self.stiffness, limits, H, B, eta)

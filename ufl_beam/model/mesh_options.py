@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.errors import SceneError, require_kind, require_memory, require_number, shorten
-from ufl_beam.model.beams import Beam
+from ufl_beam.model.bodies import Member
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Mesh:
         """Coefficients of the polynomials that are one in one node, in columns."""
         return np.asarray(np.linalg.inv(np.vander(self.nodes, increasing=True)))
 
-    def vertices(self, beam: Beam, attached: Sequence[float]) -> list[float]:
+    def vertices(self, beam: Member, attached: Sequence[float]) -> list[float]:
         """Parameters of the vertices of a beam: ends, corners and what is ``attached`` among them.
 
         Raises:

@@ -15,8 +15,8 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_kind, require_number
-from ufl_beam.model.fibres import Fibres, PlacedFibres
-from ufl_beam.model.material_laws import Hardening, Layout, Softening
+from ufl_beam.model.fibres import Fibres, Layout, PlacedFibres
+from ufl_beam.model.material_laws import Hardening, Softening
 
 Integral = Callable[[Array], Array]
 """Area of a shape below y, or its first moment."""

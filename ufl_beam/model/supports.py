@@ -11,17 +11,13 @@ from ufl_beam.errors import (
     require_number,
     require_vector,
 )
-from ufl_beam.model.beams import Point
 from ufl_beam.model.bodies import (
     Anchor,
     require_node,
 )
 from ufl_beam.model.connector_laws import Bearing
-from ufl_beam.model.loads import (
-    Constant,
-    TimeFunction,
-    require_time_function,
-)
+from ufl_beam.model.curves import Point
+from ufl_beam.model.time_functions import Constant, TimeFunction, require_time_function
 
 COMPONENTS = ("u", "v", "psi")
 

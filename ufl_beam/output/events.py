@@ -12,7 +12,7 @@ import numpy.typing as npt
 from ufl_beam.arrays import State
 from ufl_beam.collective_errors import on_first
 from ufl_beam.errors import require_function
-from ufl_beam.model.beams import Place
+from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import Coulomb, Stop
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.plastic_hinges import law_of

@@ -10,8 +10,7 @@ import numpy as np
 from ufl_beam.arrays import Array, Index, State
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import SceneError
-from ufl_beam.model.beams import Beam
-from ufl_beam.model.bodies import Body
+from ufl_beam.model.bodies import Body, Member
 from ufl_beam.output.recorders import Recorded, Recorder
 
 
@@ -103,7 +102,7 @@ class Extremes(Recorder):
             raise SceneError("Extremes: nothing was run; give it to simulate(..., record=)")
         return self._grid
 
-    def section_forces(self, beam: Beam) -> Extent:
+    def section_forces(self, beam: Member) -> Extent:
         """Extremes of (N, V, M) in the cells of a beam; (num_cells, 3); N, N, N m.
 
         Raises:
@@ -112,7 +111,7 @@ class Extremes(Recorder):
         cells = self.grid.cells_of(beam)
         return self._forces.of(cells)
 
-    def displacement(self, one: Beam | Body) -> Extent:
+    def displacement(self, one: Member | Body) -> Extent:
         """Extremes of (u, v, ψ) at the nodes of a beam, or of a body; (n, 3); m, m, rad.
 
         Raises:

@@ -12,7 +12,7 @@ import numpy as np
 from ufl_beam.arrays import Array, State
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import SceneError, require_kind, require_number, require_sequence
-from ufl_beam.model.beams import Place
+from ufl_beam.model.bodies import Place
 from ufl_beam.output.rainflow import Cycles, RainflowCounter, SNCurve, library
 from ufl_beam.output.recorders import Recorded, Recorder
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, NoReturn
 
 from ufl_beam.errors import SceneError
-from ufl_beam.model.axis_curves import Point
+from ufl_beam.model.curves import Point
 
 SAMPLES = 1000
 """Intervals in which a curve is sampled."""

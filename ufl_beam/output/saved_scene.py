@@ -18,21 +18,23 @@ import numpy as np
 
 from ufl_beam.errors import ModelWarning, SceneError
 from ufl_beam.model import (
-    axis_curves,
     beams,
     bodies,
     connector_laws,
     connectors,
+    curves,
     damping,
     distributions,
     fibres,
     joints,
     loads,
+    masses,
     material_laws,
     mesh_options,
     scene,
     sections,
     supports,
+    time_functions,
 )
 from ufl_beam.output import saved_functions
 from ufl_beam.output.saved_functions import LostFunction
@@ -44,8 +46,9 @@ Sampling = Callable[[Any, str, Any], Any]
 """Record that stands for a function, given the record and the field that it is in."""
 
 MODULES: tuple[ModuleType, ...] = (
-    *(axis_curves, beams, bodies, connector_laws, connectors, damping, distributions, fibres),
-    *(joints, loads, material_laws, mesh_options, saved_functions, scene, sections, supports),
+    *(beams, bodies, connector_laws, connectors, curves, damping, distributions, fibres),
+    *(joints, loads, masses, material_laws, mesh_options, saved_functions, scene, sections),
+    *(supports, time_functions),
 )
 
 RECORDS: dict[str, type] = {
@@ -59,7 +62,7 @@ RECORDS: dict[str, type] = {
 KNOWN: dict[str, Any] = {
     "GROUND": bodies.GROUND,
     "HELD": connector_laws.HELD,
-    "steady": loads.steady,
+    "steady": time_functions.steady,
     "still": supports.still,
 }
 """Objects that all scenes share."""

@@ -21,10 +21,9 @@ from ufl_beam.model.supports import Support
 from ufl_beam.output.joint_histories import Connection, links_of, motion_of, velocity_of
 from ufl_beam.parameter import Parameter
 from ufl_beam.terms.beams import Inertia, SectionForces
-from ufl_beam.terms.connectors import Couplings
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.guide_curves import Guides
 from ufl_beam.terms.inelastic_beams import InelasticBeams
+from ufl_beam.terms.links import Links
 from ufl_beam.terms.supports import Supports
 
 NO_REACTIONS = np.zeros((0, 3))
@@ -61,7 +60,7 @@ class StateView:
     supports: Supports
     inertia: Inertia
     reactions_known: bool = False
-    couplings: list[Couplings | Guides]
+    couplings: list[Links]
     inelastic: list[InelasticBeams]
     _has_inelastic: bool
 

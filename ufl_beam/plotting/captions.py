@@ -8,8 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 from functools import singledispatch
 
-from ufl_beam.model.beams import Beam
-from ufl_beam.model.bodies import Body
+from ufl_beam.model.bodies import Body, Member
 from ufl_beam.model.connector_laws import Coulomb, Damper, Law, RigidPlastic, Spring, Stop
 from ufl_beam.model.damping import Damping, KelvinVoigt, Rayleigh
 from ufl_beam.model.material_laws import HingeLaw
@@ -83,9 +82,9 @@ def _(damping: KelvinVoigt) -> str:
     return f"Kelvin–Voigt damping, {with_unit(damping.time, 's')}{where}{more}"
 
 
-def names_of(scene: Scene) -> dict[Beam | Body, str]:
+def names_of(scene: Scene) -> dict[Member | Body, str]:
     """Names of beams and bodies; equal ones with their number in the scene."""
-    groups: tuple[Sequence[Beam | Body], ...] = (scene.beams, scene.bodies)
+    groups: tuple[Sequence[Member | Body], ...] = (scene.beams, scene.bodies)
     known = [Counter(part.name for part in parts) for parts in groups]
     return {
         part: f"{part.name} {k}" if known[g][part.name] > 1 else part.name

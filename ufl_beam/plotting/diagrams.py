@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.model.beams import Beam
+from ufl_beam.model.bodies import Member
 from ufl_beam.plotting import drawing
 from ufl_beam.plotting.labels import Label, Spot, leader_of, place
 from ufl_beam.plotting.style import (
@@ -65,7 +65,7 @@ def plot_state(solution: Solution, what: str, *, n: int, magnify: float) -> Figu
     return figure
 
 
-def moments_at_ends(solution: Solution, beam: Beam, n: int = -1) -> Array:
+def moments_at_ends(solution: Solution, beam: Member, n: int = -1) -> Array:
     """Moments that act at both ends of each cell; (num_cells, 2); N m.
 
     The moment of a cell is that in its middle.  From there it changes by ``N Γ - V (1 + Σ)`` over a
@@ -81,7 +81,7 @@ def moments_at_ends(solution: Solution, beam: Beam, n: int = -1) -> Array:
     return np.column_stack([M - change, M + change])
 
 
-def _values(solution: Solution, beam: Beam, what: str, n: int) -> Array:
+def _values(solution: Solution, beam: Member, what: str, n: int) -> Array:
     """Values of a section force at both ends of each cell; (num_cells, 2); N, N m."""
     if what == "M":
         return moments_at_ends(solution, beam, n)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_number
-from ufl_beam.model.beams import Beam
+from ufl_beam.model.bodies import Member
 from ufl_beam.model.material_laws import HingeLaw
 from ufl_beam.model.plastic_hinges import law_of, place_of
 from ufl_beam.plotting import symbols
@@ -44,7 +44,7 @@ def moved_points(solution: Solution, n: int, magnify: float) -> Array:
 class OpenHinge(NamedTuple):
     """Hinge that has opened."""
 
-    beam: Beam
+    beam: Member
     at: Array  # where it is now; (2,); m
     part: float  # of its fracture energy, from 0 (closed) to 1 (a joint); 0 if it hardens
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError
-from ufl_beam.model.beams import Place
+from ufl_beam.model.bodies import Place
 from ufl_beam.model.plastic_hinges import law_of
 from ufl_beam.plotting import drawing
 from ufl_beam.plotting.style import (

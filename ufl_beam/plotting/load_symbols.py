@@ -11,20 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.model.beams import Beam, Place
-from ufl_beam.model.bodies import Anchor, Body
-from ufl_beam.model.loads import (
-    FollowerLoad,
-    Gravity,
-    LineLoad,
-    Load,
-    PointLoad,
-    RotatingFrame,
-    TimeFunction,
-    steady,
-)
-from ufl_beam.model.scene import Velocity
+from ufl_beam.model.bodies import Anchor, Body, Member, Place
+from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame
+from ufl_beam.model.masses import Velocity
 from ufl_beam.model.supports import COMPONENTS, Support
+from ufl_beam.model.time_functions import TimeFunction, steady
 from ufl_beam.plotting.labels import Label, Spot
 from ufl_beam.plotting.style import FRONT, GREEN, RED, WHITE, Stroke, with_unit
 
@@ -48,7 +39,7 @@ class Sizes(NamedTuple):
 
     unit: float  # half the size of a symbol of a support; m
     points: float  # points of length in a metre of the scene
-    axes: dict[Beam, Array]  # axis of each beam through its vertices; (n, 2); m
+    axes: dict[Member, Array]  # axis of each beam through its vertices; (n, 2); m
     ways: Callable[[Anchor], Array]  # directions in which beams leave a point; (k, 2)
     largest: tuple[float, float, float]  # force, force per length and velocity; N, N/m, m/s
     stacks: dict[object, float]  # height of the arrows that stand at a place in a direction; m
@@ -195,7 +186,7 @@ def _(load: LineLoad, sizes: Sizes) -> Drawn:
     return strokes, labels
 
 
-def _comb(beam: Beam, way: Array, part: float, sizes: Sizes) -> tuple[list[Stroke], Spots]:
+def _comb(beam: Member, way: Array, part: float, sizes: Sizes) -> tuple[list[Stroke], Spots]:
     """Arrows that end on a beam, and the line that they begin at."""
     axis, unit = sizes.axes[beam], sizes.unit
     height = (1.3 + 1.1 * part) * unit
@@ -212,7 +203,7 @@ def _comb(beam: Beam, way: Array, part: float, sizes: Sizes) -> tuple[list[Strok
     return strokes, tuple(spots)
 
 
-def _flow(beam: Beam, way: Array, part: float, sizes: Sizes) -> tuple[list[Stroke], Spots]:
+def _flow(beam: Member, way: Array, part: float, sizes: Sizes) -> tuple[list[Stroke], Spots]:
     """Arrows along a beam, beside it."""
     axis, unit = sizes.axes[beam], sizes.unit
     left = left_of(way)
@@ -306,7 +297,7 @@ def velocity_symbol(velocity: Velocity, sizes: Sizes) -> Drawn:
     return strokes, labels
 
 
-def _points_of(one: Beam | Body, sizes: Sizes) -> Array:
+def _points_of(one: Member | Body, sizes: Sizes) -> Array:
     """Points at which the velocity is shown: both ends and the middle of a beam; (n, 2); m."""
     if isinstance(one, Body):
         return np.array([one.center])

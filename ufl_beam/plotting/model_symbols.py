@@ -12,8 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.model.beams import Beam, Place
-from ufl_beam.model.bodies import Anchor, Body
+from ufl_beam.model.bodies import Anchor, Body, Member, Place
 from ufl_beam.model.loads import FollowerLoad, LineLoad, PointLoad
 from ufl_beam.model.plastic_hinges import law_of, place_of
 from ufl_beam.model.scene import Scene
@@ -68,8 +67,8 @@ class Subject(NamedTuple):
     """Scene, and the properties that drawings of any scale have in common."""
 
     scene: Scene
-    axes: dict[Beam, Array]  # vertices of each beam; (n, 2); m
-    names: dict[Beam | Body, str]
+    axes: dict[Member, Array]  # vertices of each beam; (n, 2); m
+    names: dict[Member | Body, str]
     ways: Callable[[Anchor], Array]  # directions in which beams leave a place; (n, 2)
     typical: float  # median of the lengths of beams; m
     largest: tuple[float, float, float]  # point force, line load and velocity; N, N/m, m/s
@@ -78,7 +77,7 @@ class Subject(NamedTuple):
     def of(cls, scene: Scene) -> Subject:
         """The subject that a scene is."""
         attached = scene.attached
-        axes = {
+        axes: dict[Member, Array] = {
             beam: np.array([beam.curve(s) for s in beam.vertices(attached[beam])], dtype=float)
             for beam in scene.beams
         }
@@ -190,7 +189,9 @@ def _between_cells(axis: Array, scale: float) -> Iterator[Stroke]:
             yield Stroke(ends, INK, 1.0, layer=4.0)
 
 
-def _draw_bodies(drawing: Drawing, pose: Pose, names: dict[Beam | Body, str], scale: float) -> None:
+def _draw_bodies(
+    drawing: Drawing, pose: Pose, names: dict[Member | Body, str], scale: float
+) -> None:
     """Outlines, centres, names; many bodies as dots."""
     stage, bodies = pose.stage, pose.stage.scene.bodies
     if len(bodies) > MOST_CELLS:
@@ -240,7 +241,7 @@ def _draw_connectors(drawing: Drawing, pose: Pose, scale: float) -> None:
 class _Ways:
     """Directions in which beams leave a place, of all beams that meet there."""
 
-    def __init__(self, scene: Scene, axes_of: dict[Beam, Array]) -> None:
+    def __init__(self, scene: Scene, axes_of: dict[Member, Array]) -> None:
         self._near, self._axes = 1e-7 * scene.size, axes_of
         ends: Array = np.reshape([(x[0], x[1], x[-1], x[-2]) for x in axes_of.values()], (-1, 2, 2))
         ways = ends[:, 1] - ends[:, 0]
@@ -261,7 +262,7 @@ def _direction(start: Array, end: Array) -> Array:
     return np.asarray((end - start) / np.linalg.norm(end - start))
 
 
-def _largest(scene: Scene, axes_of: dict[Beam, Array]) -> tuple[float, float, float]:
+def _largest(scene: Scene, axes_of: dict[Member, Array]) -> tuple[float, float, float]:
     """Largest point force, line load and initial velocity; N, N/m, m/s."""
     forces = [math.hypot(*x.force) for x in scene.loads if isinstance(x, PointLoad | FollowerLoad)]
     lines = [math.hypot(*x.force) for x in scene.loads if isinstance(x, LineLoad)]

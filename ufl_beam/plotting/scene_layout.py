@@ -14,11 +14,10 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.model.beams import Curve
 from ufl_beam.model.bodies import GROUND, Anchor, Body, Spot
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.plane_curves import nearest, parameter_step, tangent
+from ufl_beam.model.curves import Curve, nearest, parameter_step, tangent
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.joint_histories import Motion, motion_of, turned
 from ufl_beam.output.line_data import spots_of

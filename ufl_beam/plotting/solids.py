@@ -12,8 +12,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import require_number
-from ufl_beam.model.beams import Beam, Place
-from ufl_beam.model.bodies import Anchor
+from ufl_beam.model.bodies import Anchor, Member, Place
 from ufl_beam.plotting import style, symbols
 from ufl_beam.plotting.drawing import OpenHinge, moved_points
 from ufl_beam.plotting.scene_layout import Pose, Stage
@@ -50,11 +49,11 @@ class Look:
         """Add bodies, joints, connectors and supports."""
         return Stage(self.solution, self.magnify, self.symbol, sorted(set(shown)))
 
-    def depth(self, beam: Beam) -> float:
+    def depth(self, beam: Member) -> float:
         """Depth in the plane; m."""
-        return self.thickness * beam.section.depth
+        return self.thickness * float(beam.section.depth)
 
-    def width(self, beam: Beam) -> float:
+    def width(self, beam: Member) -> float:
         """Width across the plane; m."""
         return max(self.depth(beam), self.least_width)
 
@@ -75,14 +74,14 @@ class Look:
             map(self.width, beams), default=self.least_width
         )
 
-    def values(self, beam: Beam, n: int) -> Array:
+    def values(self, beam: Member, n: int) -> Array:
         """Return the values of a beam's colours: (num_cells,), of rotations (num_vertices,)."""
         if self.color == "rotation":
             dofs = self.solution.grid.dofs[self.solution.grid.vertices_of(beam), 2]
             return np.asarray(self.solution.q[n][dofs])
         return self.solution.section_forces(beam, n)[:, list(style.RESULTANTS).index(self.color)]
 
-    def corners(self, beam: Beam, n: int, points: Array) -> Array:
+    def corners(self, beam: Member, n: int, points: Array) -> Array:
         """Corners of all cross-sections of a beam; (4 num_vertices, 3); m.
 
         Cross-sections turn with ψ; at a corner of the axis they halve the angle.

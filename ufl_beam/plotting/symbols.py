@@ -13,8 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.model.beams import Place
-from ufl_beam.model.bodies import GROUND, Anchor, Spot, node
+from ufl_beam.model.bodies import GROUND, Anchor, Place, Spot, node
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint

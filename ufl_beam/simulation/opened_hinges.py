@@ -17,8 +17,8 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import ModelWarning
 from ufl_beam.mechanics.time_schemes import Scheme
-from ufl_beam.model.beams import Beam, Place
-from ufl_beam.model.material_laws import Layout
+from ufl_beam.model.bodies import Member, Place
+from ufl_beam.model.fibres import Layout
 
 LARGE = 0.05
 """Part of its limit from which a run warns that the place of an embedded hinge shifts it."""
@@ -42,7 +42,7 @@ class OpenedHinges(NamedTuple):
         place: Middle of the cell with the largest error.
     """
 
-    beam: Beam
+    beam: Member
     number: int
     error: float
     place: Place
@@ -78,7 +78,8 @@ class Opened:
 
     def hinges(self) -> list[OpenedHinges]:
         """Embedded hinges, laws of sections, that opened in the run; beam by beam."""
-        grid, found = self._grid, []
+        grid = self._grid
+        found = []
         for beam in grid.scene.beams:
             law = beam.section.hinge
             cells, laws = grid.cells_of(beam), grid.hinges(beam)
@@ -91,7 +92,7 @@ class Opened:
             found.append(OpenedHinges(beam, len(cells), float(errors[worst]), place))
         return found
 
-    def jumps(self, scheme: Scheme) -> list[tuple[Beam, int, float]]:
+    def jumps(self, scheme: Scheme) -> list[tuple[Member, int, float]]:
         """Beams with cells whose opening is a jump within a step.
 
         The resistance falls faster with the opening than the stress of the cell, whose stiffness
@@ -100,7 +101,8 @@ class Opened:
         Returns:
             Each beam, the cell in which it is worst, and how many times too fast that is.
         """
-        grid, found = self._grid, []
+        grid = self._grid
+        found: list[tuple[Member, int, float]] = []
         for beam in grid.scene.beams:
             cells, laws = grid.cells_of(beam), grid.hinges(beam)
             fall = {law: _fall(beam.section.layout(law), scheme) for law in set(laws)}

@@ -28,10 +28,11 @@ from ufl_beam.simulation.checkpoint import (
     require_continuable,
 )
 from ufl_beam.simulation.initial_state import mesh_of
-from ufl_beam.simulation.simulation import SMALLEST_PART, Simulation
+from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_control import Adaptive, AdaptiveSteps, EqualSteps, Pace
-from ufl_beam.solvers.newton import Newton
+from ufl_beam.simulation.step_cutting import MOST_PARTS
+from ufl_beam.solvers.newton_options import Newton
 
 BAR = "{percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
 
@@ -196,7 +197,7 @@ def _require_times(t: tuple[float, float]) -> tuple[float, float]:
 def _require_step(dt: float | Adaptive, scheme: Scheme, t: tuple[float, float]) -> None:
     if not isinstance(dt, Adaptive):
         require_number(dt, "simulate: dt", positive=True)
-        least = SMALLEST_PART * math.ulp(max(map(abs, t)))
+        least = MOST_PARTS * math.ulp(max(map(abs, t)))
         if dt < least:
             raise SceneError(
                 f"simulate: dt = {dt:g} s is too small: steps from t = {t[0]:g} to {t[1]:g} s can "

@@ -19,12 +19,11 @@ from ufl_beam.discretization.dof_numbering import Grid, Share
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError
-from ufl_beam.model.beams import Beam, Curve, Place
-from ufl_beam.model.bodies import Anchor, Spot
+from ufl_beam.model.bodies import Anchor, Member, Place, Spot
 from ufl_beam.model.connector_laws import Controller, ForceLaw, Guide
 from ufl_beam.model.connectors import Connector
+from ufl_beam.model.curves import Curve, nearest, parameter_step
 from ufl_beam.model.joints import Joint
-from ufl_beam.model.plane_curves import nearest, parameter_step
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 from ufl_beam.output.archive import read, write
@@ -236,7 +235,7 @@ class Solution:
 
     def _sampled(self, owner: Any, field: str, function: Any) -> Any:
         """Return the record that stands for a function of a user in a file."""
-        if field == "curve" and isinstance(owner, Beam):
+        if field == "curve" and isinstance(owner, Member):
             return SavedCurve.of(function, 0.0, 1.0, self.grid.parameters(owner))
         if field == "curve":
             return self._used_curve(function)
@@ -346,7 +345,7 @@ class Solution:
         forces = np.array(self._connections)[..., 1] if self._connections else np.zeros((0, 0))
         return of_joint(self, joint, forces)
 
-    def shape(self, beam: Beam, n: int = -1) -> Array:
+    def shape(self, beam: Member, n: int = -1) -> Array:
         """Coordinates of the vertices of a beam at the n-th kept time; (num_vertices, 2); m."""
         vertices = self.grid.vertices_of(beam)
         return np.asarray(self.grid.points[vertices] + self._q[n][self.grid.dofs[vertices, :2]])
@@ -387,7 +386,7 @@ class Solution:
             forces[cells] = rows[:, :3]
         return forces
 
-    def section_forces(self, beam: Beam, n: int = -1) -> Array:
+    def section_forces(self, beam: Member, n: int = -1) -> Array:
         """(N, V, M) in the cells of a beam at the n-th kept time; (num_cells, 3); N, N, N m."""
         cells = self.grid.cells_of(beam)
         return self._forces(n)[cells]
@@ -409,7 +408,7 @@ class Solution:
     def _strains(self) -> Strains:
         return Strains(self._fields)
 
-    def strains(self, beam: Beam, n: int = -1) -> Array:
+    def strains(self, beam: Member, n: int = -1) -> Array:
         """(Σ, Γ, K) in the cells of a beam at the n-th kept time; (num_cells, 3); 1, 1, 1/m.
 
         The curvature includes the jump of a hinge over the length of its cell.
@@ -426,7 +425,7 @@ class Solution:
         strains[self._fields.order] = self._strains.mean(self._q[n])
         return strains
 
-    def material(self, beam: Beam, n: int = -1) -> Material:
+    def material(self, beam: Member, n: int = -1) -> Material:
         """Forces, jumps and dissipated energies in the cells of a beam at the n-th kept time.
 
         Raises:
@@ -457,7 +456,7 @@ class Solution:
         """The cells whose embedded hinge or cracks opened in the run."""
         return Opened(self.grid, self._material)
 
-    def hinge_place_error(self) -> dict[Beam, float]:
+    def hinge_place_error(self) -> dict[Member, float]:
         """Largest part of its limit by which the place of an embedded hinge shifts it, by beam.
 
         A hinge of ``Section(hinge=)`` is in the middle of its cell of length h and opens where the

@@ -15,7 +15,8 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import StepFailed, require_number, require_sequence
 
 if TYPE_CHECKING:
-    from ufl_beam.simulation.simulation import Simulation, Trial
+    from ufl_beam.simulation.simulation import Simulation
+    from ufl_beam.simulation.step_solver import Trial
 
 GROWTH = 1.5
 """A step is at most so many times as long as the one before it, whose error it may repeat."""

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Direct solvers as PETSc preconditioners: condensation along beams, bordered systems."""
+"""Direct solver as a PETSc preconditioner: condensation along beams."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 from petsc4py import PETSc
@@ -15,37 +14,6 @@ from ufl_beam.solvers.static_condensation import Elimination
 
 GOOD = int(PETSc.PC.FailedReason.NOERROR)
 BAD_PIVOT = int(PETSc.PC.FailedReason.FACTOR_NUMERIC_ZEROPIVOT)
-
-
-class Bordered:
-    """Direct solver of the tangent bordered by one more unknown and equation.
-
-    By elimination of the border: one factorisation and two solutions, as the tangent alone is
-    banded.  Where that is nearly singular, the next iteration makes up for the lost digits.
-
-    Args:
-        factors: An exact preconditioner of the tangent.
-        rate: The derivative by the unknown.
-        correct: See :class:`Border`; of vectors.
-    """
-
-    def __init__(
-        self, factors: PETSc.PC, rate: PETSc.Vec, correct: Callable[[PETSc.Vec, PETSc.Vec], None]
-    ) -> None:
-        self._factors, self._rate, self._correct = factors, rate, correct
-        self._z = rate.duplicate()
-
-    def setUp(self, pc: PETSc.PC) -> None:
-        """Factor; PETSc asks for it where the matrix has changed."""
-        self._factors.setOperators(*pc.getOperators())
-        self._factors.setUp()
-        pc.setFailedReason(self._factors.getFailedReason())
-
-    def apply(self, pc: PETSc.PC, b: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Solve the bordered system for a right-hand side."""
-        self._factors.apply(b, y)
-        self._factors.apply(self._rate, self._z)
-        self._correct(y, self._z)
 
 
 class ChainsFirst:

@@ -18,8 +18,8 @@ import ufl
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop
 from ufl_beam.compiled.csr import Csr, StepProduct
-from ufl_beam.discretization.compiled_forms import Kernel
-from ufl_beam.discretization.function_spaces import Element, Fields, stated
+from ufl_beam.discretization.compiled_forms import Kernel, stated
+from ufl_beam.discretization.function_spaces import Element, Fields
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.kinematics import split, strain
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, Step

@@ -28,8 +28,9 @@ from ufl_beam.model.connector_laws import (
     Stop,
 )
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.loads import value_at
-from ufl_beam.model.material_laws import Hardening, Layout
+from ufl_beam.model.fibres import Layout
+from ufl_beam.model.material_laws import Hardening
+from ufl_beam.model.time_functions import value_at
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.material_points import INPUTS, Course, Points, expect_entries
 from ufl_beam.terms.openings import Openable

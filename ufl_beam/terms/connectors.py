@@ -14,9 +14,8 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, integers, lib, loop
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.compiled_forms import Kernel
+from ufl_beam.discretization.compiled_forms import Kernel, stated
 from ufl_beam.discretization.dof_numbering import Share
-from ufl_beam.discretization.function_spaces import stated
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem, line_mesh
 from ufl_beam.mechanics.relative_motions import MOTIONS, Numbers, Pair
@@ -26,6 +25,7 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.terms.connector_laws import Setting, respond
 from ufl_beam.terms.guide_curves import Guides
 from ufl_beam.terms.links import Links
+from ufl_beam.terms.openings import Openable
 from ufl_beam.terms.rigid_plastic import RigidPlasticResponse
 from ufl_beam.terms.tangent_derivatives import TangentChange
 
@@ -107,8 +107,6 @@ class Couplings(Links):
 
     Each is a cell of unit length from one node to the other, with its force as a seventh unknown.
     """
-
-    kind = "connectors"
 
     def __init__(self, share: Share, here: Index, setting: Setting, A: Csr) -> None:
         super().__init__(share, here, A)
@@ -242,6 +240,15 @@ class Couplings(Links):
         """Energy that each connector has dissipated by yielding and softening; (num_links,); J."""
         return self.response.dissipated
 
+    def remaining(self) -> Array:
+        """Part of the elastic stiffness that is left in the latest iterate; (num_links,)."""
+        return self.response.remaining()
+
+    @property
+    def openable(self) -> Openable | None:
+        """Connectors that open beyond a limit, if there are."""
+        return self.response.openable
+
     def effort(self, q1: Array) -> float:
         """Sum of the sizes of the works that the connectors take in the step to ``q1``; J."""
         return float(np.abs(self._taken(q1)).sum())
@@ -303,7 +310,7 @@ def _split(q: Expr) -> tuple[Pair, Expr]:
     return Pair(at(-1.0), at(1.0)), force
 
 
-def couplings(share: Share, setting: Setting, A: Csr) -> list[Couplings | Guides]:
+def couplings(share: Share, setting: Setting, A: Csr) -> list[Links]:
     """The connectors of a process, those that are alike together."""
     links = share.grid.scene.links
     groups: dict[tuple[str, object], list[int]] = {}

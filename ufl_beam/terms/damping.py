@@ -10,7 +10,8 @@ import ufl
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.csr import Csr, StepProduct
-from ufl_beam.discretization.function_spaces import Element, Fields, stated
+from ufl_beam.discretization.compiled_forms import stated
+from ufl_beam.discretization.function_spaces import Element, Fields
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError

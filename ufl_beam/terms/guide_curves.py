@@ -12,7 +12,7 @@ from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.model.connector_laws import Guide
-from ufl_beam.model.plane_curves import REACH, nearest, parameter_step, tangent
+from ufl_beam.model.curves import REACH, nearest, parameter_step, tangent
 from ufl_beam.terms.connector_laws import Setting
 from ufl_beam.terms.links import Links
 
@@ -26,8 +26,6 @@ class Guides(Links):
 
     The motion of a guide is the distance from its curve, zero when a step is accepted.
     """
-
-    kind = "connectors"
 
     def __init__(self, share: Share, here: Index, setting: Setting, A: Csr) -> None:
         super().__init__(share, here, A)
@@ -165,9 +163,6 @@ class Guides(Links):
             change += weight / (12 * ε) * data
         data[:] = before + change
 
-    def demand(self) -> None:
-        """Prescribe no motion: guides are fixed."""
-
     def excess(self, q: Array, r: Array, force: float, moved: float) -> float:
         """Largest distance, as a part of 1 % of the scene."""
         round_off = 8 * np.spacing(self._size + np.abs(self._points + self._on0).max(axis=1))
@@ -178,34 +173,11 @@ class Guides(Links):
         """Guides take no energy."""
         return 0.0
 
-    def flows(self) -> bool:
-        """False: no plastic flow in guides."""
-        return False
-
-    def shown_motion(self, q: Array) -> Array:
-        """Motions of the accepted state ``q``; (num_links,); m."""
-        return self.motion(q)
-
-    def dissipated(self) -> Array:
-        """None: guides do not yield."""
-        return np.zeros(len(self.links))
-
-    def dissipation(self, q1: Array) -> float:
-        """None: guides do no work."""
-        return 0.0
-
-    def effort(self, q1: Array) -> float:
-        """Guides take no energy."""
-        return 0.0
-
     def accept(self, q1: Array, s: Array) -> None:
         """Remember the points on the curves."""
         self._on0, t = self._nearest(self._at(q1))
         self._steps = REACH * self._size / np.linalg.norm(t, axis=1)
         self._s0 = self._s.copy()
-
-    def freeze(self) -> None:
-        """Change nothing: guides do not yield."""
 
     # -- the state -----------------------------------------------------------------------------
 

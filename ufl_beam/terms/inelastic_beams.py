@@ -12,14 +12,15 @@ import ufl
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop
 from ufl_beam.compiled.csr import Csr
+from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.discretization.function_spaces import Element, Fields, stated
+from ufl_beam.discretization.function_spaces import Element, Fields
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_schemes import Scheme, Step
-from ufl_beam.model.material_laws import Layout
+from ufl_beam.model.fibres import Layout
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.material_points import INPUTS, Course, Points
 from ufl_beam.terms.tangent_derivatives import CellTangent

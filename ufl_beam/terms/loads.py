@@ -17,7 +17,8 @@ from ufl_beam.discretization.dof_numbering import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.bodies import carries
-from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, value_at
+from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad
+from ufl_beam.model.time_functions import value_at
 from ufl_beam.terms.energy_ledger import Ledger
 
 

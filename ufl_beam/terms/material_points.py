@@ -14,16 +14,16 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, in_order, integers, lib, names
-from ufl_beam.discretization.compiled_functions import Pointwise
-from ufl_beam.discretization.function_spaces import stated
+from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.mechanics.time_schemes import Scheme
-from ufl_beam.model import material_laws
-from ufl_beam.model.material_laws import Bulk, Layout, Softening
+from ufl_beam.model import law_functions
+from ufl_beam.model.fibres import Layout
+from ufl_beam.model.material_laws import Bulk, Softening
 from ufl_beam.terms.energy_ledger import Ledger
 
-material_laws.where.register(Condition, ufl.conditional)
-material_laws.below.register(Expr, ufl.lt)
-material_laws.exp.register(Expr, ufl.exp)
+law_functions.where.register(Condition, ufl.conditional)
+law_functions.below.register(Expr, ufl.lt)
+law_functions.exp.register(Expr, ufl.exp)
 
 INPUTS = (
     *names("point_input"),

@@ -18,10 +18,9 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, in_order, integers, lib, names
-from ufl_beam.discretization.compiled_functions import Pointwise
-from ufl_beam.discretization.function_spaces import stated
+from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.mechanics.time_schemes import Scheme, Step
-from ufl_beam.model.beams import Place
+from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import RigidPlastic
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.material_laws import Bulk, Hardening, Softening

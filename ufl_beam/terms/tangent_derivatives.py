@@ -11,8 +11,7 @@ import ufl
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.compiled_forms import Kernel
-from ufl_beam.discretization.function_spaces import stated
+from ufl_beam.discretization.compiled_forms import Kernel, stated
 from ufl_beam.dolfinx_compat import fem
 
 Compile = Callable[[ufl.Form], Kernel]
