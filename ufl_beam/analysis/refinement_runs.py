@@ -19,7 +19,6 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import ConvergenceError, SceneError, TradeoffError
 from ufl_beam.model.scene import Scene
 from ufl_beam.parallel import alone
-from ufl_beam.simulation.run import simulate
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers.newton_options import Newton
 
@@ -33,6 +32,7 @@ class RefinementRuns:
     """All runs of a trade-off, see :func:`tradeoff`.
 
     Args:
+        simulate: Function that runs the scene.
         families: Coarsest dials to begin with.
         newtons: Tolerances of Newton's method; runs have the first unless they say so.
         most: Wall time that all runs together may take; s.
@@ -47,16 +47,17 @@ class RefinementRuns:
         self,
         scene: Scene,
         quantities: Mapping[str, Quantity],
-        *,
-        t: tuple[float, float],
+        simulate: Callable[..., Solution],
         families: Sequence[Dials],
         newtons: Sequence[Newton],
+        *,
+        t: tuple[float, float],
         most: float,
         comm: MPI.Intracomm,
     ) -> None:
         self.scene, self.quantities, self.t = scene, dict(quantities), t
         self.families, self.newtons = families, newtons
-        self._most, self._comm = most, comm
+        self._most, self._comm, self._run = most, comm, simulate
         self.runs: dict[Refinement, Run] = {}
         self.failed: dict[Refinement, str] = {}
         self.spent = 0.0
@@ -144,7 +145,7 @@ class RefinementRuns:
 
     def _simulate(self, refinement: Refinement) -> Solution:
         dials = self.dials(refinement)
-        return simulate(self.scene, t=self.t, progress=False, **dials.arguments)
+        return self._run(self.scene, t=self.t, progress=False, **dials.arguments)
 
     def _quantities_of(self, solution: Solution) -> Iterator[tuple[str, Array]]:
         for name, quantity in self.quantities.items():

@@ -30,6 +30,7 @@ from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.parallel import communicator
+from ufl_beam.simulation.run import simulate
 from ufl_beam.simulation.step_control import Adaptive
 from ufl_beam.solvers.newton_options import Newton
 
@@ -124,9 +125,7 @@ def tradeoff(
         if not isinstance(step, Adaptive):
             require_number(step, f"tradeoff: dt[{i}]" if len(steps) > 1 else "tradeoff: dt")
     families = [Dials(*one, newtons[0]) for one in product(schemes, steps, meshes)]
-    runs = RefinementRuns(
-        scene, quantities, t=t, families=families, newtons=newtons, most=most, comm=comm
-    )
+    runs = RefinementRuns(scene, quantities, simulate, families, newtons, t=t, most=most, comm=comm)
     found: list[_Found] = []
     notes: list[str] = []
     wrong: list[SceneError] = []

@@ -15,7 +15,6 @@ from ufl_beam.analysis.targets import Target
 from ufl_beam.arrays import Array
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.mesh_options import Mesh
-from ufl_beam.simulation.step_control import Adaptive
 from ufl_beam.solvers.newton_options import Newton
 
 
@@ -24,7 +23,7 @@ class Dials:
     """Setting of a run, the arguments of :func:`simulate`."""
 
     scheme: Scheme  # the time scheme
-    dt: float | Adaptive  # step; s; or adaptive steps
+    dt: Any  # step; s; or adaptive steps
     mesh: Mesh  # the cells
     newton: Newton  # how exactly equilibria are found
 
@@ -36,13 +35,12 @@ class Dials:
         """
         if refine == 1 and level == 0:
             return self  # as it was given, to be checked as such
-        dt = self.dt
-        if isinstance(dt, Adaptive):
-            finer: float | Adaptive = replace(dt, tolerance=dt.tolerance / 8**level)
+        if isinstance(self.dt, float | int):
+            number = max(1, math.ceil((t[1] - t[0]) / self.dt * (1 - 1e-9)))
+            dt: Any = (t[1] - t[0]) / round(number * 2**level)
         else:
-            number = max(1, math.ceil((t[1] - t[0]) / dt * (1 - 1e-9)))
-            finer = (t[1] - t[0]) / round(number * 2**level)
-        return replace(self, dt=finer, mesh=replace(self.mesh, refine=self.mesh.refine * refine))
+            dt = replace(self.dt, tolerance=self.dt.tolerance / 8**level)
+        return replace(self, dt=dt, mesh=replace(self.mesh, refine=self.mesh.refine * refine))
 
     @property
     def arguments(self) -> dict[str, Any]:
