@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Critical points of static paths: the stiffness of the whole scene, its signs and its modes."""
+"""Critical points of static paths: tangent stiffness of the whole scene, its signs and modes."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ from ufl_beam.errors import SceneError, StepFailed
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers.factorization import Factorisation, SingularMatrix
 
-INVERSE_ITERATIONS = 50
-"""Inverse iterations in which a mode is sought."""
+INVERSE_ITERATIONS = 50  # inverse iterations in which a mode is sought
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +87,7 @@ class CriticalPoint:
     mode: Array
 
     def branch(self, sign: int = 1) -> Branch:
-        """The path that leaves along the mode, or against it with ``sign = -1``.
+        """Return the start of the path along the mode, or against it with ``sign = -1``.
 
         Raises:
             SceneError: ``sign`` is neither 1 nor -1, or nothing branches at a limit point.
@@ -104,7 +103,7 @@ class CriticalPoint:
 
 
 def metric(share: Share) -> Array:
-    """Weights of squares, such that a step's sum is its mean square; (share.size,).
+    """Return the weights of squares whose sum is the mean square of a step; (share.size,).
 
     Displacements count as parts of the size of the scene, forces of connectors do not count.  Only
     what a process owns does, so that sums over the processes are right.
@@ -118,7 +117,7 @@ def metric(share: Share) -> Array:
 
 
 class Stiffness:
-    """The tangent stiffness of the whole scene, factored by every process.
+    """Tangent stiffness of the whole scene, factored by every process.
 
     Of this process are its part A of the tangent, the local degrees of freedom that supports hold,
     and its part of the residual's derivative by the load factor, ``rate``.
@@ -205,7 +204,7 @@ class Stiffness:
         return values
 
     def softest(self, weights: Array) -> tuple[float, Array]:
-        """The eigenvalue nearest to zero, N m, and its mode of unit size in a :func:`metric`."""
+        """Find the eigenvalue nearest to zero, N m, and its mode of size 1 in a :func:`metric`."""
         w = weights[self._free]
         mode = np.random.default_rng(0).normal(size=len(w)) / np.sqrt(np.maximum(w, w.max()))
         λ = np.inf

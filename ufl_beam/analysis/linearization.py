@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Small motions about a state: their matrices, and the eigenvalues that SLEPc finds of them."""
+"""Linearised equations about a state: matrices and eigenvalues of small motions."""
 
 from __future__ import annotations
 
@@ -26,11 +26,8 @@ from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers import eigensolvers
 from ufl_beam.solvers.eigensolvers import ROUND_OFF, SHIFT, ZERO
 
-APART = 1e-9
-"""Part of the largest damping below which what couples two motions does not count."""
-
-AT_REST = 1e300
-"""Length of a step in which all rates vanish; s."""
+COUPLING_TOLERANCE = 1e-9  # couplings below this part of the largest damping do not count
+AT_REST = 1e300  # length of a step in which all rates vanish; s
 
 
 class _Standstill(Static):
@@ -65,7 +62,7 @@ class _Standstill(Static):
 
 
 class SmallMotions:
-    """Matrices of the small motions about a state, at what supports leave free.
+    """Matrices of the small motions about a state, without the motions that supports hold.
 
     Args:
         scene: What is modelled.
@@ -136,7 +133,7 @@ class SmallMotions:
     # -- frequencies ---------------------------------------------------------------------------
 
     def exponents(self, n: int) -> tuple[Complex, Complex]:
-        """At least n exponents, if there are so many, and motions; (m,), (unknowns, m)."""
+        """Compute at least n exponents, if there are so many, and motions; (m,), (unknowns, m)."""
         K, M = self.K, self.M
         heavy = (M.diagonal() > 0) & (K.diagonal() != 0)
         squares = np.abs(K.diagonal()[heavy]) / M.diagonal()[heavy]
@@ -186,7 +183,7 @@ class SmallMotions:
         N = free @ np.linalg.inv(np.linalg.cholesky(free.T @ (self.M @ free))).T
         Λ = N.T @ (C @ N)
         _, sizes, rows = np.linalg.svd(C @ N - self.M @ N @ Λ, full_matrices=False)
-        W = rows[sizes <= APART * abs(C).max() * np.abs(N).max(initial=0.0)].T
+        W = rows[sizes <= COUPLING_TOLERANCE * abs(C).max() * np.abs(N).max(initial=0.0)].T
         N, Λ = N @ W, W.T @ Λ @ W
         B = csr_array(self.M @ N * (abs(self.K).max() / abs(self.M).max() ** 0.5))
         K = csr_array(block_array([[self.K, B], [B.T, csr_array((B.shape[1],) * 2)]]))
@@ -197,7 +194,9 @@ class SmallMotions:
         s, x = eigensolvers.quadratic(K, C, M, 2 * n, most=most, shift=lowest)
         s, x = self._with_zeros(s, x[: len(free)], free)
         decay, how = np.linalg.eig(-Λ)
-        decay = np.where(np.abs(decay.imag) <= APART * np.abs(decay), decay.real, decay)
+        decay = np.where(
+            np.abs(decay.imag) <= COUPLING_TOLERANCE * np.abs(decay), decay.real, decay
+        )
         slows = np.abs(decay) > ROUND_OFF * abs(C).max() / abs(self.M).max()
         return np.concatenate([s, decay[slows]]), np.hstack([x, N @ how[:, slows]])
 
@@ -214,7 +213,7 @@ class SmallMotions:
     # -- buckling ------------------------------------------------------------------------------
 
     def buckling(self, n: int) -> tuple[Array, Complex]:
-        """At least n factors, if there are so many, and shapes."""
+        """Compute at least n buckling factors, if there are so many, and their modes."""
         u = self._path()
         right, left = self._with_laws()
         change = csr_array(
@@ -263,7 +262,7 @@ class SmallMotions:
     # -- shapes --------------------------------------------------------------------------------
 
     def shapes(self, x: Complex) -> Array | Complex:
-        """Motions of all degrees of freedom, the largest displacement one; (size, n)."""
+        """Return motions of all degrees of freedom, the largest displacement one; (size, n)."""
         shapes = self._Z @ x
         turns = self._simulation.share.rotations()
         sizes = np.abs(shapes)

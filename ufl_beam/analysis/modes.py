@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Small motions: natural frequencies, damping ratios, buckling loads, their shapes."""
+"""Vibration modes with natural frequencies and damping ratios, and buckling loads and modes."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ AMPLITUDE = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Shapes(ABC):
-    """Shapes about a state; the same on every process.
+    """Modes about a state; the same on every process.
 
     Attributes:
         scene: What was modelled.
@@ -58,7 +58,7 @@ class Shapes(ABC):
     @property
     @abstractmethod
     def titles(self) -> list[str]:
-        """Captions of the shapes."""
+        """Captions of the modes in pictures."""
 
     def __str__(self) -> str:
         return "\n".join(f"{self.word} {k}: {title}" for k, title in enumerate(self.titles))
@@ -67,7 +67,7 @@ class Shapes(ABC):
         return int(self.shapes.shape[1])
 
     def shape(self, k: int, place: Anchor) -> Array | Complex:
-        """Motion (u, v, ψ) of a place in the k-th shape; (3,).
+        """Return the motion (u, v, ψ) of a place in the k-th mode; (3,).
 
         Raises:
             SceneError: No such shape, or the place is not in the scene.
@@ -77,7 +77,7 @@ class Shapes(ABC):
         return np.asarray(velocity_of(self.grid, place, [self.q], [shape])[0])
 
     def motion(self, k: int, *, amplitude: float = AMPLITUDE, count: int = 24) -> Solution:
-        """One period of the k-th shape, for what shows solutions: ``animate``, ``plot_shapes``.
+        """Return one period of the k-th mode as a solution, for ``animate`` or ``plot_shapes``.
 
         Args:
             k: Which.
@@ -99,7 +99,7 @@ class Shapes(ABC):
         return solution
 
     def write(self, path: str | Path, *, amplitude: float = AMPLITUDE) -> None:
-        """Write a time series for ParaView: the k-th shape is what it shows at time k.
+        """Write a time series for ParaView with the k-th mode at time k.
 
         Displacements are those of the state and the shape together, N, V, M those of the shape.
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Studies: one scene many times, with other parameters or seeds, several at a time.
+"""Parameter studies: a scene many times, with other parameters or seeds, in parallel.
 
 Members are handed out by :mod:`mpi4py.futures`.  Since all processes run the same script, each has
 the function of the member itself and only cases travel: it may be a closure, and need not pickle.
@@ -41,7 +41,7 @@ def study(
     progress: bool = True,
     comm: MPI.Intracomm | None = None,
 ) -> Study:
-    """Call ``member(**case)`` for each case, several at a time under ``mpirun``.
+    """Run a parameter study: call ``member(**case)`` for each case, in parallel under ``mpirun``.
 
     Each member is computed by one process alone, to the same last bit on any number of them.  The
     first process hands cases out and writes the file at once; it computes nothing and hardly takes

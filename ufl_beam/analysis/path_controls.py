@@ -18,8 +18,7 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.simulation.step_solver import Trial
 
-LEAST_REST = 1e-3
-"""Part of a step of arc length that is gone at least beyond a kink."""
+LEAST_REST = 1e-3  # part of a step of arc length that is gone at least beyond a kink
 
 
 # -- equations of steps --------------------------------------------------------------------------
@@ -69,7 +68,7 @@ class DissipatedEnergy:
         return self.corrector.dissipation(q) / self.energy - 1.0
 
     def derivative(self, q: Array, way: Direction) -> float:
-        """By a central difference over a small part of the step; nothing else asks for it."""
+        """Derivative of the equation, by a central difference over a small part of the step."""
         size = self.corrector.size(way)
         gone = self.corrector.size(Direction(q - self.corrector.simulation.q, 0.0))
         if size == 0.0:
@@ -120,16 +119,16 @@ class ArcLength(Control):
         require_number(self.factor, "ArcLength: factor", positive=True)
 
     def begins_along(self, corrector: PathCorrector, way: Direction) -> float:
-        """The sign of the step is that of the first change of the load factor."""
+        """Positive if the load factor changes with the sign of the step."""
         return self.step * way.t
 
     def continues_along(self, corrector: PathCorrector, gone: Direction, way: Direction) -> float:
-        """Choose the direction: plastic flow and openings go on, else the turn is below π/2."""
+        """Positive if flow and openings go on along ``way``, else if it turns by less than π/2."""
         side = corrector.dissipation_side(corrector.simulation.q + gone.q, way)
         return side or corrector.product(gone, way, self.factor)
 
     def solve_step(self, corrector: PathCorrector, part: float) -> Trial:
-        """Solve on the plane across the direction."""
+        """Solve on the plane across the direction of the path."""
         reach, way = abs(self.step) * part, corrector.direction
         size = corrector.length(way, self.factor)
         unit = way / size
@@ -319,11 +318,11 @@ class DissipationControl(Control):
         return self.otherwise.factor
 
     def begins_along(self, corrector: PathCorrector, way: Direction) -> float:
-        """As the arc length begins."""
+        """Positive if the arc length begins along ``way``."""
         return self.otherwise.begins_along(corrector, way)
 
     def continues_along(self, corrector: PathCorrector, gone: Direction, way: Direction) -> float:
-        """As the arc length goes on."""
+        """Positive if the arc length goes on along ``way``."""
         return self.otherwise.continues_along(corrector, gone, way)
 
     def solve_step(self, corrector: PathCorrector, part: float) -> Trial:

@@ -20,21 +20,17 @@ from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.step_solver import Trial
 from ufl_beam.terms.beams import Term
 
-MOST_DOUBLINGS = 30
-"""Doublings of a step until something dissipates in it."""
-
-ONSET_PART = 1e-6
-"""Part of the dissipated energy of a step at which its onset is looked at."""
+MOST_DOUBLINGS = 30  # doublings of a step until something dissipates in it
+ONSET_PART = 1e-6  # part of the dissipated energy of a step at which its onset is looked at
 
 MOST_BISECTIONS = 40
 """Bisections in which the state is sought in which something begins to dissipate."""
 
-CONTROL_TOLERANCE = 1e-9
-"""Part of a step by which its end may miss the equation of the control."""
+CONTROL_TOLERANCE = 1e-9  # part of a step by which its end may miss the equation of the control
 
 
 class Constraint(Protocol):
-    """Equation of a step besides equilibrium; without dimension."""
+    """Equation of a step besides equilibrium; dimensionless."""
 
     def residual(self, q: Array, t: float) -> float:
         """Residual in a state."""
@@ -87,11 +83,11 @@ class PathCorrector:
     # -- measures ------------------------------------------------------------------------------
 
     def product(self, a: Direction, b: Direction, factor: float) -> float:
-        """Inner product of two directions; without dimension."""
+        """Return the inner product of two directions; dimensionless."""
         return self.share.total(float((self.weights * a.q) @ b.q)) + a.t * b.t / factor**2
 
     def length(self, way: Direction, factor: float) -> float:
-        """Length of a direction, however small; without dimension."""
+        """Return the length of a direction, however small; dimensionless."""
         along = abs(way.t) / factor
         largest = max(self.share.largest(float(np.abs(way.q).max(initial=0.0))), along)
         if largest == 0.0 or not math.isfinite(largest):
@@ -101,17 +97,17 @@ class PathCorrector:
         return largest * math.sqrt(self.product(unit, unit, factor))
 
     def size(self, way: Direction) -> float:
-        """Length of a direction's part in the configuration; without dimension."""
+        """Return the length of a direction's part in the configuration; dimensionless."""
         return self.length(Direction(way.q, 0.0), 1.0)
 
     def dissipation(self, q: Array) -> float:
-        """Energy that beams and springs dissipate in the step to ``q``; J."""
+        """Return the energy that beams and springs dissipate in the step to ``q``; J."""
         in_cells = sum(one.dissipation(q) for one in self.simulation.inelastic)
         here = sum((one.dissipation(q) for one in self.simulation.couplings), in_cells)
         return self.share.total(here)
 
     def predict_dissipation(self, energy: float) -> Direction:
-        """Predictor of a step in which so much energy (J) is dissipated, if nothing gives way.
+        """Predict a step in which so much energy (J) is dissipated, if nothing gives way.
 
         Where nothing dissipated before, the direction changes as soon as something does.
 
@@ -127,7 +123,7 @@ class PathCorrector:
         return self._until(energy, gone, way)
 
     def kink(self, length: float) -> tuple[Direction, Direction] | None:
-        """Step to the state in which something begins to dissipate, and the path's direction there.
+        """Find the state in which dissipation begins, and the path's direction beyond it.
 
         It is sought in the direction of the path up to a ``length``; None if nothing does.
         """
@@ -181,7 +177,7 @@ class PathCorrector:
     # -- the border ----------------------------------------------------------------------------
 
     def step_at(self, t: float) -> Step:
-        """A path is infinitely slow: rates and what they do vanish."""
+        """Return an infinitely slow step to a load factor: rates and viscous forces vanish."""
         return Step(-math.inf, t, self.simulation.q, load_time=t, motion_time=t, toward=1.0)
 
     @staticmethod
@@ -201,7 +197,7 @@ class PathCorrector:
         self._give(self.step_at(self.t), self._driven)
 
     def tangent(self, x: Array, r: Array) -> None:
-        """Fill the matrix; the derivative by the load factor, of linear functions exactly."""
+        """Fill the matrix, and the derivative by the load factor, exact for linear functions."""
         simulation = self.simulation
         q = simulation.supports.in_plane(x)
         ε = 1e-6 * max(1.0, abs(self.t))
@@ -220,7 +216,7 @@ class PathCorrector:
         self._A = simulation.equation.tangent_at(x, self._rates, r)
 
     def correct(self, y: Array, z: Array) -> None:
-        """By the equation of the control, linearised."""
+        """Correct an iterate by the linearised equation of the control."""
         supports, moving = self.simulation.supports, self.simulation.supports.moving
         if len(moving):
             z = z - self._rates
@@ -267,7 +263,7 @@ class PathCorrector:
         simulation.together(self._give, self.step_at(simulation.t), simulation.terms)
 
     def stiffness_at(self, q: Array) -> Stiffness:
-        """The tangent stiffness at a state."""
+        """Return the tangent stiffness at a state."""
         supports = self.simulation.supports
         x = supports.in_axes(q)
         # The first tangent of a step is that of the forces before it, and may not yet be taken.
@@ -278,7 +274,7 @@ class PathCorrector:
         return Stiffness(self.share, self._A, supports.dofs, rate)
 
     def direction_of(self, stiffness: Stiffness) -> Direction:
-        """Direction of the path of growing load factor."""
+        """Return the direction of the path in which the load factor grows."""
         q = stiffness.flow[self.share.dofs] + self._rates
         self.simulation.supports.leave(q)
         way = Direction(q, 1.0)
@@ -292,7 +288,7 @@ class PathCorrector:
 
 
 class Control(ABC):
-    """Control of a path: it sets the lengths of steps."""
+    """Base class of path controls, which set the lengths of steps."""
 
     @property
     @abstractmethod

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Static paths: equilibria one after the other, the load factor among the unknowns."""
+"""Path following: static equilibria with the load factor among the unknowns."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Steps of a static path, and the critical points that they pass."""
+"""Steps of path following, and location of the critical points that they pass."""
 
 from __future__ import annotations
 
@@ -20,8 +20,7 @@ ADVICE = (
     "displacements, DissipationControl through softening that snaps back"
 )
 
-SMALLEST_STEP_PART = 2.0**-12
-"""A step is cut down to this part of it."""
+SMALLEST_STEP_PART = 2.0**-12  # a step is cut down to this part of it
 
 TARGET_ITERATIONS = 12
 """Steps of more Newton iterations are followed by shorter ones, of fewer by longer ones."""
@@ -29,17 +28,10 @@ TARGET_ITERATIONS = 12
 MOST_FAILURES = 4
 """Steps that fail before the search for a critical point goes on from another state."""
 
-LOCATION_TOLERANCE = 1e-7
-"""Critical points are located to this part of a step."""
-
-MOST_LOCATION_STEPS = 60
-"""Steps in which a critical point is sought."""
-
-LEAST_COSINE = 0.5
-"""Cosine of the angle by which a step may leave the direction of its predictor."""
-
-LARGEST_LENGTH_RATIO = 10.0
-"""Ratio by which a step may be longer than its predictor."""
+LOCATION_TOLERANCE = 1e-7  # critical points are located to this part of a step
+MOST_LOCATION_STEPS = 60  # steps in which a critical point is sought
+LEAST_COSINE = 0.5  # cosine of the angle by which a step may leave the direction of its predictor
+LARGEST_LENGTH_RATIO = 10.0  # ratio by which a step may be longer than its predictor
 
 UNCHECKED_PART = 2.0**-6
 """Part of a step from which on that is not asked, for a law may have a kink."""
@@ -68,7 +60,7 @@ class Candidate(NamedTuple):
 
 
 class PathStepper:
-    """Steps of a path: their lengths, and the critical points that they pass.
+    """Stepper of a path: it sets lengths of steps and locates critical points.
 
     Args:
         simulation: In statics, at the beginning of the path.
@@ -111,7 +103,7 @@ class PathStepper:
         return self._corrector.simulation.t + self._corrector.sought.t
 
     def advance(self) -> None:
-        """One step; where it fails, a shorter one; where it passes a critical point, up to there.
+        """Take a step, a shorter one where it fails, only up to a critical point in it.
 
         Raises:
             ConvergenceError: Even the smallest part failed.

@@ -64,7 +64,7 @@ class RefinementRuns:
         self._shapes: dict[str, tuple[int, ...]] = {}
 
     def begin(self, family: int) -> None:
-        """Compile and see that quantities can be compared, on every process.
+        """Compile and require comparable quantities, on every process.
 
         Raises:
             SceneError: The scene, its dials or a quantity are wrong.
@@ -123,13 +123,13 @@ class RefinementRuns:
             self.spent += took["spent"]
 
     def dials(self, refinement: Refinement) -> Dials:
-        """The dials of a refinement."""
+        """Return the dials of a refinement."""
         family, refine, level, newton = refinement
         finer = self.families[family].finer(refine, level, self.t)
         return replace(finer, newton=self.newtons[newton])
 
     def of(self, family: int) -> list[Run]:
-        """The runs of a family."""
+        """Return the runs of a family."""
         return [run for one, run in self.runs.items() if one.family == family]
 
     def _longest(self, refinement: Refinement) -> float:

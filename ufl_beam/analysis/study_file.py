@@ -15,8 +15,7 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_kind
 
-Outcome = dict[str, Array] | str
-"""Result of a member, or the reason of its failure."""
+Outcome = dict[str, Array] | str  # result of a member, or the reason of its failure
 
 FORMAT = "study of ufl_beam, 1"
 
@@ -48,7 +47,7 @@ class Study:
 
     @classmethod
     def of(cls, member: str, records: dict[str, tuple[Outcome, float]]) -> Study:
-        """From outcome and seconds of each case, cases as :func:`text_of`."""
+        """Make a study from outcome and seconds of each case, cases as :func:`text_of`."""
         outcomes = [outcome for outcome, _ in records.values()]
         failed = {i: outcome for i, outcome in enumerate(outcomes) if isinstance(outcome, str)}
         first: dict[str, Array] = next((row for row in outcomes if not isinstance(row, str)), {})
@@ -59,7 +58,7 @@ class Study:
         return cls(member, tuple(map(json.loads, records)), results, failed, seconds)
 
     def records(self) -> dict[str, tuple[Outcome, float]]:
-        """Return the data that :meth:`of` makes this study from."""
+        """Return the data from which :meth:`of` makes this study."""
         found: dict[str, tuple[Outcome, float]] = {}
         for i, case in enumerate(self.cases):
             row = {name: values[i] for name, values in self.results.items()}
@@ -80,7 +79,7 @@ class Study:
         return "\n".join(lines)
 
     def save(self, path: str | Path) -> None:
-        """Write an HDF5 file; one that is there is replaced once the new one is complete.
+        """Write an HDF5 file; an existing one is replaced once the new one is complete.
 
         Raises:
             SceneError: The file cannot be written.
@@ -105,7 +104,7 @@ class Study:
 
     @classmethod
     def load(cls, path: str | Path) -> Study:
-        """Read what :meth:`save` or :func:`study` wrote.
+        """Read a file that :meth:`save` or :func:`study` wrote.
 
         Raises:
             SceneError: There is no such file, or it holds no study, or is damaged.
@@ -131,7 +130,7 @@ class Study:
 
 
 def text_of(case: dict[str, Any], what: str = "case") -> str:
-    """The case as JSON, by which cases are compared: all digits, names in alphabetical order.
+    """Write a case as JSON, by which cases are compared: all digits, names sorted.
 
     Raises:
         SceneError: It is no dict, or a value is no number or text and no list of these.

@@ -14,27 +14,22 @@ from ufl_beam.analysis.richardson import Cost, Cross, size
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_number
 
-STEPS_PER_LEVEL = 16
-"""Choices of steps from one level of refinement to the next."""
-
-EXTRAPOLATED_LEVELS = 2
-"""Levels beyond those that were run which a choice may ask for."""
+STEPS_PER_LEVEL = 16  # choices of steps from one level of refinement to the next
+EXTRAPOLATED_LEVELS = 2  # levels beyond those that were run which a choice may ask for
 
 BUDGET_AIM, BUDGET_SLACK = 0.9, 0.2
 """Part of a budget that is aimed at; part by which a run may fall short of it."""
 
-LARGEST_ERROR = 0.3
-"""Errors of this part of a quantity are none to recommend."""
+LARGEST_ERROR = 0.3  # errors of this part of a quantity are none to recommend
 
 NEARLY_BEST = 2.0
 """Where nothing is accurate enough, the cheapest with so many times the least error is next."""
 
-NEGLIGIBLE = 0.1
-"""Changes up to this part of a tolerance need not converge."""
+NEGLIGIBLE = 0.1  # changes up to this part of a tolerance need not converge
 
 
 class Choice(NamedTuple):
-    """Setting and what is expected of it."""
+    """Setting of a run with its predicted time and error."""
 
     refine: int  # parts of each cell
     level: float  # steps are about 2**level times as many
@@ -61,12 +56,12 @@ class Prediction:
         return cross.cells.finest, cross.steps.finest
 
     def ratio(self, refine: int, level: float) -> float:
-        """Largest error, in its unit."""
+        """Predict the largest error, in its unit."""
         i = math.log2(refine)
         return max(cross.error(i, level) / self.units[name] for name, cross in self.crosses.items())
 
     def bottleneck(self, choice: Choice) -> tuple[int, int]:
-        """One level more of that dial, cells or steps, which has the larger part of the error.
+        """Refine by a level that dial, cells or steps, which has the larger part of the error.
 
         None if that is negligible already.
         """
@@ -78,11 +73,11 @@ class Prediction:
         return 0, int(worst.steps.used > 0)
 
     def largest(self, differences: Mapping[str, Array]) -> float:
-        """Largest of differences of the quantities, in its unit."""
+        """Return the largest of differences of the quantities, in its unit."""
         return max(size(d) / self.units[name] for name, d in differences.items())
 
     def settings(self) -> tuple[list[tuple[int, float]], Array, Array]:
-        """All that may be chosen, with wall times (s) and ratios."""
+        """List all settings that may be chosen, with wall times (s) and ratios."""
         i, j = self.finest
         levels = np.arange(STEPS_PER_LEVEL * (j + EXTRAPOLATED_LEVELS) + 1) / STEPS_PER_LEVEL
         refinements = range(1, 2 ** (i + EXTRAPOLATED_LEVELS) + 1)
@@ -105,7 +100,7 @@ class Target(Protocol):
         """Return the units of errors by quantity, from the sizes of the quantities."""
 
     def choose(self, prediction: Prediction) -> Choice:
-        """The setting that serves best."""
+        """Choose the setting that serves best."""
 
     def hopeless(self, choice: Choice, best: Choice) -> bool:
         """Return whether a choice cannot be better than another one."""
@@ -138,11 +133,11 @@ class Tolerance:
         return "errors of " + ", ".join(f"{value:g} of {n}" for n, value in self.absolute.items())
 
     def units(self, scales: Mapping[str, float]) -> dict[str, float]:
-        """Tolerance of each quantity, in its unit."""
+        """Return the tolerance of each quantity, in its unit."""
         return {n: self.absolute.get(n, self.relative * scale) for n, scale in scales.items()}
 
     def choose(self, prediction: Prediction) -> Choice:
-        """The cheapest that is accurate enough, or else nearly as accurate as any."""
+        """Choose the cheapest that is accurate enough, or else nearly as accurate as any."""
         settings, seconds, ratios = prediction.settings()
         good = ratios <= max(1.0, NEARLY_BEST * ratios.min())
         k = int(np.argmin(np.where(good, seconds, np.inf)))
@@ -150,7 +145,7 @@ class Tolerance:
         return Choice(*settings[k], float(seconds[k]), float(ratios[k]), serves, not serves)
 
     def hopeless(self, choice: Choice, best: Choice) -> bool:
-        """Return whether it would take much longer."""
+        """Return whether a choice would take much longer."""
         return choice.seconds > 2 * best.seconds
 
     def accepts(self, seconds: float, ratio: float) -> bool:
@@ -158,7 +153,7 @@ class Tolerance:
         return ratio <= 1.0
 
     def rank(self, seconds: float, ratio: float, expected: float) -> tuple[bool, float]:
-        """By time where accurate enough, else by error."""
+        """Rank by time where accurate enough, else by error."""
         return (False, seconds) if ratio <= 1.0 else (True, ratio)
 
 
@@ -183,11 +178,11 @@ class Budget:
         return f"runs of {self.seconds:g} s"
 
     def units(self, scales: Mapping[str, float]) -> dict[str, float]:
-        """The sizes of the quantities."""
+        """Return the sizes of the quantities."""
         return dict(scales)
 
     def choose(self, prediction: Prediction) -> Choice:
-        """The most accurate that is fast enough, or the fastest."""
+        """Choose the most accurate that is fast enough, or the fastest."""
         settings, seconds, ratios = prediction.settings()
         fast = seconds <= BUDGET_AIM * self.seconds
         k = int(np.argmin(np.where(fast, ratios, np.inf) if fast.any() else seconds))
@@ -196,7 +191,7 @@ class Budget:
         return Choice(*settings[k], *numbers, bool(fast[k]) and good, bool(fast[k]) and not good)
 
     def hopeless(self, choice: Choice, best: Choice) -> bool:
-        """Return whether it would be much less accurate."""
+        """Return whether a choice would be much less accurate."""
         return choice.ratio > 2 * best.ratio
 
     def accepts(self, seconds: float, ratio: float) -> bool:
@@ -204,14 +199,14 @@ class Budget:
         return (1 - BUDGET_SLACK) * self.seconds <= seconds <= self.seconds
 
     def rank(self, seconds: float, ratio: float, expected: float) -> tuple[bool, float]:
-        """By the expected error where fast enough, for a single one may be small by chance."""
+        """Rank by the expected error where fast enough, as a single one may be small by chance."""
         return (False, expected) if seconds <= self.seconds else (True, seconds)
 
 
 def target_of(
     quantities: Collection[str], tolerance: float | Mapping[str, float] | None, budget: float | None
 ) -> Target:
-    """Return the target that a call gives for quantities, checked."""
+    """Return the target of a call for some quantities, checked."""
     if (tolerance is None) == (budget is None):
         raise SceneError("tradeoff: give either a tolerance or a budget")
     if budget is not None:

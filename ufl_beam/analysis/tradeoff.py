@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Trade-off of speed for accuracy on a user's own scene, measured and chosen from."""
+"""Trade-off of speed for accuracy on a user's own scene: runs, search, recommendation."""
 
 from __future__ import annotations
 
@@ -34,20 +34,17 @@ from ufl_beam.simulation.run import simulate
 from ufl_beam.simulation.step_control import Adaptive
 from ufl_beam.solvers.newton_options import Newton
 
-NEWTON_SHARE = 0.1
-"""Part of the error that another tolerance of Newton's method may change."""
+NEWTON_SHARE = 0.1  # part of the error that another tolerance of Newton's method may change
 
 MOST_DOUBTS, MOST_TRIALS = 4, 6
 """Refinements at which self-convergence may not be seen; settings that are tried."""
 
-SHORT_CHOICE = 2.0
-"""Of settings that are tried, runs below are done three times; s."""
+SHORT_CHOICE = 2.0  # of settings that are tried, runs below are done three times; s
 
 ROUNDING = 1e-9
 """Changes up to this part of a quantity are rounding, or the tolerance of Newton's method."""
 
-STEP_ORDER = 2.0
-"""Order of the schemes, at most; that of cells is twice their degree."""
+STEP_ORDER = 2.0  # order of the schemes, at most; that of cells is twice their degree
 
 One = TypeVar("One")
 

@@ -28,7 +28,7 @@ class Dials:
     newton: Newton  # how exactly equilibria are found
 
     def finer(self, refine: int, level: float, t: tuple[float, float]) -> Dials:
-        """Each cell in ``refine`` parts, steps about ``2**level`` times as many.
+        """Refine each cell into ``refine`` parts and take about ``2**level`` times as many steps.
 
         The error of an adaptive step is of third order, so that their number goes with the cube
         root of the tolerance.
@@ -136,16 +136,16 @@ class Tradeoff:
         return {name: cross.uncertainty for name, cross in self.crosses.items()}
 
     def errors(self, run: Run) -> dict[str, float]:
-        """Distance of a run from the limits, by quantity; its unit."""
+        """Return the distances of a run from the limits, by quantity; its unit."""
         return {name: size(run.values[name] - limit) for name, limit in self.limit.items()}
 
     def ratio(self, run: Run) -> float:
-        """The largest of the errors over tolerance, or over the size of the quantity."""
+        """Return the largest of the errors over tolerance, or over the size of the quantity."""
         return max(error / self.units[name] for name, error in self.errors(run).items())
 
     @property
     def front(self) -> list[Run]:
-        """The runs that no other one beats in time and in accuracy, the fastest first."""
+        """Runs that no other one beats in time and in accuracy, the fastest first."""
         seconds = np.array([run.seconds for run in self.runs])
         ratios = np.array([self.ratio(run) for run in self.runs])
         return [self.runs[k] for k in pareto(seconds, ratios)]

@@ -27,14 +27,9 @@ IN_CELLS = ("yields", "opens", "is free")
 BETWEEN = {Stop: ("touches", "lets go"), Coulomb: ("slides", "sticks")}
 """Events of connectors, and their ends."""
 
-ALL = (*IN_CELLS, *(what for pair in BETWEEN.values() for what in pair))
-"""All that can happen."""
-
-Row = tuple[float, int, str]
-"""Time, number of the cell or connector, what."""
-
-FREE = 0.999
-"""Part of the energy of a hinge after which it is called a joint."""
+KINDS = (*IN_CELLS, *(kind for pair in BETWEEN.values() for kind in pair))  # all events
+Row = tuple[float, int, str]  # time, number of the cell or connector, what
+BROKEN_PART = 0.999  # part of the energy of a hinge after which it is called a joint
 
 
 class Event(NamedTuple):
@@ -101,7 +96,7 @@ class Events(Recorder):
         laws = [*in_cells, *(law_of(hinge) for hinge in simulation.scene.hinges)]
         breaking = [law is not None and law.limit > 0 for law in laws]
         energies = np.array([law.energy if law is not None else np.inf for law in laws])
-        self._enough = np.where(breaking, FREE * energies, np.inf)
+        self._enough = np.where(breaking, BROKEN_PART * energies, np.inf)
         self._breaks = np.isfinite(energies)
         links = simulation.scene.links
         self._links = [i for i, link in enumerate(links) if type(link.law) in BETWEEN]
@@ -128,7 +123,7 @@ class Events(Recorder):
         return in_cells, [bool(goes_on) for goes_on in forces > limits]
 
     def write(self, simulation: Recorded) -> None:
-        """Note what has changed in the step."""
+        """Note the changes of a step."""
         flags = self._look(simulation)
         (cells, goes_on), (cells_before, went_on) = flags, self._flags
         self._flags = flags
@@ -155,11 +150,11 @@ class Events(Recorder):
         return events
 
     def state(self) -> State:
-        """The events so far: time, number of the cell or connector, and kind."""
-        return {"events": np.array([(t, n, ALL.index(what)) for t, n, what in self._rows])}
+        """Return the events so far: time, number of the cell or connector, and kind."""
+        return {"events": np.array([(t, n, KINDS.index(what)) for t, n, what in self._rows])}
 
     def resume(self, simulation: Recorded, state: State) -> None:
-        """Go on after those events."""
+        """Go on after the events of a :meth:`state`."""
         self.found, self._rows = [], []
-        self._add(simulation, [(float(t), int(n), ALL[int(k)]) for t, n, k in state["events"]])
+        self._add(simulation, [(float(t), int(n), KINDS[int(k)]) for t, n, k in state["events"]])
         self._watch(simulation)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Least and largest values that a run has reached, and when."""
+"""Extremes of section forces and motions in a run, with their times."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class Extremes(Recorder):
         self._forces, self._q = (Extent.around(x, simulation.t) for x in _state(simulation))
 
     def write(self, simulation: Recorded) -> None:
-        """Take in the state."""
+        """Take in the state of a step."""
         for extent, values in zip((self._forces, self._q), _state(simulation), strict=True):
             extent.widen(values, simulation.t)
 
@@ -103,7 +103,7 @@ class Extremes(Recorder):
         return self._grid
 
     def section_forces(self, beam: Member) -> Extent:
-        """Extremes of (N, V, M) in the cells of a beam; (num_cells, 3); N, N, N m.
+        """Return extremes of (N, V, M) in the cells of a beam; (num_cells, 3); N, N, N m.
 
         Raises:
             SceneError: The beam is not in the scene, or nothing was run.
@@ -112,7 +112,7 @@ class Extremes(Recorder):
         return self._forces.of(cells)
 
     def displacement(self, one: Member | Body) -> Extent:
-        """Extremes of (u, v, ψ) at the nodes of a beam, or of a body; (n, 3); m, m, rad.
+        """Return extremes of (u, v, ψ) at the nodes of a beam, or of a body; (n, 3); m, m, rad.
 
         Raises:
             SceneError: It is not in the scene, or nothing was run.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Stress at named places, its cycles counted while a run goes on."""
+"""Fatigue at named places: stress cycles counted while a run goes on."""
 
 from __future__ import annotations
 
@@ -16,8 +16,7 @@ from ufl_beam.model.bodies import Place
 from ufl_beam.output.rainflow import Cycles, RainflowCounter, SNCurve, library
 from ufl_beam.output.recorders import Recorded, Recorder
 
-BLOCK = 1000
-"""Steps that are collected before their cycles are counted."""
+BLOCK = 1000  # steps that are collected before their cycles are counted
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +47,7 @@ class HotSpot:
 
     @classmethod
     def fibre(cls, place: Place, *, y: float, E: float, factor: float = 1.0) -> HotSpot:
-        """Elastic stress E (N/EA − y M/EI) of a fibre of the section at a place.
+        """Make a spot with the elastic stress E (N/EA − y M/EI) of a fibre.
 
         Args:
             place: Where on a beam.
@@ -139,12 +138,12 @@ class Fatigue(Recorder):
             self._counters[spot].add(stress)
 
     def close(self) -> None:
-        """Count what is left."""
+        """Count the steps that are left."""
         if self._counters and self._filled:
             self._count()
 
     def state(self) -> State:
-        """The time that was counted, cycles and what waits at each spot."""
+        """Return the time that was counted, cycles and waiting turning points of each spot."""
         self.close()
         state: State = {"duration": np.array([self._begin, self._end])}
         for i, counter in enumerate(self._counters.values()):
@@ -166,7 +165,7 @@ class Fatigue(Recorder):
         return self._end - self._begin
 
     def cycles(self, spot: HotSpot) -> Cycles:
-        """The cycles at a spot.
+        """Return the cycles at a spot.
 
         Raises:
             SceneError: The spot is not one of these, or nothing was run.
@@ -176,11 +175,11 @@ class Fatigue(Recorder):
         return self._counters[spot].cycles()
 
     def damage(self, spot: HotSpot) -> float:
-        """Miner's sum at a spot, 1 at failure; errors as :meth:`cycles`."""
+        """Compute Miner's sum at a spot, 1 at failure; errors as :meth:`cycles`."""
         return self.cycles(spot).damage(self.curve)
 
     def life(self, spot: HotSpot) -> float:
-        """Time to failure if all goes on like this; s; errors as :meth:`cycles`."""
+        """Extrapolate the time to failure; s; errors as :meth:`cycles`."""
         damage = self.damage(spot)
         return self.duration / damage if damage > 0 else math.inf
 

@@ -22,11 +22,8 @@ from ufl_beam.output.joint_histories import links_of, motion_of
 from ufl_beam.output.output_files import OutputFile, require_path
 from ufl_beam.output.recorders import Recorded, Recorder
 
-MOTION = (("u", "m"), ("v", "m"), ("psi", "rad"))
-"""Columns of a place, and their units."""
-
-CONNECTOR = ("motion", "force", "work")
-"""Columns of a connector."""
+MOTION = (("u", "m"), ("v", "m"), ("psi", "rad"))  # columns of a place, and their units
+CONNECTOR = ("motion", "force", "work")  # columns of a connector
 
 
 class History(Recorder):
@@ -79,7 +76,7 @@ class History(Recorder):
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """The file, and if rows may go the one that takes its place."""
+        """Path of the file, and if rows may go that of the one that takes its place."""
         return (self._path,) if self._most == sys.maxsize else (self._path, self._part)
 
     def open(self, simulation: Recorded) -> None:
@@ -146,7 +143,7 @@ class History(Recorder):
         return _line([repr(float(x)) for x in numbers])
 
     def state(self) -> State:
-        """The length of the file, and the whole of it where rows may go again."""
+        """Return the length of the file, and the whole of it where rows may go again."""
         on_first(self._comm, self._sync)
         counts = np.array([self._every, self._steps, self._rows, 0], dtype=float)
         content = b""

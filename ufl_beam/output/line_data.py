@@ -20,8 +20,7 @@ from ufl_beam.output.recorders import Recorded
 LineFields = tuple[dict[str, Array], dict[str, Array]]
 """Fields at points, (n,) or (n, 3), and in cells, (m,), by name."""
 
-BEAM, BODY, LINK = 0, 1, 2
-"""Numbers of the parts of a scene in files."""
+BEAM, BODY, LINK = 0, 1, 2  # numbers of the parts of a scene in files
 
 
 class Rod(NamedTuple):
@@ -34,7 +33,7 @@ class Rod(NamedTuple):
 
 
 def spots_of(scene: Scene) -> dict[Body, list[Spot]]:
-    """Points of each body, and of the ground, that something is attached to, each once."""
+    """Find the points of bodies and of the ground that something is attached to, each once."""
     found: dict[Body, dict[Spot, None]] = {body: {} for body in (*scene.bodies, GROUND)}
     for anchor in _anchors(scene):
         if isinstance(anchor, Spot):
@@ -52,7 +51,7 @@ def _anchors(scene: Scene) -> Iterator[Anchor]:
 
 
 def rods_of(scene: Scene) -> list[Rod]:
-    """Lines from the centre of each body to its points, and along links and springs."""
+    """List the lines from the centre of each body to its points, and along links and springs."""
     spots, rods = spots_of(scene), []
     for body in scene.bodies:
         x, y = body.center
@@ -105,7 +104,7 @@ class LineData:
         self._pieces_of_cell, self._num_rods = grid.mesh.degree, len(rods)
 
     def fields(self, simulation: Recorded) -> LineFields:
-        """Fields of the present state; all processes that share the scene call it together.
+        """Compute the fields of the present state; all processes call it together.
 
         At points the displacement (m) and rotation (rad), in dynamics also the velocity (m/s) and
         angular velocity (rad/s); in cells N, V (N), M (N m), and where anything yields or breaks

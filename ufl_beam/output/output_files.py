@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Files that runs write: checks of their paths before the run, errors that name the file."""
+"""Output files: checks of their paths before a run, errors that name the file."""
 
 from __future__ import annotations
 
@@ -13,11 +13,8 @@ from pathlib import Path
 
 from ufl_beam.errors import SceneError, shorten
 
-Output = tuple[str, tuple[Path, ...]]
-"""Name of a writer in messages, and the files that it writes."""
-
-_in_use: list[Output] = []
-"""Outputs of the runs that go on in this process, the outer ones first."""
+Output = tuple[str, tuple[Path, ...]]  # name of a writer in messages, and the files that it writes
+_in_use: list[Output] = []  # outputs of the runs that go on in this process, the outer ones first
 
 
 # -- before the run ----------------------------------------------------------------------------
@@ -129,7 +126,7 @@ class OutputFile:
         return os.pread(self._file, count, at)
 
     def cut(self, length: int) -> None:
-        """Cut the file off."""
+        """Cut the file off at a length."""
         if self._regular:
             os.ftruncate(self._file, length)
 
@@ -191,7 +188,7 @@ def is_at(file: int, path: Path) -> bool:
 
 
 def removed(path: Path) -> FileNotFoundError:
-    """The error of an output that is not where it was when a checkpoint is due."""
+    """Return the error of an output that is gone when a checkpoint is due."""
     return FileNotFoundError(
         errno.ENOENT,
         f"output {path} was removed or replaced during the run, so that no checkpoint can count "
@@ -209,7 +206,7 @@ def warn_of_removal(path: Path) -> None:
 
 
 def failure(error: OSError, path: Path) -> OSError:
-    """An error in writing in words: the file, the reason, the free space, what is kept."""
+    """Return an error in writing in words: file, reason, free space, kept content."""
     space = ""
     if error.errno == errno.ENOSPC and path.is_file():
         space = f" ({shutil.disk_usage(path.parent).free / 1e6:.3g} MB are free)"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Recorders, which look at each accepted step of a run."""
+"""Recorders of runs: base class, protocol of the recorded state, checks."""
 
 from __future__ import annotations
 
@@ -44,28 +44,28 @@ class Recorded(Protocol):
         """True if something in the scene yields, softens or has plastic hinges."""
 
     def velocities(self) -> list[Array]:
-        """Velocities at the local degrees of freedom; none in statics."""
+        """Return velocities at the local degrees of freedom; none in statics."""
 
     def entries(self) -> tuple[dict[str, float], ...]:
         """Return the ledger over all processes: state, supplied, lost; J."""
 
     def ledger_names(self) -> list[str]:
-        """Names of the entries of the ledger."""
+        """Return the names of the entries of the ledger."""
 
     def connections(self) -> Array:
-        """Columns of ``Connection`` for all links of the scene; (num_links, 5)."""
+        """Return the columns of ``Connection`` for all links of the scene; (num_links, 5)."""
 
     def hinges(self) -> Array:
-        """Columns of ``Connection`` for the plastic hinges; (num_hinges, 5)."""
+        """Return the columns of ``Connection`` for the plastic hinges; (num_hinges, 5)."""
 
     def section_forces(self) -> Array:
-        """Section forces (N, V, M) in all cells; (num_cells, 3); N, N, N m."""
+        """Return section forces (N, V, M) in all cells; (num_cells, 3); N, N, N m."""
 
     def material(self) -> list[tuple[Index, Array]]:
-        """Cells that can yield or break, and their state."""
+        """Return the cells that can yield or break, and their state."""
 
     def damage(self) -> tuple[Array, Array]:
-        """Jump of rotation (rad) and dissipated energy (J) of each cell; both (num_cells,)."""
+        """Return jump of rotation (rad) and dissipated energy (J) of cells; (num_cells,) each."""
 
 
 class Recorder(ABC):

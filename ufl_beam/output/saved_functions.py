@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Functions of a user in a scene that was saved: their values at some points, and no more."""
+"""Saved values of a user's functions, at the points that a saved solution needs."""
 
 from __future__ import annotations
 
@@ -12,13 +12,12 @@ from typing import Any, NoReturn
 from ufl_beam.errors import SceneError
 from ufl_beam.model.curves import Point
 
-SAMPLES = 1000
-"""Intervals in which a curve is sampled."""
+SAMPLES = 1000  # intervals in which a curve is sampled
 
 
 @dataclass(frozen=True)
 class SavedFunction:
-    """A function of time that is known at some times."""
+    """Function of time that is known at some times."""
 
     name: str  # that of the function
     times: tuple[float, ...]  # ascending; s
@@ -48,7 +47,7 @@ class SavedFunction:
 
 @dataclass(frozen=True)
 class SavedCurve:
-    """A curve that is known at some parameters, cubic between them and straight beyond."""
+    """Curve through saved points, cubic between them and straight beyond."""
 
     name: str  # that of the function
     s: tuple[float, ...]  # ascending parameters, at least two
@@ -58,7 +57,7 @@ class SavedCurve:
     def of(
         cls, curve: Callable[[float], Any], first: float, last: float, more: Iterable[float] = ()
     ) -> SavedCurve:
-        """Sample a curve between two parameters, and at more of them; where it fails, not."""
+        """Sample a curve between two parameters, and at more of them; gaps where it fails."""
         even = (first + (last - first) * k / SAMPLES for k in range(SAMPLES + 1))
         known = {}
         for s in sorted({*even, *more}):
@@ -86,7 +85,7 @@ class SavedCurve:
 
 @dataclass(frozen=True)
 class LostFunction:
-    """A function that cannot be saved, such as a controller."""
+    """Placeholder of a function that cannot be saved, such as a controller."""
 
     name: str  # that of the function
 
@@ -99,5 +98,5 @@ class LostFunction:
 
 
 def name_of(function: Any) -> str:
-    """The name of a function, or of the class of what can be called."""
+    """Return the name of a function, or of the class of a callable object."""
     return str(getattr(function, "__qualname__", type(function).__qualname__))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Scenes as data of JSON: each record with the numbers that it was made of, exact.
+"""Scenes as JSON data: each record with the exact numbers that made it.
 
 Functions of a user are no data.  Those of time are saved by their values at the times of a
 solution, curves by many points; of others the name is left.
@@ -39,8 +39,7 @@ from ufl_beam.model import (
 from ufl_beam.output import saved_functions
 from ufl_beam.output.saved_functions import LostFunction
 
-Data = Any
-"""Data of JSON."""
+Data = Any  # data of JSON
 
 Sampling = Callable[[Any, str, Any], Any]
 """Record that stands for a function, given the record and the field that it is in."""
@@ -69,7 +68,7 @@ KNOWN: dict[str, Any] = {
 
 
 def lost(owner: Any, field: str, function: Any) -> LostFunction:
-    """Sampling that leaves nothing but the name."""
+    """Replace a function by its name."""
     return LostFunction(saved_functions.name_of(function))
 
 
@@ -122,7 +121,7 @@ def to_data(value: Any, sampling: Sampling = lost) -> Data:
 
 
 def from_data(data: Data) -> Any:
-    """Make what :func:`to_data` described; warnings about the scene were given when it was made."""
+    """Rebuild the records that :func:`to_data` described, without repeating warnings."""
     made: list[Any] = []
 
     def make(data: Data) -> Any:

@@ -64,7 +64,7 @@ class TimeSeries(Recorder):
             on_first(self._comm, lambda: self._writers[0].write(simulation.t, fields))
 
     def state(self) -> State:
-        """The number of steps, and the sizes of what is complete; that is on the disk."""
+        """Return the number of steps and the sizes of the complete parts, which are on the disk."""
         on_first(self._comm, self._sync)
         sizes = [n for writer in self._writers for n in writer.complete]
         return {"sizes": np.array([self._count, *sizes], dtype=float)}
@@ -126,7 +126,7 @@ class XDMF(TimeSeries):
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """The file, and that of its numbers."""
+        """Paths of the file, and of that of its numbers."""
         return self._path, data_path(self._path)
 
     def require_writable(self) -> None:

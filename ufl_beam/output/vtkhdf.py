@@ -21,26 +21,13 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.output.output_files import OutputFile, failure, is_at, removed, warn_of_removal
 
-Fields = Sequence[Mapping[str, Array]]
-"""At points and in cells, by name."""
-
-LAYOUT = (2, 0)
-"""Of the format; VTK 9.3 warns of later ones."""
-
-LINE = 3
-"""VTK's number of the type of a cell."""
-
-KINDS = ("PointData", "CellData")
-"""Groups of fields."""
-
-ROWS = 1024
-"""Steps in a chunk of what has one number a step."""
-
-BLOCK = 4096
-"""Rows in a chunk of a field, at least those of one step."""
-
-INDEX = 1 << 20
-"""Bytes that the indices of all data sets grow by in a step, and some more."""
+Fields = Sequence[Mapping[str, Array]]  # at points and in cells, by name
+LAYOUT = (2, 0)  # of the format; VTK 9.3 warns of later ones
+LINE = 3  # VTK's number of the type of a cell
+KINDS = ("PointData", "CellData")  # groups of fields
+ROWS = 1024  # steps in a chunk of what has one number a step
+BLOCK = 4096  # rows in a chunk of a field, at least those of one step
+INDEX = 1 << 20  # bytes that the indices of all data sets grow by in a step, and some more
 
 
 class VtkhdfWriter:

@@ -33,7 +33,7 @@ PAGE, ROOM = mmap.PAGESIZE, 1 << 16
 
 
 def data_path(path: Path) -> Path:
-    """The file of the numbers of an XDMF file."""
+    """Return the path of the numbers of an XDMF file."""
     return path.with_name(path.name + ".bin")
 
 

@@ -24,11 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-LEAST_ERROR = 1e-12
-"""Errors below are drawn there, in the unit of the quantity."""
-
-CLASSES = 40
-"""Classes of ranges and of means of cycles in pictures."""
+LEAST_ERROR = 1e-12  # errors below are drawn there, in the unit of the quantity
+CLASSES = 40  # classes of ranges and of means of cycles in pictures
 
 
 def plot_modes(

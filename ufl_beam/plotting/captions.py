@@ -59,13 +59,13 @@ def _(law: RigidPlastic, turns: bool) -> str:
 
 
 def hinge_in_words(law: HingeLaw) -> str:
-    """The moment at which a hinge opens."""
+    """Describe the moment at which a hinge opens."""
     return f"hinge {with_unit(float(law.limit), 'N m')}"
 
 
 @singledispatch
 def damping_in_words(damping: Damping) -> str:
-    """A kind of damping and its size."""
+    """Describe a kind of damping and its size."""
     return type(damping).__name__
 
 
@@ -83,7 +83,7 @@ def _(damping: KelvinVoigt) -> str:
 
 
 def names_of(scene: Scene) -> dict[Member | Body, str]:
-    """Names of beams and bodies; equal ones with their number in the scene."""
+    """Return names of beams and bodies; equal ones with their number in the scene."""
     groups: tuple[Sequence[Member | Body], ...] = (scene.beams, scene.bodies)
     known = [Counter(part.name for part in parts) for parts in groups]
     return {
@@ -94,5 +94,5 @@ def names_of(scene: Scene) -> dict[Member | Body, str]:
 
 
 def counted(number: int, one: str, many: str = "") -> str:
-    """A number and what it counts: "1 body", "20 000 beams"."""
+    """Write a number and the noun that it counts: "1 body", "20 000 beams"."""
     return f"{number:,}".replace(",", " ") + " " + (one if number == 1 else many or f"{one}s")

@@ -100,8 +100,7 @@ STRAIGHT: dict[type, list[Piece]] = {
 }
 """Along a line; what drives is orange, filled if its motion is given."""
 
-CENTRE = -9.0
-"""The coordinate t of the pin."""
+CENTRE = -9.0  # the coordinate t of the pin
 
 
 _SPOKES = [Piece([(s, CENTRE), (s, 0.0)]) for s in (-2.0, 2.0)]
@@ -128,7 +127,7 @@ AROUND: dict[type, Glyph] = {
 
 
 def along(piece: Piece, a: Array, b: Array, sides: tuple[Array, float], body: float) -> Array:
-    """Points of a piece of a straight glyph from a to b (m); (n, 2); m.
+    """Compute points of a piece of a straight glyph from a to b (m); (n, 2); m.
 
     ``sides`` are the unit vector across and the length of 1 in it (m), ``body`` is the part of the
     way that the body of the glyph takes.
@@ -140,7 +139,7 @@ def along(piece: Piece, a: Array, b: Array, sides: tuple[Array, float], body: fl
 
 
 def around(piece: Piece, pin: Array, radius: float, angles: tuple[float, float]) -> Array:
-    """Points of a piece of a glyph around a pin; (n, 2); m.
+    """Compute points of a piece of a glyph around a pin; (n, 2); m.
 
     The ``radius`` is that of t = 0, three units of t (m); ``angles`` are those of s = -2 and 2.
     """

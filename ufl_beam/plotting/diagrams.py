@@ -37,15 +37,14 @@ if TYPE_CHECKING:
 DRAWN_AS_ZERO = 1e-6
 """Part of the largest value below which a value is drawn as zero and is not written."""
 
-LABEL_SIZE, TITLE_SIZE = 13.0, 14.0
-"""Sizes of the texts and of the title; points."""
+LABEL_SIZE, TITLE_SIZE = 13.0, 14.0  # sizes of the texts and of the title; points
 
 AROUND, LEAST, MOST = (1.0, 1.2), (3.6, 2.6), (9.0, 6.8)
 """Room for words and numbers around the axes; least and largest size of a figure; inch."""
 
 
 def plot_state(solution: Solution, what: str, *, n: int, magnify: float) -> Figure:
-    """The frame at the n-th kept time, with the diagram of a section force; see :func:`plot`."""
+    """Draw the frame at a time, with a diagram of a section force; see :func:`plot`."""
     require_choice(what, ("shape", *RESULTANTS), "plot: what")
     points = drawing.moved_points(solution, n, magnify)
     stage = drawing.plane_stage(solution, [n], magnify)
@@ -66,7 +65,7 @@ def plot_state(solution: Solution, what: str, *, n: int, magnify: float) -> Figu
 
 
 def moments_at_ends(solution: Solution, beam: Member, n: int = -1) -> Array:
-    """Moments that act at both ends of each cell; (num_cells, 2); N m.
+    """Compute the moments at both ends of each cell; (num_cells, 2); N m.
 
     The moment of a cell is that in its middle.  From there it changes by ``N Γ - V (1 + Σ)`` over a
     unit of length, which is what equilibrium of the cell asks for: moments at the ends of cells are

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Geometry and drawing of a solution in its plane, which all its pictures share."""
+"""Geometry and drawing of a solution in its plane, shared by all its pictures."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 def moved_points(solution: Solution, n: int, magnify: float) -> Array:
-    """Vertices of all beams at the n-th kept time; (num_vertices, 2); m.
+    """Return the vertices of all beams at the n-th kept time; (num_vertices, 2); m.
 
     Raises:
         SceneError: No such time, or ``magnify`` is not positive.
@@ -50,7 +50,7 @@ class OpenHinge(NamedTuple):
 
 
 def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
-    """Hinges that have opened at the n-th kept time: in cells, and of zero length.
+    """Find hinges that have opened at the n-th kept time: in cells, and of zero length.
 
     Args:
         solution: What to show.
@@ -82,24 +82,24 @@ def _spent(law: HingeLaw, dissipated: float) -> float:
 
 
 def evenly(solution: Solution, count: int) -> list[int]:
-    """Numbers of so many kept states, evenly spaced in time or along a path."""
+    """Choose numbers of so many kept states, evenly spaced in time or along a path."""
     progress = solution.progress
     return nearest(progress, np.linspace(progress[0], progress[-1], count))
 
 
 def nearest(kept: Array, times: Sequence[float] | Array) -> list[int]:
-    """Numbers of the kept times nearest to ``times``, ascending."""
+    """Find the numbers of the kept times nearest to ``times``, ascending."""
     return [int(np.argmin(np.abs(kept - t))) for t in sorted(times)]
 
 
 def plane_size(*shapes: Array) -> tuple[float, float]:
-    """Size of a figure for these points: 9 inches wide unless they stand upright."""
+    """Choose the size of a figure: 9 inches wide unless its points stand upright."""
     width, height = np.ptp(np.concatenate(shapes), axis=0)
     return 9.0, float(np.clip(8.0 * height / max(width, 1e-12), 3.2, 6.8))
 
 
 def plane_stage(solution: Solution, shown: Sequence[int], magnify: float) -> Stage:
-    """A solution with symbols that are as large as those of supports in pictures of these states.
+    """Make a stage whose symbols are as large as those of supports in pictures of some states.
 
     Supports are drawn in points, which do not depend on the scale; what moves and stretches in m.
     """
@@ -118,13 +118,13 @@ def plane_stage(solution: Solution, shown: Sequence[int], magnify: float) -> Sta
 
 
 def draw_axes(axes: Axes, solution: Solution, points: Array, **line: Any) -> None:
-    """The axes of all beams through these points."""
+    """Draw the axes of all beams through these points."""
     for beam in solution.scene.beams:
         axes.plot(*points[solution.grid.nodes_along(beam)].T, **line)
 
 
 def draw_undeformed(axes: Axes, solution: Solution, stage: Stage) -> None:
-    """Beams, bodies and rods in grey, where they were made."""
+    """Draw undeformed beams, bodies and rods in grey."""
     pose = stage.undeformed
     draw_axes(axes, solution, solution.grid.points, color=GREY, linewidth=1.2, zorder=1)
     for stroke in (*symbols.bodies(pose), *symbols.rods(pose)):
@@ -140,7 +140,7 @@ def make_room(figure: Figure, axes: Axes) -> None:
 
 
 def draw_symbols(axes: Axes, pose: Pose) -> None:
-    """Bodies, joints, connectors, supports and masses."""
+    """Draw bodies, joints, connectors, supports and masses."""
     draw_strokes(axes, (*symbols.bodies(pose), *symbols.rods(pose)))
     draw_fixings(axes, pose)
     draw_strokes(axes, symbols.centres(pose))
@@ -151,7 +151,7 @@ def draw_symbols(axes: Axes, pose: Pose) -> None:
 
 
 def draw_strokes(axes: Axes, strokes: Iterable[Stroke], color: Any = None) -> None:
-    """Lines and areas, in their own colours or all in one."""
+    """Draw lines and areas, in their own colours or all in one."""
     for points, own, weight, fill, layer in strokes:
         line: dict[str, Any] = {"linewidth": weight, "zorder": layer}
         edge = own if color is None else color
@@ -163,13 +163,13 @@ def draw_strokes(axes: Axes, strokes: Iterable[Stroke], color: Any = None) -> No
 
 
 def draw_masses(axes: Axes, pose: Pose, color: Any) -> None:
-    """Dots at the point masses."""
+    """Draw dots at the point masses."""
     for mass in pose.stage.scene.masses:
         axes.plot(*pose.at(mass.place), "o", ms=10.0, color=color, zorder=5)
 
 
 def draw_fixings(axes: Axes, pose: Pose) -> None:
-    """Rails, connectors, and symbols at the supports; orange ones move."""
+    """Draw rails, connectors, and symbols at the supports; orange ones move."""
     from matplotlib.markers import MarkerStyle
     from matplotlib.path import Path
 

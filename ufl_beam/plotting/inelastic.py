@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pictures of yielding and fracture, by Matplotlib: where, along which path, at what cost."""
+"""Pictures of yielding and fracture, by Matplotlib: places, paths and dissipation."""
 
 from __future__ import annotations
 
@@ -39,8 +39,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FULLY_OPEN = 0.99
-"""Part of the fracture energy from which on a hinge is drawn as a joint."""
+FULLY_OPEN = 0.99  # part of the fracture energy from which on a hinge is drawn as a joint
 
 
 # -- what users call ---------------------------------------------------------------------------
@@ -202,11 +201,8 @@ def plot_dissipation(solution: Solution) -> Figure:
         axes.plot(t, held, color=BLUE, label="in the scene")
         _prefix(axes, "y", np.concatenate([supplied, held]), "energy", "J")
         axes.set_xlabel(solution.parameter.progress)
-        axes.set_title(
-            f"worst imbalance {_scientific(energy.worst)} of {with_unit(energy.throughput, 'J')} "
-            "throughput",
-            loc="left", color=INK,
-        )  # fmt: skip
+        worst, through = _scientific(energy.worst), with_unit(energy.throughput, "J")
+        axes.set_title(f"worst imbalance {worst} of {through} throughput", loc="left", color=INK)
         figure.legend(loc="outside upper left", ncols=3)
     return figure
 
@@ -255,9 +251,9 @@ def _prefix(axes: Axes, which: str, values: Array, quantity: str, unit: str) -> 
 
 def _draw_path(figure: Figure, axes: Axes, solution: Solution, x: Array, M: Array) -> None:
     """M against x, from light to dark in time; a ring at the beginning, a dot at the end."""
-    times, named = solution.progress, solution.parameter
     from matplotlib.collections import LineCollection
 
+    times, named = solution.progress, solution.parameter
     colors = scale("viridis_r", 0.12, 1.0, float(times[0]), float(times[-1]))
     path = np.column_stack([x, M])
     middle = (times[1:] + times[:-1]) / 2
@@ -268,11 +264,9 @@ def _draw_path(figure: Figure, axes: Axes, solution: Solution, x: Array, M: Arra
     for at_zero in (axes.axhline, axes.axvline):
         at_zero(0.0, color=GREY, linewidth=1.0, zorder=1)
     axes.add_collection(pieces)
+    ring: dict[str, Any] = {"ms": 8.0, "mec": INK, "mew": 1.6, "zorder": 5, "ls": "none"}
     for i, inside in ((0, "white"), (-1, INK)):
-        label = named.at(solution.times[i])
-        axes.plot(
-            *path[i], "o", ms=8.0, mfc=inside, mec=INK, mew=1.6, zorder=5, ls="none", label=label
-        )
+        axes.plot(*path[i], "o", mfc=inside, label=named.at(solution.times[i]), **ring)
     axes.autoscale_view()
     axes.tick_params(labelsize=12, color="#888888")
     _prefix(axes, "y", M, "bending moment M", "N m")

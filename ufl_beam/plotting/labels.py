@@ -10,11 +10,8 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 
-GAPS = (4.0, 12.0, 24.0, 40.0, 60.0)
-"""Distances of a label from its spot that are tried; points."""
-
-CLEARANCE = 2.0
-"""Room around a label; points."""
+GAPS = (4.0, 12.0, 24.0, 40.0, 60.0)  # distances of a label from its spot that are tried; points
+CLEARANCE = 2.0  # room around a label; points
 
 LINE_COST, LABEL_COST, OUTSIDE_COST, DISTANCE_COST, RANK_COST = 8.0, 40.0, 100.0, 0.6, 0.4
 """Costs of a candidate: of a point of length of lines under the label, of a square point of another
@@ -23,8 +20,7 @@ label, of a point beyond the frame, of a point of distance, and of a place in th
 CROSSING_COST = 25.0
 """Cost of a label that the leader crosses; a line that it crosses costs a tenth of that."""
 
-LEADER = 10.0
-"""Distance of a label from its spot from which on a line leads to it; points."""
+LEADER = 10.0  # distance of a label from its spot from which on a line leads to it; points
 
 
 class Spot(NamedTuple):
@@ -118,7 +114,7 @@ def _best(
 
 
 def leader_of(placed: Placed) -> Array:
-    """Line from the spot of a label to its box, if it stands away from it; (2, 2) or (0, 2)."""
+    """Return the line from a spot to a box that stands away from it; (2, 2) or (0, 2)."""
     edge = np.clip(placed.spot, placed.center - placed.half, placed.center + placed.half)
     if np.linalg.norm(edge - placed.spot) < LEADER:
         return np.empty((0, 2))
@@ -126,7 +122,7 @@ def leader_of(placed: Placed) -> Array:
 
 
 def crossings(first: Array, second: Array) -> Array:
-    """Number of segments (n, 4) that each of the first segments (num_first, 4) crosses."""
+    """Count segments (n, 4) that each of the first segments (num_first, 4) crosses."""
     a, b, c, d = first[:, None, :2], first[:, None, 2:], second[None, :, :2], second[None, :, 2:]
 
     def side(p: Array, q: Array, r: Array) -> Array:
@@ -139,7 +135,7 @@ def crossings(first: Array, second: Array) -> Array:
 
 
 def lengths_inside(low: Array, high: Array, lines: Array) -> Array:
-    """Length of segments (n, 4) inside each box, given by its corners (num_boxes, 2)."""
+    """Measure segments (n, 4) inside each box, given by its corners (num_boxes, 2)."""
     first, way = lines[None, :, :2], (lines[:, 2:] - lines[:, :2])[None]
     with np.errstate(divide="ignore", invalid="ignore"):
         enter, leave = (low[:, None] - first) / way, (high[:, None] - first) / way
@@ -153,6 +149,6 @@ def lengths_inside(low: Array, high: Array, lines: Array) -> Array:
 
 
 def areas_covered(low: Array, high: Array, boxes: Array) -> Array:
-    """Area of each box, given by its corners (num_boxes, 2), that other boxes (n, 4) cover."""
+    """Measure the area of boxes with corners (num_boxes, 2) that others (n, 4) cover."""
     ends, starts = np.minimum(high[:, None], boxes[:, 2:]), np.maximum(low[:, None], boxes[:, :2])
     return np.asarray(np.prod(np.maximum(ends - starts, 0.0), axis=2).sum(axis=1))

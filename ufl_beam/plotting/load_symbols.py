@@ -22,16 +22,12 @@ from ufl_beam.plotting.style import FRONT, GREEN, RED, WHITE, Stroke, with_unit
 MOVED = "#A86E00"
 """Colour of prescribed motions: the orange of what drives, dark enough for text."""
 
-LOADS, MOTIONS, CAPTIONS, NAMES = range(4)
-"""Ranks of labels: those of loads are placed first."""
-
-HEAD, SHAFT = 0.85, 1.9
-"""Length of the head of an arrow in units, and width of its line in points."""
+LOADS, MOTIONS, CAPTIONS, NAMES = range(4)  # ranks of labels: those of loads are placed first
+HEAD, SHAFT = 0.85, 1.9  # length of the head of an arrow in units, and width of its line in points
 
 Spots = tuple[Spot, ...]
 
-Drawn = tuple[list[Stroke], list[Label]]
-"""Strokes and labels of one object."""
+Drawn = tuple[list[Stroke], list[Label]]  # strokes and labels of one object
 
 
 class Sizes(NamedTuple):
@@ -55,14 +51,14 @@ class Sizes(NamedTuple):
 
 
 def left_of(way: Array) -> Array:
-    """A vector turned to its left; (2,)."""
+    """Turn a vector to its left; (2,)."""
     return np.array([-way[1], way[0]])
 
 
 def arrow(
     tail: Array, tip: Array, color: str, unit: float, *, hollow: bool = False, size: float = 1.0
 ) -> list[Stroke]:
-    """A straight arrow; ``size`` is a factor on its head and the width of its line."""
+    """Draw a straight arrow; ``size`` is a factor on its head and the width of its line."""
     way = (tip - tail) / np.linalg.norm(tip - tail)
     head = size * unit * np.array([(0.0, 0.0), (-HEAD, 0.3), (-HEAD, -0.3), (0.0, 0.0)])
     outline = tip + head @ np.array([way, left_of(way)])
@@ -75,7 +71,7 @@ def arrow(
 def turning_arrow(
     center: Array, radius: float, sense: float, color: str, unit: float, *, hollow: bool = False
 ) -> list[Stroke]:
-    """An arrow around a point, counter-clockwise if ``sense`` is positive; lengths in m."""
+    """Draw an arrow around a point, counter-clockwise if ``sense`` is positive; m."""
     sign = math.copysign(1.0, sense)
     angles = np.radians(90.0 + sign * np.linspace(-150.0, 120.0, 40))
     arc = center + radius * np.column_stack([np.cos(angles), np.sin(angles)])
@@ -93,13 +89,13 @@ def turning_arrow(
 
 
 def around(at: Array, gap: float) -> Spots:
-    """Spots of a label on all sides of a symbol, whose radius is ``gap`` (points)."""
+    """List spots of a label on all sides of a symbol, whose radius is ``gap`` (points)."""
     angles = np.radians([0, 180, 90, 270, 45, 135, 315, 225])
     return tuple(Spot(at, np.array([math.cos(a), math.sin(a)]), gap) for a in angles)
 
 
 def beside(tail: Array, tip: Array) -> Spots:
-    """Spots of the label of an arrow: beyond its tail, and on both sides."""
+    """List spots of the label of an arrow: beyond its tail, and on both sides."""
     way: Array = (tip - tail) / np.linalg.norm(tip - tail)
     left, middle = left_of(way), np.asarray((tail + tip) / 2)
     ahead = (Spot(tail, -way), *(Spot(at, s * left) for at in (tail, middle) for s in (1.0, -1.0)))
@@ -108,7 +104,7 @@ def beside(tail: Array, tip: Array) -> Spots:
 
 
 def in_time(text: str, time: TimeFunction) -> str:
-    """The text, with a sign that the quantity varies in time if it does."""
+    """Mark the text of a quantity that varies in time."""
     return text if time is steady else f"{text} × f(t)"
 
 
@@ -117,7 +113,7 @@ def in_time(text: str, time: TimeFunction) -> str:
 
 @singledispatch
 def load_symbol(load: Load, sizes: Sizes) -> Drawn:
-    """Strokes and labels of a load; none of what acts on the whole scene."""
+    """Draw a load with its labels; nothing of a load on the whole scene."""
     return [], []
 
 
@@ -218,7 +214,7 @@ def _flow(beam: Member, way: Array, part: float, sizes: Sizes) -> tuple[list[Str
 
 @singledispatch
 def badge(load: Load) -> tuple[str, tuple[float, float] | float] | None:
-    """Drawn and symbol of a load on the whole scene: a direction, or a sense of rotation."""
+    """Describe a load on the whole scene, with its direction or sense of rotation."""
     return None
 
 
@@ -238,7 +234,7 @@ def _(load: RotatingFrame) -> tuple[str, tuple[float, float] | float]:
 
 
 def prescribed_symbol(support: Support, inward: Array, sizes: Sizes) -> Drawn:
-    """Strokes and labels of the motions that a support prescribes; hollow heads.
+    """Draw the motions that a support prescribes, with labels; hollow heads.
 
     Its beam leaves the place in the direction ``inward``; (2,).
     """
@@ -271,7 +267,7 @@ def _motion_in_words(component: int, motion: TimeFunction) -> str:
 
 
 def velocity_symbol(velocity: Velocity, sizes: Sizes) -> Drawn:
-    """Strokes and labels of an initial motion."""
+    """Draw an initial motion with its label."""
     strokes, labels, unit = [], [], sizes.unit
     found: list[tuple[float, Array, Array]] = []
     for one in velocity.beams:
@@ -308,7 +304,7 @@ def _points_of(one: Member | Body, sizes: Sizes) -> Array:
 
 
 def along_axis(axis: Array, gap: float) -> Spots:
-    """Spots of a label on both sides along a beam, at least a ``gap`` away (points)."""
+    """List spots of a label on both sides of a beam, at least a ``gap`` away (points)."""
     return tuple(Spot(at, s * left, gap) for at, left in _normals(axis) for s in (1.0, -1.0))
 
 

@@ -37,8 +37,7 @@ from ufl_beam.plotting.symbols import Footing
 HINGE, TEXT = "#B0508A", "#444444"
 """Colours of hinges, and of words that are no loads."""
 
-MOST_LABELS, MOST_CELLS = 80, 300
-"""Numbers beyond which names, and marks of cells, are left out."""
+MOST_LABELS, MOST_CELLS = 80, 300  # numbers beyond which names, and marks of cells, are left out
 
 SYMBOL, SHORT_BEAM, SMALLEST = 12.0, 45.0, 0.3
 """Half the size of a symbol of a support where beams are not short; length of a beam below which it
@@ -53,7 +52,7 @@ class Drawing:
     labels: list[Label] = field(default_factory=list)
 
     def add(self, group: str, strokes: Iterable[Stroke], labels: Iterable[Label] = ()) -> None:
-        """Add what an object looks like."""
+        """Add the strokes and labels of an object to a group."""
         self.strokes[group] += strokes
         self.labels += labels
 
@@ -75,7 +74,7 @@ class Subject(NamedTuple):
 
     @classmethod
     def of(cls, scene: Scene) -> Subject:
-        """The subject that a scene is."""
+        """Make the subject of a scene."""
         attached = scene.attached
         axes: dict[Member, Array] = {
             beam: np.array([beam.curve(s) for s in beam.vertices(attached[beam])], dtype=float)

@@ -17,7 +17,7 @@ from ufl_beam.errors import SceneError
 
 
 def optional(module: str, package: str, why: str) -> Any:
-    """A module that need not be installed, or an error that says how to install it."""
+    """Import a module that need not be installed, or say how to install it."""
     try:
         return importlib.import_module(module)
     except ImportError as error:
@@ -35,7 +35,7 @@ def require_suffix(path: str | Path, suffixes: tuple[str, ...]) -> Path:
 
 
 def film_writer(path: Path, fps: float) -> Any:
-    """Writer of a GIF or MP4 with so many frames per second."""
+    """Open a GIF or MP4 with so many frames per second."""
     imageio = optional("imageio.v2", "ufl_beam[view]", "films need imageio")
     if path.suffix.lower() == ".gif":
         return imageio.get_writer(path, mode="I", duration=1000.0 / fps, loop=0)
@@ -45,7 +45,7 @@ def film_writer(path: Path, fps: float) -> Any:
 
 @contextmanager
 def screen(pyvista: Any) -> Iterator[None]:
-    """A screen, if VTK needs one and there is none: without, it ends the interpreter."""
+    """Provide a screen if VTK needs one and there is none: without, it ends the interpreter."""
     needed = sys.platform == "linux" and tuple(pyvista.vtk_version_info) < (9, 4)
     if not needed or os.environ.get("DISPLAY"):
         yield

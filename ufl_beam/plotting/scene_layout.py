@@ -133,7 +133,7 @@ class Stage(Setting):
         self._shown = range(len(solution.times)) if shown is None else shown
 
     def pose(self, n: int) -> Pose:
-        """The n-th kept time."""
+        """Return the pose at the n-th kept time."""
         grid, q = self._solution.grid, self._solution.q[n]
         return Pose(self, lambda anchor: np.asarray(motion_of(grid, anchor, [q])[0]))
 
@@ -163,25 +163,25 @@ class Pose:
     motion: Callable[[Anchor], Array]  # (u, v, ψ) of an anchor, not magnified; (3,); m, m, rad
 
     def at(self, anchor: Anchor) -> Array:
-        """Coordinates of an anchor; (2,); m."""
+        """Return the coordinates of an anchor; (2,); m."""
         return np.asarray(anchor.point + self.stage.magnify * self.motion(anchor)[:2])
 
     def turn(self, anchor: Anchor) -> float:
-        """Rotation of an anchor; rad."""
+        """Return the rotation of an anchor; rad."""
         return float(self.motion(anchor)[2])
 
     def turned(self, x: tuple[float, float], anchor: Anchor) -> Array:
-        """A vector that turns with an anchor; (2,)."""
+        """Turn a vector with an anchor; (2,)."""
         return np.asarray(turned(x, np.array([self.turn(anchor)]))[0])
 
     def points(self) -> Array:
-        """Points of all bodies, and of all that is attached to the ground; (n, 2); m."""
+        """Return points of all bodies, and of all that is attached to the ground; (n, 2); m."""
         ground = [spot.point for spot in self.stage.spots[GROUND]]
         bodies = [self.of_body(body, outline) for body, outline in self.stage.outlines.items()]
         return np.concatenate([np.reshape(ground, (-1, 2)), *bodies])
 
     def of_body(self, body: Body, points: Array) -> Array:
-        """Points of a body of the undeformed scene, moved with it; (n, 2); m."""
+        """Move points of a body of the undeformed scene with it; (n, 2); m."""
         u, v, ψ = self.motion(body.middle)
         arms = points - body.center
         moved = turned(arms, np.full(len(arms), ψ)) - arms + (u, v)

@@ -46,15 +46,15 @@ class Look:
         return max(0.022 * self.solution.scene.size, 0.7 * deepest)
 
     def stage(self, shown: list[int]) -> Stage:
-        """Add bodies, joints, connectors and supports."""
+        """Return the stage of bodies, joints, connectors and supports."""
         return Stage(self.solution, self.magnify, self.symbol, sorted(set(shown)))
 
     def depth(self, beam: Member) -> float:
-        """Depth in the plane; m."""
+        """Return the depth of a beam in the plane; m."""
         return self.thickness * float(beam.section.depth)
 
     def width(self, beam: Member) -> float:
-        """Width across the plane; m."""
+        """Return the width of a beam across the plane; m."""
         return max(self.depth(beam), self.least_width)
 
     @property
@@ -68,7 +68,7 @@ class Look:
         return max(map(self.width, self.solution.scene.beams), default=self.least_width)
 
     def around(self, places: Iterable[Anchor]) -> tuple[float, float]:
-        """Depth and width of the thickest beam of some places; m."""
+        """Return depth and width of the thickest beam of some places; m."""
         beams = [place.beam for place in places if isinstance(place, Place)]
         return max(map(self.depth, beams), default=0.0), max(
             map(self.width, beams), default=self.least_width
@@ -82,7 +82,7 @@ class Look:
         return self.solution.section_forces(beam, n)[:, list(style.RESULTANTS).index(self.color)]
 
     def corners(self, beam: Member, n: int, points: Array) -> Array:
-        """Corners of all cross-sections of a beam; (4 num_vertices, 3); m.
+        """Compute the corners of all cross-sections of a beam; (4 num_vertices, 3); m.
 
         Cross-sections turn with ψ; at a corner of the axis they halve the angle.
         """
@@ -99,7 +99,7 @@ class Look:
         return np.stack(planes, axis=1).reshape(-1, 3)
 
     def bounds(self, shown: list[int]) -> Array:
-        """Lower and upper corner of the box around everything in these states; (2, 3); m."""
+        """Compute lower and upper corner of the box around these states; (2, 3); m."""
         margin, stage = 2.2 * self.symbol, self.stage(shown)
         shapes = [moved_points(self.solution, n, self.magnify) for n in set(shown)]
         poses = [stage.undeformed, *(stage.pose(n) for n in set(shown))]
@@ -116,7 +116,7 @@ class Solids:
         self._pyvista, self._plotter, self._look = pyvista, plotter, look
 
     def add_beams(self, n: int, points: Array, largest: float) -> None:
-        """The beams in colour, the undeformed axes in grey, and the colour bar."""
+        """Add the beams in colour, the undeformed axes in grey, and the colour bar."""
         quantity, unit = QUANTITIES[self._look.color]
         factor, prefix = style.decimal_prefix(largest)
         limit = largest / factor or 1.0
@@ -152,7 +152,7 @@ class Solids:
             self._plotter.add_mesh(line, color="#A0A0A0", name=f"axis {i}", reset_camera=False)
 
     def add_text(self, text: str, position: tuple[float, float]) -> None:
-        """A text at a position in parts of the picture; another one replaces it."""
+        """Write a text at a position in parts of the picture, in place of the one before."""
         look = {"font_size": self._look.size[1] // 40, "color": "black", "viewport": True}
         self._plotter.add_text(text, position=position, name=str(position), **look)
 
@@ -168,7 +168,7 @@ class Solids:
         return face.triangulate().extrude((0.0, 0.0, high - low), capping=True)
 
     def add_strokes(self, pose: Pose) -> None:
-        """Bodies as plates; lines as rods, filled areas as blocks."""
+        """Add bodies as plates, lines as rods, and filled areas as blocks."""
         body, front = self._look.least_width, 0.7 * self._look.widest
         found: dict[str, list[Any]] = {}
         lines: dict[tuple[str, float], list[Array]] = {}
@@ -205,7 +205,7 @@ class Solids:
         return chains.tube(radius=radius, n_sides=12)
 
     def add_fittings(self, pose: Pose, hinges: list[OpenHinge]) -> None:
-        """Joints as pins across the plane, open hinges as orange ones, masses, supports."""
+        """Add joints as pins across the plane, open hinges as orange ones, masses, supports."""
         solution, symbol = self._look.solution, self._look.symbol
         pins = [self._cylinder(pin) for pin in symbols.pins(pose)]
         self._add(pins, "#707070", "joints")

@@ -33,8 +33,7 @@ BACK, MIDDLE, UPON, FRONT = 2.5, 4.2, 4.3, 5.5
 
 RESULTANTS = {"N": ("axial force", "N"), "V": ("shear force", "N"), "M": ("bending moment", "N m")}
 
-POINTS = 72.0
-"""Points of an inch."""
+POINTS = 72.0  # points of an inch
 
 STYLE = {
     "font.size": 13.0,
@@ -64,20 +63,20 @@ class Stroke(NamedTuple):
 
 
 def decimal_prefix(value: float) -> tuple[float, str]:
-    """Power of 1000 that leaves a value between 1 and 1000, and its prefix: (1000.0, "k")."""
+    """Find the power of 1000 that leaves 1 to 1000 of a value, and its prefix: (1000.0, "k")."""
     rounded = abs(float(f"{value:.3g}"))
     power = min(max(math.floor(math.log10(rounded) / 3), -3), 3) if rounded > 0.0 else 0
     return 1000.0**power, ("n", "µ", "m", "", "k", "M", "G")[power + 3]
 
 
 def with_unit(value: float, unit: str) -> str:
-    """A value with three digits and a decimal prefix: "−12.3 kN m"."""
+    """Write a value with three digits and a decimal prefix: "−12.3 kN m"."""
     factor, prefix = decimal_prefix(value)
     return f"{value / factor:.3g} {prefix}{unit}".replace("-", "−")
 
 
 def magnified(factor: float, before: str = ", ") -> str:
-    """Words for the factor on displacements; none if it is 1."""
+    """Write the factor on displacements in words; nothing if it is 1."""
     return f"{before}displacements × {factor:g}" if factor != 1 else ""
 
 
@@ -116,7 +115,7 @@ def picture(size: tuple[float, float]) -> Iterator[Figure]:
 
 
 def plane_axes(figure: Figure, title: str) -> Axes:
-    """Axes of the plane of motion, both to one scale."""
+    """Add axes of the plane of motion, both to one scale."""
     axes = figure.add_subplot(aspect="equal")
     axes.margins(0.06, 0.10)
     axes.set(xlabel="x (m)", ylabel="y (m)")
@@ -126,7 +125,7 @@ def plane_axes(figure: Figure, title: str) -> Axes:
 
 
 def time_axes(axes: Axes) -> Axes:
-    """Let axes show something over time."""
+    """Set axes up for histories over time."""
     axes.margins(x=0.0)
     axes.grid(axis="y", color="#E8E8E8", linewidth=0.8)
     axes.set_axisbelow(True)
@@ -135,12 +134,12 @@ def time_axes(axes: Axes) -> Axes:
 
 
 def color_cycle(count: int, colors: Iterable[str] = (BLUE, RED, GREEN, PINK, ORANGE, SKY)) -> Any:
-    """So many colours, one after the other."""
+    """Iterate over so many colours, from the first again after the last."""
     return islice(cycle(colors), count)
 
 
 def scale(name: str, first: float, last: float, low: float, high: float) -> Any:
-    """Colours of values from ``low`` to ``high``: a part of a colour map of Matplotlib.
+    """Make a part of a colour map of Matplotlib for values from ``low`` to ``high``.
 
     The bright end of a colour map would not be seen on white.
     """
@@ -153,14 +152,14 @@ def scale(name: str, first: float, last: float, low: float, high: float) -> Any:
 
 
 def draw_bar(figure: Figure, axes: Axes, colors: Any, label: str) -> None:
-    """The colour bar of a :func:`scale`."""
+    """Draw the colour bar of a :func:`scale`."""
     bar = figure.colorbar(colors, ax=axes, shrink=0.85, aspect=25, pad=0.02)
     bar.set_label(label)
     bar.ax.spines["outline"].set_visible(False)
 
 
 def half_size(figure: Figure, axes: Axes, text: str, size: float, **style: Any) -> Array:
-    """Half of the width and height of a text; (2,); points."""
+    """Measure half of the width and height of a text; (2,); points."""
     probe = axes.text(0.0, 0.0, text, fontsize=size, **style)
     box = probe.get_window_extent()
     probe.remove()

@@ -62,13 +62,13 @@ class Footing(NamedTuple):
 
 
 def bodies(pose: Pose) -> list[Stroke]:
-    """Outlines of the rigid bodies."""
+    """Draw outlines of the rigid bodies."""
     outlines = pose.stage.outlines.items()
     return [Stroke(pose.of_body(body, line), EDGE, 1.6, FILLED, BACK) for body, line in outlines]
 
 
 def centres(pose: Pose) -> Iterator[Stroke]:
-    """Marks of the centres of mass: circles, two quarters dark."""
+    """Draw centres of mass as circles, two quarters dark."""
     angle = np.linspace(0.0, math.pi / 2, 13)
     arc = 0.45 * pose.stage.unit * np.column_stack([np.cos(angle), np.sin(angle)])
     quarter = np.vstack([(0.0, 0.0), arc, (0.0, 0.0)])
@@ -83,7 +83,7 @@ def centres(pose: Pose) -> Iterator[Stroke]:
 
 
 def rods(pose: Pose) -> Iterator[Stroke]:
-    """Rigid links, thick, and links, thin."""
+    """Draw rigid links, thick, and links, thin."""
     for joint in pose.stage.scene.joints:
         if joint.kind in ("RigidLink", "Link"):
             weight = 6.0 if joint.kind == "RigidLink" else 2.6
@@ -92,14 +92,22 @@ def rods(pose: Pose) -> Iterator[Stroke]:
 
 
 def pins(pose: Pose) -> Iterator[Pin]:
-    """Circles where joints turn, squares where they do not."""
+    """Draw circles where joints turn, squares where they do not."""
     for joint in pose.stage.scene.joints:
-        if joint.kind in _PINS:
-            yield from _PINS[joint.kind](pose, joint)
+        places, apart = joint.places, 2 not in joint.shared
+        match joint.kind:
+            case "Link":
+                yield from (Pin(pose.at(place), True, (place,)) for place in places)
+            case "Prismatic" | "Guided" if apart:
+                yield Pin(pose.at(places[1]), True, places[1:])
+            case "Rigid" | "Revolute":
+                yield Pin(pose.at(places[0]), _turns(joint), places)
+            case "Release" if apart or 0 in joint.shared:  # else it only slides: rails show it
+                yield Pin(pose.at(places[0]), _turns(joint), places)
 
 
 def rails(pose: Pose) -> Iterator[Stroke]:
-    """Rails, guide curves, and the blocks on them."""
+    """Draw rails, guide curves, and the blocks on them."""
     for joint in pose.stage.scene.joints:
         if joint.kind in _RAILS:
             yield from _RAILS[joint.kind](pose, joint)
@@ -109,7 +117,7 @@ def rails(pose: Pose) -> Iterator[Stroke]:
 
 
 def connectors(pose: Pose) -> Iterator[Stroke]:
-    """Springs, dampers, motors and their like."""
+    """Draw springs, dampers, motors and their like."""
     for connector in pose.stage.scene.connectors:
         draw = _around if connector.turns else _straight
         yield from draw(pose, connector)
@@ -155,7 +163,7 @@ def _around(pose: Pose, connector: Connector) -> Iterator[Stroke]:
 
 
 def footings(pose: Pose) -> Iterator[Footing]:
-    """Symbols of supports, and of the points of the ground that hold something."""
+    """Draw supports, and points of the ground that hold something."""
     for support in pose.stage.scene.supports:
         angle = support_direction(support, pose.turn(support.place))
         color = ORANGE if support.moving else GROUND_GREY
@@ -165,6 +173,10 @@ def footings(pose: Pose) -> Iterator[Footing]:
         symbol = [_TRIANGLE, _PLATE] if turns else [_CLAMP]
         angle = _upright(inward) if turns else inward - math.pi / 2
         yield Footing(np.array(spot.point), angle, symbol, GROUND_GREY, spot)
+
+
+def _turns(joint: Joint) -> bool:
+    return 2 not in joint.shared and not any(holder.turns for holder in joint.holders)
 
 
 def _grounds(scene: Scene) -> dict[Spot, tuple[float, bool]]:
@@ -183,41 +195,7 @@ def _grounds(scene: Scene) -> dict[Spot, tuple[float, bool]]:
     return found
 
 
-# -- joints, by kind ---------------------------------------------------------------------------
-
-
-def _turns(joint: Joint) -> bool:
-    return 2 not in joint.shared and not any(holder.turns for holder in joint.holders)
-
-
-def _one_pin(pose: Pose, joint: Joint) -> Iterator[Pin]:
-    yield Pin(pose.at(joint.places[0]), _turns(joint), joint.places)
-
-
-def _pin_at_ends(pose: Pose, joint: Joint) -> Iterator[Pin]:
-    for place in joint.places:
-        yield Pin(pose.at(place), True, (place,))
-
-
-def _pin_that_slides(pose: Pose, joint: Joint) -> Iterator[Pin]:
-    if 2 not in joint.shared:
-        yield Pin(pose.at(joint.places[1]), True, joint.places[1:])
-
-
-def _pin_of_release(pose: Pose, joint: Joint) -> Iterator[Pin]:
-    """None if it only slides, which rails show."""
-    if 2 not in joint.shared or 0 in joint.shared:
-        yield from _one_pin(pose, joint)
-
-
-_PINS: dict[str, Callable[[Pose, Joint], Iterator[Pin]]] = {
-    "Rigid": _one_pin,
-    "Revolute": _one_pin,
-    "Release": _pin_of_release,
-    "Link": _pin_at_ends,
-    "Prismatic": _pin_that_slides,
-    "Guided": _pin_that_slides,
-}
+# -- rails, by kind of joint -------------------------------------------------------------------
 
 
 def _rail(pose: Pose, joint: Joint) -> Iterator[Stroke]:
@@ -279,13 +257,13 @@ _RAILS: dict[str, Callable[[Pose, Joint], Iterator[Stroke]]] = {
 
 
 def support_symbol(support: Support) -> list[Outline]:
-    """Outlines of the symbol of a support; half a symbol is 1, the place is the origin."""
+    """Return outlines of the symbol of a support; half a symbol is 1, its place the origin."""
     held = 3 if len(support.held) == 3 else len({0, 1} & set(support.held))
     return [[_DIAMOND], [_TRIANGLE, _TRACK], [_TRIANGLE, _PLATE], [_CLAMP]][held]
 
 
 def support_direction(support: Support, turned: float) -> float:
-    """Angle by which the symbol of a support is turned, away from its beam; rad.
+    """Return the angle of the symbol of a support, away from its beam; rad.
 
     A clamp follows the rotation of its place, by which it is ``turned`` (rad).
     """
