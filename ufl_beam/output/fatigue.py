@@ -14,7 +14,7 @@ from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import SceneError, require_kind, require_number, require_sequence
 from ufl_beam.model.bodies import Place
 from ufl_beam.output.rainflow import Cycles, RainflowCounter, SNCurve, library
-from ufl_beam.output.recorders import Recorded, Recorder
+from ufl_beam.output.recorders import RecordedState, Recorder
 
 BLOCK = 1000  # steps that are collected before their cycles are counted
 
@@ -107,7 +107,7 @@ class Fatigue(Recorder):
         self._resolution = resolution or curve.range / 100
         self._counters: dict[HotSpot, RainflowCounter] = {}
 
-    def open(self, simulation: Recorded) -> None:
+    def open(self, simulation: RecordedState) -> None:
         """Begin to count, with the initial state."""
         self._prepare(simulation.grid)
         self._begin = simulation.t
@@ -120,7 +120,7 @@ class Fatigue(Recorder):
         self._counters = {spot: RainflowCounter(self._resolution) for spot in self.spots}
         self._block, self._filled = np.empty((len(self.spots), 3, BLOCK)), 0
 
-    def write(self, simulation: Recorded) -> None:
+    def write(self, simulation: RecordedState) -> None:
         """Note the section forces, and count now and then."""
         self._block[..., self._filled] = simulation.section_forces()[self._cells]
         self._filled += 1
@@ -150,7 +150,7 @@ class Fatigue(Recorder):
             state[f"counted {i}"], state[f"waiting {i}"] = counter.state()
         return state
 
-    def resume(self, simulation: Recorded, state: State) -> None:
+    def resume(self, simulation: RecordedState, state: State) -> None:
         """Go on after a :meth:`state`."""
         self._prepare(simulation.grid)
         self._begin, self._end = map(float, state["duration"])

@@ -20,7 +20,7 @@ from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.joint_histories import links_of, motion_of
 from ufl_beam.output.output_files import OutputFile, require_path
-from ufl_beam.output.recorders import Recorded, Recorder
+from ufl_beam.output.recorders import RecordedState, Recorder
 
 MOTION = (("u", "m"), ("v", "m"), ("psi", "rad"))  # columns of a place, and their units
 CONNECTOR = ("motion", "force", "work")  # columns of a connector
@@ -79,14 +79,14 @@ class History(Recorder):
         """Path of the file, and if rows may go that of the one that takes its place."""
         return (self._path,) if self._most == sys.maxsize else (self._path, self._part)
 
-    def open(self, simulation: Recorded) -> None:
+    def open(self, simulation: RecordedState) -> None:
         """Write the header and the initial state."""
         self._prepare(simulation)
         row = self._row(simulation)
         self._every, self._steps, self._rows = self._first_every, 0, 0
         on_first(simulation.comm, lambda: self._begin(self._path, self._header + row))
 
-    def _prepare(self, simulation: Recorded) -> None:
+    def _prepare(self, simulation: RecordedState) -> None:
         """Note the objects that are followed, and the header."""
         self._comm = simulation.comm
         self._links = {
@@ -112,7 +112,7 @@ class History(Recorder):
         self._files[0].put(self._length, line)
         self._length += len(line)
 
-    def write(self, simulation: Recorded) -> None:
+    def write(self, simulation: RecordedState) -> None:
         """Write the row of the state, every so many steps."""
         self._steps += 1
         if self._steps % self._every:
@@ -132,7 +132,7 @@ class History(Recorder):
         self._begin(self._part, self._header + b"".join(rows[::2]))
         self._files[0].rename(self._path)
 
-    def _row(self, simulation: Recorded) -> bytes:
+    def _row(self, simulation: RecordedState) -> bytes:
         q = simulation.share.gather(simulation.q)
         motion = [motion_of(simulation.grid, place, [q])[0] for place in self._places]
         links = list(self._links)
@@ -157,7 +157,7 @@ class History(Recorder):
         for file in self._files:
             file.sync()
 
-    def resume(self, simulation: Recorded, state: State) -> None:
+    def resume(self, simulation: RecordedState, state: State) -> None:
         """Cut off what was written after the state, and append."""
         self._prepare(simulation)
         self._every, self._steps, self._rows, length = map(int, state["counts"])

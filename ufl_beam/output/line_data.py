@@ -15,7 +15,7 @@ from ufl_beam.model.joints import Joint
 from ufl_beam.model.loads import FollowerLoad, PointLoad
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.joint_histories import turned
-from ufl_beam.output.recorders import Recorded
+from ufl_beam.output.recorders import RecordedState
 
 LineFields = tuple[dict[str, Array], dict[str, Array]]
 """Fields at points, (n,) or (n, 3), and in cells, (m,), by name."""
@@ -87,7 +87,7 @@ class LineData:
         parts: 0 in beams, 1 in bodies, 2 in joints and connectors; (m,).
     """
 
-    def __init__(self, simulation: Recorded) -> None:
+    def __init__(self, simulation: RecordedState) -> None:
         grid, rods = simulation.grid, rods_of(simulation.scene)
         ends = [anchor for rod in rods for anchor in (rod.a, rod.b)]
         corners = np.reshape([anchor.point for anchor in ends], (-1, 2))
@@ -103,7 +103,7 @@ class LineData:
         self._pulling, self._along = np.reshape(pulls, (-1, 2)).astype(int).T
         self._pieces_of_cell, self._num_rods = grid.mesh.degree, len(rods)
 
-    def fields(self, simulation: Recorded) -> LineFields:
+    def fields(self, simulation: RecordedState) -> LineFields:
         """Compute the fields of the present state; all processes call it together.
 
         At points the displacement (m) and rotation (rad), in dynamics also the velocity (m/s) and
@@ -122,7 +122,7 @@ class LineData:
             at_points |= {"velocity": velocity, "angular velocity": v[:, 2]}
         return at_points, self._in_cells(simulation)
 
-    def _in_cells(self, simulation: Recorded) -> dict[str, Array]:
+    def _in_cells(self, simulation: RecordedState) -> dict[str, Array]:
         forces = simulation.section_forces()
         in_cells: dict[str, Array] = {name: forces[:, k] for k, name in enumerate("NVM")}
         if simulation.may_break:

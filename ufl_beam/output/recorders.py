@@ -21,7 +21,7 @@ from ufl_beam.output.output_files import Output, require_apart, require_writable
 from ufl_beam.parameter import Parameter
 
 
-class Recorded(Protocol):
+class RecordedState(Protocol):
     """State of a simulation as recorders read it; a :class:`Simulation` has more.
 
     All processes call its methods together.
@@ -74,7 +74,7 @@ class Recorder(ABC):
     Example:
         >>> class Speed(ub.Recorder):
         ...     largest = 0.0
-        ...     require_writable = open = close = lambda self, *simulation: None
+        ...     open = lambda self, simulation: None
         ...     def write(self, simulation):
         ...         self.largest = max(self.largest, abs(simulation.velocity(beam.end)[1]))
         >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=Speed())
@@ -91,11 +91,11 @@ class Recorder(ABC):
             require_writable(path)
 
     @abstractmethod
-    def open(self, simulation: Recorded) -> None:
+    def open(self, simulation: RecordedState) -> None:
         """Begin, with the initial state."""
 
     @abstractmethod
-    def write(self, simulation: Recorded) -> None:
+    def write(self, simulation: RecordedState) -> None:
         """Record the state after a step."""
 
     def close(self) -> None:  # noqa: B027 - not all have something to close
@@ -112,7 +112,7 @@ class Recorder(ABC):
             "state() and resume(simulation, state), or run without a checkpoint"
         )
 
-    def resume(self, simulation: Recorded, state: State) -> None:
+    def resume(self, simulation: RecordedState, state: State) -> None:
         """Go on from a :meth:`state`, in the place of :meth:`open`; nothing is recorded yet.
 
         Raises:

@@ -16,7 +16,7 @@ from ufl_beam.collective_errors import on_first
 from ufl_beam.errors import SceneError, require_count
 from ufl_beam.output.line_data import LineData, LineFields
 from ufl_beam.output.output_files import require_path
-from ufl_beam.output.recorders import Recorded, Recorder
+from ufl_beam.output.recorders import RecordedState, Recorder
 from ufl_beam.output.vtkhdf import VtkhdfWriter
 from ufl_beam.output.xdmf import Complete, XdmfWriter, data_path
 
@@ -35,13 +35,13 @@ class TimeSeries(Recorder):
             raise SceneError(f"{kind} {path}: the name of the file must end in {self.ending}")
         self._writers: list[Any] = []
 
-    def open(self, simulation: Recorded) -> None:
+    def open(self, simulation: RecordedState) -> None:
         """Write the mesh and the initial state."""
         self._count = 0
         fields = self._prepare(simulation)
         on_first(simulation.comm, lambda: self._begin(simulation.t, fields))
 
-    def _prepare(self, simulation: Recorded) -> LineFields:
+    def _prepare(self, simulation: RecordedState) -> LineFields:
         """Note the mesh; the fields of the present state."""
         self._comm: MPI.Intracomm = simulation.comm
         self._lines = LineData(simulation)
@@ -56,7 +56,7 @@ class TimeSeries(Recorder):
     def _writer(self, fields: LineFields, complete: list[int] | None = None) -> Any:
         """Make the writer of a file, or of one that is complete up to some sizes."""
 
-    def write(self, simulation: Recorded) -> None:
+    def write(self, simulation: RecordedState) -> None:
         """Write the state, every so many steps."""
         self._count += 1
         if self._count % self._every == 0:
@@ -73,7 +73,7 @@ class TimeSeries(Recorder):
         for writer in self._writers:
             writer.sync()
 
-    def resume(self, simulation: Recorded, state: State) -> None:
+    def resume(self, simulation: RecordedState, state: State) -> None:
         """Cut off what was written after the state, and go on."""
         self._count, *sizes = (int(n) for n in state["sizes"])
         fields = self._prepare(simulation)

@@ -69,6 +69,10 @@ def plot(
     Raises:
         SceneError: Neither a scene nor a solution; a scene whose constraints repeat; anything but
             the shape of a scene; an unknown ``what``, no such time, or ``magnify`` not positive.
+
+    Example:
+        >>> ub.plot(scene).savefig("model.png")
+        >>> ub.plot(solution, "M", magnify=10).savefig("moments.png")
     """
     if isinstance(shown, Solution):
         return plot_state(shown, what, n=n, magnify=magnify)
