@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
+from collections.abc import Callable
+from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -33,6 +35,9 @@ LEFT, RIGHT, BELOW, ABOVE, NOTE = 66.0, 14.0, 46.0, 34.0, 16.0
 
 LABEL_SIZE, TITLE_SIZE = 11.0, 14.0  # sizes of labels and of the title; points
 BADGE = 60.0  # room for the symbol of a load on the whole scene, and between two of them; points
+
+
+Measure = Callable[[str], Array]  # half of width and height of a text; (2,); points
 
 
 class Plan(NamedTuple):
@@ -97,8 +102,11 @@ def plot_model(scene: Scene) -> Figure:
     notes = notes_of(scene)
     with picture((WIDTH[1], HEIGHT[1])) as figure:
         figure.set_layout_engine("none")
-        plan = _first_plan(skeleton, scene.size)
-        measure = _Measure(figure)
+        width, height = np.ptp(skeleton, axis=0)
+        scale = max(width / 400.0, height / 250.0, scene.size / 500.0)
+        plan = Plan(scale, np.empty(4), (0.0, 0.0))
+        probe = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        measure: Measure = cache(lambda text: half_size(figure, probe, text, LABEL_SIZE))
         least = _width_of_words(subject, notes, measure)
         # What stands around the beams has a size in points: with the second plan it fits.
         for again in (False, True):
@@ -112,6 +120,7 @@ def plot_model(scene: Scene) -> Figure:
         _paint(axes, drawing)
         _write(axes, placed, plan.scale)
         _badges(axes, scene, plan, measure)
+        probe.remove()
     return figure
 
 
@@ -146,27 +155,7 @@ def _skeleton(subject: Subject) -> Array:
     return np.concatenate(points)
 
 
-class _Measure:
-    """Sizes of texts."""
-
-    def __init__(self, figure: Figure) -> None:
-        self._figure, self._axes = figure, figure.add_axes((0.0, 0.0, 1.0, 1.0))
-        self._known: dict[str, Array] = {}
-
-    def __call__(self, text: str) -> Array:
-        """Half of width and height; (2,); points."""
-        if text not in self._known:
-            self._known[text] = half_size(self._figure, self._axes, text, LABEL_SIZE)
-        return self._known[text]
-
-    def finish(self) -> None:
-        """Remove the axes that texts were measured in."""
-        self._axes.remove()
-
-
-def _arrange(
-    drawing: Drawing, scale: float, measure: _Measure, frame: Array | None
-) -> list[Placed]:
+def _arrange(drawing: Drawing, scale: float, measure: Measure, frame: Array | None) -> list[Placed]:
     """Labels at their places; those that others would cover are left out."""
     labels = drawing.labels
     for rank in (NAMES, CAPTIONS):
@@ -183,9 +172,7 @@ def _arrange(
 
 def _segments(chains: list[Array]) -> Array:
     """Segments of some lines; (n, 4)."""
-    points = np.concatenate(chains)
-    last = np.cumsum([len(chain) for chain in chains]) - 1
-    return np.delete(np.hstack([points[:-1], points[1:]]), last[:-1], axis=0)
+    return np.concatenate([np.hstack([chain[:-1], chain[1:]]) for chain in chains])
 
 
 def _box(drawing: Drawing, placed: list[Placed], scale: float) -> Array:
@@ -196,17 +183,12 @@ def _box(drawing: Drawing, placed: list[Placed], scale: float) -> Array:
     return np.array([*everything.min(axis=0), *everything.max(axis=0)])
 
 
-def _width_of_words(subject: Subject, notes: list[str], measure: _Measure) -> float:
+def _width_of_words(subject: Subject, notes: list[str], measure: Measure) -> float:
     """Width of the words above the axes; points."""
     badges = [found[0] for load in subject.scene.loads if (found := badge(load)) is not None]
     first = TITLE_SIZE / LABEL_SIZE * 2 * measure(_title(subject))[0]
     first += sum(2 * measure(text)[0] + BADGE for text in badges)
     return float(max([first, *(2 * measure(note)[0] for note in notes)]))
-
-
-def _first_plan(skeleton: Array, size: float) -> Plan:
-    width, height = np.ptp(skeleton, axis=0)
-    return Plan(max(width / 400.0, height / 250.0, size / 500.0), np.empty(4), (0.0, 0.0))
 
 
 def _plan(skeleton: Array, scale: float, box: Array, notes: int, words: float) -> Plan:
@@ -301,7 +283,7 @@ def _write(axes: Axes, placed: list[Placed], scale: float) -> None:
         )  # fmt: skip
 
 
-def _badges(axes: Axes, scene: Scene, plan: Plan, measure: _Measure) -> None:
+def _badges(axes: Axes, scene: Scene, plan: Plan, measure: Measure) -> None:
     """Write the loads of the whole scene right above the axes."""
     x, y = plan.frame[2:] - plan.frame[:2] + (0.0, 17.0)
     for load in scene.loads:
@@ -326,4 +308,3 @@ def _badges(axes: Axes, scene: Scene, plan: Plan, measure: _Measure) -> None:
                 },
             )  # fmt: skip
         x -= 0.65 * BADGE
-    measure.finish()
