@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import logging
 import sysconfig
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,8 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 try:
-    import petsc4py  # noqa: F401 - solvers need it
     from mpi4py import MPI
+    from petsc4py import PETSc
 
     import basix.ufl
     import dolfinx
@@ -32,6 +33,7 @@ except ImportError as error:  # pragma: no cover - depends on the machine
 __all__ = [
     "TABULATE",
     "VERSION",
+    "VERSIONS",
     "cell_coordinates",
     "compile_form",
     "cpp",
@@ -46,10 +48,16 @@ __all__ = [
 ]
 
 VERSION = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
-if VERSION < (0, 9):  # pragma: no cover - depends on the machine
+VERSIONS = f"DOLFINx {dolfinx.__version__} and FFCx {ffcx.__version__}"
+if VERSION < (0, 9):
     raise ImportError(
         f"ufl_beam needs DOLFINx 0.9 or newer, this is {dolfinx.__version__}; "
         "run through ./env of the source tree, or see docs/installation.md"
+    )
+if np.dtype(PETSc.ScalarType) != np.float64:
+    raise ImportError(
+        "ufl_beam needs PETSc with real numbers of double precision; those of this PETSc are "
+        f"{np.dtype(PETSc.ScalarType)}. Debian: python3-dolfinx-real; conda: petsc=*=*real*"
     )
 
 if all(
@@ -61,6 +69,12 @@ if all(
     # log gets a handler that shows nothing if a warning comes before this line, as with -W always.
     logging.captureWarnings(False)
 
+if VERSION > (0, 11):
+    warnings.warn(
+        f"ufl_beam is tested with DOLFINx 0.9 to 0.11, and not with {dolfinx.__version__}",
+        RuntimeWarning,
+        stacklevel=2,
+    )
 
 TABULATE = (
     "double *A, const double *w, const double *c, const double *x, const int *entity, "

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import ctypes
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -58,11 +56,3 @@ def say(*words: object, sep: str = " ") -> None:
     """
     if ours().rank == 0:
         print(*words, sep=sep, flush=True)  # noqa: T201
-
-
-def give_back_memory() -> None:
-    """Let the system have what was needed for a while, where the C library keeps it."""
-    if sys.platform == "linux":
-        trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
-        if trim is not None:
-            trim(0)

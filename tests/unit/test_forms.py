@@ -12,8 +12,9 @@ import ufl
 
 import ufl_beam as ub
 from ufl_beam.discretization import compiled_forms
-from ufl_beam.discretization.dof_numbering import Grid, Share
+from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.discretization.partition import Share
 from ufl_beam.dolfinx_compat import fem, line_mesh, space_with_dofs
 from ufl_beam.mechanics.kinematics import Axis, strain
 
@@ -208,7 +209,7 @@ def no_points(monkeypatch):
     monkeypatch.setattr("ufl_beam.terms.inelastic_beams.InelasticBeams.__init__", refuse)
     monkeypatch.setattr("ufl_beam.discretization.function_spaces.Element.at_points", refuse)
     monkeypatch.setattr("ufl_beam.model.material_laws.Softening.traction", refuse)
-    monkeypatch.setattr("ufl_beam.model.material_laws.Bulk.flow", refuse)
+    monkeypatch.setattr("ufl_beam.model.material_laws.HardeningBulk.flow", refuse)
 
 
 @pytest.mark.parametrize(

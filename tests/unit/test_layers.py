@@ -264,6 +264,6 @@ def test_the_script_of_the_readme_runs(tmp_path, monkeypatch):
     names = {}
     exec(script, names)
     assert names["solution"].times[-1] == 0.4
-    assert names["solution"].energy.worst < 1e-9  # the ledger closes, design.md section 9
+    assert names["solution"].energy.worst < 1e-9  # the ledger closes
     assert (tmp_path / "portal.png").stat().st_size > 1000
     assert (tmp_path / "portal.xdmf").exists()

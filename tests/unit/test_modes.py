@@ -215,7 +215,7 @@ def test_a_rotating_frame_keeps_energy():
     )
     solution = ub.simulate(thrown, ub.Midpoint(), t=(0, 1.0), dt=0.02, progress=False)
     assert np.ptp(solution.displacement(beam.end)[:, 1]) > 1e-3
-    assert solution.energy.worst < 1e-9  # design.md section 9
+    assert solution.energy.worst < 1e-9  # the ledger closes
 
 
 def test_a_thrown_body_flies_straight():

@@ -50,7 +50,7 @@ def lanes_source():
     defined = [f"#define {name} {size}" for name, size in sizes.items()]
     head = [jit.HEADERS, jit.DECLARATIONS, *defined, jit.text("lanes.h")]
     # The only function that other files call is declared in no header: cffi reads it as text.
-    return "\n".join([*head, KERNEL, "void *in_lanes(void);", jit.text("lanes.c")])
+    return "\n".join([*head, KERNEL, "void *address(void);", jit.text("lanes.c")])
 
 
 @pytest.mark.parametrize(

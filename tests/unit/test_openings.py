@@ -11,8 +11,7 @@ import pytest
 
 import ufl_beam as ub
 from ufl_beam.errors import StepFailed
-from ufl_beam.terms.material_points import OVER, Course
-from ufl_beam.terms.openings import Openings
+from ufl_beam.terms.openings import OVER, Course, Openings
 
 LENGTH, EI, STIFF = 2.0, 1000.0, 1e6  # m, N m², N
 LAWS = [ub.Softening, ub.LinearSoftening]

@@ -8,7 +8,8 @@ import pytest
 
 import ufl_beam as ub
 from ufl_beam.model.fibres import Layout
-from ufl_beam.terms.material_points import INPUTS, Points
+from ufl_beam.model.material_laws import HardeningBulk
+from ufl_beam.terms.material_points import Points, inputs
 
 C, LENGTH = 200.0, 0.5
 NONE = ub.Hardening(math.inf)
@@ -54,7 +55,7 @@ class Bars:
             [(0, k) for k in range(cells)],
             np.full(cells, length),
             scheme,
-            np.zeros((cells, 1, len(INPUTS))),
+            np.zeros((cells, 1, len(inputs(HardeningBulk)))),
         )
         self.strain = np.zeros(cells)
 

@@ -16,6 +16,13 @@ PAGES = [
     for path in sorted((ROOT / folder).glob("*.md"))
 ]
 
+FILES = {"portal.py", "axis.h"}.union(
+    path.name
+    for folder in ("ufl_beam", "tests", "demos", "benchmarks")
+    for path in (ROOT / folder).rglob("*.*")
+)
+"""Names of the files of the repository, the script of the README, and an attribute."""
+
 
 def docstrings(tree, owner):
     """(name, docstring) of all public classes, functions and methods."""
@@ -29,7 +36,7 @@ def docstrings(tree, owner):
 DOCSTRINGS = {
     name: text
     for path in sorted((ROOT / "ufl_beam").rglob("*.py"))
-    for name, text in docstrings(ast.parse(path.read_text(encoding="utf-8")), path.stem)
+    for name, text in docstrings(ast.parse(path.read_text("utf-8")), path.relative_to(ROOT))
 }
 
 
@@ -50,6 +57,16 @@ def test_relative_links_lead_somewhere(page):
     for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", text):
         if not target.startswith("http"):
             assert (page.parent / target).exists(), target
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_pages_name_what_exists(page):
+    """Files in code font, and names of the package."""
+    text = page.read_text(encoding="utf-8")
+    for name in re.findall(r"`(?:[\w/]+/)?(\w+\.(?:py|c|h))`", text):
+        assert name in FILES, name
+    for name in re.findall(r"\bub\.(\w+)", text):
+        assert hasattr(ub, name), name
 
 
 def test_public_names_are_documented():

@@ -16,9 +16,10 @@ import numpy as np
 from ufl_beam.analysis.linearization import SmallMotions
 from ufl_beam.arrays import Array, Complex, State
 from ufl_beam.collective_errors import on_first
-from ufl_beam.discretization.dof_numbering import Grid, Share
+from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.model_warnings import warn_of_masses
+from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import SceneError, require_count, require_kind, require_number
 from ufl_beam.model.bodies import Anchor
 from ufl_beam.model.constraint_checks import require_no_mechanism

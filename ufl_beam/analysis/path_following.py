@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, cast
 
 from mpi4py import MPI
 
@@ -21,12 +21,15 @@ from ufl_beam.model.connector_laws import Actuator, Controller, Motor
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.time_functions import TimeFunction
+from ufl_beam.output.archive import below
 from ufl_beam.output.output_files import take
 from ufl_beam.output.recorders import Recorder, close_all, recorders_of
 from ufl_beam.parallel import communicator
 from ufl_beam.parameter import FACTOR
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
+from ufl_beam.simulation.solution_files import arrays_of
+from ufl_beam.simulation.solution_files import take as take_solution
 from ufl_beam.solvers.newton_options import Newton
 
 
@@ -55,7 +58,7 @@ class Path(Solution):
         text["critical"] = [{"kind": c.kind, "factor": c.factor, "n": c.n} for c in self.critical]
         for k, point in enumerate(self.critical):
             arrays[f"critical/{k}/mode"] = point.mode
-            for name, values in point.state._arrays().items():
+            for name, values in arrays_of(point.state).items():
                 arrays[f"critical/{k}/state/{name}"] = values
         return text, arrays
 
@@ -64,9 +67,7 @@ class Path(Solution):
         critical = []
         for k, one in enumerate(text["critical"]):
             state, prefix = Solution(self.scene, self.grid), f"critical/{k}/state/"
-            state._take(
-                text, {n.removeprefix(prefix): a for n, a in arrays.items() if n.startswith(prefix)}
-            )
+            take_solution(state, text, below(prefix, arrays))
             critical.append(CriticalPoint(**one, state=state, mode=arrays[f"critical/{k}/mode"]))
         self.critical = critical
 
@@ -140,9 +141,9 @@ def follow(
     _require_driven(scene, t0)
     began = time.perf_counter()
     simulation = Simulation(
-        scene, Static(), t0=t0, start=state, newton=newton, mesh=mesh, comm=comm
+        scene, Static(), t0=t0, start=state, newton=newton, mesh=mesh, comm=comm, kind=Path
     )
-    simulation.solution = path = Path(scene, simulation.grid)
+    path = cast(Path, simulation.solution)
     stepper = PathStepper(simulation, control)
     path.critical = stepper.critical
     release = take(outputs)
@@ -150,27 +151,22 @@ def follow(
     def after_step() -> bool:
         if recorders:
             simulation.settle()  # before anything is written
-        path.keep(simulation)
+        simulation.keep()
         for recorder in recorders:
             recorder.write(simulation)
         return until is not None and bool(until(simulation))
 
     try:
-        stepper.begin(branch, fresh=state is None)
-        for recorder in recorders:
-            simulation.together(recorder.open, simulation)
-        path.keep(simulation)
-        for _ in range(steps):
-            stepper.advance()
-            if simulation.share.largest(simulation.together(after_step)):
-                break
-        simulation.end()
-    except BaseException as error:
-        simulation.leave()
-        if simulation.share.comm.size == 1 or error is simulation.together.raised:
-            simulation.end()  # else the processes may not all be here
-        error.__dict__["solution"] = path
-        raise
+        with simulation.partial_results():
+            stepper.begin(branch, fresh=state is None)
+            for recorder in recorders:
+                simulation.together(recorder.open, simulation)
+            simulation.keep()
+            for _ in range(steps):
+                stepper.advance()
+                if simulation.share.largest(simulation.together(after_step)):
+                    break
+            simulation.end()
     finally:
         release()
         path.seconds = time.perf_counter() - began

@@ -18,7 +18,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.jit import DECLARATIONS, HEADERS, compiled, text
-from ufl_beam.dolfinx_compat import TABULATE
+from ufl_beam.dolfinx_compat import TABULATE, VERSIONS
 
 T = TypeVar("T")
 
@@ -60,14 +60,17 @@ def petsc(name: str, *arguments: Any) -> None:
     """Call a function of ``petsc_functions`` in loops.h; objects of petsc4py are theirs in C.
 
     Raises:
-        PETSc.Error: It returns an error.
+        RuntimeError: It returns an error.
     """
     in_c = (
         ffi.cast("void *", argument.handle) if isinstance(argument, PETSc.Object) else argument
         for argument in arguments
     )
     if error := getattr(lib.petsc, name)(*in_c):
-        raise PETSc.Error(error)
+        text, specific = ffi.new("const char **"), ffi.new("char **")
+        lib.petsc.PetscErrorMessage(error, text, specific)
+        words = (ffi.string(of[0]).decode() for of in (text, specific) if of[0])
+        raise RuntimeError(f"{name} of PETSc failed with error {error}: {': '.join(words)}")
 
 
 Loop = tuple[Any, Any]
@@ -119,5 +122,15 @@ def combined(a: float, x: Array, b: float, y: Array) -> Array:
 
 
 def kernel(pointer: Any, of: Any) -> Any:
-    """An FFCx kernel, given as a function pointer of the cffi instance ``of``."""
+    """An FFCx kernel, given as a function pointer of the cffi instance ``of``.
+
+    Raises:
+        RuntimeError: It takes other arguments than ufl_beam passes.
+    """
+    expected, found = ffi.typeof("kernel *").cname, of.typeof(pointer).cname
+    if found != expected:
+        raise RuntimeError(
+            f"{VERSIONS} make kernels of the C type {found}; ufl_beam calls {expected}. It is "
+            "tested with DOLFINx 0.9 to 0.11"
+        )
     return ffi.cast("kernel *", int(of.cast("intptr_t", pointer)))

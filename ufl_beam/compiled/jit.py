@@ -50,6 +50,7 @@ SANITIZERS = (
     "-fno-wrapv",
     "-fsanitize=address,undefined,bounds-strict",
     "-fno-sanitize-recover=all",
+    *("-Wall", "-Wextra", "-Wno-unused-parameter", "-Werror"),
 )
 """Flags that make the compiler check addresses and undefined behaviour; see `make sanitize`."""
 
@@ -61,6 +62,10 @@ class CompilerError(RuntimeError):
     """The C compiler is missing, or refuses the code."""
 
 
+class Refused(Exception):
+    """Code that is not to be used, and why; the cache remembers it."""
+
+
 def compiled(
     stem: str,
     declarations: str,
@@ -68,47 +73,67 @@ def compiled(
     *,
     made_of: Sequence[str],
     flags: Sequence[str],
+    check: Callable[[ModuleType], None] = lambda _: None,
 ) -> ModuleType:
     """Load a module of C, compiled first if the cache has it not.
 
     Args:
         stem: Beginning of its name.
         declarations: C declarations of its functions and types for Python.
-        source: Its C; called if it is not in the cache.
+        source: Its C; called if it is not in the cache; may raise :class:`Refused`.
         made_of: Texts that the C, and the effect of the flags, depend on.
         flags: For the compiler.
+        check: Called with the module once it has been compiled; may raise :class:`Refused`.
 
     Raises:
         CompilerError: The compiler is missing, or refuses.
+        Refused: As by ``source`` or ``check``, now or when the module was made.
     """
     flags = [*flags, "-fvisibility=hidden", *EXTRA]
     name = f"{stem}_{_digest(declarations, *made_of, *flags, sys.version)}"
 
-    def build(directory: Path) -> ModuleType:
+    def build(directory: Path) -> ModuleType | Refused:
         builder = cffi.FFI()
         builder.cdef(declarations)
-        builder.set_source(
-            name,
-            source(),
-            extra_compile_args=flags,
-            extra_link_args=list(EXTRA),
-            libraries=["m"],
-        )
-        with _explained(stem):
-            builder.compile(tmpdir=directory)
-        return load(directory)
-
-    def load(directory: Path) -> ModuleType:
-        library = directory / (name + str(sysconfig.get_config_var("EXT_SUFFIX")))
-        spec = importlib.util.spec_from_file_location(name, library)
-        if spec is None or spec.loader is None:
-            raise ImportError(f"{library} is no library of Python")
-        module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
+        try:
+            builder.set_source(
+                name,
+                source(),
+                extra_compile_args=flags,
+                extra_link_args=list(EXTRA),
+                libraries=["m"],
+            )
+            with _explained(stem):
+                builder.compile(tmpdir=directory)
+            check(module := _imported(name, directory))
+        except Refused as refusal:
+            (directory / REFUSAL).write_text(str(refusal))
+            return refusal
         return module
 
+    def load(directory: Path) -> ModuleType | Refused:
+        refusal = directory / REFUSAL
+        return Refused(refusal.read_text()) if refusal.exists() else _imported(name, directory)
+
     module, directory = kept(name, build, load)
+    if isinstance(module, Refused):
+        raise module
     module.__file__ = str(directory / Path(str(module.__file__)).name)  # it was built elsewhere
+    return module
+
+
+REFUSAL = "refused"
+"""File of an entry of the cache that says why its code is not to be used."""
+
+
+def _imported(name: str, directory: Path) -> ModuleType:
+    """Import a compiled module."""
+    library = directory / (name + str(sysconfig.get_config_var("EXT_SUFFIX")))
+    spec = importlib.util.spec_from_file_location(name, library)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"{library} is no library of Python")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
     return module
 
 

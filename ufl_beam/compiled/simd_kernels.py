@@ -8,13 +8,21 @@ the cells is that of :mod:`ufl_beam.compiled.c_library`.
 
 from __future__ import annotations
 
+import logging
+import math
 import re
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from ufl_beam.compiled.jit import DECLARATIONS, HEADERS, CompilerError, compiled, text
+from ufl_beam.compiled.c_library import doubles, ffi, integers, lib
+from ufl_beam.compiled.jit import DECLARATIONS, HEADERS, CompilerError, Refused, compiled, text
+from ufl_beam.dolfinx_compat import VERSIONS
+
+LOGGER = logging.getLogger("ufl_beam")
 
 LANES = 4
 """Cells that are computed at once: as many as AVX has room for.  On what has less, vectors are made
@@ -26,10 +34,6 @@ FUNCTIONS = {"sin", "cos", "sqrt", "fabs", "pow"}
 _NUMBER = r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?"
 
 
-class NotInVectors(Exception):
-    """A kernel that has to be computed cell by cell."""
-
-
 def in_vectors(kernel: str) -> str:
     """The text of a kernel of FFCx with vectors in the place of numbers.
 
@@ -37,13 +41,16 @@ def in_vectors(kernel: str) -> str:
         kernel: Its definition in C.
 
     Raises:
-        NotInVectors: It asks for functions that lanes.h has not.
+        Refused: It asks for functions that lanes.h has not.
     """
     body = kernel[kernel.index("{") :]
     called = re.findall(r"\b(?!for\b)([a-z_]\w*)\(", body)
     whole = re.findall(r"\bpow\([\w\[\]]+, -?\d+\)", body)
-    if set(called) - FUNCTIONS or len(whole) < called.count("pow"):
-        raise NotInVectors(f"functions {sorted(set(called))}, of whole powers {whole}")
+    missing = sorted(set(called) - FUNCTIONS)
+    if len(whole) < called.count("pow"):
+        missing.append("pow with a broken exponent")
+    if missing:
+        raise Refused(f"lanes.h has no {', '.join(missing)}")
     lines = []
     for line in body.splitlines():
         if not line.startswith("static const"):
@@ -66,63 +73,115 @@ def written(source: Path) -> str:
         source: File of its C.
 
     Raises:
-        NotInVectors: The file has none.
+        Refused: The file has none.
     """
     pattern = r"^void tabulate_tensor_.*?^}(?=\s*^(?:bool|ufcx_integral) )"
     if source.exists() and (found := re.search(pattern, source.read_text(), re.M | re.S)):
         return found[0]
-    raise NotInVectors(f"{source} has no kernel")
+    raise Refused(f"{source} has no kernel")
 
 
-NONE = "void *in_lanes(void) { return 0; }"
-"""C of a module without a loop, which the cache remembers like one with it."""
+def in_batches(rows: npt.NDArray[Any], lanes: int) -> npt.NDArray[Any]:
+    """Rows of numbers, one of each cell, as loops.h says; (num_batches, numbers, lanes).
+
+    Args:
+        rows: Shape (num_cells, ...).
+        lanes: Number of rows in a batch.
+    """
+    rows = rows.reshape(len(rows), math.prod(rows.shape[1:]))
+    if missing := -len(rows) % lanes:
+        rows = np.concatenate([rows, np.repeat(rows[-1:], missing, axis=0)])
+    return np.ascontiguousarray(rows.reshape(-1, lanes, rows.shape[1]).transpose(0, 2, 1))
 
 
-def _loop(written_in: Path, sizes: dict[str, int]) -> ModuleType:
-    """The module with the loop over the cells."""
-    defined = [f"#define {name} {size}" for name, size in sizes.items()]
-    files = [text("lanes.h"), text("lanes.c")]
+AGREEMENT = 1e-12
+"""Difference of a kernel in vectors from FFCx's, as a part of the largest entry of a cell."""
 
-    def source() -> str:
-        try:
-            kernel = in_vectors(written(written_in))
-        except NotInVectors:
-            return NONE
-        return "\n".join([HEADERS, DECLARATIONS, *defined, files[0], kernel, files[1]])
 
-    return compiled(
-        "ufl_beam_lanes",
-        "void *in_lanes(void);",
-        source,
-        # FFCx names what it makes by what is in it; NumPy knows what "native" means.
-        made_of=[written_in.name, *defined, *files, DECLARATIONS, Path(__file__).read_text(), _CPU],
-        flags=["-O2", "-march=native", "-fno-math-errno", "-w"],
-    )
+def require_agreement(found: Any, tabulate: Any, entries: int, width: int, constants: int) -> None:
+    """Compare a kernel in vectors with FFCx's on random cells.
+
+    Args:
+        found: Function of lanes.c.
+        tabulate: The kernel of FFCx.
+        entries: Sizes of the kernel, as for :func:`in_lanes`.
+        width: The same.
+        constants: The same.
+
+    Raises:
+        Refused: The results differ.
+    """
+    number, random = 4 * LANES + 1, np.random.default_rng(0)  # the last batch is not full
+    w = random.uniform(0.1, 1.0, (number, width))
+    w[::2] *= random.choice([-1.0, 1.0], w[::2].shape)
+    x = np.array([0.0, 0.0, 0.0, 1.0, 0.5, 0.0]) + random.uniform(-0.1, 0.1, (number, 6))
+    row = np.arange(number * entries, dtype=np.int32).reshape(number, entries)
+    numbers, results = random.uniform(0.1, 0.9, constants), np.zeros((2, number, entries))
+    for result, lanes, function in zip(results, (1, LANES), (ffi.NULL, found), strict=True):
+        cells = {
+            **{"tabulate": tabulate, "several": function, "lanes": lanes, "number": number},
+            **{"w": doubles(in_batches(w, lanes)), "width": width, "constants": doubles(numbers)},
+            **{"coordinates": doubles(in_batches(x, lanes)), "rows": entries},
+            "row": integers(in_batches(row, lanes)),
+        }
+        lib.add_cells(ffi.new("cells *", cells), ffi.NULL, doubles(result))
+    one, several = results
+    scale = np.abs(one).max(axis=1, where=np.isfinite(one), initial=0.0, keepdims=True)
+    with np.errstate(invalid="ignore"):
+        good = (abs(several - one) <= AGREEMENT * scale) | (several == one)
+    good |= np.isnan(one) & np.isnan(several)
+    if not np.all(good) or not np.any(np.isfinite(one)):
+        why = f"{np.sum(~good)} of {good.size} entries are not those of FFCx's kernel"
+        LOGGER.warning("a kernel in vectors, compiled by %s, is wrong: %s", VERSIONS, why)
+        raise Refused(why)
 
 
 _CPU = repr(np.show_config(mode="dicts"))
 """Configuration of NumPy, which includes the features of the processor."""
 
-_modules: dict[tuple[str, int, int, int], ModuleType | None] = {}
+_functions: dict[tuple[str, int, int, int], Any] = {}
 
 
-def in_lanes(source: Path, entries: int, width: int, constants: int) -> int | None:
-    """Address of what computes several cells of a compiled form at once; none if nothing does.
+def in_lanes(source: Path, tabulate: Any, entries: int, width: int, constants: int) -> Any:
+    """Function that computes several cells of a compiled form at once, or None.
 
     Args:
         source: The C that FFCx wrote for a cell form.
+        tabulate: Its kernel.
         entries: Of the vector or matrix of a cell.
         width: Number of its coefficients' values in a cell.
         constants: Number of its constants.
     """
-    key = (source.name, entries, width, constants)
-    if key not in _modules:
-        sizes = {"LANES": LANES, "ENTRIES": entries, "WIDTH": width, "CONSTANTS": constants}
+    sizes = (entries, width, constants)
+    key = (source.name, *sizes)
+    if key not in _functions:
         try:
-            _modules[key] = _loop(source, sizes)
-        except CompilerError:
-            _modules[key] = None
-    module = _modules[key]
-    if module is None:
-        return None
-    return int(module.ffi.cast("intptr_t", module.lib.in_lanes())) or None
+            module = _compiled(source, tabulate, sizes)
+            _functions[key] = _function(module)
+        except (Refused, CompilerError) as why:
+            LOGGER.info("%s is computed cell by cell, which is slower: %s", source.stem, why)
+            _functions[key] = None
+    return _functions[key]
+
+
+def _function(module: ModuleType) -> Any:
+    address = int(module.ffi.cast("intptr_t", module.lib.address()))
+    return ffi.cast("in_lanes *", address)
+
+
+def _compiled(source: Path, tabulate: Any, sizes: tuple[int, int, int]) -> ModuleType:
+    """The module with the loop over the cells."""
+    names = ("LANES", "ENTRIES", "WIDTH", "CONSTANTS")
+    defined = [f"#define {x} {n}" for x, n in zip(names, (LANES, *sizes), strict=True)]
+    head, loop = text("lanes.h"), text("lanes.c")
+    return compiled(
+        "ufl_beam_lanes",
+        "void *address(void);",
+        lambda: "\n".join(
+            [HEADERS, DECLARATIONS, *defined, head, in_vectors(written(source)), loop]
+        ),
+        # FFCx names what it makes by what is in it; NumPy knows what "native" means.
+        made_of=[source.name, *defined, head, loop, DECLARATIONS, Path(__file__).read_text(), _CPU],
+        flags=["-O2", "-march=native", "-fno-math-errno"],
+        check=lambda module: require_agreement(_function(module), tabulate, *sizes),
+    )

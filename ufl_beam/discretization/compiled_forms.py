@@ -10,49 +10,35 @@ silently wrong in FFCx 0.9 to 0.11.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
+from itertools import accumulate
 from pathlib import Path
 from typing import Any, NamedTuple, ParamSpec, Protocol, TypeVar, cast
 
 import basix.ufl
 import numpy as np
-import numpy.typing as npt
 import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, integers, kernel, lib
 from ufl_beam.compiled.jit import compiled_form
-from ufl_beam.compiled.simd_kernels import LANES, in_lanes
-from ufl_beam.dolfinx_compat import fem, line_mesh, pack
+from ufl_beam.compiled.simd_kernels import LANES, in_batches, in_lanes
+from ufl_beam.dolfinx_compat import VERSIONS, fem, line_mesh, pack
 
 
-def in_batches(rows: npt.NDArray[Any], lanes: int) -> npt.NDArray[Any]:
-    """Rows of numbers, one of each cell, as loops.h says; (num_batches, numbers, lanes).
-
-    Args:
-        rows: Shape (num_cells, ...).
-        lanes: Number of rows in a batch.
-    """
-    rows = rows.reshape(len(rows), math.prod(rows.shape[1:]))
-    if missing := -len(rows) % lanes:
-        rows = np.concatenate([rows, np.repeat(rows[-1:], missing, axis=0)])
-    return np.ascontiguousarray(rows.reshape(-1, lanes, rows.shape[1]).transpose(0, 2, 1))
-
-
-def vectorise(kernels: Iterable[Kernel], coordinates: Array) -> None:
+def vectorise(kernels: Sequence[Kernel], coordinates: Array) -> None:
     """Let all of some kernels compute several cells at once, or none: they may share numbers.
 
     Args:
         kernels: On the same cells.
         coordinates: Of the cells, in batches of ``LANES``.
     """
-    addresses = {kernel: kernel.address_in_lanes() for kernel in kernels}
-    known = {kernel: address for kernel, address in addresses.items() if address is not None}
-    if len(known) == len(addresses):
-        for kernel, address in known.items():
-            kernel.compute_in_lanes(address, coordinates)
+    functions = [kernel.in_lanes() for kernel in kernels]
+    if None not in functions:
+        for one, function in zip(kernels, functions, strict=True):
+            one.compute_in_lanes(function, coordinates)
 
 
 def tabulator(compiled: fem.Form) -> Any:
@@ -76,7 +62,9 @@ class Prepared(NamedTuple):
     Attributes:
         form: The DOLFINx form.
         source: The C that FFCx wrote for it.
-        columns: Place of the values of each coefficient in the row of numbers of a cell.
+        tabulate: Its kernel.
+        coefficients: Its coefficients.
+        columns: Place of the values of each, by identity, in the row of numbers of a cell.
         constants: Values of its constants.
         packed: Values of the coefficients in the cells that the form was stated on.
         entries: Number of entries of the vector or matrix of a cell.
@@ -84,7 +72,9 @@ class Prepared(NamedTuple):
 
     form: fem.Form
     source: Path
-    columns: dict[fem.Function, slice]
+    tabulate: Any
+    coefficients: list[fem.Function]
+    columns: dict[int, slice]
     constants: Array
     packed: Array
     entries: int
@@ -92,18 +82,29 @@ class Prepared(NamedTuple):
 
 @lru_cache(maxsize=512)
 def prepared(form: ufl.Form) -> Prepared:
-    """Compile a form, once in a process."""
+    """Compile a form, once in a process.
+
+    Raises:
+        ValueError: Its cells have more entries than C has room for, or others than FFCx packs.
+    """
     compiled, source = compiled_form(form)
-    ufcx, everything = compiled.ufcx_form, form.coefficients()
-    constants, packed = pack(compiled)
-    columns, start = {}, 0
-    for i in range(ufcx.num_coefficients):
-        function = everything[ufcx.original_coefficient_positions[i]]
-        end = start + function.function_space.element.space_dimension
-        columns[function], start = slice(start, end), end
-    spaces = [argument.ufl_function_space() for argument in form.arguments()]
-    entries = math.prod(space.element.space_dimension for space in spaces)
-    return Prepared(compiled, source, columns, constants, packed, entries)
+    ufcx, (constants, packed) = compiled.ufcx_form, pack(compiled)
+    positions = ufcx.original_coefficient_positions[0 : ufcx.num_coefficients]
+    used = [form.coefficients()[i] for i in positions]
+    ends = [0, *accumulate(f.function_space.element.space_dimension for f in used)]
+    if packed.shape[1] != ends[-1]:
+        raise ValueError(f"{VERSIONS} pack {packed.shape[1]} values of a cell, not {ends[-1]}")
+    # By identity: functions of UFL compute what they hash to.
+    columns = {id(f): slice(*ends[i : i + 2]) for i, f in enumerate(used)}
+    sizes = [x.ufl_function_space().element.space_dimension for x in form.arguments()]
+    entries = math.prod(sizes)
+    if entries > lib.MOST_ENTRIES:
+        raise ValueError(
+            f"a form on cells of {' x '.join(map(str, sizes))} degrees of freedom has {entries} "
+            f"entries; loops.h has room for {lib.MOST_ENTRIES}"
+        )
+    tabulate = tabulator(compiled)
+    return Prepared(compiled, source, tabulate, used, columns, constants, packed, entries)
 
 
 class Entries(Protocol):
@@ -127,48 +128,52 @@ class Kernel:
         coordinates: Vertices of the cells; shape (num_cells, 2, 3); m.
 
     Attributes:
-        compiled: The DOLFINx form.
         cells: What ``add_cells`` of loops.c takes; a new one after :meth:`share`, :meth:`place`,
             :meth:`compute_in_lanes`.
+
+    Raises:
+        ValueError: The arrays are of other cells than each other, or than the form.
     """
 
     def __init__(
         self, form: ufl.Form, unknown: fem.Function, cell_dofs: Index, coordinates: Array
     ) -> None:
-        ready = prepared(form)
-        self.compiled, self._source, self._columns = ready.form, ready.source, ready.columns
-        self._starts = {id(f): columns.start for f, columns in self._columns.items()}
-        self._constants, self._entries = ready.constants, ready.entries
+        self._form = ready = prepared(form)
+        self._columns, self._entries = ready.columns, ready.entries
         self._dofs = np.ascontiguousarray(cell_dofs, dtype=np.int32)
         self._lanes, self._in_lanes, num_cells = 1, ffi.NULL, len(cell_dofs)
         packed = np.tile(ready.packed, (num_cells // len(ready.packed), 1))
         spaces = [argument.ufl_function_space() for argument in form.arguments()]
-        if not spaces:
-            rows: Index = np.zeros((num_cells, 1), dtype=np.int32)
+        if len(spaces) != 1:  # a functional; a matrix until it is placed
+            rows: Index = np.zeros((num_cells, self._entries), dtype=np.int32)
         elif spaces[0] is unknown.function_space:
             rows = self._dofs
         else:
-            width = spaces[0].element.space_dimension
-            rows = np.arange(num_cells * width, dtype=np.int32).reshape(num_cells, width)
+            rows = np.arange(num_cells * self._entries, dtype=np.int32).reshape(-1, self._entries)
+        expected = (len(packed), (num_cells, self._entries), (num_cells, 2, 3))
+        if expected != (num_cells, rows.shape, coordinates.shape):
+            raise ValueError(
+                f"a form with {self._entries} entries of a cell, stated on {len(ready.packed)} "
+                f"cells, got rows of {rows.shape} and coordinates of {coordinates.shape}"
+            )
         self._packed, self._coordinates, self._rows = (
             in_batches(x, 1) for x in (packed, coordinates, rows)
         )
-        self._at = self._columns[unknown].start if self.depends_on(unknown) else 0
-        self._unknowns = self._dofs.shape[1] if self.depends_on(unknown) else 0
+        self._at, self._unknowns = 0, 0
+        if self.uses(unknown):
+            self._at, self._unknowns = self.position(unknown), self._dofs.shape[1]
         self._prepare()
 
     def _prepare(self) -> None:
         """Make the data of the loop over the cells."""
-        self._arrays = (
-            *map(integers, (self._dofs, self._rows)),
-            *map(doubles, (self._packed, self._constants, self._coordinates)),
-        )
+        numbers = (self._packed, self._form.constants, self._coordinates)
+        self._arrays = (*map(integers, (self._dofs, self._rows)), *map(doubles, numbers))
         dofs, row, packed, constants, coordinates = self._arrays
         self.cells = ffi.new(
             "cells *",
             {
-                "tabulate": tabulator(self.compiled),
-                "in_lanes": self._in_lanes,
+                "tabulate": self._form.tabulate,
+                "several": self._in_lanes,
                 "lanes": self._lanes,
                 "number": len(self._dofs),
                 "of_cell": self._dofs.shape[1],
@@ -184,30 +189,24 @@ class Kernel:
             },
         )
 
-    def depends_on(self, function: fem.Function) -> bool:
-        """Return whether ``function`` appears in the form."""
-        return function in self._columns
-
-    def set(self, function: fem.Function, q: Array) -> None:
-        """Give ``function`` the degrees of freedom ``q``, if it appears in the form."""
-        # By identity: functions of UFL compute what they hash to.
-        if (at := self._starts.get(id(function))) is not None:
-            lib.set_cells(self.cells, doubles(q), at)
-
     def uses(self, function: fem.Function) -> bool:
         """Return whether a function appears in the form."""
-        return id(function) in self._starts
-
-    def put(self, function: fem.Function, values: Array) -> None:
-        """Give ``function`` other values in the cells; shape (num_cells, dofs per cell)."""
-        columns = self._columns[function]
-        rows = np.broadcast_to(values, (len(self._dofs), columns.stop - columns.start))
-        self._packed[:, columns] = in_batches(rows, self._lanes)
+        return id(function) in self._columns
 
     def position(self, function: fem.Function) -> int:
         """Where the coefficients of a cell have the values of ``function``."""
-        position: int = self._columns[function].start
-        return position
+        return int(self._columns[id(function)].start)
+
+    def set(self, function: fem.Function, q: Array) -> None:
+        """Give ``function`` the degrees of freedom ``q``, if it appears in the form."""
+        if (columns := self._columns.get(id(function))) is not None:
+            lib.set_cells(self.cells, doubles(q), columns.start)
+
+    def put(self, function: fem.Function, values: Array) -> None:
+        """Give ``function`` other values in the cells; shape (num_cells, dofs per cell)."""
+        columns = self._columns[id(function)]
+        rows = np.broadcast_to(values, (len(self._dofs), columns.stop - columns.start))
+        self._packed[:, columns] = in_batches(rows, self._lanes)
 
     def share(self, other: Kernel) -> None:
         """Use the packed values of ``other``, a form of the same coefficients."""
@@ -217,24 +216,30 @@ class Kernel:
         self._prepare()
 
     def place(self, A: Entries) -> None:
-        """Let a bilinear form on the degrees of freedom of the cells add to ``A``."""
+        """Let a bilinear form on the degrees of freedom of the cells add to ``A``.
+
+        Raises:
+            ValueError: It has other entries.
+        """
         per_cell = self._dofs.shape[1]
+        if self._entries != per_cell**2:
+            raise ValueError(f"a form of {self._entries} entries on {per_cell} degrees of freedom")
         rows = np.repeat(self._dofs, per_cell, axis=1)
         positions = A.positions(rows.ravel(), np.tile(self._dofs, per_cell).ravel())
         self._rows = in_batches(positions.reshape(rows.shape), self._lanes)
         self._prepare()
 
-    def address_in_lanes(self) -> int | None:
-        """Address of what computes several cells at once; none if the compiler cannot."""
-        return in_lanes(self._source, self._entries, self._packed.shape[1], len(self._constants))
+    def in_lanes(self) -> Any:
+        """Function in C that computes several cells at once, or None."""
+        sizes = (self._entries, self._packed.shape[1], len(self._form.constants))
+        return in_lanes(self._form.source, self._form.tabulate, *sizes)
 
-    def compute_in_lanes(self, address: int, coordinates: Array) -> None:
+    def compute_in_lanes(self, function: Any, coordinates: Array) -> None:
         """Compute several cells at once from now on, with their coordinates in batches."""
-        self._in_lanes = ffi.cast("void (*)(const cells *, const double *, double *)", address)
         self._packed, self._rows = (
             in_batches(x[:, :, 0], LANES) for x in (self._packed, self._rows)
         )
-        self._lanes, self._coordinates = LANES, coordinates
+        self._in_lanes, self._lanes, self._coordinates = function, LANES, coordinates
         self._prepare()
 
     @property

@@ -14,11 +14,11 @@ import ufl
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr, coupling
-from ufl_beam.compiled.simd_kernels import LANES
-from ufl_beam.discretization.compiled_forms import Kernel, in_batches, stated, vectorise
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.compiled.simd_kernels import LANES, in_batches
+from ufl_beam.discretization.compiled_forms import Kernel, stated, vectorise
+from ufl_beam.discretization.partition import Share
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
-from ufl_beam.mechanics.kinematics import Axis
+from ufl_beam.mechanics.kinematics import Axis, split, strain
 from ufl_beam.model.mesh_options import Mesh
 
 
@@ -192,3 +192,56 @@ class Fields:
         """A function with so many numbers in each point of the cells."""
         element = basix.ufl.quadrature_element("interval", value_shape=(number,), degree=1)
         return fem.Function(fem.functionspace(self.mesh, element))
+
+
+@stated
+def _mass(of: Element) -> ufl.Form:
+    (u, ψ), (w_u, w_ψ), ρ = split(ufl.TrialFunction(of.space)), split(of.w), of.inertia
+    return (ρ[0] * ufl.dot(u, w_u) + ρ[1] * ψ * w_ψ) * of.dx_of_mass()  # P(67)
+
+
+def mass_matrix(fields: Fields) -> Csr:
+    """Mass of the beams, the point masses and the bodies."""
+    share, M = fields.share, fields.assembled(_mass(fields.element))
+    scene = share.grid.scene
+    lumps = [(share.at(one.place), one.mass, one.inertia) for one in scene.masses]
+    lumps += [(share.at(one.middle), one.mass, one.inertia) for one in scene.bodies]
+    for dofs, mass, inertia in lumps:
+        mine = share.owns(dofs)
+        here = share.local(dofs[mine])
+        M.data[M.positions(here, here)] += np.array([mass, mass, inertia])[mine]
+    return M
+
+
+@stated
+def _weighted_strains(of: Element) -> ufl.Form:
+    z = ufl.TestFunction(of.at_points(3).function_space)
+    return ufl.dot(strain(of.q1, of.axis), z) / of.axis.h * of.dx(1)
+
+
+class Strains:
+    """(Σ, Γ, K) in the points of the cells of some fields.
+
+    Attributes:
+        kernel: Strains times the weights of the points.
+        shape: Cells, and three times the points in each.
+    """
+
+    def __init__(self, fields: Fields) -> None:
+        self.kernel = fields.hot_kernel(_weighted_strains(fields.element), fields.element.q1)
+        self._weights = np.repeat(fields.share.grid.mesh.point_weights, 3)
+        self.shape = (len(fields.order), len(self._weights))
+
+    def __call__(self, q: Array) -> Array:
+        """Strains at ``q``, in the order of the mesh, point after point; 1, 1, 1/m."""
+        return np.asarray(self._weighted(q) / self._weights)
+
+    def mean(self, q: Array) -> Array:
+        """Means of the cells at ``q``, in the order of the mesh; (num_cells, 3); 1, 1, 1/m."""
+        in_points = self._weighted(q).reshape(self.shape[0], self.shape[1] // 3, 3)
+        return np.asarray(in_points.sum(axis=1))
+
+    def _weighted(self, q: Array) -> Array:
+        strains = np.zeros(self.shape)
+        self.kernel.add(q, strains)
+        return strains

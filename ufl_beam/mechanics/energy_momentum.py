@@ -100,7 +100,7 @@ class ExactStep(_OverStep):
         return s, turn
 
     def half_tangents(self, rotations: Index) -> Index:
-        """All of them."""
+        """Return all rotations: each has the step 2 tan(Δψ/2)."""
         return rotations
 
 

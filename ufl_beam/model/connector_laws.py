@@ -17,7 +17,13 @@ from ufl_beam.errors import (
     require_returned,
 )
 from ufl_beam.model.curves import Curve
-from ufl_beam.model.material_laws import Hardening, HingeLaw, Softening, require_hinge_law
+from ufl_beam.model.material_laws import (
+    BulkLaw,
+    HingeLaw,
+    Softening,
+    require_bulk_law,
+    require_hinge_law,
+)
 from ufl_beam.model.time_functions import TimeFunction, require_time_function
 
 
@@ -129,13 +135,13 @@ class Spring:
     """
 
     stiffness: float
-    law: Hardening | None = None
+    law: BulkLaw | None = None
     softening: Softening | None = None
 
     def __post_init__(self) -> None:
         require_number(self.stiffness, "Spring: stiffness", positive=True)
         if self.law is not None:
-            require_kind(self.law, Hardening, "Spring: law")
+            require_bulk_law(self.law, "Spring: law")
         if self.softening is not None:
             require_kind(self.softening, Softening, "Spring: softening")
 

@@ -89,14 +89,24 @@ class Connector:
         """True if the motion is a rotation: rad and N m in the place of m and N."""
         return self.motion == "turning"
 
+    @property
+    def stretches(self) -> bool:
+        """True if the motion is that of the distance of the points."""
+        return self.motion == "stretching"
+
+    @property
+    def follows_a(self) -> bool:
+        """True if the axis turns with the node of ``a``, which then bears a moment."""
+        return self.motion == "sliding"
+
     def rigidly(self) -> Rigidly:
         """Return the derivatives of the motion by those of the nodes, in the undeformed scene."""
         if self.turns:
             return Rigidly((0.0, 0.0, -1.0), (0.0, 0.0, 1.0))
         (dx, dy), length = self.apart, math.hypot(*self.apart)
-        x, y = (dx / length, dy / length) if self.motion == "stretching" else self.axis
+        x, y = (dx / length, dy / length) if self.stretches else self.axis
         (ax, ay), (bx, by) = self.arms
-        turned_with_a = x * dy - y * dx if self.motion == "sliding" else 0.0
+        turned_with_a = x * dy - y * dx if self.follows_a else 0.0
         # d/dψ of axis(ψ)·d is (W axis)·d = -y dx + x dy
         return Rigidly((-x, -y, x * ay - y * ax + turned_with_a), (x, y, y * bx - x * by))
 

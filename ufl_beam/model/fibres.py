@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from ufl_beam.array_checks import require_array
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_count, require_kind
 from ufl_beam.model.law_functions import Values
-from ufl_beam.model.material_laws import Bulk, Hardening, Softening
+from ufl_beam.model.material_laws import Bulk, BulkLaw, Softening, require_bulk_law
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +35,7 @@ class Layout:
     strains: Values
     weights: Values
     stiffness: Values
-    laws: tuple[tuple[Hardening, int], ...]
+    laws: tuple[tuple[BulkLaw, int], ...]
     rest: Values
     softening: Softening | None
     breaking: slice
@@ -50,29 +51,36 @@ class Layout:
         """True if the bulk can yield."""
         return any(law.limit != np.inf for law, _ in self.laws)
 
+    @cached_property
+    def statement(self) -> type[Bulk]:
+        """The law that points of the bulk follow, with numbers of their own.
+
+        Raises:
+            SceneError: They follow laws of different kinds.
+        """
+        laws = [law for law, _ in self.laws if law.limit != np.inf] or [self.laws[0][0]]
+        kinds = dict.fromkeys(type(law) for law in laws)
+        if len(kinds) > 1:
+            names = " and ".join(kind.__name__ for kind in kinds)
+            raise SceneError(f"Section: its laws must be of one kind, not {names}")
+        return laws[0].statement
+
     def bulk(self, keys: list[tuple[int, int]]) -> Bulk:
         """The laws at the points of many cells.
 
         Args:
             keys: For each cell two numbers that random limits depend on, besides their seed.
         """
-        one = np.ones(len(self.weights))
-
-        def row(value: Callable[[Hardening], float]) -> Values:
-            return np.concatenate([np.full(n, value(law)) for law, n in self.laws])
-
-        H, B = row(lambda law: law.modulus), row(lambda law: law.kinematic)
-        flow = self.stiffness + H + B
-        first = np.cumsum([0, *(n for _, n in self.laws)])
-        eta, limits = one.copy(), np.empty((len(keys), len(one)))
-        for (law, n), k in zip(self.laws, first, strict=False):
-            eta[k : k + n] = law.viscosity.coefficient(flow[k : k + n])
-            limits[:, k : k + n] = (
-                [law.limit.draw(n, key) for key in keys]
-                if hasattr(law.limit, "draw")
-                else law.limit
-            )
-        return Bulk(self.stiffness, limits, H, B, eta)
+        shape, first = (len(keys), len(self.weights)), 0
+        columns = {name: np.zeros(shape) for name in self.statement.numbers()}
+        for law, n in self.laws:
+            at = slice(first, first + n)
+            for name, value in law.numbers(self.stiffness[at]).items():
+                if name in columns:
+                    drawn = hasattr(value, "draw")
+                    columns[name][:, at] = [value.draw(n, k) for k in keys] if drawn else value
+            first += n
+        return self.statement(self.stiffness, **columns)
 
 
 @dataclass(frozen=True)
@@ -95,13 +103,13 @@ class Fibres:
         1.39e+07
     """
 
-    law: Hardening
+    law: BulkLaw
     _: KW_ONLY
     number: int = 20
     softening: Softening | None = None
 
     def __post_init__(self) -> None:
-        require_kind(self.law, Hardening, "Fibres: law")
+        require_bulk_law(self.law, "Fibres: law")
         require_count(self.number, "Fibres: number")
         object.__setattr__(self, "number", int(self.number))
         if self.softening is not None:

@@ -30,6 +30,7 @@ class Joint(Bearing):
         holders: What is held besides, by connectors.
         meets: Whether the anchors are at one point of the undeformed scene.
         advice: For anchors that should meet and do not.
+        look: Kind of joint whose picture it has; its own by default.
 
     Example:
         >>> mast = ub.Beam((2, 0), (2, 3), section, name="mast")
@@ -46,12 +47,14 @@ class Joint(Bearing):
     holders: tuple[Connector, ...] = field(default=(), repr=False)
     meets: bool = False
     advice: str = "RigidLink and Link join places that are apart"
+    look: str = ""
 
     def __post_init__(self) -> None:
         if len(self.places) < 2:
             raise SceneError(f"{self.kind}: a joint needs at least two places")
         for place in self.places:
             require_anchor(place, self.kind)
+        object.__setattr__(self, "look", self.look or self.kind)
 
     def __str__(self) -> str:
         return f"{self.kind}({', '.join(map(str, self.places))})"

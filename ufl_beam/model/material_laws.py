@@ -9,12 +9,13 @@ derives their tangents and FFCx compiles them for the time loop, see
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Protocol
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from ufl_beam.errors import SceneError, is_infinite, require_kind, require_number
+from ufl_beam.errors import SceneError, is_infinite, require_kind, require_number, shorten
 from ufl_beam.model.law_functions import Values, below, exp, positive, sign, where
 
 
@@ -82,8 +83,106 @@ class DuvautLions:
         return np.asarray(self.tau * stiffness)  # P(46)
 
 
+@dataclass(frozen=True, eq=False)
+class Bulk(ABC):
+    """Statement of a law of the bulk at many points, for arrays and for symbols.
+
+    The internal variables of a point are its plastic strain and the sum of the sizes of its
+    increments.  A law has further numbers as fields; those of :attr:`numbers` are the inputs of
+    the compiled law.
+
+    Attributes:
+        C: Stiffness; arrays of one shape, or numbers.
+        limit: Yield stress; infinite where the bulk stays elastic.
+    """
+
+    C: Values
+    limit: Values
+
+    @classmethod
+    def numbers(cls) -> tuple[str, ...]:
+        """Names of the numbers of the law but for the stiffness."""
+        return tuple(field.name for field in fields(cls))[1:]
+
+    @abstractmethod
+    def flow(self, strain: Values, p: Values, ξ: Values, θ: Values, dt: Values) -> Values:
+        """Increment of the plastic strain over a step.
+
+        Args:
+            strain: Strain at t_n+θ.
+            p: Plastic strain at t_n.
+            ξ: Accumulated plastic strain at t_n.
+            θ: Part of the step at which the law is stated: 1/2 is of second order, 1 is backward
+                Euler.
+            dt: Length of the step; s.
+        """
+
+    @abstractmethod
+    def hardening_energy(self, p: Values, ξ: Values) -> Values:
+        """Energy per volume that hardening stores."""
+
+    @abstractmethod
+    def dissipation(self, dp: Values, dt: Values) -> Values:
+        """Energy per volume that a plastic increment dissipates."""
+
+    def stress(self, strain: Values, p: Values) -> Values:
+        """Stress of the elastic part of the strain."""
+        return self.C * (strain - p)
+
+    def elastic_energy(self, strain: Values) -> Values:
+        """Energy per volume of an elastic strain."""
+        return self.C * strain**2 / 2
+
+
+class BulkLaw(ABC):
+    """Base of records of laws of the bulk, such as :class:`Hardening`."""
+
+    statement: ClassVar[type[Bulk]]
+    """The law of many points."""
+
+    limit: Any
+    """Yield stress, a number or a distribution; infinite if the bulk stays elastic."""
+
+    @abstractmethod
+    def numbers(self, C: Values) -> dict[str, Any]:
+        """Numbers of :attr:`statement` by name, at points of stiffness ``C``."""
+
+
+@dataclass(frozen=True, eq=False)
+class HardeningBulk(Bulk):
+    """Statement of :class:`Hardening`.
+
+    Attributes:
+        H: Isotropic hardening modulus.
+        B: Kinematic hardening modulus.
+        eta: Viscosity.
+    """
+
+    H: Values
+    B: Values
+    eta: Values
+
+    def flow(self, strain: Values, p: Values, ξ: Values, θ: Values, dt: Values) -> Values:
+        """Increment of the plastic strain over a step, in closed form, P(38)-P(44)."""
+        trial = self.C * (strain - p) - self.B * p
+        direction = sign(trial)
+        overstress = direction * trial - (self.limit + self.H * ξ)  # P(38)
+        γ = positive(overstress) / (self.eta / dt + θ * (self.C + self.H + self.B))  # P(44)
+        return direction * γ
+
+    def hardening_energy(self, p: Values, ξ: Values) -> Values:
+        """Energy per volume that hardening stores."""
+        return (self.B * p**2 + self.H * ξ**2) / 2  # P(35)
+
+    def dissipation(self, dp: Values, dt: Values) -> Values:
+        """Energy per volume that a plastic increment dissipates, by yield stress and viscosity."""
+        γ = abs(dp)
+        flows = below(-γ, 0.0)  # a limit that is infinite must not meet an increment of zero
+        return (where(flows, self.limit, 0.0) + where(flows, self.eta, 0.0) * γ / dt) * γ  # P(37)
+
+
 @dataclass(frozen=True)
-class Hardening:
+class Hardening(BulkLaw):
     """Elasto-(visco)plastic law with linear isotropic and kinematic hardening, P(35)-P(48).
 
     Args:
@@ -119,6 +218,13 @@ class Hardening:
                 )
         require_kind(self.viscosity, (Perzyna, DuvautLions), "Hardening: viscosity")
 
+    statement: ClassVar[type[Bulk]] = HardeningBulk
+
+    def numbers(self, C: Values) -> dict[str, Any]:
+        """Limit, both moduli and viscosity."""
+        eta = self.viscosity.coefficient(C + self.modulus + self.kinematic)
+        return {"limit": self.limit, "H": self.modulus, "B": self.kinematic, "eta": eta}
+
     @property
     def opens(self) -> bool:
         """True if it ever flows."""
@@ -134,64 +240,6 @@ class Hardening:
         """True if the stress never exceeds the limit."""
         viscous = bool(np.any(self.viscosity.coefficient(np.ones(1)) > 0.0))
         return self.modulus == self.kinematic == 0.0 and not viscous
-
-
-@dataclass(frozen=True, eq=False)
-class Bulk:
-    """The numbers of :class:`Hardening` at many points, and the law itself.
-
-    Attributes:
-        C: Stiffness; arrays of one shape, or numbers.
-        limit: Yield stress.
-        H: Isotropic hardening modulus.
-        B: Kinematic hardening modulus.
-        eta: Viscosity.
-    """
-
-    C: Values
-    limit: Values
-    H: Values
-    B: Values
-    eta: Values
-
-    def flow(self, strain: Values, p: Values, ξ: Values, θ: Values, dt: Values) -> Values:
-        """Increment of the plastic strain over a step, in closed form.
-
-        The rule is stated at t_n+θ: 1/2 is of second order, 1 is backward Euler.
-
-        Args:
-            strain: Strain at t_n+θ.
-            p: Plastic strain at t_n.
-            ξ: Accumulated plastic strain at t_n.
-            θ: Part of the step.
-            dt: Length of the step; s.
-
-        Equations:
-            P(38)-P(44).
-        """
-        trial = self.C * (strain - p) - self.B * p
-        direction = sign(trial)
-        overstress = direction * trial - (self.limit + self.H * ξ)  # P(38)
-        γ = positive(overstress) / (self.eta / dt + θ * (self.C + self.H + self.B))  # P(44)
-        return direction * γ
-
-    def stress(self, strain: Values, p: Values) -> Values:
-        """Stress of the elastic part of the strain."""
-        return self.C * (strain - p)
-
-    def elastic_energy(self, strain: Values) -> Values:
-        """Energy per volume of an elastic strain."""
-        return self.C * strain**2 / 2
-
-    def hardening_energy(self, p: Values, ξ: Values) -> Values:
-        """Energy per volume that hardening stores."""
-        return (self.B * p**2 + self.H * ξ**2) / 2  # P(35)
-
-    def dissipation(self, dp: Values, dt: Values) -> Values:
-        """Energy per volume that a plastic increment dissipates, by yield stress and viscosity."""
-        γ = abs(dp)
-        flows = below(-γ, 0.0)  # a limit that is infinite must not meet an increment of zero
-        return (where(flows, self.limit, 0.0) + where(flows, self.eta, 0.0) * γ / dt) * γ  # P(37)
 
 
 # -- softening ---------------------------------------------------------------------------------
@@ -287,6 +335,12 @@ def _mean_of_decay(x: Values) -> Values:
         series = 1 - x / k * series
     safe = where(small, 1.0, x)
     return where(small, series, (1 - exp(-safe)) / safe)
+
+
+def require_bulk_law(law: object, what: str) -> None:
+    """Raise :class:`SceneError` naming ``what`` unless a bulk can follow a law."""
+    if not isinstance(law, BulkLaw):
+        raise SceneError(f"{what} = {shorten(law)} is not a Hardening")
 
 
 HingeLaw = Softening | Hardening

@@ -168,7 +168,7 @@ class Scene:
                 yield support.place
         for link in self._links_but_hinges:
             by_a, by_b = link.rigidly()
-            if by_a[2] or link.motion == "sliding":
+            if by_a[2] or link.follows_a:
                 yield link.a
             if by_b[2]:
                 yield link.b

@@ -16,7 +16,7 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_kind, require_number
 from ufl_beam.model.fibres import Fibres, Layout, PlacedFibres
-from ufl_beam.model.material_laws import Hardening, Softening
+from ufl_beam.model.material_laws import BulkLaw, Hardening, Softening, require_bulk_law
 
 Integral = Callable[[Array], Array]
 """Area of a shape below y, or its first moment."""
@@ -62,9 +62,9 @@ class Section:
     rhoI: float = 0.0
     depth: float = 0.0
     _: KW_ONLY
-    axial: Hardening | None = None
-    shear: Hardening | None = None
-    bending: Hardening | None = None
+    axial: BulkLaw | None = None
+    shear: BulkLaw | None = None
+    bending: BulkLaw | None = None
     hinge: Softening | None = None
     fibres: PlacedFibres | None = None
     massless_by_default: bool = field(init=False, repr=False)
@@ -84,7 +84,10 @@ class Section:
         laws = {name: getattr(self, name) for name in ("axial", "shear", "bending", "hinge")}
         for name, law in laws.items():
             if law is not None:
-                require_kind(law, Softening if name == "hinge" else Hardening, f"Section: {name}")
+                if name == "hinge":
+                    require_kind(law, Softening, "Section: hinge")
+                else:
+                    require_bulk_law(law, f"Section: {name}")
                 if self.fibres is not None:
                     raise SceneError(
                         f"Section: a law {name} beside fibres; the fibres bear N and M, shear is "

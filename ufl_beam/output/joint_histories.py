@@ -165,7 +165,7 @@ def of_joint(solution: Motion, joint: Joint, forces: Array) -> JointHistory:
 
 def _direction(solution: Motion, holder: Connector, turn: Array) -> Array:
     """Unit vectors in the plane along which a motion grows; (n+1, 2)."""
-    if holder.motion == "stretching":
+    if holder.stretches:
         between = solution.position(holder.b) - solution.position(holder.a)
         return np.asarray(between / np.linalg.norm(between, axis=1)[:, None])
     if isinstance(holder.law, Guide):
@@ -176,4 +176,4 @@ def _direction(solution: Motion, holder: Connector, turn: Array) -> Array:
             x, y = tangent(curve, s, step)
             normals.append((-y, x))
         return np.asarray(normals / np.linalg.norm(normals, axis=1)[:, None])
-    return turned(holder.axis, turn if holder.motion == "sliding" else np.zeros_like(turn))
+    return turned(holder.axis, turn if holder.follows_a else np.zeros_like(turn))

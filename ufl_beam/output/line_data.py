@@ -60,7 +60,7 @@ def rods_of(scene: Scene) -> list[Rod]:
         others = [s for s in spots[body] if s.point != body.center] or [beside]
         rods += [Rod(body.middle, spot, BODY) for spot in others]
     for joint in scene.joints:
-        if joint.kind in ("RigidLink", "Link"):
+        if joint.look in ("RigidLink", "Link"):
             a, b = joint.places
             rods.append(Rod(a, b, LINK, _pulls(joint.holders)))
     rods += [
@@ -72,7 +72,7 @@ def rods_of(scene: Scene) -> list[Rod]:
 
 
 def _pulls(connectors: tuple[Connector, ...]) -> Connector | None:
-    return next((c for c in connectors if c.motion == "stretching"), None)
+    return next((c for c in connectors if c.stretches), None)
 
 
 class LineData:

@@ -165,6 +165,14 @@ def replace_file(path: Path, data: bytes) -> None:
     Raises:
         OSError: It cannot be written.
     """
+    try:
+        put_in_place(path, data)
+    except OSError as error:
+        raise failure(error, path) from None
+
+
+def put_in_place(path: Path, data: bytes) -> None:
+    """Do as :func:`replace_file`, with the error of the system."""
     part = path.parent / f"{path.name}.part"
     try:
         with part.open("wb") as file:
@@ -172,11 +180,14 @@ def replace_file(path: Path, data: bytes) -> None:
             file.flush()
             os.fsync(file.fileno())
         os.replace(part, path)
-    except BaseException as error:
+    except BaseException:
         part.unlink(missing_ok=True)
-        if isinstance(error, OSError):
-            raise failure(error, path) from None
         raise
+    folder = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)
 
 
 def is_at(file: int, path: Path) -> bool:

@@ -13,7 +13,8 @@ from mpi4py import MPI
 
 from ufl_beam.arrays import Array, Index, State
 from ufl_beam.collective_errors import on_first
-from ufl_beam.discretization.dof_numbering import Grid, Share
+from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import SceneError, require_kind, require_sequence
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.scene import Scene

@@ -61,7 +61,7 @@ class Setting(ABC):
         """Offsets of connectors that share their line, or their pin, with others; in units."""
         alike: dict[tuple[bool, frozenset[object]], list[Connector | None]] = {}
         for joint in self.scene.joints:
-            if joint.kind in ("Prismatic", "RigidLink", "Link"):
+            if joint.look in ("Prismatic", "RigidLink", "Link"):
                 alike[False, frozenset(joint.places)] = [None]  # which keeps the middle
         for c in self.scene.connectors:
             ends: tuple[object, ...] = (c.b.point,) if c.turns else (c.a, c.b)
@@ -83,7 +83,7 @@ class Setting(ABC):
     def sliding(self) -> list[Connector]:
         """Connectors that hold all that slides on a rail or a guide curve."""
         kinds = ("Prismatic", "Guided")
-        return [j.holders[0] for j in self.scene.joints if j.kind in kinds]
+        return [j.holders[0] for j in self.scene.joints if j.look in kinds]
 
 
 class Model(Setting):

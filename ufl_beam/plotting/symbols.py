@@ -85,8 +85,8 @@ def centres(pose: Pose) -> Iterator[Stroke]:
 def rods(pose: Pose) -> Iterator[Stroke]:
     """Draw rigid links, thick, and links, thin."""
     for joint in pose.stage.scene.joints:
-        if joint.kind in ("RigidLink", "Link"):
-            weight = 6.0 if joint.kind == "RigidLink" else 2.6
+        if joint.look in ("RigidLink", "Link"):
+            weight = 6.0 if joint.look == "RigidLink" else 2.6
             ends = np.array([pose.at(place) for place in joint.places])
             yield Stroke(ends, DARK, weight)
 
@@ -95,7 +95,7 @@ def pins(pose: Pose) -> Iterator[Pin]:
     """Draw circles where joints turn, squares where they do not."""
     for joint in pose.stage.scene.joints:
         places, apart = joint.places, 2 not in joint.shared
-        match joint.kind:
+        match joint.look:
             case "Link":
                 yield from (Pin(pose.at(place), True, (place,)) for place in places)
             case "Prismatic" | "Guided" if apart:
@@ -109,8 +109,8 @@ def pins(pose: Pose) -> Iterator[Pin]:
 def rails(pose: Pose) -> Iterator[Stroke]:
     """Draw rails, guide curves, and the blocks on them."""
     for joint in pose.stage.scene.joints:
-        if joint.kind in _RAILS:
-            yield from _RAILS[joint.kind](pose, joint)
+        if joint.look in _RAILS:
+            yield from _RAILS[joint.look](pose, joint)
 
 
 # -- connectors --------------------------------------------------------------------------------
@@ -182,7 +182,7 @@ def _turns(joint: Joint) -> bool:
 def _grounds(scene: Scene) -> dict[Spot, tuple[float, bool]]:
     """Direction in which a point of the ground holds something; True if that turns freely."""
     held: list[tuple[Sequence[Anchor], bool]] = [
-        (j.places, _turns(j)) for j in scene.joints if j.kind not in ("Prismatic", "Guided")
+        (j.places, _turns(j)) for j in scene.joints if j.look not in ("Prismatic", "Guided")
     ]
     held += [((c.a, c.b), False) for c in scene.connectors if not c.turns]
     found: dict[Spot, tuple[float, bool]] = {}

@@ -10,8 +10,9 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.collective_errors import Agreement
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.dof_numbering import Share
 from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.discretization.partition import Share
+from ufl_beam.discretization.state_io import NOWHERE, Restoring, Saving, State
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.connector_laws import Controller, Coulomb
 from ufl_beam.model.connectors import Connector
@@ -20,16 +21,18 @@ from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.terms.algorithmic_damping import numerical_forces
-from ufl_beam.terms.beams import Cells, ElasticBeams, Inertia, Term
-from ufl_beam.terms.connector_laws import Setting
+from ufl_beam.terms.base import Cells, Term
+from ufl_beam.terms.beams import ElasticBeams, Inertia
+from ufl_beam.terms.connector_responses import Setting
 from ufl_beam.terms.connectors import couplings
 from ufl_beam.terms.damping import damping_forces
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.guide_curves import guides
 from ufl_beam.terms.inelastic_beams import InelasticBeams, inelastic_cells
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.loads import DeadLoads, FollowerLoads
-from ufl_beam.terms.material_points import Course, expect_entries
-from ufl_beam.terms.openings import Openable, Openings
+from ufl_beam.terms.material_points import expect_entries
+from ufl_beam.terms.openings import Course, Openable, Openings
 from ufl_beam.terms.rotating_frame import FrameForces
 from ufl_beam.terms.supports import Supports
 
@@ -75,6 +78,46 @@ class Assembly:
         """Terms with internal variables."""
         return [*self.inelastic, *self.couplings]
 
+    def internal_variables(self, q: Array) -> State:
+        """Return what a run that starts here takes over: internal variables, reactions, rates."""
+        memory = Saving(self.equation.share)
+        for one in self.remembering:
+            one.remember(memory, q)
+        if self.supports.work or any(isinstance(link.law, Coulomb) for link in self.asked):
+            self.supports.carry_on(memory, q)
+        if self.inertia is not None:
+            self.inertia.carry_on(memory, len(self.inertia.more))
+        return memory.state()
+
+    def take_over(self, q: Array, internal: State, *, same: bool) -> None:
+        """Take over :meth:`internal_variables` of another run.
+
+        Args:
+            q: The initial configuration at the local degrees of freedom.
+            internal: What the other run has passed on.
+            same: Whether no force has changed since, so that accelerations are what they were.
+        """
+        memory = Restoring(self.equation.share, internal)
+        for one in self.remembering:
+            one.remember(memory, NOWHERE)
+        if "reactions" in internal:
+            self.supports.carry_on(memory, q)
+        if self.inertia is not None and same:
+            known = sum(name in internal for name in self.inertia.scheme.kept)
+            self.inertia.carry_on(memory, known)
+
+    def bear(self, force: Array, loads: list[Array]) -> None:
+        """Set the reactions to those of the initial state of a static run.
+
+        Args:
+            force: The internal forces of that state.
+            loads: The loads that it is in equilibrium with; none if nothing acts yet.
+        """
+        r = np.asarray(force - sum(loads))
+        self.supports.enter(r)
+        self.supports.hold(self.equation.share.added(r))
+        self.supports.take()
+
 
 def assemble(share: Share, scheme: Scheme, v: Array, together: Agreement) -> Assembly:
     """Make the terms of a scene.
@@ -109,7 +152,7 @@ def assemble(share: Share, scheme: Scheme, v: Array, together: Agreement) -> Ass
     asked = {link: 0.0 for link in scene.links if isinstance(link.law, Controller | Coulomb)}
     rates = dict(asked)
     connectors = Setting(asked, rates, scene.size, scheme, ledger, friction_repeats(scene), course)
-    coupled = together(couplings, share, connectors, A)
+    coupled = together(lambda: [*couplings(share, connectors, A), *guides(share, scheme, A)])
     openings = Openings.of(course, _openable(inelastic, coupled), share.comm)
 
     loads = _loads(scene, fields, scheme, ledger, A)

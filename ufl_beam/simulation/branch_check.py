@@ -10,11 +10,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme
-from ufl_beam.terms.beams import Beams
+from ufl_beam.terms.base import Beams
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.links import Links
 

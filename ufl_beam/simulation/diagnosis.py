@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.discretization.dof_numbering import Grid, Share
+from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import ConvergenceError, StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.scene import Scene
@@ -19,7 +20,7 @@ from ufl_beam.parameter import Parameter
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.solvers.null_vectors import SINGULAR, free_matrix, null_vector
-from ufl_beam.terms.beams import KINDS
+from ufl_beam.terms.base import KINDS
 from ufl_beam.terms.inelastic_beams import InelasticBeams
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.supports import Supports

@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.arrays import Array
+from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.scene import Scene
-from ufl_beam.simulation.step_solver import Trial
 
 APPLYING = 1 / 8
 """Part of the first step in which loads that are there from the start are applied."""
@@ -39,12 +39,15 @@ def begins_loaded(scene: Scene, scheme: Scheme, t: float) -> bool:
     return frames or any(f(t) != 0 for _, f in scene.time_functions())
 
 
-def require_small_turn(share: Share, trial: Trial, whole: float) -> None:
-    """Raise :class:`StepFailed` if a node turns far in a part of the application, of ``whole`` s.
+def require_small_turn(share: Share, change: Array, dt: float, whole: float) -> None:
+    """Raise :class:`StepFailed` if a node turns far in a part of the application.
 
-    Shorter parts may help, down to a length.
+    Args:
+        share: The degrees of freedom of this process.
+        change: That of the configuration in the part.
+        dt: Length of the part, of which shorter ones may help; s.
+        whole: Length of the whole application; s.
     """
-    step, q1, _ = trial
-    turn = share.largest(np.abs(q1 - step.q0)[share.rotations()].max(initial=0.0))
-    if turn > APPLYING_TURN and SHORT_PART * step.dt > whole:
+    turn = share.largest(np.abs(change)[share.rotations()].max(initial=0.0))
+    if turn > APPLYING_TURN and SHORT_PART * dt > whole:
         raise StepFailed("a node turns too far while the loads at the beginning are applied")

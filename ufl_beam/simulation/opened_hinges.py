@@ -113,6 +113,18 @@ class Opened:
                 found.append((beam, int(cells[worst]), float(ratios[worst])))
         return found
 
+    def summary(self) -> str:
+        """A line about embedded hinges that opened, if there are any."""
+        hinges = self.hinges()
+        if not hinges:
+            return ""
+        number, worst = sum(one.number for one in hinges), max(hinges, key=lambda one: one.error)
+        return (
+            f"embedded hinges opened in {_cells_in_words(number)}; their place within the cell "
+            f"shifts the limit by at most {_percent(worst.error)} ({worst.beam.name}, cell at "
+            f"s = {worst.place.s:.3g})\n"
+        )
+
     def warn(self, scheme: Scheme, times: Array) -> None:
         """Issue a :class:`ModelWarning` for each beam where much depends on the mesh."""
         for beam, cell, ratio in self.jumps(scheme):
@@ -128,21 +140,21 @@ class Opened:
         for beam, number, error, place in self.hinges():
             if error > LARGE:
                 _warn(
-                    f"{beam.name}: the hinge of the section opened in {cells_in_words(number)}, "
+                    f"{beam.name}: the hinge of the section opened in {_cells_in_words(number)}, "
                     "in the middle of a cell. At the ends of the cell at "
                     f"s = {place.s:.3g} the moment differs from that in its middle by "
-                    f"{percent(error)} of the limit, so the load at which the hinge opens is "
+                    f"{_percent(error)} of the limit, so the load at which the hinge opens is "
                     "uncertain by as much. Put a hinge exactly where it belongs, "
                     "Beam(hinges={s: law}), or use shorter cells"
                 )
 
 
-def cells_in_words(number: int) -> str:
+def _cells_in_words(number: int) -> str:
     """A number of cells in words: "1 cell", "2 cells"."""
     return f"{number} cell{'s'[: number != 1]}"
 
 
-def percent(part: float) -> str:
+def _percent(part: float) -> str:
     """A part in words: "12 %", or "more than 100 %" where the limit is next to nothing."""
     return f"{100 * part:.2g} %" if part <= 1 else "more than 100 %"
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.collective_errors import duplicate
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import CopiesDiffer, warn
 
 TOLERANCE = 1e-8

@@ -93,6 +93,8 @@ def simulate(
     _require_step(dt, scheme, (t0, t1))
     require_count(every, "simulate: every")
     require_count(most, "simulate: most")
+    if start is not None:
+        require_kind(start, Solution, "start")
     if checkpoint is not None:
         require_kind(checkpoint, Checkpoint, "simulate: checkpoint")
     kept = [] if checkpoint is None else [("checkpoint", checkpoint.files)]
@@ -115,38 +117,49 @@ def simulate(
         simulation = Simulation(
             scene, scheme, t0=t0, start=start, newton=newton, mesh=mesh, comm=comm
         )
+        solution = simulation.solution
+
+        def note_time() -> None:
+            solution.seconds = time.perf_counter() - begin
+
+        stack.callback(note_time)
+        stack.callback(simulation.close)
         pace: Pace = (
             AdaptiveSteps(simulation, t1, dt)
             if isinstance(dt, Adaptive)
             else EqualSteps(simulation.t, t1, dt)
         )
-        stack.pop_all()  # the run closes it
-    solution = simulation.solution
-    release = take(outputs)
 
-    def after_step() -> None:
-        if recorders or keeper is not None:
-            simulation.settle()  # before anything is written
-        if pace.steps % solution.every == 0 or pace.finished:
-            solution.keep(simulation)
-            if len(solution) > most + 1 and not pace.finished:
-                solution.thin()
-                solution.every *= 2
-        for recorder in recorders:
-            recorder.write(simulation)
-        if keeper is not None:
-            keeper.note(simulation, pace, recorders)
+        def go_on(keeper: Keeper) -> None:
+            states = keeper.resume(simulation, pace, t1)
+            for recorder, state in zip(recorders, states, strict=False):
+                recorder.resume(simulation, state)
 
-    try:
+        def after_step() -> None:
+            if recorders or keeper is not None:
+                simulation.settle()  # before anything is written
+            if pace.steps % solution.every == 0 or pace.finished:
+                simulation.keep()
+                if len(solution) > most + 1 and not pace.finished:
+                    solution.thin()
+                    solution.every *= 2
+            for recorder in recorders:
+                recorder.write(simulation)
+            if keeper is not None:
+                keeper.note(simulation, pace, recorders)
+
+        stack.callback(close_all, recorders)
+        stack.callback(take(outputs))
+        stack.enter_context(simulation.partial_results())
         solution.every = every
         if keeper is not None and keeper.found:
-            simulation.together(keeper.resume, simulation, pace, recorders, t1)
+            simulation.together(go_on, keeper)
             say(f"checkpoint {keeper.path}: the run goes on from t = {simulation.t:.9g} s")
             begin -= solution.seconds
         else:
             for recorder in recorders:
                 simulation.together(recorder.open, simulation)
-            solution.keep(simulation)
+            simulation.keep()
         quiet = None if progress and comm.rank == 0 and not in_study() else True
         with tqdm(total=1.0, bar_format=BAR, disable=quiet, mininterval=0.5) as bar:
             while not pace.finished:
@@ -155,20 +168,6 @@ def simulate(
                 bar.update(pace.progress - bar.n)
         simulation.end()
         simulation.check_ledger()
-    except BaseException as error:
-        # Whatever stops a run, an interrupt or a user's function, what was reached is not lost.
-        simulation.leave()
-        if simulation.share.comm.size == 1 or error is simulation.together.raised:
-            simulation.end()  # else the processes may not all be here
-        error.__dict__["solution"] = solution
-        raise
-    finally:
-        release()
-        close_all(recorders)
-        simulation.close()
-        if keeper is not None:
-            keeper.close()
-        solution.seconds = time.perf_counter() - begin
     if comm.rank == 0:
         solution.opened.warn(scheme, solution.times)
     return solution
@@ -178,7 +177,6 @@ def _end_of(start: Solution | None) -> str:
     """A checksum of what a run begins with."""
     if start is None:
         return "nothing"
-    require_kind(start, Solution, "start")
     return digest_of({"q": start.q[-1:], "v": start.v[-1:], **start.internal})
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
-from typing import NoReturn
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, NoReturn
 
 from mpi4py import MPI
 
@@ -15,16 +16,23 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.collective_errors import Agreement
 from ufl_beam.compiled.c_library import extrapolated
-from ufl_beam.discretization.dof_numbering import Share
 from ufl_beam.discretization.model_warnings import warn_of_jumps
+from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory, Restoring, Saving, State
-from ufl_beam.errors import ModelWarning, StepFailed, require_kind, require_number
+from ufl_beam.errors import (
+    ModelWarning,
+    SceneError,
+    StepFailed,
+    require_kind,
+    require_number,
+    shorten,
+)
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.connector_laws import Controller, Coulomb
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.state_view import StateView
-from ufl_beam.parallel import communicator, give_back_memory
+from ufl_beam.parallel import communicator
 from ufl_beam.parameter import Parameter
 from ufl_beam.simulation.assembly import assemble
 from ufl_beam.simulation.branch_check import StaticPath
@@ -32,11 +40,10 @@ from ufl_beam.simulation.diagnosis import no_equilibrium
 from ufl_beam.simulation.first_loads import APPLYING, begins_loaded, require_small_turn
 from ufl_beam.simulation.initial_state import initial_state, mesh_of
 from ufl_beam.simulation.replicas import Copies
-from ufl_beam.simulation.restart import bear, internal_variables, take_internal_variables
 from ufl_beam.simulation.scene_checks import checked_grid
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.step_cutting import go_in_parts
-from ufl_beam.simulation.step_solver import StepSolver, Trial
+from ufl_beam.simulation.step_cutting import Trial, go_in_parts
+from ufl_beam.simulation.step_solver import StepSolver
 from ufl_beam.solvers.equation import Border
 from ufl_beam.solvers.newton_options import Newton
 
@@ -71,6 +78,7 @@ class Simulation(StateView):
         newton: Tolerances and PETSc options.
         mesh: How finely it is discretised; as ``start``, or with the cells of the beams.
         comm: Processes that share the scene; all of them, or in a :func:`study` this one alone.
+        kind: Class of the solution.
 
     Attributes:
         t: Time; s.
@@ -101,11 +109,16 @@ class Simulation(StateView):
         newton: Newton | None = None,
         mesh: Mesh | None = None,
         comm: MPI.Intracomm | None = None,
+        kind: type[Solution] = Solution,
     ) -> None:
         comm = communicator(comm, "comm")
         require_number(t0, "t0")
         newton = Newton() if newton is None else newton
         require_kind(newton, Newton, "newton")
+        if not (isinstance(kind, type) and issubclass(kind, Solution)):
+            raise SceneError(f"kind = {shorten(kind)} must be a class of solutions, such as Path")
+        if start is not None:
+            require_kind(start, Solution, "start")
         grid = checked_grid(scene, scheme, mesh_of(start, mesh))
         shared = len(grid.cells) >= comm.size * SMALLEST_SHARE
         share = Share(grid, comm if shared else MPI.COMM_SELF)
@@ -136,7 +149,7 @@ class Simulation(StateView):
             loaded = together(lambda: [load.carry_on(t0, self.q) for load in self.loads])
         if start is not None:
             same = start.scene is scene and start.times[-1] == t0
-            take_internal_variables(parts, self.q, internal, same=same)
+            parts.take_over(self.q, internal, same=same)
         for term in self.terms:
             term.add_state(self.q)
         self._branch: StaticPath | None = None
@@ -147,15 +160,14 @@ class Simulation(StateView):
         else:
             state = (self.ledger, self.q, t0)
             self._branch = together(StaticPath, share, scheme, self.beams, self.couplings, *state)
-            bear(parts, self._branch.force, loaded)
+            parts.bear(self._branch.force, loaded)
             self.reactions_known = True
 
         self._steps = StepSolver(
             scheme, self.equation, parts.openings, self._branch, newton, together
         )
         self._solver = self._steps.newton
-        self.solution: Solution = Solution(scene, grid)
-        give_back_memory()
+        self.solution = kind(scene, grid)
 
     # -- stepping ------------------------------------------------------------------------------
 
@@ -183,7 +195,7 @@ class Simulation(StateView):
         """
         step = self.scheme.step(self.t, t1, end, self.q)
         trial = self._attempt(step._replace(load_time=begin, motion_time=begin))
-        require_small_turn(self.share, trial, end - begin)
+        require_small_turn(self.share, trial.q1 - self.q, trial.step.dt, end - begin)
         return trial
 
     def attempt(self, t1: float, end: float | None = None) -> Trial:
@@ -319,19 +331,39 @@ class Simulation(StateView):
         """Newton iterations so far."""
         return self._solver.iterations
 
+    def keep(self) -> None:
+        """Append the state to the solution; all processes call it together."""
+        self.solution.keep(self.gather())
+
+    @contextmanager
+    def partial_results(self) -> Iterator[None]:
+        """Let what is raised in this context carry the solution so far, ``error.solution``.
+
+        Whatever stops a run, an interrupt or a user's function, what was reached is not lost.
+        """
+        try:
+            yield
+        except BaseException as error:
+            self.leave()
+            if self.share.comm.size == 1 or error is self.together.raised:
+                self.end()  # else the processes may not all be here
+            stopped: Any = error
+            stopped.solution = self.solution
+            raise
+
     def end(self) -> None:
         """Let the solution have the last state, and what another run that starts there needs."""
         self.settle()
         if self.t not in self.solution.times[-1:]:
-            self.solution.keep(self)
-        self.solution.internal = internal_variables(self._assembly, self.q)
+            self.keep()
+        self.solution.internal = self._assembly.internal_variables(self.q)
 
     def snapshot(self) -> Solution:
         """The state now, as a solution that other runs may start with; all processes call it."""
         self.settle()
         now = Solution(self.scene, self.grid)
-        now.keep(self)
-        now.internal = internal_variables(self._assembly, self.q)
+        now.keep(self.gather())
+        now.internal = self._assembly.internal_variables(self.q)
         return now
 
     def state(self) -> State:

@@ -7,22 +7,51 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Protocol
+from typing import NoReturn, Protocol
 
 import numpy as np
 
 from ufl_beam.arrays import Array
+from ufl_beam.collective_errors import Agreement
+from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed, require_number, require_sequence
-
-if TYPE_CHECKING:
-    from ufl_beam.simulation.simulation import Simulation
-    from ufl_beam.simulation.step_solver import Trial
+from ufl_beam.model.scene import Scene
+from ufl_beam.simulation.solution import Solution
+from ufl_beam.simulation.step_cutting import Trial
+from ufl_beam.terms.beams import Inertia
+from ufl_beam.terms.supports import Supports
 
 GROWTH = 1.5
 """A step is at most so many times as long as the one before it, whose error it may repeat."""
 
 SAMPLES = (0.01, 0.5, 0.99)
 """Parts of a step at which loads are asked for."""
+
+
+class Stepper(Protocol):
+    """A simulation, as far as step controls know it; see there."""
+
+    scene: Scene
+    share: Share
+    t: float
+    q: Array
+    last_dt: float
+    inertia: Inertia
+    supports: Supports
+    solution: Solution
+    together: Agreement
+
+    def step_to(self, t1: float) -> None:
+        """Go to a time, in parts where that fails."""
+
+    def attempt(self, t1: float) -> Trial:
+        """Solve the next step."""
+
+    def accept(self, trial: Trial) -> None:
+        """Go where the latest attempt went."""
+
+    def give_up(self, failure: StepFailed, end: float) -> NoReturn:
+        """End the run where it is."""
 
 
 class Pace(Protocol):
@@ -42,7 +71,7 @@ class Pace(Protocol):
     def progress(self) -> float:
         """Part of the way that is done, from 0 to 1."""
 
-    def advance(self, simulation: Simulation) -> None:
+    def advance(self, simulation: Stepper) -> None:
         """One step.
 
         Raises:
@@ -86,7 +115,7 @@ class EqualSteps:
         """Part of the steps that are done."""
         return self.steps / self._all
 
-    def advance(self, simulation: Simulation) -> None:
+    def advance(self, simulation: Stepper) -> None:
         """One step; where it fails, in parts."""
         n = self.steps + 1
         simulation.step_to(self._t0 + (self._t1 - self._t0) * n / self._all)
@@ -162,7 +191,7 @@ class AdaptiveSteps:
         error: Sum of the errors so far.
     """
 
-    def __init__(self, simulation: Simulation, t1: float, choice: Adaptive) -> None:
+    def __init__(self, simulation: Stepper, t1: float, choice: Adaptive) -> None:
         self._t0 = self._t = t0 = simulation.t
         self._t1, self._solution = t1, simulation.solution
         self._tolerance = choice.tolerance
@@ -198,7 +227,7 @@ class AdaptiveSteps:
         """Part of the time that is over."""
         return (self._t - self._t0) / (self._t1 - self._t0)
 
-    def advance(self, simulation: Simulation) -> None:
+    def advance(self, simulation: Stepper) -> None:
         """One step that is accurate, after as many as it takes that are not."""
         stop = next(t for t in self._stops if t > self._t)
         while True:
@@ -226,7 +255,7 @@ class AdaptiveSteps:
         # The acceleration may jump at a stop, so what was before tells nothing about what comes.
         self._fresh = self._t == stop
 
-    def _attempt(self, simulation: Simulation, stop: float) -> tuple[Trial, float]:
+    def _attempt(self, simulation: Stepper, stop: float) -> tuple[Trial, float]:
         """Solve the next step; also its error."""
         left = stop - self._t
         # Two equal steps to a stop in the place of a long and a tiny one
@@ -249,7 +278,7 @@ class AdaptiveSteps:
         missed = simulation.share.largest(simulation.together(self._missed, dt))
         return trial, max(error, missed)
 
-    def _size(self, simulation: Simulation, trial: Trial, error: Array) -> float:
+    def _size(self, simulation: Stepper, trial: Trial, error: Array) -> float:
         """Largest error of a position over the size of the scene, or of a rotation."""
         error[self._turns] += (trial.q1 - simulation.q - trial.s)[self._turns]
         supports = simulation.supports

@@ -1,15 +1,32 @@
 # SPDX-License-Identifier: MIT
-"""Cutting of steps that fail into parts."""
+"""Steps that were solved, and the cutting of those that fail into parts."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NoReturn
+from typing import NamedTuple, NoReturn
 
+from ufl_beam.arrays import Array
 from ufl_beam.errors import StepFailed
+from ufl_beam.mechanics.time_schemes import Step
 
 MOST_PARTS = 2**12
 """Largest number of parts that a step is cut into."""
+
+
+class Trial(NamedTuple):
+    """A step that was solved but not yet accepted.
+
+    Attributes:
+        step: Its times.
+        q1: Configuration at its end, local degrees of freedom.
+        s: What forces work on, see :meth:`Scheme.nodal_step`; in dynamics the mean velocity of the
+            step times its length.
+    """
+
+    step: Step
+    q1: Array
+    s: Array
 
 
 def go_in_parts(

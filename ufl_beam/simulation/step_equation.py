@@ -10,14 +10,15 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.csr import Csr, Product
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.solvers.c_equation import CEquation
 from ufl_beam.solvers.equation import Equation, PythonEquation
-from ufl_beam.terms.beams import Beams, Cells, Inertia, Term
+from ufl_beam.terms.base import Beams, Cells, Term
+from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.links import Links
-from ufl_beam.terms.material_points import Course
+from ufl_beam.terms.openings import Course
 from ufl_beam.terms.supports import Supports
 
 

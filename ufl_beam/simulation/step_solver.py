@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import NamedTuple
 
 from ufl_beam.arrays import Array
 from ufl_beam.collective_errors import Agreement
@@ -14,6 +13,7 @@ from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.constraint_checks import no_number
 from ufl_beam.simulation.branch_check import StaticPath
+from ufl_beam.simulation.step_cutting import Trial
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.equation import Border
 from ufl_beam.solvers.newton import Solver
@@ -29,21 +29,6 @@ LEAST_AT_REST, LEAST_IN_MOTION = 2, 1
 A column that nearly buckles magnifies a load that is hardly larger than the tolerance.  In motion
 its inertia holds it meanwhile.
 """
-
-
-class Trial(NamedTuple):
-    """A step that was solved but not yet accepted.
-
-    Attributes:
-        step: Its times.
-        q1: Configuration at its end, local degrees of freedom.
-        s: What forces work on, see :meth:`Scheme.nodal_step`; in dynamics the mean velocity of the
-            step times its length.
-    """
-
-    step: Step
-    q1: Array
-    s: Array
 
 
 class StepSolver:

@@ -19,7 +19,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, integers, lib, petsc
 from ufl_beam.solvers.equation import Callbacks, Demand, Equation, InPython
 from ufl_beam.solvers.preconditioners import ChainsFirst
-from ufl_beam.terms.beams import Beams, Term
+from ufl_beam.terms.base import Beams, Term
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.supports import Supports
 

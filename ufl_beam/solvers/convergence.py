@@ -12,7 +12,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, integers, lib
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
 from ufl_beam.solvers.equation import Equation
 from ufl_beam.solvers.newton_options import Newton

@@ -18,10 +18,10 @@ class Callbacks(Protocol):
     """Functions in Python that SNES calls, with the arguments of PETSc."""
 
     def function(self, snes: Any, x: Any, f: Any) -> None:
-        """Compute the residual."""
+        """Compute the residual at an iterate."""
 
     def jacobian(self, snes: Any, x: Any, J: Any, P: Any) -> None:
-        """Compute the tangent."""
+        """Compute the tangent at an iterate."""
 
     def test(self, snes: Any, iteration: int, norms: Any) -> int:
         """Return why to stop, or zero."""

@@ -14,7 +14,7 @@ from scipy.linalg import qr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.solvers.null_vectors import free_matrix, null_vectors
 

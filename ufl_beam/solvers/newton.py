@@ -12,7 +12,7 @@ from petsc4py import PETSc
 from ufl_beam.arrays import Array
 from ufl_beam.collective_errors import Agreement
 from ufl_beam.compiled.c_library import doubles, integers, lib
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
 from ufl_beam.solvers.bordered import BorderedNewton

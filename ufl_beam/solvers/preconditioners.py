@@ -9,7 +9,7 @@ from petsc4py import PETSc
 
 from ufl_beam.compiled.c_library import doubles, ffi, lib
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.partition import Share
 from ufl_beam.solvers.static_condensation import Elimination
 
 GOOD = int(PETSc.PC.FailedReason.NOERROR)

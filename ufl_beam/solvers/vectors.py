@@ -7,7 +7,7 @@ from petsc4py import PETSc
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import ffi, petsc
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.partition import Share
 
 
 class Vectors:
@@ -22,7 +22,7 @@ class Vectors:
         self.parallel = share.comm.size > 1
 
     def new(self) -> PETSc.Vec:
-        """Make a vector."""
+        """Make a vector of the unknowns, shared like them."""
         share = self._share
         if not self.parallel:
             return PETSc.Vec().createSeq(share.size)

@@ -12,15 +12,14 @@ import ufl
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import stated
-from ufl_beam.discretization.function_spaces import Element, Fields
+from ufl_beam.discretization.function_spaces import Element, Fields, Strains
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
 from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_schemes import Step
-from ufl_beam.terms.beams import OfForms, Term
+from ufl_beam.terms.base import OfForms, Term
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.inelastic_beams import Strains
 
 
 @singledispatch

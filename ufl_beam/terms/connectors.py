@@ -15,21 +15,21 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, integers, lib, loop
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import Kernel, stated
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem, line_mesh
 from ufl_beam.mechanics.relative_motions import MOTIONS, Numbers, Pair
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.connector_laws import HELD, Law, RigidPlastic, Spring
 from ufl_beam.model.connectors import Connector
-from ufl_beam.terms.connector_laws import Setting, respond
-from ufl_beam.terms.guide_curves import Guides
+from ufl_beam.terms import connector_laws, rigid_plastic, springs
+from ufl_beam.terms.connector_responses import Setting, respond
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.openings import Openable
-from ufl_beam.terms.rigid_plastic import RigidPlasticResponse
 from ufl_beam.terms.tangent_derivatives import TangentChange
 
-respond.register(RigidPlastic, RigidPlasticResponse)
+LAWS = (connector_laws, rigid_plastic, springs)
+"""Modules with the responses of laws, which register them with :func:`respond`."""
 
 
 def _alike(link: Connector) -> tuple[str, object]:
@@ -311,7 +311,7 @@ def _split(q: Expr) -> tuple[Pair, Expr]:
 
 
 def couplings(share: Share, setting: Setting, A: Csr) -> list[Links]:
-    """The connectors of a process, those that are alike together."""
+    """Make the connectors of a process but for guides, those that are alike together."""
     links = share.grid.scene.links
     groups: dict[tuple[str, object], list[int]] = {}
     for i, number in enumerate(share.links):
@@ -320,6 +320,7 @@ def couplings(share: Share, setting: Setting, A: Csr) -> list[Links]:
         if _alike(link) not in groups and link.motion in MOTIONS:
             respond(link.law, (), setting)  # makes the entries of the ledger that others write
     return [
-        (Couplings if motion in MOTIONS else Guides)(share, np.array(here), setting, A)
+        Couplings(share, np.array(here), setting, A)
         for (motion, _), here in groups.items()
+        if motion in MOTIONS
     ]

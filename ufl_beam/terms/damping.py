@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from functools import singledispatch
+from typing import Protocol
 
 import numpy as np
 import ufl
@@ -11,15 +12,21 @@ import ufl
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.csr import Csr, StepProduct
 from ufl_beam.discretization.compiled_forms import stated
-from ufl_beam.discretization.function_spaces import Element, Fields
+from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.kinematics import strain, virtual_strain
-from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.mechanics.time_schemes import DynamicScheme, Rates, Scheme, Step
 from ufl_beam.model.damping import KelvinVoigt, Rayleigh
-from ufl_beam.terms.beams import Inertia, OfForms, OfMatrix, Term, mass_matrix
+from ufl_beam.terms.base import OfForms, OfMatrix, Term
 from ufl_beam.terms.energy_ledger import Ledger
+
+
+class Inertia(Rates, Protocol):
+    """Velocities of a scene in motion, and its scheme."""
+
+    scheme: DynamicScheme
 
 
 @singledispatch

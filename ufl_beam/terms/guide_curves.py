@@ -7,13 +7,12 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
-from ufl_beam.mechanics.time_schemes import Step
+from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.curves import REACH, nearest, parameter_step, tangent
-from ufl_beam.terms.connector_laws import Setting
 from ufl_beam.terms.links import Links
 
 
@@ -27,7 +26,7 @@ class Guides(Links):
     The motion of a guide is the distance from its curve, zero when a step is accepted.
     """
 
-    def __init__(self, share: Share, here: Index, setting: Setting, A: Csr) -> None:
+    def __init__(self, share: Share, here: Index, scheme: Scheme, A: Csr) -> None:
         super().__init__(share, here, A)
         self._laws = [link.law for link in self.links if isinstance(link.law, Guide)]
         self._x, self._y = (self._dofs[:, k].astype(np.int64) for k in (1, 3))
@@ -36,7 +35,7 @@ class Guides(Links):
         self._across = [A.positions(d, self._forces_at) for d in (self._x, self._y)]
         self._rows = [A.positions(self._forces_at, d) for d in (self._x, self._y)]
         self._points = np.array([link.b.point for link in self.links])
-        self._over_step = np.full(len(self.links), setting.scheme.average(0.0, 1.0) != 1.0)
+        self._over_step = np.full(len(self.links), scheme.average(0.0, 1.0) != 1.0)
         n = len(self.links)
         self._s: Array = np.zeros(n)
         self._s0: Array = np.zeros(n)
@@ -190,3 +189,10 @@ class Guides(Links):
         rows = memory.rows("guides", self.numbers, np.column_stack([*numbers, self._on0]))
         self.work, self.rate, self._s, self._s0, self._steps = rows[:, :5].T.copy()
         self._on0 = rows[:, 5:].copy()
+
+
+def guides(share: Share, scheme: Scheme, A: Csr) -> list[Links]:
+    """Make the guides of a process, all together; empty if it has none."""
+    links = share.grid.scene.links
+    here = [i for i, number in enumerate(share.links) if isinstance(links[number].law, Guide)]
+    return [Guides(share, np.array(here), scheme, A)] if here else []

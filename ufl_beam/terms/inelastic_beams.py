@@ -13,8 +13,8 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import stated
-from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.discretization.function_spaces import Element, Fields
+from ufl_beam.discretization.function_spaces import Element, Fields, Strains
+from ufl_beam.discretization.partition import Numbering
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError
@@ -22,11 +22,12 @@ from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.fibres import Layout
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.material_points import INPUTS, Course, Points
+from ufl_beam.terms.material_points import Points, inputs
+from ufl_beam.terms.openings import Course
 from ufl_beam.terms.tangent_derivatives import CellTangent
 
 
-def inelastic_cells(grid: Grid) -> list[tuple[Layout, Index]]:
+def inelastic_cells(grid: Numbering) -> list[tuple[Layout, Index]]:
     """Layouts of material points, and the cells (numbers of the grid) that have them.
 
     Raises:
@@ -49,40 +50,6 @@ def inelastic_cells(grid: Grid) -> list[tuple[Layout, Index]]:
                     )
                 groups.setdefault(layout, []).append(int(cell))
     return [(layout, np.array(cells)) for layout, cells in groups.items()]
-
-
-@stated
-def _weighted_strains(of: Element) -> ufl.Form:
-    z = ufl.TestFunction(of.at_points(3).function_space)
-    return ufl.dot(strain(of.q1, of.axis), z) / of.axis.h * of.dx(1)
-
-
-class Strains:
-    """(Σ, Γ, K) in the points of the cells of some fields.
-
-    Attributes:
-        kernel: Strains times the weights of the points.
-        shape: Cells, and three times the points in each.
-    """
-
-    def __init__(self, fields: Fields) -> None:
-        self.kernel = fields.hot_kernel(_weighted_strains(fields.element), fields.element.q1)
-        self._weights = np.repeat(fields.share.grid.mesh.point_weights, 3)
-        self.shape = (len(fields.order), len(self._weights))
-
-    def __call__(self, q: Array) -> Array:
-        """Strains at ``q``, in the order of the mesh, point after point; 1, 1, 1/m."""
-        return self._weighted(q) / self._weights
-
-    def mean(self, q: Array) -> Array:
-        """Means of the cells at ``q``, in the order of the mesh; (num_cells, 3); 1, 1, 1/m."""
-        in_points = self._weighted(q).reshape(self.shape[0], self.shape[1] // 3, 3)
-        return np.asarray(in_points.sum(axis=1))
-
-    def _weighted(self, q: Array) -> Array:
-        strains = np.zeros(self.shape)
-        self.kernel.add(q, strains)
-        return strains
 
 
 class _Forms(NamedTuple):
@@ -130,13 +97,14 @@ class InelasticBeams:
         self._strains = Strains(fields)
         cells, n = len(fields.order), len(layout.weights)
         # Internal variables and numbers of the points: one function in their quadrature space.
-        self._variables = fields.variables(n * len(INPUTS))
+        width = len(inputs(layout.statement))
+        self._variables = fields.variables(n * width)
         self.points = Points(
             layout,
             fields.share.grid.keys(self._cells),
             fields.share.cell_lengths()[fields.order],
             scheme,
-            self._variables.x.array.reshape(cells, n, len(INPUTS)),
+            self._variables.x.array.reshape(cells, n, width),
             course,
         )
 

@@ -8,9 +8,9 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import Loop
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.partition import Share
 from ufl_beam.model.connectors import Connector
-from ufl_beam.terms.beams import Beams
+from ufl_beam.terms.base import Beams
 from ufl_beam.terms.openings import Openable
 
 

@@ -20,19 +20,18 @@ from ufl_beam.model import law_functions
 from ufl_beam.model.fibres import Layout
 from ufl_beam.model.material_laws import Bulk, Softening
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.openings import NOTHING, RELEASED, SPENT, Course
 
 law_functions.where.register(Condition, ufl.conditional)
 law_functions.below.register(Expr, ufl.lt)
 law_functions.exp.register(Expr, ufl.exp)
 
-INPUTS = (
-    *names("point_input"),
-    *("dt", "limit", "H", "B", "eta", "softening limit", "softening energy"),
-)
-"""Inputs of the law of a point, in the order of their storage; the first ones are in loops.h."""
 
-SPENT, NOTHING = 1e-6, 1e-30
-"""Part of its limit below which an open hinge counts as a joint; factor of its stiffness then."""
+def inputs(bulk: type[Bulk]) -> tuple[str, ...]:
+    """Inputs of the law of a point, as they are stored; the first ones are those of loops.h."""
+    others = ("dt", *bulk.numbers(), "softening limit", "softening energy")
+    return (*names("point_input"), *others)
+
 
 STATE = ("plastic", "accumulated", "jump", "opening", "before", "traction", "flows")
 """The internal variables, and what else of an accepted state the next step depends on."""
@@ -50,15 +49,16 @@ def expect_entries(layout: Layout, scheme: Scheme, ledger: Ledger) -> None:
         ledger.lost["numerical"] += 0.0
 
 
-def point_forms(softening: Softening | None, scheme: Scheme) -> PointForms:
+def point_forms(bulk: type[Bulk], softening: Softening | None, scheme: Scheme) -> PointForms:
     """Compiled laws of points, made once in a process; numbers of ``softening`` do not matter."""
-    return _point_forms(softening and softening.of(1.0, 1.0), scheme)
+    return _point_forms(bulk, softening and softening.of(1.0, 1.0), scheme)
 
 
 class PointForms:
     """Compiled laws: C functions from the inputs of a point to what the loops need.
 
     Args:
+        statement: Law of the bulk.
         softening: Law of the discontinuities, if points can break; its numbers do not matter.
         scheme: The time scheme.
 
@@ -70,13 +70,13 @@ class PointForms:
         end: What the end of the step brings, see ``point_output`` in loops.h.
     """
 
-    def __init__(self, softening: Softening | None, scheme: Scheme) -> None:
-        self._pointwise = pointwise = Pointwise(INPUTS)
+    def __init__(self, statement: type[Bulk], softening: Softening | None, scheme: Scheme) -> None:
+        self._pointwise = pointwise = Pointwise(inputs(statement))
         at = pointwise.at
         strain, a = ufl.variable(at["strain"]), ufl.variable(at["growth"])
         s, p, ξ, length = (at[n] for n in ("direction", "plastic", "accumulated", "length"))
         θ, dt = at["theta"], at["dt"]
-        bulk = Bulk(at["stiffness"], at["limit"], at["H"], at["B"], at["eta"])
+        bulk = statement(at["stiffness"], *(at[name] for name in statement.numbers()))
 
         # The incompatible mode: a jump relaxes the strain of the bulk by jump over length.
         relieved = at["jump"] / length
@@ -113,40 +113,6 @@ class PointForms:
 
 _point_forms = stated(PointForms)
 
-OPENED, RELIEF, HOLD, OVER = (lib.OPENED, lib.RELIEF, lib.HOLD, lib.OVER)
-"""Entries of :attr:`Course.flags`."""
-
-RELEASED = float(lib.RELEASED)
-"""Value of "flows" of a point that may open in this step although it did not flow in the last."""
-
-
-class Course:
-    """Flags that all points of a scene share in a step.
-
-    Attributes:
-        flags: Of the present search for an equilibrium; (4,), int32.  OPENED: a point has opened.
-            RELIEF: points that do not open answer elastically.  HOLD: points that do not flow stay
-            closed.  OVER: one of them has borne more than its limit.
-    """
-
-    def __init__(self) -> None:
-        self.flags: Index = np.zeros(lib.COURSE_FLAGS, dtype=np.int32)
-        self._first: tuple[Index, Index] = (self.flags.copy(), self.flags.copy())
-        self._first[True][HOLD] = 1
-
-    def begin(self, hold: bool) -> None:
-        """Begin a search for an equilibrium."""
-        self.flags[:] = self._first[hold]
-
-    @property
-    def opened(self) -> bool:
-        """True if a point of this process has opened."""
-        return bool(self.flags[OPENED])
-
-    def relieve(self, relief: bool) -> None:
-        """Let points that do not open answer elastically, or no more."""
-        self.flags[RELIEF] = relief
-
 
 class Points:
     """Points of the same layout in many cells.
@@ -156,7 +122,7 @@ class Points:
         keys: For each cell two numbers that random limits depend on, besides their seed.
         length: Of the cells; (cells,); m.
         scheme: The time scheme.
-        storage: Zeros, for all that is known of the points; (cells, n, len(INPUTS)).
+        storage: Zeros, for all that is known of the points; (cells, n, number of inputs).
         course: Shared by all points of a scene.
 
     Attributes:
@@ -183,13 +149,13 @@ class Points:
         course: Course | None = None,
     ) -> None:
         course = course or Course()
-        self._forms = point_forms(layout.softening, scheme)
+        self._forms = point_forms(layout.statement, layout.softening, scheme)
         self._layout, self._storage, self._loss = layout, storage, scheme.loss
         self._yields, self.softens = layout.yields, layout.softening is not None
-        self._at = {name: storage[:, :, i] for i, name in enumerate(INPUTS)}
+        self._at = {name: storage[:, :, i] for i, name in enumerate(inputs(layout.statement))}
         self._bulk = bulk = layout.bulk(keys)
         self._at["stiffness"][:] = bulk.C
-        for name in ("limit", "H", "B", "eta"):
+        for name in bulk.numbers():
             self._at[name][:] = getattr(bulk, name)
         self._at["length"][:] = length[:, None]
         self._at["theta"][:] = scheme.theta

@@ -23,11 +23,10 @@ from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import RigidPlastic
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.material_laws import Bulk, Hardening, Softening
+from ufl_beam.model.material_laws import Hardening, HardeningBulk, Softening
 from ufl_beam.model.plastic_hinges import law_of
-from ufl_beam.terms.connector_laws import Rows, Setting
-from ufl_beam.terms.material_points import NOTHING, RELEASED, SPENT
-from ufl_beam.terms.openings import Openable
+from ufl_beam.terms.connector_responses import Rows, Setting, respond
+from ufl_beam.terms.openings import NOTHING, RELEASED, SPENT, Openable
 
 INPUTS = (
     *names("slip_input", "slip_"),
@@ -74,7 +73,7 @@ def _(law: Softening, at: Mapping[str, Expr], scheme: Scheme) -> Slip:
 @slip.register
 def _(law: Hardening, at: Mapping[str, Expr], scheme: Scheme) -> Slip:
     a, ξ, s, e, θ, H, B = (at[n] for n in ("slip", "slipped", "direction", "start", "θ", "H", "B"))
-    numbers = Bulk(0.0, at["limit"], H, B, at["eta"])
+    numbers = HardeningBulk(0.0, at["limit"], H, B, at["eta"])
     resistance = at["limit"] + H * (ξ + θ * a) + at["eta"] * a / at["dt"]
     return Slip(
         s * resistance + B * (e + θ * s * a),
@@ -152,6 +151,7 @@ def slip_forms(law: Softening | Hardening, scheme: Scheme) -> SlipForms:
     return _slip_forms(Hardening(1.0) if isinstance(law, Hardening) else law.of(1.0, 1.0), scheme)
 
 
+@respond.register(RigidPlastic)
 class RigidPlasticResponse:
     """Rigid-plastic connectors whose laws are of one kind."""
 

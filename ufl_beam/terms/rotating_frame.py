@@ -9,12 +9,11 @@ import ufl
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.csr import Csr, Product
 from ufl_beam.discretization.compiled_forms import stated
-from ufl_beam.discretization.function_spaces import Element, Fields
+from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.kinematics import split, turn
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.loads import RotatingFrame
-from ufl_beam.terms.beams import mass_matrix
 from ufl_beam.terms.energy_ledger import Ledger
 
 

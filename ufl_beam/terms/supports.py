@@ -9,7 +9,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr, as_slice
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.bodies import GROUND

@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The loops over cells and rows that a Newton iteration consists of; see loops.h. */
 
-enum { MOST = 144 }; /* entries of an element vector or matrix: 12 unknowns of degree 3 */
-
 /* The coefficients of a cell from `at` on; the way from one to the next is c->lanes, a power of two:
  * before the batch of a cell there are cell & -lanes cells. */
 static inline double *in_cell(const cells *c, int cell, int at)
@@ -32,13 +30,13 @@ static inline void put_in_cell(const cells *c, int cell, int at, int number, con
 void add_cells(void *self, const double *q, double *b)
 {
   const cells *c = self;
-  if (c->in_lanes) {
-    c->in_lanes(c, q, b);
+  if (c->several) {
+    c->several(c, q, b);
     return;
   }
   const int32_t *dofs = c->dofs, *row = c->row;
   const double *coordinates = c->coordinates;
-  double *w = c->w, e[MOST];
+  double *w = c->w, e[MOST_ENTRIES];
   for (int k = 0; k < c->number; ++k) {
     for (int i = 0; i < c->unknowns; ++i) w[c->at + i] = q[dofs[i]];
     memset(e, 0, c->rows * sizeof *e);

@@ -13,16 +13,19 @@ typedef struct {
 
 /* -- forms and constant matrices --------------------------------------------------------------- */
 
+enum { MOST_ENTRIES = 144 }; /* of the vector or matrix of a cell: 12 unknowns of degree 3 */
+
 /* A compiled form on some cells. w holds the packed coefficients of a cell, `width` of them, of
  * which those from `at` on are the unknowns of the cell, brought up to date on the way.
  *
- * Where a form is computed for several cells at once, in_lanes does what add_cells does, and numbers
+ * Where a form is computed for several cells at once, `several` does what add_cells does, and numbers
  * of cells (w, coordinates, row) come in batches of as many cells: the first number of each of these
  * cells, then their second numbers, and so on; the last batch is filled up with the last cell. */
 typedef struct cells cells;
+typedef void (in_lanes)(const cells *self, const double *q, double *out);
 struct cells {
   kernel *tabulate;
-  void (*in_lanes)(const cells *self, const double *q, double *out); /* or none */
+  in_lanes *several; /* or none */
   int lanes; /* cells of a batch, a power of two; else 1 */
   int number, of_cell, unknowns; /* cells, degrees of freedom of each, those the form depends on */
   const int32_t *dofs;
@@ -209,6 +212,7 @@ int all_finite(int size, const double *values);
 /* Functions of PETSc, which Python finds by these names; its objects are opaque here. Each returns an
  * error, or zero, as what SNES calls does. */
 typedef struct {
+  int (*PetscErrorMessage)(int error, const char **text, char **specific);
   int (*VecGetArrayRead)(void *vec, const double **values);
   int (*VecRestoreArrayRead)(void *vec, const double **values);
   int (*VecGetArray)(void *vec, double **values);
