@@ -1,5 +1,5 @@
 # %% [markdown]
-# # Fibres that yield: where damping of the exponential kind comes from
+# # Yielding fibres: exponential damping without viscosity
 #
 # Engineers damp structures by a viscous force, after Rayleigh, because measured vibrations decay
 # exponentially.  Materials are not viscous, though: what they dissipate, they dissipate by sliding

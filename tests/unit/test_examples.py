@@ -2,6 +2,7 @@
 """Every public name has an example in its docstring, and it does what it shows."""
 
 import doctest
+import re
 
 import pytest
 
@@ -19,9 +20,10 @@ def run(name, thing, names):
     report = []
     runner = doctest.DocTestRunner(verbose=False, optionflags=FLAGS)
     runner.run(test, out=report.append, clear_globs=False)
-    if any("\nImportError: " in line for line in report):  # of an optional package
-        pytest.skip(report[-1].splitlines()[-1])
-    assert not report, "\n".join(report)
+    said = "\n".join(report)
+    if missing := re.search(r"^ *ImportError: .*", said, re.MULTILINE):  # of an optional package
+        pytest.skip(missing[0].strip())
+    assert not report, said
     return test.globs
 
 

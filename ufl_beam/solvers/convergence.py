@@ -12,10 +12,10 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, integers, lib
+from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
 from ufl_beam.solvers.equation import Equation
 from ufl_beam.solvers.newton_options import Newton
-from ufl_beam.solvers.unknowns import Unknowns
 
 REASONS = {
     lib.SINGULAR: "found a singular tangent",
@@ -45,7 +45,7 @@ class Convergence:
 
     def __init__(
         self,
-        share: Unknowns,
+        share: Share,
         equation: Equation,
         x: Array,
         r: Array,

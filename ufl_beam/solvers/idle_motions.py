@@ -14,9 +14,9 @@ from scipy.linalg import qr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr
+from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.solvers.null_vectors import free_matrix, null_vectors
-from ufl_beam.solvers.unknowns import Unknowns
 
 STIFFNESS = 0.01
 """Stiffness against an idle motion in the tangent, as a part of the largest one in the scene.
@@ -42,7 +42,7 @@ class IdleMotions:
         stiffness: At the local degrees of freedom; N/m, N m/rad.
     """
 
-    def __init__(self, share: Unknowns, A: Csr, diagonal: Index, held: Index) -> None:
+    def __init__(self, share: Share, A: Csr, diagonal: Index, held: Index) -> None:
         self._share, self._A, self._diagonal, self._held = share, A, diagonal, held
         self._turns = np.zeros(share.size, dtype=bool)
         self._turns[share.rotations()] = True

@@ -12,6 +12,7 @@ from petsc4py import PETSc
 from ufl_beam.arrays import Array
 from ufl_beam.collective_errors import Agreement
 from ufl_beam.compiled.c_library import doubles, ffi, integers, lib
+from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
 from ufl_beam.solvers.bordered import BorderedNewton
@@ -22,7 +23,6 @@ from ufl_beam.solvers.line_search import SearchingNewton
 from ufl_beam.solvers.newton_options import PREFIX, Newton
 from ufl_beam.solvers.preconditioners import ChainsFirst
 from ufl_beam.solvers.snes_callbacks import SnesCallbacks
-from ufl_beam.solvers.unknowns import Unknowns
 from ufl_beam.solvers.vectors import Vectors, unlock
 
 FULL_STEPS = {"snes_linesearch_type": "basic"}
@@ -51,7 +51,7 @@ class Solver:
 
     def __init__(
         self,
-        share: Unknowns,
+        share: Share,
         equation: Equation,
         newton: Newton,
         least: int,

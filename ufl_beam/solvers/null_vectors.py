@@ -9,7 +9,7 @@ from scipy.sparse.linalg import splu
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.solvers.unknowns import Unknowns
+from ufl_beam.discretization.partition import Share
 
 DENSE = 300
 """Up to this number of unknowns the null vector comes from a singular value decomposition."""
@@ -21,7 +21,7 @@ ROUNDS = 40
 """Largest number of times that rows and columns are scaled."""
 
 
-def free_matrix(share: Unknowns, A: Csr, held: Index) -> tuple[csc_array, Index]:
+def free_matrix(share: Share, A: Csr, held: Index) -> tuple[csc_array, Index]:
     """Assemble the tangent of the whole scene at what supports leave free; all processes call it.
 
     Args:

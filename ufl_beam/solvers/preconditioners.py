@@ -3,14 +3,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from petsc4py import PETSc
 
 from ufl_beam.compiled.c_library import doubles, ffi, lib
 from ufl_beam.compiled.csr import Csr
+from ufl_beam.discretization.partition import Share
 from ufl_beam.solvers.static_condensation import Elimination
-from ufl_beam.solvers.unknowns import Unknowns
 
 GOOD = int(PETSc.PC.FailedReason.NOERROR)
 BAD_PIVOT = int(PETSc.PC.FailedReason.FACTOR_NUMERIC_ZEROPIVOT)
@@ -27,7 +28,7 @@ class ChainsFirst:
         package: What factors the matrix that is left.
     """
 
-    def __init__(self, share: Unknowns, A: Csr, package: str) -> None:
+    def __init__(self, share: Share, A: Csr, package: str) -> None:
         self._elimination = left = Elimination(share, A)
         self._good = False
         arrays = (left.indptr.astype(PETSc.IntType), left.indices.astype(PETSc.IntType), left.data)
@@ -55,29 +56,29 @@ class ChainsFirst:
 
     def setUp(self, pc: PETSc.PC) -> None:
         """Factor; PETSc asks for it where the matrix has changed."""
-        self._good = self._elimination.factor() and self._factor()
+        self._matrix.stateIncrease()
+        self._good = self._elimination.factor() and self._succeeds(self._factors.setUp)
+        self._good = self._good and int(self._factors.getFailedReason()) == GOOD
         pc.setFailedReason(GOOD if self._good else BAD_PIVOT)
 
-    def _factor(self) -> bool:
-        self._matrix.stateIncrease()
+    def _succeeds(self, function: Callable[..., None], *vectors: PETSc.Vec) -> bool:
+        """Return False if KLU finds that the matrix is singular; its next factorisation works."""
         try:
-            self._factors.setUp()
+            function(*vectors)
         except PETSc.Error as error:
             if error.ierr != lib.OF_LIBRARY:
                 raise
-            # KLU says so of a matrix that is singular; its next factorisation does not mind.
             return False
-        return int(self._factors.getFailedReason()) == GOOD
-
-    def _solve(self) -> None:
-        self._rhs.stateIncrease()
-        self._factors.apply(self._rhs, self._solution)
+        return True
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, x: PETSc.Vec) -> None:
-        """Solve; nothing after a failure, where an error would leave objects of PETSc half done."""
-        if not self._good:
+        """Solve; zero after a failure, where an error would leave objects of PETSc half done."""
+        if self._good:
+            self._elimination.reduce(b.array_r)
+            self._rhs.stateIncrease()
+            self._good = self._succeeds(self._factors.apply, self._rhs, self._solution)
+        if self._good:
+            self._elimination.expand(self._solution.array_r, x.array_w)
+        else:
             x.array_w[:] = 0.0
-            return
-        self._elimination.reduce(b.array_r)
-        self._solve()
-        self._elimination.expand(self._solution.array_r, x.array_w)
+            pc.setFailedReason(BAD_PIVOT)

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, integers, lib
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.solvers.unknowns import Unknowns
+from ufl_beam.discretization.partition import Share
 
 
 class Chains:
@@ -26,7 +26,7 @@ class Chains:
     They are found in the structure of the matrix, so they remain right whatever comes to couple.
 
     Args:
-        cell_dofs: Local degrees of freedom of the cells, see :class:`Unknowns`.
+        cell_dofs: Local degrees of freedom of the cells, see :class:`Share`.
         A: Matrix with the columns of each row in order.
         alone: Which local degrees of freedom no other process has; (A.size,).
 
@@ -120,7 +120,7 @@ class Elimination:
         c: All of it in C, see loops.h.
     """
 
-    def __init__(self, share: Unknowns, A: Csr) -> None:
+    def __init__(self, share: Share, A: Csr) -> None:
         self._comm, self._A = share.comm, A
         chains = Chains(share.cell_dofs, A, self._alone(share))
         left = np.ones(share.size, dtype=bool)
@@ -138,7 +138,7 @@ class Elimination:
         })  # fmt: skip
 
     @staticmethod
-    def _alone(share: Unknowns) -> npt.NDArray[np.bool_]:
+    def _alone(share: Share) -> npt.NDArray[np.bool_]:
         ghosts = np.concatenate(share.comm.allgather(share.dofs[share.num_owned :]))
         return ~np.isin(share.dofs, ghosts)
 
@@ -188,9 +188,9 @@ class Elimination:
         }
         of_doubles = {
             "data": A.data,
-            "pivots": np.empty(9 * vertices),  # sizes as in elimination.c
-            "to_next": np.empty(9 * vertices),
-            "sides": np.empty(18 * vertices if chains.spikes.any() else 0),
+            "pivots": np.empty(lib.BLOCK * vertices),
+            "to_next": np.empty(lib.BLOCK * vertices),
+            "sides": np.empty(lib.SIDES * vertices if chains.spikes.any() else 0),
             "f": np.zeros(3 * vertices),
             "left_data": self.data,
             "left_f": self.f,

@@ -7,7 +7,7 @@ from petsc4py import PETSc
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import ffi, petsc
-from ufl_beam.solvers.unknowns import Unknowns
+from ufl_beam.discretization.partition import Share
 
 
 class Vectors:
@@ -17,7 +17,7 @@ class Vectors:
         share: The degrees of freedom of this process.
     """
 
-    def __init__(self, share: Unknowns) -> None:
+    def __init__(self, share: Share) -> None:
         self._share, self._views = share, dict[int, Array]()
         self.parallel = share.comm.size > 1
 

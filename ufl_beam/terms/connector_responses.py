@@ -61,7 +61,7 @@ class Response:
 
     @property
     def openable(self) -> Openable | None:
-        """Those that open beyond a limit, if there are."""
+        """Connectors that open beyond a limit, if there are any."""
         return None
 
     def begin(self, e0: Array, step: Step) -> None:
@@ -133,7 +133,7 @@ class Response:
         """Begin at motions that no step has led to."""
 
     def freeze(self) -> None:
-        """From now on nothing yields or breaks further."""
+        """Keep everything elastic from now on: nothing yields or breaks further."""
 
 
 @singledispatch
@@ -170,7 +170,7 @@ class Working(Response):
         """Prepare a step."""
 
     def accept(self, e1: Array, work: float) -> None:
-        """Enter the work."""
+        """Enter the work into the ledger."""
         if self._entry:
             self._entries[self._entry] += self._sign * work
 

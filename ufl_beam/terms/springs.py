@@ -107,5 +107,5 @@ class _Sprung(Response):
         self.points.refresh(self._at(e))
 
     def freeze(self) -> None:
-        """From now on nothing yields or breaks further."""
+        """Keep everything elastic from now on: nothing yields or breaks further."""
         self.points.freeze()
