@@ -28,10 +28,7 @@ from ufl_beam.model.plastic_hinges import law_of
 from ufl_beam.terms.connector_responses import Response, Rows, Setting, respond
 from ufl_beam.terms.openings import NOTHING, RELEASED, SPENT, Openable
 
-INPUTS = (
-    *names("slip_input", "slip_"),
-    *("θ", "dt", "limit", "energy", "H", "B", "eta"),
-)
+INPUTS = (*names("slip_input", "slip_"), *("θ", "dt", "limit", "energy", "H", "B", "eta"))
 """Inputs of the compiled laws: the slip of the step and its direction (1 or -1); accumulated slip
 and motion at t_n, which loops.h names as well; numbers of the scheme and the law."""
 
