@@ -17,7 +17,7 @@ from ufl_beam.analysis.linearization import SmallMotions
 from ufl_beam.arrays import Array, Complex, State
 from ufl_beam.collective_errors import on_first
 from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.discretization.function_spaces import Fields, SectionForces
 from ufl_beam.discretization.model_warnings import warn_of_masses
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import SceneError, require_count, require_kind, require_number
@@ -31,7 +31,6 @@ from ufl_beam.output.time_series import VTKHDF, XDMF, TimeSeries
 from ufl_beam.parallel import ours
 from ufl_beam.simulation.initial_state import mesh_of
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.terms.beams import SectionForces
 
 AMPLITUDE = 0.1
 """Largest displacement of what is shown of a mode, as a part of the size of the scene."""

@@ -164,7 +164,7 @@ class Fields:
         if self._matrix is None:
             share = self.share
             couples = (share.cell_dofs, share.link_dofs, share.body_dofs)
-            self._matrix = Csr(coupling(share.size, *couples))
+            self._matrix = coupling(share.size, *couples)
             return self._matrix
         return self._matrix.zeros_like()
 
@@ -245,3 +245,24 @@ class Strains:
         strains = np.zeros(self.shape)
         self.kernel.add(q, strains)
         return strains
+
+
+@stated
+def _section_forces(of: Element) -> ufl.Form:
+    C, e = of.stiffness, strain(of.q1, of.axis)
+    z = ufl.TestFunction(C.function_space)
+    return sum(C[i] * e[i] * z[i] for i in range(3)) / of.axis.h * of.dx(1)  # P(7)
+
+
+class SectionForces:
+    """(N, V, M) in the cells were they elastic, from the strains of a configuration, P(7)."""
+
+    def __init__(self, fields: Fields) -> None:
+        self._kernel = fields.kernel(_section_forces(fields.element), fields.element.q1)
+        self._order = fields.order
+
+    def write(self, q: Array, resultants: Array) -> None:
+        """Resultants at ``q`` into the rows of the cells, in the order of the share; N, N, N m."""
+        values = np.zeros(3 * len(self._order))
+        self._kernel.add(np.ascontiguousarray(q), values)
+        resultants[self._order] = values.reshape(-1, 3)

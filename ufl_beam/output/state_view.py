@@ -11,7 +11,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.discretization.function_spaces import Fields, SectionForces
 from ufl_beam.discretization.partition import Share
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.bodies import Anchor
@@ -22,7 +22,7 @@ from ufl_beam.model.supports import Support
 from ufl_beam.output.joint_histories import Connection, links_of, motion_of, velocity_of
 from ufl_beam.output.snapshot import Snapshot
 from ufl_beam.parameter import Parameter
-from ufl_beam.terms.beams import Inertia, SectionForces
+from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.inelastic_beams import InelasticBeams
 from ufl_beam.terms.links import Links

@@ -20,6 +20,8 @@ from ufl_beam.model.constraint_checks import friction_repeats
 from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.simulation.step_equation import StepEquation
+from ufl_beam.solvers.c_equation import CEquation
+from ufl_beam.solvers.equation import Equation
 from ufl_beam.terms.algorithmic_damping import numerical_forces
 from ufl_beam.terms.base import Cells, Term
 from ufl_beam.terms.beams import ElasticBeams, Inertia
@@ -77,6 +79,13 @@ class Assembly:
     def remembering(self) -> list[InelasticBeams | Links]:
         """Terms with internal variables."""
         return [*self.inelastic, *self.couplings]
+
+    def compiled(self) -> Equation:
+        """Return the equation in C, or as it is where several processes or axes need Python."""
+        python = self.equation
+        if python.share.comm.size > 1 or self.supports.turned:
+            return python
+        return CEquation(python, self.beams, self.couplings, python.others, self.supports)
 
     def internal_variables(self, q: Array) -> State:
         """Return what a run that starts here takes over: internal variables, reactions, rates."""

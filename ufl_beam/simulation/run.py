@@ -132,10 +132,12 @@ def simulate(
 
         def go_on(keeper: Keeper) -> None:
             states = keeper.resume(simulation, pace, t1)
+            solution.time_error = pace.error
             for recorder, state in zip(recorders, states, strict=False):
                 recorder.resume(simulation, state)
 
         def after_step() -> None:
+            solution.time_error = pace.error
             if recorders or keeper is not None:
                 simulation.settle()  # before anything is written
             if pace.steps % solution.every == 0 or pace.finished:

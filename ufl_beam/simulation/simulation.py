@@ -164,7 +164,7 @@ class Simulation(StateView):
             self.reactions_known = True
 
         self._steps = StepSolver(
-            scheme, self.equation, parts.openings, self._branch, newton, together
+            scheme, self.equation, parts.compiled(), parts.openings, self._branch, newton, together
         )
         self._solver = self._steps.newton
         self.solution = kind(scene, grid)
@@ -272,6 +272,8 @@ class Simulation(StateView):
 
         All processes ask together, whoever computes the connector.
         """
+        if not self._asking:
+            return
         self.asked.update({link: law.ask(self, link) for link, law in self._asking})
         for coupling in self._rubbing if has_inertia(self.scheme) else ():
             rates = coupling.rates(self.q, self.inertia.v)

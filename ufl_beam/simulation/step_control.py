@@ -16,7 +16,6 @@ from ufl_beam.collective_errors import Agreement
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed, require_number, require_sequence
 from ufl_beam.model.scene import Scene
-from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_cutting import Trial
 from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.supports import Supports
@@ -38,7 +37,6 @@ class Stepper(Protocol):
     last_dt: float
     inertia: Inertia
     supports: Supports
-    solution: Solution
     together: Agreement
 
     def step_to(self, t1: float) -> None:
@@ -59,9 +57,11 @@ class Pace(Protocol):
 
     Attributes:
         steps: Steps done.
+        error: Sum of the estimated errors so far; NaN if there are none.
     """
 
     steps: int
+    error: float
 
     @property
     def finished(self) -> bool:
@@ -96,6 +96,7 @@ class EqualSteps:
 
     def __init__(self, t0: float, t1: float, dt: float) -> None:
         self._t0, self._t1 = t0, t1
+        self.error = math.nan
         # The slack is for the rounding of (t1 - t0) / dt.
         self._all = max(1, math.ceil((t1 - t0) / dt * (1 - 1e-9)))
         self.steps = 0
@@ -193,7 +194,7 @@ class AdaptiveSteps:
 
     def __init__(self, simulation: Stepper, t1: float, choice: Adaptive) -> None:
         self._t0 = self._t = t0 = simulation.t
-        self._t1, self._solution = t1, simulation.solution
+        self._t1 = t1
         self._tolerance = choice.tolerance
         self._longest = choice.longest or t1 - t0
         last_digit = math.ulp(max(abs(t0), abs(t1)))
@@ -249,7 +250,7 @@ class AdaptiveSteps:
                 simulation.give_up(failure, self._t + self._dt)
         simulation.accept(trial)
         self._t = simulation.t
-        self.error = self._solution.time_error = self.error + error
+        self.error += error
         self.steps += 1
         self._dt = min(dt * min(change, GROWTH), self._longest)
         # The acceleration may jump at a stop, so what was before tells nothing about what comes.
@@ -312,6 +313,5 @@ class AdaptiveSteps:
         for name in self._STATE:
             setattr(self, name, type(getattr(self, name))(state[name]))
         self._largest = [state[f"largest {i}"] for i in range(len(self._largest))]
-        self._solution.time_error = self.error
 
     _STATE = ("steps", "rejected", "error", "_t", "_dt", "_fresh")

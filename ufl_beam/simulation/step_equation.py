@@ -13,10 +13,8 @@ from ufl_beam.compiled.csr import Csr, Product
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Step
-from ufl_beam.solvers.c_equation import CEquation
-from ufl_beam.solvers.equation import Equation, PythonEquation
+from ufl_beam.solvers.equation import PythonEquation
 from ufl_beam.terms.base import Beams, Cells, Term
-from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.openings import Course
 from ufl_beam.terms.supports import Supports
@@ -40,6 +38,7 @@ class StepEquation(PythonEquation):
         course: Flags that all material points share.
 
     Attributes:
+        others: All terms but those of internal forces.
         terms: All terms.
     """
 
@@ -58,8 +57,8 @@ class StepEquation(PythonEquation):
         self.share, self.supports, self._course = share, supports, course
         self._beams, self._couplings, self._loads = beams, couplings, loads
         self._inner: list[Beams] = [*beams, *couplings]
-        self._others: list[Term] = [*loads, *others]
-        self.terms: list[Term] = [*self._inner, *self._others]
+        self.others: list[Term] = [*loads, *others]
+        self.terms: list[Term] = [*self._inner, *self.others]
 
     def begin(self, step: Step) -> None:
         """Let all terms begin a step."""
@@ -70,12 +69,6 @@ class StepEquation(PythonEquation):
         """Vectors of the loads in the present step; new arrays where they have changed."""
         return [load.force for load in self._loads]
 
-    def compiled(self) -> Equation:
-        """Return the same equation in C; itself where several processes or axes need Python."""
-        if self.share.comm.size > 1 or self.supports.turned:
-            return self
-        return CEquation(self, self._beams, self._couplings, self._others, self.supports)
-
     def residual(self, x: Array, r: Array) -> None:
         """Write the local part of the residual at ``x`` into ``r``."""
         q1 = self.supports.in_plane(x)
@@ -83,7 +76,7 @@ class StepEquation(PythonEquation):
         for inner in self._inner:
             inner.add_residual(q1, self.force)
         r[:] = self.force
-        for term in self._others:
+        for term in self.others:
             term.add_residual(q1, r)
         self.supports.enter(r)
 
@@ -157,7 +150,7 @@ class StepEquation(PythonEquation):
         r = np.zeros(self.share.size)
         self.A.data.fill(0.0)
         for term in self.terms:
-            if not isinstance(term, Inertia):
+            if term.kind != "inertia":
                 term.begin(step)
                 term.add_residual(q, r)
                 term.add_tangent(q)
@@ -184,8 +177,8 @@ class StepEquation(PythonEquation):
             Y: Virtual motions, in columns.
         """
         self.A.data.fill(0.0)
-        for term in (*self._couplings, *self._others):
-            if not isinstance(term, Inertia):
+        for term in (*self._couplings, *self.others):
+            if term.kind != "inertia":
                 term.add_tangent(q)
         times, works = Product(self.A), np.zeros(X.shape[1])
         for i, (x, y) in enumerate(zip(*map(np.ascontiguousarray, (X.T, Y.T)), strict=True)):

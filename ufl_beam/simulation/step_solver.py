@@ -15,7 +15,7 @@ from ufl_beam.model.constraint_checks import no_number
 from ufl_beam.simulation.branch_check import StaticPath
 from ufl_beam.simulation.step_cutting import Trial
 from ufl_beam.simulation.step_equation import StepEquation
-from ufl_beam.solvers.equation import Border
+from ufl_beam.solvers.equation import Border, Equation
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.solvers.newton_options import Newton
 from ufl_beam.terms.openings import Openings
@@ -37,6 +37,7 @@ class StepSolver:
     Args:
         scheme: The time scheme.
         equation: The equation of a step.
+        compiled: The same for the solver, perhaps in C.
         openings: Search for what opens; None if nothing can.
         branch: In statics, whether a step has stayed on its branch of equilibria.
         newton: Tolerances and PETSc options.
@@ -50,6 +51,7 @@ class StepSolver:
         self,
         scheme: Scheme,
         equation: StepEquation,
+        compiled: Equation,
         openings: Openings | None,
         branch: StaticPath | None,
         newton: Newton,
@@ -58,7 +60,7 @@ class StepSolver:
         self._scheme, self._equation, self._openings = scheme, equation, openings
         self._branch, self._together, share = branch, together, equation.share
         least = LEAST_IN_MOTION if has_inertia(scheme) else LEAST_AT_REST
-        self.newton = Solver(share, equation.compiled(), newton, least, together)
+        self.newton = Solver(share, compiled, newton, least, together)
         self._rotations, self._multipliers = share.rotations(), as_slice(share.multipliers())
         self._coupled = len(share.grid.multipliers) > 0
 
@@ -74,11 +76,11 @@ class StepSolver:
             StepFailed: There is no equilibrium, or it is too far away.
         """
         loads = self._equation.load_forces()
-        solve = partial(self.newton.solve, loads=loads, like_last=like_last)
         try:
             if self._openings is None:
-                q1 = solve(guess)
+                q1 = self.newton.solve(guess, loads, like_last)
             else:
+                solve = partial(self.newton.solve, loads=loads, like_last=like_last)
                 q1 = self._openings.solve(guess, solve, partial(self._equation.begin, step))
         except StepFailed:
             try:

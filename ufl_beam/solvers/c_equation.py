@@ -18,7 +18,6 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, integers, lib, petsc
 from ufl_beam.solvers.equation import Callbacks, Demand, Equation, InPython
-from ufl_beam.solvers.preconditioners import ChainsFirst
 from ufl_beam.terms.base import Beams, Term
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.supports import Supports
@@ -102,7 +101,7 @@ class CEquation:
         petsc("SNESSetJacobian", snes, matrix, matrix, jacobian, self.c)
         petsc("SNESSetConvergenceTest", snes, test, self.c, ffi.NULL)
 
-    def drive(self, snes: PETSc.SNES, factors: ChainsFirst) -> None:
+    def drive(self, snes: PETSc.SNES, factors: Any) -> None:
         """Let SNES leave Newton's method to the one in C."""
         factors.drive(self.c)
         snes.setType("shell")

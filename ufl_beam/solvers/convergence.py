@@ -11,12 +11,11 @@ from petsc4py import PETSc
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import doubles, ffi, integers, lib
+from ufl_beam.compiled.c_library import doubles, integers, lib
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
 from ufl_beam.solvers.equation import Equation
 from ufl_beam.solvers.newton_options import Newton
-from ufl_beam.solvers.vectors import Vectors
 
 REASONS = {
     lib.SINGULAR: "found a singular tangent",
@@ -34,8 +33,8 @@ class Convergence:
     Args:
         share: The degrees of freedom of this process.
         equation: Its data in C are completed.
-        vectors: Makes the local values of vectors known.
-        x, f: Vectors of the iterate, and of its residual.
+        x: Local values of the iterate.
+        r: Those of its residual.
         newton: Tolerances.
         least: Iterations at least, unless a residual is far below its tolerance.
 
@@ -48,14 +47,13 @@ class Convergence:
         self,
         share: Share,
         equation: Equation,
-        vectors: Vectors,
-        x: PETSc.Vec,
-        f: PETSc.Vec,
+        x: Array,
+        r: Array,
         newton: Newton,
         least: int,
     ) -> None:
-        self._share, self._A, self._parallel = share, equation.A, vectors.parallel
-        self._x, self._r = vectors.view(x, writable=True), vectors.view(f, writable=True)
+        self._share, self._A, self._parallel = share, equation.A, share.comm.size > 1
+        self._x, self._r = x, r
         self._weights = self._force_weights()
         self._norm = (len(self._weights), doubles(self._weights))
         self.moves = np.ones(share.size)
@@ -74,7 +72,6 @@ class Convergence:
         c.rtol, c.modified, c.rate = newton.rtol, newton.modified, math.inf
         c.weight, c.residual = self._norm[1], self._at_r
         c.lengths, c.moves, c.space, c.change, c.diagonal = self._alive
-        c.x = ffi.cast("void *", x.handle)
         c.most, c.least = newton.max_iterations, least
 
     def _force_weights(self) -> Array:

@@ -11,7 +11,7 @@ from petsc4py import PETSc
 
 from ufl_beam.arrays import Array
 from ufl_beam.collective_errors import Agreement
-from ufl_beam.compiled.c_library import doubles, integers, lib
+from ufl_beam.compiled.c_library import doubles, ffi, integers, lib
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
@@ -60,10 +60,10 @@ class Solver:
         self._share, self._equation, self._newton = share, equation, newton
         self._agreement, self._vectors = agreement, Vectors(share)
         self._x, self._f = self._vectors.new(), self._vectors.new()
-        self._convergence = Convergence(
-            share, equation, self._vectors, self._x, self._f, newton, least
-        )
-        self._callbacks = SnesCallbacks(equation, self._vectors, self._convergence)
+        self._q, r = (self._vectors.view(one, writable=True) for one in (self._x, self._f))
+        self._convergence = Convergence(share, equation, self._q, r, newton, least)
+        equation.c.x = ffi.cast("void *", self._x.handle)
+        self._callbacks = SnesCallbacks(equation, self._vectors, self._convergence.test)
         self._matrix = self._make_matrix()
         # A connector alone may hold a part whose own stiffness leaves zeros, or nothing but
         # round-off, on the diagonal; PETSc's factorisation does not exchange rows, KLU's does.
@@ -140,7 +140,7 @@ class Solver:
         """Work of the latest residual on a step from the present iterate; J."""
         for vector in (self._x, y):
             self._vectors.update_ghosts(vector)
-        step = self._equation.working(self._vectors.view(self._x), self._vectors.view(y))
+        step = self._equation.working(self._q, self._vectors.view(y))
         return lambda: self._convergence.work(step)
 
     def _along(self, border: Border) -> PETSc.SNES:
@@ -232,7 +232,7 @@ class Solver:
         return exact if exact > 0 else slow
 
     def _go_to(self, q: Array) -> None:
-        self._vectors.view(self._x)[:] = q
+        self._q[:] = q
         self._x.stateIncrease()
 
     def _iterate(
@@ -280,7 +280,7 @@ class Solver:
 
     def iterate(self) -> Array:
         """Return the latest configuration, converged or not; local values, ghosts included."""
-        return self._vectors.view(self._x).copy()
+        return self._q.copy()
 
     def size(self, forces: Array) -> float:
         """Euclidean norm over the scene of forces, and moments over its size; N."""

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -12,7 +12,6 @@ from petsc4py import PETSc
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.solvers.convergence import Convergence
 from ufl_beam.solvers.equation import Equation
 from ufl_beam.solvers.vectors import Vectors
 
@@ -23,14 +22,14 @@ class SnesCallbacks:
     Args:
         equation: Says what they are.
         vectors: Local values of vectors.
-        convergence: Says when to stop.
+        stop: Returns why to stop after an iteration, or zero.
 
     Attributes:
         idle: Entries of the tangent and stiffnesses that hold idle motions, if there are any.
     """
 
-    def __init__(self, equation: Equation, vectors: Vectors, convergence: Convergence) -> None:
-        self._equation, self._vectors, self._convergence = equation, vectors, convergence
+    def __init__(self, equation: Equation, vectors: Vectors, stop: Callable[[int], int]) -> None:
+        self._equation, self._vectors, self._stop = equation, vectors, stop
         self.idle: tuple[Index, Array] | None = None
 
     @contextmanager
@@ -59,7 +58,7 @@ class SnesCallbacks:
 
     def jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, J: PETSc.Mat, P: PETSc.Mat) -> None:
         """Compute the tangent at ``x``, unless the last one is near enough."""
-        if self._convergence.c.near:
+        if self._equation.c.near:
             return
         self._vectors.update_ghosts(x)
         with self.noted():
@@ -71,4 +70,4 @@ class SnesCallbacks:
 
     def test(self, snes: Any, iteration: int, norms: Any) -> int:
         """Return why to stop after an iteration, or zero."""
-        return self._convergence.test(iteration)
+        return self._stop(iteration)

@@ -7,7 +7,6 @@ import math
 from functools import cached_property, partial
 from typing import NamedTuple
 
-import numpy as np
 import ufl
 
 from ufl_beam.arrays import Array
@@ -130,27 +129,6 @@ class ElasticBeams(OfForms):
     def _cell_tangent(self) -> CellTangent:
         kernel = partial(self._fields.kernel, unknown=self._q1)
         return CellTangent(self._work, self._q1, kernel, self._A)
-
-
-@stated
-def _section_forces(of: Element) -> ufl.Form:
-    C, e = of.stiffness, strain(of.q1, of.axis)
-    z = ufl.TestFunction(C.function_space)
-    return sum(C[i] * e[i] * z[i] for i in range(3)) / of.axis.h * of.dx(1)  # P(7)
-
-
-class SectionForces:
-    """(N, V, M) in the cells were they elastic, from the strains of a configuration, P(7)."""
-
-    def __init__(self, fields: Fields) -> None:
-        self._kernel = fields.kernel(_section_forces(fields.element), fields.element.q1)
-        self._order = fields.order
-
-    def write(self, q: Array, resultants: Array) -> None:
-        """Resultants at ``q`` into the rows of the cells, in the order of the share; N, N, N m."""
-        values = np.zeros(3 * len(self._order))
-        self._kernel.add(np.ascontiguousarray(q), values)
-        resultants[self._order] = values.reshape(-1, 3)
 
 
 class Inertia(OfMatrix):
