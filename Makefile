@@ -15,11 +15,11 @@ export OMPI_MCA_mpi_yield_when_idle = 1
 mpi = ./env timeout 2400 mpirun -n $(1) sh -c 'rank=$${OMPI_COMM_WORLD_RANK:-$${PMI_RANK:-0}}; [ $$rank = 0 ] && exec "$$@"; \
 	log=.rank$$rank.log; "$$@" >$$log 2>&1 && exec rm $$log; status=$$?; echo "rank $$rank:"; cat $$log; exit $$status' -
 pytest_mpi = python3 -m pytest -q --color=no -p no:cacheprovider
-# Only on 3 ranks has one of them neighbours on both sides, and do sums depend on their order. That concerns what is shared:
-# random scenes and their invariance (whatever goes wrong with them on 2 ranks does so on 3), elimination, gathering, files,
-# agreement. For all other units it is enough that they have met a second rank. Whole suites on 2 and 3 took half an hour.
+# With 3 ranks one of them has neighbours on both sides, and sums depend on their order. This matters for shared data:
+# random scenes and their invariance, elimination, gathering, files, agreement. All other units run on 2 ranks only;
+# whole suites on 2 and 3 ranks took half an hour.
 sharing = tests/properties $(addprefix tests/unit/test_,$(addsuffix .py,agreement checkpoint copies elimination factorisation locks mesh modes outputs record solution sparse studies))
-# What compiles forms, reads FFCx's kernels or calls PETSc: there the versions of DOLFINx differ.
+# Tests of code that depends on the version of DOLFINx: forms, kernels of FFCx, calls of PETSc.
 versions = $(addprefix tests/unit/test_,$(addsuffix .py,forms lanes native solve equation elimination factorisation modes))
 cheap_demos = $(addprefix demos/demo_,$(addsuffix .py,four_beam_swing roll_up emergency_stop fibre_damping monte_carlo adaptive_steps lee_frame hinge_snapback rotating_beam))
 
@@ -61,13 +61,13 @@ demos-cheap: ## the cheap demos, alone and on 2 ranks
 check: ## lint, format and types
 	@./env sh -ec '$(with_ruff); $$ruff check; $$ruff format --check; python3 -m mypy'
 
-check-paraview: ## whether ParaView shows what runs write; builds a root with ParaView once, 2.3 GB
+check-paraview: ## time series opened in ParaView; builds a root with ParaView once, 2.3 GB
 	@tests/paraview/check
 
-extremes: ## what happens at the extremes, as a table in docs/extremes.md
+extremes: ## results at extreme parameters, as tables in docs/extremes.md
 	@./env python3 benchmarks/extremes
 
-study: ## what each dial costs and errs, as docs/study.md; twenty minutes, `make study only=--quick` two
+study: ## cost and error of each setting, as docs/study.md; twenty minutes, `make study only=--quick` two
 	@./env python3 benchmarks/study $(only)
 
 schemes: ## errors of the time schemes at equal steps, as tables in docs/schemes.md
@@ -80,7 +80,7 @@ bench: ## time per step
 	@./env python3 benchmarks/bench_budget.py
 	@./env python3 benchmarks/bench_scaling.py
 
-bench-peers: ## beside Exudyn, OpenSees and a C loop: time, memory, error
+bench-peers: ## time, memory and error beside Exudyn, OpenSees and a C loop, as docs/peers.md
 	@./env python3 benchmarks/peers
 
 alone = set -e; for demo in $(1); do echo "== $$demo"; ./env python3 $$demo; done

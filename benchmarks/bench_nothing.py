@@ -85,7 +85,7 @@ def main():
         case = {
             "case": name,
             "unknowns": simulation.grid.size,
-            "entries": len(simulation._A.data),
+            "entries": len(simulation.equation.A.data),
             "works": [type(term).__name__ for term in simulation.terms],
             "iterations_per_step": iterations / options.steps,
             "us_per_iteration": statistics.median(times),

@@ -94,9 +94,10 @@ def watched(simulation):
     watch, solver = Stopwatch(), simulation._solver
     chains_first = solver._ksp.getPC().getPythonContext()
     for owner, names, part in (
-        (solver, ("_residual", "_tangent"), "assembly"),
-        (solver, ("_complete", "_update_ghosts"), "supports and ghosts"),
-        (solver, ("_size", "_round_off", "_excess"), "convergence test"),
+        (simulation.equation, ("residual", "tangent"), "assembly"),
+        (simulation.equation, ("complete",), "supports and ghosts"),
+        (solver._vectors, ("update_ghosts",), "supports and ghosts"),
+        (solver._convergence, ("_size", "_round_off"), "convergence test"),
         (chains_first._elimination, ("factor", "reduce", "expand"), "elimination"),
         (chains_first._elimination, ("_sum",), "communication"),
         (chains_first, ("_factor", "_solve"), "what is left"),

@@ -1,11 +1,11 @@
 # %% [markdown]
-# # Adaptive steps: short where it matters
+# # Adaptive steps
 #
 # The four-beam swing moves slowly for 0.64 s, then it snaps taut within microseconds.  Equal steps
-# that resolve the snap are far too short for the rest.  `dt=ub.Adaptive(tolerance)` takes steps as
-# long as the accuracy allows: each step estimates its own error from how its acceleration changes.
+# that resolve the snap are far too short for the rest.  `dt=ub.Adaptive(tolerance)` chooses the
+# steps by the error of each step, estimated from the change of the acceleration.
 #
-# This demo emphasises
+# This demo shows
 #
 # * adaptive steps against equal ones: steps needed for the same error,
 # * that steps end where the table of the load has its kinks,
@@ -102,13 +102,13 @@ for kink in push.times[1:]:
     assert kink in chosen.times
 
 # %% [markdown]
-# Against equal steps that err as much, adaptive ones are fewer by an order of magnitude.  The sum
-# of the errors that the steps estimated is above the error that is left: here the motion forgets.
+# For the same error, there are fewer adaptive than equal steps, by an order of magnitude.  The sum
+# of the estimated errors is larger than the error at the end, since errors decay in this motion.
 #
-# ## Something to hit
+# ## Impact on a stop
 #
-# A stop 0.12 m to the right of the middle.  `Events` lists what happens; the steps find the
-# impacts by themselves.
+# A stop stands 0.12 m to the right of the middle.  `Events` lists the impacts; the steps adapt to
+# them.
 
 # %%
 stop = ub.Slide(ub.ground(0.36, -0.36), middle, ub.Stop(1e5, high=0.12), axis=(1, 0))
@@ -155,6 +155,6 @@ if ub.parallel.ours().rank == 0:
 # %% [markdown]
 # ## Try this
 #
-# * `Midpoint(0.05, 0.05)`: what the scheme loses counts as an error, so steps are shorter.
-# * A pulse that no table announces, `time=lambda t: 2.0 * (0.1 < t < 0.2)`: steps find the jumps
-#   at some cost; `ub.Adaptive(1e-6, stops=[0.1, 0.2])` saves it.
+# * `Midpoint(0.05, 0.05)`: dissipation of the scheme counts as an error, so steps are shorter.
+# * A pulse without a table, `time=lambda t: 2.0 * (0.1 < t < 0.2)`: the steps find the jumps at
+#   some cost; `ub.Adaptive(1e-6, stops=[0.1, 0.2])` avoids it.

@@ -2,11 +2,11 @@
 # # Emergency stop: a hinge that opens and saves the arm
 #
 # A slender arm of a pick-and-place machine turns with its payload at 4 rad/s when the brake of its
-# hub closes within 20 ms.  The moment at the hub would bend the arm for good.  A predetermined
-# breaking joint in the flange gives way first: it opens, dissipates its fracture energy, no more
-# and no less, and is a revolute joint from then on, about which the arm swings on.
+# hub closes within 20 ms.  The moment at the hub would bend the arm permanently.  A predetermined
+# breaking joint at the hub prevents this: it opens, dissipates exactly its fracture energy, and is
+# a revolute joint from then on, about which the arm swings on.
 #
-# This demo emphasises
+# This demo shows
 #
 # * a hinge that softens, P(49)-P(53), at a chosen place of a moving beam,
 # * the transition from a rigid joint to a revolute one without a change of the model,
@@ -31,14 +31,13 @@ output.mkdir(exist_ok=True)
 # ## Scene
 #
 # The hub turns as prescribed: up to speed within 0.3 s, on until 0.5 s, then the brake.  The
-# breaking joint is in the middle of the flange, 10 mm from the hub.  It opens at M_u = 300 N m,
-# twice what the drive needs, and takes G_f = 20 J to break, half the energy in motion.
+# breaking joint is at the hub.  It opens at M_u = 300 N m, twice the moment of the drive, and its
+# fracture energy G_f = 20 J is half of the kinetic energy.
 
 # %%
 L, payload = 1.5, 2.0  # m, kg
 tube = ub.Section.tube(d=0.050, t=0.002, E=70e9, nu=0.33, rho=2700.0)  # m, Pa, -, kg/m^3
 M_yield = 250e6 * tube.EI / 70e9 / 0.025  # N m: 250 MPa in the outermost fibre
-flange = 0.020  # m
 M_u, G_f = 300.0, 20.0  # N m, J
 
 speed = 4.0  # rad/s
@@ -66,8 +65,8 @@ def run(hinges, record=()):
 # %% [markdown]
 # ## Two runs
 #
-# The arm as it is, and the same without the breaking joint.  `alpha` takes out what the brake
-# excites in frequencies far above those of the arm; it is in the ledger as "numerical".
+# The arm with the breaking joint, and without it.  `alpha` damps vibrations at frequencies far
+# above those of the arm, which the brake excites; the ledger has this loss as "numerical".
 
 # %%
 breaking = {0.0: ub.Softening(M_u, G_f)}
@@ -169,12 +168,11 @@ ub.plot_hinge(saved, arm.start).savefig(output / "emergency_stop_hinge.png")
 ub.say("\npictures and data:", *sorted(str(p) for p in output.glob("emergency*")), sep="\n  ")
 
 # %% [markdown]
-# ## What the agreement proves
+# ## Verification
 #
-# The opening of the hinge costs what its law says and nothing else: the ledger closes with it.
-# After that it is a revolute joint: no moment, no dissipation, and the arm swings on freely.  Its
-# angular momentum about the hub is constant up to what the force in the flange does on the 10 mm
-# between hub and hinge.
+# The hinge dissipates exactly its fracture energy, and the ledger closes.  After that it is a
+# revolute joint: no moment, no dissipation, and the arm swings freely with constant angular
+# momentum about the hub.
 
 # %%
 for solution in (saved, bent):
@@ -196,5 +194,5 @@ assert np.ptp(momentum) < 1e-2 * momentum.mean()
 # ## Try this
 #
 # * `LinearSoftening(M_u, G_f)`: the joint is open after 2 G_f/M_u = 0.13 rad, and then entirely,
-# * `G_f = 60.0`: more than the arm has; where does it stop?
+# * `G_f = 60.0`: more than the energy of the arm; where does it stop?
 # * `tube` with `bending=ub.Hardening(M_yield, modulus=...)`: how far does the arm bend without?

@@ -2,14 +2,14 @@
 # # End rotation: the moment of a beam that yields, flows and breaks
 #
 # The free end of a straight cantilever is turned by π, at different rates.  The moment is the same
-# all along the beam, so every law of the material shows itself in one number, and every number has
+# all along the beam, so the result of each material law is one number with
 # a closed form.  This is section 4.1 of the paper: its Table 1 and its Figures 4 and 5.
 #
-# This demo emphasises
+# This demo shows
 #
 # * hardening plasticity and two ways to state its viscosity, P(39) and P(45),
 # * an energy ledger that closes to round-off although energy is dissipated,
-# * a hinge that opens in one cell, softens, and does not know the mesh around it.
+# * a plastic hinge that opens and softens, independently of the mesh.
 #
 # What the paper does not print follows from its numbers: L = 1 m, and the rates π, 10π and 100π
 # per second are those of the curvature, so that the end turns by π in 1, 0.1 and 0.01 s.
@@ -372,11 +372,11 @@ ub.plot_shapes(half_circle, count=9).savefig(output / "end_rotation_shapes.png")
 ub.say("\npictures and data:", *sorted(str(p) for p in output.glob("end_rotation*")), sep="\n  ")
 
 # %% [markdown]
-# ## What the agreement proves
+# ## Verification
 #
-# The laws are stated right, in the paper's numbers and against closed forms to round-off; Perzyna
-# and Duvaut and Lions are one law; the ledger is exact with all of them; and what a hinge resists
-# depends on its jump alone, whatever the mesh and the rate.
+# The laws agree with the paper's numbers, and with closed forms to round-off.  The laws of Perzyna
+# and of Duvaut and Lions are identical.  The ledger is exact with all of them, and the moment of a
+# hinge depends on its jump alone, whatever the mesh and the rate.
 #
 # ## Try this
 #

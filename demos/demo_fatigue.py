@@ -2,9 +2,9 @@
 # # A tank on a frame in a storm: which weld cracks first
 #
 # A tank stands on a steel frame of two storeys.  Turbulence shakes it at its natural frequency, so
-# that stresses go to and fro some thousand times in an hour.  Nothing yields; welds get tired.
+# that stresses alternate some thousand times in an hour.  Nothing yields, but welds fatigue.
 #
-# This demo emphasises
+# This demo shows
 #
 # * `Fatigue`: rainflow cycles of the stress at named places, counted while the run goes on,
 # * `SNCurve.eurocode`, Miner's sum, the life that is left; other curves afterwards,
@@ -180,7 +180,7 @@ with ub.picture((13, 5.5)) as figure:
 figure.savefig(output / "fatigue_storm.png")
 
 # %% [markdown]
-# ## What the agreement proves
+# ## Verification
 #
 # A lightly damped frame in a random wind answers in a narrow band: the amplitudes of its stress
 # follow Rayleigh's law.  With one slope $m$ the damage per cycle is then
@@ -222,4 +222,4 @@ ub.say("pictures:", *sorted(str(p) for p in output.glob("fatigue*.png")), sep="\
 #
 # * `Rayleigh(mass=0.6)`, a damper in the frame: which life does it buy?
 # * `factor=1.3` for the lower girder: the stress concentration of a bad weld.
-# * `Section.tube(d=0.33, ...)` for the lower girder: does it get less tired, or does a foot more?
+# * `Section.tube(d=0.33, ...)` for the lower girder: how do its damage and that of a foot change?

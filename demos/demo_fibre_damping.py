@@ -1,5 +1,5 @@
 # %% [markdown]
-# # Fibres that yield: where damping of the exponential kind comes from
+# # Yielding fibres: exponential damping without viscosity
 #
 # Engineers damp structures by a viscous force, after Rayleigh, because measured vibrations decay
 # exponentially.  Materials are not viscous, though: what they dissipate, they dissipate by sliding
@@ -7,7 +7,7 @@
 # which amplitudes decay **linearly**.  Many of them, with scattered yield stresses, are activated
 # one after the other as the amplitude grows, and the decay is **exponential**, without viscosity.
 #
-# This demo emphasises
+# This demo shows
 #
 # * a section of fibres, each with a yield stress of its own, `Hardening(limit=Normal(...))`,
 # * free vibration from an initial velocity under the scheme that conserves energy exactly,
@@ -222,7 +222,7 @@ names = sorted(str(path) for path in output.glob("fibre_damping*"))
 ub.say("\npictures and data:", *names, sep="\n  ")
 
 # %% [markdown]
-# ## What the agreement proves
+# ## Verification
 #
 # The paper's transition: linear decay of the homogeneous bar, exponential decay of the
 # heterogeneous one, each far closer than the other law and within a hundredth of the first

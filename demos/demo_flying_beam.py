@@ -5,11 +5,11 @@
 # large rotations.  From then on its energy, its momentum and its angular momentum must not
 # change.
 #
-# This demo emphasises
+# This demo shows
 #
 # * exact conservation of all three by `Midpoint()`, at small and at absurdly large steps,
 # * second order in the step, measured,
-# * what `alpha` and `beta` give up.
+# * the effect of `alpha` and `beta` on them.
 #
 # The planar "flying spaghetti" of J. C. Simo and L. Vu-Quoc (1986).
 
@@ -74,10 +74,10 @@ ub.say()
 ub.say("dt = 0.01 s\n" + str(flights[0.01][1]))
 
 # %% [markdown]
-# ## What the decaying scheme gives up
+# ## Dissipation
 #
-# `alpha` takes energy out of what the beam stores, and leaves both momenta exact; `beta` takes it
-# from the velocities, and angular momentum with it.
+# `alpha` dissipates stored energy and conserves both momenta exactly; `beta` dissipates kinetic
+# energy, and changes the angular momentum.
 
 # %%
 with_alpha = fly(0.1, ub.Midpoint(alpha=0.1))[1]

@@ -1,13 +1,13 @@
 # %% [markdown]
-# # Four-beam swing: what an energy-decaying scheme is for
+# # Four-beam swing: conserving and dissipative schemes
 #
 # A flexible beam hangs from two rigid links and carries a heavy mass at mid-span.  A short push
 # makes it swing out; at t = 0.64 s the left link and the left half of the beam come into line and
 # snap taut.  The impact excites axial vibrations a thousand times faster than the swing.  A
-# scheme that conserves energy keeps them for ever; one that decays takes them out and leaves the
-# swing alone.
+# scheme that conserves energy keeps them for ever; a dissipative scheme removes them without
+# changing the swing.
 #
-# This demo emphasises
+# This demo shows
 #
 # * revolute joints, which cost nothing: they only remove unknowns,
 # * a point mass, a load in a time table, massless links as stiff beams and as constraints,
@@ -108,9 +108,9 @@ fine = ub.simulate(fine_rods, ub.Midpoint(), t=(0.0, 0.65), dt=2e-4, progress=Fa
 # ## Plastic hinges that have become joints
 #
 # In the paper the joints between links and beam are hinges that have gone through their plastic
-# process.  The units of its hinge data do not fit each other, so the numbers here are free: a limit
-# of 0.5 mN m, which the push exceeds soon, and a fracture energy of 10 µJ each: together a
-# three-thousandth of what the push brings.
+# process.  The units of its hinge data are inconsistent, so these numbers are assumptions: a limit
+# of 0.5 mN m, which the push exceeds soon, and a fracture energy of 10 µJ each, together a
+# three-thousandth of the energy of the push.
 
 # %%
 M_u, G_f = 0.5e-3, 10e-6  # N m, J
@@ -258,7 +258,7 @@ ub.animate(decaying, output / "swing.gif", fps=16, seconds=3, color="N", thickne
 ub.say("\npictures and data:", *sorted(str(path) for path in output.glob("swing*")), sep="\n  ")
 
 # %% [markdown]
-# ## What the agreement proves
+# ## Verification
 #
 # The reference values come from an independent program with the same four cells and the same
 # step, so they check the scene, the element and the scheme to the digits given.  The ledger
@@ -282,7 +282,7 @@ for solution in (conserving, decaying, exact, fine, hinged_conserving, hinged_de
 # Links and stiff beams move the same way: 10⁴ times the stiffness of the beam yields nothing that
 # forces of less than a newton, before the snap, would show.  The mesh of the paper is met to the
 # digits given, and the converged motion up to what 16 cells and 0.2 ms leave.  The hinges take
-# their fracture energy, once, and the swing differs by their cells and by what they took: by a
+# their fracture energy, once, which changes the swing by a
 # thousandth of the motion, until the snap makes it sensitive to everything.
 
 # %%

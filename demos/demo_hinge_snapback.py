@@ -6,7 +6,7 @@
 # hinge can dissipate.  Then load *and* displacement must go back together, and neither of them can
 # be prescribed.  What always grows is the dissipated energy.
 #
-# This demo emphasises
+# This demo shows
 #
 # * dissipation control, which also tells softening from elastic unloading,
 # * the arc length, which takes over where nothing dissipates,
@@ -131,7 +131,7 @@ figure.savefig(output / "hinge_snapback.png")
 ub.say("\npicture:", output / "hinge_snapback.png")
 
 # %% [markdown]
-# ## What the agreement proves
+# ## Verification
 #
 # What is left of the deflection is the mesh, 1/(4·16²) of its elastic part, and of the load that
 # rotations are not quite small: 1e-4.  The peak is a state of each path,

@@ -5,15 +5,15 @@
 # left corner.  The blow runs through it as waves: fast ones that stretch members, and slow ones
 # that bend them.
 #
-# This demo emphasises
+# This demo shows
 #
 # * size: 20 000 beams, 10 000 joints, 600 000 unknowns, with exact rotations everywhere,
 # * processes that share a scene: `mpirun -n 2 python3 demos/demo_lattice.py`, the same script,
 # * a loop of your own over `Simulation.step_to`, with files written on the way,
 # * the ledger: at this size, too, every joule is accounted for.
 #
-# Each process eliminates what lies within its members, without a word to the others; what remains
-# are the joints, a twentieth of the unknowns, which are solved for together.
+# Each process condenses the interior nodes of its members without communication.  The remaining
+# unknowns of the joints, a twentieth of all, are solved for together.
 
 # %%
 # SPDX-License-Identifier: MIT
@@ -112,14 +112,14 @@ files = ub.XDMF(output / "lattice.xdmf", every=quarter)
 
 solution, seconds = simulation.solution, []
 files.open(simulation)
-solution.keep(simulation)
+simulation.keep()
 for n in range(1, steps + 1):
     begin = time.perf_counter()
     simulation.step_to(n * end / steps)
     seconds.append(time.perf_counter() - begin)
     files.write(simulation)
     if n % quarter == 0:
-        solution.keep(simulation)
+        simulation.keep()
 files.close()
 simulation.close()
 
@@ -162,11 +162,11 @@ waves.savefig(output / "lattice_waves.png")
 ub.say("\npictures and data:", *sorted(str(p) for p in output.glob("lattice*")), sep="\n  ")
 
 # %% [markdown]
-# ## What the agreement proves
+# ## Verification
 #
-# The ledger closes to round-off, whatever the number of processes.  And nothing that matters is
-# faster than sound in steel, which no member but a straight one in its own direction reaches: an
-# implicit step reaches every node at once, but a few steps ahead of the front with next to nothing.
+# The ledger closes to round-off, for any number of processes.  The front of the waves is not faster
+# than sound in steel.  An implicit step moves all nodes at once, but the motion ahead of the front
+# is negligible.
 
 # %%
 assert abs(solution.energy.worst) < 1e-9

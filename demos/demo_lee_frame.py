@@ -5,7 +5,7 @@
 # a limit, falls to nothing, pulls, and grows again; on the way the loaded point turns back twice.
 # Neither steps of the load nor steps of the displacement get through.  The arc length does.
 #
-# This demo emphasises
+# This demo shows
 #
 # * `ub.follow`, which finds the load factor together with the displacements,
 # * critical points, reported with their modes,
@@ -126,7 +126,7 @@ figure.savefig(output / "lee_frame.png")
 ub.say("\npicture:", output / "lee_frame.png")
 
 # %% [markdown]
-# ## What the agreement proves
+# ## Verification
 #
 # The limit loads of a converged solution are 18.5466 and -9.3961 kN, v turns at 61.013 and
 # 50.737 cm.  Sixty cells a member are off by the mesh, an error of second order.

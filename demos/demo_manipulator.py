@@ -1,17 +1,16 @@
 # %% [markdown]
 # # Manipulator: a plastic hinge that has become a joint
 #
-# A rigid arm carries a flexible one.  What joins them is, at first, no joint but a plastic hinge:
-# it bears up to M_u, then softens, and once its fracture energy is spent it is a perfect revolute
-# joint.  In the first second the flexible arm is bent until the hinge has gone through that; in
-# the next two the rigid arm turns at 10 rad/s and the flexible one swings on what the hinge has
-# become, as it would on a revolute joint.
+# A rigid arm carries a flexible one.  They are joined by a plastic hinge, which bears moments up
+# to M_u, then softens, and is a perfect revolute joint when its fracture energy is dissipated.  In
+# the first second the flexible arm is turned until the hinge has softened completely.  In the next
+# two seconds the rigid arm turns at 10 rad/s, and the flexible arm swings about the opened hinge
+# as it would about a revolute joint.
 #
-# This demo emphasises
+# This demo shows
 #
 # * two runs in a row: the second starts with the state of the first, its material included,
-# * a softened hinge against `Revolute`: where they differ, and that the difference is the length
-#   of the cell in which the hinge sits,
+# * an opened hinge compared with `Revolute`,
 # * a rigid part both ways: a beam 10³ to 10⁸ times as stiff, and a `Body`.
 #
 # It is section 4.2 of the paper: EA = GA = 10⁶, EI = 10⁵, 10 rad/s, steps of 1 ms.  Its geometry
@@ -35,10 +34,10 @@ output.mkdir(exist_ok=True)
 # ## Scene
 #
 # Both arms are 5 m long.  The flexible one has 0.1 kg/m, so little that it bends by millimetres,
-# and the rigid one none.  The hinge sits in the first cell of the flexible arm, 10 mm long.  It
-# opens at 100 N m and takes 4 J to break; when the tip has turned by two radians exp(-50) of M_u
-# is left.  Then the tip turns back.  All this goes from one equilibrium to the next, so that
-# nothing is left ringing.
+# and the rigid one none.  The hinge is at the start of the flexible arm, whose first cell is 10 mm
+# long.  It opens at 100 N m with a fracture energy of 4 J; when the tip has turned by two radians,
+# exp(-50) of M_u is left.  Then the tip turns back.  This run is quasi-static, so no vibration
+# remains.
 #
 # The drive gets up to speed within 0.2 s.  A velocity that jumps would excite what no step of 1 ms
 # resolves.
@@ -66,8 +65,8 @@ class Manipulator:
     """The two arms and both runs.
 
     Args:
-        hinge: Length of the cell with the hinge; m.  Zero is a revolute joint.
-        cells: Of the flexible arm, besides that of the hinge.
+        hinge: Length of the cell beside the hinge; m.  Zero is a revolute joint.
+        cells: Of the flexible arm, besides the one at the hinge.
         stiffer: How much stiffer the rigid arm is; infinity is a rigid body.
     """
 
@@ -112,7 +111,7 @@ class Manipulator:
 # %% [markdown]
 # ## Runs
 #
-# The hinge in cells of three lengths, against the joint; the flexible arm with 1, 2, 4 and 8 cells;
+# The hinge beside cells of three lengths, and the joint; the flexible arm with 1, 2, 4 and 8 cells;
 # and the rigid arm both ways.
 
 # %%
@@ -135,7 +134,7 @@ ub.say("\nrevolute joint, in motion\n" + str(revolute.motion))
 apart = {cell: other.away(revolute) for cell, other in by_length.items()}
 ub.say("\ntip of the hinged arm from that of the jointed one, at most")
 for cell, distance in apart.items():
-    ub.say(f"  hinge in a cell of {1e3 * cell:3.0f} mm: {1e3 * distance:6.1f} mm")
+    ub.say(f"  hinge beside a cell of {1e3 * cell:3.0f} mm: {1e6 * distance:6.1f} µm")
 coarse = {n: other.away(by_cells[8]) for n, other in by_cells.items() if n < 8}
 ub.say("tip from that with 8 cells, at most")
 for cells, distance in coarse.items():
@@ -247,7 +246,7 @@ with ub.picture((13, 12)) as figure:
     differences.loglog(1e3 * cells, 1e3 * np.array(list(apart.values())), "o-", color=blue)
     differences.loglog(1e3 * cells, 1e3 * cells * apart[0.01] / 0.01, ":", color=grey)
     differences.set_title("hinge and joint: tips apart (mm)", loc="left")
-    differences.set_xlabel("length of the cell of the hinge (mm)")
+    differences.set_xlabel("length of the cell beside the hinge (mm)")
     differences.text(12, 180, "slope 1", color="0.4")
     differences.set_xticks([10, 20, 40], ["10", "20", "40"])
     differences.set_yticks([50, 100, 200], ["50", "100", "200"])
@@ -256,18 +255,16 @@ figure.savefig(output / "manipulator.png")
 ub.say("\npictures and data:", *sorted(str(p) for p in output.glob("manipulator*")), sep="\n  ")
 
 # %% [markdown]
-# ## What the agreement proves
+# ## Verification
 #
-# The hinge dissipates its fracture energy while it softens and nothing afterwards: not little, but
-# what exp(-50) leaves of it.  As a joint it differs from `Revolute` by where it is: in the middle
-# of a cell whose chord keeps its length.  That is of first order in the cell, so halving the cell
-# halves the distance of the tips.
+# The hinge dissipates its fracture energy while it softens and nothing afterwards, except for the
+# part exp(-50) that remains.  The hinged arm has one cell more than the arm with `Revolute`.  This
+# is the only difference: the distance of the tips is of first order in the length of that cell.
 #
-# A cell is straight, its mass exact, and the arm hardly bends, so one cell moves as eight do, up
-# to the bending.  A beam a thousand times as stiff as the flexible one yields a thousandth of
-# what that would, and the distance from the rigid body goes on as 1/ratio.  The price is in the
-# ledger: the strains of a beam are known to rounding, and its forces to rounding times its
-# stiffness.  At 10⁸ EA that is 0.02 N, which act along the 94 m that the elbow goes; a `Body` has
+# The arm hardly bends, so one cell gives the motion of eight up to the bending.  The deformation
+# of the stiff beam is in inverse proportion to its stiffness, and so is its distance from the
+# rigid body.  But its strains have round-off errors, and its forces have these errors times its
+# stiffness: at 10⁸ EA they are 0.02 N, and act along the path of the elbow of 94 m.  A `Body` has
 # no such forces, and takes two thirds of the iterations.
 
 # %%

@@ -1,19 +1,19 @@
 # %% [markdown]
-# # Monte Carlo: what a frame of mean strength does not tell
+# # Monte Carlo: a frame with random strength
 #
-# A portal frame takes a blow that bends its columns beyond yield, and stands askew ever after.  How
-# far, that depends on yield stresses, which scatter from one place of the columns to the next.  The
-# usual answer is one simulation with the mean yield stress.  Here are 48 more, each with yield
-# stresses of its own.  They tell two things that the one cannot: by how much the drift scatters,
-# and that frames with scatter **dissipate more**, in the mean and nearly each of them.
+# A portal frame is hit so that its columns yield, and it keeps a residual drift.  The drift depends
+# on the yield stresses, which vary along the columns.  The usual answer is one simulation with the
+# mean yield stress.  Here are 48 more, each with random yield stresses.  They show what one run
+# cannot: the scatter of the drift, and that frames with scatter **dissipate more**, in the mean
+# and in nearly every sample.
 #
-# This demo emphasises
+# This demo shows
 #
 # * `ub.study`, which calls one function for many cases: one after the other here, several at a time
 #   under `mpirun`, with the same results to the last bit,
 # * random yield stresses of fibres, `Hardening(limit=TruncatedNormal(..., seed=))`,
-# * one file for all members, which a study that was interrupted goes on with,
-# * how many members a mean needs: its 95 % interval against their number.
+# * one file for all members, from which an interrupted study continues,
+# * the 95 % interval of the mean over the number of members.
 
 # %%
 # SPDX-License-Identifier: MIT
@@ -206,7 +206,7 @@ names = sorted(str(path) for path in output.glob("monte_carlo*"))
 ub.say("\npictures and data:", *names, sep="\n  ")
 
 # %% [markdown]
-# ## What the agreement proves
+# ## Verification
 #
 # The ledger of every member closes and no step was cut, so that none of the scatter is numerical.
 # From ten members on, the interval of the mean energy excludes the frame of mean strength; that of

@@ -2,10 +2,10 @@
 # # Roll-up: a cantilever bent to a circle and beyond
 #
 # A moment at the free end bends a straight cantilever to an arc of constant curvature κ = M/EI,
-# and M = 2π EI/L closes the circle.  No other load makes so large a rotation with so simple an
-# answer, so this is where every geometrically exact beam begins.
+# and M = 2π EI/L closes the circle.  Its large rotations have a closed-form solution, so this is
+# the first test of every geometrically exact beam.
 #
-# This demo emphasises
+# This demo shows
 #
 # * statics with the time as load parameter,
 # * rotations of any size, twice around here,
@@ -91,7 +91,7 @@ figure.savefig(output / "roll_up_error.png")
 ub.say("\npictures:", *sorted(str(p) for p in output.glob("roll_up*")), sep="\n  ")
 
 # %% [markdown]
-# ## What the agreement proves
+# ## Verification
 #
 # The computed error is the closed form of the polygon to solver tolerance: the element has no
 # error but that of its geometry, in particular no locking in shear or extension.

@@ -1,16 +1,16 @@
 # %% [markdown]
 # # Rotating beam: a Campbell diagram
 #
-# A blade on a turning shaft is stretched by the centrifugal force, and what is stretched is stiffer
-# against bending.  In the plane of rotation that force also grows outward, which softens it again.
-# So its natural frequencies depend on the speed, and so do the speeds at which something that comes
-# once, twice, ... per revolution meets one of them: a Campbell diagram shows both.
+# The centrifugal force stretches a blade on a turning shaft, which makes it stiffer in bending.  In
+# the plane of rotation this force also grows outward, which makes it softer again.  So the natural
+# frequencies depend on the speed.  A Campbell diagram shows them over the speed, and the speeds at
+# which an excitation once, twice, ... per revolution is in resonance.
 #
-# This demo emphasises
+# This demo shows
 #
 # * `ub.RotatingFrame`, a load that makes the steady rotation a state of equilibrium,
 # * `ub.modes(scene, n, at=steady)`: frequencies, damping ratios and shapes about that state,
-#   Coriolis' forces included, by SLEPc or LAPACK,
+#   Coriolis forces included, by SLEPc or LAPACK,
 # * a closed form that bounds the frequencies, after Southwell.
 #
 # Data: an aluminium blade, clamped to the axis, in the plane of rotation.
@@ -83,7 +83,7 @@ bounds = np.array(bounds).T
 # %% [markdown]
 # ## Speeds to avoid
 #
-# What comes m times per revolution has the frequency m Ω/2π, a straight line through the origin.
+# An excitation m times per revolution has the frequency m Ω/2π, a line through the origin.
 
 # %%
 orders = (1, 2, 3, 4, 6, 8)
@@ -127,7 +127,7 @@ fast.write(output / "rotating_beam.xdmf")  # the k-th shape at time k, for ParaV
 ub.say("\npictures:", *sorted(str(p) for p in output.glob("rotating_beam*.png")), sep="\n  ")
 
 # %% [markdown]
-# ## What the agreement proves
+# ## Verification
 #
 # The computed frequencies stay below the bound, and near it: only where the speed is large, and
 # most in the first mode, does the shape change.  The damping ratios of the second and third mode

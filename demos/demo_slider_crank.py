@@ -6,7 +6,7 @@
 # controller, a flywheel on the crank, a heavy slider with dry friction on its guide, a spring that
 # pushes it back and a workpiece that it hits before the end of its travel.
 #
-# This demo emphasises
+# This demo shows
 #
 # * `Prismatic`, `Revolute(..., measured=True)` and the forces that they bear,
 # * `Body` for what is rigid, `Turn`, `Slide` and `Stretch` for what acts between two places,
@@ -268,7 +268,7 @@ ub.animate(controlled.run, output / "slider_crank.gif", seconds=2, thickness=2, 
 ub.say("\npictures and data:", *sorted(str(p) for p in output.glob("slider*")), sep="\n  ")
 
 # %% [markdown]
-# ## What the agreement proves
+# ## Verification
 #
 # Angles, positions and the energy are those of another program, to the digits of its step.  Joints
 # do no work: the energy stays after the moment has ended.  Their forces are those that move the

@@ -1,16 +1,16 @@
 # %% [markdown]
-# # How many cells, how long a step, which scheme?
+# # Speed and accuracy: cells, step and scheme
 #
 # The arm of a pick-and-place machine swings its payload through 90 degrees within 0.6 s.  How far
-# does it bend on the way, and where is the payload in the end?  Any setting gives numbers;
-# `ub.tradeoff` finds the cheapest one whose numbers are accurate enough, by runs of this very
-# scene, and the most accurate one that a given wall time buys.
+# does it bend on the way, and where is the payload in the end?  `ub.tradeoff` runs this scene with
+# several settings.  It finds the cheapest setting for a required accuracy, and the most accurate
+# one for a given wall time.
 #
-# This demo emphasises
+# This demo shows
 #
-# * quantities: errors are those of what you want to know,
-# * dials that compete: schemes, and cells with two or three nodes,
-# * what the search itself costs, and what it refuses.
+# * errors of chosen quantities,
+# * competing settings: schemes, and cells with two or three nodes,
+# * the cost of the search, and cases that it refuses.
 
 # %%
 # SPDX-License-Identifier: MIT
@@ -50,7 +50,7 @@ scene = ub.Scene(
 )
 
 # %% [markdown]
-# ## What is to be accurate
+# ## Quantities
 #
 # The place of the payload at the end, and how much the arm lags behind the hub at sixteen instants
 # on the way.  Arrays must have one shape whatever the steps are, so a history is asked for at
@@ -118,7 +118,7 @@ ub.plot_tradeoff(accurate).savefig(output / "tradeoff_tolerance.png")
 ub.plot_tradeoff(fast).savefig(output / "tradeoff_budget.png")
 
 # %% [markdown]
-# ## What the agreement proves
+# ## Verification
 #
 # The recommended arguments go into `simulate` as they are.  Against a reference with steps and
 # cells that are much finer than all that was run, the errors are below what was asked for; the

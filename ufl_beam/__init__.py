@@ -1,5 +1,22 @@
 # SPDX-License-Identifier: MIT
-"""Planar flexible multibody dynamics with geometrically exact beams.  Units are SI."""
+"""Planar flexible multibody dynamics with geometrically exact beams.  Units are SI.
+
+The examples in docstrings, which are run as tests, use the names of this one: a cantilever, and
+one with a plastic hinge at its clamped end that has opened.
+
+Example:
+    >>> import numpy as np
+    >>> import ufl_beam as ub
+    >>> section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
+    >>> beam = ub.Beam((0, 0), (2, 0), section, cells=4)
+    >>> force = ub.PointLoad(beam.end, force=(0, -1e5), time=lambda t: t)
+    >>> scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[force])
+    >>> solution = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05)
+    >>> weak = ub.Beam((0, 0), (2, 0), section, hinges={0.0: ub.Softening(5e4, energy=1e3)})
+    >>> down = ub.Prescribed(weak.end, v=lambda t: -0.05 * t)
+    >>> hinged = ub.Scene([weak], supports=[ub.Clamped(weak.start), down])
+    >>> broken = ub.simulate(hinged, ub.Static(), t=(0, 1), dt=0.02)
+"""
 
 from ufl_beam import dolfinx_compat  # noqa: F401 - first, because it explains what is not installed
 
@@ -35,14 +52,10 @@ from ufl_beam.errors import (
     TradeoffError,
 )
 from ufl_beam.mechanics.classical import GeneralizedAlpha, Newmark, Static
-from ufl_beam.mechanics.energy_momentum import (
-    DecayingMidpoint,
-    ExactStatic,
-    Midpoint,
-    PrintedMidpoint,
-)
-from ufl_beam.model.beams import Beam, Place
-from ufl_beam.model.bodies import Body, Spot, ground
+from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
+from ufl_beam.mechanics.energy_momentum import ExactStatic, Midpoint, PrintedMidpoint
+from ufl_beam.model.beams import Beam
+from ufl_beam.model.bodies import Body, Place, Spot, ground
 from ufl_beam.model.connector_laws import (
     Actuator,
     Controller,
@@ -68,44 +81,39 @@ from ufl_beam.model.joints import (
     Rigid,
     RigidLink,
 )
-from ufl_beam.model.loads import (
-    FollowerLoad,
-    Gravity,
-    LineLoad,
-    PointLoad,
-    RotatingFrame,
-    Table,
-    ramp,
-)
+from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, PointLoad, RotatingFrame
+from ufl_beam.model.masses import PointMass, Velocity
 from ufl_beam.model.material_laws import DuvautLions, Hardening, LinearSoftening, Perzyna, Softening
 from ufl_beam.model.mesh_options import Mesh
-from ufl_beam.model.scene import PointMass, Scene, Velocity
+from ufl_beam.model.scene import Scene
 from ufl_beam.model.sections import Section
 from ufl_beam.model.supports import Clamped, Pinned, Prescribed, Roller, Support
+from ufl_beam.model.time_functions import Table, ramp
 from ufl_beam.output.events import Event, Events
 from ufl_beam.output.extremes import Extent, Extremes
 from ufl_beam.output.fatigue import Fatigue, HotSpot
+from ufl_beam.output.history import History
 from ufl_beam.output.rainflow import Cycles, Gerber, Goodman, SNCurve, rainflow
-from ufl_beam.output.recorders import History, Recorder
+from ufl_beam.output.recorders import Recorder
 from ufl_beam.output.time_series import VTKHDF, XDMF
-from ufl_beam.plotting.extremes import plot_cycles, plot_extremes
+from ufl_beam.parallel import say
+from ufl_beam.plotting.analyses import plot_cycles, plot_extremes, plot_modes, plot_tradeoff
 from ufl_beam.plotting.inelastic import (
     plot_damage,
     plot_dissipation,
     plot_hinge,
     plot_moment_curvature,
 )
-from ufl_beam.plotting.modes import plot_modes
-from ufl_beam.plotting.plot import plot
-from ufl_beam.plotting.plots import picture, plot_energy, plot_history, plot_shapes
+from ufl_beam.plotting.model import plot
+from ufl_beam.plotting.plots import plot_energy, plot_history, plot_shapes
 from ufl_beam.plotting.render3d import animate, render
-from ufl_beam.plotting.tradeoff import plot_tradeoff
+from ufl_beam.plotting.style import picture
 from ufl_beam.simulation.checkpoint import Checkpoint
-from ufl_beam.simulation.run import say, simulate
+from ufl_beam.simulation.run import simulate
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution, load
 from ufl_beam.simulation.step_control import Adaptive
-from ufl_beam.solvers.newton import Newton
+from ufl_beam.solvers.newton_options import Newton
 from ufl_beam.terms.energy_ledger import Energy
 from ufl_beam.version import version
 

@@ -106,6 +106,20 @@ def portable(error: BaseException | None) -> BaseException | None:
     return error
 
 
+def on_first(comm: MPI.Intracomm, action: Callable[[], object]) -> None:
+    """Do something on the first process; what it raises there is raised on all of them."""
+    error: BaseException | None = None
+    if comm.rank == 0:
+        try:
+            action()
+        except BaseException as caught:
+            error = caught
+    if comm.size > 1:
+        error = comm.bcast(portable(error))
+    if error is not None:
+        raise error
+
+
 def _completed(*requests: MPI.Request) -> bool:
     """Wait for communication with the others, but not for ever."""
     end = time.monotonic() + GRACE

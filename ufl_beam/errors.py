@@ -21,18 +21,31 @@ PACKAGE = os.path.join(os.path.dirname(__file__), "")
 
 
 class SceneError(ValueError):
-    """The scene or the call is wrong; raised before any mesh exists.
+    """Error in a scene or a call; raised before any mesh exists.
 
     The message says which object, what is wrong and what to do.
+
+    Example:
+        >>> ub.Scene([beam], supports=[ub.Clamped(beam.start), ub.Pinned(beam.start)])
+        Traceback (most recent call last):
+        ufl_beam.errors.SceneError: supports in conflict: Clamped at beam.start (0, 0) and ...
     """
 
 
 class ModelWarning(UserWarning):
-    """A scene or a call that is likely, but not surely, wrong.
+    """Warning about a scene or a call that is likely, but not surely, wrong.
 
     The message says which object it is about, what is unusual and what to do.  To silence one
     that is meant: ``warnings.filterwarnings("ignore", category=ub.ModelWarning)``; to make all of
     them errors: ``warnings.simplefilter("error", ub.ModelWarning)``.
+
+    Example:
+        >>> import warnings
+        >>> with warnings.catch_warnings():
+        ...     warnings.simplefilter("error", ub.ModelWarning)
+        ...     ub.Beam((0, 0), (0.05, 0), section, name="stub")
+        Traceback (most recent call last):
+        ufl_beam.errors.ModelWarning: stub: its section is 0.2 m deep ...
     """
 
 
@@ -59,7 +72,7 @@ class StepFailed(Exception):
 
 
 class ConvergenceError(RuntimeError):
-    """A step found no equilibrium, even after it was cut; nothing before it is lost.
+    """No equilibrium was found for a step, even after cutting it; results so far are kept.
 
     Attributes:
         time: Time of the last accepted state, on a path its load factor; s.
@@ -73,6 +86,15 @@ class ConvergenceError(RuntimeError):
             "loads", "inertia", "damping"; N.
         reason: Name that PETSc has for why its solver stopped, such as "DIVERGED_MAX_IT"; empty if
             equilibria were found but refused.
+
+    Example:
+        >>> pull = ub.PointLoad(weak.end, force=(0, -5e4), time=lambda t: t)
+        >>> pulled = ub.Scene([weak], supports=[ub.Clamped(weak.start)], loads=[pull])
+        >>> try:
+        ...     run = ub.simulate(pulled, ub.Static(), t=(0, 1), dt=0.1)
+        ... except ub.ConvergenceError as error:
+        ...     print(f"limit load: {5e4 * error.solution.times[-1]:.0f} N")
+        limit load: 25000 N
     """
 
     def __init__(
@@ -96,7 +118,14 @@ class ConvergenceError(RuntimeError):
 
 
 class CopiesDiffer(RuntimeError):
-    """Processes that compute copies of one small scene have found different motions."""
+    """Copies of one small scene, computed by several processes, have different motions.
+
+    Example:
+        >>> try:
+        ...     run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05)
+        ... except ub.CopiesDiffer as error:
+        ...     print("Does a function of the scene depend on the rank?", error)
+    """
 
 
 class TradeoffError(RuntimeError):
@@ -104,6 +133,14 @@ class TradeoffError(RuntimeError):
 
     Attributes:
         runs: What was run, see :class:`~ufl_beam.analysis.refinement_runs.Run`.
+
+    Example:
+        >>> jumps = {"jumps": lambda run: 1.0 + len(run.times) % 3}
+        >>> try:
+        ...     ub.tradeoff(scene, jumps, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance=0.1)
+        ... except ub.TradeoffError as error:
+        ...     print(len(error.runs) > 0)
+        True
     """
 
     def __init__(self, message: str, runs: tuple[Any, ...] = ()) -> None:

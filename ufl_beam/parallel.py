@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import ctypes
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -49,9 +47,12 @@ def in_study() -> bool:
     return _OURS.get() != MPI.COMM_WORLD
 
 
-def give_back_memory() -> None:
-    """Let the system have what was needed for a while, where the C library keeps it."""
-    if sys.platform == "linux":
-        trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
-        if trim is not None:
-            trim(0)
+def say(*words: object, sep: str = " ") -> None:
+    """Print from the first process only, as scripts do that may run under ``mpirun``.
+
+    Example:
+        >>> ub.say("steps:", len(solution.times) - 1)  # once, on any number of processes
+        steps: 20
+    """
+    if ours().rank == 0:
+        print(*words, sep=sep, flush=True)  # noqa: T201

@@ -13,7 +13,7 @@ SIZES = [0.005, 0.1]
 """Time steps; s.  The larger is as long as many periods of the axial vibrations."""
 
 CLOSED = 1e-9
-"""Part of the energy that went through, the promise of design.md, section 9."""
+"""Largest imbalance of a ledger, as a part of the energy that went through."""
 
 
 @pytest.mark.parametrize("step", SIZES)

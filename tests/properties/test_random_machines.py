@@ -28,7 +28,7 @@ ten machines close to :data:`MOSTLY`.
 """
 
 MOSTLY = 1e-9
-"""The promise of design.md, section 9."""
+"""Largest imbalance of a ledger, as a part of the energy that went through."""
 
 BY_TRAPEZES = 0.1
 """The same for `Static`, whose works follow the trapezoidal rule; a step may err by a twentieth."""

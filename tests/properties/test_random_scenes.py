@@ -50,7 +50,7 @@ coordinates; angles of short links lose some digits more.
 """
 
 CLOSED = 1e-9
-"""Imbalance of the ledger as a part of the energy that went through; see design.md, section 9."""
+"""Largest imbalance of the ledger as a part of the energy that went through."""
 
 EXACT = ("Midpoint(", "DecayingMidpoint(", "ExactStatic(")
 """Schemes whose ledger closes at any step."""

@@ -16,7 +16,7 @@ import pytest
 
 import ufl_beam as ub
 from ufl_beam.discretization.state_io import Restoring, Saving
-from ufl_beam.simulation.checkpoint import HEADER, read
+from ufl_beam.simulation.checkpoint_file import HEADER, read
 from ufl_beam.simulation.fingerprint import Description, difference
 
 STEEL = {"EA": 1e4, "GA": 1e4, "EI": 100.0, "rhoA": 1.0, "rhoI": 0.1}

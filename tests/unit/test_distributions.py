@@ -10,7 +10,8 @@ import pytest
 from scipy import stats
 
 import ufl_beam as ub
-from ufl_beam.discretization.dof_numbering import Grid, Share
+from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.partition import Share
 
 MEAN, DEVIATION, SEED = 250e6, 50e6, 7
 NORMALS = [ub.Normal, ub.TruncatedNormal, ub.Lognormal]

@@ -36,11 +36,7 @@ def system(cell_dofs, seed=0, more=(), held=()):
         dense[dof], dense[:, dof] = 0, 0
         dense[dof, dof] = 5.0
     rows = np.repeat(np.arange(size), np.diff(pattern.indptr))
-    A = Csr(
-        SimpleNamespace(
-            data=dense[rows, pattern.indices], indices=pattern.indices, indptr=pattern.indptr
-        )
-    )
+    A = Csr(dense[rows, pattern.indices], pattern.indices, pattern.indptr)
     share = SimpleNamespace(
         comm=MPI.COMM_SELF, cell_dofs=cell_dofs, size=size, dofs=np.arange(size), num_owned=size
     )
@@ -173,8 +169,7 @@ def test_on_several_processes_as_on_one(scheme):
 def test_a_singular_tangent_cuts_the_step(monkeypatch):
     """Also where elimination finds it; the message is that of any failure."""
     simulation = ub.Simulation(tower(), ub.Midpoint())
-    data = simulation._A.data
-    monkeypatch.setattr(simulation, "_tangent", lambda x: data.fill(0.0))
-    simulation._solver._tangent = simulation._tangent
+    data = simulation.equation.A.data
+    monkeypatch.setattr(simulation.equation, "tangent", lambda x: data.fill(0.0))
     with pytest.raises(ub.ConvergenceError, match="found a singular tangent"):
         simulation.step_to(0.1)

@@ -2,6 +2,7 @@
 """What is compiled: one quadrature rule per form, and nothing that the scene does not need."""
 
 import math
+import sys
 
 from mpi4py import MPI
 
@@ -11,18 +12,29 @@ import ufl
 
 import ufl_beam as ub
 from ufl_beam.discretization import compiled_forms
-from ufl_beam.discretization.dof_numbering import Grid, Share
+from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import Fields
-from ufl_beam.dolfinx_compat import fem, line_mesh
-from ufl_beam.mechanics.kinematics import strain
+from ufl_beam.discretization.partition import Share
+from ufl_beam.dolfinx_compat import fem, line_mesh, space_with_dofs
+from ufl_beam.mechanics.kinematics import Axis, strain
 
 SECTION = ub.Section(EA=60.0, GA=40.0, EI=30.0, rhoA=2.0, rhoI=1.0)
+
+
+def forget_forms():
+    """Let forms be stated and compiled again that were before in this process."""
+    for name, module in list(sys.modules.items()):
+        if name.startswith("ufl_beam"):
+            for value in vars(module).values():
+                if hasattr(value, "cache_clear"):
+                    value.cache_clear()
 
 
 @pytest.fixture
 def compiled(monkeypatch):
     """List that takes every form that is compiled."""
     found = []
+    forget_forms()
     compile_form = compiled_forms.fem.form
 
     def note(form, *args, **kwargs):
@@ -146,7 +158,7 @@ def test_follower_loads_only_where_there_are_some(compiled):
     assert names_of(dead) == ["ElasticBeams", "DeadLoads", "Inertia"]
     assert names_of(both) == ["ElasticBeams", "DeadLoads", "FollowerLoads", "Inertia"]
     assert names_of(alone) == ["ElasticBeams", "FollowerLoads", "Inertia"]
-    assert len(compiled) == 3 * 4  # loads need no form
+    assert len(compiled) == 4  # loads need no form, and the beams are alike
 
 
 def test_supports_that_stand_still_do_no_work():
@@ -191,12 +203,13 @@ def no_points(monkeypatch):
     def refuse(*args, **kwargs):
         raise AssertionError("made for a scene that is elastic")
 
+    forget_forms()
     monkeypatch.setattr("ufl_beam.terms.material_points.Points.__init__", refuse)
     monkeypatch.setattr("ufl_beam.terms.material_points.PointForms.__init__", refuse)
     monkeypatch.setattr("ufl_beam.terms.inelastic_beams.InelasticBeams.__init__", refuse)
-    monkeypatch.setattr("ufl_beam.discretization.function_spaces.Fields.at_points", refuse)
+    monkeypatch.setattr("ufl_beam.discretization.function_spaces.Element.at_points", refuse)
     monkeypatch.setattr("ufl_beam.model.material_laws.Softening.traction", refuse)
-    monkeypatch.setattr("ufl_beam.model.material_laws.Bulk.flow", refuse)
+    monkeypatch.setattr("ufl_beam.model.material_laws.HardeningBulk.flow", refuse)
 
 
 @pytest.mark.parametrize(
@@ -228,6 +241,7 @@ def test_no_points_can_fail(no_points):
 def test_changing_alpha_compiles_no_other_code(compiled):
     """Numbers of the scheme are constants: the same signature, so the same code."""
     for alpha in (0.1, 0.2):
+        forget_forms()
         ub.Simulation(make(), ub.Midpoint(alpha=alpha))
     half = len(compiled) // 2
     one, other = (
@@ -246,33 +260,60 @@ def fields_of_a_frame():
     return Fields(Share(Grid(scene), MPI.COMM_SELF))
 
 
+def forms_of(q, axis, dx):
+    """An energy and both its derivatives."""
+    e, space = strain(q, axis), q.function_space
+    energy = sum(c * e[i] ** 2 for i, c in enumerate((3.0, 2.0, 1.0))) * dx
+    force = ufl.derivative(energy, q, ufl.TestFunction(space))
+    return energy, force, ufl.derivative(force, q, ufl.TrialFunction(space))
+
+
 def test_kernels_give_what_dolfinx_assembles():
+    """Stated on one cell, and stated on the mesh of the scene."""
     fields = fields_of_a_frame()
-    q, w = fields.configuration(), ufl.TestFunction(fields.space)
-    q.x.array[:] = np.random.default_rng(0).uniform(-1, 1, len(q.x.array))
-    e = strain(q, fields.axis)
-    energy = sum(c * e[i] ** 2 for i, c in enumerate((3.0, 2.0, 1.0))) * fields.dx(1)
-    force = ufl.derivative(energy, q, w)
-    tangent = ufl.derivative(force, q, ufl.TrialFunction(fields.space))
-
+    element = fields.element
+    energy, force, tangent = forms_of(element.q1, element.axis, element.dx(1))
+    q = np.random.default_rng(0).uniform(-1, 1, fields.share.size)
     vector = np.zeros(fields.share.size)
-    fields.kernel(force, q).add(q.x.array, vector)
+    fields.kernel(force, element.q1).add(q, vector)
     matrix = fields.matrix()
-    kernel = fields.kernel(tangent, q)
+    kernel = fields.kernel(tangent, element.q1)
     kernel.place(matrix)
-    kernel.add(q.x.array, matrix.data)
-    value = fields.kernel(energy, q).value(q.x.array)
+    kernel.add(q, matrix.data)
+    value = fields.kernel(energy, element.q1).value(q)
 
-    expected = fem.assemble_matrix(fem.form(tangent))
+    of_three = element.space.ufl_element()
+    space = space_with_dofs(fields.mesh, of_three, fields.cell_dofs, fields.share.size)
+    function = fem.Function(space)
+    function.x.array[:] = q
+    dx = ufl.Measure("dx", domain=fields.mesh, metadata={"quadrature_degree": 1})
+    of_all = [fem.form(form) for form in forms_of(function, Axis(fields.mesh), dx)]
+    expected = fem.assemble_matrix(of_all[2])
     assert np.array_equal(expected.indices, matrix.indices)
     scale = np.abs(expected.data).max()
     # The same kernels; sums over cells in another order
-    assert value == pytest.approx(fem.assemble_scalar(fem.form(energy)), rel=1e-14)
-    assert np.abs(vector - fem.assemble_vector(fem.form(force)).array).max() < 1e-14 * scale
+    assert value == pytest.approx(fem.assemble_scalar(of_all[0]), rel=1e-14)
+    assert np.abs(vector - fem.assemble_vector(of_all[1]).array).max() < 1e-14 * scale
     assert np.abs(matrix.data - expected.data).max() < 1e-14 * scale
+
+
+def test_forms_are_compiled_once_in_a_process(compiled):
+    """For scenes with other numbers, on other meshes; hinges of the same kind included."""
+    for n, limit in ((3, 1.0), (5, 2.0)):
+        section = ub.Section(EA=60.0 * n, GA=40.0, EI=30.0, rhoA=2.0, hinge=ub.Softening(limit, 1))
+        hinges = {0.0: ub.Softening(limit, 2.0), 1.0: ub.Hardening(limit, 0.1 * n)}
+        beam = ub.Beam((0, 0), (n, 1), section, cells=n, hinges=hinges)
+        scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), ub.Clamped(beam.end)])
+        ub.Simulation(scene, ub.Midpoint())
+        if n == 3:
+            before = len(compiled)
+    assert before == len(compiled) > 10
 
 
 def test_matrix_entries_that_do_not_exist_are_refused():
     matrix = fields_of_a_frame().matrix()
     with pytest.raises(ValueError, match="no such entry"):
         matrix.positions(np.array([0]), np.array([matrix.size - 3]))
+    for beyond in (-1, matrix.size):
+        with pytest.raises(ValueError, match="no such entry"):
+            matrix.positions(np.array([beyond]), np.array([0]))

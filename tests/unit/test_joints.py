@@ -281,10 +281,10 @@ def test_live_questions_agree_with_the_solution():
         initial=[ub.Velocity((mass,), linear=(1.0, 0.0))],
     )  # fmt: skip
     simulation = ub.Simulation(scene, ub.Midpoint())
-    simulation.solution.keep(simulation)
+    simulation.keep()
     for n in range(1, 6):
         simulation.step_to(0.1 * n)
-        simulation.solution.keep(simulation)
+        simulation.keep()
     solution, now = simulation.solution, simulation.connector(spring)
     then = solution.connector(spring)
     assert now == pytest.approx([field[-1] for field in then], rel=1e-14)

@@ -8,9 +8,10 @@ import pytest
 import ufl
 
 import ufl_beam as ub
-from ufl_beam.compiled import simd_kernels
+from ufl_beam.compiled import code_cache, jit, simd_kernels
 from ufl_beam.compiled.c_library import ffi
-from ufl_beam.discretization.compiled_forms import Kernel, in_batches, vectorise
+from ufl_beam.compiled.simd_kernels import in_batches
+from ufl_beam.discretization.compiled_forms import Kernel, vectorise
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
@@ -109,8 +110,67 @@ def test_what_vectors_cannot_is_computed_cell_by_cell(expression, meant):
 
 def test_without_the_text_of_the_kernel(tmp_path):
     """The cache may have lost it."""
-    with pytest.raises(simd_kernels.NotInVectors, match=r"gone\.c has no kernel"):
+    with pytest.raises(jit.Refused, match=r"gone\.c has no kernel"):
         simd_kernels.written(tmp_path / "gone.c")
+
+
+# -- the check of what is compiled ---------------------------------------------------------------
+
+
+@pytest.fixture
+def fresh(tmp_path, monkeypatch):
+    """Nothing is compiled or known yet."""
+    monkeypatch.setattr(code_cache, "_place", lambda: tmp_path)
+    monkeypatch.setattr(simd_kernels, "_addresses", {})
+
+
+@pytest.mark.serial
+def test_wrong_vectors_are_found_once(fresh, monkeypatch, caplog):
+    """As after a change of FFCx's text that still compiles, but means something else."""
+    right = simd_kernels.in_vectors
+    monkeypatch.setattr(
+        simd_kernels, "in_vectors", lambda kernel: right(kernel).replace("lanes_sin(", "lanes_cos(")
+    )
+    caplog.set_level("INFO", logger="ufl_beam")
+    for told in (["WARNING", "INFO"], ["INFO"]):
+        kernel, q = pointwise(ufl.sin, np.linspace(0.1, 1.0, 5))
+        in_lanes(kernel)
+        assert not kernel.vectorised
+        assert [record.levelname for record in caplog.records] == told
+        assert "entries are not those of FFCx's kernel" in caplog.text
+        values = np.zeros(len(q))
+        kernel.add(q, values)
+        assert np.allclose(values, np.sin(q), rtol=1e-14)
+        caplog.clear()
+        simd_kernels._addresses.clear()
+
+
+@pytest.mark.serial
+def test_the_check_is_made_once(fresh, monkeypatch):
+    calls = []
+    check = simd_kernels.require_agreement
+    monkeypatch.setattr(
+        simd_kernels, "require_agreement", lambda *args: (calls.append(args), check(*args))
+    )
+    for _ in range(2):
+        kernel, _ = pointwise(ufl.cos, np.ones(2))
+        in_lanes(kernel)
+        assert kernel.vectorised
+        simd_kernels._addresses.clear()
+    assert len(calls) == 1
+
+
+@pytest.mark.serial
+def test_what_is_slower_is_said(fresh, caplog, monkeypatch):
+    caplog.set_level("INFO", logger="ufl_beam")
+    kernel, _ = pointwise(ufl.atan, np.ones(2))
+    in_lanes(kernel)
+    assert "computed cell by cell, which is slower: lanes.h has no atan" in caplog.text
+    kernel, _ = pointwise(ufl.sin, np.ones(2))
+    monkeypatch.setenv("CC", "no-such-compiler")
+    in_lanes(kernel)
+    assert not kernel.vectorised
+    assert "which is slower: ufl_beam_lanes cannot be compiled" in caplog.text
 
 
 # -- the kernels of the hot loop ---------------------------------------------------------------

@@ -2,14 +2,17 @@
 """Laws of one point: flow in closed form, its limits, and tractions with their exact means."""
 
 import math
+from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
 import ufl_beam as ub
-from ufl_beam.model.material_laws import Bulk, Layout, positive, sign
+from ufl_beam.model.fibres import Layout
+from ufl_beam.model.material_laws import Bulk, BulkLaw, HardeningBulk, positive, sign
 
 C, LIMIT, H, B, ETA = 200.0, 3.0, 20.0, 10.0, 0.5
 """Numbers of a test material: yields at a strain of 0.015."""
@@ -18,7 +21,7 @@ STEP = 1e-30
 
 
 def bulk(C=C, limit=LIMIT, H=H, B=B, eta=ETA):
-    return Bulk(*(np.array([float(x)]) for x in (C, limit, H, B, eta)))
+    return HardeningBulk(*(np.array([float(x)]) for x in (C, limit, H, B, eta)))
 
 
 def flow(law, strain, p=0.0, ξ=0.0, θ=1.0, dt=0.1):
@@ -270,9 +273,9 @@ def test_laws_of_resultants_stand_at_their_points():
     assert layout.rest.tolist() == [0, 5, 0]
     assert law.C.tolist() == [7, 3]
     assert law.limit.tolist() == [[2, 4], [2, 4]]
-    assert law.H.tolist() == [1, 0]
-    assert law.B.tolist() == [0, 6]
-    assert law.eta.tolist() == [0.5 * (7 + 1), 9]
+    assert law.H.tolist() == [[1, 0], [1, 0]]
+    assert law.B.tolist() == [[0, 6], [0, 6]]
+    assert law.eta.tolist() == [[0.5 * (7 + 1), 9], [0.5 * (7 + 1), 9]]
     assert layout.softening is None
     assert layout.yields
 
@@ -292,3 +295,64 @@ def test_a_hinge_in_an_elastic_section_has_one_point():
 def test_a_hinge_that_never_opens_is_none():
     section = ub.Section(EA=7.0, GA=5.0, EI=3.0)
     assert section.layout(ub.Softening(math.inf, 1.0)) is None
+
+
+# -- laws of one's own --------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class SaturatingBulk(Bulk):
+    """Yield stress that grows by ``gain`` (1 - ξ/c) per plastic strain at the plastic strain ξ."""
+
+    gain: Any
+    c: Any
+
+    def flow(self, strain, p, ξ, θ, dt):
+        trial = self.C * (strain - p)
+        over = positive(sign(trial) * trial - self.limit - self.gain * ξ * (1 - ξ / (2 * self.c)))
+        return sign(trial) * over / (θ * (self.C + self.gain * (1 - ξ / self.c)))
+
+    def hardening_energy(self, p, ξ):
+        return self.gain * ξ**2 * (1 / 2 - ξ / (6 * self.c))
+
+    def dissipation(self, dp, dt):
+        return self.limit * abs(dp)
+
+
+@dataclass(frozen=True)
+class Saturating(BulkLaw):
+    """Record of :class:`SaturatingBulk`."""
+
+    limit: float
+    gain: float
+    c: float
+
+    statement = SaturatingBulk
+
+    def numbers(self, C):
+        return {"limit": self.limit, "gain": self.gain, "c": self.c}
+
+
+def test_a_law_of_ones_own_needs_no_c():
+    """A bar of it, pulled in small steps, follows its curve: N = limit + gain ξ (1 - ξ/(2 c))."""
+    law = Saturating(limit=2.0, gain=10.0, c=0.5)
+    section = ub.Section(EA=100.0, GA=1.0, EI=1.0, axial=law)
+    bar = ub.Beam((0, 0), (1, 0), section, cells=2)
+    pull = ub.Prescribed(bar.end, u=lambda t: 0.2 * t, v=0.0)
+    scene = ub.Scene([bar], supports=[ub.Clamped(bar.start), pull])
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1e-3, progress=False)
+    N = run.section_forces(bar)[:, 0]
+    ξ = 0.2 - N / 100
+    # Each step takes the slope at its beginning: first order, 1e-3 of a curve that bends little.
+    assert pytest.approx(2 + 10 * ξ * (1 - ξ), rel=1e-3) == N
+    assert run.energy.lost["plastic"][-1] == pytest.approx(2 * ξ[0], rel=1e-2)
+
+
+def test_laws_of_one_section_are_of_one_kind():
+    section = ub.Section(
+        EA=100.0, GA=1.0, EI=1.0, axial=Saturating(2.0, 10.0, 0.5), bending=ub.Hardening(1.0)
+    )
+    bar = ub.Beam((0, 0), (1, 0), section)
+    scene = ub.Scene([bar], supports=[ub.Clamped(bar.start)])
+    with pytest.raises(ub.SceneError, match="one kind, not Saturating and Hardening"):
+        ub.Simulation(scene, ub.Static())

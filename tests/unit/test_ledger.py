@@ -15,7 +15,7 @@ import ufl_beam as ub
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
 
 CLOSED = 1e-9
-"""Part of the throughput, the promise of design.md, section 9."""
+"""Largest imbalance of a ledger as a part of its throughput."""
 
 
 # -- arithmetic ----------------------------------------------------------------------------------

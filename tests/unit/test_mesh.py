@@ -13,9 +13,9 @@ import pytest
 from scipy.sparse import csr_array
 
 import ufl_beam as ub
-from ufl_beam.discretization.dof_numbering import Grid, Share
-from ufl_beam.discretization.function_spaces import Fields
-from ufl_beam.terms.beams import mass_matrix
+from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.function_spaces import Fields, mass_matrix
+from ufl_beam.discretization.partition import Share
 
 STEEL = ub.Section(EA=1e6, GA=4e5, EI=1e3, rhoA=2.0, rhoI=1e-3)  # N, N, N m2, kg/m, kg m
 

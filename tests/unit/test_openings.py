@@ -11,8 +11,7 @@ import pytest
 
 import ufl_beam as ub
 from ufl_beam.errors import StepFailed
-from ufl_beam.terms.material_points import OVER, Course
-from ufl_beam.terms.openings import Openings
+from ufl_beam.terms.openings import OVER, Course, Openings
 
 LENGTH, EI, STIFF = 2.0, 1000.0, 1e6  # m, N m², N
 LAWS = [ub.Softening, ub.LinearSoftening]
@@ -266,4 +265,4 @@ def test_places_are_free_where_holding_them_leads_nowhere():
 def test_no_search_where_nothing_opens():
     """There is no object for it."""
     _, scene = pushed()
-    assert ub.Simulation(scene, ub.Static())._openings is None
+    assert ub.Simulation(scene, ub.Static())._assembly.openings is None

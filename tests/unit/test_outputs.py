@@ -22,7 +22,7 @@ from ufl_beam.output import output_files
 from ufl_beam.output.output_files import OutputFile
 from ufl_beam.output.vtkhdf import VtkhdfWriter
 from ufl_beam.output.xdmf import PAGE, XdmfWriter
-from ufl_beam.simulation.checkpoint import read
+from ufl_beam.simulation.checkpoint_file import read
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=0.1)
 

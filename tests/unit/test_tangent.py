@@ -8,6 +8,7 @@ import pytest
 from scipy.sparse import csr_array
 
 import ufl_beam as ub
+from ufl_beam.terms.algorithmic_damping import SecondDifferences
 
 # Numbers of one magnitude, so that an error in any term shows in the largest entry.
 SECTION = ub.Section(EA=60.0, GA=40.0, EI=30.0, rhoA=2.0, rhoI=1.0)
@@ -78,14 +79,15 @@ class Probe:
         inertia.v, inertia.v_before = random.uniform(-1, 1, (2, len(inertia.v)))
         inertia.more = tuple(random.uniform(-1, 1, (len(inertia.scheme.kept), len(inertia.v))))
         inertia.last_dt = 0.2
-        for term in simulation._numerical:
+        numerical = (one for one in simulation.terms if isinstance(one, SecondDifferences))
+        for term in numerical:
             term._change, term._last_dt = random.uniform(-1, 1, term._change.shape), 0.2
 
     @staticmethod
     def at_random(inelastic, random):
         """Random plastic strains, jumps and their sums, the latter at least as large."""
         cells, state = inelastic.state()
-        n = inelastic.points["p"].shape[1]
+        n = inelastic.points["plastic"].shape[1]
         p, jump = random.uniform(-0.5, 0.5, (2, len(cells), n))
         if not np.isfinite(inelastic.points["traction"]).any():
             jump[:] = 0.0
@@ -95,14 +97,14 @@ class Probe:
 
     def residual(self, x):
         r = np.empty(len(x))
-        self.simulation._residual(x, r)
+        self.simulation.equation.residual(x, r)
         return r[self.free]
 
     def tangent(self):
-        A = self.simulation._A
+        A = self.simulation.equation.A
         self.residual(self.x)  # rows of connectors are those of the latest residual
         for _ in range(2):  # the first tangent of a static step takes the forces before the step
-            self.simulation._tangent(self.x)
+            self.simulation.equation.tangent(self.x)
         matrix = csr_array((A.data, A.indices, A.indptr)).toarray()
         return matrix[np.ix_(self.free, self.free)]
 
@@ -162,7 +164,7 @@ def test_held_rows_and_columns_are_diagonal():
     probe = Probe(scene("roller"), ub.Static(), turn=1.0)
     simulation = probe.simulation
     probe.tangent()
-    A = simulation._A
+    A = simulation.equation.A
     matrix = csr_array((A.data, A.indices, A.indptr)).toarray()
     held = simulation.supports.dofs
     diagonal = np.diag(matrix)
@@ -241,9 +243,9 @@ def test_laws_show_in_the_tangent(kind):
         probe = Probe(inelastic_scene(kind), ub.Midpoint(), turn=1.0, seed=seed)
         probe.tangent()
         (inelastic,) = probe.simulation.inelastic
-        p, opening = (inelastic.points[name].copy() for name in ("p", "opening"))
+        p, opening = (inelastic.points[name].copy() for name in ("plastic", "opening"))
         inelastic.accept(probe.simulation.supports.in_plane(probe.x), None)
-        flow, growth = inelastic.points["p"] != p, inelastic.points["opening"] > opening
+        flow, growth = inelastic.points["plastic"] != p, inelastic.points["opening"] > opening
         flows, opens = flows or flow.any(), opens or growth.any()
         both = both or (flow & growth).any()
     assert opens == ("hinge" in LAWS[kind] or "softening" in LAWS[kind])

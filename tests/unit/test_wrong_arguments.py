@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.simulation import simulation
+from ufl_beam.simulation import assembly
 
 NAN, INF, HUGE = math.nan, math.inf, 10**400
 ARRAY = np.array([1.0, 2.0])
@@ -318,7 +318,7 @@ TABLE = {
     "Simulation": call(
         ub.Simulation,
         scene=V(SCENE, OBJECT), scheme=V(ub.Static(), [*OBJECT, ub.Static]), t0=V(0.0, NUMBER),
-        start=V(None, optional(OBJECT)), **RUN,
+        start=V(None, optional(OBJECT)), kind=V(ub.Path, OBJECT), **RUN,
     ),
     "follow": call(
         ub.follow,
@@ -471,7 +471,7 @@ def test_wrong_values_are_refused_by_name(name, monkeypatch):
     def no_mesh(*_, **__):
         raise AssertionError("a mesh was made")
 
-    monkeypatch.setattr(simulation, "Fields", no_mesh)
+    monkeypatch.setattr(assembly, "Fields", no_mesh)
     of, _ = TABLE[name]
     faults = []
     for parameter, value, values in _wrong(name):

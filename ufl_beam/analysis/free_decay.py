@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Damping of a free vibration: its peaks, their logarithmic decrement, the law of their decay."""
+"""Damping of a free vibration: peaks, logarithmic decrement and decay laws."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ufl_beam.errors import SceneError, require_number
 
 @dataclass(frozen=True)
 class Envelope:
-    """A law fitted to peaks; ``_95`` is the half-width of a 95 % interval, Student's, linearised.
+    """Decay law fitted to peaks; ``_95`` is the half-width of a 95 % interval (Student's t).
 
     Attributes:
         initial: A_0, the amplitude at the first peak; unit of x.
@@ -24,6 +24,12 @@ class Envelope:
         initial_95: Uncertainty of ``initial``; unit of x.
         rate_95: Uncertainty of ``rate``; same unit.
         rms: Root mean square of the residuals; unit of x.
+
+    Example:
+        >>> t = np.arange(5.0)
+        >>> fit = ub.fit_decay(t, 1.0 - 0.1 * t).linear
+        >>> print(f"{fit.initial:.2f} - {fit.rate:.2f} t")
+        1.00 - 0.10 t
     """
 
     initial: float
@@ -41,7 +47,7 @@ class Envelope:
 
 @dataclass(frozen=True, eq=False)
 class Decay:
-    """Decay of the peaks of a free vibration.
+    """Decay of a free vibration: peaks, logarithmic decrement and fitted laws.
 
     Attributes:
         times: Times of the n peaks; (n,); s.
@@ -50,6 +56,12 @@ class Decay:
         decrements: That of each period; (n-1,).
         linear: The fit of A_0 − r t, as under dry friction: every period takes the same amount.
         exponential: The fit of A_0 exp(−λ t), as under viscous damping: the same part.
+
+    Example:
+        >>> t = np.arange(0, 5, 0.01)
+        >>> decay = ub.damping(t, np.exp(-0.1 * t) * np.cos(2 * np.pi * t))
+        >>> print(f"{decay.period:.2f} s, ratio {decay.ratio:.4f}, {decay.better}")
+        1.00 s, ratio 0.0159, exponential
     """
 
     times: Array
@@ -113,10 +125,16 @@ class Decay:
 def damping(
     t: npt.ArrayLike, x: npt.ArrayLike, about: float = 0.0, *, prominence: float = 0.05
 ) -> Decay:
-    """Damping of a free vibration from its history; arguments and errors of :func:`peaks`.
+    """Estimate the damping of a free vibration; arguments and errors of :func:`peaks`.
 
     Raises:
         SceneError: Less than 3 peaks, or not all of them are above ``about``.
+
+    Example:
+        >>> t = np.arange(0, 5, 0.01)
+        >>> decay = ub.damping(t, np.exp(-0.1 * t) * np.cos(2 * np.pi * t))
+        >>> print(f"{decay.decrement:.3f} {decay.ratio:.4f}")
+        0.100 0.0159
     """
     times, amplitudes = peaks(t, x, about, prominence=prominence)
     if len(times) < 3:
@@ -130,7 +148,7 @@ def damping(
 def peaks(
     t: npt.ArrayLike, x: npt.ArrayLike, about: float = 0.0, *, prominence: float = 0.05
 ) -> tuple[Array, Array]:
-    """Times (s) and amplitudes (unit of x) of the maxima of a vibration; (m,) each.
+    """Find times (s) and amplitudes (unit of x) of the maxima of a vibration; (m,) each.
 
     Of x and not of its magnitude: these are one period apart, wherever the equilibrium is.  Each
     is that of the parabola through three samples; an end of the history is no maximum.
@@ -147,6 +165,12 @@ def peaks(
 
     Raises:
         SceneError: t and x are not as many, not finite, or t does not increase.
+
+    Example:
+        >>> t = np.arange(0, 3, 0.01)
+        >>> times, amplitudes = ub.peaks(t, np.cos(2 * np.pi * t))
+        >>> print(times.round(3), amplitudes.round(3))
+        [1. 2.] [1. 1.]
     """
     t, x = _series("peaks", t, x, "x")
     require_number(about, "peaks: about")
@@ -162,10 +186,15 @@ def peaks(
 
 
 def logarithmic_decrement(amplitudes: npt.ArrayLike) -> tuple[float, Array]:
-    """Logarithmic decrement δ of n + 1 amplitudes: mean over n periods, and of each one, (n,).
+    """Compute the mean logarithmic decrement δ of n + 1 amplitudes, and that of each period, (n,).
 
     Raises:
         SceneError: Less than two amplitudes, or some are not positive.
+
+    Example:
+        >>> mean, each = ub.logarithmic_decrement([1.0, 0.9, 0.81])
+        >>> print(round(mean, 4), each.round(4))
+        0.1054 [0.1054 0.1054]
     """
     Φ = require_row(amplitudes, "logarithmic_decrement: amplitudes")
     n = len(Φ) - 1
@@ -181,7 +210,12 @@ def logarithmic_decrement(amplitudes: npt.ArrayLike) -> tuple[float, Array]:
 
 
 def damping_ratio(decrement: npt.ArrayLike) -> Array:
-    """Damping ratio ζ of logarithmic decrements δ of any shape; negative where vibrations grow."""
+    """Compute damping ratios ζ of decrements δ of any shape; negative where vibrations grow.
+
+    Example:
+        >>> print(f"{ub.damping_ratio(0.1):.4f}")
+        0.0159
+    """
     δ = require_array(decrement, "damping_ratio: decrement")
     ζ: Array = δ / np.hypot(δ, 2 * np.pi)  # P(62)
     return ζ
@@ -199,6 +233,12 @@ def fit_decay(t: npt.ArrayLike, amplitudes: npt.ArrayLike) -> Decay:
     Raises:
         SceneError: t and amplitudes are not as many, at least 3, and finite; t does not increase;
             an amplitude is not positive; or they scatter so much that nothing fits.
+
+    Example:
+        >>> t = np.arange(6.0)
+        >>> decay = ub.fit_decay(t, 2.0 * np.exp(-0.1 * t))
+        >>> print(decay.better, f"{decay.exponential.rate:.3f}")
+        exponential 0.100
     """
     t, A = _series("fit_decay", t, amplitudes, "amplitudes")
     if len(A) < 3:

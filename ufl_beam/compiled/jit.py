@@ -26,7 +26,13 @@ import ufl
 from ufl_beam.compiled.code_cache import kept
 from ufl_beam.dolfinx_compat import TABULATE, compile_form, fem, form_key
 
-HEADERS = "\n".join(f"#include <{name}.h>" for name in ("float", "math", "stdint", "string"))
+HEADERS = "\n".join(
+    [
+        *(f"#include <{name}.h>" for name in ("float", "math", "stdint", "string")),
+        f"#define CALL(f, e, w, c, x) f(e, w, c, x, 0, 0{TABULATE[1]})",
+    ]
+)
+"""Head of all files of C; CALL calls a kernel of FFCx."""
 
 
 def text(name: str) -> str:
@@ -50,6 +56,7 @@ SANITIZERS = (
     "-fno-wrapv",
     "-fsanitize=address,undefined,bounds-strict",
     "-fno-sanitize-recover=all",
+    *("-Wall", "-Wextra", "-Wno-unused-parameter", "-Werror"),
 )
 """Flags that make the compiler check addresses and undefined behaviour; see `make sanitize`."""
 
@@ -61,6 +68,10 @@ class CompilerError(RuntimeError):
     """The C compiler is missing, or refuses the code."""
 
 
+class Refused(Exception):
+    """Code that must not be used, with the reason; the cache remembers it."""
+
+
 def compiled(
     stem: str,
     declarations: str,
@@ -68,50 +79,72 @@ def compiled(
     *,
     made_of: Sequence[str],
     flags: Sequence[str],
+    check: Callable[[ModuleType], None] = lambda _: None,
 ) -> ModuleType:
-    """Load a module of C, compiled first if the cache has it not.
+    """Load a module of C, compiled first if it is not in the cache.
 
     Args:
         stem: Beginning of its name.
         declarations: C declarations of its functions and types for Python.
-        source: Its C; called if it is not in the cache.
+        source: Its C; called if it is not in the cache; may raise :class:`Refused`.
         made_of: Texts that the C, and the effect of the flags, depend on.
         flags: For the compiler.
+        check: Called with the module once it has been compiled; may raise :class:`Refused`.
 
     Raises:
         CompilerError: The compiler is missing, or refuses.
+        Refused: As by ``source`` or ``check``, now or when the module was made.
     """
-    flags = [*flags, *EXTRA]
+    flags = [*flags, "-fvisibility=hidden", *EXTRA]
     name = f"{stem}_{_digest(declarations, *made_of, *flags, sys.version)}"
 
-    def build(directory: Path) -> ModuleType:
+    def build(directory: Path) -> ModuleType | Refused:
         builder = cffi.FFI()
         builder.cdef(declarations)
-        builder.set_source(
-            name,
-            source(),
-            extra_compile_args=flags,
-            extra_link_args=list(EXTRA),
-            libraries=["m"],
-        )
-        with _explained(stem):
-            builder.compile(tmpdir=directory)
-        return load(directory)
-
-    def load(directory: Path) -> ModuleType:
-        library = directory / (name + str(sysconfig.get_config_var("EXT_SUFFIX")))
-        spec = importlib.util.spec_from_file_location(name, library)
-        if spec is None or spec.loader is None:
-            raise ImportError(f"{library} is no library of Python")
-        module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
+        try:
+            builder.set_source(
+                name,
+                source(),
+                extra_compile_args=flags,
+                extra_link_args=list(EXTRA),
+                libraries=["m"],
+            )
+            with _explained(stem):
+                builder.compile(tmpdir=directory)
+            check(module := _imported(name, directory))
+        except Refused as refusal:
+            (directory / REFUSAL).write_text(str(refusal))
+            return refusal
         return module
 
-    return kept(name, build, load)[0]
+    def load(directory: Path) -> ModuleType | Refused:
+        refusal = directory / REFUSAL
+        return Refused(refusal.read_text()) if refusal.exists() else _imported(name, directory)
+
+    module, directory = kept(name, build, load)
+    if isinstance(module, Refused):
+        raise module
+    module.__file__ = str(directory / Path(str(module.__file__)).name)  # it was built elsewhere
+    return module
+
+
+REFUSAL = "refused"
+"""File of a cache entry with the reason why its code must not be used."""
+
+
+def _imported(name: str, directory: Path) -> ModuleType:
+    """Import a compiled module."""
+    library = directory / (name + str(sysconfig.get_config_var("EXT_SUFFIX")))
+    spec = importlib.util.spec_from_file_location(name, library)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"{library} is no library of Python")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def compiled_form(form: ufl.Form) -> tuple[fem.Form, Path]:
-    """Load a form, compiled first if the cache has it not.
+    """Load a form, compiled first if it is not in the cache.
 
     Returns:
         The form, and the C that FFCx wrote for it.

@@ -1,49 +1,62 @@
 # SPDX-License-Identifier: MIT
-"""FFCx's kernels for several cells at once: one cell in each lane of the processor's vectors.
+"""SIMD versions of FFCx's kernels: several cells at once, one in each lane of a vector.
 
-Kernels are long straight lines of arithmetic on the numbers of one cell.  Their text is compiled
-once more with vectors in the place of numbers, which GCC and Clang know as types.  The loop over
-the cells is that of :mod:`ufl_beam.compiled.c_library`.
+Kernels are straight-line arithmetic on the numbers of one cell.  Their text is compiled once more
+with vector types of GCC and Clang in the place of numbers, and compared with FFCx's kernel.
 """
 
 from __future__ import annotations
 
+import logging
+import math
 import re
+from functools import partial
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from ufl_beam.compiled.jit import DECLARATIONS, HEADERS, CompilerError, compiled, text
+from ufl_beam.compiled.jit import DECLARATIONS, HEADERS, CompilerError, Refused, compiled, text
+from ufl_beam.dolfinx_compat import VERSIONS
+
+LOGGER = logging.getLogger("ufl_beam")
 
 LANES = 4
-"""Cells that are computed at once: as many as AVX has room for.  On what has less, vectors are made
-of several; eight of AVX-512 are hardly faster, and more often too many."""
+"""Cells that are computed at once, as many as AVX has room for; compilers split vectors for less.
+Eight (AVX-512) are hardly faster."""
 
 FUNCTIONS = {"sin", "cos", "sqrt", "fabs", "pow"}
-"""Functions of which lanes.h has a version for vectors; powers with whole exponents."""
+"""Functions that lanes.h has for vectors; powers with integer exponents."""
+
+INTERFACE = """
+void *address(void);
+void compute_both(void *of_ffcx, const double *w, const double *constants, const double *x,
+                  double *one, double *several);
+"""
+"""Functions of lanes.c that Python calls."""
 
 _NUMBER = r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?"
 
 
-class NotInVectors(Exception):
-    """A kernel that has to be computed cell by cell."""
-
-
 def in_vectors(kernel: str) -> str:
-    """The text of a kernel of FFCx with vectors in the place of numbers.
+    """Rewrite the text of a kernel of FFCx with vectors in the place of numbers.
 
     Args:
         kernel: Its definition in C.
 
     Raises:
-        NotInVectors: It asks for functions that lanes.h has not.
+        Refused: It calls functions that lanes.h does not have.
     """
     body = kernel[kernel.index("{") :]
     called = re.findall(r"\b(?!for\b)([a-z_]\w*)\(", body)
     whole = re.findall(r"\bpow\([\w\[\]]+, -?\d+\)", body)
-    if set(called) - FUNCTIONS or len(whole) < called.count("pow"):
-        raise NotInVectors(f"functions {sorted(set(called))}, of whole powers {whole}")
+    missing = sorted(set(called) - FUNCTIONS)
+    if len(whole) < called.count("pow"):
+        missing.append("pow with a fractional exponent")
+    if missing:
+        raise Refused(f"lanes.h has no {', '.join(missing)}")
     lines = []
     for line in body.splitlines():
         if not line.startswith("static const"):
@@ -66,63 +79,96 @@ def written(source: Path) -> str:
         source: File of its C.
 
     Raises:
-        NotInVectors: The file has none.
+        Refused: The file has none.
     """
     pattern = r"^void tabulate_tensor_.*?^}(?=\s*^(?:bool|ufcx_integral) )"
     if source.exists() and (found := re.search(pattern, source.read_text(), re.M | re.S)):
         return found[0]
-    raise NotInVectors(f"{source} has no kernel")
+    raise Refused(f"{source} has no kernel")
 
 
-NONE = "void *in_lanes(void) { return 0; }"
-"""C of a module without a loop, which the cache remembers like one with it."""
+def in_batches(rows: npt.NDArray[Any], lanes: int) -> npt.NDArray[Any]:
+    """Arrange numbers of cells in batches, see loops.h; (num_batches, numbers, lanes).
+
+    Args:
+        rows: Shape (num_cells, ...).
+        lanes: Number of rows in a batch.
+    """
+    rows = rows.reshape(len(rows), math.prod(rows.shape[1:]))
+    if missing := -len(rows) % lanes:
+        rows = np.concatenate([rows, np.repeat(rows[-1:], missing, axis=0)])
+    return np.ascontiguousarray(rows.reshape(-1, lanes, rows.shape[1]).transpose(0, 2, 1))
 
 
-def _loop(written_in: Path, sizes: dict[str, int]) -> ModuleType:
-    """The module with the loop over the cells."""
-    defined = [f"#define {name} {size}" for name, size in sizes.items()]
-    files = [text("lanes.h"), text("lanes.c")]
+AGREEMENT = 1e-12
+"""Tolerance on the difference from FFCx's kernel, relative to the largest entry of a cell."""
 
-    def source() -> str:
-        try:
-            kernel = in_vectors(written(written_in))
-        except NotInVectors:
-            return NONE
-        return "\n".join([HEADERS, DECLARATIONS, *defined, files[0], kernel, files[1]])
 
-    return compiled(
-        "ufl_beam_lanes",
-        "void *in_lanes(void);",
-        source,
-        # FFCx names what it makes by what is in it; NumPy knows what "native" means.
-        made_of=[written_in.name, *defined, *files, DECLARATIONS, Path(__file__).read_text(), _CPU],
-        flags=["-O2", "-march=native", "-fno-math-errno", "-w"],
-    )
+def require_agreement(module: ModuleType, kernel: int, sizes: tuple[int, int, int]) -> None:
+    """Compare a kernel in vectors with FFCx's on random cells.
+
+    Args:
+        module: Compiled from lanes.c.
+        kernel: Address of the kernel of FFCx.
+        sizes: Numbers of its entries, values of coefficients, and constants.
+
+    Raises:
+        Refused: The results differ.
+    """
+    random, (entries, width, constants) = np.random.default_rng(0), sizes
+    at, wrong = partial(module.ffi.from_buffer, "double[]"), 0
+    for signs in ([1.0], [1.0], [-1.0, 1.0], [-1.0, 1.0]):
+        w = random.uniform(0.1, 1.0, (width, LANES)) * random.choice(signs, (width, LANES))
+        x = np.array([[0.0, 0.0, 0.0, 1.0, 0.5, 0.0]]).T + random.uniform(-0.1, 0.1, (6, LANES))
+        numbers, (one, several) = random.uniform(0.1, 0.9, constants), np.zeros((2, entries, LANES))
+        address = module.ffi.cast("void *", kernel)
+        module.lib.compute_both(address, *map(at, (w, numbers, x, one, several)))
+        scale = np.abs(one).max(axis=0, where=np.isfinite(one), initial=0.0)
+        with np.errstate(invalid="ignore"):
+            good = (np.abs(several - one) <= AGREEMENT * scale) | (several == one)
+        wrong += np.sum(~good & ~(np.isnan(one) & np.isnan(several)))
+    if wrong:
+        why = f"{wrong} of {16 * entries} entries are not those of FFCx's kernel"
+        LOGGER.warning("a kernel in vectors, compiled by %s, is wrong: %s", VERSIONS, why)
+        raise Refused(why)
 
 
 _CPU = repr(np.show_config(mode="dicts"))
 """Configuration of NumPy, which includes the features of the processor."""
 
-_modules: dict[tuple[str, int, int, int], ModuleType | None] = {}
+_addresses: dict[tuple[str, int, int, int], int | None] = {}
 
 
-def in_lanes(source: Path, entries: int, width: int, constants: int) -> int | None:
-    """Address of what computes several cells of a compiled form at once; none if nothing does.
+def in_lanes(source: Path, kernel: int, sizes: tuple[int, int, int]) -> int | None:
+    """Return the address of the SIMD loop of a compiled form, or None where there is none.
 
     Args:
         source: The C that FFCx wrote for a cell form.
-        entries: Of the vector or matrix of a cell.
-        width: Number of its coefficients' values in a cell.
-        constants: Number of its constants.
+        kernel: Address of its kernel.
+        sizes: Numbers of its entries, values of coefficients, and constants.
     """
-    key = (source.name, entries, width, constants)
-    if key not in _modules:
-        sizes = {"LANES": LANES, "ENTRIES": entries, "WIDTH": width, "CONSTANTS": constants}
+    key = (source.name, *sizes)
+    if key not in _addresses:
         try:
-            _modules[key] = _loop(source, sizes)
-        except CompilerError:
-            _modules[key] = None
-    module = _modules[key]
-    if module is None:
-        return None
-    return int(module.ffi.cast("intptr_t", module.lib.in_lanes())) or None
+            module = _compiled(source, kernel, sizes)
+            _addresses[key] = int(module.ffi.cast("intptr_t", module.lib.address()))
+        except (Refused, CompilerError) as why:
+            LOGGER.info("%s is computed cell by cell, which is slower: %s", source.stem, why)
+            _addresses[key] = None
+    return _addresses[key]
+
+
+def _compiled(source: Path, kernel: int, sizes: tuple[int, int, int]) -> ModuleType:
+    """Compile or load the module with the loop over the cells."""
+    names = ("LANES", "ENTRIES", "WIDTH", "CONSTANTS")
+    defined = [f"#define {x} {n}" for x, n in zip(names, (LANES, *sizes), strict=True)]
+    head, loop = "\n".join([HEADERS, DECLARATIONS, *defined, text("lanes.h")]), text("lanes.c")
+    return compiled(
+        "ufl_beam_lanes",
+        INTERFACE,
+        lambda: "\n".join([head, in_vectors(written(source)), loop]),
+        # FFCx names what it makes by what is in it; NumPy knows what "native" means.
+        made_of=[source.name, head, loop, Path(__file__).read_text(), _CPU],
+        flags=["-O2", "-march=native", "-fno-math-errno"],
+        check=lambda module: require_agreement(module, kernel, sizes),
+    )

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""UFL forms compiled for the hot loop: packed once, refreshed only where something changed.
+"""UFL forms and functions of points, compiled for the hot loop.
+
+Forms are packed once, and refreshed only where something changed.
 
 A form is compiled with one quadrature rule: forms that mix a one-point rule with another are
 silently wrong in FFCx 0.9 to 0.11.
@@ -8,56 +10,116 @@ silently wrong in FFCx 0.9 to 0.11.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from itertools import accumulate
+from pathlib import Path
+from typing import Any, NamedTuple, ParamSpec, Protocol, TypeVar, cast
 
+import basix.ufl
 import numpy as np
-import numpy.typing as npt
 import ufl
+from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, integers, kernel, lib
-from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.jit import compiled_form
-from ufl_beam.compiled.simd_kernels import LANES, in_lanes
-from ufl_beam.dolfinx_compat import fem, pack
+from ufl_beam.compiled.simd_kernels import LANES, in_batches, in_lanes
+from ufl_beam.dolfinx_compat import VERSIONS, fem, line_mesh, pack
 
 
-def in_batches(rows: npt.NDArray[Any], lanes: int) -> npt.NDArray[Any]:
-    """Rows of numbers, one of each cell, as loops.h says; (num_batches, numbers, lanes).
-
-    Args:
-        rows: Shape (num_cells, ...).
-        lanes: Number of rows in a batch.
-    """
-    rows = rows.reshape(len(rows), math.prod(rows.shape[1:]))
-    if missing := -len(rows) % lanes:
-        rows = np.concatenate([rows, np.repeat(rows[-1:], missing, axis=0)])
-    return np.ascontiguousarray(rows.reshape(-1, lanes, rows.shape[1]).transpose(0, 2, 1))
-
-
-def vectorise(kernels: Iterable[Kernel], coordinates: Array) -> None:
-    """Let all of some kernels compute several cells at once, or none: they may share numbers.
+def vectorise(kernels: Sequence[Kernel], coordinates: Array) -> None:
+    """Switch kernels to SIMD, all of them or none: they may share numbers.
 
     Args:
         kernels: On the same cells.
         coordinates: Of the cells, in batches of ``LANES``.
     """
-    addresses = {kernel: kernel.address_in_lanes() for kernel in kernels}
-    known = {kernel: address for kernel, address in addresses.items() if address is not None}
-    if len(known) == len(addresses):
-        for kernel, address in known.items():
-            kernel.compute_in_lanes(address, coordinates)
+    addresses = [kernel.address_in_lanes() for kernel in kernels]
+    if None not in addresses:
+        for one, address in zip(kernels, addresses, strict=True):
+            one.compute_in_lanes(address, coordinates)
 
 
 def tabulator(compiled: fem.Form) -> Any:
-    """The C function of a compiled cell form; it lives as long as the form."""
+    """Return the C function of a compiled cell form; it lives as long as the form."""
     integral = compiled.ufcx_form.form_integrals[0]
     return kernel(integral.tabulate_tensor_float64, compiled.module.ffi)
 
 
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def stated(function: Callable[P, T]) -> Callable[P, T]:
+    """Call a function that states forms once in a process with the same arguments."""
+    return cast("Callable[P, T]", lru_cache(maxsize=128)(function))
+
+
+class Prepared(NamedTuple):
+    """A form compiled for all scenes.
+
+    Attributes:
+        form: The DOLFINx form.
+        source: The C that FFCx wrote for it.
+        tabulate: Its kernel.
+        coefficients: Its coefficients.
+        columns: Place of the values of each, by identity, in the row of numbers of a cell.
+        constants: Values of its constants.
+        packed: Values of the coefficients in the cells that the form was stated on.
+        entries: Number of entries of the vector or matrix of a cell.
+    """
+
+    form: fem.Form
+    source: Path
+    tabulate: Any
+    coefficients: list[fem.Function]
+    columns: dict[int, slice]
+    constants: Array
+    packed: Array
+    entries: int
+
+
+@lru_cache(maxsize=512)
+def prepared(form: ufl.Form) -> Prepared:
+    """Compile a form, once in a process.
+
+    Raises:
+        ValueError: Its cells have more entries than C has room for, or others than FFCx packs.
+    """
+    compiled, source = compiled_form(form)
+    ufcx, (constants, packed) = compiled.ufcx_form, pack(compiled)
+    positions = ufcx.original_coefficient_positions[0 : ufcx.num_coefficients]
+    used = [form.coefficients()[i] for i in positions]
+    ends = [0, *accumulate(f.function_space.element.space_dimension for f in used)]
+    if packed.shape[1] != ends[-1]:
+        raise ValueError(f"{VERSIONS} pack {packed.shape[1]} values of a cell, not {ends[-1]}")
+    # By identity: functions of UFL compute what they hash to.
+    columns = {id(f): slice(*ends[i : i + 2]) for i, f in enumerate(used)}
+    sizes = [x.ufl_function_space().element.space_dimension for x in form.arguments()]
+    entries = math.prod(sizes)
+    if entries > lib.MOST_ENTRIES:
+        raise ValueError(
+            f"a form on cells of {' x '.join(map(str, sizes))} degrees of freedom has {entries} "
+            f"entries; loops.h has room for {lib.MOST_ENTRIES}"
+        )
+    tabulate = tabulator(compiled)
+    return Prepared(compiled, source, tabulate, used, columns, constants, packed, entries)
+
+
+class Entries(Protocol):
+    """Matrix of a fixed pattern, see :class:`Csr`."""
+
+    def positions(self, rows: Index, columns: Index) -> Index:
+        """Positions of entries in its data."""
+
+
 class Kernel:
     """A compiled cell form together with the packed values of its coefficients.
+
+    A form stated on one cell is computed on all cells, with the values of its coefficients there
+    until :meth:`put` or :meth:`set` gives them others.  If its test functions are those of the
+    unknown's space, cells add to their degrees of freedom; else each to entries of its own.
 
     Args:
         form: Cell integrals with one quadrature rule.
@@ -66,59 +128,52 @@ class Kernel:
         coordinates: Vertices of the cells; shape (num_cells, 2, 3); m.
 
     Attributes:
-        compiled: The DOLFINx form.
-        cells: What ``add_cells`` of loops.c takes; a new one after :meth:`share`, :meth:`place`,
+        cells: Argument of ``add_cells`` of loops.c; a new one after :meth:`share`, :meth:`place`,
             :meth:`compute_in_lanes`.
+
+    Raises:
+        ValueError: The arrays are of other cells than each other, or than the form.
     """
 
     def __init__(
         self, form: ufl.Form, unknown: fem.Function, cell_dofs: Index, coordinates: Array
     ) -> None:
-        self.compiled, self._source = compiled_form(form)
-        ufcx = self.compiled.ufcx_form
-        constants, packed = pack(self.compiled)
-        everything = form.coefficients()
-        used = [
-            everything[ufcx.original_coefficient_positions[i]] for i in range(ufcx.num_coefficients)
-        ]
-        ends = np.cumsum([f.function_space.element.space_dimension for f in used])
-        self._columns = {
-            f: slice(end - f.function_space.element.space_dimension, end)
-            for f, end in zip(used, ends, strict=True)
-        }
-        self._starts = {id(f): columns.start for f, columns in self._columns.items()}
+        self._form = ready = prepared(form)
+        self._columns, self._entries = ready.columns, ready.entries
         self._dofs = np.ascontiguousarray(cell_dofs, dtype=np.int32)
-        self._lanes, self._in_lanes = 1, ffi.NULL
-        self._packed, self._coordinates = (in_batches(x, 1) for x in (packed, coordinates))
-        self._rows = in_batches(self._rows_of_cells(form), 1)
+        self._lanes, self._in_lanes, num_cells = 1, ffi.NULL, len(cell_dofs)
+        packed = np.tile(ready.packed, (num_cells // len(ready.packed), 1))
         spaces = [argument.ufl_function_space() for argument in form.arguments()]
-        self._entries = math.prod(space.element.space_dimension for space in spaces)
-        self._at = self._columns[unknown].start if self.depends_on(unknown) else 0
-        self._unknowns = self._dofs.shape[1] if self.depends_on(unknown) else 0
-        self._constants = constants
+        if len(spaces) != 1:  # a functional; a matrix until it is placed
+            rows: Index = np.zeros((num_cells, self._entries), dtype=np.int32)
+        elif spaces[0] is unknown.function_space:
+            rows = self._dofs
+        else:
+            rows = np.arange(num_cells * self._entries, dtype=np.int32).reshape(-1, self._entries)
+        expected = (len(packed), (num_cells, self._entries), (num_cells, 2, 3))
+        if expected != (num_cells, rows.shape, coordinates.shape):
+            raise ValueError(
+                f"a form with {self._entries} entries of a cell, stated on {len(ready.packed)} "
+                f"cells, got rows of {rows.shape} and coordinates of {coordinates.shape}"
+            )
+        self._packed, self._coordinates, self._rows = (
+            in_batches(x, 1) for x in (packed, coordinates, rows)
+        )
+        self._at, self._unknowns = 0, 0
+        if self.uses(unknown):
+            self._at, self._unknowns = self.position(unknown), self._dofs.shape[1]
         self._prepare()
-
-    def _rows_of_cells(self, form: ufl.Form) -> Index:
-        """Entries of the vector that the cells add to; (num_cells, entries of a cell)."""
-        if not form.arguments():
-            return np.zeros((len(self._dofs), 1), dtype=np.int32)
-        dofmap = form.arguments()[0].ufl_function_space().dofmap
-        blocks = np.asarray(dofmap.list)[:, :, None] * dofmap.bs + np.arange(dofmap.bs)
-        width = blocks.shape[1] * dofmap.bs
-        return np.ascontiguousarray(blocks.reshape(len(blocks), width), dtype=np.int32)
 
     def _prepare(self) -> None:
         """Make the data of the loop over the cells."""
-        self._arrays = (
-            *map(integers, (self._dofs, self._rows)),
-            *map(doubles, (self._packed, self._constants, self._coordinates)),
-        )
+        numbers = (self._packed, self._form.constants, self._coordinates)
+        self._arrays = (*map(integers, (self._dofs, self._rows)), *map(doubles, numbers))
         dofs, row, packed, constants, coordinates = self._arrays
         self.cells = ffi.new(
             "cells *",
             {
-                "tabulate": tabulator(self.compiled),
-                "in_lanes": self._in_lanes,
+                "tabulate": self._form.tabulate,
+                "several": self._in_lanes,
                 "lanes": self._lanes,
                 "number": len(self._dofs),
                 "of_cell": self._dofs.shape[1],
@@ -134,30 +189,24 @@ class Kernel:
             },
         )
 
-    def depends_on(self, function: fem.Function) -> bool:
-        """Return whether ``function`` appears in the form."""
-        return function in self._columns
+    def uses(self, function: fem.Function) -> bool:
+        """Return whether a function appears in the form."""
+        return id(function) in self._columns
+
+    def position(self, function: fem.Function) -> int:
+        """Return the column of the first value of ``function`` among the coefficients of a cell."""
+        return int(self._columns[id(function)].start)
 
     def set(self, function: fem.Function, q: Array) -> None:
         """Give ``function`` the degrees of freedom ``q``, if it appears in the form."""
-        # By identity: functions of UFL compute what they hash to.
-        if (at := self._starts.get(id(function))) is not None:
-            lib.set_cells(self.cells, doubles(q), at)
-
-    def uses(self, function: fem.Function) -> bool:
-        """Return whether a function appears in the form."""
-        return id(function) in self._starts
+        if (columns := self._columns.get(id(function))) is not None:
+            lib.set_cells(self.cells, doubles(q), columns.start)
 
     def put(self, function: fem.Function, values: Array) -> None:
         """Give ``function`` other values in the cells; shape (num_cells, dofs per cell)."""
-        columns = self._columns[function]
+        columns = self._columns[id(function)]
         rows = np.broadcast_to(values, (len(self._dofs), columns.stop - columns.start))
         self._packed[:, columns] = in_batches(rows, self._lanes)
-
-    def position(self, function: fem.Function) -> int:
-        """Where the coefficients of a cell have the values of ``function``."""
-        position: int = self._columns[function].start
-        return position
 
     def share(self, other: Kernel) -> None:
         """Use the packed values of ``other``, a form of the same coefficients."""
@@ -166,30 +215,37 @@ class Kernel:
         self._packed = other._packed
         self._prepare()
 
-    def place(self, A: Csr) -> None:
-        """Let a bilinear form on the degrees of freedom of the cells add to ``A``."""
+    def place(self, A: Entries) -> None:
+        """Let a bilinear form on the degrees of freedom of the cells add to ``A``.
+
+        Raises:
+            ValueError: It has other entries.
+        """
         per_cell = self._dofs.shape[1]
+        if self._entries != per_cell**2:
+            raise ValueError(f"a form of {self._entries} entries on {per_cell} degrees of freedom")
         rows = np.repeat(self._dofs, per_cell, axis=1)
         positions = A.positions(rows.ravel(), np.tile(self._dofs, per_cell).ravel())
         self._rows = in_batches(positions.reshape(rows.shape), self._lanes)
         self._prepare()
 
     def address_in_lanes(self) -> int | None:
-        """Address of what computes several cells at once; none if the compiler cannot."""
-        return in_lanes(self._source, self._entries, self._packed.shape[1], len(self._constants))
+        """Return the address of the SIMD loop, or None."""
+        sizes = (self._entries, self._packed.shape[1], len(self._form.constants))
+        return in_lanes(self._form.source, int(ffi.cast("intptr_t", self._form.tabulate)), sizes)
 
-    def compute_in_lanes(self, address: int, coordinates: Array) -> None:
-        """Compute several cells at once from now on, with their coordinates in batches."""
-        self._in_lanes = ffi.cast("void (*)(const cells *, const double *, double *)", address)
+    def compute_in_lanes(self, address: int | None, coordinates: Array) -> None:
+        """Use the SIMD loop from now on, with coordinates in batches."""
         self._packed, self._rows = (
             in_batches(x[:, :, 0], LANES) for x in (self._packed, self._rows)
         )
+        self._in_lanes = ffi.cast("in_lanes *", address)
         self._lanes, self._coordinates = LANES, coordinates
         self._prepare()
 
     @property
     def vectorised(self) -> bool:
-        """True if several cells are computed at once."""
+        """True with the SIMD loop."""
         return self._lanes > 1
 
     def add(self, q: Array, b: Array) -> None:
@@ -197,6 +253,37 @@ class Kernel:
         lib.add_cells(self.cells, doubles(q), doubles(b))
 
     def value(self, q: Array) -> float:
-        """Value of the functional at the unknown ``q``."""
+        """Return the value of the functional at the unknown ``q``."""
         value: float = lib.value_of_cells(self.cells, doubles(q))
         return value
+
+
+class Pointwise:
+    """Compiler of functions from the numbers of a point to other numbers.
+
+    A form on a cell of unit length with one quadrature point is such a function.
+
+    Args:
+        inputs: Names of the numbers that functions depend on, in the order of their storage.
+
+    Attributes:
+        at: UFL symbols of the inputs, by name.
+    """
+
+    def __init__(self, inputs: Sequence[str]) -> None:
+        self._cell = line_mesh(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0, 1]]))
+        self._alive: list[fem.Form] = []
+        x = fem.Function(self._values(len(inputs)))
+        self.at: dict[str, Expr] = {name: x[i] for i, name in enumerate(inputs)}
+
+    def compile(self, *outputs: Expr) -> Any:
+        """Compile a function to C; the C lives as long as this object."""
+        z = ufl.TestFunction(self._values(len(outputs)))
+        dx = ufl.Measure("dx", domain=self._cell, metadata={"quadrature_degree": 1})
+        form, _ = compiled_form(ufl.dot(ufl.as_vector(outputs), z) * dx)
+        self._alive.append(form)
+        return tabulator(form)
+
+    def _values(self, n: int) -> fem.FunctionSpace:
+        element = basix.ufl.quadrature_element("interval", value_shape=(n,), degree=1)
+        return fem.functionspace(self._cell, element)

@@ -8,47 +8,34 @@ process.
 
 from __future__ import annotations
 
-import math
-import struct
-from bisect import bisect_left
 from functools import cache, cached_property
 from zlib import crc32
 
-from mpi4py import MPI
-
 import numpy as np
-import numpy.typing as npt
 
 from ufl_beam.arrays import Array, Index
+from ufl_beam.discretization.beam_mesh import BeamMesh
 from ufl_beam.errors import SceneError, require_kind
-from ufl_beam.model.beams import Beam, Place
-from ufl_beam.model.bodies import Anchor, Body, Node, Spot, node
+from ufl_beam.model.bodies import Anchor, Body, Member, Node, Place, node
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.material_laws import Softening
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.plastic_hinges import place_of
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
 
 
-class Grid:
+class Grid(BeamMesh):
     """Vertices, cells and degrees of freedom of a scene.
 
-    Cells of a higher degree have nodes between their vertices, too.  A node has three degrees of
-    freedom (u, v, ψ); those that joints share are one.  They are numbered along the beams, the
-    shared ones last: eliminating them in this order fills in nothing but the coupling of the
-    joints.
+    A node has three degrees of freedom (u, v, ψ); those that joints share are one.  They are
+    numbered along the beams, the shared ones last: eliminating them in this order fills in nothing
+    but the coupling of the joints.
 
     Args:
         scene: What is modelled.
         mesh: How finely; with the cells of its beams by default.
 
     Attributes:
-        points: Nodes of all beams: the vertices, beam after beam, those inside of cells, and the
-            second vertex of each plastic hinge; shape (num_nodes, 2); m.
-        cells: Vertices of the cells; shape (num_cells, 2).
-        nodes_of_cells: Both vertices of the cells and the nodes between; (num_cells, degree + 1).
-        beam_of_cell: Number of the beam of each cell; shape (num_cells,).
         dofs: Degrees of freedom of each node; shape (num_nodes, 3).
         dofs_of_bodies: Degrees of freedom of each of the scene's movers; shape (num_movers, 3).
         multipliers: Degrees of freedom that are the forces of connectors; shape (num_links,).
@@ -58,26 +45,9 @@ class Grid:
     def __init__(self, scene: Scene, mesh: Mesh | None = None) -> None:
         mesh = Mesh() if mesh is None else mesh
         require_kind(mesh, Mesh, "mesh")
-        self.scene, self.mesh = scene, mesh
-        self._parameters = [np.array(self.mesh.vertices(b, scene.attached[b])) for b in scene.beams]
-        counts = np.array([len(p) for p in self._parameters], dtype=np.int64)
-        self._first = np.concatenate([[0], np.cumsum(counts)])
-        vertices = np.array(
-            [b.curve(s) for b, p in zip(scene.beams, self._parameters, strict=True) for s in p],
-            dtype=np.float64,
-        ).reshape(-1, 2)
-        last = np.zeros(len(vertices), dtype=bool)
-        last[self._first[1:] - 1] = True
-        begin = np.flatnonzero(~last)
-        self.cells = np.column_stack([begin, begin + 1])
-        self.beam_of_cell = np.repeat(np.arange(len(scene.beams)), counts - 1)
-        inner, begins, ends = self.mesh.nodes[1:-1], vertices[self.cells[:, 0]], vertices[begin + 1]
-        between = begins[:, None] + inner[:, None] * (ends - begins)[:, None]
-        self.points = np.concatenate([vertices, between.reshape(-1, 2)])
-        numbers = len(vertices) + np.arange(between[..., 0].size).reshape(between.shape[:2])
-        self._require_length()
-        self._add_hinges()
-        self.nodes_of_cells = np.hstack([self.cells, numbers])
+        self.scene = scene
+        places = [place_of(hinge) for hinge in scene.hinges]
+        super().__init__(scene.beams, scene.attached, places, mesh, scene.size)
         self._number()
 
     def agrees(self, other: Grid) -> bool:
@@ -93,103 +63,12 @@ class Grid:
         numbers = np.concatenate([self.dofs.ravel(), self.dofs_of_bodies.ravel(), self.multipliers])
         return crc32(numbers.astype("<i8").tobytes(), crc32(self.points.astype("<f8").tobytes()))
 
-    def parameters(self, beam: Beam) -> Array:
-        """Parameters of the vertices of a beam."""
-        return self._parameters[self._index(beam)]
-
-    @cached_property
-    def _number_of_beam(self) -> dict[Beam, int]:
-        return {beam: i for i, beam in enumerate(self.scene.beams)}
-
-    def _index(self, beam: Beam) -> int:
-        """Number of a beam of the scene."""
-        require_kind(beam, Beam, "beam")
-        if beam not in self._number_of_beam:
-            raise SceneError(f"{beam.name} is not in the scene")
-        return self._number_of_beam[beam]
-
-    @property
-    def first_vertices(self) -> Index:
-        """First vertex of each beam, and the number of all vertices; (num_beams + 1,)."""
-        return self._first
-
-    def place(self, vertex: int) -> Place:
-        """Place of a vertex."""
-        number = int(np.searchsorted(self._first, vertex, side="right")) - 1
-        beam: Beam = self.scene.beams[number]
-        return beam.at(float(self._parameters[number][vertex - self._first[number]]))
-
-    def vertices_of(self, beam: Beam) -> Index:
-        """Vertices of a beam from start to end."""
-        i = self._index(beam)
-        return np.arange(self._first[i], self._first[i + 1])
-
-    def nodes_of(self, one: Beam | Body) -> tuple[Array, Index]:
+    def nodes_of(self, one: Member | Body) -> tuple[Array, Index]:
         """Points and degrees of freedom of the nodes of a beam or body; (n, 2), (n, 3); m."""
         if isinstance(one, Body):
             return np.array([one.center]), self.node(one.middle).reshape(1, 3)
         nodes = self._nodes_of(one)
         return self.points[nodes], self.dofs[nodes]
-
-    def _nodes_of(self, beam: Beam) -> Index:
-        """Nodes of a beam, both sides of its hinges included."""
-        return np.union1d(self.nodes_of_cells[self.cells_of(beam)], self.vertices_of(beam))
-
-    def _add_hinges(self) -> None:
-        """Give each plastic hinge a second vertex, which the cell beyond it begins or ends with."""
-        places = [place_of(hinge) for hinge in self.scene.hinges]
-        at = np.array([self.vertex(place) for place in places], dtype=np.int64)
-        numbers = range(len(self.points), len(self.points) + len(at))
-        beyond = [Place(place.beam, place.s, beyond=True) for place in places]
-        self._beyond = dict(zip(beyond, numbers, strict=True))
-        self.points = np.concatenate([self.points, self.points[at]])
-        self.cells_at_hinges = np.array([self.cell(place) for place in places], dtype=np.int64)
-        for place, number, cell in zip(places, numbers, self.cells_at_hinges, strict=True):
-            at_end = place.s == 1.0
-            cell_beyond = cell if at_end or place.s == 0.0 else cell + 1
-            self.cells[cell_beyond, int(at_end)] = number
-        self.vertices_at_hinges = at
-
-    @property
-    def pieces(self) -> Index:
-        """Neighbouring nodes, one pair after the other along each cell; (degree num_cells, 2)."""
-        start, end, *between = self.nodes_of_cells.T
-        along = np.column_stack([start, *between, end])
-        return np.stack([along[:, :-1], along[:, 1:]], axis=2).reshape(-1, 2)
-
-    def nodes_along(self, beam: Beam) -> Index:
-        """Vertices of a beam and nodes between them, from start to end."""
-        vertices, inner = self.vertices_of(beam), self.nodes_of_cells[self.cells_of(beam), 2:]
-        return np.append(np.column_stack([vertices[:-1], inner]), vertices[-1])
-
-    def cells_of(self, beam: Beam) -> Index:
-        """Cells of a beam from start to end."""
-        i = self._index(beam)
-        return np.arange(self._first[i] - i, self._first[i + 1] - i - 1)
-
-    def weights(self, place: Place) -> tuple[Index, Array]:
-        """Nodes of the cell at a place, the vertices first, and their weights there; (degree + 1,).
-
-        Raises:
-            SceneError: The beam of the place is not in the scene.
-        """
-        cell, part = self._cell_and_part(place)
-        first, *between, last = self.mesh.weights(part)
-        nodes = self.nodes_of_cells[cell].copy()
-        if part in (0.0, 1.0):  # the side of a hinge that is attached to, not that of the cell
-            nodes[int(part)] = self.vertex(place)
-        return nodes, np.array([first, last, *between])
-
-    def _cell_and_part(self, place: Place) -> tuple[int, float]:
-        """The cell at a place, and the part of it that lies before the place."""
-        require_kind(place, Place, "place")
-        if place.beam not in self._number_of_beam:
-            raise SceneError(f"{place}: {place.beam.name} is not in the scene")
-        i = self._number_of_beam[place.beam]
-        s = self._parameters[i]
-        left = min(max(bisect_left(s, place.s) - 1, 0), len(s) - 2)
-        part = (place.s - s[left]) / (s[left + 1] - s[left])
-        return int(self._first[i]) - i + left, float(part)
 
     def node(self, anchor: Anchor) -> Index:
         """Degrees of freedom of what an anchor that has a vertex, or a body, moves with; (3,).
@@ -205,6 +84,11 @@ class Grid:
         return np.asarray(self.dofs_of_bodies[self.scene.movers.index(of)])
 
     @cached_property
+    def rotations(self) -> Index:
+        """Degrees of freedom that are rotations, those that joints share once."""
+        return np.unique(np.r_[self.dofs[:, 2], self.dofs_of_bodies[:, 2]])
+
+    @cached_property
     def dofs_of_links(self) -> Index:
         """Of each connector: both u, both v, both ψ of its nodes, and its force; (num_links, 7)."""
         links = self.scene.links
@@ -212,49 +96,15 @@ class Grid:
         both = nodes.transpose(0, 2, 1).reshape(-1, 6)
         return np.column_stack([both, self.multipliers]).astype(np.int64)
 
-    def vertex(self, place: Place) -> int:
-        """The vertex at a place that something is attached to."""
-        if place.beyond:
-            return self._beyond[place]
-        cell, part = self._cell_and_part(place)
-        return cell + self._index(place.beam) + round(part)
-
-    def cell(self, place: Place) -> int:
-        """The cell at a place; at a vertex the one before it, at the start the first one."""
-        return self._cell_and_part(place)[0]
-
-    def lengths(self, cells: Index) -> Array:
-        """Lengths of some cells; (len(cells),); m."""
-        ends = self.points[self.cells[cells]]
-        return np.asarray(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
-
-    def middle(self, cell: int) -> Place:
-        """The place in the middle of a cell."""
-        number = int(self.beam_of_cell[cell])
-        s, i = self._parameters[number], cell - int(self._first[number] - number)
-        beam: Beam = self.scene.beams[number]
-        return beam.at((s[i] + s[i + 1]) / 2)
-
     def place_of(self, number: int) -> Place:
         """The middle of a cell or, numbered after the cells, the place of a plastic hinge."""
         if number < len(self.cells):
             return self.middle(number)
         return place_of(self.scene.hinges[number - len(self.cells)])
 
-    def hinges(self, beam: Beam) -> list[Softening | None]:
-        """Law of the hinge that may open in the middle of each cell of a beam."""
-        return [beam.section.hinge] * len(self.cells_of(beam))
-
     def hinge_at(self, place: Place) -> Connector | None:
         """The plastic hinge of zero length at a place, if there is one."""
         return next((h for h in self.scene.hinges if place in (h.a, h.b)), None)
-
-    def keys(self, cells: Index) -> list[tuple[int, int]]:
-        """A number for the ends of the beam, and the number in the beam, of some cells."""
-        beams = self.beam_of_cell[cells]
-        of_beam = [crc32(struct.pack("4d", *beam.a, *beam.b)) for beam in self.scene.beams]
-        first = (self._first - np.arange(len(self._first)))[beams]
-        return [(of_beam[b], int(c)) for b, c in zip(beams, cells - first, strict=True)]
 
     def describe(self, dof: int) -> str:
         """A degree of freedom in words: its component, beam and point."""
@@ -278,14 +128,6 @@ class Grid:
         groups = [*dofs_of_beams, *self.dofs_of_bodies, *self.multipliers.reshape(-1, 1)]
         worst = sorted({int(g.flat[np.argmax(sizes[g])]) for g in groups}, key=lambda d: -sizes[d])
         return {self.describe(dof): float(sizes[dof]) for dof in worst if sizes[dof]}
-
-    def _require_length(self) -> None:
-        ends = self.points[self.cells]
-        lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-        for cell in np.flatnonzero(lengths <= 1e-12 * self.scene.size)[:1]:
-            beam = self.scene.beams[self.beam_of_cell[cell]]
-            x, y = ends[cell, 0]
-            raise SceneError(f"{beam.name}: zero length of a cell at ({x:g}, {y:g})")
 
     def _number(self) -> None:
         nodes, movers = len(self.points), self.scene.movers
@@ -313,169 +155,5 @@ class Grid:
         dofs = number[slots].reshape(-1, 3)
         self.dofs, self.dofs_of_bodies = dofs[:nodes], dofs[nodes:]
         # Forces come last: eliminating what they act on first leaves no zero on the diagonal.
-        self.multipliers = len(order) + np.arange(len(self.scene.links))
+        self.multipliers: Index = len(order) + np.arange(len(self.scene.links))
         self.size = len(order) + len(self.multipliers)
-
-
-class Share:
-    """The part of a grid that one process computes: its cells, and their degrees of freedom.
-
-    Local numbers: first the degrees of freedom that this process owns, then the ghosts; each in the
-    order of the grid.  Global numbers, those of PETSc, are contiguous on each process.
-
-    Attributes:
-        cells: Numbers of the cells of this process; contiguous.
-        dofs: Degrees of freedom, in numbers of the grid, by local number.
-        num_owned: How many of them this process owns.
-        ghosts: Global numbers of the others.
-        cell_dofs: Local degrees of freedom of the cells: all u, all v, all ψ of their nodes;
-            shape (len(cells), 3 (degree + 1)).
-        links: Numbers of the connectors of this process.
-        body_dofs: Local degrees of freedom of the bodies that are here; (num, 3).
-        link_dofs: Local degrees of freedom of the connectors: those of a cell, and their force;
-            shape (len(links), 7).
-    """
-
-    def __init__(self, grid: Grid, comm: MPI.Intracomm) -> None:
-        self.grid = grid
-        self.comm = comm
-        num_cells = len(grid.cells)
-        limits = np.arange(comm.size + 1) * num_cells // comm.size
-        self.cells = np.arange(limits[comm.rank], limits[comm.rank + 1])
-
-        of_cell = grid.dofs[grid.nodes_of_cells].transpose(0, 2, 1)
-        of_cell = of_cell.reshape(num_cells, 3 * (grid.mesh.degree + 1))
-        owner = np.full(grid.size, comm.size)
-        rank_of_cell = np.searchsorted(limits, np.arange(num_cells), side="right") - 1
-        np.minimum.at(owner, of_cell, rank_of_cell[:, None])
-        of_hinge, cell_of_hinge = grid.dofs[grid.vertices_at_hinges], grid.cells_at_hinges
-        np.minimum.at(owner, of_hinge, rank_of_cell[cell_of_hinge][:, None])
-        of_link = grid.dofs_of_links
-        rank_of_link = owner[of_link].min(axis=1, initial=comm.size) % comm.size
-        np.minimum.at(owner, of_link, rank_of_link[:, None])
-        owner[owner == comm.size] = 0  # bodies that nothing is attached to
-        self.links = np.flatnonzero(rank_of_link == comm.rank)
-        order = np.argsort(owner, kind="stable")
-        self._global = np.empty(grid.size, dtype=np.int64)
-        self._global[order] = np.arange(grid.size)
-
-        own = np.flatnonzero(owner == comm.rank)
-        at_hinges = of_hinge[rank_of_cell[cell_of_hinge] == comm.rank].ravel()
-        of_links = of_link[self.links].ravel()
-        touched = np.unique(np.r_[own, of_cell[self.cells].ravel(), at_hinges, of_links])
-        mine = owner[touched] == comm.rank
-        self.dofs = np.concatenate([touched[mine], touched[~mine]])
-        self.num_owned = int(mine.sum())
-        self.ghosts = self._global[self.dofs[self.num_owned :]].astype(np.int32)
-        self._local = np.full(grid.size, -1, dtype=np.int32)
-        self._local[self.dofs] = np.arange(len(self.dofs))
-        self.cell_dofs = self._local[of_cell[self.cells]]
-        self.link_dofs = self._local[of_link[self.links]]
-        of_body = self._local[grid.dofs_of_bodies]
-        self.body_dofs = of_body[(of_body >= 0).all(axis=1)]
-        self._all_owned = order
-        self._num_owned_by = np.bincount(owner, minlength=comm.size).tolist()
-
-    @property
-    def size(self) -> int:
-        """Number of local degrees of freedom, ghosts included."""
-        return len(self.dofs)
-
-    def at(self, anchor: Anchor) -> Index:
-        """Degrees of freedom (numbers of the grid) of what an anchor moves with; shape (3,)."""
-        return self.grid.node(anchor)
-
-    def computes(self, anchor: Anchor) -> bool:
-        """Return whether this process has the (first) cell at a place, or owns a body.
-
-        It then has all degrees of freedom of the place, even if others own some of them.
-        """
-        if isinstance(anchor, Spot):
-            return bool(self.owns(self.at(anchor)).all())
-        return bool(self.cells[0] <= self.grid.cell(anchor) <= self.cells[-1])
-
-    def rotations(self) -> Index:
-        """Local numbers of all rotations; int32."""
-        grid = self.grid
-        turning = np.r_[grid.dofs[:, 2], grid.dofs_of_bodies[:, 2]]
-        return np.unique(self.local(turning)).astype(np.int32)
-
-    def translations(self) -> tuple[Index, Index]:
-        """Local numbers of both components of all displacements."""
-        grid = self.grid
-        pairs = np.unique(np.r_[grid.dofs[:, :2], grid.dofs_of_bodies[:, :2]], axis=0)
-        found = self._local[pairs]
-        x, y = found[(found >= 0).all(axis=1)].T
-        return x, y
-
-    def multipliers(self) -> Index:
-        """Local numbers of the forces of connectors."""
-        return self.local(self.grid.multipliers)
-
-    def cell_lengths(self) -> Array:
-        """Lengths of the cells; m."""
-        return self.grid.lengths(self.cells)
-
-    def lengths(self) -> Array:
-        """Change of each local degree of freedom by a strain of one: a cell's length, or a radian.
-
-        Bodies are as large as the scene; forces of connectors have no length.
-        """
-        lengths = np.full(self.size, self.grid.scene.size)
-        displacements = self.cell_dofs[:, : 2 * (self.grid.mesh.degree + 1)]
-        lengths[displacements] = self.cell_lengths()[:, None]
-        lengths[self.rotations()] = 1.0
-        lengths[self.multipliers()] = 0.0
-        return lengths
-
-    def local(self, dofs: Index) -> Index:
-        """Local numbers of those ``dofs`` (numbers of the grid) that this process has."""
-        found = self._local[dofs]
-        return np.asarray(found[found >= 0])
-
-    def owns(self, dofs: Index) -> npt.NDArray[np.bool_]:
-        """Which of ``dofs`` (numbers of the grid) this process owns."""
-        found = self._local[dofs]
-        return np.asarray((found >= 0) & (found < self.num_owned))
-
-    def gather(self, values: Array) -> Array:
-        """Values of all degrees of freedom, in the order of the grid, on every process.
-
-        One process alone gets ``values`` back: states are new arrays in each step.
-        """
-        if self.comm.size == 1:
-            return values
-        parts, result = np.empty((2, self.grid.size))
-        owned = np.ascontiguousarray(values[: self.num_owned])
-        self.comm.Allgatherv(owned, [parts, self._num_owned_by])
-        result[self._all_owned] = parts
-        return result
-
-    def added(self, values: Array) -> Array:
-        """Sums over the processes of values at the local degrees of freedom."""
-        if self.comm.size == 1:
-            return values
-        sums = np.zeros(self.grid.size)
-        sums[self.dofs] = values
-        self.comm.Allreduce(MPI.IN_PLACE, sums)
-        return np.asarray(sums[self.dofs])
-
-    def gather_cells(self, values: Array) -> Array:
-        """Values of all cells, in the order of the grid, on every process."""
-        if self.comm.size == 1:
-            return values.copy()
-        return np.concatenate(self.comm.allgather(values))
-
-    def total(self, value: float) -> float:
-        """Sum over the processes."""
-        return value if self.comm.size == 1 else float(self.comm.allreduce(value))
-
-    def largest(self, value: float) -> float:
-        """Largest over the processes; infinite where one has no number.
-
-        MPI does not say what the largest of numbers is with one that is none, and processes that
-        learn different ones part.
-        """
-        if self.comm.size == 1:
-            return value
-        return float(self.comm.allreduce(math.inf if math.isnan(value) else value, op=MPI.MAX))

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The finite element spaces of a share of the grid, and the functions that forms are written in."""
+"""The finite element of the beams that forms are stated on, and the cells of a share of the grid.
+
+Forms depend on nothing of a scene: they are stated on one cell, and compiled once in a process.
+"""
 
 from __future__ import annotations
 
@@ -11,15 +14,94 @@ import ufl
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr, coupling
-from ufl_beam.compiled.simd_kernels import LANES
-from ufl_beam.discretization.compiled_forms import Kernel, in_batches, vectorise
-from ufl_beam.discretization.dof_numbering import Share
-from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh, space_with_dofs
-from ufl_beam.mechanics.kinematics import Axis
+from ufl_beam.compiled.simd_kernels import LANES, in_batches
+from ufl_beam.discretization.compiled_forms import Kernel, stated, vectorise
+from ufl_beam.discretization.partition import Share
+from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
+from ufl_beam.mechanics.kinematics import Axis, split, strain
+from ufl_beam.model.mesh_options import Mesh
+
+
+class Element:
+    """The finite element of the beams on one cell, and the functions that forms are written in.
+
+    Args:
+        mesh: Degree of the element, and how it integrates inertia.
+
+    Attributes:
+        axis: Undeformed axis, in UFL.
+        space: Configurations (u_x, u_y, ψ).
+        q0, q1: Configurations at the beginning and at the end of a step.
+        w: Virtual motions.
+        stiffness: (EA, GA, EI); N, N, N m².
+        inertia: (rhoA, rhoI); kg/m, kg m.
+    """
+
+    def __init__(self, mesh: Mesh) -> None:
+        self._degree, self._lumped = mesh.degree, mesh.lumped
+        self._cell = line_mesh(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0, 1]]))
+        line = basix.ufl.element("Lagrange", "interval", mesh.degree)
+        self.axis = Axis(self._cell, mesh.nodes, self._along() if mesh.degree > 1 else 0.5)
+        self.space = fem.functionspace(self._cell, basix.ufl.mixed_element([line, line, line]))
+        self.q0, self.q1 = self.configuration(), self.configuration()
+        self.w = ufl.TestFunction(self.space)
+        self.stiffness, self.inertia = (
+            fem.Function(fem.functionspace(self._cell, ("DG", 0, (n,)))) for n in (3, 2)
+        )
+
+    def _along(self) -> fem.Function:
+        """From 0 to 1 along the cell."""
+        function = fem.Function(fem.functionspace(self._cell, ("DG", 1)))
+        function.x.array[:] = 0.0, 1.0
+        return function
+
+    def configuration(self) -> fem.Function:
+        """A new configuration (u_x, u_y, ψ)."""
+        return fem.Function(self.space)
+
+    def at_points(self, *shape: int) -> fem.Function:
+        """A new function with values of a shape in the points of ``dx(1)``."""
+        rule = self._rule(1)
+        element = basix.ufl.quadrature_element("interval", value_shape=shape, degree=rule)
+        return fem.Function(fem.functionspace(self._cell, element))
+
+    def constant(self, value: float) -> fem.Constant:
+        """A number that forms are not compiled for anew."""
+        return fem.Constant(self._cell, value)
+
+    def dx(self, degree: int) -> ufl.Measure:
+        """Integration over the cells; one degree per form, see compiled_forms.py.
+
+        Args:
+            degree: Of the rule on cells of degree 1; each degree that they have more adds two.
+        """
+        rule = {"quadrature_degree": self._rule(degree)}
+        return ufl.Measure("dx", domain=self._cell, metadata=rule)
+
+    def dx_of_mass(self) -> ufl.Measure:
+        """Integration of inertia: exact, or with the nodes as points, which lumps it."""
+        if not self._lumped:
+            return self.dx(2)
+        rule = {"quadrature_rule": "GLL", "quadrature_degree": self._rule(1)}
+        return ufl.Measure("dx", domain=self._cell, metadata=rule)
+
+    def _rule(self, degree: int) -> int:
+        return degree + 2 * (self._degree - 1)
+
+
+@stated
+def _element(degree: int, lumped: bool) -> Element:
+    return Element(Mesh(degree=degree, lumped=lumped))
+
+
+@stated
+def _tangent(work: ufl.Form, q1: fem.Function) -> ufl.Form:
+    """Derivative of a virtual work."""
+    return ufl.derivative(work, q1, ufl.TrialFunction(q1.function_space))
 
 
 class Fields:
-    """Mesh and function spaces of the cells of one process, or of some of them.
+    """Cells of one process, or some of them: what forms of the element are computed on.
 
     Args:
         share: The cells and degrees of freedom of this process.
@@ -27,8 +109,7 @@ class Fields:
 
     Attributes:
         share: The cells and degrees of freedom of this process.
-        axis: Undeformed axis, in UFL.
-        space: Configurations (u_x, u_y, ψ), with the degrees of freedom that joints share.
+        element: The finite element of the beams.
         cell_dofs: Local degrees of freedom in the order of the cells of the mesh;
             (num_cells, 3 (degree + 1)).
         order: Position in ``share.cells`` of each cell of the mesh.
@@ -46,17 +127,19 @@ class Fields:
         self._require_direction(grid.points[grid.cells[share.cells[self.order]]])
         self.cell_dofs = share.cell_dofs[self.order]
         self._matrix: Csr | None = None
-        self._degree = grid.mesh.degree
-        X = self._along() if self._degree > 1 else 0.5
-        self.axis = Axis(self.mesh, grid.mesh.nodes, X)
-        line = basix.ufl.element("Lagrange", "interval", self._degree)
-        self.space = space_with_dofs(
-            self.mesh, basix.ufl.mixed_element([line, line, line]), self.cell_dofs, share.size
-        )
+        self.element = _element(grid.mesh.degree, grid.mesh.lumped)
 
     def kernel(self, form: ufl.Form, unknown: fem.Function) -> Kernel:
         """A form on the cells, compiled; ``unknown`` is the configuration that changes."""
-        return Kernel(form, unknown, self.cell_dofs, self._coordinates)
+        kernel = Kernel(form, unknown, self.cell_dofs, self._coordinates)
+        of_sections = (
+            (self.element.stiffness, ("EA", "GA", "EI")),
+            (self.element.inertia, ("rhoA", "rhoI")),
+        )
+        for function, names in of_sections:
+            if kernel.uses(function):
+                kernel.put(function, self._of_sections(*names))
+        return kernel
 
     def hot_kernel(self, form: ufl.Form, unknown: fem.Function) -> Kernel:
         """The same for what steps ask again and again: several cells at once."""
@@ -66,8 +149,7 @@ class Fields:
 
     def force_and_tangent(self, work: ufl.Form, q1: fem.Function, A: Csr) -> tuple[Kernel, Kernel]:
         """A virtual work, and its derivative by ``q1`` that adds to ``A``."""
-        derivative = ufl.derivative(work, q1, ufl.TrialFunction(self.space))
-        force, tangent = self.kernel(work, q1), self.kernel(derivative, q1)
+        force, tangent = self.kernel(work, q1), self.kernel(_tangent(work, q1), q1)
         vectorise([force, tangent], self._coordinates_in_lanes)
         tangent.share(force)
         tangent.place(A)
@@ -82,67 +164,105 @@ class Fields:
         if self._matrix is None:
             share = self.share
             couples = (share.cell_dofs, share.link_dofs, share.body_dofs)
-            self._matrix = Csr(coupling(share.size, *couples))
+            self._matrix = coupling(share.size, *couples)
             return self._matrix
         return self._matrix.zeros_like()
+
+    def assembled(self, form: ufl.Form) -> Csr:
+        """A new matrix with a bilinear form of the undeformed scene."""
+        matrix = self.matrix()
+        kernel = self.kernel(form, self.element.q1)
+        kernel.place(matrix)
+        kernel.add(np.zeros(self.share.size), matrix.data)
+        return matrix
 
     def _require_direction(self, ends: Array) -> None:
         """The mesh must keep the order of the vertices of a cell, which orients the beam."""
         if not np.array_equal(self._coordinates[:, :, :2], ends):
             raise RuntimeError("this version of DOLFINx turns cells around; please report it")
 
-    def dx(self, degree: int) -> ufl.Measure:
-        """Integration over the cells; one degree per form, see compiled_forms.py.
-
-        Args:
-            degree: Of the rule on cells of degree 1; each degree that they have more adds two.
-        """
-        rule = {"quadrature_degree": self._rule(degree)}
-        return ufl.Measure("dx", domain=self.mesh, metadata=rule)
-
-    def dx_of_mass(self) -> ufl.Measure:
-        """Integration of inertia: exact, or with the nodes as points, which lumps it."""
-        if not self.share.grid.mesh.lumped:
-            return self.dx(2)
-        rule = {"quadrature_rule": "GLL", "quadrature_degree": self._rule(1)}
-        return ufl.Measure("dx", domain=self.mesh, metadata=rule)
-
-    def _rule(self, degree: int) -> int:
-        return degree + 2 * (self._degree - 1)
-
-    def _along(self) -> fem.Function:
-        """From 0 to 1 along each cell."""
-        function = fem.Function(fem.functionspace(self.mesh, ("DG", 1)))
-        function.x.array[:] = np.tile([0.0, 1.0], len(self.order))
-        return function
-
-    def configuration(self) -> fem.Function:
-        """A new configuration (u_x, u_y, ψ)."""
-        return fem.Function(self.space)
-
-    def stiffness(self) -> fem.Function:
-        """(EA, GA, EI) of the cells; N, N, N m²."""
-        return self._of_sections("EA", "GA", "EI")
-
-    def inertia(self) -> fem.Function:
-        """(rhoA, rhoI) of the cells; kg/m, kg m."""
-        return self._of_sections("rhoA", "rhoI")
-
-    def _of_sections(self, *names: str) -> fem.Function:
+    def _of_sections(self, *names: str) -> Array:
+        """Numbers of the sections of the cells; (num_cells, len(names))."""
         grid = self.share.grid
         of_beam = np.array([[getattr(b.section, n) for n in names] for b in grid.scene.beams])
-        element = basix.ufl.element("DG", "interval", 0, shape=(len(names),))
-        function = fem.Function(fem.functionspace(self.mesh, element))
-        cells = self.share.cells[self.order]
-        function.x.array[:] = of_beam[grid.beam_of_cell[cells]].ravel()
-        return function
+        of_cells = grid.beam_of_cell[self.share.cells[self.order]]
+        return of_beam.reshape(-1, len(names))[of_cells]
 
-    def at_points(self, *shape: int) -> fem.Function:
-        """A new function with values of a shape in the points of ``dx(1)``."""
-        rule = self._rule(1)
-        element = basix.ufl.quadrature_element("interval", value_shape=shape, degree=rule)
+    def variables(self, number: int) -> fem.Function:
+        """A function with so many numbers in each point of the cells."""
+        element = basix.ufl.quadrature_element("interval", value_shape=(number,), degree=1)
         return fem.Function(fem.functionspace(self.mesh, element))
 
-    def constant(self, value: float) -> fem.Constant:
-        """A number that forms are not compiled for anew."""
-        return fem.Constant(self.mesh, value)
+
+@stated
+def _mass(of: Element) -> ufl.Form:
+    (u, ψ), (w_u, w_ψ), ρ = split(ufl.TrialFunction(of.space)), split(of.w), of.inertia
+    return (ρ[0] * ufl.dot(u, w_u) + ρ[1] * ψ * w_ψ) * of.dx_of_mass()  # P(67)
+
+
+def mass_matrix(fields: Fields) -> Csr:
+    """Mass of the beams, the point masses and the bodies."""
+    share, M = fields.share, fields.assembled(_mass(fields.element))
+    scene = share.grid.scene
+    lumps = [(share.at(one.place), one.mass, one.inertia) for one in scene.masses]
+    lumps += [(share.at(one.middle), one.mass, one.inertia) for one in scene.bodies]
+    for dofs, mass, inertia in lumps:
+        mine = share.owns(dofs)
+        here = share.local(dofs[mine])
+        M.data[M.positions(here, here)] += np.array([mass, mass, inertia])[mine]
+    return M
+
+
+@stated
+def _weighted_strains(of: Element) -> ufl.Form:
+    z = ufl.TestFunction(of.at_points(3).function_space)
+    return ufl.dot(strain(of.q1, of.axis), z) / of.axis.h * of.dx(1)
+
+
+class Strains:
+    """(Σ, Γ, K) in the points of the cells of some fields.
+
+    Attributes:
+        kernel: Strains times the weights of the points.
+        shape: Cells, and three times the points in each.
+    """
+
+    def __init__(self, fields: Fields) -> None:
+        self.kernel = fields.hot_kernel(_weighted_strains(fields.element), fields.element.q1)
+        self._weights = np.repeat(fields.share.grid.mesh.point_weights, 3)
+        self.shape = (len(fields.order), len(self._weights))
+
+    def __call__(self, q: Array) -> Array:
+        """Strains at ``q``, in the order of the mesh, point after point; 1, 1, 1/m."""
+        return np.asarray(self._weighted(q) / self._weights)
+
+    def mean(self, q: Array) -> Array:
+        """Means of the cells at ``q``, in the order of the mesh; (num_cells, 3); 1, 1, 1/m."""
+        in_points = self._weighted(q).reshape(self.shape[0], self.shape[1] // 3, 3)
+        return np.asarray(in_points.sum(axis=1))
+
+    def _weighted(self, q: Array) -> Array:
+        strains = np.zeros(self.shape)
+        self.kernel.add(q, strains)
+        return strains
+
+
+@stated
+def _section_forces(of: Element) -> ufl.Form:
+    C, e = of.stiffness, strain(of.q1, of.axis)
+    z = ufl.TestFunction(C.function_space)
+    return sum(C[i] * e[i] * z[i] for i in range(3)) / of.axis.h * of.dx(1)  # P(7)
+
+
+class SectionForces:
+    """(N, V, M) in the cells were they elastic, from the strains of a configuration, P(7)."""
+
+    def __init__(self, fields: Fields) -> None:
+        self._kernel = fields.kernel(_section_forces(fields.element), fields.element.q1)
+        self._order = fields.order
+
+    def write(self, q: Array, resultants: Array) -> None:
+        """Resultants at ``q`` into the rows of the cells, in the order of the share; N, N, N m."""
+        values = np.zeros(3 * len(self._order))
+        self._kernel.add(np.ascontiguousarray(q), values)
+        resultants[self._order] = values.reshape(-1, 3)

@@ -10,13 +10,12 @@ from __future__ import annotations
 from collections import defaultdict
 from typing import Protocol
 
+from mpi4py import MPI
+
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.discretization.dof_numbering import Share
-
-State = dict[str, Array]
-"""Arrays of a state, by name."""
+from ufl_beam.arrays import State as State
 
 NOWHERE: Array = np.empty(0)
 """In the place of a configuration: of what is remembered, strains and stored energies are not that
@@ -45,40 +44,52 @@ class Memory(Protocol):
         """
 
 
+class Part(Protocol):
+    """Degrees of freedom of one process, see :class:`Share`."""
+
+    comm: MPI.Intracomm
+    dofs: Index
+    num_owned: int
+
+    @property
+    def num_global(self) -> int:
+        """Number of degrees of freedom of all processes."""
+
+
 class Saving:
     """A memory that writes down; :meth:`state` is what came together."""
 
-    def __init__(self, share: Share) -> None:
+    def __init__(self, share: Part) -> None:
         self._share = share
         self._sums: dict[str, tuple[int, Index, Array]] = {}
         self._rows: defaultdict[str, list[Array]] = defaultdict(list)
 
     def number(self, name: str, value: float) -> float:
-        """See :class:`Memory`."""
+        """Save a number that is the same on all processes."""
         self._sum(name, 1, np.zeros(int(self._share.comm.rank == 0), dtype=int), np.array([value]))
         return value
 
     def total(self, name: str, value: float) -> float:
-        """See :class:`Memory`."""
+        """Save the sum of a number over all processes."""
         self._sum(name, 1, np.zeros(1, dtype=int), np.array([value]))
         return value
 
     def at_dofs(self, name: str, values: Array) -> Array:
-        """See :class:`Memory`."""
+        """Save values at the owned degrees of freedom."""
         share = self._share
-        self._sum(name, share.grid.size, share.dofs[: share.num_owned], values)
+        self._sum(name, share.num_global, share.dofs[: share.num_owned], values)
         return values
 
     def added(self, name: str, values: Array) -> Array:
-        """See :class:`Memory`."""
-        self._sum(name, self._share.grid.size, self._share.dofs, values)
+        """Save a number that is the same on all processes."""
+        self._sum(name, self._share.num_global, self._share.dofs, values)
         return values
 
     def _sum(self, name: str, size: int, where: Index, values: Array) -> None:
         self._sums[name] = size, where, values[: len(where)].copy()
 
     def rows(self, name: str, numbers: Index, rows: Array) -> Array:
-        """See :class:`Memory`."""
+        """Save numbered rows of a table."""
         self._rows[f"{name}, {rows.shape[1]}"].append(np.column_stack([numbers, rows]))
         return rows
 
@@ -103,11 +114,11 @@ class Saving:
 class Restoring:
     """A memory that gives back a state; what that does not have stays as it is."""
 
-    def __init__(self, share: Share, state: State) -> None:
+    def __init__(self, share: Part, state: State) -> None:
         self._share, self._state = share, state
 
     def number(self, name: str, value: float) -> float:
-        """See :class:`Memory`."""
+        """Return the number that was saved."""
         return float(self._state[name][0])
 
     def total(self, name: str, value: float) -> float:
@@ -115,7 +126,7 @@ class Restoring:
         return self.number(name, value) if self._share.comm.rank == 0 else 0.0
 
     def at_dofs(self, name: str, values: Array) -> Array:
-        """See :class:`Memory`."""
+        """Return the saved values at the local degrees of freedom."""
         return np.asarray(self._state[name][self._share.dofs])
 
     def added(self, name: str, values: Array) -> Array:
@@ -125,7 +136,7 @@ class Restoring:
         return values
 
     def rows(self, name: str, numbers: Index, rows: Array) -> Array:
-        """See :class:`Memory`."""
+        """Return the saved rows of these numbers."""
         table = self._state.get(f"{name}, {rows.shape[1]}")
         if table is None:
             return rows

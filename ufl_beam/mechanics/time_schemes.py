@@ -10,7 +10,7 @@ the step are in energy_momentum.py, those whose forces act at its end in classic
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple, Protocol, TypeGuard, runtime_checkable
+from typing import Any, NamedTuple, Protocol, TypeGuard, runtime_checkable
 
 import ufl
 from ufl.core.expr import Expr
@@ -18,11 +18,23 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array, Index
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.mechanics.kinematics import Axis
-from ufl_beam.model.material_laws import Softening, Values
-from ufl_beam.model.scene import Scene
 
 Constant = Callable[[float], Expr]
 """Makes a number of the scheme a constant of the form, so that changing it compiles nothing."""
+
+
+Values = Any
+"""Array, or expression of UFL."""
+
+
+class Opening(Protocol):
+    """Law of a discontinuity, such as :class:`Softening`."""
+
+    def traction(self, ξ: Values) -> Values:
+        """Resistance after the accumulated opening ξ."""
+
+    def mean_traction(self, ξ: Values, a: Values) -> Values:
+        """Mean resistance while the opening grows from ξ by a."""
 
 
 class Step(NamedTuple):
@@ -78,7 +90,7 @@ class Scheme(Protocol):
     def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
         """The step from ``t0`` to ``t1``, perhaps a part of one that goes on to ``end``."""
 
-    def resistance(self, softening: Softening, opening: Array, growth: Values) -> Values:
+    def resistance(self, softening: Opening, opening: Array, growth: Values) -> Values:
         """Traction of a discontinuity whose opening grows in the step."""
 
     def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
@@ -137,8 +149,11 @@ class DynamicScheme(Scheme, Protocol):
     slips: bool
     """True if it loses energy by :meth:`slip`."""
 
-    def require(self, scene: Scene) -> None:
-        """Raise :class:`SceneError` if the scene has what the scheme cannot do."""
+    has_mean_velocity: bool
+    """True if a step has a mean velocity in its equation; friction and rotating frames need it."""
+
+    rings: bool
+    """True if the accelerations of a motion that is given oscillate for ever."""
 
     def half_tangents(self, rotations: Index) -> Index:
         """Those rotations whose step of the nodes is 2 tan(Δψ/2); it is Δψ for the others."""

@@ -1,44 +1,34 @@
 # SPDX-License-Identifier: MIT
-"""Beams and the places on them: where the undeformed axis runs."""
+"""Beams: where the undeformed axis runs, and the section along it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from itertools import pairwise
-
-import numpy as np
 
 from ufl_beam.errors import (
     SceneError,
     require_count,
-    require_function,
     require_kind,
     require_memory,
     require_number,
     require_sequence,
-    require_switch,
     require_text,
     require_vector,
     shorten,
     warn,
 )
-from ufl_beam.model.axis_curves import Arc, Polyline, Straight
-from ufl_beam.model.axis_curves import Point as Point
+from ufl_beam.model.bodies import TOGETHER, Member, Place
+from ufl_beam.model.curves import Arc, Curve, Point, Polyline, Straight, point_of
 from ufl_beam.model.material_laws import HingeLaw, require_hinge_law
-from ufl_beam.model.plane_curves import tangent_within
 from ufl_beam.model.sections import Section
-
-Curve = Callable[[float], Sequence[float]]
-
-TOGETHER = 1e-9
-"""Part of a cell below which two places of a beam are one."""
 
 
 @dataclass(frozen=True, eq=False)
-class Beam:
-    """A beam with straight cells along a curve; straight from ``a`` to ``b`` by default.
+class Beam(Member):
+    """Beam with straight cells along a curve, by default along the line from ``a`` to ``b``.
 
     Args:
         a: First end; m.
@@ -58,6 +48,12 @@ class Beam:
     Raises:
         SceneError: Zero length, ``cells < 1``, coordinates that are no finite numbers, or hinges in
             a section of fibres.
+
+    Example:
+        >>> column = ub.Beam((0, 0), (0, 3), section, cells=6, name="column")
+        >>> arch = ub.Beam.arc((0, 0), 5.0, (0, np.pi), section, cells=20, name="arch")
+        >>> print(column.end, "and", arch.start)
+        column.end (0, 3) and arch.start (5, 0)
     """
 
     a: Point
@@ -123,6 +119,13 @@ class Beam:
                 "Units are SI: m, N, N m². If EI is large on purpose, give the section its depth"
             )
 
+    @property
+    def hinge_laws(self) -> dict[Place, HingeLaw]:
+        """Laws of the plastic hinges of zero length that the beam may have, by place."""
+        laws: dict[float, HingeLaw | None] = dict.fromkeys((0.0, 1.0), self.section.hinge)
+        laws |= {float(s): law for s, law in self.hinges.items()}
+        return {self.at(s): law for s, law in laws.items() if law is not None}
+
     @classmethod
     def arc(
         cls,
@@ -169,97 +172,3 @@ class Beam:
         """Any curve ``s -> (x, y)``, ``s`` from 0 to 1; m."""
         a, b = (point_of(curve, s, f"{name}: curve") for s in (0.0, 1.0))
         return cls(a, b, section, cells=cells, name=name, curve=curve)
-
-    def at(self, s: float) -> Place:
-        """Place at the parameter ``s`` of the axis, 0 at the start and 1 at the end.
-
-        On straight beams, arcs and polylines ``s`` is the part of the length.
-        """
-        return Place(self, s)
-
-    @property
-    def start(self) -> Place:
-        """First end."""
-        return Place(self, 0.0)
-
-    @property
-    def end(self) -> Place:
-        """Last end."""
-        return Place(self, 1.0)
-
-    def vertices(self, attached: Sequence[float]) -> list[float]:
-        """Parameters of the vertices: equal cells, the corners and what is ``attached``.
-
-        A place nearer to a regular vertex than :data:`TOGETHER` is that vertex.
-        """
-        regular = [i / self.cells for i in range(self.cells + 1)]
-        vertices = sorted({*regular, *self.corners, *attached})
-        kept = [0.0]
-        for s in vertices[1:]:
-            if (s - kept[-1]) * self.cells > TOGETHER:
-                kept.append(s)
-        kept[-1] = 1.0
-        return kept
-
-
-@dataclass(frozen=True)
-class Place:
-    """A point of a beam; made by ``beam.start``, ``beam.end`` and ``beam.at(s)``.
-
-    Attributes:
-        beam: The beam, by identity.
-        s: Parameter of its axis, from 0 to 1.
-        beyond: Whether the cross-section beyond the plastic hinge at ``s`` is meant, the one that
-            no joint, support or load is attached to.
-    """
-
-    beam: Beam
-    s: float
-    beyond: bool = False
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.beam, Beam):
-            raise SceneError(f"Place: {shorten(self.beam)} is not a Beam")
-        require_number(self.s, f"{self.beam.name}.at(s): s")
-        if not 0.0 <= self.s <= 1.0:
-            raise SceneError(f"{self.beam.name}.at({self.s:g}): s must lie between 0 and 1")
-        require_switch(self.beyond, f"{self.beam.name}.at({self.s:g}): beyond")
-
-    @property
-    def point(self) -> Point:
-        """Coordinates in the undeformed scene; m."""
-        x, y = self.beam.curve(self.s)
-        return float(x), float(y)
-
-    @property
-    def direction(self) -> Point:
-        """Unit tangent of the undeformed axis; at a corner the mean of both sides."""
-        edges = sorted({0.0, *self.beam.corners, 1.0})
-        sides = [
-            tangent_within(self.beam.curve, self.s, low, high)
-            for low, high in pairwise(edges)
-            if low <= self.s <= high
-        ]
-        x, y = sum((side / math.hypot(*side) for side in sides), np.zeros(2))
-        length = math.hypot(x, y)
-        return float(x / length), float(y / length)
-
-    def __str__(self) -> str:
-        ends = {0.0: "start", 1.0: "end"}
-        x, y = self.point
-        name = f"{self.beam.name}.{ends.get(self.s, f'at({self.s:g})')} ({x:g}, {y:g})"
-        return f"{name} beyond the hinge" if self.beyond else name
-
-
-def point_of(curve: Curve, s: float, what: str) -> Point:
-    """Evaluate a curve of a user.
-
-    Raises:
-        SceneError: It fails there, or returns no pair of finite numbers; the message has ``what``.
-    """
-    require_function(curve, what, "s that returns (x, y)")
-    try:
-        point = curve(s)
-    except Exception as error:
-        raise SceneError(f"{what}({s:g}) fails: {shorten(error)}") from error
-    return require_vector(point, f"{what}({s:g})")

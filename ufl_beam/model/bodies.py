@@ -1,25 +1,134 @@
 # SPDX-License-Identifier: MIT
-"""Rigid bodies, the ground, and the points on them."""
+"""Rigid bodies, the ground, and the places on beams and bodies that something is attached to."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
 
 from ufl_beam.errors import (
     SceneError,
     require_kind,
     require_number,
+    require_switch,
     require_text,
     require_vector,
     shorten,
 )
-from ufl_beam.model.beams import Place, Point
+from ufl_beam.model.curves import Curve, Point, tangent_within
+
+TOGETHER = 1e-9
+"""Part of a cell below which two places of a beam are one."""
+
+
+class Member:
+    """Base of :class:`Beam`: an axis with places on it; its attributes are those of a beam."""
+
+    a: Point
+    b: Point
+    name: str
+    curve: Curve
+    cells: int
+    corners: tuple[float, ...]
+    hinges: Mapping[float, Any]
+    section: Any
+
+    def at(self, s: float) -> Place:
+        """Place at the parameter ``s`` of the axis, 0 at the start and 1 at the end.
+
+        On straight beams, arcs and polylines ``s`` is the part of the length.
+        """
+        return Place(self, s)
+
+    @property
+    def start(self) -> Place:
+        """Place at the first end, ``s = 0``."""
+        return Place(self, 0.0)
+
+    @property
+    def end(self) -> Place:
+        """Place at the last end, ``s = 1``."""
+        return Place(self, 1.0)
+
+    def vertices(self, attached: Sequence[float]) -> list[float]:
+        """Parameters of the vertices: equal cells, the corners and what is ``attached``.
+
+        A place nearer to a regular vertex than :data:`TOGETHER` is that vertex.
+        """
+        regular = [i / self.cells for i in range(self.cells + 1)]
+        vertices = sorted({*regular, *self.corners, *attached})
+        kept = [0.0]
+        for s in vertices[1:]:
+            if (s - kept[-1]) * self.cells > TOGETHER:
+                kept.append(s)
+        kept[-1] = 1.0
+        return kept
+
+
+@dataclass(frozen=True)
+class Place:
+    """A point of a beam; made by ``beam.start``, ``beam.end`` and ``beam.at(s)``.
+
+    Attributes:
+        beam: The beam, by identity.
+        s: Parameter of its axis, from 0 to 1.
+        beyond: Whether the cross-section beyond the plastic hinge at ``s`` is meant, the one that
+            no joint, support or load is attached to.
+
+    Example:
+        >>> middle = beam.at(0.5)
+        >>> print(middle.point, middle.direction)
+        (1.0, 0.0) (1.0, 0.0)
+        >>> print((1e3 * solution.displacement(middle)[-1, 1:]).round(1))  # mm, mrad
+        [ -5.9 -10.7]
+    """
+
+    beam: Member
+    s: float
+    beyond: bool = False
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.beam, Member):
+            raise SceneError(f"Place: {shorten(self.beam)} is not a Beam")
+        require_number(self.s, f"{self.beam.name}.at(s): s")
+        if not 0.0 <= self.s <= 1.0:
+            raise SceneError(f"{self.beam.name}.at({self.s:g}): s must lie between 0 and 1")
+        require_switch(self.beyond, f"{self.beam.name}.at({self.s:g}): beyond")
+
+    @property
+    def point(self) -> Point:
+        """Coordinates in the undeformed scene; m."""
+        x, y = self.beam.curve(self.s)
+        return float(x), float(y)
+
+    @property
+    def direction(self) -> Point:
+        """Unit tangent of the undeformed axis; at a corner the mean of both sides."""
+        edges = sorted({0.0, *self.beam.corners, 1.0})
+        sides = [
+            tangent_within(self.beam.curve, self.s, low, high)
+            for low, high in pairwise(edges)
+            if low <= self.s <= high
+        ]
+        x, y = sum((side / math.hypot(*side) for side in sides), np.zeros(2))
+        length = math.hypot(x, y)
+        return float(x / length), float(y / length)
+
+    def __str__(self) -> str:
+        ends = {0.0: "start", 1.0: "end"}
+        x, y = self.point
+        name = f"{self.beam.name}.{ends.get(self.s, f'at({self.s:g})')} ({x:g}, {y:g})"
+        return f"{name} beyond the hinge" if self.beyond else name
 
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A rigid body; anything may be attached to any point of it.
+    """Rigid body; joints, connectors and loads may act at any of its points.
 
     Args:
         center: Centre of mass in the undeformed scene; m.
@@ -29,6 +138,12 @@ class Body:
 
     Raises:
         SceneError: Coordinates that are no finite numbers, a negative mass or inertia.
+
+    Example:
+        >>> rotor = ub.Body((2, 0), mass=50.0, inertia=4.0, name="rotor")
+        >>> joint = ub.Revolute(beam.end, rotor.at(2, 0))
+        >>> print(joint)
+        Revolute(beam.end (2, 0), rotor (2, 0))
     """
 
     center: Point
@@ -60,6 +175,12 @@ class Spot:
     Attributes:
         body: The body, by identity.
         point: Coordinates in the undeformed scene; m.
+
+    Example:
+        >>> wheel = ub.Body((0, 0), mass=10.0, inertia=0.5, name="wheel")
+        >>> rim = wheel.at(0.3, 0.0)
+        >>> print(rim)
+        wheel (0.3, 0)
     """
 
     body: Body
@@ -80,7 +201,12 @@ GROUND = Body((0.0, 0.0), name="ground")
 
 
 def ground(x: float, y: float) -> Spot:
-    """The point (x, y) of the ground; m."""
+    """Return the point (x, y) of the ground; m.
+
+    Example:
+        >>> pivot = ub.Revolute(ub.ground(0, 0), beam.start)
+        >>> pendulum = ub.Scene([beam], joints=[pivot], loads=[ub.Gravity()])
+    """
     return Spot(GROUND, (x, y))
 
 

@@ -16,17 +16,30 @@ from ufl_beam.errors import (
     require_number,
     require_returned,
 )
-from ufl_beam.model.beams import Curve
-from ufl_beam.model.loads import TimeFunction, require_time_function
-from ufl_beam.model.material_laws import Hardening, HingeLaw, Softening, require_hinge_law
+from ufl_beam.model.curves import Curve
+from ufl_beam.model.material_laws import (
+    BulkLaw,
+    HingeLaw,
+    Softening,
+    require_bulk_law,
+    require_hinge_law,
+)
+from ufl_beam.model.time_functions import TimeFunction, require_time_function
 
 
 @dataclass(frozen=True)
 class Motor:
-    """The motion is given; the force that it takes is found.
+    """Prescribed relative motion of a connector; its force is unknown.
 
     Args:
         motion: In time; m or rad.  Zero, which joints use, holds it.
+
+    Example:
+        >>> motor = ub.Turn(ub.ground(0, 0), beam.start, ub.Motor(lambda t: np.pi / 2 * t))
+        >>> arm = ub.Scene([beam], supports=[ub.Pinned(beam.start)], connectors=[motor])
+        >>> run = ub.simulate(arm, ub.Static(), t=(0, 1), dt=0.25)
+        >>> np.allclose(run.position(beam.end)[-1], (0, 2))
+        True
     """
 
     motion: TimeFunction
@@ -37,10 +50,17 @@ class Motor:
 
 @dataclass(frozen=True)
 class Actuator:
-    """The force is given; a positive one makes the motion grow.
+    """Prescribed force or moment of a connector; a positive one makes the motion grow.
 
     Args:
         force: In time; N or N m.
+
+    Example:
+        >>> jack = ub.Slide(ub.ground(2, 0), beam.end, ub.Actuator(lambda t: 1e3 * t), axis=(0, 1))
+        >>> lifted = ub.Scene([beam], supports=[ub.Clamped(beam.start)], connectors=[jack])
+        >>> run = ub.simulate(lifted, ub.Static(), t=(0, 1), dt=0.5)
+        >>> print(run.connector(jack).force.round())  # of its resistance; N
+        [    0.  -500. -1000.]
     """
 
     force: TimeFunction
@@ -68,11 +88,19 @@ class Running(Protocol):
 
 @dataclass(frozen=True)
 class Controller:
-    """The force is what a function says at the beginning of each step, and constant during it.
+    """Force by a function of the running simulation, constant during each step.
 
     Args:
         force: ``force(simulation)``; N or N m; a positive one makes the motion grow.  It may ask
             the simulation for its time, motions, velocities and the forces of joints.
+
+    Example:
+        >>> brake = ub.Controller(lambda now: -1e4 * now.velocity(beam.end)[1])
+        >>> device = ub.Slide(ub.ground(2, 0), beam.end, brake, axis=(0, 1))
+        >>> braked = ub.Scene([beam], [], scene.supports, scene.loads, connectors=[device])
+        >>> run = ub.simulate(braked, ub.Midpoint(), t=(0, 0.2), dt=0.001)
+        >>> bool(run.connector(device).work[-1] > 0)  # it takes energy
+        True
     """
 
     force: Callable[[Any], float]
@@ -88,7 +116,7 @@ class Controller:
 
 @dataclass(frozen=True)
 class Spring:
-    """A spring, which may yield and break.
+    """Elastic spring of a connector, which may yield and break.
 
     Args:
         stiffness: N/m or N m/rad.
@@ -97,26 +125,40 @@ class Spring:
 
     Raises:
         SceneError: A stiffness that is not positive.
+
+    Example:
+        >>> spring = ub.Stretch(ub.ground(2, 1), beam.end, ub.Spring(1e6))  # N/m
+        >>> hung = ub.Scene([beam], [], scene.supports, scene.loads, connectors=[spring])
+        >>> run = ub.simulate(hung, ub.Static(), t=(0, 1), dt=0.5)
+        >>> bool(run.connector(spring).force[-1] > 0)  # it is stretched
+        True
     """
 
     stiffness: float
-    law: Hardening | None = None
+    law: BulkLaw | None = None
     softening: Softening | None = None
 
     def __post_init__(self) -> None:
         require_number(self.stiffness, "Spring: stiffness", positive=True)
         if self.law is not None:
-            require_kind(self.law, Hardening, "Spring: law")
+            require_bulk_law(self.law, "Spring: law")
         if self.softening is not None:
             require_kind(self.softening, Softening, "Spring: softening")
 
 
 @dataclass(frozen=True)
 class Damper:
-    """A force in proportion to the rate of the motion.
+    """Viscous damper: a force in proportion to the rate of the motion.
 
     Args:
         viscosity: N s/m or N m s/rad.
+
+    Example:
+        >>> damper = ub.Stretch(ub.ground(2, -1), beam.end, ub.Damper(2e3))  # N s/m
+        >>> damped = ub.Scene([beam], [], scene.supports, scene.loads, connectors=[damper])
+        >>> run = ub.simulate(damped, ub.Midpoint(), t=(0, 1), dt=0.01)
+        >>> np.allclose(run.connector(damper).force, 2e3 * run.connector(damper).rate)
+        True
     """
 
     viscosity: float
@@ -127,7 +169,7 @@ class Damper:
 
 @dataclass(frozen=True)
 class Stop:
-    """Contact where the motion leaves an interval; free inside.
+    """Elastic stop: a contact force where the motion leaves an interval.
 
     Args:
         low, high: Ends of the interval; m or rad.
@@ -135,6 +177,13 @@ class Stop:
 
     Raises:
         SceneError: An interval that does not contain the undeformed scene, or no stiffness.
+
+    Example:
+        >>> buffer = ub.Slide(ub.ground(2, 0), beam.end, ub.Stop(1e9, low=-0.01), axis=(0, 1))
+        >>> caught = ub.Scene([beam], [], scene.supports, scene.loads, connectors=[buffer])
+        >>> run = ub.simulate(caught, ub.Static(), t=(0, 1), dt=0.05)
+        >>> print(run.displacement(beam.end)[-1, 1].round(3))  # m
+        -0.01
     """
 
     stiffness: float
@@ -156,12 +205,20 @@ class Stop:
 
 @dataclass(frozen=True)
 class ForceLaw:
-    """A force that a function of the motion and its rate gives, as a spring or damper would.
+    """Force of a connector as a function of its motion and rate.
 
     Args:
         force: ``force(motion, rate)``; arrays or numbers; N or N m; a positive one resists growth.
             It is asked for the middle of the step.  What it takes is the entry "functions" of the
             ledger, because nobody knows what it stores.
+
+    Example:
+        >>> law = ub.ForceLaw(lambda motion, rate: 1e6 * motion + 1e9 * motion**3)
+        >>> spring = ub.Slide(ub.ground(2, 0), beam.end, law, axis=(0, 1))
+        >>> propped = ub.Scene([beam], [], scene.supports, scene.loads, connectors=[spring])
+        >>> run = ub.simulate(propped, ub.Static(), t=(0, 1), dt=0.25)
+        >>> bool(run.connector(spring).force[-1] < 0)  # it is compressed
+        True
     """
 
     force: Callable[[float, float], float]
@@ -172,7 +229,7 @@ class ForceLaw:
 
 @dataclass(frozen=True)
 class Coulomb:
-    """Dry friction: no motion up to a limit, and the limit against the motion beyond it.
+    """Coulomb friction: sticks below a limit of the force, slides at the limit.
 
     The limit is ``force`` and ``coefficient`` times the force of a joint at the end of the step
     before.  There is no stiffness of sticking: the motion stops exactly, with its velocity.
@@ -185,6 +242,14 @@ class Coulomb:
 
     Raises:
         SceneError: No limit, or a coefficient without a joint.
+
+    Example:
+        >>> brake = ub.Turn(ub.ground(0, 0), beam.start, ub.Coulomb(1e3))  # N m
+        >>> spin = ub.Velocity((beam,), angular=1.0)
+        >>> arm = ub.Scene([beam], [], [ub.Pinned(beam.start)], initial=[spin], connectors=[brake])
+        >>> run = ub.simulate(arm, ub.Midpoint(alpha=0.1), t=(0, 0.5), dt=0.01)
+        >>> print(run.connector(brake).motion[-1].round(2))  # rad, to rest
+        0.21
     """
 
     force: float = 0.0
@@ -211,7 +276,7 @@ class Coulomb:
 
 @dataclass(frozen=True)
 class RigidPlastic:
-    """No motion up to the limit of a law, which the motion follows beyond it.
+    """Rigid-plastic law: no motion below a limit of the force, flow or softening at it.
 
     There is no elastic stiffness: below the limit the motion is held exactly.  Plastic hinges of
     beams, ``Beam(hinges={s: law})``, are rotations with this law.
@@ -222,6 +287,11 @@ class RigidPlastic:
 
     Raises:
         SceneError: A law of another kind, or one that relaxes an elastic stress.
+
+    Example:
+        >>> fuse = ub.RigidPlastic(ub.Hardening(limit=5e4))  # N m
+        >>> hinge = ub.Turn(ub.ground(0, 0), beam.start, fuse)
+        >>> arm = ub.Scene([beam], supports=[ub.Pinned(beam.start)], connectors=[hinge])
     """
 
     law: HingeLaw

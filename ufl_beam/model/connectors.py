@@ -12,9 +12,9 @@ from ufl_beam.errors import (
     require_kind,
     require_vector,
 )
-from ufl_beam.model.beams import Point
 from ufl_beam.model.bodies import Anchor, arm, require_anchor
 from ufl_beam.model.connector_laws import Coulomb, Guide, Law, Motor, RigidPlastic
+from ufl_beam.model.curves import Point
 
 
 class Rigidly(NamedTuple):
@@ -30,7 +30,7 @@ class Rigidly(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Connector:
-    """A relative motion of two anchors that follows a law; made by :func:`Turn` and its siblings.
+    """Relative motion of two anchors with a force law; made by :func:`Turn` and its siblings.
 
     The motion is zero in the undeformed scene.  The force of a connector resists its growth: it is
     positive in a spring that is stretched, and negative in a motor that drives.
@@ -42,6 +42,14 @@ class Connector:
         law: What it follows.
         axis: Unit vector, for motions along one.
         corner: The point of frame a that is meant, if it is not that of the anchor.
+
+    Example:
+        >>> spring = ub.Slide(ub.ground(2, 0), beam.end, ub.Spring(1e6), axis=(0, 1))
+        >>> propped = ub.Scene([beam], [], scene.supports, scene.loads, connectors=[spring])
+        >>> run = ub.simulate(propped, ub.Static(), t=(0, 1), dt=1.0)
+        >>> history = run.connector(spring)
+        >>> np.allclose(history.force, 1e6 * history.motion)
+        True
     """
 
     kind: str
@@ -81,28 +89,49 @@ class Connector:
         """True if the motion is a rotation: rad and N m in the place of m and N."""
         return self.motion == "turning"
 
+    @property
+    def stretches(self) -> bool:
+        """True if the motion is that of the distance of the points."""
+        return self.motion == "stretching"
+
+    @property
+    def follows_a(self) -> bool:
+        """True if the axis turns with the node of ``a``, which then bears a moment."""
+        return self.motion == "sliding"
+
     def rigidly(self) -> Rigidly:
         """Return the derivatives of the motion by those of the nodes, in the undeformed scene."""
         if self.turns:
             return Rigidly((0.0, 0.0, -1.0), (0.0, 0.0, 1.0))
         (dx, dy), length = self.apart, math.hypot(*self.apart)
-        x, y = (dx / length, dy / length) if self.motion == "stretching" else self.axis
+        x, y = (dx / length, dy / length) if self.stretches else self.axis
         (ax, ay), (bx, by) = self.arms
-        turned_with_a = x * dy - y * dx if self.motion == "sliding" else 0.0
+        turned_with_a = x * dy - y * dx if self.follows_a else 0.0
         # d/dψ of axis(ψ)·d is (W axis)·d = -y dx + x dy
         return Rigidly((-x, -y, x * ay - y * ax + turned_with_a), (x, y, y * bx - x * by))
 
 
 def Turn(a: Anchor, b: Anchor, law: Law) -> Connector:
-    """Rotation of ``b`` relative to ``a``: rotational springs, dampers, motors; rad, N m."""
+    """Connector of the rotation of ``b`` relative to ``a``: springs, dampers, motors; rad, N m.
+
+    Example:
+        >>> soft = ub.Turn(ub.ground(0, 0), beam.start, ub.Spring(1e7))  # N m/rad
+        >>> swaying = ub.Scene([beam], supports=[ub.Pinned(beam.start)], connectors=[soft])
+        >>> bool(ub.modes(swaying, 1).omega < ub.modes(scene, 1).omega)
+        True
+    """
     return Connector("Turn", "turning", a, b, law)
 
 
 def Stretch(a: Anchor, b: Anchor, law: Law) -> Connector:
-    """Growth of the distance of ``a`` and ``b``: springs, dampers, rods that push; m, N.
+    """Connector of the distance between ``a`` and ``b``: springs, dampers, actuators; m, N.
 
     Raises:
         SceneError: Both are at the same point, so that there is no direction.
+
+    Example:
+        >>> rod = ub.Stretch(ub.ground(2, 1), beam.end, ub.Spring(1e6))
+        >>> stayed = ub.Scene([beam], supports=scene.supports, connectors=[rod])
     """
     connector = Connector("Stretch", "stretching", a, b, law)
     _require_apart(connector)
@@ -110,7 +139,7 @@ def Stretch(a: Anchor, b: Anchor, law: Law) -> Connector:
 
 
 def Slide(a: Anchor, b: Anchor, law: Law, *, axis: Point | None = None) -> Connector:
-    """Way of ``b`` along an axis that turns with ``a``; m, N.
+    """Connector of the displacement of ``b`` along an axis that turns with ``a``; m, N.
 
     Args:
         a: Whose axis it is; it may be on the ground.
@@ -120,6 +149,10 @@ def Slide(a: Anchor, b: Anchor, law: Law, *, axis: Point | None = None) -> Conne
 
     Raises:
         SceneError: An axis of zero length.
+
+    Example:
+        >>> spring = ub.Slide(ub.ground(2, 0), beam.end, ub.Spring(1e6), axis=(0, 1))
+        >>> propped = ub.Scene([beam], supports=scene.supports, connectors=[spring])
     """
     return Connector("Slide", "sliding", a, b, law, _axis(a, b, axis, "Slide"))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from typing import Protocol
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -12,8 +13,7 @@ from scipy.sparse.linalg import eigsh
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError
-from ufl_beam.model.beams import Beam, Point
-from ufl_beam.model.bodies import GROUND, Anchor, Body, Node, Spot, node
+from ufl_beam.model.bodies import GROUND, Anchor, Body, Member, Node, Spot, node
 from ufl_beam.model.connector_laws import (
     Coulomb,
     Damper,
@@ -25,9 +25,12 @@ from ufl_beam.model.connector_laws import (
     Stop,
 )
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.loads import value_at
+from ufl_beam.model.curves import Point
+from ufl_beam.model.loads import RotatingFrame
+from ufl_beam.model.masses import PointMass
 from ufl_beam.model.plastic_hinges import Slot
-from ufl_beam.model.scene import PointMass, Scene
+from ufl_beam.model.scene import Scene
+from ufl_beam.model.time_functions import value_at
 
 DENSE = 90
 """Up to this number of unknowns the null space comes from a dense decomposition."""
@@ -214,7 +217,7 @@ def require_no_mechanism(scene: Scene) -> None:
     )
 
 
-def _center(part: Beam | Body) -> Point:
+def _center(part: Member | Body) -> Point:
     """Point about which the rigid motion of a beam or body is described."""
     if isinstance(part, Body):
         return part.center
@@ -292,7 +295,7 @@ def _sparse(entries: list[tuple[int, int, float]], shape: tuple[int, int]) -> cs
     return csr_array((values, (rows.astype(int), columns.astype(int))), shape=shape)
 
 
-def _parts(scene: Scene) -> list[Beam | Body]:
+def _parts(scene: Scene) -> list[Member | Body]:
     return [*scene.beams, *scene.bodies]
 
 
@@ -322,3 +325,28 @@ def _describe(scene: Scene, number: int, mode: Array) -> str:
         for c in (cx - v / ψ * scene.size, cy + u / ψ * scene.size)
     )
     return f"{name} can turn about ({x:.4g}, {y:.4g})"
+
+
+class Rated(Protocol):
+    """A time scheme, as far as scenes may ask too much of its rates."""
+
+    has_mean_velocity: bool
+    rings: bool
+
+
+def require_rates(scene: Scene, scheme: Rated) -> None:
+    """Raise :class:`SceneError` if a time scheme has not the rates that a scene needs."""
+    name = type(scheme).__name__
+    for owner, what in [*((c, c.law) for c in scene.links), *((x, x) for x in scene.loads)]:
+        if isinstance(what, Coulomb | RotatingFrame) and not scheme.has_mean_velocity:
+            raise SceneError(
+                f"{name}: {owner} needs the mean velocity of a step, and forces act at its end "
+                "here; use Midpoint() or DecayingMidpoint()"
+            )
+    given = [str(c) for c in scene.links if isinstance(c.law, Motor | Guide)]
+    given += [f"the support of {s.place}" for s in scene.supports if s.moving]
+    if given and scheme.rings:
+        raise SceneError(
+            f"{name}: {given[0]} prescribes a motion, whose accelerations ring for ever "
+            "without numerical damping; use GeneralizedAlpha(0.8), or Midpoint()"
+        )

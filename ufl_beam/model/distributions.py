@@ -51,7 +51,7 @@ class Distribution(ABC):
 
 @dataclass(frozen=True)
 class Normal(Distribution):
-    """Gauss's distribution; values below zero become zero, such fibres yield at once.
+    """Normal distribution; negative values become zero, and such fibres yield at once.
 
     Args:
         mean: Mean; Pa for fibres, N or N m for resultants.
@@ -60,6 +60,10 @@ class Normal(Distribution):
 
     Raises:
         SceneError: Mean or deviation are not positive, or the seed is no whole number.
+
+    Example:
+        >>> limit = ub.Normal(mean=355e6, deviation=25e6, seed=1)
+        >>> scattered = ub.Fibres(ub.Hardening(limit), number=16)
     """
 
     mean: float
@@ -71,7 +75,13 @@ class Normal(Distribution):
 
 
 class TruncatedNormal(Normal):
-    """Gauss's distribution of these parameters, given that the value is positive."""
+    """Normal distribution of these parameters, truncated to positive values.
+
+    Example:
+        >>> limit = ub.TruncatedNormal(mean=30e6, deviation=20e6, seed=1)
+        >>> bool((limit.draw(100, (0, 0)) > 0).all())
+        True
+    """
 
     def law(self) -> Any:
         """The distribution of SciPy."""
@@ -79,7 +89,12 @@ class TruncatedNormal(Normal):
 
 
 class Lognormal(Normal):
-    """The distribution of this mean and deviation whose logarithm is normal."""
+    """Lognormal distribution of given mean and standard deviation.
+
+    Example:
+        >>> limit = ub.Lognormal(mean=355e6, deviation=25e6, seed=1)
+        >>> scattered = ub.Fibres(ub.Hardening(limit), number=16)
+    """
 
     def law(self) -> Any:
         """The distribution of SciPy."""
@@ -89,7 +104,7 @@ class Lognormal(Normal):
 
 @dataclass(frozen=True)
 class Weibull(Distribution):
-    """Weibull's distribution.
+    """Weibull distribution of positive values, for strengths.
 
     Args:
         scale: What a part exp(-1) of the values exceeds; Pa for fibres, N or N m for resultants.
@@ -98,6 +113,10 @@ class Weibull(Distribution):
 
     Raises:
         SceneError: Scale or shape are not positive, or the seed is no whole number.
+
+    Example:
+        >>> limit = ub.Weibull(scale=355e6, shape=20.0, seed=1)
+        >>> scattered = ub.Fibres(ub.Hardening(limit), number=16)
     """
 
     scale: float

@@ -1,22 +1,91 @@
 # SPDX-License-Identifier: MIT
-"""Fibres of a cross-section: layers across its depth, each a material point of its own."""
+"""Material points of a cross-section: its resultants, or fibres across its depth."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass
+from functools import cached_property
 
 import numpy as np
 
 from ufl_beam.array_checks import require_array
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_count, require_kind
-from ufl_beam.model.material_laws import Hardening, Layout, Softening
+from ufl_beam.model.law_functions import Values
+from ufl_beam.model.material_laws import Bulk, BulkLaw, Softening, require_bulk_law
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Material points of a cross-section: what strains them, and what their stresses add up to.
+
+    Attributes:
+        strains: Strain of each point per strain (Σ, Γ, K) of the section; shape (n, 3).  The
+            resultants are the sum of weight times stress times the same numbers.
+        weights: Shape (n,); area of fibres, 1 for resultants.
+        stiffness: Elastic stiffness of the points; shape (n,).
+        laws: Laws and the number of points in a row that follow them.
+        rest: Stiffness (axial, shear, bending) of what has no points; shape (3,).
+        softening: Law of the discontinuities, if points can break.
+        breaking: Which points can.
+        hinges: Whether the discontinuity is one hinge, a jump of rotation.
+    """
+
+    strains: Values
+    weights: Values
+    stiffness: Values
+    laws: tuple[tuple[BulkLaw, int], ...]
+    rest: Values
+    softening: Softening | None
+    breaking: slice
+    hinges: bool = False
+
+    @property
+    def elastic(self) -> bool:
+        """True if nothing can happen at the points."""
+        return self.softening is None and not self.yields
+
+    @property
+    def yields(self) -> bool:
+        """True if the bulk can yield."""
+        return any(law.limit != np.inf for law, _ in self.laws)
+
+    @cached_property
+    def statement(self) -> type[Bulk]:
+        """The law that points of the bulk follow, with numbers of their own.
+
+        Raises:
+            SceneError: They follow laws of different kinds.
+        """
+        laws = [law for law, _ in self.laws if law.limit != np.inf] or [self.laws[0][0]]
+        kinds = dict.fromkeys(type(law) for law in laws)
+        if len(kinds) > 1:
+            names = " and ".join(kind.__name__ for kind in kinds)
+            raise SceneError(f"Section: its laws must be of one kind, not {names}")
+        return laws[0].statement
+
+    def bulk(self, keys: list[tuple[int, int]]) -> Bulk:
+        """The laws at the points of many cells.
+
+        Args:
+            keys: For each cell two numbers that random limits depend on, besides their seed.
+        """
+        shape, first = (len(keys), len(self.weights)), 0
+        columns = {name: np.zeros(shape) for name in self.statement.numbers()}
+        for law, n in self.laws:
+            at = slice(first, first + n)
+            for name, value in law.numbers(self.stiffness[at]).items():
+                if name in columns:
+                    drawn = hasattr(value, "draw")
+                    columns[name][:, at] = [value.draw(n, k) for k in keys] if drawn else value
+            first += n
+        return self.statement(self.stiffness, **columns)
 
 
 @dataclass(frozen=True)
 class Fibres:
-    """Material law of the fibres of a section and their number, P(93).
+    """Number and material law of the fibres of a section, P(93).
 
     Args:
         law: Of each fibre; stresses in Pa.  A random limit is drawn for each fibre of each cell.
@@ -26,15 +95,21 @@ class Fibres:
 
     Raises:
         SceneError: A law is none, or ``number`` is no whole number from 1.
+
+    Example:
+        >>> steel = ub.Fibres(ub.Hardening(355e6, modulus=2e9), number=16)
+        >>> layered = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, fibres=steel)
+        >>> print(f"{layered.EI:.3g}")  # of 16 layers; N m²
+        1.39e+07
     """
 
-    law: Hardening
+    law: BulkLaw
     _: KW_ONLY
     number: int = 20
     softening: Softening | None = None
 
     def __post_init__(self) -> None:
-        require_kind(self.law, Hardening, "Fibres: law")
+        require_bulk_law(self.law, "Fibres: law")
         require_count(self.number, "Fibres: number")
         object.__setattr__(self, "number", int(self.number))
         if self.softening is not None:
@@ -108,7 +183,7 @@ class PlacedFibres:
 
     @property
     def EA(self) -> float:
-        """Axial stiffness; N."""
+        """Axial stiffness, the sum over all fibres; N."""
         return float(self.E * self.A.sum())
 
     @property

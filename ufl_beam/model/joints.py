@@ -12,15 +12,15 @@ from ufl_beam.errors import (
     require_switch,
     require_text,
 )
-from ufl_beam.model.beams import Curve, Place, Point, point_of
-from ufl_beam.model.bodies import Anchor, carries, ground, require_anchor
+from ufl_beam.model.bodies import Anchor, Place, carries, ground, require_anchor
 from ufl_beam.model.connector_laws import HELD, Bearing, Guide
 from ufl_beam.model.connectors import Connector, _axis, _require_apart
+from ufl_beam.model.curves import Curve, Point, point_of
 
 
 @dataclass(frozen=True, eq=False)
 class Joint(Bearing):
-    """Anchors that share components of motion, or are held by connectors; see :func:`Rigid`.
+    """Joint by shared unknowns or by constraint forces; made by :func:`Rigid` and its siblings.
 
     Attributes:
         kind: Name for messages.
@@ -30,6 +30,15 @@ class Joint(Bearing):
         holders: What is held besides, by connectors.
         meets: Whether the anchors are at one point of the undeformed scene.
         advice: For anchors that should meet and do not.
+        look: Kind of joint whose picture it has; its own by default.
+
+    Example:
+        >>> mast = ub.Beam((2, 0), (2, 3), section, name="mast")
+        >>> corner = ub.Rigid(beam.end, mast.start, measured=True)
+        >>> frame = ub.Scene([beam, mast], [corner], scene.supports, [ub.Gravity()])
+        >>> run = ub.simulate(frame, ub.Static(), t=(0, 1), dt=1.0)
+        >>> print(run.joint(corner).force[-1, 1].round())  # weight of the mast; N
+        4621.0
     """
 
     kind: str
@@ -38,12 +47,14 @@ class Joint(Bearing):
     holders: tuple[Connector, ...] = field(default=(), repr=False)
     meets: bool = False
     advice: str = "RigidLink and Link join places that are apart"
+    look: str = ""
 
     def __post_init__(self) -> None:
         if len(self.places) < 2:
             raise SceneError(f"{self.kind}: a joint needs at least two places")
         for place in self.places:
             require_anchor(place, self.kind)
+        object.__setattr__(self, "look", self.look or self.kind)
 
     def __str__(self) -> str:
         return f"{self.kind}({', '.join(map(str, self.places))})"
@@ -89,6 +100,10 @@ def Rigid(*places: Anchor, measured: bool = False) -> Joint:
         places: What is joined.
         measured: Keep separate unknowns and hold them with forces, which solutions and
             controllers can ask for, in the place of sharing the unknowns, which costs nothing.
+
+    Example:
+        >>> column = ub.Beam((2, 0), (2, -3), section, name="column")
+        >>> frame = ub.Scene([beam, column], [ub.Rigid(beam.end, column.start)], scene.supports)
     """
     return _joined("Rigid", places, (0, 1, 2), measured)
 
@@ -99,6 +114,10 @@ def Revolute(*places: Anchor, measured: bool = False) -> Joint:
     Args:
         places: What is joined.
         measured: As in :func:`Rigid`; friction needs it.
+
+    Example:
+        >>> rod = ub.Beam((2, 0), (4, 0), section, name="rod")
+        >>> chain = ub.Scene([beam, rod], [ub.Revolute(beam.end, rod.start)], scene.supports)
     """
     return _joined("Revolute", places, (0, 1), measured)
 
@@ -116,6 +135,12 @@ def Prismatic(
 
     Raises:
         SceneError: An axis of zero length.
+
+    Example:
+        >>> slider = ub.Body((2, 0), mass=10.0, inertia=1.0, name="slider")
+        >>> joint = ub.Prismatic(beam.end, slider.middle, axis=(0, 1))
+        >>> print(joint)
+        Prismatic(beam.end (2, 0), slider (2, 0))
     """
     require_switch(turning, "Prismatic: turning")
     x, y = _axis(rail, slider, axis, "Prismatic")
@@ -128,6 +153,10 @@ def RigidLink(a: Anchor, b: Anchor) -> Joint:
 
     Raises:
         SceneError: Both are at the same point.
+
+    Example:
+        >>> flange = ub.Beam((0, 0.5), (2, 0.5), section, name="flange")
+        >>> built = ub.Scene([beam, flange], [ub.RigidLink(beam.end, flange.end)], scene.supports)
     """
     for anchor in (a, b):
         require_anchor(anchor, "RigidLink")
@@ -141,10 +170,17 @@ def RigidLink(a: Anchor, b: Anchor) -> Joint:
 
 
 def Link(a: Anchor, b: Anchor) -> Joint:
-    """Massless rigid rod with a revolute joint at both ends: the distance stays.
+    """Massless rigid rod with a revolute joint at both ends: keeps the distance.
 
     Raises:
         SceneError: Zero length.
+
+    Example:
+        >>> hanger = ub.Link(ub.ground(2, 3), beam.end)
+        >>> hung = ub.Scene([beam], [hanger], [ub.Pinned(beam.start)], [ub.Gravity()])
+        >>> run = ub.simulate(hung, ub.Static(), t=(0, 1), dt=1.0)
+        >>> print(run.joint(hanger).force[-1, 1].round())  # half of the weight; N
+        1540.0
     """
     rod = Connector("Link", "stretching", a, b, HELD)
     _require_apart(rod)
@@ -152,7 +188,7 @@ def Link(a: Anchor, b: Anchor) -> Joint:
 
 
 def Guided(place: Anchor, curve: Curve) -> Joint:
-    """A point stays on a guide curve of the ground, free along it and free to turn.
+    """Joint that keeps a point on a guide curve of the ground, free along it and free to turn.
 
     Args:
         place: What is guided; of bodies the centre, other points by a :func:`Revolute` to a beam.
@@ -161,6 +197,10 @@ def Guided(place: Anchor, curve: Curve) -> Joint:
     Raises:
         SceneError: The curve stands still at s = 0.  A scene raises it where ``curve(0)`` is not at
             the place.
+
+    Example:
+        >>> rail = ub.Guided(beam.end, lambda s: (2 + s, 0.5 * s**2))
+        >>> guided = ub.Scene([beam], [rail], [ub.Roller(beam.start)], [ub.Gravity()])
     """
     require_anchor(place, "Guided")
     if not carries(place):
@@ -178,7 +218,7 @@ def Guided(place: Anchor, curve: Curve) -> Joint:
 
 
 def Release(a: Place, b: Anchor, *, free: str, measured: bool = False) -> Joint:
-    """Joint at one point that transmits all but some resultants of the beam of ``a``.
+    """Joint at one point that releases some of the resultants of the beam of ``a``.
 
     Args:
         a: The place on a beam whose axis says what is axial.
@@ -188,6 +228,12 @@ def Release(a: Place, b: Anchor, *, free: str, measured: bool = False) -> Joint:
 
     Raises:
         SceneError: Other letters, or none.
+
+    Example:
+        >>> girder = ub.Beam((2, 0), (4, 0), section, name="girder")
+        >>> joint = ub.Release(beam.end, girder.start, free="V")  # a shear joint
+        >>> print(joint)
+        Release(beam.end (2, 0), girder.start (2, 0))
     """
     require_kind(a, Place, "Release: a")
     require_anchor(b, "Release: b")

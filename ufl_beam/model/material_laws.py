@@ -9,48 +9,14 @@ derives their tangents and FFCx compiles them for the time loop, see
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import singledispatch
-from typing import Any, Protocol
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from ufl_beam.errors import SceneError, is_infinite, require_kind, require_number
-
-Values = Any
-"""Array of real or complex numbers, or a UFL expression."""
-
-
-# -- what laws are written with ----------------------------------------------------------------
-
-
-@singledispatch
-def where(condition: Values, yes: Values, no: Values) -> Values:
-    """``yes`` where the condition holds, else ``no``; both are evaluated everywhere."""
-    return np.where(condition, yes, no)
-
-
-@singledispatch
-def below(x: Values, limit: float) -> Values:
-    """Return whether x is less than the limit."""
-    return x < limit
-
-
-@singledispatch
-def exp(x: Values) -> Values:
-    """Exponential function."""
-    return np.exp(x)
-
-
-def sign(x: Values) -> Values:
-    """1 or -1; 1 at zero."""
-    return where(below(x, 0.0), -1.0, 1.0)
-
-
-def positive(x: Values) -> Values:
-    """Macaulay's bracket <x>: x where it is positive, else zero."""
-    return where(below(-x, 0.0), x, 0.0)
+from ufl_beam.errors import SceneError, is_infinite, require_kind, require_number, shorten
+from ufl_beam.model.law_functions import Values, below, exp, positive, sign, where
 
 
 def _require_from_zero_to_infinity(value: float, what: str) -> None:
@@ -71,11 +37,15 @@ class Viscosity(Protocol):
 
 @dataclass(frozen=True)
 class Perzyna:
-    """Overstress in proportion to the rate of plastic strain, P(39).
+    """Perzyna viscoplasticity: overstress in proportion to the plastic strain rate, P(39).
 
     Args:
         eta: Overstress per rate; Pa s for fibres, N s and N m² s for resultants.  Zero is
             rate-independent, infinity elastic.
+
+    Example:
+        >>> law = ub.Hardening(250e6, modulus=2e9, viscosity=ub.Perzyna(eta=1e6))  # Pa, Pa s
+        >>> viscous = ub.Fibres(law, number=10)
     """
 
     eta: float
@@ -90,13 +60,17 @@ class Perzyna:
 
 @dataclass(frozen=True)
 class DuvautLions:
-    """Relaxation towards the rate-independent stress, P(45).
+    """Duvaut-Lions viscoplasticity: relaxation towards the rate-independent stress, P(45).
 
     The same law as :class:`Perzyna` with ``eta = tau (C + H)``; the relaxation time is what the
     user knows.
 
     Args:
         tau: Relaxation time; s.  Zero is rate-independent, infinity elastic.
+
+    Example:
+        >>> law = ub.Hardening(250e6, modulus=2e9, viscosity=ub.DuvautLions(tau=1e-3))  # Pa, s
+        >>> viscous = ub.Fibres(law, number=10)
     """
 
     tau: float
@@ -109,8 +83,106 @@ class DuvautLions:
         return np.asarray(self.tau * stiffness)  # P(46)
 
 
+@dataclass(frozen=True, eq=False)
+class Bulk(ABC):
+    """Statement of a law of the bulk at many points, for arrays and for symbols.
+
+    The internal variables of a point are its plastic strain and the sum of the sizes of its
+    increments.  A law has further numbers as fields; those of :attr:`numbers` are the inputs of
+    the compiled law.
+
+    Attributes:
+        C: Stiffness; arrays of one shape, or numbers.
+        limit: Yield stress; infinite where the bulk stays elastic.
+    """
+
+    C: Values
+    limit: Values
+
+    @classmethod
+    def numbers(cls) -> tuple[str, ...]:
+        """Names of the numbers of the law but for the stiffness."""
+        return tuple(field.name for field in fields(cls))[1:]
+
+    @abstractmethod
+    def flow(self, strain: Values, p: Values, ξ: Values, θ: Values, dt: Values) -> Values:
+        """Increment of the plastic strain over a step.
+
+        Args:
+            strain: Strain at t_n+θ.
+            p: Plastic strain at t_n.
+            ξ: Accumulated plastic strain at t_n.
+            θ: Part of the step at which the law is stated: 1/2 is of second order, 1 is backward
+                Euler.
+            dt: Length of the step; s.
+        """
+
+    @abstractmethod
+    def hardening_energy(self, p: Values, ξ: Values) -> Values:
+        """Energy per volume that hardening stores."""
+
+    @abstractmethod
+    def dissipation(self, dp: Values, dt: Values) -> Values:
+        """Energy per volume that a plastic increment dissipates."""
+
+    def stress(self, strain: Values, p: Values) -> Values:
+        """Stress of the elastic part of the strain."""
+        return self.C * (strain - p)
+
+    def elastic_energy(self, strain: Values) -> Values:
+        """Energy per volume of an elastic strain."""
+        return self.C * strain**2 / 2
+
+
+class BulkLaw(ABC):
+    """Base of records of laws of the bulk, such as :class:`Hardening`."""
+
+    statement: ClassVar[type[Bulk]]
+    """The law of many points."""
+
+    limit: Any
+    """Yield stress, a number or a distribution; infinite if the bulk stays elastic."""
+
+    @abstractmethod
+    def numbers(self, C: Values) -> dict[str, Any]:
+        """Numbers of :attr:`statement` by name, at points of stiffness ``C``."""
+
+
+@dataclass(frozen=True, eq=False)
+class HardeningBulk(Bulk):
+    """Statement of :class:`Hardening`.
+
+    Attributes:
+        H: Isotropic hardening modulus.
+        B: Kinematic hardening modulus.
+        eta: Viscosity.
+    """
+
+    H: Values
+    B: Values
+    eta: Values
+
+    def flow(self, strain: Values, p: Values, ξ: Values, θ: Values, dt: Values) -> Values:
+        """Increment of the plastic strain over a step, in closed form, P(38)-P(44)."""
+        trial = self.C * (strain - p) - self.B * p
+        direction = sign(trial)
+        overstress = direction * trial - (self.limit + self.H * ξ)  # P(38)
+        γ = positive(overstress) / (self.eta / dt + θ * (self.C + self.H + self.B))  # P(44)
+        return direction * γ
+
+    def hardening_energy(self, p: Values, ξ: Values) -> Values:
+        """Energy per volume that hardening stores."""
+        return (self.B * p**2 + self.H * ξ**2) / 2  # P(35)
+
+    def dissipation(self, dp: Values, dt: Values) -> Values:
+        """Energy per volume that a plastic increment dissipates, by yield stress and viscosity."""
+        γ = abs(dp)
+        flows = below(-γ, 0.0)  # a limit that is infinite must not meet an increment of zero
+        return (where(flows, self.limit, 0.0) + where(flows, self.eta, 0.0) * γ / dt) * γ  # P(37)
+
+
 @dataclass(frozen=True)
-class Hardening:
+class Hardening(BulkLaw):
     """Elasto-(visco)plastic law with linear isotropic and kinematic hardening, P(35)-P(48).
 
     Args:
@@ -122,6 +194,10 @@ class Hardening:
 
     Raises:
         SceneError: A number is negative or none; infinity is allowed for the limit.
+
+    Example:
+        >>> law = ub.Hardening(3e5, modulus=1e6)  # N m, N m²
+        >>> yielding = ub.Section(EA=4e9, GA=1e9, EI=1.4e7, rhoA=157.0, bending=law)
     """
 
     limit: Any
@@ -142,6 +218,13 @@ class Hardening:
                 )
         require_kind(self.viscosity, (Perzyna, DuvautLions), "Hardening: viscosity")
 
+    statement: ClassVar[type[Bulk]] = HardeningBulk
+
+    def numbers(self, C: Values) -> dict[str, Any]:
+        """Limit, both moduli and viscosity."""
+        eta = self.viscosity.coefficient(C + self.modulus + self.kinematic)
+        return {"limit": self.limit, "H": self.modulus, "B": self.kinematic, "eta": eta}
+
     @property
     def opens(self) -> bool:
         """True if it ever flows."""
@@ -159,64 +242,6 @@ class Hardening:
         return self.modulus == self.kinematic == 0.0 and not viscous
 
 
-@dataclass(frozen=True, eq=False)
-class Bulk:
-    """The numbers of :class:`Hardening` at many points, and the law itself.
-
-    Attributes:
-        C: Stiffness; arrays of one shape, or numbers.
-        limit: Yield stress.
-        H: Isotropic hardening modulus.
-        B: Kinematic hardening modulus.
-        eta: Viscosity.
-    """
-
-    C: Values
-    limit: Values
-    H: Values
-    B: Values
-    eta: Values
-
-    def flow(self, strain: Values, p: Values, ξ: Values, θ: Values, dt: Values) -> Values:
-        """Increment of the plastic strain over a step, in closed form.
-
-        The rule is stated at t_n+θ: 1/2 is of second order, 1 is backward Euler.
-
-        Args:
-            strain: Strain at t_n+θ.
-            p: Plastic strain at t_n.
-            ξ: Accumulated plastic strain at t_n.
-            θ: Part of the step.
-            dt: Length of the step; s.
-
-        Equations:
-            P(38)-P(44).
-        """
-        trial = self.C * (strain - p) - self.B * p
-        direction = sign(trial)
-        overstress = direction * trial - (self.limit + self.H * ξ)  # P(38)
-        γ = positive(overstress) / (self.eta / dt + θ * (self.C + self.H + self.B))  # P(44)
-        return direction * γ
-
-    def stress(self, strain: Values, p: Values) -> Values:
-        """Stress of the elastic part of the strain."""
-        return self.C * (strain - p)
-
-    def elastic_energy(self, strain: Values) -> Values:
-        """Energy per volume of an elastic strain."""
-        return self.C * strain**2 / 2
-
-    def hardening_energy(self, p: Values, ξ: Values) -> Values:
-        """Energy per volume that hardening stores."""
-        return (self.B * p**2 + self.H * ξ**2) / 2  # P(35)
-
-    def dissipation(self, dp: Values, dt: Values) -> Values:
-        """Energy per volume that a plastic increment dissipates, by yield stress and viscosity."""
-        γ = abs(dp)
-        flows = below(-γ, 0.0)  # a limit that is infinite must not meet an increment of zero
-        return (where(flows, self.limit, 0.0) + where(flows, self.eta, 0.0) * γ / dt) * γ  # P(37)
-
-
 # -- softening ---------------------------------------------------------------------------------
 
 BROKEN = 70.0
@@ -228,7 +253,7 @@ Far below round-off; but numbers that underflow would be forces and stiffnesses 
 
 @dataclass(frozen=True)
 class Softening:
-    """Exponential softening of a discontinuity, P(51)-P(53): a hinge that ends as a joint.
+    """Exponential softening of a hinge or crack, down to a perfect joint, P(51)-P(53).
 
     Args:
         limit: Traction at which it opens: moment of a hinge, N m; stress of a fibre, Pa.  Zero is a
@@ -237,6 +262,11 @@ class Softening:
 
     Raises:
         SceneError: A negative limit, or an energy that is not positive.
+
+    Example:
+        >>> law = ub.Softening(limit=5e4, energy=1e3)  # N m, J
+        >>> print(law.traction(np.array([0.0, 0.02, 0.04])).round())  # after openings in rad; N m
+        [50000. 18394.  6767.]
     """
 
     limit: float
@@ -275,9 +305,14 @@ class Softening:
 
 @dataclass(frozen=True)
 class LinearSoftening(Softening):
-    """Linear softening of a discontinuity, down to nothing at the opening 2 energy / limit.
+    """Linear softening of a hinge or crack, to zero at the opening 2 energy / limit.
 
     Args and errors are those of :class:`Softening`.
+
+    Example:
+        >>> law = ub.LinearSoftening(limit=5e4, energy=1e3)  # N m, J
+        >>> print(law.traction(np.array([0.0, 0.02, 0.04])))  # after openings in rad; N m
+        [50000. 25000.     0.]
     """
 
     def traction(self, ξ: Values) -> Values:
@@ -302,6 +337,12 @@ def _mean_of_decay(x: Values) -> Values:
     return where(small, series, (1 - exp(-safe)) / safe)
 
 
+def require_bulk_law(law: object, what: str) -> None:
+    """Raise :class:`SceneError` naming ``what`` unless a bulk can follow a law."""
+    if not isinstance(law, BulkLaw):
+        raise SceneError(f"{what} = {shorten(law)} is not a Hardening")
+
+
 HingeLaw = Softening | Hardening
 """Laws of a plastic hinge of zero length, which has no elasticity of its own."""
 
@@ -316,66 +357,3 @@ def require_hinge_law(law: object, owner: str) -> None:
                 f"{owner}: DuvautLions relaxes an elastic stress, and a hinge of zero length is "
                 "rigid before it flows; use Perzyna(eta)"
             )
-
-
-# -- where the points of a cross-section are ---------------------------------------------------
-
-
-@dataclass(frozen=True, eq=False)
-class Layout:
-    """Material points of a cross-section: what strains them, and what their stresses add up to.
-
-    Attributes:
-        strains: Strain of each point per strain (Σ, Γ, K) of the section; shape (n, 3).  The
-            resultants are the sum of weight times stress times the same numbers.
-        weights: Shape (n,); area of fibres, 1 for resultants.
-        stiffness: Elastic stiffness of the points; shape (n,).
-        laws: Laws and the number of points in a row that follow them.
-        rest: Stiffness (axial, shear, bending) of what has no points; shape (3,).
-        softening: Law of the discontinuities, if points can break.
-        breaking: Which points can.
-        hinges: Whether the discontinuity is one hinge, a jump of rotation.
-    """
-
-    strains: Values
-    weights: Values
-    stiffness: Values
-    laws: tuple[tuple[Hardening, int], ...]
-    rest: Values
-    softening: Softening | None
-    breaking: slice
-    hinges: bool = False
-
-    @property
-    def elastic(self) -> bool:
-        """True if nothing can happen at the points."""
-        return self.softening is None and not self.yields
-
-    @property
-    def yields(self) -> bool:
-        """True if the bulk can yield."""
-        return any(law.limit != np.inf for law, _ in self.laws)
-
-    def bulk(self, keys: list[tuple[int, int]]) -> Bulk:
-        """The laws at the points of many cells.
-
-        Args:
-            keys: For each cell two numbers that random limits depend on, besides their seed.
-        """
-        one = np.ones(len(self.weights))
-
-        def row(value: Callable[[Hardening], float]) -> Values:
-            return np.concatenate([np.full(n, value(law)) for law, n in self.laws])
-
-        H, B = row(lambda law: law.modulus), row(lambda law: law.kinematic)
-        flow = self.stiffness + H + B
-        first = np.cumsum([0, *(n for _, n in self.laws)])
-        eta, limits = one.copy(), np.empty((len(keys), len(one)))
-        for (law, n), k in zip(self.laws, first, strict=False):
-            eta[k : k + n] = law.viscosity.coefficient(flow[k : k + n])
-            limits[:, k : k + n] = (
-                [law.limit.draw(n, key) for key in keys]
-                if hasattr(law.limit, "draw")
-                else law.limit
-            )
-        return Bulk(self.stiffness, limits, H, B, eta)

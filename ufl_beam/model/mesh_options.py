@@ -16,12 +16,12 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.errors import SceneError, require_kind, require_memory, require_number, shorten
-from ufl_beam.model.beams import Beam
+from ufl_beam.model.bodies import Member
 
 
 @dataclass(frozen=True)
 class Mesh:
-    """The cells that a scene is computed with; those of its beams by default.
+    """Discretization of a scene: number of cells, polynomial degree, lumped mass.
 
     Args:
         refine: Factor on the number of cells between any two places of a beam; a whole number
@@ -33,6 +33,12 @@ class Mesh:
 
     Raises:
         SceneError: A number that makes no mesh.
+
+    Example:
+        >>> fine = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, mesh=ub.Mesh(refine=4))
+        >>> cubic = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, mesh=ub.Mesh(degree=3))
+        >>> print(len(fine.shape(beam)), len(cubic.shape(beam)))
+        17 5
     """
 
     refine: int | Fraction = 1
@@ -79,7 +85,7 @@ class Mesh:
         """Coefficients of the polynomials that are one in one node, in columns."""
         return np.asarray(np.linalg.inv(np.vander(self.nodes, increasing=True)))
 
-    def vertices(self, beam: Beam, attached: Sequence[float]) -> list[float]:
+    def vertices(self, beam: Member, attached: Sequence[float]) -> list[float]:
         """Parameters of the vertices of a beam: ends, corners and what is ``attached`` among them.
 
         Raises:

@@ -4,17 +4,32 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Protocol
 
 from ufl_beam.errors import SceneError
-from ufl_beam.model.beams import Beam, Place
-from ufl_beam.model.bodies import Anchor, Node, node
+from ufl_beam.model.bodies import Anchor, Node, Place, node
 from ufl_beam.model.connector_laws import RigidPlastic
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.joints import Joint
 from ufl_beam.model.material_laws import HingeLaw
 
 Slot = tuple[Node, int]
 """A component of motion of a node: 0, 1 displacement, 2 rotation."""
+
+
+class Sharing(Protocol):
+    """Joint whose places share components of motion."""
+
+    @property
+    def places(self) -> tuple[Anchor, ...]:
+        """All that it joins."""
+
+    @property
+    def shared(self) -> tuple[int, ...]:
+        """Components: 0, 1 displacement, 2 rotation."""
+
+    @property
+    def carriers(self) -> tuple[Anchor, ...]:
+        """Places that share displacements."""
 
 
 def merged(groups: Iterable[Sequence[Slot]]) -> dict[Slot, Slot]:
@@ -34,7 +49,7 @@ def merged(groups: Iterable[Sequence[Slot]]) -> dict[Slot, Slot]:
     return {slot: root(slot) for slot in parent}
 
 
-def shared_by_joints(joints: Iterable[Joint]) -> Iterator[list[Slot]]:
+def shared_by_joints(joints: Iterable[Sharing]) -> Iterator[list[Slot]]:
     """Groups of components of motion that joints make equal."""
     for joint in joints:
         for component in joint.shared:
@@ -43,8 +58,8 @@ def shared_by_joints(joints: Iterable[Joint]) -> Iterator[list[Slot]]:
 
 
 def plastic_hinges(
-    beams: Sequence[Beam],
-    joints: Sequence[Joint],
+    may_have: Mapping[Place, HingeLaw],
+    joints: Sequence[Sharing],
     bearing: Iterable[Anchor],
     loaded: Iterable[Anchor],
 ) -> tuple[Connector, ...]:
@@ -57,12 +72,12 @@ def plastic_hinges(
     one never opens.
 
     Args:
-        beams: The beams of the scene.
+        may_have: Laws of the hinges that the beams may have, by place.
         joints: Its joints.
         bearing: Places where supports, connectors or masses bear a moment.
         loaded: Places where loads are moments.
     """
-    laws = {place: law for beam in beams for place, law in _laws(beam).items() if law.opens}
+    laws = {place: law for place, law in may_have.items() if law.opens}
     same = merged(
         [(node(place), 2) for place in joint.places] for joint in joints if 2 in joint.shared
     )
@@ -107,13 +122,6 @@ def place_of(hinge: Connector) -> Place:
     if not isinstance(hinge.a, Place):
         raise SceneError(f"{hinge}: it is not a plastic hinge of a beam")
     return hinge.a.beam.at(hinge.a.s)
-
-
-def _laws(beam: Beam) -> dict[Place, HingeLaw]:
-    """Laws of the hinges that a beam may have, by place."""
-    laws: dict[float, HingeLaw | None] = dict.fromkeys((0.0, 1.0), beam.section.hinge)
-    laws |= {float(s): law for s, law in beam.hinges.items()}
-    return {beam.at(s): law for s, law in laws.items() if law is not None}
 
 
 def _outlasts(place: Place, others: Sequence[Node], laws: Mapping[Place, HingeLaw]) -> bool:

@@ -14,103 +14,35 @@ from ufl_beam.errors import (
     SceneError,
     clip,
     require_kind,
-    require_number,
     require_sequence,
-    require_vector,
 )
-from ufl_beam.model.beams import Beam, Place, Point
+from ufl_beam.model.beams import Beam
 from ufl_beam.model.bodies import (
     GROUND,
     Anchor,
     Body,
+    Member,
+    Place,
     Spot,
     carries,
     ground,
     node,
-    require_node,
 )
 from ufl_beam.model.connector_laws import Actuator, Bearing, Coulomb, Motor
 from ufl_beam.model.connectors import Connector
+from ufl_beam.model.curves import enclosing_diameter
 from ufl_beam.model.damping import Damping, KelvinVoigt, Rayleigh
 from ufl_beam.model.joints import Joint
-from ufl_beam.model.loads import (
-    FollowerLoad,
-    Gravity,
-    LineLoad,
-    Load,
-    PointLoad,
-    RotatingFrame,
-    TimeFunction,
-    value_at,
-)
-from ufl_beam.model.plane_curves import enclosing_diameter
+from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame
+from ufl_beam.model.masses import PointMass, Velocity
 from ufl_beam.model.plastic_hinges import Slot, merged, plastic_hinges, shared_by_joints
 from ufl_beam.model.supports import COMPONENTS, Support
-
-# -- masses and initial motion -----------------------------------------------------------------
-
-
-@dataclass(frozen=True, eq=False)
-class PointMass:
-    """Mass, and rotary inertia, fixed to a place.
-
-    Args:
-        place: Where.
-        mass: kg.
-        inertia: About the place; kg m².
-    """
-
-    place: Anchor
-    mass: float
-    inertia: float = 0.0
-
-    def __post_init__(self) -> None:
-        require_node(self.place, "PointMass")
-        require_number(self.mass, f"PointMass at {self.place}: mass", at_least=0.0)
-        require_number(self.inertia, f"PointMass at {self.place}: inertia", at_least=0.0)
-
-
-@dataclass(frozen=True, eq=False)
-class Velocity:
-    """Initial motion of beams and bodies as one rigid body.
-
-    Args:
-        beams: The beams and bodies that move so.
-        linear: Velocity of the point ``about``; m/s.
-        angular: Angular velocity; rad/s.
-        about: Point of the undeformed scene, by default the origin; m.
-    """
-
-    beams: tuple[Beam | Body, ...]
-    linear: tuple[float, float] = (0.0, 0.0)
-    angular: float = 0.0
-    about: Point | None = None
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "beams", require_sequence(self.beams, "Velocity: beams"))
-        for i, beam in enumerate(self.beams):
-            require_kind(beam, (Beam, Body), f"Velocity: beams[{i}]")
-        require_vector(self.linear, "Velocity: linear")
-        require_number(self.angular, "Velocity: angular")
-        if self.about is not None:
-            require_vector(self.about, "Velocity: about")
-
-    def at(self, x: float, y: float) -> tuple[float, float, float]:
-        """(du/dt, dv/dt, dψ/dt) of the point (x, y); m/s, m/s, rad/s."""
-        about_x, about_y = self.about or (0.0, 0.0)
-        return (
-            self.linear[0] - self.angular * (y - about_y),
-            self.linear[1] + self.angular * (x - about_x),
-            self.angular,
-        )
-
-
-# -- the scene ---------------------------------------------------------------------------------
+from ufl_beam.model.time_functions import TimeFunction, value_at
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Beams and bodies, and what joins, holds, loads and moves them.
+    """Model: beams and bodies with joints, supports, loads, masses and connectors.
 
     Args:
         beams: The beams.
@@ -128,6 +60,10 @@ class Scene:
 
     Raises:
         SceneError: The parts do not fit together; the message names them.
+
+    Example:
+        >>> frame = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.Gravity()])
+        >>> figure = ub.plot(frame)  # check it by eye before the run
     """
 
     beams: Sequence[Beam] = ()
@@ -216,7 +152,8 @@ class Scene:
     def hinges(self) -> tuple[Connector, ...]:
         """Plastic hinges of zero length: those of beams, and at ends whose section has a hinge."""
         loaded = [load.place for load in self.moments]
-        return plastic_hinges(self.beams, self.joints, self._bearing_moments(), loaded)
+        laws = {place: law for beam in self.beams for place, law in beam.hinge_laws.items()}
+        return plastic_hinges(laws, self.joints, self._bearing_moments(), loaded)
 
     @property
     def moments(self) -> list[PointLoad | FollowerLoad]:
@@ -231,7 +168,7 @@ class Scene:
                 yield support.place
         for link in self._links_but_hinges:
             by_a, by_b = link.rigidly()
-            if by_a[2] or link.motion == "sliding":
+            if by_a[2] or link.follows_a:
                 yield link.a
             if by_b[2]:
                 yield link.b
@@ -279,16 +216,16 @@ class Scene:
                 yield "LineLoad", load.beam.start
         for velocity in self.initial:
             for one in velocity.beams:
-                yield "Velocity", one.start if isinstance(one, Beam) else one.middle
+                yield "Velocity", one.middle if isinstance(one, Body) else one.start
         for damping in self.damping:
             if isinstance(damping, KelvinVoigt):
                 for beam in damping.beams or ():
                     yield "KelvinVoigt", beam.start
 
     @cached_property
-    def attached(self) -> dict[Beam, list[float]]:
+    def attached(self) -> dict[Member, list[float]]:
         """Parameters of the places of each beam that must be vertices."""
-        found: dict[Beam, list[float]] = {beam: list(beam.hinges) for beam in self.beams}
+        found: dict[Member, list[float]] = {beam: list(beam.hinges) for beam in self.beams}
         for _, place in self.attachments():
             if isinstance(place, Place):
                 found[place.beam].append(place.s)
@@ -381,7 +318,7 @@ def _(load: PointLoad) -> tuple[Connector, ...]:
     if carries(load.place):
         return ()
 
-    def push(motion: str, size: float, axis: Point = (1.0, 0.0)) -> Connector:
+    def push(motion: str, size: float, axis: tuple[float, float] = (1.0, 0.0)) -> Connector:
         law = Actuator(lambda t: size * value_at(load.time, t, load))
         return Connector("PointLoad", motion, ground(*load.place.point), load.place, law, axis)
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_kind, require_number
-from ufl_beam.model.fibres import Fibres, PlacedFibres
-from ufl_beam.model.material_laws import Hardening, Layout, Softening
+from ufl_beam.model.fibres import Fibres, Layout, PlacedFibres
+from ufl_beam.model.material_laws import BulkLaw, Hardening, Softening, require_bulk_law
 
 Integral = Callable[[Array], Array]
 """Area of a shape below y, or its first moment."""
@@ -46,6 +46,13 @@ class Section:
     Raises:
         SceneError: A stiffness is not positive, a number is not finite, a law is none, or laws of
             resultants stand beside fibres.
+
+    Example:
+        >>> plate = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
+        >>> pipe = ub.Section.tube(d=0.2, t=0.01, E=210e9, nu=0.3, rho=7850.0)
+        >>> own = ub.Section(EA=4.2e9, GA=1.3e9, EI=1.4e7, rhoA=157.0, rhoI=0.5)
+        >>> print(f"{plate.EI:.3g} {pipe.EI:.3g} {own.EI:.3g}")  # N m²
+        1.4e+07 5.67e+06 1.4e+07
     """
 
     EA: float
@@ -55,9 +62,9 @@ class Section:
     rhoI: float = 0.0
     depth: float = 0.0
     _: KW_ONLY
-    axial: Hardening | None = None
-    shear: Hardening | None = None
-    bending: Hardening | None = None
+    axial: BulkLaw | None = None
+    shear: BulkLaw | None = None
+    bending: BulkLaw | None = None
     hinge: Softening | None = None
     fibres: PlacedFibres | None = None
     massless_by_default: bool = field(init=False, repr=False)
@@ -77,7 +84,10 @@ class Section:
         laws = {name: getattr(self, name) for name in ("axial", "shear", "bending", "hinge")}
         for name, law in laws.items():
             if law is not None:
-                require_kind(law, Softening if name == "hinge" else Hardening, f"Section: {name}")
+                if name == "hinge":
+                    require_kind(law, Softening, "Section: hinge")
+                else:
+                    require_bulk_law(law, f"Section: {name}")
                 if self.fibres is not None:
                     raise SceneError(
                         f"Section: a law {name} beside fibres; the fibres bear N and M, shear is "

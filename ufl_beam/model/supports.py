@@ -11,30 +11,33 @@ from ufl_beam.errors import (
     require_number,
     require_vector,
 )
-from ufl_beam.model.beams import Point
 from ufl_beam.model.bodies import (
     Anchor,
     require_node,
 )
 from ufl_beam.model.connector_laws import Bearing
-from ufl_beam.model.loads import (
-    Constant,
-    TimeFunction,
-    require_time_function,
-)
+from ufl_beam.model.curves import Point
+from ufl_beam.model.time_functions import Constant, TimeFunction, require_time_function
 
 COMPONENTS = ("u", "v", "psi")
 
 
 @dataclass(frozen=True, eq=False)
 class Support(Bearing):
-    """Components of motion of a place that are given; made by :func:`Clamped` and its siblings.
+    """Held or prescribed motion of a place; made by :func:`Clamped` and its siblings.
 
     Attributes:
         kind: Name for messages.
         place: Where.
         held: Component -> its value in time (m, m, rad), in axes turned by ``angle``.
         angle: Direction of the first axis; rad.
+
+    Example:
+        >>> foot = ub.Clamped(beam.start)
+        >>> held = ub.Scene([beam], supports=[foot], loads=scene.loads)
+        >>> run = ub.simulate(held, ub.Static(), t=(0, 1), dt=0.5)
+        >>> print(run.reaction(foot)[-1, 1].round())  # N
+        100000.0
     """
 
     kind: str
@@ -64,17 +67,38 @@ def still(t: float) -> float:
 
 
 def Clamped(place: Anchor) -> Support:
-    """Holds displacement and rotation."""
+    """Clamped support: holds displacement and rotation.
+
+    Example:
+        >>> support = ub.Clamped(beam.start)
+        >>> sorted(support.held)  # 0, 1: displacement, 2: rotation
+        [0, 1, 2]
+    """
     return Support("Clamped", place, {0: still, 1: still, 2: still})
 
 
 def Pinned(place: Anchor) -> Support:
-    """Holds the displacement; the place turns freely."""
+    """Pinned support: holds the displacement; the place turns freely.
+
+    Example:
+        >>> support = ub.Pinned(beam.start)
+        >>> sorted(support.held)  # both components of the displacement
+        [0, 1]
+    """
     return Support("Pinned", place, {0: still, 1: still})
 
 
 def Roller(place: Anchor, *, along: Point = (1.0, 0.0)) -> Support:
-    """Holds the displacement across the direction ``along``; the place rolls and turns freely."""
+    """Roller support: holds the displacement across ``along``; the place rolls and turns freely.
+
+    Example:
+        >>> roller = ub.Roller(beam.end, along=(1, 1))
+        >>> simple = ub.Scene([beam], [], [ub.Pinned(beam.start), roller], [ub.Gravity()])
+        >>> run = ub.simulate(simple, ub.Static(), t=(0, 1), dt=1.0)
+        >>> force = run.reaction(roller)[-1]
+        >>> bool(abs(force[0] + force[1]) < 1e-6)  # across the direction
+        True
+    """
     x, y = require_vector(along, f"Roller at {place}: along")
     if x == y == 0.0:
         raise SceneError(f"Roller at {place}: along = (0, 0) is no direction")
@@ -92,10 +116,16 @@ def Prescribed(
     v: float | TimeFunction | None = None,
     psi: float | TimeFunction | None = None,
 ) -> Support:
-    """Moves the named components as given: numbers, or functions of time; m, m, rad.
+    """Prescribed motion of a place by numbers or functions of time; m, m, rad.
 
     A number is reached at once in dynamics, and in proportion to the time in statics only if it is
     given as a function such as ``lambda t: 0.1 * t``.
+
+    Example:
+        >>> turned = ub.Prescribed(beam.start, u=0.0, v=0.0, psi=lambda t: np.pi / 2 * t)
+        >>> run = ub.simulate(ub.Scene([beam], supports=[turned]), ub.Static(), t=(0, 1), dt=0.25)
+        >>> np.allclose(run.position(beam.end)[-1], (0, 2))
+        True
     """
     held = {
         component: value if callable(value) else _constant(value, place, component)

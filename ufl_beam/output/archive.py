@@ -8,11 +8,20 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from ufl_beam.discretization.state_io import State
+from ufl_beam.arrays import State
 from ufl_beam.errors import SceneError
 from ufl_beam.output.output_files import replace_file, require_writable
+
+
+def above(prefix: str, content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return content with a prefix before its names."""
+    return {prefix + name: value for name, value in content.items()}
+
+
+def below(prefix: str, content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the content whose names begin with a prefix, without it."""
+    inside = ((n, v) for n, v in content.items() if n.startswith(prefix))
+    return {name.removeprefix(prefix): value for name, value in inside}
 
 
 def write(path: Path, format: str, text: Mapping[str, Any], arrays: State) -> None:
@@ -28,18 +37,21 @@ def write(path: Path, format: str, text: Mapping[str, Any], arrays: State) -> No
         SceneError: The file cannot be written.
         OSError: There is no space for it.
     """
+    require_writable(path)
+    encoded = json.dumps({**text, "arrays": [*arrays]})
+    replace_file(path, image_of(format, {"text": encoded, **arrays}))
+
+
+def image_of(format: str, content: Mapping[str, Any]) -> bytes:
+    """Return an HDF5 file, made in memory: HDF5 dies of a full disk."""
     import h5py
 
-    require_writable(path)
-    # Made in memory, since HDF5 dies of a full disk
     with h5py.File("archive", "w", driver="core", backing_store=False) as file:
         file.attrs["format"] = format
-        file["text"] = json.dumps({**text, "arrays": [*arrays]})
-        for name, values in arrays.items():
-            file[name] = np.asarray(values)
+        for name, values in content.items():
+            file[name] = values
         file.flush()
-        image = file.id.get_file_image()
-    replace_file(path, bytes(image))
+        return bytes(file.id.get_file_image())
 
 
 def read(path: Path, format: str) -> tuple[dict[str, Any], State]:

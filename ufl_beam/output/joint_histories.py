@@ -14,8 +14,8 @@ from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import GROUND, Anchor, Spot, arm, node
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
+from ufl_beam.model.curves import nearest, parameter_step, tangent
 from ufl_beam.model.joints import Joint
-from ufl_beam.model.plane_curves import nearest, parameter_step, tangent
 from ufl_beam.model.scene import Scene
 
 
@@ -31,7 +31,7 @@ class Motion(Protocol):
 
     @property
     def times(self) -> Array:
-        """Times; (n+1,); s."""
+        """Times that were kept; (n+1,); s."""
 
     def displacement(self, place: Anchor) -> Array:
         """Return (u, v, ψ) of a place; (n+1, 3); m, m, rad."""
@@ -165,7 +165,7 @@ def of_joint(solution: Motion, joint: Joint, forces: Array) -> JointHistory:
 
 def _direction(solution: Motion, holder: Connector, turn: Array) -> Array:
     """Unit vectors in the plane along which a motion grows; (n+1, 2)."""
-    if holder.motion == "stretching":
+    if holder.stretches:
         between = solution.position(holder.b) - solution.position(holder.a)
         return np.asarray(between / np.linalg.norm(between, axis=1)[:, None])
     if isinstance(holder.law, Guide):
@@ -176,4 +176,4 @@ def _direction(solution: Motion, holder: Connector, turn: Array) -> Array:
             x, y = tangent(curve, s, step)
             normals.append((-y, x))
         return np.asarray(normals / np.linalg.norm(normals, axis=1)[:, None])
-    return turned(holder.axis, turn if holder.motion == "sliding" else np.zeros_like(turn))
+    return turned(holder.axis, turn if holder.follows_a else np.zeros_like(turn))

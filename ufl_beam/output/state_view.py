@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
 
 from mpi4py import MPI
@@ -11,8 +10,9 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.discretization.dof_numbering import Grid, Share
-from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.function_spaces import Fields, SectionForces
+from ufl_beam.discretization.partition import Share
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.bodies import Anchor
 from ufl_beam.model.connectors import Connector
@@ -20,15 +20,16 @@ from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 from ufl_beam.output.joint_histories import Connection, links_of, motion_of, velocity_of
+from ufl_beam.output.snapshot import Snapshot
 from ufl_beam.parameter import Parameter
-from ufl_beam.terms.beams import Inertia, SectionForces
-from ufl_beam.terms.connectors import Couplings
+from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.guide_curves import Guides
 from ufl_beam.terms.inelastic_beams import InelasticBeams
+from ufl_beam.terms.links import Links
 from ufl_beam.terms.supports import Supports
 
 NO_REACTIONS = np.zeros((0, 3))
+NO_CONNECTIONS = np.zeros((0, len(Connection._fields)))
 
 
 class StateView:
@@ -62,7 +63,7 @@ class StateView:
     supports: Supports
     inertia: Inertia
     reactions_known: bool = False
-    couplings: list[Couplings | Guides]
+    couplings: list[Links]
     inelastic: list[InelasticBeams]
     _has_inelastic: bool
 
@@ -75,6 +76,15 @@ class StateView:
     def iterations(self) -> int:
         """Newton iterations so far."""
         raise NotImplementedError
+
+    def gather(self) -> Snapshot:
+        """Gather the state of all processes."""
+        v = [self.share.gather(v) for v in self.velocities()]
+        connections = self.connections() if self.scene.links else NO_CONNECTIONS
+        return Snapshot(
+            self.t, self.share.gather(self.q), v[0] if v else None, self.reactions(),
+            self.entries(), self.material(), connections, self.parts, self.iterations,
+        )  # fmt: skip
 
     def velocities(self) -> list[Array]:
         """Velocities at the local degrees of freedom; none in statics."""
@@ -167,15 +177,6 @@ class StateView:
         links = self.scene.links
         numbers = [n for n in links_of(self.scene, joint) if not links[n].turns]
         return float(np.linalg.norm(self.connections()[numbers, 1]))
-
-    def rates(self, links: Sequence[Connector]) -> Array:
-        """Rates of the relative motions of one kind of connectors now; m/s or rad/s."""
-        rates = np.zeros(len(links))
-        for v in self.velocities():
-            for coupling in self.couplings:
-                if isinstance(coupling, Couplings) and coupling.links == list(links):
-                    rates += coupling.rates(self.q, v)
-        return rates
 
     def section_forces(self) -> Array:
         """(N, V, M) in all cells; (num_cells, 3); N, N, N m; all processes call it together."""

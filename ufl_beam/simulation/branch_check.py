@@ -10,14 +10,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme
-from ufl_beam.terms.beams import Beams
-from ufl_beam.terms.connectors import Couplings
+from ufl_beam.terms.base import Beams
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.guide_curves import Guides
+from ufl_beam.terms.links import Links
 
 FAR = 1e3
 """Sizes of the scene, or radians, by which nothing moves in a static step but a mechanism."""
@@ -44,7 +43,7 @@ class StaticPath:
         share: Share,
         scheme: Scheme,
         beams: Sequence[Beams],
-        couplings: Sequence[Couplings | Guides],
+        couplings: Sequence[Links],
         ledger: Ledger,
         q: Array,
         t0: float,

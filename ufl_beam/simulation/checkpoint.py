@@ -1,50 +1,39 @@
 # SPDX-License-Identifier: MIT
-"""Files from which a run goes on after whatever has stopped it.
-
-A file is one line of text, filled up to 512 bytes, and an HDF5 file, which readers of HDF5 find
-behind it.  The line has the checksum of all that follows.
-"""
+"""Checkpoints: a run goes on after whatever has stopped it."""
 
 from __future__ import annotations
 
-import errno
 import hashlib
-import json
 import os
-import shutil
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from mpi4py import MPI
 
 import numpy as np
 
 from ufl_beam.arrays import Array
+from ufl_beam.collective_errors import Agreement, on_first
+from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError, require_count, require_number, require_sequence, shorten
 from ufl_beam.file_locks import Lock
+from ufl_beam.output.archive import above, below
 from ufl_beam.output.output_files import require_path
-from ufl_beam.output.recorders import Recorder, on_first
+from ufl_beam.output.recorders import Recorder
+from ufl_beam.simulation.checkpoint_file import Content, read, write
 from ufl_beam.simulation.fingerprint import CODE, Description, difference, has_state, kind_of
-from ufl_beam.simulation.simulation import Simulation
+from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_control import Pace
-
-FORMAT = "checkpoint of ufl_beam, 2"
-"""To be counted up whenever files of before mean something else."""
-
-HEADER = 512
-"""Bytes before the HDF5 file, the least that readers of HDF5 skip."""
-
-Content = dict[str, Any]
-"""Arrays by name; what is not an array is JSON."""
 
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """Where and how often a run writes down all that it needs to go on.
+    """Checkpoint file from which a run is restarted, and the interval of writing it.
 
     If the file exists when the run begins, it goes on from there, as the same run to the last bit:
     after a crash the same script is simply run again.
@@ -59,6 +48,12 @@ class Checkpoint:
 
     Raises:
         SceneError: Neither ``every`` nor ``minutes``, or a bad number; no state in ``also``.
+
+    Example:
+        >>> backup = ub.Checkpoint("run.checkpoint", every=1000)
+        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, checkpoint=backup)
+        >>> [path.name for path in backup.files]
+        ['run.checkpoint', 'run.checkpoint.part']
     """
 
     path: str | Path
@@ -88,6 +83,25 @@ class Checkpoint:
         """The file, and the one that takes its place; no other output may write them."""
         path = Path(self.path)
         return path, path.parent / f"{path.name}.part"
+
+
+class Running(Protocol):
+    """A simulation, as far as checkpoints know it; see there."""
+
+    t: float
+    parts: int
+    solution: Solution
+    together: Agreement
+
+    @property
+    def iterations(self) -> int:
+        """Newton iterations so far."""
+
+    def state(self) -> State:
+        """All that later steps depend on."""
+
+    def resume(self, state: State) -> None:
+        """Go on from a state."""
 
 
 class Keeper:
@@ -159,7 +173,7 @@ class Keeper:
 
     def _require_same(self, found: Content) -> None:
         now, then = dict(self._described.texts), dict(found["call"])
-        if found["python"] != _python():
+        if found["python"] != PYTHON:
             for texts in (now, then):
                 for name in [n for n in texts if n.endswith(f".{CODE}")]:
                     del texts[name]
@@ -181,37 +195,34 @@ class Keeper:
         """Let other runs have the file."""
         self._lock.release()
 
-    def resume(
-        self, simulation: Simulation, pace: Pace, recorders: Sequence[Recorder], t1: float
-    ) -> None:
-        """Take all over that the file has.
+    def resume(self, simulation: Running, pace: Pace, t1: float) -> Iterator[Content]:
+        """Take over what the file has, then give what it has of each recorder.
 
         Raises:
-            SceneError: The run is beyond ``t1``, or a recorder cannot go on.
+            SceneError: The run is beyond ``t1``.
         """
         found = self.found
-        state = _below("state/", found)
+        state = below("state/", found)
         t = float(state["t"][0])
         if t > t1 and t - t1 > 1e-9 * (self._step or 0.0):
             raise SceneError(
                 f"checkpoint {self.path} is at t = {t:.9g} s, beyond the end t[1] = {t1:.9g} s"
             )
         simulation.resume(state)
-        simulation.solution.resume(_below("history/", found))
+        simulation.solution.resume(below("history/", found))
         simulation.solution.parts = simulation.parts
         simulation.solution.iterations = simulation.iterations
         simulation.solution.seconds = found["seconds"]
         pace.restore(found["pace"])
         for one, its_state in zip(self._stateful.values(), found["stateful"].values(), strict=True):
             _restore(one, its_state)
-        for i, recorder in enumerate(recorders):
-            recorder.resume(simulation, _below(f"recorder {i}/", found))
         self._last_step = pace.steps
         self.found = {}
+        return (below(f"recorder {i}/", found) for i in count())
 
     # -- writing -------------------------------------------------------------------------------
 
-    def note(self, simulation: Simulation, pace: Pace, recorders: Sequence[Recorder]) -> None:
+    def note(self, simulation: Running, pace: Pace, recorders: Sequence[Recorder]) -> None:
         """Write if it is time to; all processes call it together after each step.
 
         Raises:
@@ -232,24 +243,24 @@ class Keeper:
             due = due or bool(self._comm.bcast(over) if self._comm.size > 1 else over)
         return due
 
-    def write(self, simulation: Simulation, pace: Pace, recorders: Sequence[Recorder]) -> None:
+    def write(self, simulation: Running, pace: Pace, recorders: Sequence[Recorder]) -> None:
         """Write; all processes call it together."""
         self._require_told()
         content: Content = {
-            "python": _python(),
+            "python": PYTHON,
             "call": self._described.texts,
             "step": self._step,
             "seconds": time.perf_counter() - self._begin,
             "pace": pace.state(),
             "stateful": simulation.together(self._states),
-            **_above("state/", simulation.state()),
+            **above("state/", simulation.state()),
         }
         parts = [recorder.state() for recorder in recorders]
 
         def put() -> None:
-            content.update(_above("history/", simulation.solution.history()))
+            content.update(above("history/", simulation.solution.history()))
             for i, part in enumerate(parts):
-                content.update(_above(f"recorder {i}/", part))
+                content.update(above(f"recorder {i}/", part))
             write(self.path, content, f"of t = {simulation.t:.9g} s")
 
         on_first(self._comm, put)
@@ -270,17 +281,8 @@ class Keeper:
             )
 
 
-def _python() -> str:
-    return ".".join(map(str, sys.version_info[:2]))
-
-
-def _above(prefix: str, content: Mapping[str, Any]) -> Content:
-    return {prefix + name: value for name, value in content.items()}
-
-
-def _below(prefix: str, content: Content) -> Content:
-    inside = ((n, v) for n, v in content.items() if n.startswith(prefix))
-    return {name.removeprefix(prefix): value for name, value in inside}
+PYTHON = ".".join(map(str, sys.version_info[:2]))
+"""Version of Python, on which the code of functions depends."""
 
 
 # -- what has a state ---------------------------------------------------------------------------
@@ -301,111 +303,6 @@ def _restore(one: Any, state: Any) -> None:
         one.set_state(state)
     else:
         one.restore(state)
-
-
-# -- the file -----------------------------------------------------------------------------------
-
-
-def write(path: Path, content: Content, what: str) -> None:
-    """Write a file at once: there is always a whole one, the new or the one before.
-
-    Raises:
-        OSError: It cannot be written; the message says how much space there is.
-    """
-    body = _packed(content, what)
-    line = f"{FORMAT}; sha256 {hashlib.sha256(body).hexdigest()}\n"
-    part = path.with_name(path.name + ".part")
-    try:
-        try:
-            with part.open("wb") as file:
-                file.write(line.encode().ljust(HEADER, b"\0"))
-                file.write(body)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(part, path)
-        except BaseException:
-            part.unlink(missing_ok=True)
-            raise
-        folder = os.open(path.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
-    except OSError as error:
-        free = shutil.disk_usage(path.parent).free
-        before = "the one before is still there" if path.exists() else "there is none yet"
-        raise OSError(
-            error.errno or errno.EIO,
-            f"checkpoint {path} {what} cannot be written: {error.strerror}; it needs "
-            f"{(len(body) + HEADER) / 1e6:.3g} MB, and {path.parent} has {free / 1e6:.3g} MB; "
-            f"{before}",
-        ) from None
-
-
-def _packed(content: Content, what: str) -> bytes:
-    """An HDF5 file, made in memory: full disks are no business of its library."""
-    import h5py
-
-    text = {name: value for name, value in content.items() if not isinstance(value, np.ndarray)}
-    arrays = {name: value for name, value in content.items() if name not in text}
-    try:
-        encoded = json.dumps({**text, "arrays": list(arrays)}, default=_plain)
-    except TypeError as error:
-        raise SceneError(
-            f"checkpoint {what}: a state() has something else than numbers, texts, lists and "
-            f"dicts: {error}"
-        ) from None
-    with h5py.File("checkpoint", "w", driver="core", backing_store=False) as file:
-        file.attrs["format"] = FORMAT
-        file["text"] = np.frombuffer(encoded.encode(), dtype=np.uint8)
-        for name, values in arrays.items():
-            file[name] = values
-        file.flush()
-        return bytes(file.id.get_file_image())
-
-
-def read(path: Path) -> Content:
-    """Read a file of :func:`write`.
-
-    Raises:
-        SceneError: The file is damaged, or something else.
-    """
-    import h5py
-
-    def refuse(why: str) -> SceneError:
-        return SceneError(
-            f"checkpoint {path}: {why}. Delete the file to begin anew, or name another"
-        )
-
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise refuse(f"the file cannot be read: {error.strerror}") from None
-    line, _, rest = data[:HEADER].partition(b"\n")
-    kind, _, checksum = line.decode(errors="replace").partition("; sha256 ")
-    name, _, version = FORMAT.rpartition(", ")
-    if not data:
-        raise refuse("the file is empty")
-    if kind != FORMAT:
-        if kind.startswith(name):
-            raise refuse(
-                f"the file is a {kind}, and this version of ufl_beam reads number {version}"
-            )
-        raise refuse("the file is no checkpoint, or its beginning is damaged")
-    body = data[HEADER:]
-    if hashlib.sha256(body).hexdigest() != checksum or rest.strip(b"\0"):
-        raise refuse("the file is damaged: its checksum is not that of its content")
-    with h5py.File(path, "r") as file:
-        content: Content = json.loads(file["text"][()].tobytes())
-        for array in content.pop("arrays"):
-            content[array] = file[array][()]
-    return content
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, np.generic | np.ndarray):
-        return value.tolist()
-    raise TypeError(repr(value))
 
 
 def kinds_of(recorders: Sequence[Recorder]) -> list[str]:

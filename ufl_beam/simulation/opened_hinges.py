@@ -17,8 +17,8 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import ModelWarning
 from ufl_beam.mechanics.time_schemes import Scheme
-from ufl_beam.model.beams import Beam, Place
-from ufl_beam.model.material_laws import Layout
+from ufl_beam.model.bodies import Member, Place
+from ufl_beam.model.fibres import Layout
 
 LARGE = 0.05
 """Part of its limit from which a run warns that the place of an embedded hinge shifts it."""
@@ -42,7 +42,7 @@ class OpenedHinges(NamedTuple):
         place: Middle of the cell with the largest error.
     """
 
-    beam: Beam
+    beam: Member
     number: int
     error: float
     place: Place
@@ -78,7 +78,8 @@ class Opened:
 
     def hinges(self) -> list[OpenedHinges]:
         """Embedded hinges, laws of sections, that opened in the run; beam by beam."""
-        grid, found = self._grid, []
+        grid = self._grid
+        found = []
         for beam in grid.scene.beams:
             law = beam.section.hinge
             cells, laws = grid.cells_of(beam), grid.hinges(beam)
@@ -91,7 +92,7 @@ class Opened:
             found.append(OpenedHinges(beam, len(cells), float(errors[worst]), place))
         return found
 
-    def jumps(self, scheme: Scheme) -> list[tuple[Beam, int, float]]:
+    def jumps(self, scheme: Scheme) -> list[tuple[Member, int, float]]:
         """Beams with cells whose opening is a jump within a step.
 
         The resistance falls faster with the opening than the stress of the cell, whose stiffness
@@ -100,7 +101,8 @@ class Opened:
         Returns:
             Each beam, the cell in which it is worst, and how many times too fast that is.
         """
-        grid, found = self._grid, []
+        grid = self._grid
+        found: list[tuple[Member, int, float]] = []
         for beam in grid.scene.beams:
             cells, laws = grid.cells_of(beam), grid.hinges(beam)
             fall = {law: _fall(beam.section.layout(law), scheme) for law in set(laws)}
@@ -110,6 +112,18 @@ class Opened:
             if ratios[worst] > 1:
                 found.append((beam, int(cells[worst]), float(ratios[worst])))
         return found
+
+    def summary(self) -> str:
+        """A line about embedded hinges that opened, if there are any."""
+        hinges = self.hinges()
+        if not hinges:
+            return ""
+        number, worst = sum(one.number for one in hinges), max(hinges, key=lambda one: one.error)
+        return (
+            f"embedded hinges opened in {_cells_in_words(number)}; their place within the cell "
+            f"shifts the limit by at most {_percent(worst.error)} ({worst.beam.name}, cell at "
+            f"s = {worst.place.s:.3g})\n"
+        )
 
     def warn(self, scheme: Scheme, times: Array) -> None:
         """Issue a :class:`ModelWarning` for each beam where much depends on the mesh."""
@@ -126,21 +140,21 @@ class Opened:
         for beam, number, error, place in self.hinges():
             if error > LARGE:
                 _warn(
-                    f"{beam.name}: the hinge of the section opened in {cells_in_words(number)}, "
+                    f"{beam.name}: the hinge of the section opened in {_cells_in_words(number)}, "
                     "in the middle of a cell. At the ends of the cell at "
                     f"s = {place.s:.3g} the moment differs from that in its middle by "
-                    f"{percent(error)} of the limit, so the load at which the hinge opens is "
+                    f"{_percent(error)} of the limit, so the load at which the hinge opens is "
                     "uncertain by as much. Put a hinge exactly where it belongs, "
                     "Beam(hinges={s: law}), or use shorter cells"
                 )
 
 
-def cells_in_words(number: int) -> str:
+def _cells_in_words(number: int) -> str:
     """A number of cells in words: "1 cell", "2 cells"."""
     return f"{number} cell{'s'[: number != 1]}"
 
 
-def percent(part: float) -> str:
+def _percent(part: float) -> str:
     """A part in words: "12 %", or "more than 100 %" where the limit is next to nothing."""
     return f"{100 * part:.2g} %" if part <= 1 else "more than 100 %"
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.collective_errors import duplicate
+from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import CopiesDiffer, warn
 
 TOLERANCE = 1e-8
@@ -37,11 +38,14 @@ class Copies:
 
     Args:
         comm: The processes, each of which computes the whole scene.
-        scales: What a displacement or rotation counts, by degree of freedom; 1/m, 1.
+        share: The degrees of freedom of the scene, all of them.
     """
 
-    def __init__(self, comm: MPI.Intracomm, scales: Array) -> None:
+    def __init__(self, comm: MPI.Intracomm, share: Share) -> None:
         self._comm = duplicate(comm)
+        scales: Array = np.full(share.size, 1 / share.grid.scene.size)
+        scales[share.rotations()] = 1.0
+        scales[share.multipliers()] = 0.0
         self._weights = scales * np.random.default_rng(0).uniform(0.5, 1.0, len(scales))
         self._sum = self._size = self._times = 0.0
         self._steps, self._compared = 0, 0

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -17,8 +18,8 @@ from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import take
-from ufl_beam.output.recorders import UNLIMITED, Recorder, close_all, recorders_of
-from ufl_beam.parallel import communicator, in_study, ours
+from ufl_beam.output.recorders import Recorder, close_all, recorders_of
+from ufl_beam.parallel import communicator, in_study, say
 from ufl_beam.simulation.checkpoint import (
     Checkpoint,
     Keeper,
@@ -27,10 +28,11 @@ from ufl_beam.simulation.checkpoint import (
     require_continuable,
 )
 from ufl_beam.simulation.initial_state import mesh_of
-from ufl_beam.simulation.simulation import SMALLEST_PART, Simulation
+from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_control import Adaptive, AdaptiveSteps, EqualSteps, Pace
-from ufl_beam.solvers.newton import Newton
+from ufl_beam.simulation.step_cutting import MOST_PARTS
+from ufl_beam.solvers.newton_options import Newton
 
 BAR = "{percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
 
@@ -43,7 +45,7 @@ def simulate(
     dt: float | Adaptive,
     record: Sequence[Recorder] | Recorder = (),
     every: int = 1,
-    most: int = UNLIMITED,
+    most: int = sys.maxsize,
     start: Solution | None = None,
     newton: Newton | None = None,
     mesh: Mesh | None = None,
@@ -51,7 +53,7 @@ def simulate(
     progress: bool = True,
     comm: MPI.Intracomm | None = None,
 ) -> Solution:
-    """Simulate a scene.
+    """Simulate the motion of a scene in time, or its equilibria under growing loads.
 
     Args:
         scene: What is modelled.
@@ -79,6 +81,11 @@ def simulate(
     Raises:
         SceneError: The call or the scene is wrong; nothing was computed.
         ConvergenceError: A step failed; it carries the solution so far, and files are complete.
+
+    Example:
+        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05)
+        >>> print((1e3 * run.displacement(beam.end)[-1]).round(1))  # mm, mm, mrad
+        [ -0.1 -18.9 -14.3]
     """
     comm = communicator(comm, "simulate: comm")
     require_switch(progress, "simulate: progress")
@@ -86,6 +93,8 @@ def simulate(
     _require_step(dt, scheme, (t0, t1))
     require_count(every, "simulate: every")
     require_count(most, "simulate: most")
+    if start is not None:
+        require_kind(start, Solution, "start")
     if checkpoint is not None:
         require_kind(checkpoint, Checkpoint, "simulate: checkpoint")
     kept = [] if checkpoint is None else [("checkpoint", checkpoint.files)]
@@ -108,38 +117,51 @@ def simulate(
         simulation = Simulation(
             scene, scheme, t0=t0, start=start, newton=newton, mesh=mesh, comm=comm
         )
+        solution = simulation.solution
+
+        def note_time() -> None:
+            solution.seconds = time.perf_counter() - begin
+
+        stack.callback(note_time)
+        stack.callback(simulation.close)
         pace: Pace = (
             AdaptiveSteps(simulation, t1, dt)
             if isinstance(dt, Adaptive)
             else EqualSteps(simulation.t, t1, dt)
         )
-        stack.pop_all()  # the run closes it
-    solution = simulation.solution
-    release = take(outputs)
 
-    def after_step() -> None:
-        if recorders or keeper is not None:
-            simulation.settle()  # before anything is written
-        if pace.steps % solution.every == 0 or pace.finished:
-            solution.keep(simulation)
-            if len(solution) > most + 1 and not pace.finished:
-                solution.thin()
-                solution.every *= 2
-        for recorder in recorders:
-            recorder.write(simulation)
-        if keeper is not None:
-            keeper.note(simulation, pace, recorders)
+        def go_on(keeper: Keeper) -> None:
+            states = keeper.resume(simulation, pace, t1)
+            solution.time_error = pace.error
+            for recorder, state in zip(recorders, states, strict=False):
+                recorder.resume(simulation, state)
 
-    try:
+        def after_step() -> None:
+            solution.time_error = pace.error
+            if recorders or keeper is not None:
+                simulation.settle()  # before anything is written
+            if pace.steps % solution.every == 0 or pace.finished:
+                simulation.keep()
+                if len(solution) > most + 1 and not pace.finished:
+                    solution.thin()
+                    solution.every *= 2
+            for recorder in recorders:
+                recorder.write(simulation)
+            if keeper is not None:
+                keeper.note(simulation, pace, recorders)
+
+        stack.callback(close_all, recorders)
+        stack.callback(take(outputs))
+        stack.enter_context(simulation.partial_results())
         solution.every = every
         if keeper is not None and keeper.found:
-            simulation.together(keeper.resume, simulation, pace, recorders, t1)
+            simulation.together(go_on, keeper)
             say(f"checkpoint {keeper.path}: the run goes on from t = {simulation.t:.9g} s")
             begin -= solution.seconds
         else:
             for recorder in recorders:
                 simulation.together(recorder.open, simulation)
-            solution.keep(simulation)
+            simulation.keep()
         quiet = None if progress and comm.rank == 0 and not in_study() else True
         with tqdm(total=1.0, bar_format=BAR, disable=quiet, mininterval=0.5) as bar:
             while not pace.finished:
@@ -148,20 +170,6 @@ def simulate(
                 bar.update(pace.progress - bar.n)
         simulation.end()
         simulation.check_ledger()
-    except BaseException as error:
-        # Whatever stops a run, an interrupt or a user's function, what was reached is not lost.
-        simulation.leave()
-        if simulation.share.comm.size == 1 or error is simulation.together.raised:
-            simulation.end()  # else the processes may not all be here
-        error.__dict__["solution"] = solution
-        raise
-    finally:
-        release()
-        close_all(recorders)
-        simulation.close()
-        if keeper is not None:
-            keeper.close()
-        solution.seconds = time.perf_counter() - begin
     if comm.rank == 0:
         solution.opened.warn(scheme, solution.times)
     return solution
@@ -171,7 +179,6 @@ def _end_of(start: Solution | None) -> str:
     """A checksum of what a run begins with."""
     if start is None:
         return "nothing"
-    require_kind(start, Solution, "start")
     return digest_of({"q": start.q[-1:], "v": start.v[-1:], **start.internal})
 
 
@@ -190,7 +197,7 @@ def _require_times(t: tuple[float, float]) -> tuple[float, float]:
 def _require_step(dt: float | Adaptive, scheme: Scheme, t: tuple[float, float]) -> None:
     if not isinstance(dt, Adaptive):
         require_number(dt, "simulate: dt", positive=True)
-        least = SMALLEST_PART * math.ulp(max(map(abs, t)))
+        least = MOST_PARTS * math.ulp(max(map(abs, t)))
         if dt < least:
             raise SceneError(
                 f"simulate: dt = {dt:g} s is too small: steps from t = {t[0]:g} to {t[1]:g} s can "
@@ -201,9 +208,3 @@ def _require_step(dt: float | Adaptive, scheme: Scheme, t: tuple[float, float]) 
             "simulate: dt = Adaptive(...) estimates the error of accelerations, and a static "
             "scheme has none; give a number"
         )
-
-
-def say(*words: object, sep: str = " ") -> None:
-    """Print from the first process only, as scripts do that may run under ``mpirun``."""
-    if ours().rank == 0:
-        print(*words, sep=sep, flush=True)  # noqa: T201

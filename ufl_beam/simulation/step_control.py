@@ -7,15 +7,18 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Protocol
+from typing import NoReturn, Protocol
 
 import numpy as np
 
 from ufl_beam.arrays import Array
+from ufl_beam.collective_errors import Agreement
+from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed, require_number, require_sequence
-
-if TYPE_CHECKING:
-    from ufl_beam.simulation.simulation import Simulation, Trial
+from ufl_beam.model.scene import Scene
+from ufl_beam.simulation.step_cutting import Trial
+from ufl_beam.terms.beams import Inertia
+from ufl_beam.terms.supports import Supports
 
 GROWTH = 1.5
 """A step is at most so many times as long as the one before it, whose error it may repeat."""
@@ -24,14 +27,41 @@ SAMPLES = (0.01, 0.5, 0.99)
 """Parts of a step at which loads are asked for."""
 
 
+class Stepper(Protocol):
+    """A simulation, as far as step controls know it; see there."""
+
+    scene: Scene
+    share: Share
+    t: float
+    q: Array
+    last_dt: float
+    inertia: Inertia
+    supports: Supports
+    together: Agreement
+
+    def step_to(self, t1: float) -> None:
+        """Go to a time, in parts where that fails."""
+
+    def attempt(self, t1: float) -> Trial:
+        """Solve the next step."""
+
+    def accept(self, trial: Trial) -> None:
+        """Go where the latest attempt went."""
+
+    def give_up(self, failure: StepFailed, end: float) -> NoReturn:
+        """End the run where it is."""
+
+
 class Pace(Protocol):
     """Protocol of step controls.
 
     Attributes:
         steps: Steps done.
+        error: Sum of the estimated errors so far; NaN if there are none.
     """
 
     steps: int
+    error: float
 
     @property
     def finished(self) -> bool:
@@ -41,7 +71,7 @@ class Pace(Protocol):
     def progress(self) -> float:
         """Part of the way that is done, from 0 to 1."""
 
-    def advance(self, simulation: Simulation) -> None:
+    def advance(self, simulation: Stepper) -> None:
         """One step.
 
         Raises:
@@ -66,6 +96,7 @@ class EqualSteps:
 
     def __init__(self, t0: float, t1: float, dt: float) -> None:
         self._t0, self._t1 = t0, t1
+        self.error = math.nan
         # The slack is for the rounding of (t1 - t0) / dt.
         self._all = max(1, math.ceil((t1 - t0) / dt * (1 - 1e-9)))
         self.steps = 0
@@ -85,7 +116,7 @@ class EqualSteps:
         """Part of the steps that are done."""
         return self.steps / self._all
 
-    def advance(self, simulation: Simulation) -> None:
+    def advance(self, simulation: Stepper) -> None:
         """One step; where it fails, in parts."""
         n = self.steps + 1
         simulation.step_to(self._t0 + (self._t1 - self._t0) * n / self._all)
@@ -102,7 +133,7 @@ class EqualSteps:
 
 @dataclass(frozen=True)
 class Adaptive:
-    """Steps as long as the accuracy that is asked for allows; given in the place of ``dt``.
+    """Adaptive time steps of a given local error; given in the place of ``dt``.
 
     Each step estimates its own error: what its mean velocity and acceleration miss of a motion
     whose acceleration changes, and what the middle of the step misses of the loads.  As with other
@@ -124,6 +155,12 @@ class Adaptive:
 
     Raises:
         SceneError: A number is out of range.
+
+    Example:
+        >>> steps = ub.Adaptive(tolerance=1e-4, stops=[0.5])
+        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=steps)
+        >>> 0.5 in run.times, bool(run.time_error < 0.01)
+        (True, True)
     """
 
     tolerance: float
@@ -155,9 +192,9 @@ class AdaptiveSteps:
         error: Sum of the errors so far.
     """
 
-    def __init__(self, simulation: Simulation, t1: float, choice: Adaptive) -> None:
+    def __init__(self, simulation: Stepper, t1: float, choice: Adaptive) -> None:
         self._t0 = self._t = t0 = simulation.t
-        self._t1, self._solution = t1, simulation.solution
+        self._t1 = t1
         self._tolerance = choice.tolerance
         self._longest = choice.longest or t1 - t0
         last_digit = math.ulp(max(abs(t0), abs(t1)))
@@ -191,7 +228,7 @@ class AdaptiveSteps:
         """Part of the time that is over."""
         return (self._t - self._t0) / (self._t1 - self._t0)
 
-    def advance(self, simulation: Simulation) -> None:
+    def advance(self, simulation: Stepper) -> None:
         """One step that is accurate, after as many as it takes that are not."""
         stop = next(t for t in self._stops if t > self._t)
         while True:
@@ -213,13 +250,13 @@ class AdaptiveSteps:
                 simulation.give_up(failure, self._t + self._dt)
         simulation.accept(trial)
         self._t = simulation.t
-        self.error = self._solution.time_error = self.error + error
+        self.error += error
         self.steps += 1
         self._dt = min(dt * min(change, GROWTH), self._longest)
         # The acceleration may jump at a stop, so what was before tells nothing about what comes.
         self._fresh = self._t == stop
 
-    def _attempt(self, simulation: Simulation, stop: float) -> tuple[Trial, float]:
+    def _attempt(self, simulation: Stepper, stop: float) -> tuple[Trial, float]:
         """Solve the next step; also its error."""
         left = stop - self._t
         # Two equal steps to a stop in the place of a long and a tiny one
@@ -242,7 +279,7 @@ class AdaptiveSteps:
         missed = simulation.share.largest(simulation.together(self._missed, dt))
         return trial, max(error, missed)
 
-    def _size(self, simulation: Simulation, trial: Trial, error: Array) -> float:
+    def _size(self, simulation: Stepper, trial: Trial, error: Array) -> float:
         """Largest error of a position over the size of the scene, or of a rotation."""
         error[self._turns] += (trial.q1 - simulation.q - trial.s)[self._turns]
         supports = simulation.supports
@@ -276,6 +313,5 @@ class AdaptiveSteps:
         for name in self._STATE:
             setattr(self, name, type(getattr(self, name))(state[name]))
         self._largest = [state[f"largest {i}"] for i in range(len(self._largest))]
-        self._solution.time_error = self.error
 
     _STATE = ("steps", "rejected", "error", "_t", "_dt", "_fresh")

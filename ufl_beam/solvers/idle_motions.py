@@ -14,7 +14,7 @@ from scipy.linalg import qr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.solvers.null_vectors import free_matrix, null_vectors
 
@@ -50,7 +50,7 @@ class IdleMotions:
         self._owned[share.multipliers()] = False
         grid = share.grid
         self._radians = np.full(grid.size, 1 / grid.scene.size)
-        self._radians[np.r_[grid.dofs[:, 2], grid.dofs_of_bodies[:, 2]]] = 1.0
+        self._radians[grid.rotations] = 1.0
         self._radians[grid.multipliers] = 0.0
         self.stiffness: Array = np.zeros(share.size)
 

@@ -9,7 +9,7 @@ from scipy.sparse.linalg import splu
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.partition import Share
 
 DENSE = 300
 """Up to this number of unknowns the null vector comes from a singular value decomposition."""

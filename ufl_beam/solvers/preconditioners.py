@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Direct solvers as PETSc preconditioners: condensation along beams, bordered systems."""
+"""Direct solver as a PETSc preconditioner: condensation along beams."""
 
 from __future__ import annotations
 
@@ -8,44 +8,13 @@ from typing import Any
 
 from petsc4py import PETSc
 
-from ufl_beam.compiled.c_library import doubles, ffi
+from ufl_beam.compiled.c_library import doubles, ffi, lib
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.partition import Share
 from ufl_beam.solvers.static_condensation import Elimination
 
 GOOD = int(PETSc.PC.FailedReason.NOERROR)
 BAD_PIVOT = int(PETSc.PC.FailedReason.FACTOR_NUMERIC_ZEROPIVOT)
-
-
-class Bordered:
-    """Direct solver of the tangent bordered by one more unknown and equation.
-
-    By elimination of the border: one factorisation and two solutions, as the tangent alone is
-    banded.  Where that is nearly singular, the next iteration makes up for the lost digits.
-
-    Args:
-        factors: An exact preconditioner of the tangent.
-        rate: The derivative by the unknown.
-        correct: See :class:`Border`; of vectors.
-    """
-
-    def __init__(
-        self, factors: PETSc.PC, rate: PETSc.Vec, correct: Callable[[PETSc.Vec, PETSc.Vec], None]
-    ) -> None:
-        self._factors, self._rate, self._correct = factors, rate, correct
-        self._z = rate.duplicate()
-
-    def setUp(self, pc: PETSc.PC) -> None:
-        """Factor; PETSc asks for it where the matrix has changed."""
-        self._factors.setOperators(*pc.getOperators())
-        self._factors.setUp()
-        pc.setFailedReason(self._factors.getFailedReason())
-
-    def apply(self, pc: PETSc.PC, b: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Solve."""
-        self._factors.apply(b, y)
-        self._factors.apply(self._rate, self._z)
-        self._correct(y, self._z)
 
 
 class ChainsFirst:
@@ -87,27 +56,29 @@ class ChainsFirst:
 
     def setUp(self, pc: PETSc.PC) -> None:
         """Factor; PETSc asks for it where the matrix has changed."""
-        self._good = self._elimination.factor() and self._factor()
+        self._matrix.stateIncrease()
+        self._good = self._elimination.factor() and self._succeeds(self._factors.setUp)
+        self._good = self._good and int(self._factors.getFailedReason()) == GOOD
         pc.setFailedReason(GOOD if self._good else BAD_PIVOT)
 
-    def _factor(self) -> bool:
-        self._matrix.stateIncrease()
+    def _succeeds(self, function: Callable[..., None], *vectors: PETSc.Vec) -> bool:
+        """Return False if KLU finds that the matrix is singular; its next factorisation works."""
         try:
-            self._factors.setUp()
-        except PETSc.Error:
-            # KLU says so of a matrix that is singular; its next factorisation does not mind.
+            function(*vectors)
+        except PETSc.Error as error:
+            if error.ierr != lib.OF_LIBRARY:
+                raise
             return False
-        return int(self._factors.getFailedReason()) == GOOD
-
-    def _solve(self) -> None:
-        self._rhs.stateIncrease()
-        self._factors.apply(self._rhs, self._solution)
+        return True
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, x: PETSc.Vec) -> None:
-        """Solve; nothing after a failure, where an error would leave objects of PETSc half done."""
-        if not self._good:
+        """Solve; zero after a failure, where an error would leave objects of PETSc half done."""
+        if self._good:
+            self._elimination.reduce(b.array_r)
+            self._rhs.stateIncrease()
+            self._good = self._succeeds(self._factors.apply, self._rhs, self._solution)
+        if self._good:
+            self._elimination.expand(self._solution.array_r, x.array_w)
+        else:
             x.array_w[:] = 0.0
-            return
-        self._elimination.reduce(b.array_r)
-        self._solve()
-        self._elimination.expand(self._solution.array_r, x.array_w)
+            pc.setFailedReason(BAD_PIVOT)

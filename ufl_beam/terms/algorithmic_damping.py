@@ -11,14 +11,15 @@ import ufl
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.discretization.compiled_forms import stated
+from ufl_beam.discretization.function_spaces import Element, Fields, Strains
 from ufl_beam.discretization.state_io import Memory
-from ufl_beam.mechanics.energy_momentum import DecayingMidpoint
+from ufl_beam.dolfinx_compat import fem
+from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
 from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_schemes import Step
-from ufl_beam.terms.beams import OfForms, Term
+from ufl_beam.terms.base import OfForms, Term
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.inelastic_beams import Strains
 
 
 @singledispatch
@@ -27,21 +28,27 @@ def numerical_forces(scheme: object, fields: Fields, A: Csr, ledger: Ledger) -> 
     return []
 
 
+@stated
+def _forms(of: Element, scheme: DecayingMidpoint) -> tuple[ufl.Form, ufl.Form, fem.Function]:
+    """Virtual work, the energy lost, and the changes of the strains in the step before."""
+    q0, q1, C, dx = of.q0, of.q1, of.stiffness, of.dx(1)
+    before, part = of.at_points(3), of.constant(scheme.part)
+    change = strain(q1, of.axis) - strain(q0, of.axis)
+    r = ufl.as_vector([part * C[i] * (change[i] - before[i]) for i in range(3)])
+    work = ufl.dot(r, scheme.virtual_strain(q0, q1, of.w, of.axis)) * dx
+    return work, ufl.dot(r, change) * dx, before
+
+
 class SecondDifferences(OfForms):
     """Resultants c C (Δe - r Δe'), see :class:`DecayingMidpoint`."""
 
     kind = "beams"
 
     def __init__(self, scheme: DecayingMidpoint, fields: Fields, A: Csr, ledger: Ledger) -> None:
-        q0, q1 = fields.configuration(), fields.configuration()
-        w, axis, dx = ufl.TestFunction(fields.space), fields.axis, fields.dx(1)
-        C, before, part = fields.stiffness(), fields.at_points(3), fields.constant(scheme.part)
-        change = strain(q1, axis) - strain(q0, axis)
-        r = ufl.as_vector([part * C[i] * (change[i] - before[i]) for i in range(3)])
-        work = ufl.dot(r, scheme.virtual_strain(q0, q1, w, axis)) * dx
-        self._q0, self._before = q0, before
+        work, lost, self._before = _forms(fields.element, scheme)
+        self._q0, q1 = fields.element.q0, fields.element.q1
         self._force, self._tangent = fields.force_and_tangent(work, q1, A)
-        self._lost = fields.hot_kernel(ufl.dot(r, change) * dx, q1)
+        self._lost = fields.hot_kernel(lost, q1)
         self._strains = Strains(fields)
         self._cells = fields.share.cells[fields.order]
         self._q: Array = np.empty(0)

@@ -1,122 +1,55 @@
 # SPDX-License-Identifier: MIT
-"""Virtual works, one class each: what a scene may contribute to the equation of a step.
-
-A term adds its part of the residual and of the tangent at the end of the step, and says what the
-step did to the energy.  Vectors hold the local degrees of freedom of a process, ghosts included;
-what several processes add to one degree of freedom is summed by the solver.
-"""
+"""Elastic beams and inertia."""
 
 from __future__ import annotations
 
 import math
 from functools import cached_property, partial
-from typing import Protocol
+from typing import NamedTuple
 
-import numpy as np
 import ufl
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop
 from ufl_beam.compiled.csr import Csr, StepProduct
-from ufl_beam.discretization.compiled_forms import Kernel
-from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.discretization.compiled_forms import Kernel, stated
+from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
 from ufl_beam.discretization.state_io import Memory
-from ufl_beam.mechanics.kinematics import split, strain
+from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, Step
+from ufl_beam.terms.base import OfForms, OfMatrix
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.tangent_derivatives import CellTangent
 
-KINDS = ("beams", "connectors", "loads", "inertia", "damping")
-"""Kinds of forces."""
+
+class _ElasticForms(NamedTuple):
+    """Forms of elastic beams: virtual work, stored energy, and what a scheme loses of it.
+
+    ``first`` is the tangent of the first iteration of a static step.
+    """
+
+    work: ufl.Form
+    stored: ufl.Form
+    losses: list[ufl.Form]
+    first: ufl.Form | None
 
 
-class Term(Protocol):
-    """A virtual work."""
-
-    kind: str
-    """Kind of its forces, one of :data:`KINDS`."""
-
-    def loops(self) -> tuple[Loop, Loop | None] | None:
-        """Return C functions with data in the place of both methods, or None without them."""
-
-    def begin(self, step: Step) -> None:
-        """Take note of the step that is to be solved."""
-
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Add the virtual work at ``q1`` to ``r``."""
-
-    def add_tangent(self, q1: Array) -> None:
-        """Add the derivative at ``q1`` to the matrix that the term was made with."""
-
-    def accept(self, q1: Array, s: Array) -> None:
-        """Take the end of the step as the new state, and enter what the step supplied or lost.
-
-        ``s`` is the step of the nodes that the virtual works are works on.
-        """
-
-    def add_state(self, q: Array) -> None:
-        """Enter the energy that the term holds in the accepted state ``q``."""
-
-    def remember(self, memory: Memory, q: Array) -> None:
-        """State what later steps depend on; ``q`` is the configuration of the state."""
-
-
-class Beams(Term, Protocol):
-    """Resultants of cells working on the virtual strains; the residual is an internal force."""
-
-    def change(self, q1: Array) -> float:
-        """Energy that cells of this process store and dissipate in the step to ``q1``; J."""
-
-    def add_tangent_change(self, q1: Array, u: Array) -> None:
-        """Add the derivative of the tangent at ``q1`` along ``u``; no internal variable changes."""
-
-
-class Cells(Beams, Protocol):
-    """Beams whose tangent is known by its works, too, summed over cells from strains."""
-
-    def tangent_work(self, q1: Array, x: Array, y: Array) -> float:
-        """Return the work of the tangent for the motion x on y; J."""
-
-    def work_of_change(self, q1: Array, u: Array, x: Array, y: Array) -> float:
-        """Return the work of the derivative of the tangent along u, for x on y; J."""
-
-
-class OfForms:
-    """A term whose forces and their derivative are two forms on cells."""
-
-    _force: Kernel
-    _tangent: Kernel
-    _A: Csr
-
-    def loops(self) -> tuple[Loop, Loop | None]:
-        """Two forms."""
-        return loop("add_cells", self._force.cells), loop("add_cells", self._tangent.cells)
-
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Add the forces."""
-        self._force.add(q1, r)
-
-    def add_tangent(self, q1: Array) -> None:
-        """Add their derivative."""
-        self._tangent.add(q1, self._A.data)
-
-
-class OfMatrix:
-    """A term whose forces are a constant matrix times the step of the nodes."""
-
-    _times: StepProduct
-
-    def loops(self) -> tuple[Loop, Loop | None]:
-        """The product, and its derivative."""
-        return self._times.loops()
-
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Add the forces."""
-        self._times.add_force(q1, r)
-
-    def add_tangent(self, q1: Array) -> None:
-        """Add their derivative."""
-        self._times.add_tangent(q1)
+@stated
+def _elastic_forms(of: Element, scheme: Scheme) -> _ElasticForms:
+    q0, q1, w, C, dx = of.q0, of.q1, of.w, of.stiffness, of.dx(1)
+    e0, e1 = strain(q0, of.axis), strain(q1, of.axis)
+    r = scheme.resultants(C, e0, e1, of.constant)
+    w_e = scheme.virtual_strain(q0, q1, w, of.axis)
+    stored = sum(C[i] * e1[i] ** 2 / 2 for i in range(3)) * dx  # P(9)
+    losses = [d * dx for d in scheme.losses(C, e0, e1, of.constant)]
+    first = None
+    if not scheme.dynamic:
+        dq = ufl.TrialFunction(of.space)
+        before = ufl.as_vector([C[i] * e0[i] for i in range(3)])
+        geometric = ufl.dot(before, ufl.derivative(w_e, q1, dq))
+        material = ufl.dot(ufl.derivative(r, q1, dq), w_e)
+        first = (geometric + material) * dx
+    return _ElasticForms(ufl.dot(r, w_e) * dx, stored, losses, first)  # P(12)
 
 
 class ElasticBeams(OfForms):
@@ -125,32 +58,21 @@ class ElasticBeams(OfForms):
     kind = "beams"
 
     def __init__(self, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger) -> None:
-        q0, q1 = fields.configuration(), fields.configuration()
-        w, dx, axis = ufl.TestFunction(fields.space), fields.dx(1), fields.axis
-        C = fields.stiffness()
-        e0, e1 = strain(q0, axis), strain(q1, axis)
-
-        r = scheme.resultants(C, e0, e1, fields.constant)
-        w_e = scheme.virtual_strain(q0, q1, w, axis)
-        stored = sum(C[i] * e1[i] ** 2 / 2 for i in range(3)) * dx  # P(9)
-        losses = [d * dx for d in scheme.losses(C, e0, e1, fields.constant)]
-
-        self._q0, self._q1, self._fields = q0, q1, fields
-        self._work = ufl.dot(r, w_e) * dx
-        self._force, self._tangent = fields.force_and_tangent(self._work, q1, A)  # P(12)
-        self._stored, *self._losses = (fields.hot_kernel(f, q1) for f in (stored, *losses))
+        forms = _elastic_forms(fields.element, scheme)
+        self._q0, self._q1, self._fields = fields.element.q0, fields.element.q1, fields
+        self._work = forms.work
+        self._force, self._tangent = fields.force_and_tangent(forms.work, self._q1, A)
+        self._stored, *self._losses = (
+            fields.hot_kernel(form, self._q1) for form in (forms.stored, *forms.losses)
+        )
         self._first: Kernel | None = None
         self._tangents = ffi.new("first_cells *", {"then": self._tangent.cells})
-        if not scheme.dynamic:
-            dq = ufl.TrialFunction(fields.space)
-            before = ufl.as_vector([C[i] * e0[i] for i in range(3)])
-            geometric = ufl.dot(before, ufl.derivative(w_e, q1, dq))
-            material = ufl.dot(ufl.derivative(r, q1, dq), w_e)
-            self._first = fields.kernel((geometric + material) * dx, q1)
+        if forms.first is not None:
+            self._first = fields.kernel(forms.first, self._q1)
             self._first.place(A)
             self._tangents.first = self._first.cells
         self._A, self._ledger = A, ledger
-        if losses:
+        if self._losses:
             ledger.lost["numerical"] += 0.0
 
     def begin(self, step: Step) -> None:
@@ -162,7 +84,7 @@ class ElasticBeams(OfForms):
             self._tangents.begins = 1
 
     def loops(self) -> tuple[Loop, Loop | None]:
-        """Two forms."""
+        """C loops over the cells, of force and tangent."""
         return loop("add_cells", self._force.cells), loop("add_first_cells", self._tangents)
 
     def add_tangent(self, q1: Array) -> None:
@@ -180,7 +102,7 @@ class ElasticBeams(OfForms):
             self._ledger.lost["numerical"] += loss.value(q1)
 
     def add_state(self, q: Array) -> None:
-        """Stored energy."""
+        """Add the stored energy to the ledger."""
         self._held = self._stored.value(q)
         self._ledger.state["stored"] += self._held
 
@@ -207,44 +129,6 @@ class ElasticBeams(OfForms):
     def _cell_tangent(self) -> CellTangent:
         kernel = partial(self._fields.kernel, unknown=self._q1)
         return CellTangent(self._work, self._q1, kernel, self._A)
-
-
-class SectionForces:
-    """(N, V, M) in the cells were they elastic, from the strains of a configuration, P(7)."""
-
-    def __init__(self, fields: Fields) -> None:
-        q = fields.configuration()
-        C, e = fields.stiffness(), strain(q, fields.axis)
-        z = ufl.TestFunction(C.function_space)
-        mean = sum(C[i] * e[i] * z[i] for i in range(3)) / fields.axis.h  # P(7)
-        self._kernel = fields.kernel(mean * fields.dx(1), q)
-        self._order = fields.order
-
-    def write(self, q: Array, resultants: Array) -> None:
-        """Resultants at ``q`` into the rows of the cells, in the order of the share; N, N, N m."""
-        values = np.zeros(3 * len(self._order))
-        self._kernel.add(np.ascontiguousarray(q), values)
-        resultants[self._order] = values.reshape(-1, 3)
-
-
-def mass_matrix(fields: Fields) -> Csr:
-    """Mass of the beams, the point masses and the bodies."""
-    share = fields.share
-    (u, ψ), (w_u, w_ψ) = (split(f(fields.space)) for f in (ufl.TrialFunction, ufl.TestFunction))
-    ρ = fields.inertia()
-    M = fields.matrix()
-    work = (ρ[0] * ufl.dot(u, w_u) + ρ[1] * ψ * w_ψ) * fields.dx_of_mass()  # P(67)
-    kernel = fields.kernel(work, fields.configuration())
-    kernel.place(M)
-    kernel.add(np.zeros(share.size), M.data)
-    scene = share.grid.scene
-    lumps = [(share.at(one.place), one.mass, one.inertia) for one in scene.masses]
-    lumps += [(share.at(one.middle), one.mass, one.inertia) for one in scene.bodies]
-    for dofs, mass, inertia in lumps:
-        mine = share.owns(dofs)
-        here = share.local(dofs[mine])
-        M.data[M.positions(here, here)] += np.array([mass, mass, inertia])[mine]
-    return M
 
 
 class Inertia(OfMatrix):
@@ -313,11 +197,11 @@ class Inertia(OfMatrix):
         self.v_before, self.v, self.more, self.last_dt = self.v, v, tuple(more), self._dt
 
     def add_state(self, q: Array) -> None:
-        """Kinetic energy."""
+        """Add the kinetic energy to the ledger."""
         self._ledger.state["kinetic"] += self._times.square(self.v) / 2  # P(18)
 
     def remember(self, memory: Memory, q: Array) -> None:
-        """The velocities."""
+        """Save or restore velocities and the last step."""
         self.v = memory.at_dofs("velocity", self.v)
         self.v_before = memory.at_dofs("velocity before", self.v_before)
         self.last_dt = memory.number("step of velocity", self.last_dt)

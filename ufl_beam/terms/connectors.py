@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from functools import cached_property, partial, singledispatch
+from functools import cached_property, singledispatch
+from typing import NamedTuple
 
 import basix.ufl
 import numpy as np
@@ -13,21 +14,22 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, integers, lib, loop
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.compiled_forms import Kernel
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.compiled_forms import Kernel, stated
+from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
-from ufl_beam.dolfinx_compat import fem, line_mesh, space_with_dofs
+from ufl_beam.dolfinx_compat import fem, line_mesh
 from ufl_beam.mechanics.relative_motions import MOTIONS, Numbers, Pair
-from ufl_beam.mechanics.time_schemes import Step
+from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.connector_laws import HELD, Law, RigidPlastic, Spring
 from ufl_beam.model.connectors import Connector
-from ufl_beam.terms.connector_laws import Setting, respond
-from ufl_beam.terms.guide_curves import Guides
+from ufl_beam.terms import connector_laws, rigid_plastic, springs
+from ufl_beam.terms.connector_responses import Setting, respond
 from ufl_beam.terms.links import Links
-from ufl_beam.terms.rigid_plastic import RigidPlasticResponse
+from ufl_beam.terms.openings import Openable
 from ufl_beam.terms.tangent_derivatives import TangentChange
 
-respond.register(RigidPlastic, RigidPlasticResponse)
+LAWS = (connector_laws, rigid_plastic, springs)
+"""Modules with the responses of laws, which register them with :func:`respond`."""
 
 
 def _alike(link: Connector) -> tuple[str, object]:
@@ -51,53 +53,69 @@ def _(law: RigidPlastic) -> object:
     return RigidPlastic, type(law.law)
 
 
+class _Forms(NamedTuple):
+    """Forms of connectors with the coefficients that they are written in.
+
+    Attributes:
+        work: Virtual work, and the row ``row[0] e + row[1] λ - row[2]`` of a law.
+        tangent: Its derivative by the configuration.
+        motion: The relative motion e by cell.
+        rate: Its derivative along ``u``.
+        change: Derivative of the tangent along ``u``; rows change with the motion by ``bend``.
+        numbers: Numbers of the relative motion, see :class:`Numbers`.
+    """
+
+    work: ufl.Form
+    tangent: ufl.Form
+    motion: ufl.Form
+    rate: ufl.Form
+    change: ufl.Form
+    numbers: fem.Function
+    row: fem.Function
+    q0: fem.Function
+    q1: fem.Function
+    bend: fem.Function
+    u: fem.Function
+
+
+@stated
+def _forms(motion: str, scheme: Scheme) -> _Forms:
+    cell = line_mesh(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0, 1]]))
+    line = basix.ufl.element("Lagrange", "interval", 1)
+    point = basix.ufl.element("DG", "interval", 0)
+    space = fem.functionspace(cell, basix.ufl.mixed_element([line, line, line, point]))
+    numbers, row, bend = (
+        fem.Function(fem.functionspace(cell, ("DG", 0, shape))) for shape in ((8,), (3,), ())
+    )
+    q0, q1, u = (fem.Function(space) for _ in range(3))
+    (before, _), (now, λ), (w, w_λ) = map(_split, (q0, q1, ufl.TestFunction(space)))
+    n = Numbers(*(ufl.as_vector([numbers[i], numbers[i + 1]]) for i in (0, 2, 4, 6)))
+    e = MOTIONS[motion].value(now, n)
+    e_w = MOTIONS[motion].variation(before, now, w, n, scheme)
+    dx = ufl.Measure("dx", domain=cell, metadata={"quadrature_degree": 1})
+    dq, z = ufl.TrialFunction(space), ufl.TestFunction(bend.function_space)
+    work = (λ * e_w + w_λ * (row[0] * e + row[1] * λ - row[2])) * dx
+    tangent, by_cell = ufl.derivative(work, q1, dq), e * z * dx
+    of_rows = w_λ * bend * ufl.derivative(e, q1, u) * ufl.derivative(e, q1, dq) * dx
+    change = ufl.derivative(tangent, q1, u) + of_rows
+    rate = ufl.derivative(by_cell, q1, u)
+    return _Forms(work, tangent, by_cell, rate, change, numbers, row, q0, q1, bend, u)
+
+
 class Couplings(Links):
     """Connectors of one relative motion whose laws are of one kind.
 
     Each is a cell of unit length from one node to the other, with its force as a seventh unknown.
     """
 
-    kind = "connectors"
-
     def __init__(self, share: Share, here: Index, setting: Setting, A: Csr) -> None:
         super().__init__(share, here, A)
-        links, dofs, n = self.links, self._dofs, len(here)
-        ends = np.tile([[0.0, 0.0], [1.0, 0.0]], (n, 1))
-        mesh = line_mesh(ends, np.arange(2 * n).reshape(-1, 2))
-        order = np.asarray(mesh.topology.original_cell_index)
-        self._order = order
-        coordinates = np.ascontiguousarray(np.tile([[0.0, 0, 0], [1.0, 0, 0]], (n, 1, 1)))
-        line = basix.ufl.element("Lagrange", "interval", 1)
-        point = basix.ufl.element("DG", "interval", 0)
-        element = basix.ufl.mixed_element([line, line, line, point])
-        space = space_with_dofs(mesh, element, dofs[order], share.size)
-
-        def given(*shape: int) -> fem.Function:
-            element = basix.ufl.element("DG", "interval", 0, shape=shape)
-            return fem.Function(fem.functionspace(mesh, element))
-
-        numbers, row = given(8), given(3)
-        numbers.x.array[:] = np.array(
-            [(*c.arms[0], *c.arms[1], *c.apart, *c.axis) for c in links], dtype=np.float64
-        )[order].ravel()
-        q0, q1 = fem.Function(space), fem.Function(space)
-        (before, _), (now, λ), (w, w_λ) = map(_split, (q0, q1, ufl.TestFunction(space)))
-        motion = MOTIONS[links[0].motion]
-        n_ = Numbers(*(ufl.as_vector([numbers[i], numbers[i + 1]]) for i in (0, 2, 4, 6)))
-        e = motion.value(now, n_)
-        e_w = motion.variation(before, now, w, n_, setting.scheme)
-        dx = ufl.Measure("dx", domain=mesh, metadata={"quadrature_degree": 1})
-        work = (λ * e_w + w_λ * (row[0] * e + row[1] * λ - row[2])) * dx
-        tangent = ufl.derivative(work, q1, ufl.TrialFunction(space))
-        z = ufl.TestFunction(given().function_space)
-
-        self._kernel = kernel = partial(
-            Kernel, unknown=q1, cell_dofs=dofs[order], coordinates=coordinates
+        links, n = self.links, len(here)
+        self._forms = forms = _forms(links[0].motion, setting.scheme)
+        self._numbers = np.array([(*c.arms[0], *c.arms[1], *c.apart, *c.axis) for c in links])
+        self._work, self._tangent, self._value = map(
+            self._kernel, (forms.work, forms.tangent, forms.motion)
         )
-        self._space, self._motion = space, e * z * dx
-        self._q0, self._q1, self._row, self._bend = q0, q1, row, given()
-        self._forms = e, w_λ, tangent, dx
-        self._work, self._tangent, self._value = map(kernel, (work, tangent, self._motion))
         self._tangent.place(A)
         self.response = respond(links[0].law, links, setting)
         self._length = np.where([c.turns for c in links], 1.0, share.grid.scene.size)
@@ -107,14 +125,14 @@ class Couplings(Links):
         self._in_c = c = ffi.new("couplings *")
         c.work, c.tangent, c.motion = self._work.cells, self._tangent.cells, self._value.cells
         self._alive = [
-            *(integers(x.astype(np.int32)) for x in (order, self._forces_at, self._dofs)),
+            *(integers(x.astype(np.int32)) for x in (np.arange(n), self._forces_at, self._dofs)),
             *map(doubles, (np.zeros(n), self._now, self._e, self._before, self.work, self.rate)),
             doubles(self._length),
         ]
         c.link, c.force, c.dofs = self._alive[:3]
         c.by_cell, c.e1, c.e0, c.before, c.taken, c.rate, c.length = self._alive[3:]
         c.number, c.size = n, share.grid.scene.size
-        c.row, c.row_of_tangent = (one.position(row) for one in (self._work, self._tangent))
+        c.row, c.row_of_tangent = (one.position(forms.row) for one in (self._work, self._tangent))
         c.weight_of_before = setting.scheme.acting(np.ones(1), np.zeros(1))[0]
         for name, data in self.response.in_c.items():
             setattr(c, name, data)
@@ -127,20 +145,24 @@ class Couplings(Links):
         lib.find_motions(self._in_c, doubles(q))
         return self._now.copy()
 
+    def _kernel(self, form: ufl.Form) -> Kernel:
+        """A form on the connectors, compiled."""
+        unit = np.tile([[0.0, 0, 0], [1.0, 0, 0]], (len(self.links), 1, 1))
+        kernel = Kernel(form, self._forms.q1, self._dofs, unit)
+        if kernel.uses(self._forms.numbers):
+            kernel.put(self._forms.numbers, self._numbers)
+        return kernel
+
     @cached_property
-    def _velocity(self) -> tuple[Kernel, fem.Function]:
-        """The rates of the motions, and the velocities that they are of; friction asks for them."""
-        velocity = fem.Function(self._space)
-        form = ufl.derivative(self._motion, self._q1, velocity)
-        return self._kernel(form), velocity
+    def _rate(self) -> Kernel:
+        """The rates of the motions; friction asks for them."""
+        return self._kernel(self._forms.rate)
 
     def rates(self, q: Array, v: Array) -> Array:
         """Rates of the motions at ``q`` if the velocities are ``v``; (num_links,); m/s or rad/s."""
-        kernel, velocity = self._velocity
-        by_cell, rates = np.zeros((2, len(self.links)))
-        kernel.set(velocity, v)
-        kernel.add(q, by_cell)
-        rates[self._order] = by_cell
+        rates = np.zeros(len(self.links))
+        self._rate.set(self._forms.u, v)
+        self._rate.add(q, rates)
         return rates
 
     def again(self) -> None:
@@ -157,8 +179,8 @@ class Couplings(Links):
 
     def begin(self, step: Step) -> None:
         """Remember the motions at the beginning."""
-        self._work.set(self._q0, step.q0)
-        self._tangent.set(self._q0, step.q0)
+        self._work.set(self._forms.q0, step.q0)
+        self._tangent.set(self._forms.q0, step.q0)
         if step.q0 is not self._q:
             self._q, self._e[:] = step.q0, self.motion(step.q0)
         self._dt = step.dt
@@ -170,7 +192,7 @@ class Couplings(Links):
         for column, numbers in enumerate(rows):
             self._rows[:, column] = numbers
         for kernel in (self._work, self._tangent):
-            kernel.put(self._row, self._rows[self._order])
+            kernel.put(self._forms.row, self._rows)
 
     def loops(self) -> tuple[Loop, Loop | None] | None:
         """Those of laws that are steady or of material points."""
@@ -218,6 +240,15 @@ class Couplings(Links):
         """Energy that each connector has dissipated by yielding and softening; (num_links,); J."""
         return self.response.dissipated
 
+    def remaining(self) -> Array:
+        """Part of the elastic stiffness that is left in the latest iterate; (num_links,)."""
+        return self.response.remaining()
+
+    @property
+    def openable(self) -> Openable | None:
+        """Connectors that open beyond a limit, if there are."""
+        return self.response.openable
+
     def effort(self, q1: Array) -> float:
         """Sum of the sizes of the works that the connectors take in the step to ``q1``; J."""
         return float(np.abs(self._taken(q1)).sum())
@@ -238,21 +269,13 @@ class Couplings(Links):
         rows = np.zeros_like(self._rows)
         for column, numbers in enumerate(self.response.rows(e, self.force(q1))):
             rows[:, column] = numbers
-        change.put(self._row, rows[self._order])
-        change.put(self._bend, self.response.bends(e)[self._order, None])
+        change.put(self._forms.row, rows)
+        change.put(self._forms.bend, self.response.bends(e)[:, None])
         change.add(q1, u)
 
     @cached_property
     def _tangent_change(self) -> TangentChange:
-        e, w_λ, tangent, dx = self._forms
-        q1, bend = self._q1, self._bend
-
-        def of_rows(u: fem.Function) -> ufl.Form:
-            """Rows of laws change with the motion, too."""
-            dq = ufl.TrialFunction(q1.function_space)
-            return w_λ * bend * ufl.derivative(e, q1, u) * ufl.derivative(e, q1, dq) * dx
-
-        return TangentChange(tangent, q1, self._kernel, self._A, of_rows)
+        return TangentChange(self._forms.change, self._forms.u, self._kernel, self._A)
 
     def freeze(self) -> None:
         """From now on nothing yields or breaks further."""
@@ -287,8 +310,8 @@ def _split(q: Expr) -> tuple[Pair, Expr]:
     return Pair(at(-1.0), at(1.0)), force
 
 
-def couplings(share: Share, setting: Setting, A: Csr) -> list[Couplings | Guides]:
-    """The connectors of a process, those that are alike together."""
+def couplings(share: Share, setting: Setting, A: Csr) -> list[Links]:
+    """Make the connectors of a process but for guides, those that are alike together."""
     links = share.grid.scene.links
     groups: dict[tuple[str, object], list[int]] = {}
     for i, number in enumerate(share.links):
@@ -297,6 +320,7 @@ def couplings(share: Share, setting: Setting, A: Csr) -> list[Couplings | Guides
         if _alike(link) not in groups and link.motion in MOTIONS:
             respond(link.law, (), setting)  # makes the entries of the ledger that others write
     return [
-        (Couplings if motion in MOTIONS else Guides)(share, np.array(here), setting, A)
+        Couplings(share, np.array(here), setting, A)
         for (motion, _), here in groups.items()
+        if motion in MOTIONS
     ]

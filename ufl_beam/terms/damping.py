@@ -4,20 +4,29 @@
 from __future__ import annotations
 
 from functools import singledispatch
+from typing import Protocol
 
 import numpy as np
 import ufl
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.csr import Csr, StepProduct
-from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.discretization.compiled_forms import stated
+from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
 from ufl_beam.discretization.state_io import Memory
+from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.kinematics import strain, virtual_strain
-from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.mechanics.time_schemes import DynamicScheme, Rates, Scheme, Step
 from ufl_beam.model.damping import KelvinVoigt, Rayleigh
-from ufl_beam.terms.beams import Inertia, OfForms, OfMatrix, Term, mass_matrix
+from ufl_beam.terms.base import OfForms, OfMatrix, Term
 from ufl_beam.terms.energy_ledger import Ledger
+
+
+class Inertia(Rates, Protocol):
+    """Velocities of a scene in motion, and its scheme."""
+
+    scheme: DynamicScheme
 
 
 @singledispatch
@@ -33,6 +42,16 @@ def damping_forces(
     raise TypeError(f"{damping!r} is not a damping")
 
 
+@stated
+def _forms(of: Element, scheme: Scheme) -> tuple[ufl.Form, ufl.Form, fem.Function]:
+    """Virtual work, the energy lost, and the time over that of the step."""
+    q0, q1, C, dx, rate = of.q0, of.q1, of.stiffness, of.dx(1), of.at_points()
+    change = strain(q1, of.axis) - strain(q0, of.axis)
+    r = ufl.as_vector([rate * C[i] * change[i] for i in range(3)])
+    work = ufl.dot(r, scheme.virtual_strain(q0, q1, of.w, of.axis)) * dx
+    return work, ufl.dot(r, change) * dx, rate
+
+
 class KelvinVoigtForces(OfForms):
     """Resultants in proportion to the rates of the strains, P(89) with a weight of time over dt."""
 
@@ -41,15 +60,10 @@ class KelvinVoigtForces(OfForms):
     def __init__(
         self, damping: KelvinVoigt, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger
     ) -> None:
-        q0, q1 = fields.configuration(), fields.configuration()
-        w, axis, dx = ufl.TestFunction(fields.space), fields.axis, fields.dx(1)
-        C, rate = fields.stiffness(), fields.at_points()
-        change = strain(q1, axis) - strain(q0, axis)
-        r = ufl.as_vector([rate * C[i] * change[i] for i in range(3)])
-        work = ufl.dot(r, scheme.virtual_strain(q0, q1, w, axis)) * dx
-        self._q0, self._rate, self._time = q0, rate, damping.time
+        work, lost, self._rate = _forms(fields.element, scheme)
+        self._q0, self._time, q1 = fields.element.q0, damping.time, fields.element.q1
         self._force, self._tangent = fields.force_and_tangent(work, q1, A)
-        self._lost = fields.hot_kernel(ufl.dot(r, change) * dx, q1)
+        self._lost = fields.hot_kernel(lost, q1)
         self._A, self._ledger, self._dt = A, ledger, 0.0
 
     def begin(self, step: Step) -> None:
@@ -65,24 +79,16 @@ class KelvinVoigtForces(OfForms):
         self._ledger.lost["damping"] += self._lost.value(q1)
 
     def add_state(self, q: Array) -> None:
-        """Nothing is stored."""
+        """Add nothing: damping stores no energy."""
 
     def remember(self, memory: Memory, q: Array) -> None:
-        """Nothing is remembered."""
+        """Save nothing: damping has no internal variables."""
 
 
-def reference_stiffness(fields: Fields) -> Csr:
-    """Stiffness of the undeformed scene."""
-    K = fields.matrix()
-    q, C, axis = fields.configuration(), fields.stiffness(), fields.axis
-    e, w_e = (
-        virtual_strain(q, f(fields.space), axis) for f in (ufl.TrialFunction, ufl.TestFunction)
-    )
-    work = sum(C[i] * e[i] * w_e[i] for i in range(3)) * fields.dx(1)
-    kernel = fields.kernel(work, q)
-    kernel.place(K)
-    kernel.add(np.zeros(fields.share.size), K.data)
-    return K
+@stated
+def _reference_stiffness(of: Element) -> ufl.Form:
+    e, w_e = (virtual_strain(of.q1, w, of.axis) for w in (ufl.TrialFunction(of.space), of.w))
+    return sum(of.stiffness[i] * e[i] * w_e[i] for i in range(3)) * of.dx(1)
 
 
 class RayleighForces(OfMatrix):
@@ -93,7 +99,8 @@ class RayleighForces(OfMatrix):
     def __init__(
         self, damping: Rayleigh, fields: Fields, A: Csr, ledger: Ledger, inertia: Inertia
     ) -> None:
-        C, M, K = fields.matrix(), mass_matrix(fields), reference_stiffness(fields)
+        C, M = fields.matrix(), mass_matrix(fields)
+        K = fields.assembled(_reference_stiffness(fields.element))
         C.data[:] = damping.mass * M.data + damping.stiffness * K.data  # P(92)
         rotations = inertia.scheme.half_tangents(fields.share.rotations())
         self._times = StepProduct(C, rotations, A)
@@ -109,10 +116,10 @@ class RayleighForces(OfMatrix):
         self._ledger.lost["damping"] += self._times.square(s) / self._dt
 
     def add_state(self, q: Array) -> None:
-        """Nothing is stored."""
+        """Add nothing: damping stores no energy."""
 
     def remember(self, memory: Memory, q: Array) -> None:
-        """Nothing is remembered."""
+        """Save nothing: damping has no internal variables."""
 
 
 @damping_forces.register

@@ -62,12 +62,19 @@ class Entries(dict[str, Array]):
 
 @dataclass(frozen=True)
 class Energy:
-    """The ledger of a run.
+    """Energy ledger of a run: energy in the scene, work supplied, losses.
 
     Attributes:
         state: Arrays by name, "kinetic" and "stored"; each (n+1,); J.
         supplied: Work since the beginning, by source: "loads", "supports"; each (n+1,); J.
         lost: Energy that went out since the beginning, by sink: "numerical", ...; each (n+1,); J.
+
+    Example:
+        >>> ledger = solution.energy
+        >>> print(sorted(ledger.state), sorted(ledger.supplied))
+        ['kinetic', 'stored'] ['loads']
+        >>> bool(ledger.worst < 1e-9)  # largest imbalance over the energy that went through
+        True
     """
 
     state: dict[str, Array]

@@ -7,13 +7,12 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
-from ufl_beam.mechanics.time_schemes import Step
+from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.connector_laws import Guide
-from ufl_beam.model.plane_curves import REACH, nearest, parameter_step, tangent
-from ufl_beam.terms.connector_laws import Setting
+from ufl_beam.model.curves import REACH, nearest, parameter_step, tangent
 from ufl_beam.terms.links import Links
 
 
@@ -27,9 +26,7 @@ class Guides(Links):
     The motion of a guide is the distance from its curve, zero when a step is accepted.
     """
 
-    kind = "connectors"
-
-    def __init__(self, share: Share, here: Index, setting: Setting, A: Csr) -> None:
+    def __init__(self, share: Share, here: Index, scheme: Scheme, A: Csr) -> None:
         super().__init__(share, here, A)
         self._laws = [link.law for link in self.links if isinstance(link.law, Guide)]
         self._x, self._y = (self._dofs[:, k].astype(np.int64) for k in (1, 3))
@@ -38,7 +35,7 @@ class Guides(Links):
         self._across = [A.positions(d, self._forces_at) for d in (self._x, self._y)]
         self._rows = [A.positions(self._forces_at, d) for d in (self._x, self._y)]
         self._points = np.array([link.b.point for link in self.links])
-        self._over_step = np.full(len(self.links), setting.scheme.average(0.0, 1.0) != 1.0)
+        self._over_step = np.full(len(self.links), scheme.average(0.0, 1.0) != 1.0)
         n = len(self.links)
         self._s: Array = np.zeros(n)
         self._s0: Array = np.zeros(n)
@@ -129,7 +126,7 @@ class Guides(Links):
         self._s = self._s0.copy()
 
     def loops(self) -> None:
-        """None."""
+        """None: guide curves are evaluated in Python."""
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the forces, and the distances."""
@@ -140,7 +137,7 @@ class Guides(Links):
         r[self._forces_at] += distance
 
     def add_tangent(self, q1: Array) -> None:
-        """Add the derivatives."""
+        """Add the derivatives of forces and constraints to the tangent."""
         _, n, m, dm = self._frames(q1)
         λ, data = self.force(q1), self._A.data
         for k in range(2):
@@ -165,9 +162,6 @@ class Guides(Links):
             change += weight / (12 * ε) * data
         data[:] = before + change
 
-    def demand(self) -> None:
-        """None."""
-
     def excess(self, q: Array, r: Array, force: float, moved: float) -> float:
         """Largest distance, as a part of 1 % of the scene."""
         round_off = 8 * np.spacing(self._size + np.abs(self._points + self._on0).max(axis=1))
@@ -178,39 +172,16 @@ class Guides(Links):
         """Guides take no energy."""
         return 0.0
 
-    def flows(self) -> bool:
-        """None does."""
-        return False
-
-    def shown_motion(self, q: Array) -> Array:
-        """Motions of the accepted state ``q``; (num_links,); m."""
-        return self.motion(q)
-
-    def dissipated(self) -> Array:
-        """None: guides do not yield."""
-        return np.zeros(len(self.links))
-
-    def dissipation(self, q1: Array) -> float:
-        """None: guides do no work."""
-        return 0.0
-
-    def effort(self, q1: Array) -> float:
-        """Guides take no energy."""
-        return 0.0
-
     def accept(self, q1: Array, s: Array) -> None:
         """Remember the points on the curves."""
         self._on0, t = self._nearest(self._at(q1))
         self._steps = REACH * self._size / np.linalg.norm(t, axis=1)
         self._s0 = self._s.copy()
 
-    def freeze(self) -> None:
-        """Nothing yields."""
-
     # -- the state -----------------------------------------------------------------------------
 
     def add_state(self, q: Array) -> None:
-        """Nothing is stored."""
+        """Add nothing: guides store no energy."""
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The points on the curves, their parameters, and the steps of these for tangents."""
@@ -218,3 +189,10 @@ class Guides(Links):
         rows = memory.rows("guides", self.numbers, np.column_stack([*numbers, self._on0]))
         self.work, self.rate, self._s, self._s0, self._steps = rows[:, :5].T.copy()
         self._on0 = rows[:, 5:].copy()
+
+
+def guides(share: Share, scheme: Scheme, A: Csr) -> list[Links]:
+    """Make the guides of a process, all together; empty if it has none."""
+    links = share.grid.scene.links
+    here = [i for i, number in enumerate(share.links) if isinstance(links[number].law, Guide)]
+    return [Guides(share, np.array(here), scheme, A)] if here else []

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from functools import cached_property, partial
+from typing import NamedTuple
 
 import numpy as np
 import ufl
@@ -11,19 +12,22 @@ import ufl
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.discretization.compiled_forms import stated
+from ufl_beam.discretization.function_spaces import Element, Fields, Strains
+from ufl_beam.discretization.partition import Numbering
 from ufl_beam.discretization.state_io import Memory
+from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_schemes import Scheme, Step
-from ufl_beam.model.material_laws import Layout
+from ufl_beam.model.fibres import Layout
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.material_points import INPUTS, Course, Points
+from ufl_beam.terms.material_points import Points, inputs
+from ufl_beam.terms.openings import Course
 from ufl_beam.terms.tangent_derivatives import CellTangent
 
 
-def inelastic_cells(grid: Grid) -> list[tuple[Layout, Index]]:
+def inelastic_cells(grid: Numbering) -> list[tuple[Layout, Index]]:
     """Layouts of material points, and the cells (numbers of the grid) that have them.
 
     Raises:
@@ -48,35 +52,24 @@ def inelastic_cells(grid: Grid) -> list[tuple[Layout, Index]]:
     return [(layout, np.array(cells)) for layout, cells in groups.items()]
 
 
-class Strains:
-    """(Σ, Γ, K) in the points of the cells of some fields.
+class _Forms(NamedTuple):
+    """Virtual work of resultants r; the same of b + D e around an iterate, and its derivative."""
 
-    Attributes:
-        kernel: Strains times the weights of the points.
-        shape: Cells, and three times the points in each.
-    """
+    work: ufl.Form
+    around: ufl.Form
+    tangent: ufl.Form
+    r: fem.Function
+    b: fem.Function
+    D: fem.Function
 
-    def __init__(self, fields: Fields) -> None:
-        q = fields.configuration()
-        z = ufl.TestFunction(fields.at_points(3).function_space)
-        weighted = ufl.dot(strain(q, fields.axis), z) / fields.axis.h
-        self.kernel = fields.hot_kernel(weighted * fields.dx(1), q)
-        self._weights = np.repeat(fields.share.grid.mesh.point_weights, 3)
-        self.shape = (len(fields.order), len(self._weights))
 
-    def __call__(self, q: Array) -> Array:
-        """Strains at ``q``, in the order of the mesh, point after point; 1, 1, 1/m."""
-        return self._weighted(q) / self._weights
-
-    def mean(self, q: Array) -> Array:
-        """Means of the cells at ``q``, in the order of the mesh; (num_cells, 3); 1, 1, 1/m."""
-        in_points = self._weighted(q).reshape(self.shape[0], self.shape[1] // 3, 3)
-        return np.asarray(in_points.sum(axis=1))
-
-    def _weighted(self, q: Array) -> Array:
-        strains = np.zeros(self.shape)
-        self.kernel.add(q, strains)
-        return strains
+@stated
+def _forms(of: Element, scheme: Scheme) -> _Forms:
+    r, b, D = of.at_points(3), of.at_points(3), of.at_points(3, 3)
+    w_e, dx = scheme.virtual_strain(of.q0, of.q1, of.w, of.axis), of.dx(1)
+    around = ufl.dot(b + ufl.dot(D, strain(of.q1, of.axis)), w_e) * dx
+    tangent = ufl.derivative(around, of.q1, ufl.TrialFunction(of.space))
+    return _Forms(ufl.dot(r, w_e) * dx, around, tangent, r, b, D)  # P(34)
 
 
 class InelasticBeams:
@@ -104,34 +97,30 @@ class InelasticBeams:
         self._strains = Strains(fields)
         cells, n = len(fields.order), len(layout.weights)
         # Internal variables and numbers of the points: one function in their quadrature space.
-        self._variables = fields.at_points(n * len(INPUTS))
+        width = len(inputs(layout.statement))
+        self._variables = fields.variables(n * width)
         self.points = Points(
             layout,
             fields.share.grid.keys(self._cells),
             fields.share.cell_lengths()[fields.order],
             scheme,
-            self._variables.x.array.reshape(cells, n, len(INPUTS)),
+            self._variables.x.array.reshape(cells, n, width),
             course,
         )
 
-        q0, q1 = fields.configuration(), fields.configuration()
-        r, b, D = fields.at_points(3), fields.at_points(3), fields.at_points(3, 3)
-        w, axis = ufl.TestFunction(fields.space), fields.axis
-        w_e, dx = scheme.virtual_strain(q0, q1, w, axis), fields.dx(1)
-        around = ufl.dot(b + ufl.dot(D, strain(q1, axis)), w_e) * dx
-        derivative = ufl.derivative(around, q1, ufl.TrialFunction(fields.space))
-        self._q0, self._q1, self._b, self._D = q0, q1, b, D
-        self._fields, self._around = fields, around
+        forms = _forms(fields.element, scheme)
+        self._q0, self._q1 = fields.element.q0, fields.element.q1
+        self._b, self._D, self._fields, self._around = forms.b, forms.D, fields, forms.around
         self._force, self._tangent = (
-            fields.hot_kernel(form, q1)
-            for form in (ufl.dot(r, w_e) * dx, derivative)  # P(34)
+            fields.hot_kernel(form, self._q1) for form in (forms.work, forms.tangent)
         )
         self._tangent.place(A)
         self._latest: Array = np.full(fields.share.size, np.nan)
         self._in_c = c = ffi.new("inelastic *")
         c.points, c.strains = self.points.points, self._strains.kernel.cells
         c.force, c.tangent = self._force.cells, self._tangent.cells
-        c.at_r, c.at_b, c.at_D = self._force.position(r), *map(self._tangent.position, (b, D))
+        c.at_r = self._force.position(forms.r)
+        c.at_b, c.at_D = map(self._tangent.position, (forms.b, forms.D))
         self._at_latest = doubles(self._latest)
         c.size, c.latest = len(self._latest), self._at_latest
         self._q: Array = np.empty(0)
@@ -215,7 +204,7 @@ class InelasticBeams:
         self._latest.fill(np.nan)
 
     def hold(self) -> None:
-        """Take back :meth:`release`."""
+        """Close again the points that :meth:`release` opened."""
         self.points.hold()
 
     def freeze(self) -> None:
@@ -232,7 +221,7 @@ class InelasticBeams:
         self.points.enter_losses(self._ledger)
 
     def add_state(self, q: Array) -> None:
-        """Stored energy."""
+        """Add the stored energy to the ledger."""
         if q is not self._q:
             self._q = q
             strains = self._strains(q)
@@ -241,7 +230,7 @@ class InelasticBeams:
         self.points.enter_stored(self._ledger)
 
     def remember(self, memory: Memory, q: Array) -> None:
-        """Internal variables."""
+        """Save or restore the internal variables."""
         self.restore(self._cells, memory.rows("cells", *self.state()))
         self._q = q
 

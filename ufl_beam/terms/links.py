@@ -6,12 +6,15 @@ from __future__ import annotations
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
+from ufl_beam.compiled.c_library import Loop
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.partition import Share
 from ufl_beam.model.connectors import Connector
+from ufl_beam.terms.base import Beams
+from ufl_beam.terms.openings import Openable
 
 
-class Links:
+class Links(Beams):
     """Connectors that are alike; each has a force among the unknowns.
 
     Args:
@@ -25,6 +28,8 @@ class Links:
         work: That they have taken since the beginning; (num_links,); J.
         rate: Mean rate of the motions in the last step; (num_links,); m/s or rad/s.
     """
+
+    kind = "connectors"
 
     def __init__(self, share: Share, here: Index, A: Csr) -> None:
         self.numbers: Index = share.links[here]
@@ -40,6 +45,26 @@ class Links:
         """Forces that resist the growth of the motions; (num_links,); N or N m."""
         return q[self._forces_at]
 
+    def motion(self, q: Array) -> Array:
+        """Relative motions at ``q``; (num_links,); m or rad."""
+        raise NotImplementedError
+
+    def rates(self, q: Array, v: Array) -> Array:
+        """Rates of the motions at ``q`` if the velocities are ``v``; (num_links,); m/s or rad/s."""
+        return np.zeros(len(self.links))
+
+    def shown_motion(self, q: Array) -> Array:
+        """Motions of the accepted state ``q`` as solutions show them; (num_links,); m or rad."""
+        return self.motion(q)
+
+    def demand(self) -> Loop | None:
+        """Return the C function of :meth:`excess` with its data, if there is one."""
+        return None
+
+    def excess(self, q: Array, r: Array, force: float, moved: float) -> float:
+        """Largest residual of a law, without dimension, see :meth:`Equation.missed`."""
+        raise NotImplementedError
+
     def again(self) -> None:
         """Begin the step again: forget what its iterates have tried."""
 
@@ -49,3 +74,33 @@ class Links:
     def take(self, q: Array) -> None:
         """Take the forces in ``q`` as those before the next step."""
         self._before[:] = self.force(q)
+
+    # -- yielding, which most laws do not know -------------------------------------------------
+
+    def flows(self) -> bool:
+        """Return whether a connector of this process slips plastically in the latest iterate."""
+        return False
+
+    def dissipation(self, q1: Array) -> float:
+        """Energy that connectors of this process dissipate plastically in the step to ``q1``; J."""
+        return 0.0
+
+    def dissipated(self) -> Array:
+        """Energy that each connector has dissipated by yielding and softening; (num_links,); J."""
+        return np.zeros(len(self.links))
+
+    def effort(self, q1: Array) -> float:
+        """Sum of the sizes of the works that the connectors take in the step to ``q1``; J."""
+        return 0.0
+
+    def remaining(self) -> Array:
+        """Part of the elastic stiffness that is left in the latest iterate; (num_links,)."""
+        return np.ones(len(self.links))
+
+    @property
+    def openable(self) -> Openable | None:
+        """Connectors that open beyond a limit, if there are."""
+        return None
+
+    def freeze(self) -> None:
+        """From now on nothing yields or breaks further."""

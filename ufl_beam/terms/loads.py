@@ -13,11 +13,12 @@ import numpy.typing as npt
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, loop
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.bodies import carries
-from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, value_at
+from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad
+from ufl_beam.model.time_functions import value_at
 from ufl_beam.terms.energy_ledger import Ledger
 
 
@@ -66,7 +67,7 @@ class DeadLoads:
         self._values = self._in_c.values = doubles(self.force)
 
     def loops(self) -> tuple[Loop, Loop | None]:
-        """A vector."""
+        """C loop that subtracts the load vector; no tangent."""
         return loop("subtract_vector", self._in_c), None
 
     def carry_on(self, t: float, q: Array) -> Array:
@@ -86,7 +87,7 @@ class DeadLoads:
         return force
 
     def add_residual(self, q1: Array, r: Array) -> None:
-        """Subtract the loads."""
+        """Subtract the loads from the residual."""
         r -= self.force
 
     def add_tangent(self, q1: Array) -> None:
@@ -180,10 +181,10 @@ class FollowerLoads:
         return cos * x - sin * y, sin * x + cos * y
 
     def loops(self) -> None:
-        """None."""
+        """None: follower loads are evaluated in Python."""
 
     def add_residual(self, q1: Array, r: Array) -> None:
-        """Subtract the loads."""
+        """Subtract the loads from the residual."""
         self.force = self._in_plane(q1)
         r -= self.force
 

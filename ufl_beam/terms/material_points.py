@@ -13,33 +13,27 @@ from ufl.conditional import Condition
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import doubles, ffi, integers, lib
-from ufl_beam.discretization.compiled_functions import Pointwise
+from ufl_beam.compiled.c_library import doubles, ffi, in_order, integers, lib, names
+from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.mechanics.time_schemes import Scheme
-from ufl_beam.model import material_laws
-from ufl_beam.model.material_laws import Bulk, Layout, Softening
+from ufl_beam.model import law_functions
+from ufl_beam.model.fibres import Layout
+from ufl_beam.model.material_laws import Bulk, Softening
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.openings import NOTHING, RELEASED, SPENT, Course
 
-material_laws.where.register(Condition, ufl.conditional)
-material_laws.below.register(Expr, ufl.lt)
-material_laws.exp.register(Expr, ufl.exp)
+law_functions.where.register(Condition, ufl.conditional)
+law_functions.below.register(Expr, ufl.lt)
+law_functions.exp.register(Expr, ufl.exp)
 
-INPUTS = (
-    # what an iterate changes: strain at the end, growth of the opening and its direction
-    *("strain", "growth", "direction"),
-    # the state at t_n: resistance, strain, plastic strain and its sum, jump and its sum
-    *("traction", "before", "p", "ξ", "jump", "opening"),
-    # 1 if the opening grew in the last step, 2 if it may in this one, else 0
-    "flows",
-    # numbers of the point; the order of these so far is that of loops.c
-    *("C", "length", "θ", "dt", "limit", "H", "B", "eta", "softening limit", "softening energy"),
-)
-"""Inputs of the law of a point, in the order of their storage."""
 
-SPENT, NOTHING = 1e-6, 1e-30
-"""Part of its limit below which an open hinge counts as a joint; factor of its stiffness then."""
+def inputs(bulk: type[Bulk]) -> tuple[str, ...]:
+    """Inputs of the law of a point, as they are stored; the first ones are those of loops.h."""
+    others = ("dt", *bulk.numbers(), "softening limit", "softening energy")
+    return (*names("point_input"), *others)
 
-STATE = ("p", "ξ", "jump", "opening", "before", "traction", "flows")
+
+STATE = ("plastic", "accumulated", "jump", "opening", "before", "traction", "flows")
 """The internal variables, and what else of an accepted state the next step depends on."""
 
 
@@ -55,10 +49,16 @@ def expect_entries(layout: Layout, scheme: Scheme, ledger: Ledger) -> None:
         ledger.lost["numerical"] += 0.0
 
 
+def point_forms(bulk: type[Bulk], softening: Softening | None, scheme: Scheme) -> PointForms:
+    """Compiled laws of points, made once in a process; numbers of ``softening`` do not matter."""
+    return _point_forms(bulk, softening and softening.of(1.0, 1.0), scheme)
+
+
 class PointForms:
     """Compiled laws: C functions from the inputs of a point to what the loops need.
 
     Args:
+        statement: Law of the bulk.
         softening: Law of the discontinuities, if points can break; its numbers do not matter.
         scheme: The time scheme.
 
@@ -67,15 +67,16 @@ class PointForms:
         opening: The same of a point that opens, its growth being known.
         excess: What the bulk bears more than the discontinuity resists, and its derivative by the
             growth.
-        end: What the end of the step brings; the order is that of loops.c.
+        end: What the end of the step brings, see ``point_output`` in loops.h.
     """
 
-    def __init__(self, softening: Softening | None, scheme: Scheme) -> None:
-        self._pointwise = pointwise = Pointwise(INPUTS)
+    def __init__(self, statement: type[Bulk], softening: Softening | None, scheme: Scheme) -> None:
+        self._pointwise = pointwise = Pointwise(inputs(statement))
         at = pointwise.at
         strain, a = ufl.variable(at["strain"]), ufl.variable(at["growth"])
-        s, p, ξ, length, θ, dt = (at[n] for n in ("direction", "p", "ξ", "length", "θ", "dt"))
-        bulk = Bulk(at["C"], at["limit"], at["H"], at["B"], at["eta"])
+        s, p, ξ, length = (at[n] for n in ("direction", "plastic", "accumulated", "length"))
+        θ, dt = at["theta"], at["dt"]
+        bulk = statement(at["stiffness"], *(at[name] for name in statement.numbers()))
 
         # The incompatible mode: a jump relaxes the strain of the bulk by jump over length.
         relieved = at["jump"] / length
@@ -97,51 +98,20 @@ class PointForms:
             self.excess = pointwise.compile(excess, ufl.diff(excess, a))
             broken = a * law.mean_traction(at["opening"], a)
             traction = law.traction(at["opening"] + a)
-        self.end = pointwise.compile(
-            dp,
-            bulk.dissipation(dp, dt),
-            broken,
-            bulk.elastic_energy(e1 - e0) + bulk.hardening_energy(dp, dp),
-            bulk.elastic_energy(e1),
-            bulk.hardening_energy(p + dp, ξ + abs(dp)),
-            bulk.stress(e1, 0),
-            traction,
-        )
+        end = {
+            "flow": dp,
+            "worked": bulk.dissipation(dp, dt),
+            "broken": broken,
+            "lost": bulk.elastic_energy(e1 - e0) + bulk.hardening_energy(dp, dp),
+            "elastic": bulk.elastic_energy(e1),
+            "hardening": bulk.hardening_energy(p + dp, ξ + abs(dp)),
+            "stress": bulk.stress(e1, 0),
+            "resistance": traction,
+        }
+        self.end = pointwise.compile(*in_order("point_output", end))
 
 
-OPENED, RELIEF, HOLD, OVER = range(4)
-"""Entries of :attr:`Course.flags`; the order in loops.c."""
-
-RELEASED = 2.0
-"""Value of "flows" of a point that may open in this step although it did not flow in the last."""
-
-
-class Course:
-    """Flags that all points of a scene share in a step.
-
-    Attributes:
-        flags: Of the present search for an equilibrium; (4,), int32.  OPENED: a point has opened.
-            RELIEF: points that do not open answer elastically.  HOLD: points that do not flow stay
-            closed.  OVER: one of them has borne more than its limit.
-    """
-
-    def __init__(self) -> None:
-        self.flags: Index = np.zeros(4, dtype=np.int32)
-        self._first: tuple[Index, Index] = (self.flags.copy(), self.flags.copy())
-        self._first[True][HOLD] = 1
-
-    def begin(self, hold: bool) -> None:
-        """Begin a search for an equilibrium."""
-        self.flags[:] = self._first[hold]
-
-    @property
-    def opened(self) -> bool:
-        """True if a point of this process has opened."""
-        return bool(self.flags[OPENED])
-
-    def relieve(self, relief: bool) -> None:
-        """Let points that do not open answer elastically, or no more."""
-        self.flags[RELIEF] = relief
+_point_forms = stated(PointForms)
 
 
 class Points:
@@ -152,7 +122,7 @@ class Points:
         keys: For each cell two numbers that random limits depend on, besides their seed.
         length: Of the cells; (cells,); m.
         scheme: The time scheme.
-        storage: Zeros, for all that is known of the points; (cells, n, len(INPUTS)).
+        storage: Zeros, for all that is known of the points; (cells, n, number of inputs).
         course: Shared by all points of a scene.
 
     Attributes:
@@ -179,16 +149,16 @@ class Points:
         course: Course | None = None,
     ) -> None:
         course = course or Course()
-        self._forms = PointForms(layout.softening, scheme)
+        self._forms = point_forms(layout.statement, layout.softening, scheme)
         self._layout, self._storage, self._loss = layout, storage, scheme.loss
         self._yields, self.softens = layout.yields, layout.softening is not None
-        self._at = {name: storage[:, :, i] for i, name in enumerate(INPUTS)}
+        self._at = {name: storage[:, :, i] for i, name in enumerate(inputs(layout.statement))}
         self._bulk = bulk = layout.bulk(keys)
-        numbers = {"C": bulk.C, "limit": bulk.limit, "H": bulk.H, "B": bulk.B, "eta": bulk.eta}
-        for name, value in numbers.items():
-            self._at[name][:] = value
+        self._at["stiffness"][:] = bulk.C
+        for name in bulk.numbers():
+            self._at[name][:] = getattr(bulk, name)
         self._at["length"][:] = length[:, None]
-        self._at["θ"][:] = scheme.theta
+        self._at["theta"][:] = scheme.theta
         self._steps = self._at["dt"]
         self._steps[:] = self._dt = 1.0
         self._at["softening energy"][:] = 1.0
@@ -199,8 +169,9 @@ class Points:
                 self._at[f"softening {name}"][:, layout.breaking] = value
             self._resist()
 
-        cells, n, _ = storage.shape
-        self.kept, self.sums = np.zeros((cells, 6)), np.zeros(7)
+        cells = len(storage)
+        self.kept = np.zeros((cells, int(lib.POINT_KEPT)))
+        self.sums = np.zeros(int(lib.POINT_SUMS))
         self.r, self.D = np.zeros((cells, 3)), np.zeros((cells, 9))
         self._e0, self.strains = np.zeros((cells, 3)), np.zeros((cells, 3))
         self._over = np.zeros(1)
@@ -219,7 +190,7 @@ class Points:
         c.B, c.weight, c.rest, c.length = self._alive[:4]
         c.e0, c.e1, c.w, c.r, c.D, c.kept, c.sum, c.course, c.over = self._alive[4:]
         c.bulk, c.opening, c.excess, c.end = forms.bulk, forms.opening, forms.excess, forms.end
-        c.cells, c.of_cell, c.theta = cells, n, scheme.theta
+        c.cells, c.of_cell, c.width, c.theta = *storage.shape, scheme.theta
 
     def __getitem__(self, name: str) -> Array:
         """Return the values of an input at the points, by its name; a view; (cells, n)."""
@@ -263,7 +234,7 @@ class Points:
         lib.release(self.points, least)
 
     def hold(self) -> None:
-        """Take back :meth:`release`."""
+        """Close again the points that :meth:`release` opened."""
         flows = self["flows"]
         flows[flows == RELEASED] = 0.0
 
@@ -273,9 +244,9 @@ class Points:
         Args:
             change: Small changes of the strains of the cells; (cells, 3).
         """
-        layout, stiffness = self._layout, self._at["θ"][0, 0] * self._at["C"]
+        layout, stiffness = self._layout, self._at["theta"][0, 0] * self._at["stiffness"]
         by_point = change @ layout.strains.T
-        elastic = self._at["θ"][0, 0] * change**2 @ layout.rest
+        elastic = self._at["theta"][0, 0] * change**2 @ layout.rest
         elastic += (stiffness * by_point**2) @ layout.weights
         now = np.einsum("ci,cij,cj->c", change, self.D.reshape(-1, 3, 3), change)
         return np.asarray(np.divide(now, elastic, out=np.ones(len(now)), where=elastic > 0))
@@ -318,7 +289,7 @@ class Points:
         if softening is not None:
             borne, limit = (self[name][:, breaking] for name in ("traction", "softening limit"))
             spent = np.isfinite(limit) & (borne <= SPENT * limit)
-            self["C"][:, breaking] *= np.where(spent, NOTHING, 1.0)
+            self["stiffness"][:, breaking] *= np.where(spent, NOTHING, 1.0)
         self["traction"][:] = self["limit"][:] = np.inf
 
     # -- the ledger ----------------------------------------------------------------------------
@@ -368,9 +339,10 @@ class Points:
         e = strains @ layout.strains.T - self["jump"] / self["length"]
         volume = layout.weights * length
         self.kept[:, :3] = (
-            layout.rest * strains + (layout.weights * bulk.stress(e, self["p"])) @ layout.strains
+            layout.rest * strains
+            + (layout.weights * bulk.stress(e, self["plastic"])) @ layout.strains
         )
-        self.sums[3] = np.sum(volume * bulk.elastic_energy(e - self["p"])) + np.sum(
+        self.sums[3] = np.sum(volume * bulk.elastic_energy(e - self["plastic"])) + np.sum(
             strains**2 @ layout.rest / 2 * length[:, 0]
         )
-        self.sums[4] = np.sum(volume * bulk.hardening_energy(self["p"], self["ξ"]))
+        self.sums[4] = np.sum(volume * bulk.hardening_energy(self["plastic"], self["accumulated"]))

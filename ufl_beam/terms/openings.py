@@ -15,9 +15,11 @@ from typing import Protocol
 
 from mpi4py import MPI
 
-from ufl_beam.arrays import Array
+import numpy as np
+
+from ufl_beam.arrays import Array, Index
+from ufl_beam.compiled.c_library import lib
 from ufl_beam.errors import StepFailed
-from ufl_beam.terms.material_points import OVER, Course
 
 FALL = 0.7
 """Held places open from the largest excess over their limit on, then from this part of it on, ...
@@ -35,6 +37,45 @@ processes.
 """
 
 
+OPENED, RELIEF, HOLD, OVER = (lib.OPENED, lib.RELIEF, lib.HOLD, lib.OVER)
+"""Entries of :attr:`Course.flags`."""
+
+
+SPENT, NOTHING = 1e-6, 1e-30
+"""Part of its limit below which an open hinge counts as a joint; factor of its stiffness then."""
+
+RELEASED = float(lib.RELEASED)
+"""Value of "flows" of a point that may open in this step although it did not flow in the last."""
+
+
+class Course:
+    """Flags that all points of a scene share in a step.
+
+    Attributes:
+        flags: Of the present search for an equilibrium; (4,), int32.  OPENED: a point has opened.
+            RELIEF: points that do not open answer elastically.  HOLD: points that do not flow stay
+            closed.  OVER: one of them has borne more than its limit.
+    """
+
+    def __init__(self) -> None:
+        self.flags: Index = np.zeros(lib.COURSE_FLAGS, dtype=np.int32)
+        self._first: tuple[Index, Index] = (self.flags.copy(), self.flags.copy())
+        self._first[True][HOLD] = 1
+
+    def begin(self, hold: bool) -> None:
+        """Begin a search for an equilibrium."""
+        self.flags[:] = self._first[hold]
+
+    @property
+    def opened(self) -> bool:
+        """True if a point of this process has opened."""
+        return bool(self.flags[OPENED])
+
+    def relieve(self, relief: bool) -> None:
+        """Let points that do not open answer elastically, or no more."""
+        self.flags[RELIEF] = relief
+
+
 class Openable(Protocol):
     """Places of one kind that open beyond a limit, and are held closed while HOLD is set."""
 
@@ -46,7 +87,7 @@ class Openable(Protocol):
         """Let held places open from now on whose excess is at least so large."""
 
     def hold(self) -> None:
-        """Take back :meth:`release`."""
+        """Close again the points that :meth:`release` opened."""
 
 
 class Openings:

@@ -17,25 +17,23 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import doubles, ffi, integers, lib
-from ufl_beam.discretization.compiled_functions import Pointwise
+from ufl_beam.compiled.c_library import doubles, ffi, in_order, integers, lib, names
+from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.mechanics.time_schemes import Scheme, Step
-from ufl_beam.model.beams import Place
+from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import RigidPlastic
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.material_laws import Bulk, Hardening, Softening
+from ufl_beam.model.material_laws import Hardening, HardeningBulk, Softening
 from ufl_beam.model.plastic_hinges import law_of
-from ufl_beam.terms.connector_laws import Rows, Setting
-from ufl_beam.terms.material_points import NOTHING, RELEASED, SPENT
-from ufl_beam.terms.openings import Openable
+from ufl_beam.terms.connector_responses import Rows, Setting, respond
+from ufl_beam.terms.openings import NOTHING, RELEASED, SPENT, Openable
 
 INPUTS = (
-    *("slip", "direction", "slipped", "start"),
+    *names("slip_input", "slip_"),
     *("θ", "dt", "limit", "energy", "H", "B", "eta"),
 )
 """Inputs of the compiled laws: the slip of the step and its direction (1 or -1); accumulated slip
-and motion at t_n; numbers of the scheme and the law.  The first four are those of rigid_plastic.c.
-"""
+and motion at t_n, which loops.h names as well; numbers of the scheme and the law."""
 
 
 class Slip(NamedTuple):
@@ -75,7 +73,7 @@ def _(law: Softening, at: Mapping[str, Expr], scheme: Scheme) -> Slip:
 @slip.register
 def _(law: Hardening, at: Mapping[str, Expr], scheme: Scheme) -> Slip:
     a, ξ, s, e, θ, H, B = (at[n] for n in ("slip", "slipped", "direction", "start", "θ", "H", "B"))
-    numbers = Bulk(0.0, at["limit"], H, B, at["eta"])
+    numbers = HardeningBulk(0.0, at["limit"], H, B, at["eta"])
     resistance = at["limit"] + H * (ξ + θ * a) + at["eta"] * a / at["dt"]
     return Slip(
         s * resistance + B * (e + θ * s * a),
@@ -129,21 +127,31 @@ def _slope(link: Connector, size: float) -> float:
 
 
 class SlipForms:
-    """Compiled laws of slip: C functions of :data:`INPUTS`.
+    """Compiled laws of slip: C functions of :data:`INPUTS`; see :func:`slip_forms`.
 
     Attributes:
         force: Force in the step, and its derivative by the slip.
-        end: Numbers that the end of the step brings; the order is that of rigid_plastic.c.
+        end: Numbers that the end of the step brings, see ``slip_output`` in loops.h.
     """
 
     def __init__(self, law: Softening | Hardening, scheme: Scheme) -> None:
         self._pointwise = pointwise = Pointwise(INPUTS)
         at = {**pointwise.at, "slip": ufl.variable(pointwise.at["slip"])}
-        force, *end = slip(law, at, scheme)
+        end = slip(law, at, scheme)._asdict()
+        force = end.pop("force")
         self.force = pointwise.compile(force, ufl.diff(force, at["slip"]))
-        self.end = pointwise.compile(*end)
+        self.end = pointwise.compile(*in_order("slip_output", end, "slip_"))
 
 
+_slip_forms = stated(SlipForms)
+
+
+def slip_forms(law: Softening | Hardening, scheme: Scheme) -> SlipForms:
+    """Compiled laws of slip, made once in a process; numbers of ``law`` do not matter."""
+    return _slip_forms(Hardening(1.0) if isinstance(law, Hardening) else law.of(1.0, 1.0), scheme)
+
+
+@respond.register(RigidPlastic)
 class RigidPlasticResponse:
     """Rigid-plastic connectors whose laws are of one kind."""
 
@@ -158,7 +166,7 @@ class RigidPlasticResponse:
             ledger.state["hardening"] += 0.0
             if setting.scheme.loss:
                 ledger.lost["numerical"] += 0.0
-        self._forms = SlipForms(law.law, setting.scheme)
+        self._forms = slip_forms(law.law, setting.scheme)
         self._storage = np.zeros((n, len(INPUTS)))
         self._at = {name: self._storage[:, i] for i, name in enumerate(INPUTS)}
         for i, link in enumerate(links):
@@ -170,7 +178,7 @@ class RigidPlasticResponse:
         self._rows, self._sums, self._stored = np.zeros((n, 3)), np.zeros(3), 0.0
         self.dissipated: Array = np.zeros(n)
         self._excess = np.zeros(n)
-        self._slope = np.array([_slope(link, setting.simulation.scene.size) for link in links])
+        self._slope = np.array([_slope(link, setting.size) for link in links])
         self._c = c = ffi.new("rigid_plastic *")
         c.force, c.end, c.number, c.width = self._forms.force, self._forms.end, n, len(INPUTS)
         arrays = (self._storage, self._limit, self._back_force, self.dissipated, self._rows)
@@ -196,7 +204,7 @@ class RigidPlasticResponse:
         return self._rows[:, 0], self._rows[:, 1], self._rows[:, 2]
 
     def accept(self, e1: Array, work: float) -> None:
-        """Commit the slips."""
+        """Commit the slips of the step."""
         lib.commit_rigid_plastic(self._c, doubles(e1), doubles(self._sums))
         self._way_before[:] = self._way * self._slipped
         dissipated, lost, self._stored = self._sums.tolist()
@@ -226,7 +234,7 @@ class RigidPlasticResponse:
         self._slipped[(self._excess > 0) & (self._excess >= least)] = RELEASED
 
     def hold(self) -> None:
-        """Take back :meth:`release`."""
+        """Close again the slips that :meth:`release` opened."""
         self._slipped[:] = np.abs(self._way_before)
 
     # -- energies ------------------------------------------------------------------------------
@@ -274,7 +282,7 @@ class RigidPlasticResponse:
         return np.column_stack([*self._variables, stored])
 
     def restore(self, rows: Array) -> None:
-        """Take over :meth:`state`."""
+        """Restore the variables that :meth:`state` returned."""
         *variables, stored = rows.T
         for mine, values in zip(self._variables, variables, strict=True):
             mine[:] = values

@@ -8,24 +8,24 @@ import ufl
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.csr import Csr, Product
-from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.discretization.compiled_forms import stated
+from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.kinematics import split, turn
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.loads import RotatingFrame
-from ufl_beam.terms.beams import mass_matrix
 from ufl_beam.terms.energy_ledger import Ledger
+
+
+@stated
+def _turned_mass(of: Element) -> ufl.Form:
+    (u, _), (w_u, _) = split(ufl.TrialFunction(of.space)), split(of.w)
+    return of.inertia[0] * ufl.dot(turn(u), w_u) * of.dx_of_mass()
 
 
 def turned_mass_matrix(fields: Fields) -> Csr:
     """Mass times a quarter turn of velocities, so that 2 Ω of it times them is Coriolis' force."""
-    share = fields.share
-    (u, _), (w_u, _) = (split(f(fields.space)) for f in (ufl.TrialFunction, ufl.TestFunction))
-    G = fields.matrix()
-    work = fields.inertia()[0] * ufl.dot(turn(u), w_u) * fields.dx_of_mass()
-    kernel = fields.kernel(work, fields.configuration())
-    kernel.place(G)
-    kernel.add(np.zeros(share.size), G.data)
+    share, G = fields.share, fields.assembled(_turned_mass(fields.element))
     scene = share.grid.scene
     lumps = [(share.at(one.place), one.mass) for one in scene.masses]
     lumps += [(share.at(one.middle), one.mass) for one in scene.bodies]
@@ -85,17 +85,17 @@ class FrameForces:
         return self.force
 
     def loops(self) -> None:
-        """None."""
+        """None: frame forces are evaluated in Python."""
 
     def add_residual(self, q1: Array, r: Array) -> None:
-        """Subtract the forces."""
+        """Subtract centrifugal and Coriolis forces from the residual."""
         q: Array = self._q0 + self._share_of_end * (q1 - self._q0)
         self.force = self._growth * self._pull(self._from_centre + q)
         r -= self.force
         r += self._turn(q1 - self._q0) / self._dt
 
     def add_tangent(self, q1: Array) -> None:
-        """Subtract the derivative."""
+        """Subtract the derivative of the forces from the tangent."""
         self._A.data -= self._growth * self._share_of_end * self._S
         self._A.data += self._G / self._dt
 

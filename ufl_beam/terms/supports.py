@@ -9,12 +9,12 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr, as_slice
-from ufl_beam.discretization.dof_numbering import Share
+from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.bodies import GROUND
-from ufl_beam.model.loads import TimeFunction, value_at
 from ufl_beam.model.supports import Support
+from ufl_beam.model.time_functions import TimeFunction, value_at
 from ufl_beam.terms.energy_ledger import Ledger
 
 
@@ -167,7 +167,7 @@ class Supports:
         self._before = self.reactions.copy()
 
     def carry_on(self, memory: Memory, q: Array) -> None:
-        """The reactions."""
+        """Save or restore the reactions."""
         reactions: Array = np.zeros(len(q))
         reactions[self._held] = self._before if self._motions else self.reactions
         self.reactions[:] = memory.at_dofs("reactions", reactions)[self._held]

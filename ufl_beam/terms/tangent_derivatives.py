@@ -5,39 +5,30 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
+from typing import NamedTuple
 
 import ufl
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.compiled_forms import Kernel
+from ufl_beam.discretization.compiled_forms import Kernel, stated
 from ufl_beam.dolfinx_compat import fem
 
 Compile = Callable[[ufl.Form], Kernel]
 
 
 class TangentChange:
-    """Derivative of a tangent by the configuration, along a direction; derived by UFL.
+    """Derivative of a tangent by the configuration, along a direction.
 
     Args:
-        tangent: Bilinear form of the tangent.
-        q1: The configuration that it depends on.
-        kernel: Compiles a form; ``q1`` is the configuration that changes.
+        change: Bilinear form of the derivative.
+        u: The direction.
+        kernel: Compiles a form.
         A: Matrix that takes the derivative.
-        more: Form to be added, made from the direction.
     """
 
-    def __init__(
-        self,
-        tangent: ufl.Form,
-        q1: fem.Function,
-        kernel: Compile,
-        A: Csr,
-        more: Callable[[fem.Function], ufl.Form] | None = None,
-    ) -> None:
-        self._u, self._A = fem.Function(q1.function_space), A
-        change = ufl.derivative(tangent, q1, self._u)
-        self._kernel = kernel(change if more is None else change + more(self._u))
+    def __init__(self, change: ufl.Form, u: fem.Function, kernel: Compile, A: Csr) -> None:
+        self._u, self._A, self._kernel = u, A, kernel(change)
         self._kernel.place(A)
 
     def put(self, function: fem.Function, values: Array) -> None:
@@ -49,6 +40,26 @@ class TangentChange:
         """Add the derivative at ``q1`` along ``u`` to the matrix."""
         self._kernel.set(self._u, u)
         self._kernel.add(q1, self._A.data)
+
+
+class _Works(NamedTuple):
+    """Works of a tangent and of its derivative along u, for the motion x on y."""
+
+    tangent: ufl.Form
+    change: ufl.Form
+    matrix: ufl.Form
+    x: fem.Function
+    y: fem.Function
+    u: fem.Function
+
+
+@stated
+def _works(work: ufl.Form, q1: fem.Function) -> _Works:
+    x, y, u = (fem.Function(q1.function_space) for _ in range(3))
+    tangent = ufl.derivative(work, q1, ufl.TrialFunction(q1.function_space))
+    action = ufl.action(ufl.derivative(work, q1, x), y)
+    change = ufl.derivative(action, q1, u)
+    return _Works(action, change, ufl.derivative(tangent, q1, u), x, y, u)
 
 
 class CellTangent:
@@ -65,27 +76,20 @@ class CellTangent:
     """
 
     def __init__(self, work: ufl.Form, q1: fem.Function, kernel: Compile, A: Csr) -> None:
-        self._work, self._q1, self._compile, self._A = work, q1, kernel, A
-        self._x, self._y, self._u = (fem.Function(q1.function_space) for _ in range(3))
+        self._forms, self._compile, self._A = _works(work, q1), kernel, A
         self._values: dict[fem.Function, Array] = {}
 
     @cached_property
     def _matrix(self) -> TangentChange:
-        dq = ufl.TrialFunction(self._q1.function_space)
-        tangent = ufl.derivative(self._work, self._q1, dq)
-        return TangentChange(tangent, self._q1, self._compile, self._A)
-
-    @property
-    def _action(self) -> ufl.Form:
-        return ufl.action(ufl.derivative(self._work, self._q1, self._x), self._y)
+        return TangentChange(self._forms.matrix, self._forms.u, self._compile, self._A)
 
     @cached_property
     def _of_tangent(self) -> Kernel:
-        return self._compile(self._action)
+        return self._compile(self._forms.tangent)
 
     @cached_property
     def _of_change(self) -> Kernel:
-        return self._compile(ufl.derivative(self._action, self._q1, self._u))
+        return self._compile(self._forms.change)
 
     def put(self, function: fem.Function, values: Array) -> None:
         """Give a coefficient values in the cells."""
@@ -103,13 +107,13 @@ class CellTangent:
 
     def work_of_change(self, q1: Array, u: Array, x: Array, y: Array) -> float:
         """Work of the derivative of the tangent at ``q1`` along u, for the motion x on y; J."""
-        self._of_change.set(self._u, u)
+        self._of_change.set(self._forms.u, u)
         return self._value(self._of_change, q1, x, y)
 
     def _value(self, kernel: Kernel, q1: Array, x: Array, y: Array) -> float:
         for function, values in self._values.items():
             if kernel.uses(function):
                 kernel.put(function, values)
-        kernel.set(self._x, x)
-        kernel.set(self._y, y)
+        kernel.set(self._forms.x, x)
+        kernel.set(self._forms.y, y)
         return kernel.value(q1)

@@ -13,16 +13,19 @@ typedef struct {
 
 /* -- forms and constant matrices --------------------------------------------------------------- */
 
+enum { MOST_ENTRIES = 144 }; /* of the vector or matrix of a cell: 12 unknowns of degree 3 */
+
 /* A compiled form on some cells. w holds the packed coefficients of a cell, `width` of them, of
  * which those from `at` on are the unknowns of the cell, brought up to date on the way.
  *
- * Where a form is computed for several cells at once, in_lanes does what add_cells does, and numbers
+ * Where a form is computed for several cells at once, `several` does what add_cells does, and numbers
  * of cells (w, coordinates, row) come in batches of as many cells: the first number of each of these
  * cells, then their second numbers, and so on; the last batch is filled up with the last cell. */
 typedef struct cells cells;
+typedef void (in_lanes)(const cells *self, const double *q, double *out);
 struct cells {
   kernel *tabulate;
-  void (*in_lanes)(const cells *self, const double *q, double *out); /* or none */
+  in_lanes *several; /* or none */
   int lanes; /* cells of a batch, a power of two; else 1 */
   int number, of_cell, unknowns; /* cells, degrees of freedom of each, those the form depends on */
   const int32_t *dofs;
@@ -62,8 +65,8 @@ void add_first_cells(void *self, const double *q, double *b);
 void subtract_vector(void *self, const double *q, double *b);
 void add_step_force(void *self, const double *q, double *r);
 void add_step_tangent(void *self, const double *q, double *tangent);
-int find_entries(const int32_t *indptr, const int32_t *indices, int number, const int32_t *row,
-                 const int32_t *column, int32_t *found);
+int find_entries(int rows, const int32_t *indptr, const int32_t *indices, int number,
+                 const int32_t *row, const int32_t *column, int32_t *found);
 void add_product(int rows, const int32_t *indptr, const int32_t *indices, const double *data,
                  const double *x, double *y);
 double quadratic_form(int rows, const int32_t *indptr, const int32_t *indices, const double *data,
@@ -78,11 +81,34 @@ int has_its_digits(double sum);
 
 /* -- material points --------------------------------------------------------------------------- */
 
-/* Points in cells, `of_cell` in each; see material_points.py. */
+/* Python asks for the names in these enums, in their order; the last of each is their number. */
+
+/* The first inputs of the law of a point; what laws need beside them comes after them. */
+enum point_input {
+  STRAIN, GROWTH, DIRECTION,                                   /* of an iterate: at the end; opening */
+  TRACTION, BEFORE, PLASTIC, ACCUMULATED, JUMP, OPENING, FLOWS, /* the state before the step */
+  STIFFNESS, LENGTH, THETA,
+  POINT_INPUTS
+};
+
+/* Values of FLOWS: did not grow in the last step, grew in it, may open in this one. */
+enum { CLOSED, FLOWING, RELEASED };
+
+/* What the end of a step brings a point. */
+enum point_output {
+  FLOW, WORKED, BROKEN, LOST, ELASTIC, HARDENING, STRESS, RESISTANCE, POINT_OUTPUTS
+};
+
+enum { POINT_KEPT = 6, POINT_SUMS = 7 }; /* numbers of a cell, and of all: `kept` and `sum` of points */
+
+/* Flags that all points of a scene share in a step; see Course in material_points.py. */
+enum course { OPENED, RELIEF, HOLD, OVER, COURSE_FLAGS };
+
+/* Points in cells, `of_cell` in each, with `width` numbers of each in w; see material_points.py. */
 typedef struct {
   int32_t *course;
   kernel *bulk, *opening, *excess, *end;
-  int cells, of_cell;
+  int cells, of_cell, width;
   const double *B, *weight, *rest, *length;
   double theta;
   double *e0, *e1, *w, *r, *D, *kept, *sum;
@@ -98,6 +124,12 @@ typedef struct {
   int size, begins;
   double *latest; /* the unknowns that the points responded to */
 } inelastic;
+
+/* The first inputs of the law of a rigid-plastic connector, and what the end of a step brings. */
+enum slip_input { SLIP, SLIP_DIRECTION, SLIPPED, SLIP_START, SLIP_INPUTS };
+enum slip_output {
+  SLIP_DISSIPATED, SLIP_LOST, SLIP_STORED, SLIP_LIMIT, SLIP_BACK_FORCE, SLIP_OUTPUTS
+};
 
 /* Rigid-plastic connectors, see rigid_plastic.py. */
 typedef struct {
@@ -132,7 +164,6 @@ typedef struct {
 } couplings;
 
 void find_motions(const couplings *c, const double *q);
-void set_rows_of_rigid_plastic(const couplings *c, const double *q);
 double dissipation_of_rigid_plastic(const rigid_plastic *p, const double *e1, const double *force);
 void commit_rigid_plastic(const rigid_plastic *p, const double *e1, double *sums);
 void add_couplings_force(void *self, const double *q, double *r);
@@ -147,6 +178,10 @@ void add_inelastic_tangent(void *self, const double *q, double *tangent);
 void commit(const points *p);
 
 /* -- elimination along chains ------------------------------------------------------------------ */
+
+/* What is kept of a vertex: its pivot block as LU, what that makes of the coupling to the vertex after;
+ * where there is a spike, the couplings to and from the left end. */
+enum { BLOCK = 9, SIDES = 18 };
 
 typedef struct {
   int chains;
@@ -179,20 +214,38 @@ int all_finite(int size, const double *values);
 
 /* -- Newton's method, see newton.c ------------------------------------------------------------- */
 
-/* What PETSc offers and the callbacks of SNES need; its objects are opaque. */
+/* Functions of PETSc, which Python finds by these names; its objects are opaque here. Each returns an
+ * error, or zero, as what SNES calls does. */
 typedef struct {
-  int (*read)(void *vec, const double **values);
-  int (*end_read)(void *vec, const double **values);
-  int (*write)(void *vec, double **values);
-  int (*end_write)(void *vec, double **values);
-  int (*entries)(void *mat, double **values);
-  int (*end_entries)(void *mat, double **values);
-  int (*set_iterations)(void *snes, petsc_int number);
-  int (*set_reason)(void *snes, int reason);
-  int (*factor)(void *pc);
-  int (*failed)(void *pc, int *reason);
-  int (*apply)(void *pc, void *b, void *x);
-} petsc;
+  int (*PetscErrorMessage)(int error, const char **text, char **specific);
+  int (*VecGetArrayRead)(void *vec, const double **values);
+  int (*VecRestoreArrayRead)(void *vec, const double **values);
+  int (*VecGetArray)(void *vec, double **values);
+  int (*VecRestoreArray)(void *vec, double **values);
+  int (*VecLockGet)(void *vec, petsc_int *state);
+  int (*VecLockReadPop)(void *vec);
+  int (*MatSeqAIJGetArray)(void *mat, double **values);
+  int (*MatSeqAIJRestoreArray)(void *mat, double **values);
+  int (*PCSetUp)(void *pc);
+  int (*PCGetFailedReason)(void *pc, int *reason);
+  int (*PCApply)(void *pc, void *b, void *x);
+  int (*SNESSetFunction)(void *snes, void *f, int (*function)(void *, void *, void *, void *),
+                         void *context);
+  int (*SNESSetJacobian)(void *snes, void *A, void *P,
+                         int (*jacobian)(void *, void *, void *, void *, void *), void *context);
+  int (*SNESSetConvergenceTest)(void *snes,
+                                int (*test)(void *, petsc_int, double, double, double, int *, void *),
+                                void *context, int (*destroy)(void *));
+  int (*SNESShellSetContext)(void *snes, void *context);
+  int (*SNESShellGetContext)(void *snes, void *context);
+  int (*SNESShellSetSolve)(void *snes, int (*solve)(void *, void *));
+  int (*SNESSetIterationNumber)(void *snes, petsc_int number);
+  int (*SNESSetConvergedReason)(void *snes, int reason);
+} petsc_functions;
+
+extern petsc_functions petsc;
+
+enum { OF_LIBRARY = 76 }; /* PETSC_ERR_LIB: KLU says so of a singular matrix */
 
 /* How far a law is missed by an iterate q and its residual r, without dimension; scale is the size
  * of the forces, and moved the largest motion, see largest_motion. */
@@ -203,7 +256,6 @@ typedef struct {
 
 /* The equation of a step, and how far its solution is. */
 typedef struct {
-  const petsc *petsc;
   int size, inner, forces, stiffnesses;
   const call *force;     /* parts of the residual, the inner forces first */
   const call *stiffness; /* parts of the tangent */
@@ -245,14 +297,12 @@ void residual(equation *e, const double *q, double *r);
 void assemble(equation *e, const double *q);
 int factor_tangent(const equation *e, int *failed);
 int solve_tangent(const equation *e);
-double motion_of(const equation *e, const double *q);
 void find_last_digits(const equation *e, const double *q, double *digits);
 double size_of_forces(const equation *e, const double *f);
 int judge(equation *e, const double *q, int iteration, double residual, double scale,
           double floor);
 int snes_function(void *snes, void *x, void *f, void *self);
 int snes_jacobian(void *snes, void *x, void *A, void *P, void *self);
-extern int (*shell_context)(void *snes, void *context);
 int snes_newton(void *snes, void *x);
 int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int *reason,
               void *self);

@@ -79,7 +79,7 @@ int judge(equation *e, const double *q, int iteration, double residual, double s
 }
 
 /* Largest motion in the scene, at most its size. */
-double motion_of(const equation *e, const double *q)
+static double motion_of(const equation *e, const double *q)
 {
   return fmin(largest_motion(e->size, e->weight, q), e->scene);
 }
@@ -98,8 +98,9 @@ void find_last_digits(const equation *e, const double *q, double *digits)
   }
 }
 
-/* SNESShellGetContext, which is asked before anything else is known. */
-int (*shell_context)(void *snes, void *context);
+petsc_functions petsc;
+
+#define TRY(call) do { int error = (call); if (error) return error; } while (0)
 
 /* -- what SNES calls --------------------------------------------------------------------------- */
 
@@ -108,12 +109,11 @@ int snes_function(void *snes, void *x, void *f, void *self)
   equation *e = self;
   const double *q;
   double *r;
-  int error = e->petsc->read(x, &q);
-  if (error) return error;
-  if ((error = e->petsc->write(f, &r))) return error;
+  TRY(petsc.VecGetArrayRead(x, &q));
+  TRY(petsc.VecGetArray(f, &r));
   residual(e, q, r);
-  if ((error = e->petsc->end_write(f, &r))) return error;
-  return e->petsc->end_read(x, &q);
+  TRY(petsc.VecRestoreArray(f, &r));
+  return petsc.VecRestoreArrayRead(x, &q);
 }
 
 int snes_jacobian(void *snes, void *x, void *A, void *P, void *self)
@@ -122,12 +122,11 @@ int snes_jacobian(void *snes, void *x, void *A, void *P, void *self)
   const double *q;
   double *entries; /* they are those of e; asking for them tells PETSc that they change */
   if (e->near) return 0;
-  int error = e->petsc->read(x, &q);
-  if (error) return error;
-  if ((error = e->petsc->entries(P, &entries))) return error;
+  TRY(petsc.VecGetArrayRead(x, &q));
+  TRY(petsc.MatSeqAIJGetArray(P, &entries));
   assemble(e, q);
-  if ((error = e->petsc->end_entries(P, &entries))) return error;
-  return e->petsc->end_read(x, &q);
+  TRY(petsc.MatSeqAIJRestoreArray(P, &entries));
+  return petsc.VecRestoreArrayRead(x, &q);
 }
 
 /* Size of forces, see Solver; N. */
@@ -160,33 +159,30 @@ int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int
 {
   equation *e = self;
   const double *q;
-  int error = e->petsc->read(e->x, &q);
-  if (error) return error;
+  TRY(petsc.VecGetArrayRead(e->x, &q));
   *reason = verdict(e, q, (int)iteration);
-  return e->petsc->end_read(e->x, &q);
+  return petsc.VecRestoreArrayRead(e->x, &q);
 }
-
-#define TRY(call) do { int error = (call); if (error) return error; } while (0)
 
 /* Factors of the tangent; *failed if it is singular. */
 int factor_tangent(const equation *e, int *failed)
 {
-  const petsc *p = e->petsc;
   double *entries; /* asking for them tells PETSc that they change */
-  TRY(p->entries(e->left, &entries));
+  TRY(petsc.MatSeqAIJGetArray(e->left, &entries));
   eliminate(e->chains);
-  TRY(p->end_entries(e->left, &entries));
+  TRY(petsc.MatSeqAIJRestoreArray(e->left, &entries));
   if ((*failed = !all_finite(e->chains->left, e->chains->left_data))) return 0;
-  if (!p->factor(e->factors)) return p->failed(e->factors, failed);
-  *failed = 1; /* KLU says so of a singular matrix */
-  return 0;
+  const int error = petsc.PCSetUp(e->factors);
+  if (!error) return petsc.PCGetFailedReason(e->factors, failed);
+  *failed = 1;
+  return error == OF_LIBRARY ? 0 : error;
 }
 
 /* What Newton's method subtracts from the iterate. */
 int solve_tangent(const equation *e)
 {
   reduce(e->chains, e->residual);
-  TRY(e->petsc->apply(e->factors, e->left_f, e->left_x));
+  TRY(petsc.PCApply(e->factors, e->left_f, e->left_x));
   expand(e->chains, e->found, e->change);
   return 0;
 }
@@ -198,9 +194,8 @@ int snes_newton(void *snes, void *x)
   equation *e;
   double *q;
   int iteration = 0, reason;
-  TRY(shell_context(snes, &e));
-  const petsc *p = e->petsc;
-  TRY(p->write(x, &q));
+  TRY(petsc.SNESShellGetContext(snes, &e));
+  TRY(petsc.VecGetArray(x, &q));
   residual(e, q, e->residual);
   while (!(reason = verdict(e, q, iteration))) {
     if (iteration == e->most) {
@@ -221,7 +216,7 @@ int snes_newton(void *snes, void *x)
     residual(e, q, e->residual);
     ++iteration;
   }
-  TRY(p->end_write(x, &q));
-  TRY(p->set_iterations(snes, iteration));
-  return p->set_reason(snes, reason);
+  TRY(petsc.VecRestoreArray(x, &q));
+  TRY(petsc.SNESSetIterationNumber(snes, iteration));
+  return petsc.SNESSetConvergedReason(snes, reason);
 }

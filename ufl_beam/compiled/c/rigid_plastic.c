@@ -1,12 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Rigid-plastic connectors, such as plastic hinges: held up to a limit, then following a law. */
 
-/* What the kernels know of a connector; the order in rigid_plastic.py. */
-enum { SLIP, SLIP_DIRECTION, SLIPPED, SLIP_START };
-
-/* What the kernel of the end of a step says; the order in rigid_plastic.py. */
-enum { SLIP_DISSIPATED, SLIP_LOST, SLIP_STORED, SLIP_LIMIT, SLIP_BACK_FORCE, SLIP_SAID };
-
 static void set_slip(double *w, double motion, int way)
 {
   w[SLIP] = fmax(way * motion, 0), w[SLIP_DIRECTION] = way;
@@ -49,7 +43,7 @@ static int direction_of_slip(const rigid_plastic *p, int i, double *w, double mo
 
 /* Rows of the connectors at their motions c->e1 and forces in q: the equations above over -r, which
  * leaves the tangent of held ones symmetric. */
-void set_rows_of_rigid_plastic(const couplings *c, const double *q)
+static void set_rows_of_rigid_plastic(const couplings *c, const double *q)
 {
   const rigid_plastic *p = c->rigid_plastic;
   double *w = p->w, s[2];
@@ -71,14 +65,14 @@ void set_rows_of_rigid_plastic(const couplings *c, const double *q)
  * limit counts with its excess times a unit of motion. */
 double dissipation_of_rigid_plastic(const rigid_plastic *p, const double *e1, const double *force)
 {
-  double *w = p->w, s[SLIP_SAID], sum = 0;
+  double *w = p->w, s[SLIP_OUTPUTS], sum = 0;
   for (int i = 0; i < p->number; ++i, w += p->width) {
     if (!p->way[i]) {
       sum += fmax(fabs(force[i] - p->back_force[i]) - p->limit[i] * (1 + 1e-12), 0);
       continue;
     }
     set_slip(w, e1[i] - w[SLIP_START], p->way[i]);
-    ask(p->end, w, SLIP_SAID, s);
+    ask(p->end, w, SLIP_OUTPUTS, s);
     sum += s[SLIP_DISSIPATED];
   }
   return sum;
@@ -88,13 +82,13 @@ double dissipation_of_rigid_plastic(const rigid_plastic *p, const double *e1, co
  * what the connectors store. */
 void commit_rigid_plastic(const rigid_plastic *p, const double *e1, double *sums)
 {
-  double *w = p->w, s[SLIP_SAID];
+  double *w = p->w, s[SLIP_OUTPUTS];
   memset(sums, 0, 3 * sizeof *sums);
   for (int i = 0; i < p->number; ++i, w += p->width) {
     const int way = p->way[i];
     set_slip(w, e1[i] - w[SLIP_START], way);
     if (p->limit[i] < INFINITY) {
-      ask(p->end, w, SLIP_SAID, s);
+      ask(p->end, w, SLIP_OUTPUTS, s);
       for (int k = 0; k < 3; ++k) sums[k] += s[SLIP_DISSIPATED + k];
       p->dissipated[i] += s[SLIP_DISSIPATED];
       p->limit[i] = s[SLIP_LIMIT], p->back_force[i] = s[SLIP_BACK_FORCE];

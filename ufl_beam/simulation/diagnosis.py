@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Diagnosis of singular tangents: the motion that meets no force, and what gives way in it."""
+"""Diagnosis of failed steps: sizes of forces, and what gives way if the tangent is singular."""
 
 from __future__ import annotations
 
@@ -11,14 +11,18 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.dof_numbering import Grid, Share
-from ufl_beam.errors import StepFailed
+from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.partition import Share
+from ufl_beam.errors import ConvergenceError, StepFailed
+from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.scene import Scene
+from ufl_beam.parameter import Parameter
+from ufl_beam.simulation.step_equation import StepEquation
+from ufl_beam.solvers.newton import Solver
 from ufl_beam.solvers.null_vectors import SINGULAR, free_matrix, null_vector
-from ufl_beam.terms.connectors import Couplings
-from ufl_beam.terms.guide_curves import Guides
+from ufl_beam.terms.base import KINDS
 from ufl_beam.terms.inelastic_beams import InelasticBeams
+from ufl_beam.terms.links import Links
 from ufl_beam.terms.supports import Supports
 
 SHARE = 0.1
@@ -40,24 +44,27 @@ class Failed(Protocol):
 
     Attributes:
         scene, grid, share: What is modelled, its numbering, and the part of this process.
-        q: Configuration before the step.
+        t, q: Time and configuration before the step.
         supports, couplings, inelastic: Terms that may give way.
+        equation: The equation of the step.
+        scheme: Has general advice.
+        parameter: Words for the time.
     """
 
     scene: Scene
     grid: Grid
     share: Share
+    t: float
     q: Array
+    scheme: Scheme
     supports: Supports
-    couplings: list[Couplings | Guides]
+    couplings: list[Links]
     inelastic: list[InelasticBeams]
+    equation: StepEquation
 
     @property
-    def tangent(self) -> Csr:
-        """The latest tangent."""
-
-    def respond_at(self, q1: Array) -> bool:
-        """Evaluate forces and tangent at ``q1``; return whether all processes can."""
+    def parameter(self) -> Parameter:
+        """Time, or the load factor of a path."""
 
 
 class Softest(NamedTuple):
@@ -76,6 +83,60 @@ class Softest(NamedTuple):
     links: Array
     cells: Array
     yielding: tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]
+
+
+def no_equilibrium(
+    simulation: Failed,
+    newton: Solver,
+    solution: object,
+    failure: StepFailed,
+    end: float,
+    advice: str,
+) -> ConvergenceError:
+    """Describe why even the smallest step, to ``end``, failed; all processes call it together.
+
+    Args:
+        simulation: The state before the step.
+        newton: The solver, with its latest iterate.
+        solution: The solution so far.
+        failure: Why the step failed.
+        end: Its end; s.
+        advice: What to try; that of the scheme if it is empty.
+    """
+    q1 = simulation.supports.in_plane(newton.iterate())
+    dt, forces, named = (
+        end - simulation.t,
+        _forces_by_kind(simulation, newton, q1),
+        simulation.parameter,
+    )
+    sizes = ", ".join(f"{kind} {size:.1e} N" for kind, size in forces.items())
+    where = f"at {named.at(simulation.t, '.9g')}"
+    if dt != 0:
+        where = f"after {named.at(simulation.t, '.9g')}, even with {named.over(dt)}"
+    why = singularity(simulation, q1)
+    said = f"{failure} ({sizes})" if sizes else str(failure)
+    return ConvergenceError(
+        f"no equilibrium {where}: {why}{'; ' if why else ''}{said}. "
+        f"{advice or simulation.scheme.advice}",
+        time=simulation.t,
+        dt=dt,
+        solution=solution,
+        residuals=failure.residuals,
+        forces=forces,
+        reason=failure.reason,
+    )
+
+
+def _forces_by_kind(simulation: Failed, newton: Solver, q1: Array) -> dict[str, float]:
+    """Sizes of the forces at the latest iterate; N."""
+    forces = {kind: np.zeros(simulation.share.size) for kind in KINDS}
+    for term in simulation.equation.terms:
+        try:
+            term.add_residual(q1, forces[term.kind])
+        except Exception:
+            forces[term.kind].fill(np.nan)  # it is why the step has failed
+    sizes = {kind: newton.size(force) for kind, force in forces.items()}
+    return {kind: size for kind, size in sizes.items() if size}
 
 
 def singularity(simulation: Failed, q: Array) -> str:
@@ -99,12 +160,12 @@ def singularity(simulation: Failed, q: Array) -> str:
     if not 0 < far < np.inf:
         return ""
     near = before + min(1.0, NEAR / far) * (q - before)
-    return _singularity_at(simulation, near) if simulation.respond_at(near) else ""
+    return _singularity_at(simulation, near) if simulation.equation.respond_at(near) else ""
 
 
 def _singularity_at(simulation: Failed, q: Array) -> str:
     """Describe why the latest tangent, which is that at ``q``, is singular; empty if it is not."""
-    K, free = free_matrix(simulation.share, simulation.tangent, simulation.supports.dofs)
+    K, free = free_matrix(simulation.share, simulation.equation.A, simulation.supports.dofs)
     if not len(free) or not np.isfinite(K.data).all():
         return ""
     try:
@@ -116,7 +177,7 @@ def _singularity_at(simulation: Failed, q: Array) -> str:
     grid, scene = simulation.grid, simulation.scene
     motions: Array = np.abs(x)
     turns = np.zeros(grid.size, dtype=bool)
-    turns[[*grid.dofs[:, 2], *grid.dofs_of_bodies[:, 2]]] = True
+    turns[grid.rotations] = True
     motions[~turns] /= scene.size
     motions[grid.multipliers] = 0.0
     largest = float(motions.max())
@@ -149,8 +210,7 @@ def _softest(simulation: Failed, q: Array, x: Array, motions: Array) -> Softest:
         except StepFailed:
             continue  # a guide that ends has no motion there, which the failure of the step says
         links[one.numbers] = np.abs(change)
-        if isinstance(one, Couplings):
-            left[one.numbers] = one.response.remaining()
+        left[one.numbers] = one.remaining()
     links /= np.where([link.turns for link in scene.links], 1.0, scene.size)
     strains, left_of_cells = _strains(grid, share.gather(q), x), np.ones(len(grid.cells))
     for inelastic in simulation.inelastic:

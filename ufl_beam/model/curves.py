@@ -1,15 +1,19 @@
 # SPDX-License-Identifier: MIT
-"""Curves of the plane: tangents by differences, nearest points, the circle around points."""
+"""Curves of the plane: those of beam axes, tangents by differences, nearest points, circles."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
 from ufl_beam.arrays import Array
+from ufl_beam.errors import SceneError, require_function, require_vector, shorten
+
+Point = tuple[float, float]
 
 Curve = Callable[[float], Sequence[float]]
 
@@ -25,6 +29,89 @@ WEIGHTS = np.array(
      [-1, 6, -18, 10, 3], [3, -16, 36, -48, 25]]
 ) / 12  # fmt: skip
 """Weights of five equidistant values in the derivative at each of them."""
+
+
+# -- of beam axes: records, so that scenes are compared and saved by their numbers ---------------
+
+
+@dataclass(frozen=True)
+class Straight:
+    """Straight line.
+
+    Attributes:
+        a, b: Its ends; m.
+    """
+
+    a: Point
+    b: Point
+
+    def __call__(self, s: float) -> Point:
+        """The point at part ``s`` of the length; exact at both ends."""
+        return between(self.a, self.b, s)
+
+
+@dataclass(frozen=True)
+class Arc:
+    """Circular arc.
+
+    Attributes:
+        center: m.
+        radius: m.
+        first, last: Angles of its ends, counter-clockwise from x; rad.
+    """
+
+    center: Point
+    radius: float
+    first: float
+    last: float
+
+    def __call__(self, s: float) -> Point:
+        """The point at part ``s`` of the length."""
+        angle = self.first + s * (self.last - self.first)
+        x, y = self.center
+        return x + self.radius * math.cos(angle), y + self.radius * math.sin(angle)
+
+
+@dataclass(frozen=True)
+class Polyline:
+    """Straight pieces through points.
+
+    Attributes:
+        points: m.
+        at: Part of the length at each point, from 0 to 1.
+    """
+
+    points: tuple[Point, ...]
+    at: tuple[float, ...]
+
+    def __call__(self, s: float) -> Point:
+        """The point at part ``s`` of the length."""
+        last = len(self.at) - 2
+        i = next((k for k, limit in enumerate(self.at[1:-1]) if s <= limit), last)
+        part = (s - self.at[i]) / (self.at[i + 1] - self.at[i])
+        return between(self.points[i], self.points[i + 1], part)
+
+
+def between(p: Point, q: Point, s: float) -> Point:
+    """The point at part ``s`` of the way from ``p`` to ``q``; exact at both ends."""
+    return p[0] * (1 - s) + q[0] * s, p[1] * (1 - s) + q[1] * s
+
+
+def point_of(curve: Curve, s: float, what: str) -> Point:
+    """Evaluate a curve of a user.
+
+    Raises:
+        SceneError: It fails there, or returns no pair of finite numbers; the message has ``what``.
+    """
+    require_function(curve, what, "s that returns (x, y)")
+    try:
+        point = curve(s)
+    except Exception as error:
+        raise SceneError(f"{what}({s:g}) fails: {shorten(error)}") from error
+    return require_vector(point, f"{what}({s:g})")
+
+
+# -- tangents and nearest points ---------------------------------------------------------------
 
 
 def tangent(curve: Curve, s: float, step: float) -> Array:

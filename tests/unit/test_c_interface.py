@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: MIT
+"""Interface between Python and C: one description of names, and refusals where both differ."""
+
+import runpy
+import subprocess
+
+from petsc4py import PETSc
+
+import cffi
+import dolfinx
+import numpy as np
+import pytest
+import ufl
+
+import ufl_beam as ub
+from ufl_beam import dolfinx_compat
+from ufl_beam.compiled import c_library
+from ufl_beam.compiled.c_library import ffi, in_order, lib, names, petsc
+from ufl_beam.discretization import compiled_forms
+from ufl_beam.discretization.compiled_forms import Kernel
+from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
+from ufl_beam.model.material_laws import HardeningBulk
+from ufl_beam.terms import material_points, rigid_plastic
+from ufl_beam.terms.supports import Supports
+
+pytestmark = pytest.mark.serial  # nothing here depends on the number of processes
+
+
+def test_inputs_of_points_are_where_c_has_them():
+    """Python takes their order from loops.h."""
+    for inputs, enum, prefix in (
+        (material_points.inputs(HardeningBulk), "point_input", ""),
+        (rigid_plastic.INPUTS, "slip_input", "slip_"),
+    ):
+        of_c = names(enum, prefix)
+        assert inputs[: len(of_c)] == of_c
+        assert len(set(inputs)) == len(inputs)
+    for name in names("point_input"):
+        assert getattr(lib, name.upper()) == material_points.inputs(HardeningBulk).index(name)
+    assert len(names("point_input")) == lib.POINT_INPUTS
+
+
+def test_outputs_come_in_the_order_of_c():
+    values = {name: name.upper() for name in reversed(names("point_output"))}
+    ordered = in_order("point_output", values)
+    assert [getattr(lib, name) for name in ordered] == list(range(lib.POINT_OUTPUTS))
+
+
+@pytest.mark.parametrize("change", [{"worked": None}, {"heat": 0.0}], ids=["missing", "unknown"])
+def test_other_outputs_than_those_of_c_are_refused(change):
+    values = dict.fromkeys(names("point_output"), 0.0) | change
+    values = {name: value for name, value in values.items() if value is not None}
+    with pytest.raises(ValueError, match=r"point_output is .*'worked'.* in loops\.h"):
+        in_order("point_output", values)
+
+
+# -- symbols -------------------------------------------------------------------------------------
+
+
+def test_libraries_show_nothing_but_their_module():
+    """A visible function would give way to one of the same name in another library."""
+    command = ["nm", "-D", "--defined-only", c_library.module.__file__]
+    listed = subprocess.run(command, capture_output=True, text=True, check=True)
+    symbols = {line.split()[-1] for line in listed.stdout.splitlines()}
+    assert symbols == {f"PyInit_{c_library.module.__name__}"}
+
+
+# -- PETSc ---------------------------------------------------------------------------------------
+
+
+def test_errors_of_petsc_that_python_meets():
+    says = "VecLockReadPop of PETSc failed with error 73: .*: Vector has been unlocked .* too many"
+    with pytest.raises(RuntimeError, match=says):
+        petsc("VecLockReadPop", PETSc.Vec().createSeq(2))
+
+
+@pytest.fixture
+def simulation():
+    section = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
+    beam = ub.Beam((0, 0), (4, 3), section, cells=6)
+    loads = [ub.PointLoad(beam.end, force=(3.0, 5.0))]
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=loads)
+    return ub.Simulation(scene, ub.Static())
+
+
+def test_errors_of_petsc_that_c_meets(simulation):
+    """They end Newton's method in C, and are no singular tangent."""
+    simulation.step_to(0.5)
+    short = PETSc.Vec().createSeq(2)
+    simulation._solver._equation.c.left_x = ffi.cast("void *", short.handle)
+    with pytest.raises(PETSc.Error, match="Nonconforming object sizes"):
+        simulation.step_to(1.0)
+
+
+class FailsOnce:
+    """Factors whose second solve fails, as those of KLU may."""
+
+    def __init__(self, factors, error):
+        self.factors, self.error, self.solves = factors, error, 0
+
+    def __getattr__(self, name):
+        return getattr(self.factors, name)
+
+    def apply(self, b, x):
+        self.solves += 1
+        if self.solves == 2:
+            raise PETSc.Error(self.error)
+        self.factors.apply(b, x)
+
+
+def test_a_solve_in_python_that_fails(monkeypatch, simulation):
+    """An error of the library is a singular tangent, and cuts the step; others are raised."""
+    monkeypatch.setattr(Supports, "turned", True)  # then SNES calls Python
+    scene = simulation.scene
+    for error in (lib.OF_LIBRARY, 60):
+        simulation = ub.Simulation(scene, ub.Static())
+        chains = simulation._solver._factors
+        chains._factors = FailsOnce(chains._factors, error)
+        if error == lib.OF_LIBRARY:
+            simulation.step_to(1.0)
+            assert simulation.parts > 1
+        else:
+            with pytest.raises(PETSc.Error, match="error code 60"):
+                simulation.step_to(1.0)
+
+
+# -- versions of DOLFINx and PETSc ---------------------------------------------------------------
+
+
+def imported():
+    """Run the module that looks at the versions as an import does."""
+    return runpy.run_path(dolfinx_compat.__file__)
+
+
+def test_versions_before_the_first_are_refused(monkeypatch):
+    monkeypatch.setattr(dolfinx, "__version__", "0.8.0")
+    with pytest.raises(ImportError, match=r"needs DOLFINx 0\.9 or newer, this is 0\.8\.0"):
+        imported()
+
+
+def test_versions_after_the_last_are_said(monkeypatch):
+    monkeypatch.setattr(dolfinx, "__version__", "0.12.1")
+    with pytest.warns(RuntimeWarning, match=r"with DOLFINx 0\.9 to 0\.11, and not with 0\.12\.1"):
+        assert imported()["VERSION"] == (0, 12)
+
+
+@pytest.mark.parametrize("version", ["0.9.0", "0.10.0.post4", "0.11.0"])
+def test_known_versions(monkeypatch, recwarn, version):
+    monkeypatch.setattr(dolfinx, "__version__", version)
+    imported()
+    assert not recwarn
+
+
+@pytest.mark.parametrize("numbers", [np.complex128, np.float32])
+def test_other_numbers_of_petsc_are_refused(monkeypatch, numbers):
+    monkeypatch.setattr(PETSc, "ScalarType", numbers)
+    with pytest.raises(ImportError, match=f"real numbers of double.*{numbers.__name__}"):
+        imported()
+
+
+def test_kernels_of_another_type_are_refused():
+    """Their calls would have no defined behaviour."""
+    of = cffi.FFI()
+    pointer = of.cast("void (*)(double *, const double *, int)", 0)
+    with pytest.raises(
+        RuntimeError, match=r"DOLFINx .* FFCx .* C type void.*int\); ufl_beam calls"
+    ):
+        c_library.kernel(pointer, of)
+
+
+# -- sizes and types -----------------------------------------------------------------------------
+
+
+def test_integers_of_another_size_are_refused():
+    with pytest.raises(TypeError, match="32 bits, not int64"):
+        c_library.integers(np.arange(3))
+
+
+def kernel(degree=1, cells=2, coordinates=None):
+    """The matrix of masses on a line."""
+    points = np.column_stack([np.arange(cells + 1.0), np.zeros(cells + 1)])
+    mesh = line_mesh(points, np.column_stack([np.arange(cells), np.arange(1, cells + 1)]))
+    space = fem.functionspace(mesh, ("Lagrange", degree))
+    u, w = ufl.TrialFunction(space), ufl.TestFunction(space)
+    f = fem.Function(space)
+    form = f * u * w * ufl.dx(domain=mesh, metadata={"quadrature_degree": 2})
+    x = cell_coordinates(mesh) if coordinates is None else coordinates
+    return Kernel(form, f, np.asarray(space.dofmap.list), x)
+
+
+def test_cells_with_more_entries_than_there_is_room_for():
+    with pytest.raises(ValueError, match=r"13 x 13 .* has 169 entries; loops.h has room for 144"):
+        kernel(degree=12)
+
+
+def test_arrays_of_other_sizes_are_refused(monkeypatch):
+    with pytest.raises(ValueError, match=r"4 entries .* on 2 cells, .* coordinates of \(3, 2, 3\)"):
+        kernel(coordinates=np.zeros((3, 2, 3)))
+    pack = compiled_forms.pack
+    monkeypatch.setattr(compiled_forms, "pack", lambda form: (pack(form)[0], np.zeros((2, 1))))
+    with pytest.raises(ValueError, match=r"DOLFINx .* pack 1 values of a cell, not 2"):
+        kernel()

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: MIT
+"""Every public name has an example in its docstring, and it does what it shows."""
+
+import doctest
+import re
+
+import pytest
+
+import ufl_beam as ub
+
+pytestmark = pytest.mark.serial  # files, and lines that all ranks print
+
+FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+
+
+def run(name, thing, names):
+    """Run the example of something; the names that are known afterwards."""
+    test = doctest.DocTestParser().get_doctest(thing.__doc__ or "", names, name, None, 0)
+    assert test.examples, f"the docstring of {name} has no example"
+    report = []
+    runner = doctest.DocTestRunner(verbose=False, optionflags=FLAGS)
+    runner.run(test, out=report.append, clear_globs=False)
+    said = "\n".join(report)
+    if missing := re.search(r"^ *ImportError: .*", said, re.MULTILINE):  # of an optional package
+        pytest.skip(missing[0].strip())
+    assert not report, said
+    return test.globs
+
+
+@pytest.fixture(scope="module")
+def names():
+    """The names that examples may use: those of the package's own example."""
+    return run("ufl_beam", ub, {})
+
+
+@pytest.mark.parametrize("name", ub.__all__)
+def test_example(name, names, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    run(name, getattr(ub, name), names)
+
+
+def test_an_example_can_fail(names):
+    """With the name of its owner, the line and both outputs."""
+
+    class Wrong:
+        """>>> beam.cells
+        5
+        """
+
+    with pytest.raises(AssertionError, match=r"(?s)Wrong.*beam.cells.*Expected:\s+5\s+Got:\s+4"):
+        run("Wrong", Wrong, names)
+    with pytest.raises(AssertionError, match="docstring of object has no example"):
+        run("object", object, names)

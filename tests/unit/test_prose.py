@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: MIT
+"""First lines of docstrings, links between pages, and public names in the documentation."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+import ufl_beam as ub
+
+ROOT = Path(__file__).parents[2]
+PAGES = [
+    path
+    for folder in (".", "docs", "demos", "benchmarks")
+    for path in sorted((ROOT / folder).glob("*.md"))
+]
+
+FILES = {"portal.py", "axis.h"}.union(
+    path.name
+    for folder in ("ufl_beam", "tests", "demos", "benchmarks")
+    for path in (ROOT / folder).rglob("*.*")
+)
+"""Names of the files of the repository, the script of the README, and an attribute."""
+
+
+def docstrings(tree, owner):
+    """(name, docstring) of all public classes, functions and methods."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.ClassDef | ast.FunctionDef) and node.name[0] != "_":
+            yield f"{owner}.{node.name}", ast.get_docstring(node) or ""
+            if isinstance(node, ast.ClassDef):
+                yield from docstrings(node, f"{owner}.{node.name}")
+
+
+DOCSTRINGS = {
+    name: text
+    for path in sorted((ROOT / "ufl_beam").rglob("*.py"))
+    for name, text in docstrings(ast.parse(path.read_text("utf-8")), path.relative_to(ROOT))
+}
+
+
+def test_docstrings_say_something():
+    assert len(DOCSTRINGS) > 500
+    assert {name: text for name, text in DOCSTRINGS.items() if len(text.split()) <= 3} == {}
+
+
+def test_docstrings_begin_with_a_noun_or_a_verb():
+    begin = re.compile(r'^\s*"""(What|Whether|How)\b', re.MULTILINE)
+    files = (ROOT / "ufl_beam").rglob("*.py")
+    assert sum(len(begin.findall(path.read_text(encoding="utf-8"))) for path in files) <= 10
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_relative_links_lead_somewhere(page):
+    text = page.read_text(encoding="utf-8")
+    for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", text):
+        if not target.startswith("http"):
+            assert (page.parent / target).exists(), target
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_pages_name_what_exists(page):
+    """Files in code font, and names of the package."""
+    text = page.read_text(encoding="utf-8")
+    for name in re.findall(r"`(?:[\w/]+/)?(\w+\.(?:py|c|h))`", text):
+        assert name in FILES, name
+    for name in re.findall(r"\bub\.(\w+)", text):
+        assert hasattr(ub, name), name
+
+
+def test_public_names_are_documented():
+    """Each name of the package is in the README or on a page of docs/."""
+    pages = [page for page in PAGES if page.name == "README.md" or page.parent.name == "docs"]
+    words = {word for page in pages for word in re.findall(r"\w+", page.read_text("utf-8"))}
+    assert [name for name in ub.__all__ if name not in words] == []

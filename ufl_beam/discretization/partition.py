@@ -1,0 +1,231 @@
+# SPDX-License-Identifier: MIT
+"""Partition of a scene: the cells and degrees of freedom that one process computes."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Protocol
+
+from mpi4py import MPI
+
+import numpy as np
+import numpy.typing as npt
+
+from ufl_beam.arrays import Array, Index
+from ufl_beam.model.bodies import Anchor, Member, Place, Spot
+
+
+class Numbering(Protocol):
+    """Numbering of the degrees of freedom of a scene, see :class:`Grid`."""
+
+    scene: Any
+    mesh: Any
+    points: Array
+    cells: Index
+    nodes_of_cells: Index
+    beam_of_cell: Index
+    dofs: Index
+    dofs_of_bodies: Index
+    vertices_at_hinges: Index
+    cells_at_hinges: Index
+    multipliers: Index
+    size: int
+
+    @property
+    def rotations(self) -> Index:
+        """Degrees of freedom that are rotations."""
+
+    @property
+    def dofs_of_links(self) -> Index:
+        """Of each connector: both u, both v, both ψ of its nodes, and its force; (num_links, 7)."""
+
+    def node(self, anchor: Anchor) -> Index:
+        """Degrees of freedom of what an anchor moves with; (3,)."""
+
+    def cell(self, place: Place) -> int:
+        """The cell at a place; at a vertex the one before it."""
+
+    def lengths(self, cells: Index) -> Array:
+        """Lengths of some cells; (len(cells),); m."""
+
+    def cells_of(self, beam: Member) -> Index:
+        """Cells of a beam from start to end."""
+
+    def hinges(self, beam: Member) -> list[Any]:
+        """Law of the hinge that may open in the middle of each cell of a beam."""
+
+    def keys(self, cells: Index) -> list[tuple[int, int]]:
+        """Two numbers for each of some cells that tell it from others."""
+
+    def weights(self, place: Place) -> tuple[Index, Array]:
+        """Nodes of the cell at a place, and their weights there."""
+
+    def worst(self, sizes: Array) -> dict[str, float]:
+        """The degree of freedom of each beam, body and connector with the largest size."""
+
+
+class Share:
+    """The part of a grid that one process computes: its cells, and their degrees of freedom.
+
+    Local numbers: first the degrees of freedom that this process owns, then the ghosts; each in the
+    order of the grid.  Global numbers, those of PETSc, are contiguous on each process.
+
+    Attributes:
+        cells: Numbers of the cells of this process; contiguous.
+        dofs: Degrees of freedom, in numbers of the grid, by local number.
+        num_owned: How many of them this process owns.
+        ghosts: Global numbers of the others.
+        cell_dofs: Local degrees of freedom of the cells: all u, all v, all ψ of their nodes;
+            shape (len(cells), 3 (degree + 1)).
+        links: Numbers of the connectors of this process.
+        body_dofs: Local degrees of freedom of the bodies that are here; (num, 3).
+        link_dofs: Local degrees of freedom of the connectors: those of a cell, and their force;
+            shape (len(links), 7).
+    """
+
+    def __init__(self, grid: Numbering, comm: MPI.Intracomm) -> None:
+        self.grid = grid
+        self.comm = comm
+        num_cells = len(grid.cells)
+        limits = np.arange(comm.size + 1) * num_cells // comm.size
+        self.cells = np.arange(limits[comm.rank], limits[comm.rank + 1])
+
+        of_cell = grid.dofs[grid.nodes_of_cells].transpose(0, 2, 1)
+        of_cell = of_cell.reshape(num_cells, 3 * (grid.mesh.degree + 1))
+        owner = np.full(grid.size, comm.size)
+        rank_of_cell = np.searchsorted(limits, np.arange(num_cells), side="right") - 1
+        np.minimum.at(owner, of_cell, rank_of_cell[:, None])
+        of_hinge, cell_of_hinge = grid.dofs[grid.vertices_at_hinges], grid.cells_at_hinges
+        np.minimum.at(owner, of_hinge, rank_of_cell[cell_of_hinge][:, None])
+        of_link = grid.dofs_of_links
+        rank_of_link = owner[of_link].min(axis=1, initial=comm.size) % comm.size
+        np.minimum.at(owner, of_link, rank_of_link[:, None])
+        owner[owner == comm.size] = 0  # bodies that nothing is attached to
+        self.links = np.flatnonzero(rank_of_link == comm.rank)
+        order = np.argsort(owner, kind="stable")
+        self._global = np.empty(grid.size, dtype=np.int64)
+        self._global[order] = np.arange(grid.size)
+
+        own = np.flatnonzero(owner == comm.rank)
+        at_hinges = of_hinge[rank_of_cell[cell_of_hinge] == comm.rank].ravel()
+        of_links = of_link[self.links].ravel()
+        touched = np.unique(np.r_[own, of_cell[self.cells].ravel(), at_hinges, of_links])
+        mine = owner[touched] == comm.rank
+        self.dofs = np.concatenate([touched[mine], touched[~mine]])
+        self.num_owned = int(mine.sum())
+        self.ghosts = self._global[self.dofs[self.num_owned :]].astype(np.int32)
+        self._local = np.full(grid.size, -1, dtype=np.int32)
+        self._local[self.dofs] = np.arange(len(self.dofs))
+        self.cell_dofs = self._local[of_cell[self.cells]]
+        self.link_dofs = self._local[of_link[self.links]]
+        of_body = self._local[grid.dofs_of_bodies]
+        self.body_dofs = of_body[(of_body >= 0).all(axis=1)]
+        self._all_owned = order
+        self._num_owned_by = np.bincount(owner, minlength=comm.size).tolist()
+
+    @property
+    def size(self) -> int:
+        """Number of local degrees of freedom, ghosts included."""
+        return len(self.dofs)
+
+    @property
+    def num_global(self) -> int:
+        """Number of degrees of freedom of all processes."""
+        return self.grid.size
+
+    def at(self, anchor: Anchor) -> Index:
+        """Degrees of freedom (numbers of the grid) of what an anchor moves with; shape (3,)."""
+        return self.grid.node(anchor)
+
+    def computes(self, anchor: Anchor) -> bool:
+        """Return whether this process has the (first) cell at a place, or owns a body.
+
+        It then has all degrees of freedom of the place, even if others own some of them.
+        """
+        if isinstance(anchor, Spot):
+            return bool(self.owns(self.at(anchor)).all())
+        return bool(self.cells[0] <= self.grid.cell(anchor) <= self.cells[-1])
+
+    def rotations(self) -> Index:
+        """Local numbers of all rotations; int32."""
+        return np.sort(self.local(self.grid.rotations)).astype(np.int32)
+
+    def translations(self) -> tuple[Index, Index]:
+        """Local numbers of both components of all displacements."""
+        grid = self.grid
+        pairs = np.unique(np.r_[grid.dofs[:, :2], grid.dofs_of_bodies[:, :2]], axis=0)
+        found = self._local[pairs]
+        x, y = found[(found >= 0).all(axis=1)].T
+        return x, y
+
+    def multipliers(self) -> Index:
+        """Local numbers of the forces of connectors."""
+        return self.local(self.grid.multipliers)
+
+    def cell_lengths(self) -> Array:
+        """Lengths of the cells; m."""
+        return self.grid.lengths(self.cells)
+
+    def lengths(self) -> Array:
+        """Change of each local degree of freedom by a strain of one: a cell's length, or a radian.
+
+        Bodies are as large as the scene; forces of connectors have no length.
+        """
+        lengths = np.full(self.size, self.grid.scene.size)
+        displacements = self.cell_dofs[:, : 2 * (self.grid.mesh.degree + 1)]
+        lengths[displacements] = self.cell_lengths()[:, None]
+        lengths[self.rotations()] = 1.0
+        lengths[self.multipliers()] = 0.0
+        return lengths
+
+    def local(self, dofs: Index) -> Index:
+        """Local numbers of those ``dofs`` (numbers of the grid) that this process has."""
+        found = self._local[dofs]
+        return np.asarray(found[found >= 0])
+
+    def owns(self, dofs: Index) -> npt.NDArray[np.bool_]:
+        """Which of ``dofs`` (numbers of the grid) this process owns."""
+        found = self._local[dofs]
+        return np.asarray((found >= 0) & (found < self.num_owned))
+
+    def gather(self, values: Array) -> Array:
+        """Values of all degrees of freedom, in the order of the grid, on every process.
+
+        One process alone gets ``values`` back: states are new arrays in each step.
+        """
+        if self.comm.size == 1:
+            return values
+        parts, result = np.empty((2, self.grid.size))
+        owned = np.ascontiguousarray(values[: self.num_owned])
+        self.comm.Allgatherv(owned, [parts, self._num_owned_by])
+        result[self._all_owned] = parts
+        return result
+
+    def added(self, values: Array) -> Array:
+        """Sums over the processes of values at the local degrees of freedom."""
+        if self.comm.size == 1:
+            return values
+        sums = np.zeros(self.grid.size)
+        sums[self.dofs] = values
+        self.comm.Allreduce(MPI.IN_PLACE, sums)
+        return np.asarray(sums[self.dofs])
+
+    def gather_cells(self, values: Array) -> Array:
+        """Values of all cells, in the order of the grid, on every process."""
+        if self.comm.size == 1:
+            return values.copy()
+        return np.concatenate(self.comm.allgather(values))
+
+    def total(self, value: float) -> float:
+        """Sum over the processes."""
+        return value if self.comm.size == 1 else float(self.comm.allreduce(value))
+
+    def largest(self, value: float) -> float:
+        """Largest over the processes; infinite where one has no number.
+
+        MPI does not say what the largest of numbers is with one that is none, and processes that
+        learn different ones part.
+        """
+        if self.comm.size == 1:
+            return value
+        return float(self.comm.allreduce(math.inf if math.isnan(value) else value, op=MPI.MAX))

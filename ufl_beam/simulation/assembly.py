@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: MIT
+"""Assembly: the terms of a scene, made for one time scheme on the part of one process."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.collective_errors import Agreement
+from ufl_beam.compiled.csr import Csr
+from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.discretization.partition import Share
+from ufl_beam.discretization.state_io import NOWHERE, Restoring, Saving, State
+from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
+from ufl_beam.model.connector_laws import Controller, Coulomb
+from ufl_beam.model.connectors import Connector
+from ufl_beam.model.constraint_checks import friction_repeats
+from ufl_beam.model.loads import FollowerLoad, RotatingFrame
+from ufl_beam.model.scene import Scene
+from ufl_beam.simulation.step_equation import StepEquation
+from ufl_beam.solvers.c_equation import CEquation
+from ufl_beam.solvers.equation import Equation
+from ufl_beam.terms.algorithmic_damping import numerical_forces
+from ufl_beam.terms.base import Cells, Term
+from ufl_beam.terms.beams import ElasticBeams, Inertia
+from ufl_beam.terms.connector_responses import Setting
+from ufl_beam.terms.connectors import couplings
+from ufl_beam.terms.damping import damping_forces
+from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.guide_curves import guides
+from ufl_beam.terms.inelastic_beams import InelasticBeams, inelastic_cells
+from ufl_beam.terms.links import Links
+from ufl_beam.terms.loads import DeadLoads, FollowerLoads
+from ufl_beam.terms.material_points import expect_entries
+from ufl_beam.terms.openings import Course, Openable, Openings
+from ufl_beam.terms.rotating_frame import FrameForces
+from ufl_beam.terms.supports import Supports
+
+Loads = list[DeadLoads | FollowerLoads | FrameForces]
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """Terms of a scene and what they share.
+
+    Attributes:
+        fields: Function spaces on the cells of this process.
+        ledger: Energies of this process.
+        asked: Forces of controllers, and limits of friction, in the step; N or N m.
+        rates: Rates of the motions with friction as the step begins; m/s or rad/s.
+        beams: Beams of the cells of this process; those with material points first.
+        inelastic: Those with material points.
+        yields: Whether any process has such cells.
+        couplings: Connectors, those alike together.
+        loads: Loads.
+        inertia: Inertia; None in statics.
+        supports: Supports.
+        openings: Search for what opens; None if nothing can.
+        equation: The equation of a step, which consists of all of them.
+    """
+
+    fields: Fields
+    ledger: Ledger
+    asked: dict[Connector, float]
+    rates: dict[Connector, float]
+    beams: list[Cells]
+    inelastic: list[InelasticBeams]
+    yields: bool
+    couplings: list[Links]
+    loads: Loads
+    inertia: Inertia | None
+    supports: Supports
+    openings: Openings | None
+    equation: StepEquation
+
+    @property
+    def remembering(self) -> list[InelasticBeams | Links]:
+        """Terms with internal variables."""
+        return [*self.inelastic, *self.couplings]
+
+    def compiled(self) -> Equation:
+        """Return the equation in C, or as it is where several processes or axes need Python."""
+        python = self.equation
+        if python.share.comm.size > 1 or self.supports.turned:
+            return python
+        return CEquation(python, self.beams, self.couplings, python.others, self.supports)
+
+    def internal_variables(self, q: Array) -> State:
+        """Return what a run that starts here takes over: internal variables, reactions, rates."""
+        memory = Saving(self.equation.share)
+        for one in self.remembering:
+            one.remember(memory, q)
+        if self.supports.work or any(isinstance(link.law, Coulomb) for link in self.asked):
+            self.supports.carry_on(memory, q)
+        if self.inertia is not None:
+            self.inertia.carry_on(memory, len(self.inertia.more))
+        return memory.state()
+
+    def take_over(self, q: Array, internal: State, *, same: bool) -> None:
+        """Take over :meth:`internal_variables` of another run.
+
+        Args:
+            q: The initial configuration at the local degrees of freedom.
+            internal: What the other run has passed on.
+            same: Whether no force has changed since, so that accelerations are what they were.
+        """
+        memory = Restoring(self.equation.share, internal)
+        for one in self.remembering:
+            one.remember(memory, NOWHERE)
+        if "reactions" in internal:
+            self.supports.carry_on(memory, q)
+        if self.inertia is not None and same:
+            known = sum(name in internal for name in self.inertia.scheme.kept)
+            self.inertia.carry_on(memory, known)
+
+    def bear(self, force: Array, loads: list[Array]) -> None:
+        """Set the reactions to those of the initial state of a static run.
+
+        Args:
+            force: The internal forces of that state.
+            loads: The loads that it is in equilibrium with; none if nothing acts yet.
+        """
+        r = np.asarray(force - sum(loads))
+        self.supports.enter(r)
+        self.supports.hold(self.equation.share.added(r))
+        self.supports.take()
+
+
+def assemble(share: Share, scheme: Scheme, v: Array, together: Agreement) -> Assembly:
+    """Make the terms of a scene.
+
+    Args:
+        share: The degrees of freedom of this process, of the grid of the scene.
+        scheme: The time scheme.
+        v: Initial velocities at the local degrees of freedom; supports stop them in place.
+        together: Raises on all processes what one of them raises.
+    """
+    scene, ledger, fields, course = share.grid.scene, Ledger(), Fields(share), Course()
+    A = fields.matrix()
+    setting = (scheme, A, ledger)
+
+    # Each kind makes its entries of the ledger: their order is that of the columns of tables.
+    groups = inelastic_cells(share.grid)
+    inelastic, elastic = [], np.ones(len(share.cells), dtype=bool)
+    for layout, cells in groups:
+        expect_entries(layout, scheme, ledger)
+        part = np.flatnonzero(np.isin(share.cells, cells))
+        if len(part):
+            elastic[part] = False
+            inelastic.append(InelasticBeams(Fields(share, part), layout, *setting, course))
+    beams: list[Cells] = [*inelastic]
+    numerical: list[Term] = []
+    if elastic.any():
+        part = np.flatnonzero(elastic)
+        on_part = fields if elastic.all() else Fields(share, part)
+        beams.append(ElasticBeams(on_part, *setting))
+        numerical = numerical_forces(scheme, on_part, A, ledger)
+
+    asked = {link: 0.0 for link in scene.links if isinstance(link.law, Controller | Coulomb)}
+    rates = dict(asked)
+    connectors = Setting(asked, rates, scene.size, scheme, ledger, friction_repeats(scene), course)
+    coupled = together(lambda: [*couplings(share, connectors, A), *guides(share, scheme, A)])
+    openings = Openings.of(course, _openable(inelastic, coupled), share.comm)
+
+    loads = _loads(scene, fields, scheme, ledger, A)
+    inertia = Inertia(fields, scheme, A, ledger, v) if has_inertia(scheme) else None
+    others: list[Term] = [*numerical, *([inertia] if inertia else [])]
+    for damping in scene.damping:
+        others += damping_forces(damping, fields, *setting, inertia)
+    supports = Supports(share, scheme, ledger, A)
+    if inertia:
+        supports.stop(inertia.v)
+    equation = StepEquation(share, A, beams, coupled, loads, others, supports, course)
+    return Assembly(
+        fields, ledger, asked, rates, beams, inelastic, bool(groups), coupled, loads, inertia,
+        supports, openings, equation,
+    )  # fmt: skip
+
+
+def _loads(scene: Scene, fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr) -> Loads:
+    followers = [load for load in scene.loads if isinstance(load, FollowerLoad)]
+    frames = [load for load in scene.loads if isinstance(load, RotatingFrame)]
+    dead = [load for load in scene.loads if load not in (*followers, *frames)]
+    loads: Loads = [FrameForces(frame, fields, scheme, ledger, A) for frame in frames]
+    if dead:
+        loads.append(DeadLoads(dead, fields.share, scheme, ledger))
+    if followers:
+        loads.append(FollowerLoads(followers, fields.share, scheme, ledger, A))
+    return loads
+
+
+def _openable(inelastic: list[InelasticBeams], coupled: list[Links]) -> list[Openable]:
+    """Return the places of this process that may open: hinges, cracks, softening springs."""
+    cells: list[Openable] = [one for one in inelastic if one.points.softens]
+    return [*cells, *(one.openable for one in coupled if one.openable is not None)]

@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: MIT
+"""The equation of a step, from the terms of a scene; and its derivatives about a state."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.compiled.csr import Csr, Product
+from ufl_beam.discretization.partition import Share
+from ufl_beam.errors import StepFailed
+from ufl_beam.mechanics.time_schemes import Step
+from ufl_beam.solvers.equation import PythonEquation
+from ufl_beam.terms.base import Beams, Cells, Term
+from ufl_beam.terms.links import Links
+from ufl_beam.terms.openings import Course
+from ufl_beam.terms.supports import Supports
+
+
+class Load(Term, Protocol):
+    """A load, with its force in the present step."""
+
+    force: Array
+
+
+class StepEquation(PythonEquation):
+    """Sum of the virtual works of all terms, less what supports carry.
+
+    Args:
+        share: The degrees of freedom of this process.
+        A: Matrix of the tangent, which the terms were made with.
+        beams, couplings: Terms whose forces are internal forces.
+        loads, others: The other terms.
+        supports: Hold degrees of freedom.
+        course: Flags that all material points share.
+
+    Attributes:
+        others: All terms but those of internal forces.
+        terms: All terms.
+    """
+
+    def __init__(
+        self,
+        share: Share,
+        A: Csr,
+        beams: Sequence[Cells],
+        couplings: Sequence[Links],
+        loads: Sequence[Load],
+        others: Sequence[Term],
+        supports: Supports,
+        course: Course,
+    ) -> None:
+        super().__init__(A, np.zeros(share.size), supports.dofs)
+        self.share, self.supports, self._course = share, supports, course
+        self._beams, self._couplings, self._loads = beams, couplings, loads
+        self._inner: list[Beams] = [*beams, *couplings]
+        self.others: list[Term] = [*loads, *others]
+        self.terms: list[Term] = [*self._inner, *self.others]
+
+    def begin(self, step: Step) -> None:
+        """Let all terms begin a step."""
+        for term in self.terms:
+            term.begin(step)
+
+    def load_forces(self) -> list[Array]:
+        """Vectors of the loads in the present step; new arrays where they have changed."""
+        return [load.force for load in self._loads]
+
+    def residual(self, x: Array, r: Array) -> None:
+        """Write the local part of the residual at ``x`` into ``r``."""
+        q1 = self.supports.in_plane(x)
+        self.force.fill(0.0)
+        for inner in self._inner:
+            inner.add_residual(q1, self.force)
+        r[:] = self.force
+        for term in self.others:
+            term.add_residual(q1, r)
+        self.supports.enter(r)
+
+    def complete(self, r: Array) -> None:
+        """Note the reactions in the summed residual, and remove them from it."""
+        self.supports.hold(r)
+
+    def tangent(self, x: Array) -> None:
+        """Fill the matrix with the derivative at ``x``."""
+        self._assemble(self.supports.in_plane(x))
+        self.supports.hold_matrix(self.A.data)
+
+    def _assemble(self, q1: Array) -> None:
+        self.A.data.fill(0.0)
+        for term in self.terms:
+            term.add_tangent(q1)
+
+    def tangent_at(self, x: Array, v: Array, r: Array) -> Csr:
+        """Return the tangent at ``x``; add to ``r`` what it makes of a motion ``v`` of supports.
+
+        All are in the axes of the supports, and the local part.
+        """
+        self._assemble(self.supports.in_plane(x))
+        if len(self.supports.moving):
+            forces = Product(self.A)(self.supports.in_plane(v))
+            self.supports.enter(forces)
+            r += forces
+        self.supports.hold_matrix(self.A.data)
+        return self.A
+
+    def respond_at(self, q1: Array) -> bool:
+        """Evaluate forces and tangent of the present step at ``q1``; false if a process cannot."""
+        x, failed = self.supports.in_axes(q1), 0.0
+        try:
+            self.residual(x, np.zeros(self.share.size))
+            self.tangent(x)
+        except StepFailed:
+            failed = 1.0
+        return self.share.largest(failed) == 0.0
+
+    def relieve(self, relief: bool) -> bool:
+        """Begin again with relieved points, or end that; return if it makes a difference."""
+        opened = bool(self.share.largest(float(self._course.opened)))
+        self._course.relieve(relief and opened)
+        if relief:
+            for coupling in self._couplings:
+                coupling.again()
+        return opened
+
+    def missed(self, x: Array, r: Array, scale: float, moved: float) -> float:
+        """Return the largest residual of the laws of connectors, without dimension."""
+        q1 = self.supports.in_plane(x)
+        here = max((c.excess(q1, r, scale, moved) for c in self._couplings), default=0.0)
+        return self.share.largest(here) if self.share.grid.scene.links else 0.0
+
+    def working(self, x: Array, y: Array) -> Array:
+        """Return the conjugates of residuals in the step ``y`` from ``x``."""
+        q, v, works = self.supports.in_plane(x), self.supports.in_plane(y), y.copy()
+        for coupling in self._couplings:
+            coupling.put_motions(q, v, works)
+        return works
+
+    # -- derivatives about a state -------------------------------------------------------------
+
+    def linearise(self, q: Array, step: Step) -> tuple[Array, Array]:
+        """Return all forces but those of inertia in a step to ``q``, and their derivatives.
+
+        Returns:
+            The residual; and the entries of the matrix; in the axes of the plane, nothing held.
+        """
+        r = np.zeros(self.share.size)
+        self.A.data.fill(0.0)
+        for term in self.terms:
+            if term.kind != "inertia":
+                term.begin(step)
+                term.add_residual(q, r)
+                term.add_tangent(q)
+        return r, self.A.data.copy()
+
+    def tangent_change(self, q: Array, u: Array) -> Array:
+        """Derivative of the tangent of :meth:`linearise` along ``u``; entries of the matrix.
+
+        Args:
+            q: Configuration at the local degrees of freedom, which was linearised about last.
+            u: Direction, forces of connectors included.
+        """
+        self.A.data.fill(0.0)
+        for one in self._inner:
+            one.add_tangent_change(q, u)
+        return self.A.data.copy()
+
+    def stiffness_works(self, q: Array, X: Array, Y: Array) -> Array:
+        """Works of the tangent of :meth:`linearise` for the motions X, each on its own of Y; J.
+
+        Args:
+            q: See :meth:`tangent_change`.
+            X: Motions, in columns.
+            Y: Virtual motions, in columns.
+        """
+        self.A.data.fill(0.0)
+        for term in (*self._couplings, *self.others):
+            if term.kind != "inertia":
+                term.add_tangent(q)
+        times, works = Product(self.A), np.zeros(X.shape[1])
+        for i, (x, y) in enumerate(zip(*map(np.ascontiguousarray, (X.T, Y.T)), strict=True)):
+            of_beams = sum(one.tangent_work(q, x, y) for one in self._beams)
+            works[i] = of_beams + times(x) @ y
+        return works
+
+    def tangent_works(self, q: Array, u: Array, X: Array, Y: Array) -> tuple[Array, Array]:
+        """Works of the tangent for the motions X on Y, and of its derivative along u; J.
+
+        Args:
+            q: See :meth:`tangent_change`.
+            u: See :meth:`tangent_change`.
+            X: Motions, in columns.
+            Y: Virtual motions, in columns.
+
+        Returns:
+            Two symmetric matrices.
+        """
+        works = np.zeros((2, X.shape[1], Y.shape[1]))
+        for i, j in zip(*np.triu_indices(X.shape[1]), strict=True):
+            x, y = (np.ascontiguousarray(one) for one in (X[:, i], Y[:, j]))
+            works[0, i, j] = sum(one.tangent_work(q, x, y) for one in self._beams)
+            works[1, i, j] = sum(one.work_of_change(q, u, x, y) for one in self._beams)
+        for k, work in enumerate(works):
+            self.A.data.fill(0.0)
+            for one in self._couplings:
+                if k == 0:
+                    one.add_tangent(q)
+                else:
+                    one.add_tangent_change(q, u)
+            times = Product(self.A)
+            work += np.triu([times(np.ascontiguousarray(x)) @ Y for x in X.T])
+            work += np.triu(work, 1).T
+        return works[0], works[1]

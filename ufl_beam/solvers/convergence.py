@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: MIT
+"""Convergence of Newton's method, in tolerances without a dimension."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from petsc4py import PETSc
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.compiled.c_library import doubles, integers, lib
+from ufl_beam.discretization.partition import Share
+from ufl_beam.errors import StepFailed
+from ufl_beam.solvers.equation import Equation
+from ufl_beam.solvers.newton_options import Newton
+
+REASONS = {
+    lib.SINGULAR: "found a singular tangent",
+    lib.TOO_MANY: "did not converge",
+    lib.STALLED: "came no closer to an equilibrium",
+    lib.DIVERGED: "met a force that is not a finite number",
+    -4: "met a force that is not a finite number",  # PETSc's name for it changed in 3.24
+}
+"""Reasons for which Newton's method stops, in words; by values of SNESConvergedReason."""
+
+
+class Convergence:
+    """Sizes of residuals and motions, and the decision to go on or to stop.
+
+    Args:
+        share: The degrees of freedom of this process.
+        equation: Its data in C are completed.
+        x: Local values of the iterate.
+        r: Those of its residual.
+        newton: Tolerances.
+        least: Iterations at least, unless a residual is far below its tolerance.
+
+    Attributes:
+        c: Data in C, see :func:`judge` of newton.c.
+        diagonal: Positions of the diagonal in the data of the tangent.
+    """
+
+    def __init__(
+        self,
+        share: Share,
+        equation: Equation,
+        x: Array,
+        r: Array,
+        newton: Newton,
+        least: int,
+    ) -> None:
+        self._share, self._A, self._parallel = share, equation.A, share.comm.size > 1
+        self._x, self._r = x, r
+        self._weights = self._force_weights()
+        self._norm = (len(self._weights), doubles(self._weights))
+        self.moves = np.ones(share.size)
+        self.moves[equation.held] = 0.0
+        self.diagonal = np.flatnonzero(self._A.rows() == self._A.indices)
+        self._at_r, self._at_forces = doubles(self._r), doubles(equation.force)
+        self._last_loads: list[Array] = []
+        self._loads = 0.0
+        self._correction = np.empty(share.size)
+        self._alive = [
+            *map(doubles, (share.lengths(), self.moves, np.empty(share.size), self._correction)),
+            integers(self.diagonal.astype(np.int32)),
+        ]
+        self.c = c = equation.c
+        c.size, c.scene = share.size, share.grid.scene.size
+        c.rtol, c.modified, c.rate = newton.rtol, newton.modified, math.inf
+        c.weight, c.residual = self._norm[1], self._at_r
+        c.lengths, c.moves, c.space, c.change, c.diagonal = self._alive
+        c.most, c.least = newton.max_iterations, least
+
+    def _force_weights(self) -> Array:
+        """One for forces, one over the size of the scene for moments."""
+        weights = np.ones(self._share.size)
+        weights[self._share.rotations()] = 1 / self._share.grid.scene.size
+        weights[self._share.multipliers()] = 0.0
+        return weights[: self._share.num_owned].copy()
+
+    # -- sizes ---------------------------------------------------------------------------------
+
+    def size(self, forces: Array) -> float:
+        """Euclidean norm over the scene of forces, and moments over its size; N."""
+        return self._size(doubles(forces))
+
+    def _size(self, forces: Any) -> float:
+        if not self._parallel:
+            size: float = lib.size_of_forces(self.c, forces)
+            return size
+        square = self._share.total(lib.sum_of_squares(*self._norm, forces))
+        if lib.has_its_digits(square):
+            return math.sqrt(square)
+        if math.isnan(square):
+            return square
+        largest = self._share.largest(lib.largest_size(*self._norm, forces))
+        if largest == 0.0 or not math.isfinite(largest):
+            return largest
+        scaled = lib.scaled_sum_of_squares(*self._norm, forces, largest)
+        return largest * math.sqrt(self._share.total(scaled))
+
+    def take_loads(self, loads: list[Array]) -> None:
+        """Take vectors of the loads for the scale; new arrays where they have changed."""
+        # On several processes they may change on some only.
+        if self._parallel or list(map(id, loads)) != list(map(id, self._last_loads)):
+            self._last_loads = loads
+            self._loads = self.c.loads = sum(map(self.size, loads))
+
+    def scale(self) -> float:
+        """Size of the loads and of the internal forces in the latest residual; N."""
+        return self._loads + self._size(self._at_forces)
+
+    def residuals(self) -> Array:
+        """Sizes of the latest residual, moments over the size of the scene, ghosts zero; N."""
+        sizes = np.zeros(self._share.size)
+        number = len(self._weights)
+        sizes[:number] = np.abs(self._r[:number]) * self._weights
+        return sizes
+
+    def work(self, step: Array) -> float:
+        """Work of the latest residual on a step; J."""
+        number = len(self._weights)
+        return self._share.total(float(self._r[:number] @ step[:number]))
+
+    # -- the test ------------------------------------------------------------------------------
+
+    def begin(self, patience: int, *, like_last: bool) -> None:
+        """Begin an iteration that ends after so many residuals in a row without half the least."""
+        c = self.c
+        c.last = c.best = math.inf
+        c.near, c.slow, c.patience = 0, 0, patience
+        if not like_last:
+            c.rate = math.inf
+
+    def test(self, iteration: int) -> int:
+        """Return why to stop after an iteration, or zero."""
+        residual = self._size(self._at_r)
+        if not math.isfinite(residual):
+            return int(lib.DIVERGED)
+        scale = self.scale()
+        self._find_motion(self._x)
+        floor = 8 * self._round_off() if iteration > 1 else 0.0
+        return int(lib.judge(self.c, doubles(self._x), iteration, residual, scale, floor))
+
+    def failure(self, reason: int, iterations: int) -> StepFailed:
+        """Describe why Newton's method has stopped without a solution."""
+        names = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int)}
+        scale = self.scale()
+        residuals = self._share.grid.worst(self._share.gather(self.residuals()))
+        places = [f"{size:.1e} N in {place}" for place, size in [*residuals.items()][:3]]
+        failure = StepFailed(
+            f"Newton's method {REASONS.get(reason, 'was stopped by PETSc')} after {iterations} "
+            f"iterations; residual {self._size(self._at_r):.3e} N, largest: "
+            f"{', '.join(places) or 'nowhere'}; forces in the scene {scale:.3e} N"
+        )
+        failure.residuals = residuals
+        failure.reason = str(names.get(reason, reason))
+        return failure
+
+    # -- round-off -----------------------------------------------------------------------------
+
+    def _round_off(self) -> float:
+        """Residual that the last digit of displacements, strains and rotations makes; N.
+
+        Stiff or finely divided beams cannot be solved any better, however small the forces are.
+        """
+        return self.size(self._A.data[self.diagonal] * self._last_digits(self._x))
+
+    def _find_motion(self, x: Array) -> None:
+        """Note the largest motion in any process, at most the size of the scene."""
+        largest = lib.largest_motion(*self._norm, doubles(x))
+        self.c.moved = min(self._share.largest(largest), self.c.scene)
+
+    def _last_digits(self, x: Array) -> Array:
+        digits = np.empty(self._share.size)
+        lib.find_last_digits(self.c, doubles(x), doubles(digits))
+        return digits
+
+    def least_work(self, s: Array) -> float:
+        """Work in a step ``s`` of what the last digit of displacements makes; less is none; J."""
+        self._find_motion(self._x)
+        works = self._A.data[self.diagonal] * self._last_digits(self._x) * np.abs(s)
+        return self._share.total(float(works[: len(self._weights)].sum()))
+
+    def random_work(self, x: Array, s: Array) -> float:
+        """Work in a step ``s`` of the last digits at ``x``, were they independent; J."""
+        self._find_motion(x)
+        works = self._A.data[self.diagonal] * self._last_digits(x) * s
+        return math.sqrt(self._share.total(float(np.sum(works[: len(self._weights)] ** 2))))

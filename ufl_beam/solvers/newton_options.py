@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: MIT
+"""Options of Newton's method."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from ufl_beam.errors import (
+    require_count,
+    require_kind,
+    require_number,
+    require_switch,
+    require_text,
+)
+
+PREFIX = "ub_"
+"""Prefix of the PETSc options of the solver, as in ``-ub_snes_monitor``."""
+
+
+@dataclass(frozen=True)
+class Newton:
+    """Options of Newton's method: tolerance, number of iterations, PETSc options.
+
+    Args:
+        rtol: Residual to be reached, as a part of the forces in the scene.
+        max_iterations: Iterations before a step is cut.
+        modified: Keep the tangent, also from step to step, while residuals fall fast enough.  What
+            is saved grows with the number of cells; solutions end closer to ``rtol``.
+        petsc: PETSc options without their prefix, such as ``{"snes_monitor": None}``; in
+            ``PETSC_OPTIONS`` they have the prefix ``ub_``.  With any of them Newton's method is
+            that of PETSc, else one in C that does the same, faster where cells are few.  A
+            ``snes_linesearch_type`` takes the place of the search that follows full steps.
+
+    Example:
+        >>> newton = ub.Newton(rtol=1e-12, petsc={"snes_linesearch_type": "bt"})
+        >>> run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, newton=newton)
+    """
+
+    rtol: float = 1e-10
+    max_iterations: int = 30
+    modified: bool = False
+    petsc: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        require_number(self.rtol, "Newton: rtol", positive=True)
+        require_count(self.max_iterations, "Newton: max_iterations")
+        object.__setattr__(self, "max_iterations", int(self.max_iterations))
+        require_switch(self.modified, "Newton: modified")
+        require_kind(self.petsc, dict, "Newton: petsc")
+        for option in self.petsc:
+            require_text(option, "Newton: petsc, an option")

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: MIT
+"""Virtual works that a scene may contribute to the equation of a step.
+
+A term adds its part of the residual and of the tangent at the end of the step, and says what the
+step did to the energy.  Vectors hold the local degrees of freedom of a process, ghosts included;
+what several processes add to one degree of freedom is summed by the solver.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from ufl_beam.arrays import Array
+from ufl_beam.compiled.c_library import Loop, loop
+from ufl_beam.compiled.csr import Csr, StepProduct
+from ufl_beam.discretization.compiled_forms import Kernel
+from ufl_beam.discretization.state_io import Memory
+from ufl_beam.mechanics.time_schemes import Step
+
+KINDS = ("beams", "connectors", "loads", "inertia", "damping")
+"""Kinds of forces."""
+
+
+class Term(Protocol):
+    """Virtual work of one physical effect."""
+
+    kind: str
+    """Kind of its forces, one of :data:`KINDS`."""
+
+    def loops(self) -> tuple[Loop, Loop | None] | None:
+        """Return C functions with data in the place of both methods, or None without them."""
+
+    def begin(self, step: Step) -> None:
+        """Take note of the step that is to be solved."""
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Add the virtual work at ``q1`` to ``r``."""
+
+    def add_tangent(self, q1: Array) -> None:
+        """Add the derivative at ``q1`` to the matrix that the term was made with."""
+
+    def accept(self, q1: Array, s: Array) -> None:
+        """Take the end of the step as the new state, and enter what the step supplied or lost.
+
+        ``s`` is the step of the nodes that the virtual works are works on.
+        """
+
+    def add_state(self, q: Array) -> None:
+        """Enter the energy that the term holds in the accepted state ``q``."""
+
+    def remember(self, memory: Memory, q: Array) -> None:
+        """State what later steps depend on; ``q`` is the configuration of the state."""
+
+
+class Beams(Term, Protocol):
+    """Resultants of cells working on the virtual strains; the residual is an internal force."""
+
+    def change(self, q1: Array) -> float:
+        """Energy that cells of this process store and dissipate in the step to ``q1``; J."""
+
+    def add_tangent_change(self, q1: Array, u: Array) -> None:
+        """Add the derivative of the tangent at ``q1`` along ``u``; no internal variable changes."""
+
+
+class Cells(Beams, Protocol):
+    """Beams whose tangent is known by its works, too, summed over cells from strains."""
+
+    def tangent_work(self, q1: Array, x: Array, y: Array) -> float:
+        """Return the work of the tangent for the motion x on y; J."""
+
+    def work_of_change(self, q1: Array, u: Array, x: Array, y: Array) -> float:
+        """Return the work of the derivative of the tangent along u, for x on y; J."""
+
+
+class OfForms:
+    """A term whose forces and their derivative are two forms on cells."""
+
+    _force: Kernel
+    _tangent: Kernel
+    _A: Csr
+
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """C loops over the cells, of force and tangent."""
+        return loop("add_cells", self._force.cells), loop("add_cells", self._tangent.cells)
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Add the forces to the residual."""
+        self._force.add(q1, r)
+
+    def add_tangent(self, q1: Array) -> None:
+        """Add the derivative of the forces to the tangent."""
+        self._tangent.add(q1, self._A.data)
+
+
+class OfMatrix:
+    """A term whose forces are a constant matrix times the step of the nodes."""
+
+    _times: StepProduct
+
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """The product, and its derivative."""
+        return self._times.loops()
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Add the forces to the residual."""
+        self._times.add_force(q1, r)
+
+    def add_tangent(self, q1: Array) -> None:
+        """Add the derivative of the forces to the tangent."""
+        self._times.add_tangent(q1)

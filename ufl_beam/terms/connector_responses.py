@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: MIT
+"""Laws of connectors over a step: one row ``α e + β λ = γ`` for each of them.
+
+e is the relative motion at the end of the step and λ the force that resists its growth.  What is
+held has a row about e, all other laws have one about λ, linear in e around the latest iterate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import singledispatch
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.model.connectors import Connector
+from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.openings import Course, Openable
+
+Rows = tuple[Any, Any, Any]
+"""α, β, γ of some connectors: arrays or numbers."""
+
+
+class Setting(NamedTuple):
+    """Arguments that all responses are made with.
+
+    Attributes:
+        asked: Forces of controllers, and limits of friction, in the present step; N or N m.
+        rates: Rates of relative motions with friction as the step begins; m/s or rad/s.
+        size: Size of the scene; m.
+        scheme: Says what acts in a step.
+        ledger: Takes energies and works.
+        friction_repeats: Whether places that stick may hold what is held already.
+        course: Flags that all points of the scene share.
+    """
+
+    asked: Mapping[Connector, float]
+    rates: Mapping[Connector, float]
+    size: float
+    scheme: Scheme
+    ledger: Ledger
+    friction_repeats: bool
+    course: Course
+
+
+class Response(Protocol):
+    """Some connectors whose laws are of one kind; motions and forces are arrays of them."""
+
+    steady: bool
+    """True if the rows stay the same during a step."""
+
+    in_c: dict[str, Any]
+    """Data of laws that C evaluates, by their names in ``couplings`` of loops.h."""
+
+    @property
+    def openable(self) -> Openable | None:
+        """Connectors that open beyond a limit, if there are any."""
+
+    def motion(self, e: Array) -> Array:
+        """Motions of the accepted state as solutions show them; ``e`` are those of the nodes."""
+
+    def begin(self, e0: Array, step: Step) -> None:
+        """Begin a step at the motions ``e0``."""
+
+    def again(self) -> None:
+        """Begin the step again: forget what its iterates have tried."""
+
+    def rows(self, e1: Array, λ: Array) -> Rows:
+        """α, β, γ around an iterate."""
+
+    def accept(self, e1: Array, work: float) -> None:
+        """Take the end of the step as the new state; ``work`` is what the connectors have taken."""
+
+    def add_state(self, e: Array) -> None:
+        """Enter what is stored."""
+
+    def change(self, e1: Array, work: float) -> float:
+        """Energy that the step stores, dissipates or gives away; J."""
+
+    def dissipation(self, e1: Array, λ: Array) -> float:
+        """Energy dissipated plastically in a step to the motions ``e1``; J."""
+
+    def flows(self) -> bool:
+        """Return whether one slips plastically in the latest iterate."""
+
+    @property
+    def dissipated(self) -> Array:
+        """Energy that each connector has dissipated plastically; (num_links,); J."""
+
+    def about_force(self, rows: Array) -> Array:
+        """Factor by which rows about the force are divided, zero for rows about the motion.
+
+        Args:
+            rows: The latest ones that Python has put; (num_links, 3).
+
+        Returns:
+            Shape (num_links,).
+        """
+
+    def remaining(self) -> Array:
+        """Part of the elastic stiffness that is left in the latest iterate; (num_links,)."""
+
+    def bends(self, e1: Array) -> Array:
+        """Derivative of α by the motion, internal variables kept; (num_links,)."""
+
+    def state(self) -> Array:
+        """Return the internal variables; (num_links, k)."""
+
+    def restore(self, rows: Array) -> None:
+        """Restore the variables that :meth:`state` returned."""
+
+    def start(self, e: Array) -> None:
+        """Begin at motions that no step has led to."""
+
+    def freeze(self) -> None:
+        """Keep everything elastic from now on: nothing yields or breaks further."""
+
+
+@singledispatch
+def respond(law: Any, links: Sequence[Connector], setting: Setting) -> Response:
+    """The response of connectors whose laws are of the kind of ``law``."""
+    raise TypeError(f"{law!r} is no law of a connector")
+
+
+class Working:
+    """Base of responses that store nothing: the work of their forces is entered."""
+
+    steady = False
+    in_c: dict[str, Any] = {}  # noqa: RUF012
+    openable: Openable | None = None
+    _group = "lost"
+    _entry = ""
+    _sign = 1.0
+
+    def __init__(self, law: Any, links: Sequence[Connector], setting: Setting) -> None:
+        self._laws: list[Any] = [link.law for link in links]
+        self._links, self._setting = links, setting
+        self._entries = getattr(setting.ledger, self._group)
+        if self._entry:
+            self._entries[self._entry] += 0.0
+        self._e0: Array = np.zeros(len(links))
+        self._prepare()
+
+    def _prepare(self) -> None:
+        """Prepare the response; called once."""
+
+    def begin(self, e0: Array, step: Step) -> None:
+        """Begin a step at the motions ``e0``."""
+        self._e0, self._dt = e0, step.dt
+        self._note(step)
+
+    def _note(self, step: Step) -> None:
+        """Prepare a step."""
+
+    def motion(self, e: Array) -> Array:
+        """Motions of the nodes."""
+        return e
+
+    def again(self) -> None:
+        """Do nothing: laws do not depend on iterates."""
+
+    def accept(self, e1: Array, work: float) -> None:
+        """Enter the work into the ledger."""
+        if self._entry:
+            self._entries[self._entry] += self._sign * work
+
+    def add_state(self, e: Array) -> None:
+        """Add nothing: no energy is stored."""
+
+    def change(self, e1: Array, work: float) -> float:
+        """Energy of the step: the work of the connectors."""
+        return work
+
+    def dissipation(self, e1: Array, λ: Array) -> float:
+        """Zero: there is no plastic dissipation."""
+        return 0.0
+
+    def flows(self) -> bool:
+        """False: there is no plastic flow."""
+        return False
+
+    @property
+    def dissipated(self) -> Array:
+        """Zero: there is no plastic dissipation."""
+        return np.zeros(len(self._links))
+
+    def about_force(self, rows: Array) -> Array:
+        """Factors of one, but for those that are held in the iterate."""
+        about_motion = np.array([link.holds for link in self._links]) & (rows[:, 1] != 1.0)
+        return np.where(about_motion, 0.0, 1.0)
+
+    def remaining(self) -> Array:
+        """Part of the elastic stiffness that is left: 1, as nothing yields."""
+        return np.ones(len(self._links))
+
+    def bends(self, e1: Array) -> Array:
+        """The law is linear."""
+        return np.zeros(len(self._links))
+
+    def state(self) -> Array:
+        """Return nothing: there are no internal variables."""
+        return np.zeros((len(self._links), 0))
+
+    def restore(self, rows: Array) -> None:
+        """Restore nothing: there are no internal variables."""
+
+    def start(self, e: Array) -> None:
+        """Do nothing: there are no internal variables."""
+
+    def freeze(self) -> None:
+        """Do nothing: these laws do not yield."""
+
+    def _numbers(self, name: str) -> Array:
+        return np.array([getattr(law, name) for law in self._laws], dtype=np.float64)
