@@ -19,7 +19,7 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
-from ufl_beam.output.archive import read, write
+from ufl_beam.output.archive import write
 from ufl_beam.output.joint_histories import (
     Connection,
     JointHistory,
@@ -35,11 +35,15 @@ from ufl_beam.parameter import TIME
 from ufl_beam.simulation.cell_results import CellResults, Material
 from ufl_beam.simulation.kept_states import KeptStates
 from ufl_beam.simulation.opened_hinges import Opened
-from ufl_beam.simulation.solution_files import FORMAT, arrays_of, grid_of, take, text_of
+from ufl_beam.simulation.solution_files import (
+    FORMAT,
+    arrays_of,
+    grid_of,
+    made_of_file,
+    take,
+    text_of,
+)
 from ufl_beam.terms.energy_ledger import Energy
-
-KINDS: dict[str, type[Solution]] = {}
-"""Classes of solutions, by name."""
 
 
 class Solution:
@@ -73,12 +77,9 @@ class Solution:
 
     def __init__(self, scene: Scene, grid: Grid) -> None:
         self.scene, self.grid = scene, grid
-        self.parts = 0
-        self.iterations = 0
-        self.time_error = math.nan
-        self.seconds = 0.0
-        self.every = 1
-        self.open_ledger = ""
+        self.parts = self.iterations = 0
+        self.time_error, self.seconds = math.nan, 0.0
+        self.every, self.open_ledger = 1, ""
         self.internal: State = {}
         self._kept = KeptStates()
         self._cells = CellResults(grid, self._kept)
@@ -126,9 +127,6 @@ class Solution:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return restored, self._content()
-
-    def __init_subclass__(cls) -> None:
-        KINDS[cls.__name__] = cls
 
     def __len__(self) -> int:
         """Number of kept states."""
@@ -320,15 +318,12 @@ class Solution:
 
     def __str__(self) -> str:
         scene = self.scene
-        counts = {
-            "beam": len(scene.beams), "cell": len(self.grid.cells),
-            "bod": len(scene.bodies), "link": len(scene.links),
-        }  # fmt: skip
+        counts = (
+            (len(scene.beams), "beam", "beams"), (len(self.grid.cells), "cell", "cells"),
+            (len(scene.bodies), "body", "bodies"), (len(scene.links), "link", "links"),
+        )  # fmt: skip
         span = f"{self._kept.times[0]:g} to {self._kept.times[-1]:g}"
-        endings = {"bod": ("y", "ies")}
-        parts = [
-            f"{n} {name}{endings.get(name, ('', 's'))[n != 1]}" for name, n in counts.items() if n
-        ]
+        parts = [f"{n} {one if n == 1 else many}" for n, one, many in counts if n]
         return (
             f"{', '.join(parts)}, {self.grid.size} degrees of freedom\n"
             f"{self.parameter.value.format(span)} in {self.parts} steps, "
@@ -336,9 +331,6 @@ class Solution:
             f"{self.seconds:.2f} s of wall time\n{self.opened.summary()}{self.energy}"
             + (f"\n{self.open_ledger}" if self.open_ledger else "")
         )
-
-
-KINDS["Solution"] = Solution
 
 
 def load(path: str | Path) -> Solution:
@@ -356,19 +348,13 @@ def load(path: str | Path) -> Solution:
         >>> bool((loaded.q == solution.q).all())
         True
     """
-    file = require_path(path, "load")
-    text, arrays = read(file, FORMAT)
-    try:
-        return restored(text, arrays)
-    except SceneError as error:
-        raise SceneError(f"solution {file}: {error}") from None
-    except (KeyError, TypeError, ValueError, IndexError) as error:
-        raise SceneError(f"solution {file}: the file is damaged: {error!r}") from None
+    return made_of_file(require_path(path, "load"), restored)
 
 
 def restored(text: dict[str, Any], arrays: State) -> Solution:
     """Make a solution from what was saved of it."""
     grid = grid_of(text)
-    solution = KINDS[text["kind"]](grid.scene, grid)
+    kinds = {kind.__name__: kind for kind in (Solution, *Solution.__subclasses__())}
+    solution = kinds[text["kind"]](grid.scene, grid)
     solution._take(text, arrays)
     return solution
