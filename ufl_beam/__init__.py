@@ -92,23 +92,24 @@ from ufl_beam.model.time_functions import Table, ramp
 from ufl_beam.output.events import Event, Events
 from ufl_beam.output.extremes import Extent, Extremes
 from ufl_beam.output.fatigue import Fatigue, HotSpot
+from ufl_beam.output.history import History
 from ufl_beam.output.rainflow import Cycles, Gerber, Goodman, SNCurve, rainflow
-from ufl_beam.output.recorders import History, Recorder
+from ufl_beam.output.recorders import Recorder
 from ufl_beam.output.time_series import VTKHDF, XDMF
-from ufl_beam.plotting.extremes import plot_cycles, plot_extremes
+from ufl_beam.parallel import say
+from ufl_beam.plotting.analyses import plot_cycles, plot_extremes, plot_modes, plot_tradeoff
 from ufl_beam.plotting.inelastic import (
     plot_damage,
     plot_dissipation,
     plot_hinge,
     plot_moment_curvature,
 )
-from ufl_beam.plotting.modes import plot_modes
-from ufl_beam.plotting.plot import plot
-from ufl_beam.plotting.plots import picture, plot_energy, plot_history, plot_shapes
+from ufl_beam.plotting.model import plot
+from ufl_beam.plotting.plots import plot_energy, plot_history, plot_shapes
 from ufl_beam.plotting.render3d import animate, render
-from ufl_beam.plotting.tradeoff import plot_tradeoff
+from ufl_beam.plotting.style import picture
 from ufl_beam.simulation.checkpoint import Checkpoint
-from ufl_beam.simulation.run import say, simulate
+from ufl_beam.simulation.run import simulate
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution, load
 from ufl_beam.simulation.step_control import Adaptive

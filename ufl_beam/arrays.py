@@ -16,3 +16,6 @@ Complex: TypeAlias = npt.NDArray[np.complex128]
 
 Index: TypeAlias = npt.NDArray[Any]
 """Integers that number something."""
+
+State: TypeAlias = dict[str, Array]
+"""Arrays of a state, by name."""

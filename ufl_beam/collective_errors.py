@@ -106,7 +106,7 @@ def portable(error: BaseException | None) -> BaseException | None:
     return error
 
 
-def on_first(comm: MPI.Intracomm, action: Callable[[], None]) -> None:
+def on_first(comm: MPI.Intracomm, action: Callable[[], object]) -> None:
     """Do something on the first process; what it raises there is raised on all of them."""
     error: BaseException | None = None
     if comm.rank == 0:

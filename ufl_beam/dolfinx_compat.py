@@ -69,7 +69,7 @@ if all(
     # log gets a handler that shows nothing if a warning comes before this line, as with -W always.
     logging.captureWarnings(False)
 
-if VERSION > (0, 11):
+if VERSION > (0, 11) and MPI.COMM_WORLD.rank == 0:
     warnings.warn(
         f"ufl_beam is tested with DOLFINx 0.9 to 0.11, and not with {dolfinx.__version__}",
         RuntimeWarning,
@@ -81,11 +81,11 @@ TABULATE = (
     "const uint8_t *permutation" + ("" if VERSION < (0, 10) else ", void *data"),
     "" if VERSION < (0, 10) else ", 0",
 )
-"""Arguments of the kernels of FFCx, and what a call adds after the first six."""
+"""Arguments of the kernels of FFCx, and those that a call adds after the first six."""
 
 
 def jit_directory() -> Path:
-    """Directory in which DOLFINx keeps compiled forms.
+    """Return the directory in which DOLFINx keeps compiled forms.
 
     Raises:
         RuntimeError: The options of DOLFINx cannot be read.
@@ -115,7 +115,7 @@ def compile_form(form: ufl.Form, directory: Path) -> fem.Form:
 
 
 def form_key(form: ufl.Form) -> str:
-    """Text that differs between forms which FFCx compiles to different code."""
+    """Return a text that differs between forms which FFCx compiles to different code."""
     options = {k: v for k, v in _jit_options().items() if k not in ("cache_dir", "timeout")}
     system = [sysconfig.get_config_var(name) for name in ("CFLAGS", "EXT_SUFFIX")]
     ours = (form.signature(), ffcx.__version__, dolfinx.__version__, ffcx.get_options(), options)
@@ -123,14 +123,14 @@ def form_key(form: ufl.Form) -> str:
 
 
 def pack(form: fem.Form) -> tuple[Array, Array]:
-    """Constants of a form, and coefficients of its cells; shapes (n,), (num_cells, m)."""
+    """Pack the constants of a form and the coefficients of its cells; (n,), (num_cells, m)."""
     coefficients = cpp.fem.pack_coefficients(form._cpp_object)
     (cells,) = coefficients.values()
     return cpp.fem.pack_constants(form._cpp_object), np.array(cells)
 
 
 def line_mesh(points: Array, cells: npt.NDArray[np.int64]) -> mesh.Mesh:
-    """Mesh of straight cells in the plane, on this process alone.
+    """Make a mesh of straight cells in the plane, on this process alone.
 
     Args:
         points: Vertices; shape (num_points, 2); m.
@@ -142,7 +142,7 @@ def line_mesh(points: Array, cells: npt.NDArray[np.int64]) -> mesh.Mesh:
 
 
 def cell_coordinates(domain: mesh.Mesh) -> Array:
-    """Vertices of the cells; shape (num_cells, 2, 3); m."""
+    """Return the vertices of the cells; shape (num_cells, 2, 3); m."""
     geometry = domain.geometry
     dofmap = geometry.dofmap if VERSION < (0, 11) else geometry.dofmaps[0]
     return np.ascontiguousarray(geometry.x[dofmap])
@@ -151,7 +151,7 @@ def cell_coordinates(domain: mesh.Mesh) -> Array:
 def space_with_dofs(
     domain: mesh.Mesh, element: Any, cell_dofs: npt.NDArray[np.int32], size: int
 ) -> fem.FunctionSpace:
-    """Function space whose cells share the degrees of freedom that ``cell_dofs`` says.
+    """Make a function space with given degrees of freedom of the cells.
 
     Args:
         domain: Mesh on this process.

@@ -45,3 +45,14 @@ def alone() -> Iterator[None]:
 def in_study() -> bool:
     """Return whether this is a member of a study, which shows no progress of its own."""
     return _OURS.get() != MPI.COMM_WORLD
+
+
+def say(*words: object, sep: str = " ") -> None:
+    """Print from the first process only, as scripts do that may run under ``mpirun``.
+
+    Example:
+        >>> ub.say("steps:", len(solution.times) - 1)  # once, on any number of processes
+        steps: 20
+    """
+    if ours().rank == 0:
+        print(*words, sep=sep, flush=True)  # noqa: T201

@@ -11,7 +11,7 @@ from advice import good, schemes
 
 import ufl_beam as ub
 from ufl_beam.analysis.richardson import pareto
-from ufl_beam.plotting.connector_glyphs import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY
+from ufl_beam.plotting.style import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY
 
 Case = dict[str, Any]
 COLORS = (BLUE, SKY, GREEN, PINK, ORANGE, RED)

@@ -21,6 +21,7 @@ from ufl_beam.discretization.compiled_forms import Kernel
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
 from ufl_beam.model.material_laws import HardeningBulk
 from ufl_beam.terms import material_points, rigid_plastic
+from ufl_beam.terms.supports import Supports
 
 pytestmark = pytest.mark.serial  # nothing here depends on the number of processes
 
@@ -73,18 +74,54 @@ def test_errors_of_petsc_that_python_meets():
         petsc("VecLockReadPop", PETSc.Vec().createSeq(2))
 
 
-def test_errors_of_petsc_that_c_meets():
-    """They end Newton's method in C, and are no singular tangent."""
+@pytest.fixture
+def simulation():
     section = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
     beam = ub.Beam((0, 0), (4, 3), section, cells=6)
     loads = [ub.PointLoad(beam.end, force=(3.0, 5.0))]
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=loads)
-    simulation = ub.Simulation(scene, ub.Static())
+    return ub.Simulation(scene, ub.Static())
+
+
+def test_errors_of_petsc_that_c_meets(simulation):
+    """They end Newton's method in C, and are no singular tangent."""
     simulation.step_to(0.5)
     short = PETSc.Vec().createSeq(2)
     simulation._solver._equation.c.left_x = ffi.cast("void *", short.handle)
     with pytest.raises(PETSc.Error, match="Nonconforming object sizes"):
         simulation.step_to(1.0)
+
+
+class FailsOnce:
+    """Factors whose second solve fails, as those of KLU may."""
+
+    def __init__(self, factors, error):
+        self.factors, self.error, self.solves = factors, error, 0
+
+    def __getattr__(self, name):
+        return getattr(self.factors, name)
+
+    def apply(self, b, x):
+        self.solves += 1
+        if self.solves == 2:
+            raise PETSc.Error(self.error)
+        self.factors.apply(b, x)
+
+
+def test_a_solve_in_python_that_fails(monkeypatch, simulation):
+    """An error of the library is a singular tangent, and cuts the step; others are raised."""
+    monkeypatch.setattr(Supports, "turned", True)  # then SNES calls Python
+    scene = simulation.scene
+    for error in (lib.OF_LIBRARY, 60):
+        simulation = ub.Simulation(scene, ub.Static())
+        chains = simulation._solver._factors
+        chains._factors = FailsOnce(chains._factors, error)
+        if error == lib.OF_LIBRARY:
+            simulation.step_to(1.0)
+            assert simulation.parts > 1
+        else:
+            with pytest.raises(PETSc.Error, match="error code 60"):
+                simulation.step_to(1.0)
 
 
 # -- versions of DOLFINx and PETSc ---------------------------------------------------------------
@@ -131,7 +168,12 @@ def test_kernels_of_another_type_are_refused():
         c_library.kernel(pointer, of)
 
 
-# -- sizes ---------------------------------------------------------------------------------------
+# -- sizes and types -----------------------------------------------------------------------------
+
+
+def test_integers_of_another_size_are_refused():
+    with pytest.raises(TypeError, match="32 bits, not int64"):
+        c_library.integers(np.arange(3))
 
 
 def kernel(degree=1, cells=2, coordinates=None):

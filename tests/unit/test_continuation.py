@@ -9,7 +9,7 @@ import pytest
 
 import ufl_beam as ub
 from ufl_beam.parallel import ours
-from ufl_beam.plotting.plots import evenly
+from ufl_beam.plotting.drawing import evenly
 
 EA, WIDTH, HEIGHT = 1e6, 4.0, 1.0  # N, m, m: half a truss
 

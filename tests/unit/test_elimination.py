@@ -36,11 +36,7 @@ def system(cell_dofs, seed=0, more=(), held=()):
         dense[dof], dense[:, dof] = 0, 0
         dense[dof, dof] = 5.0
     rows = np.repeat(np.arange(size), np.diff(pattern.indptr))
-    A = Csr(
-        SimpleNamespace(
-            data=dense[rows, pattern.indices], indices=pattern.indices, indptr=pattern.indptr
-        )
-    )
+    A = Csr(dense[rows, pattern.indices], pattern.indices, pattern.indptr)
     share = SimpleNamespace(
         comm=MPI.COMM_SELF, cell_dofs=cell_dofs, size=size, dofs=np.arange(size), num_owned=size
     )

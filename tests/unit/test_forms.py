@@ -314,3 +314,6 @@ def test_matrix_entries_that_do_not_exist_are_refused():
     matrix = fields_of_a_frame().matrix()
     with pytest.raises(ValueError, match="no such entry"):
         matrix.positions(np.array([0]), np.array([matrix.size - 3]))
+    for beyond in (-1, matrix.size):
+        with pytest.raises(ValueError, match="no such entry"):
+            matrix.positions(np.array([beyond]), np.array([0]))

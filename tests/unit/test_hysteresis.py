@@ -7,7 +7,8 @@ import scenes
 from time_series import read_xdmf
 
 import ufl_beam as ub
-from ufl_beam.plotting.plots import decimal_prefix, open_hinges, with_unit
+from ufl_beam.plotting.drawing import open_hinges
+from ufl_beam.plotting.style import decimal_prefix, with_unit
 
 LIMIT, FRACTURE, YIELD = 10.0, 3.0, 8.0
 """Moments of the hinge and of yielding, N m; fracture energy of the hinge, J."""

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from ufl_beam.compiled import c_library, jit
+from ufl_beam.compiled import c_library, jit, simd_kernels
 
 pytestmark = pytest.mark.serial  # nothing here depends on the number of processes
 
@@ -49,8 +49,8 @@ def lanes_source():
     sizes = {"LANES": 4, "ENTRIES": 1, "WIDTH": 1, "CONSTANTS": 1}
     defined = [f"#define {name} {size}" for name, size in sizes.items()]
     head = [jit.HEADERS, jit.DECLARATIONS, *defined, jit.text("lanes.h")]
-    # The only function that other files call is declared in no header: cffi reads it as text.
-    return "\n".join([*head, KERNEL, "void *address(void);", jit.text("lanes.c")])
+    # The functions that Python calls are declared in no header: cffi reads them as text.
+    return "\n".join([*head, KERNEL, simd_kernels.INTERFACE, jit.text("lanes.c")])
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import pytest
 import scenes
 
 import ufl_beam as ub
-from ufl_beam.analysis import refinement_runs
+from ufl_beam.analysis import tradeoff
 
 COMM = MPI.COMM_WORLD
 SCENE = scenes.cantilever(cells=4)
@@ -37,7 +37,7 @@ def law(monkeypatch):
                 value=1.0 + error(4 / cells, length, scheme, newton),
             )  # fmt: skip
 
-        monkeypatch.setattr(refinement_runs, "simulate", simulate)
+        monkeypatch.setattr(tradeoff, "simulate", simulate)
 
     return use
 
@@ -97,7 +97,7 @@ def test_the_recommendation_are_arguments_of_simulate(law):
     law(smooth)
     found = ask(tolerance=1e-4)
     assert set(found.recommended) == {"scheme", "t", "dt", "mesh", "newton"}
-    again = refinement_runs.simulate(SCENE, progress=False, **found.recommended)
+    again = tradeoff.simulate(SCENE, progress=False, **found.recommended)
     assert again.value == found.best.values["value"]
     said = str(found)
     assert "errors of 0.0001 of each quantity" in said
@@ -147,14 +147,14 @@ def test_another_newton_is_taken_if_it_changes_little(law, change, taken):
     found = ask(tolerance=1e-4, newton=[strict, loose])
     assert found.best.dials.newton == strict
     assert any(run.dials.newton == loose for run in found.runs)
-    simulate = refinement_runs.simulate
+    simulate = tradeoff.simulate
 
     def faster(scene, *, newton, **others):
         one = simulate(scene, newton=newton, **others)
         one.seconds *= 0.5 if newton == loose else 1.0
         return one
 
-    refinement_runs.simulate = faster  # the fixture restores it
+    tradeoff.simulate = faster  # the fixture restores it
     found = ask(tolerance=1e-4, newton=[strict, loose])
     assert found.best.dials.newton == (loose if taken else strict)
 
@@ -305,7 +305,7 @@ def test_a_vibration():
     size = np.abs(history(fine)).max()
     assert np.abs(found.best.values["tip"] - history(fine)).max() < 0.02 * size
     assert found.crosses["tip"].cells.order == pytest.approx(2.0, abs=0.3)
-    assert len({run.rung for run in found.runs}) == len(found.runs)
+    assert len({run.refinement for run in found.runs}) == len(found.runs)
     texts = COMM.allgather(str(found))
     assert len(set(texts)) == 1
     ub.plot_tradeoff(found)

@@ -16,8 +16,8 @@ import ufl_beam as ub
 from ufl_beam.plotting import symbols
 from ufl_beam.plotting.connector_glyphs import AROUND, STRAIGHT
 from ufl_beam.plotting.diagrams import moments_at_ends
-from ufl_beam.plotting.plots import with_unit
 from ufl_beam.plotting.scene_layout import Stage
+from ufl_beam.plotting.style import with_unit
 from ufl_beam.plotting.symbols import EDGE, FILLED, support_direction
 
 FIRST = MPI.COMM_WORLD.rank == 0
@@ -505,11 +505,11 @@ def test_symbols_are_where_their_connector_is(connect, law):
 def test_connectors_side_by_side_do_not_cover_each_other():
     laws = [ub.Spring(10.0), ub.Damper(1.0), ub.Spring(5.0)]
     straight = ub.simulate(slider(ub.Stretch, *laws), ub.Midpoint(), t=(0, 0.1), dt=0.1)
-    lanes = Stage(straight, 1.0, 0.05).lanes
+    lanes = Stage(straight, 1.0, 0.05).offsets
     assert sorted(lanes.values()) == [-1.6, 0.0, 1.6]
     # Springs are 0.55 to each side, dampers 0.6
     turning = ub.simulate(slider(ub.Turn, *laws), ub.Midpoint(), t=(0, 0.1), dt=0.1)
-    assert np.diff(sorted(Stage(turning, 1.0, 0.05).lanes.values())).min() > 1.0
+    assert np.diff(sorted(Stage(turning, 1.0, 0.05).offsets.values())).min() > 1.0
 
 
 def test_a_slide_of_zero_length_points_along_its_axis():

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Critical points of static paths: the stiffness of the whole scene, its signs and its modes."""
+"""Critical points of static paths: tangent stiffness of the whole scene, its signs and modes."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import block_array, coo_array, csr_array, diags_array
@@ -16,20 +15,27 @@ from ufl_beam.errors import SceneError, StepFailed
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers.factorization import Factorisation, SingularMatrix
 
-ITERATIONS = 50
-"""Inverse iterations in which a mode is sought."""
+INVERSE_ITERATIONS = 50  # inverse iterations in which a mode is sought
 
 
-class Direction(NamedTuple):
-    """A direction of a path.
-
-    Attributes:
-        q: Of the configuration; m, m, rad.
-        t: Of the load factor.
-    """
+@dataclass(frozen=True, eq=False)
+class Direction:
+    """Direction of a path: change of the configuration (m, m, rad) and of the load factor."""
 
     q: Array
     t: float
+
+    def __neg__(self) -> Direction:
+        return Direction(-self.q, -self.t)
+
+    def __add__(self, other: Direction) -> Direction:
+        return Direction(self.q + other.q, self.t + other.t)
+
+    def __rmul__(self, factor: float) -> Direction:
+        return Direction(factor * self.q, factor * self.t)
+
+    def __truediv__(self, divisor: float) -> Direction:
+        return Direction(np.asarray(self.q / divisor), self.t / divisor)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +87,7 @@ class CriticalPoint:
     mode: Array
 
     def branch(self, sign: int = 1) -> Branch:
-        """The path that leaves along the mode, or against it with ``sign = -1``.
+        """Return the start of the path along the mode, or against it with ``sign = -1``.
 
         Raises:
             SceneError: ``sign`` is neither 1 nor -1, or nothing branches at a limit point.
@@ -97,7 +103,7 @@ class CriticalPoint:
 
 
 def metric(share: Share) -> Array:
-    """Weights of squares, such that a step's sum is its mean square; (share.size,).
+    """Return the weights of squares whose sum is the mean square of a step; (share.size,).
 
     Displacements count as parts of the size of the scene, forces of connectors do not count.  Only
     what a process owns does, so that sums over the processes are right.
@@ -111,16 +117,13 @@ def metric(share: Share) -> Array:
 
 
 class Stiffness:
-    """The tangent stiffness of the whole scene, factored by every process.
+    """Tangent stiffness of the whole scene, factored by every process.
 
-    Args:
-        share: The degrees of freedom of this process.
-        A: Its part of the tangent.
-        held: Local degrees of freedom that supports hold.
-        rate: Its part of the residual's derivative by the load factor.
+    Of this process are its part A of the tangent, the local degrees of freedom that supports hold,
+    and its part of the residual's derivative by the load factor, ``rate``.
 
     Attributes:
-        symmetric: Whether it is; follower loads make it unsymmetric.
+        symmetric: False with follower loads.
         negative: Number of negative eigenvalues of the stiffness that is left when the forces of
             connectors are eliminated and constraints fulfilled.  Where it is not symmetric: 1 if
             its determinant is negative, else 0.
@@ -201,15 +204,11 @@ class Stiffness:
         return values
 
     def softest(self, weights: Array) -> tuple[float, Array]:
-        """The eigenvalue nearest to zero, N m, and its mode of unit size; (grid.size,).
-
-        Args:
-            weights: :func:`metric` of all degrees of freedom, in the order of the grid.
-        """
+        """Find the eigenvalue nearest to zero, N m, and its mode of size 1 in a :func:`metric`."""
         w = weights[self._free]
         mode = np.random.default_rng(0).normal(size=len(w)) / np.sqrt(np.maximum(w, w.max()))
         λ = np.inf
-        for _ in range(ITERATIONS):
+        for _ in range(INVERSE_ITERATIONS):
             mode = self._solve(w * mode)
             mode /= np.sqrt(w @ mode**2)
             before, λ = λ, float(mode @ (self._K @ mode))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Damping of a free vibration: its peaks, their logarithmic decrement, the law of their decay."""
+"""Damping of a free vibration: peaks, logarithmic decrement and decay laws."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Small motions about a state: their matrices, and the eigenvalues that SLEPc finds of them."""
+"""Linearised equations about a state: matrices and eigenvalues of small motions."""
 
 from __future__ import annotations
 
@@ -26,17 +26,14 @@ from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers import eigensolvers
 from ufl_beam.solvers.eigensolvers import ROUND_OFF, SHIFT, ZERO
 
-APART = 1e-9
-"""Part of the largest damping below which what couples two motions does not count."""
-
-AT_REST = 1e300
-"""Length of a step in which all rates vanish; s."""
+COUPLING_TOLERANCE = 1e-9  # couplings below this part of the largest damping do not count
+AT_REST = 1e300  # length of a step in which all rates vanish; s
 
 
 class _Standstill(Static):
-    """Everything is taken where it is, and there is inertia: what small motions begin with.
+    """Scheme of small motions: all terms, inertia included, are taken at the present state.
 
-    Nothing steps with this scheme.
+    Nothing steps with it: nothing accelerates, and velocities are differences over ``dt``.
     """
 
     dynamic = True
@@ -46,32 +43,26 @@ class _Standstill(Static):
     kept: tuple[str, ...] = ()
 
     def half_tangents(self, rotations: Index) -> Index:
-        """None."""
         return rotations[:0]
 
     def inertia(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
-        """Nothing accelerates."""
         return 1 / dt**2, 0.0, rates.v
 
     def velocity(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
-        """Velocities are differences over ``dt``."""
         return 1 / dt, 0.0, rates.v
 
     def rates(self, dt: float, s: Array, rates: Rates) -> tuple[Array, ...]:
-        """Velocities are differences over ``dt``."""
         return (np.asarray(s / dt),)
 
     def slip(self, dt: float, change: Array, rates: Rates) -> Array:
-        """None."""
         return 0 * change
 
     def error_weights(self) -> tuple[float, float]:
-        """None are known."""
         return 0.5, 0.0
 
 
 class SmallMotions:
-    """Matrices of the small motions about a state, at what supports leave free.
+    """Matrices of the small motions about a state, without the motions that supports hold.
 
     Args:
         scene: What is modelled.
@@ -81,11 +72,7 @@ class SmallMotions:
     """
 
     def __init__(
-        self,
-        scene: Scene,
-        at: Solution | None,
-        t: float | None = None,
-        mesh: Mesh | None = None,
+        self, scene: Scene, at: Solution | None, t: float | None = None, mesh: Mesh | None = None
     ) -> None:
         time = 0.0 if at is None else float(at.times[-1])
         # Each process does the same: no answer depends on their number.
@@ -128,9 +115,8 @@ class SmallMotions:
 
     def _axes(self) -> csr_array:
         """Columns: the components of motion, in the axes of supports."""
-        turned = [support for support in self.scene.supports if support.angle]
         Q = eye_array(self.grid.size, format="lil")
-        for support in turned:
+        for support in (support for support in self.scene.supports if support.angle):
             i, j = self.grid.node(support.place)[:2]
             c, s = math.cos(support.angle), math.sin(support.angle)
             Q[i, i], Q[i, j], Q[j, i], Q[j, j] = c, -s, s, c
@@ -147,7 +133,7 @@ class SmallMotions:
     # -- frequencies ---------------------------------------------------------------------------
 
     def exponents(self, n: int) -> tuple[Complex, Complex]:
-        """At least n exponents, if there are so many, and motions; (m,), (unknowns, m)."""
+        """Compute at least n exponents, if there are so many, and motions; (m,), (unknowns, m)."""
         K, M = self.K, self.M
         heavy = (M.diagonal() > 0) & (K.diagonal() != 0)
         squares = np.abs(K.diagonal()[heavy]) / M.diagonal()[heavy]
@@ -156,14 +142,8 @@ class SmallMotions:
         C = (self._reduced(self._derivative(self.q, τ)) - K) * τ
         nothing = ROUND_OFF * abs(K).max()
         symmetric = abs(K - K.T).max() <= nothing
-        solve = partial(
-            eigensolvers.linear,
-            (K + K.T) / 2 if symmetric else K,
-            M,
-            n,
-            most=self.most,
-            definite=symmetric,
-        )
+        matrix = (K + K.T) / 2 if symmetric else K
+        solve = partial(eigensolvers.linear, matrix, M, n, most=self.most, definite=symmetric)
         values, x = solve(shift=-SHIFT * low)
         works = self._works(x)
         zero = self._unresisted(x, works)
@@ -193,13 +173,9 @@ class SmallMotions:
         return np.asarray(np.abs(works) <= ZERO * sizes)
 
     def _damped(self, C: csr_array, free: Array, n: int, lowest: float) -> tuple[Complex, Complex]:
-        """Exponents and motions with velocity-dependent forces.
+        """At least n exponents and motions with velocity-dependent forces, whose matrix is C.
 
-        Args:
-            C: Their matrix.
-            free: Motions that nothing resists, in columns.
-            n: How many at least.
-            lowest: The first frequency; rad/s.
+        Nothing resists the motions ``free``, in columns; ``lowest`` is the first frequency; rad/s.
         """
         # Zero is a double exponent, of drifts, and no solver finds it well.  Where velocities make
         # of them but a force like inertia, they are excluded as by constraints, and known: drifts
@@ -207,7 +183,7 @@ class SmallMotions:
         N = free @ np.linalg.inv(np.linalg.cholesky(free.T @ (self.M @ free))).T
         Λ = N.T @ (C @ N)
         _, sizes, rows = np.linalg.svd(C @ N - self.M @ N @ Λ, full_matrices=False)
-        W = rows[sizes <= APART * abs(C).max() * np.abs(N).max(initial=0.0)].T
+        W = rows[sizes <= COUPLING_TOLERANCE * abs(C).max() * np.abs(N).max(initial=0.0)].T
         N, Λ = N @ W, W.T @ Λ @ W
         B = csr_array(self.M @ N * (abs(self.K).max() / abs(self.M).max() ** 0.5))
         K = csr_array(block_array([[self.K, B], [B.T, csr_array((B.shape[1],) * 2)]]))
@@ -218,7 +194,9 @@ class SmallMotions:
         s, x = eigensolvers.quadratic(K, C, M, 2 * n, most=most, shift=lowest)
         s, x = self._with_zeros(s, x[: len(free)], free)
         decay, how = np.linalg.eig(-Λ)
-        decay = np.where(np.abs(decay.imag) <= APART * np.abs(decay), decay.real, decay)
+        decay = np.where(
+            np.abs(decay.imag) <= COUPLING_TOLERANCE * np.abs(decay), decay.real, decay
+        )
         slows = np.abs(decay) > ROUND_OFF * abs(C).max() / abs(self.M).max()
         return np.concatenate([s, decay[slows]]), np.hstack([x, N @ how[:, slows]])
 
@@ -235,7 +213,7 @@ class SmallMotions:
     # -- buckling ------------------------------------------------------------------------------
 
     def buckling(self, n: int) -> tuple[Array, Complex]:
-        """At least n factors, if there are so many, and shapes."""
+        """Compute at least n buckling factors, if there are so many, and their modes."""
         u = self._path()
         right, left = self._with_laws()
         change = csr_array(
@@ -284,7 +262,7 @@ class SmallMotions:
     # -- shapes --------------------------------------------------------------------------------
 
     def shapes(self, x: Complex) -> Array | Complex:
-        """Motions of all degrees of freedom, the largest displacement one; (size, n)."""
+        """Return motions of all degrees of freedom, the largest displacement one; (size, n)."""
         shapes = self._Z @ x
         turns = self._simulation.share.rotations()
         sizes = np.abs(shapes)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Small motions: natural frequencies, damping ratios, buckling loads, their shapes."""
+"""Vibration modes with natural frequencies and damping ratios, and buckling loads and modes."""
 
 from __future__ import annotations
 
@@ -14,13 +14,12 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.analysis.linearization import SmallMotions
-from ufl_beam.arrays import Array, Complex
+from ufl_beam.arrays import Array, Complex, State
 from ufl_beam.collective_errors import on_first
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import Fields, SectionForces
 from ufl_beam.discretization.model_warnings import warn_of_masses
 from ufl_beam.discretization.partition import Share
-from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError, require_count, require_kind, require_number
 from ufl_beam.model.bodies import Anchor
 from ufl_beam.model.constraint_checks import require_no_mechanism
@@ -39,7 +38,7 @@ AMPLITUDE = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Shapes(ABC):
-    """Shapes about a state; the same on every process.
+    """Modes about a state; the same on every process.
 
     Attributes:
         scene: What was modelled.
@@ -54,16 +53,21 @@ class Shapes(ABC):
     q: Array
     shapes: Array | Complex
 
+    word = "shape"
+
     @property
     @abstractmethod
     def titles(self) -> list[str]:
-        """Captions of the shapes."""
+        """Captions of the modes in pictures."""
+
+    def __str__(self) -> str:
+        return "\n".join(f"{self.word} {k}: {title}" for k, title in enumerate(self.titles))
 
     def __len__(self) -> int:
         return int(self.shapes.shape[1])
 
     def shape(self, k: int, place: Anchor) -> Array | Complex:
-        """Motion (u, v, ψ) of a place in the k-th shape; (3,).
+        """Return the motion (u, v, ψ) of a place in the k-th mode; (3,).
 
         Raises:
             SceneError: No such shape, or the place is not in the scene.
@@ -73,7 +77,7 @@ class Shapes(ABC):
         return np.asarray(velocity_of(self.grid, place, [self.q], [shape])[0])
 
     def motion(self, k: int, *, amplitude: float = AMPLITUDE, count: int = 24) -> Solution:
-        """One period of the k-th shape, for what shows solutions: ``animate``, ``plot_shapes``.
+        """Return one period of the k-th mode as a solution, for ``animate`` or ``plot_shapes``.
 
         Args:
             k: Which.
@@ -95,7 +99,7 @@ class Shapes(ABC):
         return solution
 
     def write(self, path: str | Path, *, amplitude: float = AMPLITUDE) -> None:
-        """Write a time series for ParaView: the k-th shape is what it shows at time k.
+        """Write a time series for ParaView with the k-th mode at time k.
 
         Displacements are those of the state and the shape together, N, V, M those of the shape.
 
@@ -140,7 +144,9 @@ class Shapes(ABC):
 
 
 class _Frame:
-    """A state with one shape, as recorders look at a simulation."""
+    """State with one shape, as recorders read a simulation; histories of connectors are zero."""
+
+    may_break = False
 
     def __init__(
         self, shapes: Shapes, share: Share, forces: SectionForces, t: float, change: Array
@@ -149,23 +155,14 @@ class _Frame:
         self.q, self.t = shapes.q + change, t
         self._forces, self._state, self._change = forces, shapes.q, change
 
-    may_break = False
-    """True if something yields; modes are elastic."""
-
     def velocities(self) -> list[Array]:
-        """Shapes have none."""
-        return []
-
-    def material(self) -> list[Any]:
-        """Nothing yields."""
         return []
 
     def connections(self) -> Array:
-        """Return nothing: histories of connectors are left out."""
         return np.zeros((len(self.scene.links), len(Connection._fields)))
 
     def section_forces(self) -> Array:
-        """Those of the shape alone: a derivative, by a small difference."""
+        """Section forces of the shape alone: a derivative, by a small difference."""
         ends, ε = np.empty((2, len(self.grid.cells), 3)), 1e-5
         for sign, end in zip((1.0, -1.0), ends, strict=True):
             self._forces.write(self._state + sign * ε * self._change, end)
@@ -188,6 +185,7 @@ class Modes(Shapes):
     """
 
     exponents: Complex
+    word = "mode"
 
     @property
     def omega(self) -> Array:
@@ -214,12 +212,10 @@ class Modes(Shapes):
     @property
     def titles(self) -> list[str]:
         """Frequency, and the damping ratio if there is damping."""
-        pairs = zip(self.frequencies, self.damping, strict=True)
-        damped = [f", ζ = {ζ:.3g}" if abs(ζ) > 1e-6 else "" for _, ζ in pairs]
-        return [f"{f:.4g} Hz{more}" for f, more in zip(self.frequencies, damped, strict=True)]
-
-    def __str__(self) -> str:
-        return "\n".join(f"mode {k}: {title}" for k, title in enumerate(self.titles))
+        return [
+            f"{f:.4g} Hz" + (f", ζ = {ζ:.3g}" if abs(ζ) > 1e-6 else "")
+            for f, ζ in zip(self.frequencies, self.damping, strict=True)
+        ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,9 +238,6 @@ class Buckling(Shapes):
     def titles(self) -> list[str]:
         """Titles of pictures: the load factors."""
         return [f"loads × {factor:.4g}" for factor in self.factors]
-
-    def __str__(self) -> str:
-        return "\n".join(f"shape {k}: {title}" for k, title in enumerate(self.titles))
 
 
 def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None = None) -> Modes:
@@ -291,12 +284,7 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
 
 
 def buckling(
-    scene: Scene,
-    n: int,
-    *,
-    t: float = 1.0,
-    at: Solution | None = None,
-    mesh: Mesh | None = None,
+    scene: Scene, n: int, *, t: float = 1.0, at: Solution | None = None, mesh: Mesh | None = None
 ) -> Buckling:
     """Compute buckling load factors and modes, (K + λ K') x = 0.
 

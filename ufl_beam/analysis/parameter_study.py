@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Studies: one scene many times, with other parameters or seeds, several at a time.
+"""Parameter studies: a scene many times, with other parameters or seeds, in parallel.
 
 Members are handed out by :mod:`mpi4py.futures`.  Since all processes run the same script, each has
 the function of the member itself and only cases travel: it may be a closure, and need not pickle.
@@ -24,8 +24,7 @@ from ufl_beam.analysis.study_file import Outcome, Study, numbers_of, text_of
 from ufl_beam.collective_errors import on_first
 from ufl_beam.errors import SceneError, require_sequence, require_switch, shorten
 from ufl_beam.output.output_files import require_apart, require_path, take
-from ufl_beam.parallel import alone, communicator
-from ufl_beam.simulation.run import say
+from ufl_beam.parallel import alone, communicator, say
 
 Case = dict[str, Any]
 Member = Callable[..., dict[str, Any]]
@@ -42,7 +41,7 @@ def study(
     progress: bool = True,
     comm: MPI.Intracomm | None = None,
 ) -> Study:
-    """Call ``member(**case)`` for each case, several at a time under ``mpirun``.
+    """Run a parameter study: call ``member(**case)`` for each case, in parallel under ``mpirun``.
 
     Each member is computed by one process alone, to the same last bit on any number of them.  The
     first process hands cases out and writes the file at once; it computes nothing and hardly takes
@@ -84,7 +83,10 @@ def study(
     require_switch(anew, "study: anew")
     require_switch(progress, "study: progress")
     name = getattr(member, "__name__", type(member).__name__)
-    outputs = [] if path is None else [("study", _files_of(require_path(path, "study")))]
+    outputs = []
+    if path is not None:
+        path = require_path(path, "study")
+        outputs.append(("study", (path, path.with_name(f"{path.name}.part"))))
     todo: dict[str, Case] = {}
     records: dict[str, tuple[Outcome, float]] = {}
     result: Study | None = None
@@ -100,7 +102,7 @@ def study(
         if not todo:
             raise SceneError("study: cases is empty")
         require_apart(outputs, "study")
-        if path is not None and Path(path).exists():
+        if path is not None and path.exists():
             old = Study.load(path)
             if old.member != name and not anew:
                 raise SceneError(f"study {path} is one of {old.member}, not of {name}")
@@ -118,13 +120,8 @@ def study(
     def gather() -> None:
         nonlocal result
         missing = {key: case for key, case in todo.items() if key not in records}
-        bar = tqdm(
-            total=len(todo),
-            initial=len(todo) - len(missing),
-            unit="member",
-            disable=None if progress else True,
-        )
-        next_save = 0.0
+        next_save, quiet, done = 0.0, None if progress else True, len(todo) - len(missing)
+        bar = tqdm(total=len(todo), initial=done, unit="member", disable=quiet)
         try:
             with bar, closing(_outcomes(comm, member, missing)) as outcomes:
                 for key, outcome, seconds in outcomes:
@@ -156,11 +153,6 @@ def study(
         result = comm.bcast(result)
     assert result is not None
     return result
-
-
-def _files_of(path: Path) -> tuple[Path, ...]:
-    """The file of a study, and the one that takes its place."""
-    return path, path.parent / f"{path.name}.part"
 
 
 def _outcomes(

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""Controls of static paths: what decides how long their steps are."""
+"""Controls of static paths, which set the lengths of their steps."""
 
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from dataclasses import KW_ONLY, dataclass, field
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from ufl_beam.analysis.critical_points import Direction
-from ufl_beam.analysis.path_corrector import Walk
+from ufl_beam.analysis.path_corrector import Control, PathCorrector
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, StepFailed, require_kind, require_number
 from ufl_beam.model.bodies import Place
@@ -18,148 +18,66 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.simulation.step_cutting import Trial
 
-SHORTEST = 1e-3
-"""Part of a step of arc length that is gone at least beyond a bend."""
+LEAST_REST = 1e-3  # part of a step of arc length that is gone at least beyond a kink
 
 
 # -- equations of steps --------------------------------------------------------------------------
 
 
 class Plane:
-    """A linear equation: how far a step goes along a normal.
+    """Linear constraint: a step goes so far along a normal.
 
     Args:
-        walk: What steps.
+        corrector: Of the path.
         normal: In the space of configurations and load factors.
-        reach: How far.
-        gone: Where this is measured from, seen from the accepted state; from there without it.
+        reach: Distance.
+        gone: Start of the distance, seen from the accepted state; by default that state.
     """
 
     def __init__(
-        self, walk: Walk, normal: Direction, reach: float, gone: Direction | None = None
+        self,
+        corrector: PathCorrector,
+        normal: Direction,
+        reach: float,
+        gone: Direction | None = None,
     ) -> None:
-        self._total, self._normal, self._reach = walk.share.total, normal, reach
-        self._q0, self._t0 = walk.simulation.q, walk.simulation.t
+        self._total, self._normal, self._reach = corrector.share.total, normal, reach
+        self._start = Direction(corrector.simulation.q, corrector.simulation.t)
         if gone is not None:
-            self._q0, self._t0 = self._q0 + gone.q, self._t0 + gone.t
+            self._start = self._start + gone
 
-    def miss(self, q: Array, t: float) -> float:
-        """Part of the reach."""
-        gone = self.slope(q, Direction(q - self._q0, t - self._t0))
-        return gone - 1.0
+    def residual(self, q: Array, t: float) -> float:
+        """Missing part of the reach."""
+        return self.derivative(q, Direction(q - self._start.q, t - self._start.t)) - 1.0
 
-    def slope(self, q: Array, way: Direction) -> float:
+    def derivative(self, q: Array, way: Direction) -> float:
         """Derivative of the equation along a direction; it is the same at any state."""
         along = self._total(float(self._normal.q @ way.q)) + self._normal.t * way.t
         return along / self._reach
 
 
-class Given:
-    """A load factor that is given.
+@dataclass(frozen=True)
+class DissipatedEnergy:
+    """Constraint of the energy (J) that is dissipated in a step."""
 
-    Args:
-        t: The load factor.
-    """
+    corrector: PathCorrector
+    energy: float
 
-    def __init__(self, t: float) -> None:
-        self._t = t
+    def residual(self, q: Array, t: float) -> float:
+        """Missing part of the energy."""
+        return self.corrector.dissipation(q) / self.energy - 1.0
 
-    def miss(self, q: Array, t: float) -> float:
-        """Residual of the equation: missing change of the load factor."""
-        return t - self._t
-
-    def slope(self, q: Array, way: Direction) -> float:
-        """That of the load factor."""
-        return way.t
-
-
-class Dissipated:
-    """Constraint of the energy that is dissipated in a step.
-
-    Args:
-        walk: What steps.
-        reach: J.
-    """
-
-    def __init__(self, walk: Walk, reach: float) -> None:
-        self._walk, self._reach = walk, reach
-
-    def miss(self, q: Array, t: float) -> float:
-        """Part of the reach."""
-        return self._walk.dissipation(q) / self._reach - 1.0
-
-    def slope(self, q: Array, way: Direction) -> float:
-        """By a central difference over a small part of the step; nothing else asks for it."""
-        size = self._walk.size(way)
-        gone = self._walk.size(Direction(q - self._walk.simulation.q, 0.0))
+    def derivative(self, q: Array, way: Direction) -> float:
+        """Derivative of the equation, by a central difference over a small part of the step."""
+        size = self.corrector.size(way)
+        gone = self.corrector.size(Direction(q - self.corrector.simulation.q, 0.0))
         if size == 0.0:
             return 0.0
         ε = 1e-3 * gone / size
-        return (self.miss(q + ε * way.q, 0.0) - self.miss(q - ε * way.q, 0.0)) / (2 * ε)
-
-
-def _across(walk: Walk, normal: Direction, reach: float, what: str) -> Trial:
-    """Solve for where the path reaches a plane; ``what`` is the quantity that grows towards it.
-
-    Raises:
-        StepFailed: It does not reach it.
-    """
-
-    def along(way: Direction) -> float:
-        return walk.share.total(float(normal.q @ way.q)) + normal.t * way.t
-
-    def length(rest: float, way: Direction) -> float:
-        """Return the length of the step along a direction."""
-        speed = along(way)
-        if not speed * reach > 0:
-            raise StepFailed(f"{what} turns back, where this control cannot follow; take ArcLength")
-        return rest / speed
-
-    way, plane = walk.direction, Plane(walk, normal, reach)
-    size = length(reach, way)
-    try:
-        return walk.attempt(way, size, plane)
-    except StepFailed as failure:
-        if (bend := walk.bend(size)) is None:
-            more = f"{failure}; perhaps {what} turns back here, where this control cannot follow"
-            raise failure.saying(f"{more}: take ArcLength") from None
-    gone, way = bend
-    return walk.attempt(
-        _joined(gone, way, length(reach - along(gone), way)), 1.0, plane, hold=False
-    )
-
-
-def _joined(gone: Direction, way: Direction, length: float) -> Direction:
-    """A direction, and so far along another one from its end."""
-    return Direction(gone.q + length * way.q, gone.t + length * way.t)
+        return (self.residual(q + ε * way.q, 0.0) - self.residual(q - ε * way.q, 0.0)) / (2 * ε)
 
 
 # -- controls ----------------------------------------------------------------------------------
-
-
-@runtime_checkable
-class Control(Protocol):
-    """Protocol of path controls, which set the lengths of steps."""
-
-    @property
-    def factor(self) -> float:
-        """Change of the load factor that counts as much as a unit of displacement."""
-
-    def require(self, scene: Scene) -> None:
-        """Raise :class:`SceneError` if the control does not fit the scene."""
-
-    def ahead(self, walk: Walk, way: Direction) -> float:
-        """Positive if ``way`` is the one in which a path begins."""
-
-    def onward(self, walk: Walk, gone: Direction, way: Direction) -> float:
-        """Positive if a path that came by ``gone`` in the step goes on along ``way``."""
-
-    def seek(self, walk: Walk, part: float) -> Trial:
-        """Solve for the end of a step, or of a part of it.
-
-        Raises:
-            StepFailed: There is none.
-        """
 
 
 def _require_step(step: float, what: str) -> None:
@@ -169,7 +87,7 @@ def _require_step(step: float, what: str) -> None:
 
 
 @dataclass(frozen=True)
-class ArcLength:
+class ArcLength(Control):
     """Arc-length control: passes limit points of loads and of displacements.
 
     The length is the root mean square of all displacements over the size of the scene, of all
@@ -200,45 +118,94 @@ class ArcLength:
         _require_step(self.step, "ArcLength")
         require_number(self.factor, "ArcLength: factor", positive=True)
 
-    def require(self, scene: Scene) -> None:
-        """It fits all scenes."""
-
-    def ahead(self, walk: Walk, way: Direction) -> float:
-        """The sign of the step is that of the first change of the load factor."""
+    def begins_along(self, corrector: PathCorrector, way: Direction) -> float:
+        """Positive if the load factor changes with the sign of the step."""
         return self.step * way.t
 
-    def onward(self, walk: Walk, gone: Direction, way: Direction) -> float:
-        """Choose the direction: plastic flow and openings go on, else the turn is below π/2."""
-        side = walk.side(walk.simulation.q + gone.q, way)
-        return side or walk.product(gone, way, self.factor)
+    def continues_along(self, corrector: PathCorrector, gone: Direction, way: Direction) -> float:
+        """Positive if flow and openings go on along ``way``, else if it turns by less than π/2."""
+        side = corrector.dissipation_side(corrector.simulation.q + gone.q, way)
+        return side or corrector.product(gone, way, self.factor)
 
-    def seek(self, walk: Walk, part: float) -> Trial:
-        """On the plane across the direction."""
-        reach = abs(self.step) * part
-        unit = self._unit(walk, walk.direction)
+    def solve_step(self, corrector: PathCorrector, part: float) -> Trial:
+        """Solve on the plane across the direction of the path."""
+        reach, way = abs(self.step) * part, corrector.direction
+        size = corrector.length(way, self.factor)
+        unit = way / size
         try:
-            return walk.attempt(unit, reach, Plane(walk, self._across(walk, unit), reach))
+            plane = Plane(corrector, self._across(corrector, unit), reach)
+            return corrector.attempt(unit, reach, plane)
         except StepFailed:
-            if (bend := walk.bend(reach / walk.length(walk.direction, self.factor))) is None:
+            if (kink := corrector.kink(reach / size)) is None:
                 raise
-        gone, unit = bend[0], self._unit(walk, bend[1])
-        rest = max(reach - walk.length(gone, self.factor), SHORTEST * reach)
-        plane = Plane(walk, self._across(walk, unit), rest, gone)
-        return walk.attempt(_joined(gone, unit, rest), 1.0, plane, hold=False)
+        gone, way = kink
+        unit = way / corrector.length(way, self.factor)
+        rest = max(reach - corrector.length(gone, self.factor), LEAST_REST * reach)
+        plane = Plane(corrector, self._across(corrector, unit), rest, gone)
+        return corrector.attempt(gone + rest * unit, 1.0, plane, hold=False)
 
-    def _unit(self, walk: Walk, way: Direction) -> Direction:
-        """A direction of length one."""
-        size = walk.length(way, self.factor)
-        return Direction(np.asarray(way.q / size, dtype=np.float64), way.t / size)
-
-    def _across(self, walk: Walk, unit: Direction) -> Direction:
+    def _across(self, corrector: PathCorrector, unit: Direction) -> Direction:
         """Normal of the plane across a direction."""
-        across: Array = np.asarray(walk.weights * unit.q, dtype=np.float64)
-        return Direction(across, unit.t / self.factor**2)
+        return Direction(np.asarray(corrector.weights * unit.q), unit.t / self.factor**2)
+
+
+class _QuantityControl(Control):
+    """Control of a quantity that is linear in the configuration and the load factor."""
+
+    step: float
+
+    @abstractmethod
+    def _normal(self, corrector: PathCorrector) -> Direction:
+        """Gradient of the quantity."""
+
+    @property
+    @abstractmethod
+    def _quantity(self) -> str:
+        """The quantity in words."""
+
+    def _along(self, corrector: PathCorrector, way: Direction) -> float:
+        """Derivative of the quantity along a direction."""
+        normal = self._normal(corrector)
+        return corrector.share.total(float(normal.q @ way.q)) + normal.t * way.t
+
+    def begins_along(self, corrector: PathCorrector, way: Direction) -> float:
+        """As the quantity changes."""
+        return self.step * self._along(corrector, way)
+
+    def continues_along(self, corrector: PathCorrector, gone: Direction, way: Direction) -> float:
+        """As the quantity changes."""
+        return self.begins_along(corrector, way)
+
+    def solve_step(self, corrector: PathCorrector, part: float) -> Trial:
+        """Solve at the next value of the quantity."""
+        reach, what = self.step * part, self._quantity
+
+        def length(rest: float, way: Direction) -> float:
+            """Return the length of the step along a direction."""
+            speed = self._along(corrector, way)
+            if not speed * reach > 0:
+                raise StepFailed(
+                    f"{what} turns back, where this control cannot follow; take ArcLength"
+                )
+            return rest / speed
+
+        way, plane = corrector.direction, Plane(corrector, self._normal(corrector), reach)
+        size = length(reach, way)
+        try:
+            return corrector.attempt(way, size, plane)
+        except StepFailed as failure:
+            if (kink := corrector.kink(size)) is None:
+                more = (
+                    f"{failure}; perhaps {what} turns back here, where this control cannot follow"
+                )
+                raise failure.saying(f"{more}: take ArcLength") from None
+        gone, way = kink
+        rest = length(reach - self._along(corrector, gone), way)
+        return corrector.attempt(gone + rest * way, 1.0, plane, hold=False)
 
 
 @dataclass(frozen=True)
-class LoadControl:
+class LoadControl(_QuantityControl):
     """Load control: equal steps of the load factor, up to the limit load.
 
     Args:
@@ -255,29 +222,17 @@ class LoadControl:
 
     step: float
     factor = 1.0
+    _quantity = "the load factor"
 
     def __post_init__(self) -> None:
         _require_step(self.step, "LoadControl")
 
-    def require(self, scene: Scene) -> None:
-        """It fits all scenes."""
-
-    def ahead(self, walk: Walk, way: Direction) -> float:
-        """As the load factor changes."""
-        return self.step * way.t
-
-    def onward(self, walk: Walk, gone: Direction, way: Direction) -> float:
-        """As the load factor changes."""
-        return self.ahead(walk, way)
-
-    def seek(self, walk: Walk, part: float) -> Trial:
-        """At the next load factor."""
-        normal = Direction(np.zeros(walk.share.size), 1.0)
-        return _across(walk, normal, self.step * part, "the load factor")
+    def _normal(self, corrector: PathCorrector) -> Direction:
+        return Direction(np.zeros(corrector.share.size), 1.0)
 
 
 @dataclass(frozen=True)
-class DisplacementControl:
+class DisplacementControl(_QuantityControl):
     """Displacement control of one component at a place: passes limit points of loads.
 
     Args:
@@ -310,36 +265,27 @@ class DisplacementControl:
         _require_step(self.step, "DisplacementControl")
 
     def require(self, scene: Scene) -> None:
-        """The beam of the place is in the scene."""
+        """Raise :class:`SceneError` unless the beam of the place is in the scene."""
         if self.place.beam not in scene.beams:
             raise SceneError(
                 f"DisplacementControl of {self.place}: {self.place.beam.name} is not in the scene"
             )
 
-    def _normal(self, walk: Walk) -> Direction:
-        share, normal = walk.share, np.zeros(walk.share.grid.size)
+    def _normal(self, corrector: PathCorrector) -> Direction:
+        share, normal = corrector.share, np.zeros(corrector.share.grid.size)
         nodes, weights = share.grid.weights(self.place)
         normal[share.grid.dofs[nodes, COMPONENTS.index(self.component)]] += weights
         local = normal[share.dofs]
         local[share.num_owned :] = 0.0
         return Direction(local, 0.0)
 
-    def ahead(self, walk: Walk, way: Direction) -> float:
-        """As the place moves."""
-        return self.step * walk.share.total(float(self._normal(walk).q @ way.q))
-
-    def onward(self, walk: Walk, gone: Direction, way: Direction) -> float:
-        """As the place moves."""
-        return self.ahead(walk, way)
-
-    def seek(self, walk: Walk, part: float) -> Trial:
-        """At the next displacement."""
-        what = f"{self.component} of {self.place}"
-        return _across(walk, self._normal(walk), self.step * part, what)
+    @property
+    def _quantity(self) -> str:
+        return f"{self.component} of {self.place}"
 
 
 @dataclass(frozen=True)
-class DissipationControl:
+class DissipationControl(Control):
     """Dissipation control by the energy that hinges and yielding beams lose: sharp snap-backs.
 
     Softening and unloading may begin in nearly the same direction; only one of them dissipates.
@@ -368,36 +314,34 @@ class DissipationControl:
 
     @property
     def factor(self) -> float:
-        """That of the arc length."""
+        """Factor of the arc length."""
         return self.otherwise.factor
 
-    def require(self, scene: Scene) -> None:
-        """It fits all scenes; of elastic ones it follows the path by arc length."""
+    def begins_along(self, corrector: PathCorrector, way: Direction) -> float:
+        """Positive if the arc length begins along ``way``."""
+        return self.otherwise.begins_along(corrector, way)
 
-    def ahead(self, walk: Walk, way: Direction) -> float:
-        """As the arc length begins."""
-        return self.otherwise.ahead(walk, way)
+    def continues_along(self, corrector: PathCorrector, gone: Direction, way: Direction) -> float:
+        """Positive if the arc length goes on along ``way``."""
+        return self.otherwise.continues_along(corrector, gone, way)
 
-    def onward(self, walk: Walk, gone: Direction, way: Direction) -> float:
-        """As the arc length goes on."""
-        return self.otherwise.onward(walk, gone, way)
-
-    def seek(self, walk: Walk, part: float) -> Trial:
-        """At the next dissipated energy, unless a step of arc length dissipates nothing."""
-        if not walk.dissipates:
+    def solve_step(self, corrector: PathCorrector, part: float) -> Trial:
+        """Solve at the next dissipated energy, unless a step of arc length dissipates nothing."""
+        if not corrector.dissipates:
             try:
-                trial = self.otherwise.seek(walk, part)
+                trial = self.otherwise.solve_step(corrector, part)
             except StepFailed:
-                return self._spend(walk, part)
-            if walk.dissipation(trial.q1) == 0.0:
+                return self._dissipate(corrector, part)
+            if corrector.dissipation(trial.q1) == 0.0:
                 return trial
         try:
-            return self._spend(walk, part)
+            return self._dissipate(corrector, part)
         except StepFailed:
-            if not walk.dissipates:
+            if not corrector.dissipates:
                 raise
-        return self.otherwise.seek(walk, part)
+        return self.otherwise.solve_step(corrector, part)
 
-    def _spend(self, walk: Walk, part: float) -> Trial:
-        reach = self.step * part
-        return walk.attempt(walk.aim(reach), 1.0, Dissipated(walk, reach), hold=False)
+    def _dissipate(self, corrector: PathCorrector, part: float) -> Trial:
+        energy = self.step * part
+        way, constraint = corrector.predict_dissipation(energy), DissipatedEnergy(corrector, energy)
+        return corrector.attempt(way, 1.0, constraint, hold=False)

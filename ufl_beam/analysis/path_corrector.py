@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Equilibria near a state of a static path, the load factor among the unknowns."""
+"""Corrector of path following, and the base class of the controls that it follows."""
 
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -13,34 +15,46 @@ from ufl_beam.analysis.critical_points import Direction, Stiffness, metric
 from ufl_beam.arrays import Array
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Step
+from ufl_beam.model.scene import Scene
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.step_cutting import Trial
 from ufl_beam.terms.base import Term
 
-FARTHEST = 30
-"""Times a way is doubled until something dissipates on it."""
+MOST_DOUBLINGS = 30  # doublings of a step until something dissipates in it
+ONSET_PART = 1e-6  # part of the dissipated energy of a step at which its onset is looked at
 
-BEGUN = 1e-6
-"""Part of a step that tells what dissipates when it begins."""
-
-HALVINGS = 40
+MOST_BISECTIONS = 40
 """Bisections in which the state is sought in which something begins to dissipate."""
 
-MET = 1e-9
-"""Part of a step by which its end may miss what the control demands."""
+CONTROL_TOLERANCE = 1e-9  # part of a step by which its end may miss the equation of the control
 
 
 class Constraint(Protocol):
-    """Equation of a step besides equilibrium; without dimension."""
+    """Equation of a step besides equilibrium; dimensionless."""
 
-    def miss(self, q: Array, t: float) -> float:
-        """Return the residual in a state."""
+    def residual(self, q: Array, t: float) -> float:
+        """Residual in a state."""
 
-    def slope(self, q: Array, way: Direction) -> float:
-        """Its derivative along a way from there."""
+    def derivative(self, q: Array, way: Direction) -> float:
+        """Derivative of the residual along a direction."""
 
 
-class Walk:
+@dataclass(frozen=True)
+class GivenLoadFactor:
+    """Constraint that the load factor is t."""
+
+    t: float
+
+    def residual(self, q: Array, t: float) -> float:
+        """Residual of the equation: missing change of the load factor."""
+        return t - self.t
+
+    def derivative(self, q: Array, way: Direction) -> float:
+        """Derivative of the load factor along a direction."""
+        return way.t
+
+
+class PathCorrector:
     """Corrector of path following: equilibrium augmented by the equation of the control.
 
     Args:
@@ -69,31 +83,31 @@ class Walk:
     # -- measures ------------------------------------------------------------------------------
 
     def product(self, a: Direction, b: Direction, factor: float) -> float:
-        """Of two directions; without dimension."""
+        """Return the inner product of two directions; dimensionless."""
         return self.share.total(float((self.weights * a.q) @ b.q)) + a.t * b.t / factor**2
 
     def length(self, way: Direction, factor: float) -> float:
-        """Of a direction, however small; without dimension."""
+        """Return the length of a direction, however small; dimensionless."""
         along = abs(way.t) / factor
         largest = max(self.share.largest(float(np.abs(way.q).max(initial=0.0))), along)
         if largest == 0.0 or not math.isfinite(largest):
             return largest
         # Squares of what is below 1e-154 would be nothing.
-        unit = Direction(np.asarray(way.q / largest, dtype=np.float64), way.t / largest)
+        unit = way / largest
         return largest * math.sqrt(self.product(unit, unit, factor))
 
     def size(self, way: Direction) -> float:
-        """Of the configuration's part of a direction; without dimension."""
+        """Return the length of a direction's part in the configuration; dimensionless."""
         return self.length(Direction(way.q, 0.0), 1.0)
 
     def dissipation(self, q: Array) -> float:
-        """Energy that beams and springs dissipate in the step to ``q``; J."""
+        """Return the energy that beams and springs dissipate in the step to ``q``; J."""
         in_cells = sum(one.dissipation(q) for one in self.simulation.inelastic)
         here = sum((one.dissipation(q) for one in self.simulation.couplings), in_cells)
         return self.share.total(here)
 
-    def aim(self, reach: float) -> Direction:
-        """A way along which so much is dissipated, if nothing gives way; ``reach`` in J.
+    def predict_dissipation(self, energy: float) -> Direction:
+        """Predict a step in which so much energy (J) is dissipated, if nothing gives way.
 
         Where nothing dissipated before, the direction changes as soon as something does.
 
@@ -104,61 +118,56 @@ class Walk:
         self.begin()
         gone = Direction(np.zeros(self.share.size), 0.0)
         if not self.dissipates:
-            gone = self._until(BEGUN * reach, gone, way)
-            way = self._bent(gone)
-        return self._until(reach, gone, way)
+            gone = self._until(ONSET_PART * energy, gone, way)
+            way = self._beyond(gone)
+        return self._until(energy, gone, way)
 
-    def bend(self, length: float) -> tuple[Direction, Direction] | None:
-        """Where something begins to dissipate in the direction of the path, and the way from there.
+    def kink(self, length: float) -> tuple[Direction, Direction] | None:
+        """Find the state in which dissipation begins, and the path's direction beyond it.
 
-        Args:
-            length: How far along the direction.
-
-        Returns:
-            From the accepted state to the bend, and the direction of the path beyond it; None if
-            nothing begins to dissipate.
+        It is sought in the direction of the path up to a ``length``; None if nothing does.
         """
         way, q = self.direction, self.simulation.q
         self.begin()
         if self.dissipates or not self.dissipation(q + length * way.q) > 0:
             return None
         low, high = 0.0, length
-        for _ in range(HALVINGS):
+        for _ in range(MOST_BISECTIONS):
             middle = (low + high) / 2
             begun = self.dissipation(q + middle * way.q) > 0
             low, high = (low, middle) if begun else (middle, high)
-        gone = Direction(high * way.q, high * way.t)
-        return gone, self._bent(gone)
+        gone = high * way
+        return gone, self._beyond(gone)
 
-    def _bent(self, gone: Direction) -> Direction:
+    def _beyond(self, gone: Direction) -> Direction:
         """Direction of the path where something has just begun to dissipate."""
         self.t, q = self.simulation.t + gone.t, self.simulation.q + gone.q
-        way = self.flow(self.look(q))
-        return Direction(-way.q, -way.t) if self.side(q, way) < 0 else way
+        way = self.direction_of(self.stiffness_at(q))
+        return -way if self.dissipation_side(q, way) < 0 else way
 
-    def _until(self, reach: float, gone: Direction, way: Direction) -> Direction:
-        """Return the step so far, and as much more along a direction as dissipates ``reach``."""
+    def _until(self, energy: float, gone: Direction, way: Direction) -> Direction:
+        """Return the step so far, and as much more along a direction as dissipates so much (J)."""
 
         def dissipated(length: float) -> float:
             return self.dissipation(self.simulation.q + gone.q + length * way.q)
 
         low, high = 0.0, 1e-6 / self.length(way, self.factor)
-        for _ in range(FARTHEST):
-            if dissipated(high) >= reach:
+        for _ in range(MOST_DOUBLINGS):
+            if dissipated(high) >= energy:
                 break
             low, high = high, 2 * high
         else:
             raise StepFailed("nothing dissipates in the direction of the path")
         for _ in range(12):
             middle = (low + high) / 2
-            low, high = (middle, high) if dissipated(middle) < reach else (low, middle)
-        return Direction(gone.q + high * way.q, gone.t + high * way.t)
+            low, high = (middle, high) if dissipated(middle) < energy else (low, middle)
+        return gone + high * way
 
-    def side(self, q: Array, way: Direction) -> float:
-        """Positive where more dissipates along a way from ``q``, negative where against it."""
+    def dissipation_side(self, q: Array, way: Direction) -> float:
+        """Positive where more dissipates in a direction from ``q``, negative where against it."""
         now, size = self.dissipation(q), self.size(way)
         flows = self.share.total(float(any(one.flows() for one in self.simulation.couplings)))
-        for doubled in range(FARTHEST if (now > 0 or flows) and size > 0 else 0):
+        for doubled in range(MOST_DOUBLINGS if (now > 0 or flows) and size > 0 else 0):
             δ = 1e-9 * 2**doubled / size
             more = self.dissipation(q + δ * way.q) - self.dissipation(q - δ * way.q)
             if abs(more) > now:
@@ -168,7 +177,7 @@ class Walk:
     # -- the border ----------------------------------------------------------------------------
 
     def step_at(self, t: float) -> Step:
-        """A path is infinitely slow: rates and what they do vanish."""
+        """Return an infinitely slow step to a load factor: rates and viscous forces vanish."""
         return Step(-math.inf, t, self.simulation.q, load_time=t, motion_time=t, toward=1.0)
 
     @staticmethod
@@ -188,7 +197,7 @@ class Walk:
         self._give(self.step_at(self.t), self._driven)
 
     def tangent(self, x: Array, r: Array) -> None:
-        """Fill the matrix; the derivative by the load factor, of linear functions exactly."""
+        """Fill the matrix, and the derivative by the load factor, exact for linear functions."""
         simulation = self.simulation
         q = simulation.supports.in_plane(x)
         ε = 1e-6 * max(1.0, abs(self.t))
@@ -207,46 +216,42 @@ class Walk:
         self._A = simulation.equation.tangent_at(x, self._rates, r)
 
     def correct(self, y: Array, z: Array) -> None:
-        """By the equation of the control, linearised."""
+        """Correct an iterate by the linearised equation of the control."""
         supports, moving = self.simulation.supports, self.simulation.supports.moving
         if len(moving):
             z = z - self._rates
         q = supports.in_plane(self._x)
-        miss = self._constraint.miss(q, self.t)
-        by_y = self._constraint.slope(q, Direction(supports.in_plane(y), 0.0))
-        by_z = self._constraint.slope(q, Direction(supports.in_plane(z), -1.0))
-        change = (miss - by_y) / by_z if by_z else math.nan
+        residual = self._constraint.residual(q, self.t)
+        by_y = self._constraint.derivative(q, Direction(supports.in_plane(y), 0.0))
+        by_z = self._constraint.derivative(q, Direction(supports.in_plane(z), -1.0))
+        change = (residual - by_y) / by_z if by_z else math.nan
         y += change * z
         self.t += change
         y[moving] = self._x[moving] - self._moved(self.t)[moving]
 
     def met(self) -> bool:
-        """Return whether the control has what it demands."""
+        """Return whether the equation of the control is fulfilled."""
         q = self.simulation.supports.in_plane(self._x)
-        return abs(self._constraint.miss(q, self.t)) <= MET
+        return abs(self._constraint.residual(q, self.t)) <= CONTROL_TOLERANCE
 
     # -- a step --------------------------------------------------------------------------------
 
     def attempt(
         self, way: Direction, length: float, constraint: Constraint, *, hold: bool = True
     ) -> Trial:
-        """Solve, beginning so far along a way.
+        """Solve for an equilibrium under a constraint, beginning so far along a direction.
 
-        Args:
-            way: The direction.
-            length: How far.
-            constraint: Demanded besides equilibrium.
-            hold: Whether what does not flow stays closed if it can, see openings.py; not on a way
-                along which it opens.
+        Closed openings that do not flow are held closed if they can be, see openings.py, unless
+        ``hold`` is false, as in a direction in which they open.
 
         Raises:
             StepFailed: There is no equilibrium.
         """
         simulation = self.simulation
         self._constraint = constraint
-        self.sought = Direction(length * way.q, length * way.t)
-        self.t = simulation.t + length * way.t
-        step, guess = self.step_at(self.t), simulation.q + length * way.q
+        self.sought = length * way
+        self.t = simulation.t + self.sought.t
+        step, guess = self.step_at(self.t), simulation.q + self.sought.q
         simulation.supports.enter(guess)
         simulation.together(simulation.supports.move, guess, guess, step)
         trial = simulation.attempt_along(step, guess, self, hold=hold)
@@ -257,8 +262,8 @@ class Walk:
         simulation = self.simulation
         simulation.together(self._give, self.step_at(simulation.t), simulation.terms)
 
-    def look(self, q: Array) -> Stiffness:
-        """The stiffness at a state."""
+    def stiffness_at(self, q: Array) -> Stiffness:
+        """Return the tangent stiffness at a state."""
         supports = self.simulation.supports
         x = supports.in_axes(q)
         # The first tangent of a step is that of the forces before it, and may not yet be taken.
@@ -268,8 +273,8 @@ class Walk:
         together(self.tangent, x, rate)
         return Stiffness(self.share, self._A, supports.dofs, rate)
 
-    def flow(self, stiffness: Stiffness) -> Direction:
-        """Direction of the path of growing load factor."""
+    def direction_of(self, stiffness: Stiffness) -> Direction:
+        """Return the direction of the path in which the load factor grows."""
         q = stiffness.flow[self.share.dofs] + self._rates
         self.simulation.supports.leave(q)
         way = Direction(q, 1.0)
@@ -279,4 +284,32 @@ class Walk:
                 "nothing moves with the load factor here; let a load or a motion go on to change, "
                 "as with time=lambda t: t"
             )
-        return Direction(q / size, 1.0 / size)
+        return way / size
+
+
+class Control(ABC):
+    """Base class of path controls, which set the lengths of steps."""
+
+    @property
+    @abstractmethod
+    def factor(self) -> float:
+        """Change of the load factor that counts as much as a unit of displacement."""
+
+    def require(self, scene: Scene) -> None:  # noqa: B027 - most controls fit all scenes
+        """Raise :class:`SceneError` if the control does not fit the scene."""
+
+    @abstractmethod
+    def begins_along(self, corrector: PathCorrector, way: Direction) -> float:
+        """Positive if ``way`` is the direction in which a path begins."""
+
+    @abstractmethod
+    def continues_along(self, corrector: PathCorrector, gone: Direction, way: Direction) -> float:
+        """Positive if a path that came by ``gone`` in the step goes on along ``way``."""
+
+    @abstractmethod
+    def solve_step(self, corrector: PathCorrector, part: float) -> Trial:
+        """Solve for the end of a step, or of a part of it.
+
+        Raises:
+            StepFailed: There is none.
+        """

@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Runs of one scene with finer and finer dials: which, how they are timed, what they give."""
+"""Runs of one scene with finer and finer dials, each done once and timed."""
 
 from __future__ import annotations
 
-import math
 import statistics
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import Any
 
 from mpi4py import MPI
 
@@ -15,115 +14,31 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.analysis.parameter_study import study
+from ufl_beam.analysis.tradeoff_result import Dials, Refinement, Run
 from ufl_beam.arrays import Array
 from ufl_beam.errors import ConvergenceError, SceneError, TradeoffError
-from ufl_beam.mechanics.time_schemes import Scheme
-from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.parallel import alone
-from ufl_beam.simulation.run import simulate
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.step_control import Adaptive
 from ufl_beam.solvers.newton_options import Newton
 
 Quantity = Callable[[Solution], npt.ArrayLike]
 
-SHORT = 0.1
+SHORT_RUN = 0.1
 """Runs below are done three times, and the median counts, unless others are asked for; s."""
 
 
-@dataclass(frozen=True)
-class Dials:
-    """Setting of a run, the arguments of :func:`simulate`.
-
-    Attributes:
-        scheme: The time scheme.
-        dt: Step; s; or adaptive steps.
-        mesh: The cells.
-        newton: How exactly equilibria are found.
-    """
-
-    scheme: Scheme
-    dt: float | Adaptive
-    mesh: Mesh
-    newton: Newton
-
-    def finer(self, refine: int, level: float, t: tuple[float, float]) -> Dials:
-        """Each cell in ``refine`` parts, steps about ``2**level`` times as many.
-
-        The error of an adaptive step is of third order, so that their number goes with the cube
-        root of the tolerance.
-        """
-        if refine == 1 and level == 0:
-            return self  # as it was given, to be checked as such
-        dt = self.dt
-        if isinstance(dt, Adaptive):
-            finer: float | Adaptive = replace(dt, tolerance=dt.tolerance / 8**level)
-        else:
-            number = max(1, math.ceil((t[1] - t[0]) / dt * (1 - 1e-9)))
-            finer = (t[1] - t[0]) / round(number * 2**level)
-        return replace(self, dt=finer, mesh=replace(self.mesh, refine=self.mesh.refine * refine))
-
-    def __str__(self) -> str:
-        return ", ".join(map(_spelled, (self.scheme, self.dt, self.mesh, self.newton)))
-
-
-class Rung(NamedTuple):
-    """A place on the ladder: which scheme and kind of steps and cells, and how fine.
-
-    Attributes:
-        family: Number of the dials that it begins with.
-        refine: Parts of each cell.
-        level: Steps are about ``2**level`` times as many.
-        newton: Number of the tolerances.
-    """
-
-    family: int
-    refine: int
-    level: float
-    newton: int = 0
-
-
-@dataclass(frozen=True, eq=False)
-class Run:
-    """Result of a run, and its cost.
-
-    Attributes:
-        rung: Where on the ladder.
-        dials: With which dials.
-        values: The quantities.
-        seconds: Wall time, building the scene included, compiling not; s; the median of three
-            if it is short.
-        steps: Steps that were taken.
-        cells: Number of cells.
-        iterations: Newton iterations per step.
-        spent: Wall time of all repetitions; s.
-    """
-
-    rung: Rung
-    dials: Dials
-    values: dict[str, Array]
-    seconds: float
-    steps: float
-    cells: float
-    iterations: float
-    spent: float
-
-
-class Ladder:
-    """All runs of a trade-off, each done once.
+class RefinementRuns:
+    """All runs of a trade-off, see :func:`tradeoff`.
 
     Args:
-        scene: What is simulated.
-        quantities: What is asked of each run.
-        t: Beginning and end; s.
+        simulate: Function that runs the scene.
         families: Coarsest dials to begin with.
         newtons: Tolerances of Newton's method; runs have the first unless they say so.
         most: Wall time that all runs together may take; s.
-        comm: Processes that share the runs.
 
     Attributes:
-        runs: What is done.
+        runs: Those that are done.
         failed: Why runs failed.
         spent: Wall time of all runs, and of compiling; s.
     """
@@ -132,23 +47,24 @@ class Ladder:
         self,
         scene: Scene,
         quantities: Mapping[str, Quantity],
-        *,
-        t: tuple[float, float],
+        simulate: Callable[..., Solution],
         families: Sequence[Dials],
         newtons: Sequence[Newton],
+        *,
+        t: tuple[float, float],
         most: float,
         comm: MPI.Intracomm,
     ) -> None:
         self.scene, self.quantities, self.t = scene, dict(quantities), t
         self.families, self.newtons = families, newtons
-        self._most, self._comm = most, comm
-        self.runs: dict[Rung, Run] = {}
-        self.failed: dict[Rung, str] = {}
+        self._most, self._comm, self._run = most, comm, simulate
+        self.runs: dict[Refinement, Run] = {}
+        self.failed: dict[Refinement, str] = {}
         self.spent = 0.0
         self._shapes: dict[str, tuple[int, ...]] = {}
 
     def begin(self, family: int) -> None:
-        """Compile and see that quantities can be compared, on every process.
+        """Compile and require comparable quantities, on every process.
 
         Raises:
             SceneError: The scene, its dials or a quantity are wrong.
@@ -157,11 +73,11 @@ class Ladder:
         with alone():
             for level in (0.0, 1.0):
                 try:
-                    solution = self._simulate(Rung(family, 1, level))
+                    solution = self._simulate(Refinement(family, 1, level))
                 except ConvergenceError:
                     continue  # finer steps may do
                 seconds += solution.seconds
-                for name, value in self._ask(solution):
+                for name, value in self._quantities_of(solution):
                     before = self._shapes.setdefault(name, value.shape)
                     if before != value.shape:
                         raise SceneError(
@@ -171,20 +87,18 @@ class Ladder:
                         )
         self.spent += float(self._comm.bcast(seconds))
 
-    def climb(self, rungs: Sequence[Rung], *, short: float = SHORT) -> None:
+    def run(self, refinements: Sequence[Refinement], *, short: float = SHORT_RUN) -> None:
         """Run what is missing, several at a time where there are processes.
 
-        Args:
-            rungs: Where on the ladder.
-            short: Runs below are done three times; s.
+        Runs that take less than ``short`` seconds are done three times.
 
         Raises:
             TradeoffError: It would take more time than all runs may.
         """
-        missing = [r for r in rungs if r not in self.runs and r not in self.failed]
+        missing = [r for r in refinements if r not in self.runs and r not in self.failed]
         if not missing:
             return
-        needed = sum(self._expected(rung) for rung in missing)
+        needed = sum(map(self._longest, missing))
         if self.spent + needed > self._most:
             raise TradeoffError(
                 f"the next {len(missing)} runs would take about {needed:.3g} s after "
@@ -192,51 +106,48 @@ class Ladder:
                 f"{self.dials(missing[-1])}",
                 tuple(self.runs.values()),
             )
-        cases = [rung._asdict() | {"short": short} for rung in missing]
+        cases = [one._asdict() | {"short": short} for one in missing]
         try:
             done = study(self._member, cases, progress=False, comm=self._comm)
         except RuntimeError as error:  # all of them failed
             self.failed |= dict.fromkeys(missing, str(error))
             return
-        names = list(self.quantities)
-        for k, rung in enumerate(missing):
+        for k, one in enumerate(missing):
             if k in done.failed:
-                self.failed[rung] = done.failed[k]
+                self.failed[one] = done.failed[k]
                 continue
-            values = {name: done[f"quantity {n}"][k] for n, name in enumerate(names)}
-            took = {
-                name: float(done[name][k])
-                for name in ("seconds", "steps", "cells", "iterations", "spent")
-            }
-            self.runs[rung] = Run(rung, self.dials(rung), values, **took)
+            values = {name: done[f"quantity {n}"][k] for n, name in enumerate(self.quantities)}
+            measured = ("seconds", "steps", "cells", "iterations", "spent")
+            took = {name: float(done[name][k]) for name in measured}
+            self.runs[one] = Run(one, self.dials(one), values, **took)
             self.spent += took["spent"]
 
-    def dials(self, rung: Rung) -> Dials:
-        """The dials of a rung."""
-        finer = self.families[rung.family].finer(rung.refine, rung.level, self.t)
-        return replace(finer, newton=self.newtons[rung.newton])
+    def dials(self, refinement: Refinement) -> Dials:
+        """Return the dials of a refinement."""
+        family, refine, level, newton = refinement
+        finer = self.families[family].finer(refine, level, self.t)
+        return replace(finer, newton=self.newtons[newton])
 
     def of(self, family: int) -> list[Run]:
-        """The runs of a family."""
-        return [run for rung, run in self.runs.items() if rung.family == family]
+        """Return the runs of a family."""
+        return [run for one, run in self.runs.items() if one.family == family]
 
-    def _expected(self, rung: Rung) -> float:
+    def _longest(self, refinement: Refinement) -> float:
         """Wall time at most, by the nearest run; s; 0 if there is none."""
-        return min(
-            (
-                run.spent
-                * 2 ** max(0.0, rung.level - run.rung.level)
-                * max(1.0, rung.refine / run.rung.refine)
-                for run in self.of(rung.family)
-            ),
-            default=0.0,
+        _, refine, level, _ = refinement
+        times = (
+            run.spent
+            * 2 ** max(0.0, level - run.refinement.level)
+            * max(1.0, refine / run.refinement.refine)
+            for run in self.of(refinement.family)
         )
+        return min(times, default=0.0)
 
-    def _simulate(self, rung: Rung) -> Solution:
-        dials = self.dials(rung)
-        return simulate(self.scene, t=self.t, progress=False, **keywords(dials))
+    def _simulate(self, refinement: Refinement) -> Solution:
+        dials = self.dials(refinement)
+        return self._run(self.scene, t=self.t, progress=False, **dials.arguments)
 
-    def _ask(self, solution: Solution) -> Iterator[tuple[str, Array]]:
+    def _quantities_of(self, solution: Solution) -> Iterator[tuple[str, Array]]:
         for name, quantity in self.quantities.items():
             value = np.asarray(quantity(solution), dtype=float)
             if not np.isfinite(value).all():
@@ -245,12 +156,12 @@ class Ladder:
 
     def _member(self, short: float, **case: Any) -> dict[str, Any]:
         """One run of a study."""
-        rung = Rung(**case)
-        solution = self._simulate(rung)
+        refinement = Refinement(**case)
+        solution = self._simulate(refinement)
         seconds = [solution.seconds]
         if solution.seconds < short:
-            seconds += [self._simulate(rung).seconds for _ in range(2)]
-        values = {f"quantity {n}": v for n, (_, v) in enumerate(self._ask(solution))}
+            seconds += [self._simulate(refinement).seconds for _ in range(2)]
+        values = {f"quantity {n}": v for n, (_, v) in enumerate(self._quantities_of(solution))}
         return values | {
             "seconds": statistics.median(seconds),
             "spent": sum(seconds),
@@ -258,22 +169,3 @@ class Ladder:
             "cells": len(solution.grid.cells),
             "iterations": solution.iterations / solution.parts,
         }
-
-
-def keywords(dials: Dials) -> dict[str, Any]:
-    """Dials as arguments of :func:`simulate`."""
-    return {name: getattr(dials, name) for name in ("scheme", "dt", "mesh", "newton")}
-
-
-def _spelled(value: Any) -> str:
-    """A number, or what of a record is not as by default."""
-    if isinstance(value, float | int):
-        return f"dt={value:.4g}"
-    values = {field.name: getattr(value, field.name) for field in fields(value)}
-    defaults = {field.name: field.default for field in fields(value)}
-    shown = (
-        f"{name}={one:.4g}" if isinstance(one, float) else f"{name}={one}"
-        for name, one in values.items()
-        if one and one != defaults[name]
-    )  # fmt: skip
-    return f"{type(value).__name__}({', '.join(shown)})"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Errors by self-convergence: from runs on three levels of a dial to order, limit and uncertainty.
+"""Richardson extrapolation of runs on three levels: order, limit and uncertainty.
 
 Level k of a dial is 2**k times as fine as level 0.  Richardson's extrapolation, with the safety
 factors of Roache's grid convergence index (J. Fluids Eng. 116 (1994) 405).
@@ -16,82 +16,58 @@ import scipy  # its parts are loaded when they are used
 
 from ufl_beam.arrays import Array
 
-Level = tuple[int, int]
-"""Of the cells and of the steps."""
-
-LEAST_ORDER = 0.5
-"""Differences that fall more slowly than with this power show no convergence."""
-
-NEAR = 0.25
-"""An observed order so near to a whole one, up to that of the method, is trusted."""
+Level = tuple[int, int]  # of the cells and of the steps
+LEAST_ORDER = 0.5  # differences that fall more slowly than with this power show no convergence
+ORDER_TOLERANCE = 0.25  # an order so near to a whole one, up to that of the method, is trusted
 
 SURE, UNSURE = 1.25, 3.0
 """Safety factors on errors that are extrapolated with a trusted order, and on others."""
 
-ALIGNED = 0.5
-"""Cosine between changes of one direction; what turns is not extrapolated."""
+LEAST_COSINE = 0.5  # between successive changes; those that turn more are not extrapolated
 
-MIXED = 0.5
+MOST_MIXED = 0.5
 """Two dials are taken one by one if the errors of one depend on the other by less than this."""
 
 
 def size(values: Array) -> float:
-    """Largest magnitude of an array; 0 if it is empty."""
+    """Return the largest magnitude of an array; 0 if it is empty."""
     return float(np.abs(values).max(initial=0.0))
 
 
 @dataclass(frozen=True)
 class Convergence:
-    """Convergence of a quantity with one dial, from three levels.
+    """Convergence of a quantity with one dial, from three levels."""
 
-    Attributes:
-        finest: The finest of the three levels.
-        differences: Size of the change from the first level to the second, and to the third.
-        order: Observed.
-        aligned: Whether both changes are of one direction; if not, nothing is extrapolated.
-        used: Order that errors are predicted with, not above that of the method; 0 where changes
-            are negligible.
-        method: Order of the method; with it errors grow towards levels coarser than the three.
-        error: Of the finest level; where changes are negligible, of every level.
-        rest: What the finest level lacks of the limit, with its sign.
-        safety: Factor by which ``error`` may be wrong.
-    """
-
-    finest: int
-    differences: tuple[float, float]
-    order: float
-    aligned: bool
-    used: float
-    method: float
-    error: float
-    rest: Array
-    safety: float
+    finest: int  # the finest of the three levels
+    differences: tuple[float, float]  # sizes of the changes from level to level
+    order: float  # observed
+    aligned: bool  # whether both changes are of one direction; if not, nothing is extrapolated
+    used: float  # order for predictions, at most that of the method; 0: no changes
+    method: float  # order of the method; with it errors grow towards levels coarser than the three
+    error: float  # of the finest level; where changes are negligible, of every level
+    rest: Array  # what the finest level lacks of the limit, with its sign
+    safety: float  # factor by which ``error`` may be wrong
 
     @classmethod
     def of(
         cls, values: tuple[Array, Array, Array], finest: int, method: float, floor: float
     ) -> Convergence:
-        """From the values on three levels, the finest last.
+        """Judge values on three levels up to the finest; changes up to ``floor`` do not count.
 
-        Args:
-            values: Of the quantity.
-            finest: The last of their levels.
-            method: Order that the method has in theory.
-            floor: Changes up to here are negligible; unit of the quantity.
+        ``method`` is the order that the method has in theory.
         """
         first, second = values[1] - values[0], values[2] - values[1]
         a, b = size(first), size(second)
         if max(a, b) <= floor:
-            return cls(
-                finest, (a, b), 0.0, False, 0.0, method, max(a, b), np.asarray(0 * second), UNSURE
-            )
+            nothing = np.asarray(0 * second)
+            return cls(finest, (a, b), 0.0, False, 0.0, method, max(a, b), nothing, UNSURE)
         order = math.log2(a / b) if min(a, b) > 0 else math.copysign(math.inf, a - b)
         lengths = np.linalg.norm(first) * np.linalg.norm(second)
-        aligned = bool(np.vdot(first, second) >= ALIGNED * lengths)
+        aligned = bool(np.vdot(first, second) >= LEAST_COSINE * lengths)
         used = min(max(order, LEAST_ORDER), method)
         # What fell faster than the method can explain may have passed through zero.
         error = max(b, a / 2**method) / (2**used - 1)
-        whole = any(abs(order - k) <= NEAR for k in range(1, round(method) + 1))
+        whole = any(abs(order - k) <= ORDER_TOLERANCE for k in range(1, round(method) + 1))
         safety = SURE if aligned and whole else UNSURE
         rest = np.asarray(aligned * second / (2**used - 1))
         return cls(finest, (a, b), order, aligned, used, method, error, rest, safety)
@@ -102,7 +78,7 @@ class Convergence:
         return self.used == 0 or self.order >= LEAST_ORDER
 
     def at(self, level: float) -> float:
-        """Error at a level, which need not be whole, with its safety factor; unit of quantity."""
+        """Predict the error at a level, not necessarily whole, with its safety factor."""
         coarser = max(0.0, self.finest - 2 - level)
         growth = self.used * (self.finest - level - coarser) + self.method * coarser
         return self.safety * self.error * 2**growth
@@ -117,23 +93,16 @@ class Convergence:
 
 @dataclass(frozen=True)
 class Cross:
-    """Self-convergence of a quantity with cells and with steps, one by one and together.
+    """Self-convergence of a quantity with cells and with steps, one by one and together."""
 
-    Attributes:
-        cells: With the cells.
-        steps: With the steps.
-        limit: Extrapolated value.
-        mixed: What refining both changes that refining each does not, extrapolated.
-    """
-
-    cells: Convergence
-    steps: Convergence
-    limit: Array
-    mixed: float
+    cells: Convergence  # with the cells
+    steps: Convergence  # with the steps
+    limit: Array  # extrapolated value
+    mixed: float  # what refining both changes that refining each does not, extrapolated
 
     @staticmethod
     def levels(base: Level) -> list[Level]:
-        """The runs it takes, the cheap ones first."""
+        """Return the levels of the runs that it takes, the cheap ones first."""
         i, j = base
         return [(i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1), (i + 2, j), (i, j + 2)]
 
@@ -141,7 +110,7 @@ class Cross:
     def of(
         cls, values: Mapping[Level, Array], base: Level, methods: tuple[float, float], floor: float
     ) -> Cross:
-        """From the values at :meth:`levels`; ``methods`` are the orders in theory."""
+        """Judge the values at :meth:`levels`; ``methods`` are the orders in theory."""
         i, j = base
         q = values[base]
         cells = Convergence.of((q, values[i + 1, j], values[i + 2, j]), i + 2, methods[0], floor)
@@ -156,7 +125,7 @@ class Cross:
     def separate(self) -> bool:
         """True if the errors of both dials add up."""
         i, j = self.cells.finest - 2, self.steps.finest - 2
-        return self.mixed <= MIXED * (self.cells.at(i) + self.steps.at(j))
+        return self.mixed <= MOST_MIXED * (self.cells.at(i) + self.steps.at(j))
 
     @property
     def seen(self) -> bool:
@@ -164,14 +133,14 @@ class Cross:
         return self.cells.seen and self.steps.seen and self.separate
 
     def error(self, i: float, j: float) -> float:
-        """Bound of the error at levels that need not be whole; unit of the quantity."""
+        """Bound the error at levels that need not be whole; unit of the quantity."""
         fallen = self.cells.used * (i - self.cells.finest + 2)
         fallen += self.steps.used * (j - self.steps.finest + 2)
         return self.cells.at(i) + self.steps.at(j) + self.mixed * 2**-fallen
 
     @property
     def uncertainty(self) -> float:
-        """Of the limit; unit of the quantity."""
+        """Uncertainty of the limit; unit of the quantity."""
         return self.error(self.cells.finest, self.steps.finest) + self.mixed / 4
 
     def __str__(self) -> str:
@@ -189,21 +158,21 @@ class Cost:
 
     @classmethod
     def of(cls, steps: Array, cells: Array, seconds: Array) -> Cost:
-        """Fitted to runs, relative differences by least squares; no coefficient is negative."""
+        """Fit to runs, relative differences by least squares; no coefficient is negative."""
         rows = np.stack([np.ones_like(steps), steps, steps * cells], axis=1)
         return cls(*scipy.optimize.nnls(rows / seconds[:, None], np.ones_like(seconds))[0].tolist())
 
     def slower(self, factor: float) -> Cost:
-        """So many times as slow."""
+        """Return the cost on a machine that is so many times as slow."""
         return Cost(factor * self.begin, factor * self.step, factor * self.cell)
 
     def seconds(self, steps: float, cells: float) -> float:
-        """Predicted wall time; s."""
+        """Predict the wall time of a run; s."""
         return self.begin + steps * (self.step + self.cell * cells)
 
 
 def pareto(seconds: Array, errors: Array) -> list[int]:
-    """Runs that no other one beats in time and error, the fastest first."""
+    """Find the runs that no other one beats in time and error, the fastest first."""
     front: list[int] = []
     for k in np.lexsort((errors, seconds)):
         if not front or errors[k] < errors[front[-1]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,7 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_kind
 
-Outcome = dict[str, Array] | str
-"""Result of a member, or the reason of its failure."""
+Outcome = dict[str, Array] | str  # result of a member, or the reason of its failure
 
 FORMAT = "study of ufl_beam, 1"
 
@@ -47,23 +47,18 @@ class Study:
 
     @classmethod
     def of(cls, member: str, records: dict[str, tuple[Outcome, float]]) -> Study:
-        """From outcome and seconds of each case, cases as :func:`text_of`."""
+        """Make a study from outcome and seconds of each case, cases as :func:`text_of`."""
         outcomes = [outcome for outcome, _ in records.values()]
+        failed = {i: outcome for i, outcome in enumerate(outcomes) if isinstance(outcome, str)}
         first: dict[str, Array] = next((row for row in outcomes if not isinstance(row, str)), {})
         none = {name: np.full_like(first[name], np.nan) for name in sorted(first)}
-        return cls(
-            member,
-            tuple(map(json.loads, records)),
-            {
-                k: np.array([none[k] if isinstance(o, str) else o[k] for o in outcomes])
-                for k in none
-            },
-            {i: outcome for i, outcome in enumerate(outcomes) if isinstance(outcome, str)},
-            np.array([seconds for _, seconds in records.values()]),
-        )
+        rows = [none if isinstance(outcome, str) else outcome for outcome in outcomes]
+        results = {name: np.array([row[name] for row in rows]) for name in none}
+        seconds = np.array([seconds for _, seconds in records.values()])
+        return cls(member, tuple(map(json.loads, records)), results, failed, seconds)
 
     def records(self) -> dict[str, tuple[Outcome, float]]:
-        """Return the data that :meth:`of` makes this study from."""
+        """Return the data from which :meth:`of` makes this study."""
         found: dict[str, tuple[Outcome, float]] = {}
         for i, case in enumerate(self.cases):
             row = {name: values[i] for name, values in self.results.items()}
@@ -84,7 +79,7 @@ class Study:
         return "\n".join(lines)
 
     def save(self, path: str | Path) -> None:
-        """Write an HDF5 file; one that is there is replaced once the new one is complete.
+        """Write an HDF5 file; an existing one is replaced once the new one is complete.
 
         Raises:
             SceneError: The file cannot be written.
@@ -102,16 +97,14 @@ class Study:
                 file.create_dataset("cases", data=[*map(text_of, self.cases)], dtype=text)
                 file.create_dataset("errors", data=errors, dtype=text)
                 file["seconds"] = self.seconds
-                results = file.create_group("results")
-                for name, values in self.results.items():
-                    results[name] = values
+                file.create_group("results").update(self.results)
             os.replace(part, path)
         except OSError as error:
             raise SceneError(f"study {path} cannot be written: {error}") from None
 
     @classmethod
     def load(cls, path: str | Path) -> Study:
-        """Read what :meth:`save` or :func:`study` wrote.
+        """Read a file that :meth:`save` or :func:`study` wrote.
 
         Raises:
             SceneError: There is no such file, or it holds no study, or is damaged.
@@ -132,13 +125,12 @@ class Study:
                     file["seconds"][()],
                 )
         except (OSError, KeyError, ValueError) as error:
-            raise SceneError(
-                f"study {path}: the file holds no study, or is damaged: {error}"
-            ) from None
+            why = f"the file holds no study, or is damaged: {error}"
+            raise SceneError(f"study {path}: {why}") from None
 
 
 def text_of(case: dict[str, Any], what: str = "case") -> str:
-    """The case as JSON, by which cases are compared: all digits, names in alphabetical order.
+    """Write a case as JSON, by which cases are compared: all digits, names sorted.
 
     Raises:
         SceneError: It is no dict, or a value is no number or text and no list of these.
@@ -167,10 +159,9 @@ def numbers_of(case: dict[str, Any], returned: Any) -> dict[str, Array]:
     for name, value in returned.items():
         if not isinstance(name, str) or name in {"", "."} or "/" in name:
             raise SceneError(f"study: {case} returned {name!r}, which is no name of a result")
-        try:
+        array = np.asarray(None)  # stays so if rows have different lengths
+        with suppress(ValueError):
             array = np.asarray(value)
-        except ValueError:  # rows of different lengths
-            array = np.asarray(None)
         if array.dtype.kind not in "biuf":
             raise SceneError(
                 f"study: {case} returned {name} = {value!r}, which is no number or array of them"

@@ -1,20 +1,23 @@
 # SPDX-License-Identifier: MIT
-"""The trade of speed for accuracy on a user's own scene, measured and chosen from."""
+"""Trade-off of speed for accuracy on a user's own scene: runs, search, recommendation."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import product
-from typing import TypeVar, cast
+from statistics import geometric_mean
+from typing import TypeVar
 
 from mpi4py import MPI
 
-from ufl_beam.analysis.refinement_runs import Dials, Ladder, Quantity, Run
-from ufl_beam.analysis.refinement_search import CAREFUL, Climb
-from ufl_beam.analysis.richardson import size
-from ufl_beam.analysis.targets import Budget, Found, Goal, Tolerance
-from ufl_beam.analysis.tradeoff_result import Tradeoff
+import numpy as np
+
+from ufl_beam.analysis.refinement_runs import Quantity, RefinementRuns
+from ufl_beam.analysis.richardson import Cost, Cross, Level, size
+from ufl_beam.analysis.targets import Choice, Prediction, Target, target_of
+from ufl_beam.analysis.tradeoff_result import Dials, Refinement, Run, Tradeoff
 from ufl_beam.errors import (
     SceneError,
     TradeoffError,
@@ -27,11 +30,21 @@ from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.parallel import communicator
+from ufl_beam.simulation.run import simulate
 from ufl_beam.simulation.step_control import Adaptive
 from ufl_beam.solvers.newton_options import Newton
 
-SHARE = 0.1
-"""Part of the error that another tolerance of Newton's method may change."""
+NEWTON_SHARE = 0.1  # part of the error that another tolerance of Newton's method may change
+
+MOST_DOUBTS, MOST_TRIALS = 4, 6
+"""Refinements at which self-convergence may not be seen; settings that are tried."""
+
+SHORT_CHOICE = 2.0  # of settings that are tried, runs below are done three times; s
+
+ROUNDING = 1e-9
+"""Changes up to this part of a quantity are rounding, or the tolerance of Newton's method."""
+
+STEP_ORDER = 2.0  # order of the schemes, at most; that of cells is twice their degree
 
 One = TypeVar("One")
 
@@ -88,89 +101,6 @@ def tradeoff(
         >>> found = ub.tradeoff(scene, tip, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance=0.01)
         >>> run = ub.simulate(scene, **found.recommended)
     """
-    goal = _goal(quantities, tolerance, budget)
-    require_number(most, "tradeoff: most", positive=True)
-    comm = communicator(comm, "tradeoff: comm")
-    meshes = _several(Mesh() if mesh is None else mesh, Mesh, "mesh")
-    newtons = _several(Newton() if newton is None else newton, Newton, "newton")
-    schemes = _several(scheme, Scheme, "scheme")
-    steps: tuple[float | Adaptive, ...] = _several(dt, object, "dt")
-    for i, step in enumerate(steps):
-        if not isinstance(step, Adaptive):
-            require_number(step, f"tradeoff: dt[{i}]" if len(steps) > 1 else "tradeoff: dt")
-    families = [Dials(*one, newtons[0]) for one in product(schemes, steps, meshes)]
-    ladder = Ladder(
-        scene, quantities, t=t, families=families, newtons=newtons, most=most,
-        comm=comm,
-    )  # fmt: skip
-    found: list[Found] = []
-    notes: list[str] = []
-    wrong: list[SceneError] = []
-    for family, dials in enumerate(families):
-        try:
-            ladder.begin(family)
-        except SceneError as error:
-            wrong.append(error)
-            notes.append(f"{dials}: {error}")
-            continue
-        try:
-            one = Climb(ladder, family, goal).find(found)
-        except TradeoffError as error:
-            notes.append(f"{dials}: {error}")
-            continue
-        if one is None:
-            notes.append(f"{dials}: given up, others are better")
-        else:
-            found.append(one)
-    if len(wrong) == len(families):
-        raise wrong[0]
-    if not found:
-        raise TradeoffError("tradeoff: " + "\n".join(notes), tuple(ladder.runs.values()))
-    best = min(found, key=goal.rank)
-    crosses = best.outlook.crosses
-    for other in found:
-        for name, cross in other.outlook.crosses.items():
-            apart = size(cross.limit - crosses[name].limit)
-            if apart > cross.uncertainty + crosses[name].uncertainty:
-                notes.append(f"{other.run.dials}: its limit of {name} is {apart:.2g} away")
-    run = _other_newton(ladder, best)
-    if not goal.accepts(replace(best, run=run)):
-        notes.append(f"no setting was found that is nearer to {goal}")
-    return Tradeoff(
-        runs=tuple(ladder.runs.values()),
-        best=run,
-        t=t,
-        crosses=crosses,
-        units=dict(best.outlook.units),
-        goal=goal,
-        families=tuple(map(str, families)),
-        notes=tuple(notes),
-        spent=ladder.spent,
-    )
-
-
-def _other_newton(ladder: Ladder, best: Found) -> Run:
-    """The recommended run, or that with another tolerance which is faster and changes little."""
-    chosen = best.run
-    for number in range(1, len(ladder.newtons)):
-        rung = best.run.rung._replace(newton=number)
-        ladder.climb([rung], short=CAREFUL)
-        if rung in ladder.runs:
-            run = ladder.runs[rung]
-            changed = best.outlook.largest(
-                {name: run.values[name] - value for name, value in best.run.values.items()}
-            )
-            if changed <= SHARE * best.choice.ratio and run.seconds < chosen.seconds:
-                chosen = run
-    return chosen
-
-
-def _goal(
-    quantities: Mapping[str, Quantity],
-    tolerance: float | Mapping[str, float] | None,
-    budget: float | None,
-) -> Goal:
-    """Return the target in words."""
     require_kind(quantities, Mapping, "tradeoff: quantities")
     if not quantities:
         raise SceneError("tradeoff: quantities is empty; name what is to be accurate")
@@ -181,22 +111,213 @@ def _goal(
                 f"tradeoff: quantity {name!r} = {shorten(quantity)} cannot be called; give a "
                 "function of a Solution"
             )
-    if (tolerance is None) == (budget is None):
-        raise SceneError("tradeoff: give either a tolerance or a budget")
-    if budget is not None:
-        require_number(budget, "tradeoff: budget", positive=True)
-        return Budget(budget)
-    if not isinstance(tolerance, Mapping):
-        require_number(cast("float", tolerance), "tradeoff: tolerance", positive=True)
-        return Tolerance({}, cast("float", tolerance))
-    if set(tolerance) != set(quantities):
-        raise SceneError(
-            f"tradeoff: tolerance is of {', '.join(tolerance)}, quantities are "
-            f"{', '.join(quantities)}; name the same"
-        )
-    for name, value in tolerance.items():
-        require_number(value, f"tradeoff: tolerance of {name}", positive=True)
-    return Tolerance(tolerance, 0.0)
+    target = target_of(quantities, tolerance, budget)
+    require_number(most, "tradeoff: most", positive=True)
+    comm = communicator(comm, "tradeoff: comm")
+    meshes = _several(Mesh() if mesh is None else mesh, Mesh, "mesh")
+    newtons = _several(Newton() if newton is None else newton, Newton, "newton")
+    schemes = _several(scheme, Scheme, "scheme")
+    steps: tuple[float | Adaptive, ...] = _several(dt, object, "dt")
+    for i, step in enumerate(steps):
+        if not isinstance(step, Adaptive):
+            require_number(step, f"tradeoff: dt[{i}]" if len(steps) > 1 else "tradeoff: dt")
+    families = [Dials(*one, newtons[0]) for one in product(schemes, steps, meshes)]
+    runs = RefinementRuns(scene, quantities, simulate, families, newtons, t=t, most=most, comm=comm)
+    found: list[_Found] = []
+    notes: list[str] = []
+    wrong: list[SceneError] = []
+    for family, dials in enumerate(families):
+        try:
+            runs.begin(family)
+        except SceneError as error:
+            wrong.append(error)
+            notes.append(f"{dials}: {error}")
+            continue
+        try:
+            one = _Search(runs, family, target).find(found)
+        except TradeoffError as error:
+            notes.append(f"{dials}: {error}")
+            continue
+        if one is None:
+            notes.append(f"{dials}: given up, others are better")
+        else:
+            found.append(one)
+    if len(wrong) == len(families):
+        raise wrong[0]
+    if not found:
+        raise TradeoffError("tradeoff: " + "\n".join(notes), tuple(runs.runs.values()))
+    best = min(found, key=lambda one: one.rank(target))
+    crosses = best.prediction.crosses
+    for other in found:
+        for name, cross in other.prediction.crosses.items():
+            apart = size(cross.limit - crosses[name].limit)
+            if apart > cross.uncertainty + crosses[name].uncertainty:
+                notes.append(f"{other.run.dials}: its limit of {name} is {apart:.2g} away")
+    run = _other_newton(runs, best)
+    if not target.accepts(run.seconds, replace(best, run=run).ratio):
+        notes.append(f"no setting was found that is nearer to {target}")
+    return Tradeoff(
+        runs=tuple(runs.runs.values()),
+        best=run,
+        t=t,
+        crosses=crosses,
+        units=dict(best.prediction.units),
+        target=target,
+        families=tuple(map(str, families)),
+        notes=tuple(notes),
+        spent=runs.spent,
+    )
+
+
+@dataclass(frozen=True)
+class _Found:
+    """Setting that was run, its prediction, and what the runs of its family predict."""
+
+    run: Run
+    choice: Choice
+    prediction: Prediction
+
+    @property
+    def ratio(self) -> float:
+        """Largest distance from a limit, in its unit."""
+        crosses, values = self.prediction.crosses, self.run.values
+        return self.prediction.largest({n: values[n] - c.limit for n, c in crosses.items()})
+
+    def rank(self, target: Target) -> tuple[bool, float]:
+        """The least is the best."""
+        return target.rank(self.run.seconds, self.ratio, self.choice.ratio)
+
+
+class _Search:
+    """Search from coarse to fine in one family of dials until the setting is known that serves."""
+
+    def __init__(self, runs: RefinementRuns, family: int, target: Target) -> None:
+        self._runs, self._family, self._target = runs, family, target
+        # Times of settings over the cost that was fitted: machines are noisy
+        self._slower: list[float] = []
+
+    def find(self, others: Sequence[_Found]) -> _Found | None:
+        """The setting; none if ``others`` are better.
+
+        Raises:
+            TradeoffError: Self-convergence is not seen, or no setting serves.
+        """
+        base: Level = (0, 0)
+        doubts: list[str] = []
+        tried: list[_Found] = []
+        while True:
+            prediction, doubt, moved = self._predict(base)
+            if prediction is None:
+                doubts.append(doubt)
+                if len(doubts) == MOST_DOUBTS:
+                    raise self._refusal("self-convergence is not seen" + "".join(doubts))
+                base = moved
+                continue
+            choice = self._target.choose(prediction)
+            if any(self._target.hopeless(choice, one.choice) for one in others):
+                return None
+            i, j = prediction.finest
+            cells_more = max(0, math.ceil(math.log2(choice.refine) - i))
+            more = cells_more, max(0, math.ceil(choice.level - j))
+            if choice.further and more == (0, 0):
+                more = prediction.bottleneck(choice)
+            if more != (0, 0):
+                base = base[0] + more[0], base[1] + more[1]
+                continue
+            if not choice.serves:
+                raise self._refusal(
+                    f"no setting serves; the nearest takes {choice.seconds:.3g} s and has errors "
+                    f"of {choice.ratio:.2g} {self._target.measure}; steps and cells as they are "
+                    "given are the coarsest, and the last digits of a quantity are not known"
+                )
+            found = self._attempt(choice, prediction)
+            again = any(one.run is found.run for one in tried)
+            tried.append(found)
+            if self._target.accepts(found.run.seconds, found.ratio):
+                return found
+            if again or len(tried) == MOST_TRIALS:
+                return min(self._all(prediction), key=lambda one: one.rank(self._target))
+            self._slower.append(found.run.seconds * self._mean / choice.seconds)
+            if found.ratio > choice.ratio:
+                more = prediction.bottleneck(choice)
+                base = base[0] + more[0], base[1] + more[1]
+
+    def _predict(self, base: Level) -> tuple[Prediction | None, str, Level]:
+        """Return the findings of the runs around a base, or the reason why there are none."""
+        i, j = base
+        runs, levels = self._runs, Cross.levels(base)
+        wanted = [Refinement(self._family, 2 ** level[0], level[1]) for level in levels]
+        runs.run(wanted[:1])  # tells how long the others take
+        runs.run(wanted)
+        failed = [f"\n  {runs.dials(r)}: {runs.failed[r]}" for r in wanted if r in runs.failed]
+        if failed:
+            return None, "".join(failed), (i, j + 1)
+        at = {level: runs.runs[one] for level, one in zip(levels, wanted, strict=True)}
+        finest = at[i, j + 2]
+        units = self._target.units({name: size(value) for name, value in finest.values.items()})
+        orders = (2.0 * finest.dials.mesh.degree, STEP_ORDER)
+        crosses = {}
+        for name, unit in units.items():
+            if unit == 0:
+                raise SceneError(
+                    f"tradeoff: quantity {name!r} is zero, so that no part of it can be a "
+                    "tolerance; give tolerances by name, in units of the quantities"
+                )
+            values = {level: run.values[name] for level, run in at.items()}
+            floor = max(self._target.negligible * unit, ROUNDING * size(finest.values[name]))
+            crosses[name] = Cross.of(values, base, orders, floor)
+        doubts = [f"\n  {name}{cross}" for name, cross in crosses.items() if not cross.seen]
+        if doubts:
+            unseen = [cross for cross in crosses.values() if not cross.seen]
+            cells = any(not (cross.cells.seen and cross.separate) for cross in unseen)
+            steps = any(not (cross.steps.seen and cross.separate) for cross in unseen)
+            where = f"\n  from {runs.dials(wanted[0])} on:"
+            return None, where + "".join(doubts), (i + cells, j + steps)
+        done = [run for run in runs.of(self._family) if run.refinement.newton == 0]
+        columns = zip(*((run.steps, run.cells, run.seconds) for run in done), strict=True)
+        cost = Cost.of(*map(np.array, columns)).slower(self._mean)
+        cells_now = at[base].cells / wanted[0].refine
+        return Prediction(crosses, cost, finest.steps / 2 ** (j + 2), cells_now, units), "", base
+
+    def _attempt(self, choice: Choice, prediction: Prediction) -> _Found:
+        """Run a choice and compare it with the limits."""
+        one = Refinement(self._family, choice.refine, choice.level)
+        self._runs.run([one], short=SHORT_CHOICE)
+        if one in self._runs.failed:
+            raise self._refusal(f"the chosen setting failed: {self._runs.failed[one]}")
+        return _Found(self._runs.runs[one], choice, prediction)
+
+    def _all(self, prediction: Prediction) -> list[_Found]:
+        """All runs of the family as if they had been chosen."""
+        found = []
+        for run in self._runs.of(self._family):
+            _, refine, level, _ = run.refinement
+            ratio = prediction.ratio(refine, level)
+            choice = Choice(refine, level, run.seconds, ratio, True, False)
+            found.append(_Found(run, choice, prediction))
+        return found
+
+    @property
+    def _mean(self) -> float:
+        return geometric_mean(self._slower or [1.0])
+
+    def _refusal(self, message: str) -> TradeoffError:
+        return TradeoffError(message, tuple(self._runs.of(self._family)))
+
+
+def _other_newton(runs: RefinementRuns, best: _Found) -> Run:
+    """The recommended run, or that with another tolerance which is faster and changes little."""
+    chosen = best.run
+    for number in range(1, len(runs.newtons)):
+        one = best.run.refinement._replace(newton=number)
+        runs.run([one], short=SHORT_CHOICE)
+        if one in runs.runs:
+            run = runs.runs[one]
+            changes = {name: run.values[name] - value for name, value in best.run.values.items()}
+            changed = best.prediction.largest(changes)
+            if changed <= NEWTON_SHARE * best.choice.ratio and run.seconds < chosen.seconds:
+                chosen = run
+    return chosen
 
 
 def _several(values: One | Sequence[One], kind: type, what: str) -> tuple[One, ...]:

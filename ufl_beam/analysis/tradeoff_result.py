@@ -3,16 +3,88 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, fields, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ufl_beam.analysis.refinement_runs import Run, keywords
 from ufl_beam.analysis.richardson import Cross, pareto, size
-from ufl_beam.analysis.targets import Goal
+from ufl_beam.analysis.targets import Target
 from ufl_beam.arrays import Array
+from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.model.mesh_options import Mesh
+from ufl_beam.solvers.newton_options import Newton
+
+
+@dataclass(frozen=True)
+class Dials:
+    """Setting of a run, the arguments of :func:`simulate`."""
+
+    scheme: Scheme  # the time scheme
+    dt: Any  # step; s; or adaptive steps
+    mesh: Mesh  # the cells
+    newton: Newton  # how exactly equilibria are found
+
+    def finer(self, refine: int, level: float, t: tuple[float, float]) -> Dials:
+        """Refine each cell into ``refine`` parts and take about ``2**level`` times as many steps.
+
+        The error of an adaptive step is of third order, so that their number goes with the cube
+        root of the tolerance.
+        """
+        if refine == 1 and level == 0:
+            return self  # as it was given, to be checked as such
+        if isinstance(self.dt, float | int):
+            number = max(1, math.ceil((t[1] - t[0]) / self.dt * (1 - 1e-9)))
+            dt: Any = (t[1] - t[0]) / round(number * 2**level)
+        else:
+            dt = replace(self.dt, tolerance=self.dt.tolerance / 8**level)
+        return replace(self, dt=dt, mesh=replace(self.mesh, refine=self.mesh.refine * refine))
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """Arguments of :func:`simulate`, by name."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    def __str__(self) -> str:
+        return ", ".join(map(_in_words, self.arguments.values()))
+
+
+def _in_words(value: Any) -> str:
+    """A number, or the fields of a record that are not as by default."""
+    if isinstance(value, float | int):
+        return f"dt={value:.4g}"
+    given = {field.name: (getattr(value, field.name), field.default) for field in fields(value)}
+    shown = (
+        f"{name}={one:.4g}" if isinstance(one, float) else f"{name}={one}"
+        for name, (one, default) in given.items()
+        if one and one != default
+    )  # fmt: skip
+    return f"{type(value).__name__}({', '.join(shown)})"
+
+
+class Refinement(NamedTuple):
+    """Family of dials and how much finer than its coarsest setting a run is."""
+
+    family: int  # number of the dials that it begins with
+    refine: int  # parts of each cell
+    level: float  # steps are about 2**level times as many
+    newton: int = 0  # number of the tolerances
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Result of a run, and its cost."""
+
+    refinement: Refinement  # how fine it is
+    dials: Dials  # with which dials
+    values: dict[str, Array]  # the quantities
+    seconds: float  # wall time without compiling; s; the median of three if it is short
+    steps: float  # steps that were taken
+    cells: float  # number of cells
+    iterations: float  # newton iterations per step
+    spent: float  # wall time of all repetitions; s
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +98,7 @@ class Tradeoff:
         crosses: How each quantity converges with the recommended kind of dials.
         units: The tolerances, in the unit of each quantity; with a budget, the sizes of the
             quantities.
-        goal: What was asked.
+        target: What was asked.
         families: The kinds of dials, in words.
         notes: What else should be known.
         spent: Wall time of all runs, repetitions and compiling included; s.
@@ -43,7 +115,7 @@ class Tradeoff:
     t: tuple[float, float]
     crosses: Mapping[str, Cross]
     units: dict[str, float]
-    goal: Goal
+    target: Target
     families: tuple[str, ...]
     notes: tuple[str, ...]
     spent: float
@@ -51,7 +123,7 @@ class Tradeoff:
     @property
     def recommended(self) -> dict[str, Any]:
         """Arguments for ``ub.simulate(scene, **recommended)``: scheme, t, dt, mesh, newton."""
-        return {"t": self.t, **keywords(self.best.dials)}
+        return {"t": self.t, **self.best.dials.arguments}
 
     @property
     def limit(self) -> dict[str, Array]:
@@ -60,35 +132,31 @@ class Tradeoff:
 
     @property
     def uncertainty(self) -> dict[str, float]:
-        """Of the limits; unit of each quantity."""
+        """Uncertainty of the limits; unit of each quantity."""
         return {name: cross.uncertainty for name, cross in self.crosses.items()}
 
     def errors(self, run: Run) -> dict[str, float]:
-        """Distance of a run from the limits, by quantity; its unit."""
+        """Return the distances of a run from the limits, by quantity; its unit."""
         return {name: size(run.values[name] - limit) for name, limit in self.limit.items()}
 
     def ratio(self, run: Run) -> float:
-        """The largest of the errors over tolerance, or over the size of the quantity."""
+        """Return the largest of the errors over tolerance, or over the size of the quantity."""
         return max(error / self.units[name] for name, error in self.errors(run).items())
 
     @property
     def front(self) -> list[Run]:
-        """The runs that no other one beats in time and in accuracy, the fastest first."""
+        """Runs that no other one beats in time and in accuracy, the fastest first."""
         seconds = np.array([run.seconds for run in self.runs])
         ratios = np.array([self.ratio(run) for run in self.runs])
         return [self.runs[k] for k in pareto(seconds, ratios)]
 
     def __str__(self) -> str:
-        names = list(self.limit)
-        front = self.front
-        rows = [["", "seconds", "steps", "cells", "iterations", *names, "dials"]]
-        for run in sorted({*front, self.best}, key=lambda run: run.seconds):
-            mark = "=>" if run is self.best else ""
-            errors = self.errors(run)
+        rows = [["", "seconds", "steps", "cells", "iterations", *self.limit, "dials"]]
+        for run in sorted({*self.front, self.best}, key=lambda run: run.seconds):
             rows.append([
-                mark, f"{run.seconds:.3g}", f"{run.steps:.0f}", f"{run.cells:.0f}",
-                f"{run.iterations:.2f}", *(f"{errors[name]:.2g}" for name in names),
-                str(run.dials),
+                "=>" if run is self.best else "", f"{run.seconds:.3g}", f"{run.steps:.0f}",
+                f"{run.cells:.0f}", f"{run.iterations:.2f}",
+                *(f"{error:.2g}" for error in self.errors(run).values()), str(run.dials),
             ])  # fmt: skip
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         lines = [
@@ -104,6 +172,6 @@ class Tradeoff:
             f"{self.spent / self.best.seconds:.2g} times the recommended one"
         )
         return "\n".join([
-            f"trade-off for {self.goal}; errors are distances from the extrapolated limit", *lines,
-            *self.notes, f"recommended: {self.best.dials}: {self.best.seconds:.3g} s",
+            f"trade-off for {self.target}; errors are distances from the extrapolated limit",
+            *lines, *self.notes, f"recommended: {self.best.dials}: {self.best.seconds:.3g} s",
         ])  # fmt: skip

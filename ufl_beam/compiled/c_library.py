@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The loops over cells and rows, compiled once for the machine.
+"""Library of the package in C: loops over cells and rows, material points, Newton's method.
 
-They do what DOLFINx's assemblers do (a test compares both), but bring the unknowns of a cell up to
-date on the way and know beforehand where the entries of its matrix go.
+It is compiled once for the machine.  The loops over cells do what DOLFINx's assemblers do (a test
+compares both), but also update the unknowns of a cell, and know where its entries of a matrix are.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from petsc4py import PETSc
 
 import numpy as np
 
-from ufl_beam.arrays import Array
+from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.jit import DECLARATIONS, HEADERS, compiled, text
-from ufl_beam.dolfinx_compat import TABULATE, VERSIONS
+from ufl_beam.dolfinx_compat import VERSIONS
 
 T = TypeVar("T")
 
-SOURCES = ("loops", "rigid_plastic", "elimination", "newton")
+SOURCES = ("loops", "material_points", "rigid_plastic", "connectors", "elimination", "newton")
 """Files of C beside this one; they are one translation unit."""
 
 _CALLBACKS = """
@@ -32,14 +32,7 @@ extern "Python" double missed_in_python(void *self, const double *q, const doubl
 """
 
 
-_SOURCE = "\n".join(
-    [
-        HEADERS,
-        f"#define CALL(f, e, w, c, x) f(e, w, c, x, 0, 0{TABULATE[1]})",
-        DECLARATIONS,
-        *(text(f"{name}.c") for name in SOURCES),
-    ]
-)
+_SOURCE = "\n".join([HEADERS, DECLARATIONS, *(text(f"{name}.c") for name in SOURCES)])
 module = compiled(
     "ufl_beam_loops",
     DECLARATIONS + _CALLBACKS,
@@ -74,29 +67,33 @@ def petsc(name: str, *arguments: Any) -> None:
 
 
 Loop = tuple[Any, Any]
-"""A function of the type ``part`` of loops.h, and what it is called with."""
+"""A function of the type ``part`` of loops.h, and its first argument."""
 
 
 def loop(name: str, data: Any) -> Loop:
-    """The function ``name`` for ``data``, which the caller keeps alive."""
+    """Pair a function of the library with its data, which the caller keeps alive."""
     return ffi.addressof(lib, name), data
 
 
 doubles = partial(ffi.from_buffer, ffi.typeof("double[]"))
 """Pointer to a contiguous array of float64; it keeps the array alive."""
 
-integers = partial(ffi.from_buffer, ffi.typeof("int32_t[]"))
-"""Pointer to a contiguous array of int32; it keeps the array alive."""
+
+def integers(array: Index) -> Any:
+    """Return a pointer to a contiguous array of int32; it keeps the array alive."""
+    if array.dtype != np.int32:
+        raise TypeError(f"C takes integers of 32 bits, not {array.dtype}")
+    return ffi.from_buffer("int32_t[]", array)
 
 
 def names(enum: str, prefix: str = "") -> tuple[str, ...]:
-    """Names in an enum of loops.h, in order, without its last one, which is their number."""
+    """Return the names in an enum of loops.h, in order, without the last, which counts them."""
     elements = ffi.typeof(f"enum {enum}").elements
     return tuple(elements[i].lower().removeprefix(prefix) for i in range(len(elements) - 1))
 
 
 def in_order(enum: str, values: Mapping[str, T], prefix: str = "") -> list[T]:
-    """Values in the order of an enum of loops.h, by its names; see :func:`names`.
+    """Sort values by name into the order of an enum of loops.h; see :func:`names`.
 
     Raises:
         ValueError: Python and C do not name the same.
@@ -108,21 +105,21 @@ def in_order(enum: str, values: Mapping[str, T], prefix: str = "") -> list[T]:
 
 
 def extrapolated(x: Array, y: Array, ratio: float) -> Array:
-    """``x + ratio (x - y)``; of short arrays in half the time that NumPy takes."""
+    """Compute ``x + ratio (x - y)``; for short arrays in half the time of NumPy."""
     out: Array = np.empty(len(x))
     lib.extrapolate(len(x), doubles(x), doubles(y), ratio, doubles(out))
     return out
 
 
 def combined(a: float, x: Array, b: float, y: Array) -> Array:
-    """``a x + b y``, likewise."""
+    """Compute ``a x + b y``, likewise."""
     out: Array = np.empty(len(x))
     lib.combine(len(x), a, doubles(x), b, doubles(y), doubles(out))
     return out
 
 
 def kernel(pointer: Any, of: Any) -> Any:
-    """An FFCx kernel, given as a function pointer of the cffi instance ``of``.
+    """Cast an FFCx kernel, a function pointer of the cffi instance ``of``, to that of loops.h.
 
     Raises:
         RuntimeError: It takes other arguments than ufl_beam passes.

@@ -1,31 +1,68 @@
 # SPDX-License-Identifier: MIT
-"""Index arithmetic on matrices whose arrays loops in C fill and PETSc solves with."""
+"""Sparse matrices by rows, filled by loops in C and solved with by PETSc."""
 
 from __future__ import annotations
 
 from copy import copy
-from typing import Any, Protocol
 
 from petsc4py import PETSc
 
 import numpy as np
-import numpy.typing as npt
 from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, integers, lib, loop
 
 
-class Structure(Protocol):
-    """A matrix by rows, the columns of each in order."""
+class Csr:
+    """Compressed sparse rows with indices of 32 bits, as C needs them; SciPy chooses others.
 
-    data: npt.NDArray[Any]
-    indices: npt.NDArray[Any]
-    indptr: npt.NDArray[Any]
+    Args:
+        data: Its entries, row after row.
+        indices: Column of each entry, those of a row in order.
+        indptr: First entry of each row, and the number of entries.
+    """
+
+    def __init__(self, data: Array, indices: Index, indptr: Index) -> None:
+        self.data = data
+        self.indices = indices.astype(np.int32, copy=False)
+        self.indptr = indptr.astype(np.int32, copy=False)
+
+    def zeros_like(self) -> Csr:
+        """Return a matrix of the same sparsity pattern, which is stored once."""
+        other = copy(self)
+        other.data = np.zeros_like(self.data)
+        return other
+
+    @property
+    def size(self) -> int:
+        """Number of rows of the matrix."""
+        return len(self.indptr) - 1
+
+    def rows(self) -> Index:
+        """Return the row of each entry."""
+        return np.repeat(np.arange(self.size, dtype=np.int32), np.diff(self.indptr))
+
+    def positions(self, rows: Index, columns: Index) -> Index:
+        """Find the entries (rows[k], columns[k]) in :attr:`data`; they must exist."""
+        found = np.empty(len(rows), dtype=np.int32)
+        structure = (self.size, integers(self.indptr), integers(self.indices))
+        pairs = [np.ascontiguousarray(x, dtype=np.int32) for x in (rows, columns)]
+        if not lib.find_entries(*structure, len(found), *map(integers, (*pairs, found))):
+            raise ValueError("the matrix has no such entry")
+        return found
+
+    def petsc(self) -> PETSc.Mat:
+        """Return a PETSc matrix on this process that shares the arrays."""
+        indptr, indices = (x.astype(PETSc.IntType, copy=False) for x in (self.indptr, self.indices))
+        arrays = (indptr, indices, self.data)
+        matrix = PETSc.Mat().createAIJWithArrays(self.size, arrays, comm=PETSc.COMM_SELF)
+        matrix.assemble()
+        return matrix
 
 
-def coupling(size: int, *coupled: Index) -> Structure:
-    """A matrix of zeros with a diagonal, and entries for what stands in a row.
+def coupling(size: int, *coupled: Index) -> Csr:
+    """Return a matrix of zeros whose pattern has the diagonal and all pairs of coupled dofs.
 
     Args:
         size: Number of degrees of freedom.
@@ -38,62 +75,11 @@ def coupling(size: int, *coupled: Index) -> Structure:
     parts = csr_array((np.ones(len(columns), np.bool_), columns, ends), shape=(len(lengths), size))
     matrix = parts.T.tocsr() @ parts
     matrix.sort_indices()
-    arrays = (np.zeros(matrix.nnz), matrix.indices, matrix.indptr)
-    zeros: Structure = csr_array(arrays, shape=matrix.shape)
-    return zeros
-
-
-class Csr:
-    """The arrays of a matrix, in which PETSc and the loops in C find the entries.
-
-    Attributes:
-        data: Its entries, row after row.
-        indices: Column of each entry.
-        indptr: First entry of each row, and the number of entries.
-    """
-
-    def __init__(self, matrix: Structure) -> None:
-        self.data: Array = matrix.data
-        self.indices = matrix.indices.astype(np.int32, copy=False)
-        self.indptr = matrix.indptr.astype(np.int32, copy=False)
-
-    def zeros_like(self) -> Csr:
-        """A matrix of the same structure, which is stored once."""
-        other = copy(self)
-        other.data = np.zeros_like(self.data)
-        return other
-
-    @property
-    def size(self) -> int:
-        """Number of rows of the matrix."""
-        return len(self.indptr) - 1
-
-    def rows(self) -> Index:
-        """Row of each entry."""
-        return np.repeat(np.arange(self.size, dtype=np.int32), np.diff(self.indptr))
-
-    def positions(self, rows: Index, columns: Index) -> Index:
-        """Where :attr:`data` holds the entries (rows[k], columns[k]); they must exist."""
-        found = np.empty(len(rows), dtype=np.int32)
-        structure = (integers(self.indptr), integers(self.indices))
-        pairs = [np.ascontiguousarray(x, dtype=np.int32) for x in (rows, columns)]
-        if not lib.find_entries(*structure, len(found), *map(integers, (*pairs, found))):
-            raise ValueError("the matrix has no such entry")
-        return found
-
-    def petsc(self) -> PETSc.Mat:
-        """PETSc matrix on this process with the same arrays: no copy, before or after."""
-        indptr = self.indptr.astype(PETSc.IntType, copy=False)
-        indices = self.indices.astype(PETSc.IntType, copy=False)
-        matrix = PETSc.Mat().createAIJWithArrays(
-            self.size, (indptr, indices, self.data), comm=PETSc.COMM_SELF
-        )
-        matrix.assemble()
-        return matrix
+    return Csr(np.zeros(matrix.nnz), matrix.indices, matrix.indptr)
 
 
 def as_slice(index: Index) -> Index | slice:
-    """The slice that selects the same as ``index``, if there is one: slices copy nothing."""
+    """Return the slice that selects the same as ``index``, if there is one: slices copy nothing."""
     if len(index) < 2:
         return index
     steps = np.unique(np.diff(index))
@@ -103,7 +89,7 @@ def as_slice(index: Index) -> Index | slice:
 
 
 class Product:
-    """``x -> A x`` on this process; what ``A`` stores of zeros is left out."""
+    """Operator ``x -> A x`` on this process, without the zeros that ``A`` stores."""
 
     def __init__(self, A: Csr) -> None:
         self._entries = np.flatnonzero(A.data).astype(np.int32)
@@ -114,13 +100,13 @@ class Product:
         self._arrays = (A.size, *pointers)
 
     def __call__(self, x: Array) -> Array:
-        """The product; a new array."""
+        """Return the product, a new array."""
         y = np.zeros(len(x))
         lib.add_product(*self._arrays, doubles(x), doubles(y))
         return y
 
     def square(self, x: Array) -> float:
-        """``x`` times its product."""
+        """Return ``x A x``."""
         square: float = lib.quadratic_form(*self._arrays, doubles(x))
         return square
 
@@ -134,7 +120,7 @@ class StepProduct(Product):
         tangent: Matrix of the same structure that takes the derivative.
 
     Attributes:
-        product: What ``add_step_force`` and ``add_step_tangent`` of loops.c take.
+        product: Argument of ``add_step_force`` and ``add_step_tangent`` of loops.c.
     """
 
     def __init__(self, A: Csr, rotations: Index, tangent: Csr) -> None:
@@ -149,7 +135,7 @@ class StepProduct(Product):
         c.rotations, (c.rotation, c.entry, c.space) = len(rotations), self._alive
 
     def matrix(self) -> Csr:
-        """The matrix; a new one."""
+        """Return the matrix, a new one."""
         A = self._structure.zeros_like()
         A.data[self._entries] = self._data
         return A
@@ -161,7 +147,7 @@ class StepProduct(Product):
         self._states = c.v, c.q0 = doubles(v), doubles(q0)
 
     def loops(self) -> tuple[Loop, Loop]:
-        """The loops of :meth:`add_force` and :meth:`add_tangent`."""
+        """Return the loops of :meth:`add_force` and :meth:`add_tangent`."""
         return loop("add_step_force", self.product), loop("add_step_tangent", self.product)
 
     def add_force(self, q1: Array, r: Array) -> None:

@@ -26,7 +26,13 @@ import ufl
 from ufl_beam.compiled.code_cache import kept
 from ufl_beam.dolfinx_compat import TABULATE, compile_form, fem, form_key
 
-HEADERS = "\n".join(f"#include <{name}.h>" for name in ("float", "math", "stdint", "string"))
+HEADERS = "\n".join(
+    [
+        *(f"#include <{name}.h>" for name in ("float", "math", "stdint", "string")),
+        f"#define CALL(f, e, w, c, x) f(e, w, c, x, 0, 0{TABULATE[1]})",
+    ]
+)
+"""Head of all files of C; CALL calls a kernel of FFCx."""
 
 
 def text(name: str) -> str:
@@ -63,7 +69,7 @@ class CompilerError(RuntimeError):
 
 
 class Refused(Exception):
-    """Code that is not to be used, and why; the cache remembers it."""
+    """Code that must not be used, with the reason; the cache remembers it."""
 
 
 def compiled(
@@ -75,7 +81,7 @@ def compiled(
     flags: Sequence[str],
     check: Callable[[ModuleType], None] = lambda _: None,
 ) -> ModuleType:
-    """Load a module of C, compiled first if the cache has it not.
+    """Load a module of C, compiled first if it is not in the cache.
 
     Args:
         stem: Beginning of its name.
@@ -123,7 +129,7 @@ def compiled(
 
 
 REFUSAL = "refused"
-"""File of an entry of the cache that says why its code is not to be used."""
+"""File of a cache entry with the reason why its code must not be used."""
 
 
 def _imported(name: str, directory: Path) -> ModuleType:
@@ -138,7 +144,7 @@ def _imported(name: str, directory: Path) -> ModuleType:
 
 
 def compiled_form(form: ufl.Form) -> tuple[fem.Form, Path]:
-    """Load a form, compiled first if the cache has it not.
+    """Load a form, compiled first if it is not in the cache.
 
     Returns:
         The form, and the C that FFCx wrote for it.

@@ -29,20 +29,20 @@ from ufl_beam.dolfinx_compat import VERSIONS, fem, line_mesh, pack
 
 
 def vectorise(kernels: Sequence[Kernel], coordinates: Array) -> None:
-    """Let all of some kernels compute several cells at once, or none: they may share numbers.
+    """Switch kernels to SIMD, all of them or none: they may share numbers.
 
     Args:
         kernels: On the same cells.
         coordinates: Of the cells, in batches of ``LANES``.
     """
-    functions = [kernel.in_lanes() for kernel in kernels]
-    if None not in functions:
-        for one, function in zip(kernels, functions, strict=True):
-            one.compute_in_lanes(function, coordinates)
+    addresses = [kernel.address_in_lanes() for kernel in kernels]
+    if None not in addresses:
+        for one, address in zip(kernels, addresses, strict=True):
+            one.compute_in_lanes(address, coordinates)
 
 
 def tabulator(compiled: fem.Form) -> Any:
-    """The C function of a compiled cell form; it lives as long as the form."""
+    """Return the C function of a compiled cell form; it lives as long as the form."""
     integral = compiled.ufcx_form.form_integrals[0]
     return kernel(integral.tabulate_tensor_float64, compiled.module.ffi)
 
@@ -128,7 +128,7 @@ class Kernel:
         coordinates: Vertices of the cells; shape (num_cells, 2, 3); m.
 
     Attributes:
-        cells: What ``add_cells`` of loops.c takes; a new one after :meth:`share`, :meth:`place`,
+        cells: Argument of ``add_cells`` of loops.c; a new one after :meth:`share`, :meth:`place`,
             :meth:`compute_in_lanes`.
 
     Raises:
@@ -194,7 +194,7 @@ class Kernel:
         return id(function) in self._columns
 
     def position(self, function: fem.Function) -> int:
-        """Where the coefficients of a cell have the values of ``function``."""
+        """Return the column of the first value of ``function`` among the coefficients of a cell."""
         return int(self._columns[id(function)].start)
 
     def set(self, function: fem.Function, q: Array) -> None:
@@ -229,22 +229,23 @@ class Kernel:
         self._rows = in_batches(positions.reshape(rows.shape), self._lanes)
         self._prepare()
 
-    def in_lanes(self) -> Any:
-        """Function in C that computes several cells at once, or None."""
+    def address_in_lanes(self) -> int | None:
+        """Return the address of the SIMD loop, or None."""
         sizes = (self._entries, self._packed.shape[1], len(self._form.constants))
-        return in_lanes(self._form.source, self._form.tabulate, *sizes)
+        return in_lanes(self._form.source, int(ffi.cast("intptr_t", self._form.tabulate)), sizes)
 
-    def compute_in_lanes(self, function: Any, coordinates: Array) -> None:
-        """Compute several cells at once from now on, with their coordinates in batches."""
+    def compute_in_lanes(self, address: int | None, coordinates: Array) -> None:
+        """Use the SIMD loop from now on, with coordinates in batches."""
         self._packed, self._rows = (
             in_batches(x[:, :, 0], LANES) for x in (self._packed, self._rows)
         )
-        self._in_lanes, self._lanes, self._coordinates = function, LANES, coordinates
+        self._in_lanes = ffi.cast("in_lanes *", address)
+        self._lanes, self._coordinates = LANES, coordinates
         self._prepare()
 
     @property
     def vectorised(self) -> bool:
-        """True if several cells are computed at once."""
+        """True with the SIMD loop."""
         return self._lanes > 1
 
     def add(self, q: Array, b: Array) -> None:
@@ -252,7 +253,7 @@ class Kernel:
         lib.add_cells(self.cells, doubles(q), doubles(b))
 
     def value(self, q: Array) -> float:
-        """Value of the functional at the unknown ``q``."""
+        """Return the value of the functional at the unknown ``q``."""
         value: float = lib.value_of_cells(self.cells, doubles(q))
         return value
 

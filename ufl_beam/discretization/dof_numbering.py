@@ -84,6 +84,11 @@ class Grid(BeamMesh):
         return np.asarray(self.dofs_of_bodies[self.scene.movers.index(of)])
 
     @cached_property
+    def rotations(self) -> Index:
+        """Degrees of freedom that are rotations, those that joints share once."""
+        return np.unique(np.r_[self.dofs[:, 2], self.dofs_of_bodies[:, 2]])
+
+    @cached_property
     def dofs_of_links(self) -> Index:
         """Of each connector: both u, both v, both ψ of its nodes, and its force; (num_links, 7)."""
         links = self.scene.links

@@ -164,7 +164,7 @@ class Fields:
         if self._matrix is None:
             share = self.share
             couples = (share.cell_dofs, share.link_dofs, share.body_dofs)
-            self._matrix = Csr(coupling(share.size, *couples))
+            self._matrix = coupling(share.size, *couples)
             return self._matrix
         return self._matrix.zeros_like()
 

@@ -32,6 +32,10 @@ class Numbering(Protocol):
     size: int
 
     @property
+    def rotations(self) -> Index:
+        """Degrees of freedom that are rotations."""
+
+    @property
     def dofs_of_links(self) -> Index:
         """Of each connector: both u, both v, both ψ of its nodes, and its force; (num_links, 7)."""
 
@@ -144,9 +148,7 @@ class Share:
 
     def rotations(self) -> Index:
         """Local numbers of all rotations; int32."""
-        grid = self.grid
-        turning = np.r_[grid.dofs[:, 2], grid.dofs_of_bodies[:, 2]]
-        return np.unique(self.local(turning)).astype(np.int32)
+        return np.sort(self.local(self.grid.rotations)).astype(np.int32)
 
     def translations(self) -> tuple[Index, Index]:
         """Local numbers of both components of all displacements."""

@@ -15,9 +15,7 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
-
-State = dict[str, Array]
-"""Arrays of a state, by name."""
+from ufl_beam.arrays import State as State
 
 NOWHERE: Array = np.empty(0)
 """In the place of a configuration: of what is remembered, strains and stored energies are not that

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ufl_beam.discretization.state_io import State
+from ufl_beam.arrays import State
 from ufl_beam.errors import SceneError
 from ufl_beam.output.output_files import replace_file, require_writable
 

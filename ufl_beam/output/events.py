@@ -4,23 +4,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from ufl_beam.arrays import State
 from ufl_beam.collective_errors import on_first
-from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import require_function
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import Coulomb, Stop
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.plastic_hinges import law_of
-from ufl_beam.output.recorders import Recorder
+from ufl_beam.output.recorders import RecordedState, Recorder
 from ufl_beam.parameter import TIME, Parameter
-
-if TYPE_CHECKING:
-    from ufl_beam.output.state_view import StateView
 
 Flags = npt.NDArray[np.bool_]
 
@@ -30,14 +27,9 @@ IN_CELLS = ("yields", "opens", "is free")
 BETWEEN = {Stop: ("touches", "lets go"), Coulomb: ("slides", "sticks")}
 """Events of connectors, and their ends."""
 
-ALL = (*IN_CELLS, *(what for pair in BETWEEN.values() for what in pair))
-"""All that can happen."""
-
-Row = tuple[float, int, str]
-"""Time, number of the cell or connector, what."""
-
-FREE = 0.999
-"""Part of the energy of a hinge after which it is called a joint."""
+KINDS = (*IN_CELLS, *(kind for pair in BETWEEN.values() for kind in pair))  # all events
+Row = tuple[float, int, str]  # time, number of the cell or connector, what
+BROKEN_PART = 0.999  # part of the energy of a hinge after which it is called a joint
 
 
 class Event(NamedTuple):
@@ -88,32 +80,29 @@ class Events(Recorder):
     def __init__(self, tell: Callable[[Event], object] | None = None) -> None:
         if tell is not None:
             require_function(tell, "Events: tell", "an Event")
-        self._tell = tell
+        self._tell = tell or (lambda event: None)
         self.found: list[Event] = []
         self._rows: list[Row] = []
 
-    def require_writable(self) -> None:
-        """Write nothing; there is no file."""
-
-    def open(self, simulation: StateView) -> None:
+    def open(self, simulation: RecordedState) -> None:
         """Take note of the initial state."""
         self.found, self._rows = [], []
         self._watch(simulation)
 
-    def _watch(self, simulation: StateView) -> None:
+    def _watch(self, simulation: RecordedState) -> None:
         """Find the events that a scene may have, and those before the run."""
         grid = simulation.grid
         in_cells = [law for beam in simulation.scene.beams for law in grid.hinges(beam)]
         laws = [*in_cells, *(law_of(hinge) for hinge in simulation.scene.hinges)]
         breaking = [law is not None and law.limit > 0 for law in laws]
         energies = np.array([law.energy if law is not None else np.inf for law in laws])
-        self._enough = np.where(breaking, FREE * energies, np.inf)
+        self._enough = np.where(breaking, BROKEN_PART * energies, np.inf)
         self._breaks = np.isfinite(energies)
         links = simulation.scene.links
         self._links = [i for i, link in enumerate(links) if type(link.law) in BETWEEN]
         self._flags = self._look(simulation)
 
-    def _look(self, simulation: StateView) -> tuple[Flags, list[bool]]:
+    def _look(self, simulation: RecordedState) -> tuple[Flags, list[bool]]:
         """Return the events of each cell and hinge, and the state of each connector."""
         in_cells = np.zeros((len(self._enough), len(IN_CELLS)), dtype=bool)
         for cells, rows in simulation.material():
@@ -128,16 +117,13 @@ class Events(Recorder):
         if not self._links:
             return in_cells, []
         forces = np.abs(simulation.connections()[self._links, 1])
-        limits = [self._limit(simulation, link) for link in self._links]
+        # Forces above which they touch, or slide; the limit of friction is known to some digits
+        links = (simulation.scene.links[link] for link in self._links)
+        limits = [(1 - 1e-9) * simulation.asked.get(link, 0.0) for link in links]
         return in_cells, [bool(goes_on) for goes_on in forces > limits]
 
-    def _limit(self, simulation: StateView, link: int) -> float:
-        """Force of a connector above which it touches, or slides; N or N m."""
-        # A force at the limit of friction is known to some digits.
-        return (1 - 1e-9) * simulation.asked.get(simulation.scene.links[link], 0.0)
-
-    def write(self, simulation: StateView) -> None:
-        """Note what has changed in the step."""
+    def write(self, simulation: RecordedState) -> None:
+        """Note the changes of a step."""
         flags = self._look(simulation)
         (cells, goes_on), (cells_before, went_on) = flags, self._flags
         self._flags = flags
@@ -149,15 +135,10 @@ class Events(Recorder):
                 begins, ends = BETWEEN[type(simulation.scene.links[link].law)]
                 new.append((simulation.t, link, begins if now else ends))
         events = self._add(simulation, new)
-        if self._tell is not None and events:
-            on_first(simulation.comm, lambda: self._tell_all(events))
+        if events:
+            on_first(simulation.comm, lambda: [self._tell(event) for event in events])
 
-    def _tell_all(self, events: list[Event]) -> None:
-        for event in events:
-            if self._tell is not None:
-                self._tell(event)
-
-    def _add(self, simulation: StateView, rows: list[Row]) -> list[Event]:
+    def _add(self, simulation: RecordedState, rows: list[Row]) -> list[Event]:
         links, grid = simulation.scene.links, simulation.grid
         named = simulation.parameter
         events = [
@@ -168,15 +149,12 @@ class Events(Recorder):
         self.found += events
         return events
 
-    def close(self) -> None:
-        """Close nothing; there is no file."""
-
     def state(self) -> State:
-        """The events so far: time, number of the cell or connector, and what."""
-        return {"events": np.array([(t, n, ALL.index(what)) for t, n, what in self._rows])}
+        """Return the events so far: time, number of the cell or connector, and kind."""
+        return {"events": np.array([(t, n, KINDS.index(what)) for t, n, what in self._rows])}
 
-    def resume(self, simulation: StateView, state: State) -> None:
-        """Go on after those events."""
+    def resume(self, simulation: RecordedState, state: State) -> None:
+        """Go on after the events of a :meth:`state`."""
         self.found, self._rows = [], []
-        self._add(simulation, [(float(t), int(n), ALL[int(k)]) for t, n, k in state["events"]])
+        self._add(simulation, [(float(t), int(n), KINDS[int(k)]) for t, n, k in state["events"]])
         self._watch(simulation)

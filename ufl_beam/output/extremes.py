@@ -1,21 +1,17 @@
 # SPDX-License-Identifier: MIT
-"""Least and largest values that a run has reached, and when."""
+"""Extremes of section forces and motions in a run, with their times."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Index
-from ufl_beam.discretization.state_io import State
+from ufl_beam.arrays import Array, Index, State
+from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import Body, Member
-from ufl_beam.output.recorders import Recorder
-
-if TYPE_CHECKING:
-    from ufl_beam.discretization.dof_numbering import Grid
-    from ufl_beam.output.state_view import StateView
+from ufl_beam.output.recorders import RecordedState, Recorder
 
 
 class Extent(NamedTuple):
@@ -72,31 +68,22 @@ class Extremes(Recorder):
         [-175000. -125000.  -75000.  -25000.]
     """
 
-    def require_writable(self) -> None:
-        """Write nothing; there is no file."""
-
-    def open(self, simulation: StateView) -> None:
+    def open(self, simulation: RecordedState) -> None:
         """Begin with the initial state."""
         self._grid: Grid = simulation.grid
         self._forces, self._q = (Extent.around(x, simulation.t) for x in _state(simulation))
 
-    def write(self, simulation: StateView) -> None:
-        """Take in the state."""
+    def write(self, simulation: RecordedState) -> None:
+        """Take in the state of a step."""
         for extent, values in zip((self._forces, self._q), _state(simulation), strict=True):
             extent.widen(values, simulation.t)
 
-    def close(self) -> None:
-        """Nothing is to be closed."""
-
     def state(self) -> State:
         """Return the extremes so far, by name."""
-        names = Extent._fields
-        return {
-            **{f"forces {name}": values for name, values in zip(names, self._forces, strict=True)},
-            **{f"q {name}": values for name, values in zip(names, self._q, strict=True)},
-        }
+        extents = ("forces", self._forces), ("q", self._q)
+        return {f"{of} {name}": x for of, extent in extents for name, x in extent._asdict().items()}
 
-    def resume(self, simulation: StateView, state: State) -> None:
+    def resume(self, simulation: RecordedState, state: State) -> None:
         """Go on after a :meth:`state`."""
         self._grid = simulation.grid
         self._forces, self._q = (
@@ -116,7 +103,7 @@ class Extremes(Recorder):
         return self._grid
 
     def section_forces(self, beam: Member) -> Extent:
-        """Extremes of (N, V, M) in the cells of a beam; (num_cells, 3); N, N, N m.
+        """Return extremes of (N, V, M) in the cells of a beam; (num_cells, 3); N, N, N m.
 
         Raises:
             SceneError: The beam is not in the scene, or nothing was run.
@@ -125,7 +112,7 @@ class Extremes(Recorder):
         return self._forces.of(cells)
 
     def displacement(self, one: Member | Body) -> Extent:
-        """Extremes of (u, v, ψ) at the nodes of a beam, or of a body; (n, 3); m, m, rad.
+        """Return extremes of (u, v, ψ) at the nodes of a beam, or of a body; (n, 3); m, m, rad.
 
         Raises:
             SceneError: It is not in the scene, or nothing was run.
@@ -134,6 +121,6 @@ class Extremes(Recorder):
         return self._q.of(dofs)
 
 
-def _state(simulation: StateView) -> tuple[Array, Array]:
+def _state(simulation: RecordedState) -> tuple[Array, Array]:
     """Section forces of all cells, and the configuration, the same on every process."""
     return simulation.section_forces(), simulation.share.gather(simulation.q)

@@ -1,28 +1,22 @@
 # SPDX-License-Identifier: MIT
-"""Stress at named places, its cycles counted while a run goes on."""
+"""Fatigue at named places: stress cycles counted while a run goes on."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ufl_beam.arrays import Array
-from ufl_beam.discretization.state_io import State
+from ufl_beam.arrays import Array, State
+from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import SceneError, require_kind, require_number, require_sequence
 from ufl_beam.model.bodies import Place
 from ufl_beam.output.rainflow import Cycles, RainflowCounter, SNCurve, library
-from ufl_beam.output.recorders import Recorder
+from ufl_beam.output.recorders import RecordedState, Recorder
 
-if TYPE_CHECKING:
-    from ufl_beam.discretization.dof_numbering import Grid
-    from ufl_beam.output.state_view import StateView
-
-BLOCK = 1000
-"""Steps that are collected before their cycles are counted."""
+BLOCK = 1000  # steps that are collected before their cycles are counted
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +47,7 @@ class HotSpot:
 
     @classmethod
     def fibre(cls, place: Place, *, y: float, E: float, factor: float = 1.0) -> HotSpot:
-        """Elastic stress E (N/EA − y M/EI) of a fibre of the section at a place.
+        """Make a spot with the elastic stress E (N/EA − y M/EI) of a fibre.
 
         Args:
             place: Where on a beam.
@@ -102,10 +96,8 @@ class Fatigue(Recorder):
     def __init__(
         self, spots: Sequence[HotSpot] | HotSpot, curve: SNCurve, *, resolution: float = 0.0
     ) -> None:
-        one = isinstance(spots, HotSpot)
-        self.spots: tuple[HotSpot, ...] = (
-            (spots,) if one else require_sequence(spots, "Fatigue: spots")
-        )
+        several = (spots,) if isinstance(spots, HotSpot) else spots
+        self.spots: tuple[HotSpot, ...] = require_sequence(several, "Fatigue: spots")
         for i, spot in enumerate(self.spots):
             require_kind(spot, HotSpot, f"Fatigue: spots[{i}]")
         require_kind(curve, SNCurve, "Fatigue: curve")
@@ -115,10 +107,7 @@ class Fatigue(Recorder):
         self._resolution = resolution or curve.range / 100
         self._counters: dict[HotSpot, RainflowCounter] = {}
 
-    def require_writable(self) -> None:
-        """Write nothing; there is no file."""
-
-    def open(self, simulation: StateView) -> None:
+    def open(self, simulation: RecordedState) -> None:
         """Begin to count, with the initial state."""
         self._prepare(simulation.grid)
         self._begin = simulation.t
@@ -131,7 +120,7 @@ class Fatigue(Recorder):
         self._counters = {spot: RainflowCounter(self._resolution) for spot in self.spots}
         self._block, self._filled = np.empty((len(self.spots), 3, BLOCK)), 0
 
-    def write(self, simulation: StateView) -> None:
+    def write(self, simulation: RecordedState) -> None:
         """Note the section forces, and count now and then."""
         self._block[..., self._filled] = simulation.section_forces()[self._cells]
         self._filled += 1
@@ -149,19 +138,19 @@ class Fatigue(Recorder):
             self._counters[spot].add(stress)
 
     def close(self) -> None:
-        """Count what is left."""
+        """Count the steps that are left."""
         if self._counters and self._filled:
             self._count()
 
     def state(self) -> State:
-        """The time that was counted, cycles and what waits at each spot."""
+        """Return the time that was counted, cycles and waiting turning points of each spot."""
         self.close()
         state: State = {"duration": np.array([self._begin, self._end])}
         for i, counter in enumerate(self._counters.values()):
             state[f"counted {i}"], state[f"waiting {i}"] = counter.state()
         return state
 
-    def resume(self, simulation: StateView, state: State) -> None:
+    def resume(self, simulation: RecordedState, state: State) -> None:
         """Go on after a :meth:`state`."""
         self._prepare(simulation.grid)
         self._begin, self._end = map(float, state["duration"])
@@ -176,7 +165,7 @@ class Fatigue(Recorder):
         return self._end - self._begin
 
     def cycles(self, spot: HotSpot) -> Cycles:
-        """The cycles at a spot.
+        """Return the cycles at a spot.
 
         Raises:
             SceneError: The spot is not one of these, or nothing was run.
@@ -186,11 +175,11 @@ class Fatigue(Recorder):
         return self._counters[spot].cycles()
 
     def damage(self, spot: HotSpot) -> float:
-        """Miner's sum at a spot, 1 at failure; errors as :meth:`cycles`."""
+        """Compute Miner's sum at a spot, 1 at failure; errors as :meth:`cycles`."""
         return self.cycles(spot).damage(self.curve)
 
     def life(self, spot: HotSpot) -> float:
-        """Time to failure if all goes on like this; s; errors as :meth:`cycles`."""
+        """Extrapolate the time to failure; s; errors as :meth:`cycles`."""
         damage = self.damage(spot)
         return self.duration / damage if damage > 0 else math.inf
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Files that runs write: checks of their paths before the run, errors that name the file."""
+"""Output files: checks of their paths before a run, errors that name the file."""
 
 from __future__ import annotations
 
@@ -13,11 +13,8 @@ from pathlib import Path
 
 from ufl_beam.errors import SceneError, shorten
 
-Output = tuple[str, tuple[Path, ...]]
-"""Name of a writer in messages, and the files that it writes."""
-
-_in_use: list[Output] = []
-"""Outputs of the runs that go on in this process, the outer ones first."""
+Output = tuple[str, tuple[Path, ...]]  # name of a writer in messages, and the files that it writes
+_in_use: list[Output] = []  # outputs of the runs that go on in this process, the outer ones first
 
 
 # -- before the run ----------------------------------------------------------------------------
@@ -38,14 +35,11 @@ def require_writable(path: Path) -> None:
             why = f": there is no directory {path.parent}; make it first"
         else:
             new = not path.exists()
-            with path.open("ab"):
-                pass
+            path.open("ab").close()
             if new:
                 path.unlink()
-    except OSError as error:
-        why = f" cannot be written: {error.strerror}"
-    except ValueError as error:  # a null character
-        why = f" cannot be written: {error}"
+    except (OSError, ValueError) as error:  # a ValueError at a null character
+        why = f" cannot be written: {getattr(error, 'strerror', error)}"
     if why:
         raise SceneError(f"output {path}{why}")
 
@@ -54,11 +48,7 @@ def require_apart(outputs: Sequence[Output], call: str) -> None:
     """Raise :class:`SceneError` if two outputs, or an outer run's and one of these, share a file.
 
     Files are compared as the file system knows them: through symbolic and hard links.  Devices
-    such as ``/dev/null`` may be shared.
-
-    Args:
-        outputs: Those of a run that is about to begin.
-        call: Name for messages.
+    such as ``/dev/null`` may be shared.  Messages name the ``call``.
     """
     owners: dict[object, str] = {}
     for owner, paths in (*_in_use, *outputs):
@@ -100,17 +90,9 @@ def take(outputs: Iterable[Output]) -> Callable[[], None]:
 
 
 class OutputFile:
-    """A file that is written at given positions; an error in writing names it.
+    """File that is written at given positions; an :class:`OSError` names it.
 
-    Args:
-        path: The file.
-        new: Whether it is emptied, or made; else it is opened as it is.
-
-    Attributes:
-        path: The file.
-
-    Raises:
-        OSError: It cannot be opened.
+    A ``new`` one is emptied, or made; else it is opened as it is.
     """
 
     def __init__(self, path: Path, *, new: bool = True) -> None:
@@ -128,18 +110,13 @@ class OutputFile:
         return os.fstat(self._file).st_size
 
     def put(self, at: int, data: bytes | bytearray) -> None:
-        """Write at a position.
-
-        Raises:
-            OSError: There is no space, or the device fails.
-        """
+        """Write at a position of the file."""
         rest = memoryview(data)
         try:
             while rest:
-                if self._regular:
-                    done = os.pwrite(self._file, rest, at)
-                else:  # pipes and terminals have no positions
-                    done = os.write(self._file, rest)
+                # Pipes and terminals have no positions.
+                file, put = self._file, self._regular
+                done = os.pwrite(file, rest, at) if put else os.write(file, rest)
                 rest, at = rest[done:], at + done
         except OSError as error:
             raise failure(error, self.path) from None
@@ -149,7 +126,7 @@ class OutputFile:
         return os.pread(self._file, count, at)
 
     def cut(self, length: int) -> None:
-        """Cut the file off."""
+        """Cut the file off at a length."""
         if self._regular:
             os.ftruncate(self._file, length)
 
@@ -222,7 +199,7 @@ def is_at(file: int, path: Path) -> bool:
 
 
 def removed(path: Path) -> FileNotFoundError:
-    """The error of an output that is not where it was when a checkpoint is due."""
+    """Return the error of an output that is gone when a checkpoint is due."""
     return FileNotFoundError(
         errno.ENOENT,
         f"output {path} was removed or replaced during the run, so that no checkpoint can count "
@@ -240,7 +217,7 @@ def warn_of_removal(path: Path) -> None:
 
 
 def failure(error: OSError, path: Path) -> OSError:
-    """An error in writing in words: the file, the reason, the free space, what is kept."""
+    """Return an error in writing in words: file, reason, free space, kept content."""
     space = ""
     if error.errno == errno.ENOSPC and path.is_file():
         space = f" ({shutil.disk_usage(path.parent).free / 1e6:.3g} MB are free)"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Cycles of stress: how they are counted in a history, and the damage that they do."""
+"""Rainflow counting of stress cycles, S-N curves and damage."""
 
 from __future__ import annotations
 
@@ -17,8 +17,7 @@ from ufl_beam.array_checks import require_row
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, is_infinite, require_function, require_number
 
-Ends = tuple[float, float]
-"""Lower and upper end of a cycle."""
+Ends = tuple[float, float]  # lower and upper end of a cycle
 
 
 # -- what a cycle does -------------------------------------------------------------------------
@@ -80,7 +79,7 @@ def _over(range: Array, part: Array) -> Array:
 
 
 def any_mean(range: Array, mean: Array) -> Array:
-    """The range itself: the mean stress is of no account, as in welds with residual stress."""
+    """Return the range itself, as in welds with residual stress: the mean does not count."""
     return range
 
 
@@ -128,7 +127,7 @@ class SNCurve:
 
     @classmethod
     def eurocode(cls, category: float) -> SNCurve:
-        """EN 1993-1-9, direct stress: slope 3 to 5e6 cycles, 5 to 1e8, no damage beyond.
+        """Make a curve of EN 1993-1-9: slope 3 to 5e6 cycles, 5 to 1e8, no damage beyond.
 
         Args:
             category: Detail category, the range that is borne for 2e6 cycles; Pa: 71e6.
@@ -137,7 +136,7 @@ class SNCurve:
         return cls(range=category, cycles=2e6, slope=3.0, knee=5e6, slope_beyond=5.0, limit=1e8)
 
     def endurance(self, range: npt.ArrayLike, mean: npt.ArrayLike = 0.0) -> Array:
-        """Cycles to failure of ranges about mean stresses, both Pa; infinite below the limit."""
+        """Compute cycles to failure of ranges about means, both Pa; infinite below the limit."""
         ranges, means = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (range, mean)))
         with np.errstate(divide="ignore"):
             first = self.cycles * (self.range / self.mean(ranges, means)) ** self.slope
@@ -170,12 +169,12 @@ class Cycles:
     count: Array
 
     def damage(self, curve: SNCurve) -> float:
-        """Miner's sum: the part of the life that these cycles take, 1 at failure."""
+        """Compute Miner's sum: the part of the life that these cycles take, 1 at failure."""
         with np.errstate(divide="ignore"):  # what breaks at once
             return float(np.sum(self.count / curve.endurance(self.range, self.mean)))
 
     def equivalent(self, curve: SNCurve) -> float:
-        """Range of constant size that does the same damage in as many cycles; Pa.
+        """Compute the constant range that does the same damage in as many cycles; Pa.
 
         By the first slope alone, as damage equivalent ranges are given.
         """
@@ -237,7 +236,7 @@ def _ends(a: float, b: float) -> Ends:
 
 
 def library() -> Any:
-    """The function of the package `rainflow` that counts, which need not be installed."""
+    """Import the counting function of the package `rainflow`, which need not be installed."""
     try:
         from rainflow import extract_cycles
     except ImportError as error:
@@ -261,7 +260,7 @@ def _cycles(counts: Mapping[Ends, float], waiting: Sequence[float], unit: float)
 
 
 class RainflowCounter:
-    """Rainflow cycles of a series that comes in pieces, in memory that does not grow with it.
+    """Rainflow counter of a series that comes in pieces, in constant memory.
 
     Values are rounded to multiples of ``resolution``: cycles are then counts in classes, and the
     turning points that wait for their cycle to close are no more than the classes.  Apart
@@ -278,16 +277,16 @@ class RainflowCounter:
         self._waiting: list[float] = []
 
     def add(self, series: Array) -> None:
-        """Count what follows; (n,)."""
+        """Count the next piece; (n,)."""
         levels = np.rint(series / self._resolution)
         self._waiting = _count([*self._waiting, *map(float, levels)], self._counts)
 
     def cycles(self) -> Cycles:
-        """All cycles so far."""
+        """Return all cycles so far."""
         return _cycles(self._counts, self._waiting, self._resolution)
 
     def state(self) -> tuple[Array, Array]:
-        """Ends of cycles and how many there were, (n, 3), and the turning points that wait.
+        """Return ends and numbers of cycles, (n, 3), and the turning points that wait.
 
         Both in classes.
         """

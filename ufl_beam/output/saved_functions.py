@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Functions of a user in a scene that was saved: their values at some points, and no more."""
+"""Saved values of a user's functions, at the points that a saved solution needs."""
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_left
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -11,23 +12,16 @@ from typing import Any, NoReturn
 from ufl_beam.errors import SceneError
 from ufl_beam.model.curves import Point
 
-SAMPLES = 1000
-"""Intervals in which a curve is sampled."""
+SAMPLES = 1000  # intervals in which a curve is sampled
 
 
 @dataclass(frozen=True)
 class SavedFunction:
-    """A function of time that is known at some times.
+    """Function of time that is known at some times."""
 
-    Attributes:
-        name: That of the function.
-        times: Ascending; s.
-        values: One for each time.
-    """
-
-    name: str
-    times: tuple[float, ...]
-    values: tuple[float, ...]
+    name: str  # that of the function
+    times: tuple[float, ...]  # ascending; s
+    values: tuple[float, ...]  # one for each time
 
     @classmethod
     def of(cls, function: Callable[[float], float], times: Iterable[float]) -> SavedFunction:
@@ -41,11 +35,7 @@ class SavedFunction:
         return cls(name_of(function), tuple(known), tuple(known.values()))
 
     def __call__(self, t: float) -> float:
-        """The value at one of the times.
-
-        Raises:
-            SceneError: The function is not known at this time.
-        """
+        """The value at one of the times, or :class:`SceneError` at others."""
         n = bisect_left(self.times, t)
         if n == len(self.times) or self.times[n] != t:
             raise SceneError(
@@ -57,23 +47,17 @@ class SavedFunction:
 
 @dataclass(frozen=True)
 class SavedCurve:
-    """A curve that is known at some parameters, cubic between them and straight beyond.
+    """Curve through saved points, cubic between them and straight beyond."""
 
-    Attributes:
-        name: That of the function.
-        s: Ascending parameters, at least two.
-        points: One for each; m.
-    """
-
-    name: str
-    s: tuple[float, ...]
-    points: tuple[Point, ...]
+    name: str  # that of the function
+    s: tuple[float, ...]  # ascending parameters, at least two
+    points: tuple[Point, ...]  # one for each; m
 
     @classmethod
     def of(
         cls, curve: Callable[[float], Any], first: float, last: float, more: Iterable[float] = ()
     ) -> SavedCurve:
-        """Sample a curve between two parameters, and at more of them; where it fails, not."""
+        """Sample a curve between two parameters, and at more of them; gaps where it fails."""
         even = (first + (last - first) * k / SAMPLES for k in range(SAMPLES + 1))
         known = {}
         for s in sorted({*even, *more}):
@@ -89,35 +73,24 @@ class SavedCurve:
         n = bisect_left(self.s, s)
         if n < len(self.s) and self.s[n] == s:
             return self.points[n]
-        inside = 0 < n < len(self.s)
-        first = min(max(n - (2 if inside else 1), 0), max(len(self.s) - (4 if inside else 2), 0))
-        near = range(first, min(first + (4 if inside else 2), len(self.s)))
+        count = 4 if 0 < n < len(self.s) else 2
+        first = max(min(n - count // 2, len(self.s) - count), 0)
         x = y = 0.0
+        near = range(first, min(first + count, len(self.s)))
         for i in near:
-            weight = 1.0
-            for j in near:
-                if j != i:
-                    weight *= (s - self.s[j]) / (self.s[i] - self.s[j])
+            weight = math.prod((s - self.s[j]) / (self.s[i] - self.s[j]) for j in near if j != i)
             x, y = x + weight * self.points[i][0], y + weight * self.points[i][1]
         return x, y
 
 
 @dataclass(frozen=True)
 class LostFunction:
-    """A function that cannot be saved, such as a controller.
+    """Placeholder of a function that cannot be saved, such as a controller."""
 
-    Attributes:
-        name: That of the function.
-    """
-
-    name: str
+    name: str  # that of the function
 
     def __call__(self, *arguments: object) -> NoReturn:
-        """Say that it is not there.
-
-        Raises:
-            SceneError: Always.
-        """
+        """Raise :class:`SceneError`, as the function is not there."""
         raise SceneError(
             f"the function {self.name} is not in the file of the solution, which has results and "
             "numbers; build the scene with the function to simulate it"
@@ -125,5 +98,5 @@ class LostFunction:
 
 
 def name_of(function: Any) -> str:
-    """The name of a function, or of the class of what can be called."""
+    """Return the name of a function, or of the class of a callable object."""
     return str(getattr(function, "__qualname__", type(function).__qualname__))

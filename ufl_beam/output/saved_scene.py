@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Scenes as data of JSON: each record with the numbers that it was made of, exact.
+"""Scenes as JSON data: each record with the exact numbers that made it.
 
 Functions of a user are no data.  Those of time are saved by their values at the times of a
 solution, curves by many points; of others the name is left.
@@ -39,8 +39,7 @@ from ufl_beam.model import (
 from ufl_beam.output import saved_functions
 from ufl_beam.output.saved_functions import LostFunction
 
-Data = Any
-"""Data of JSON."""
+Data = Any  # data of JSON
 
 Sampling = Callable[[Any, str, Any], Any]
 """Record that stands for a function, given the record and the field that it is in."""
@@ -69,16 +68,12 @@ KNOWN: dict[str, Any] = {
 
 
 def lost(owner: Any, field: str, function: Any) -> LostFunction:
-    """Sampling that leaves nothing but the name."""
+    """Replace a function by its name."""
     return LostFunction(saved_functions.name_of(function))
 
 
 def to_data(value: Any, sampling: Sampling = lost) -> Data:
-    """Describe a scene, or another record.
-
-    Args:
-        value: The record.
-        sampling: What stands for functions of a user.
+    """Describe a scene, or another record, with a sampling of the functions of a user.
 
     Raises:
         SceneError: Something in it is neither a record of the package nor a function.
@@ -88,12 +83,10 @@ def to_data(value: Any, sampling: Sampling = lost) -> Data:
     numbers: dict[int, tuple[int, Any]] = {}
 
     def describe(value: Any, owner: Any, field: str) -> Data:
-        if value is None or isinstance(value, bool | str):
+        if isinstance(value, np.generic):
+            value = value.item()
+        if value is None or isinstance(value, bool | str | int | float):
             return value
-        if isinstance(value, int | np.integer):
-            return int(value)
-        if isinstance(value, float | np.floating):
-            return float(value)
         if isinstance(value, Fraction):
             return {"fraction": str(value)}
         if isinstance(value, np.ndarray):
@@ -101,13 +94,10 @@ def to_data(value: Any, sampling: Sampling = lost) -> Data:
         if isinstance(value, tuple | list):
             return [describe(one, owner, field) for one in value]
         if isinstance(value, Mapping):
-            pairs = (
-                (describe(k, owner, field), describe(v, owner, field)) for k, v in value.items()
-            )
-            return {"mapping": [*map(list, pairs)]}
-        for name, known in KNOWN.items():
-            if value is known:
-                return {"known": name}
+            pairs = [[describe(x, owner, field) for x in pair] for pair in value.items()]
+            return {"mapping": pairs}
+        for name in (name for name, known in KNOWN.items() if value is known):
+            return {"known": name}
         if id(value) not in numbers:
             record = value
             if RECORDS.get(type(value).__name__) is not type(value):
@@ -131,7 +121,7 @@ def to_data(value: Any, sampling: Sampling = lost) -> Data:
 
 
 def from_data(data: Data) -> Any:
-    """Make what :func:`to_data` described; warnings about the scene were given when it was made."""
+    """Rebuild the records that :func:`to_data` described, without repeating warnings."""
     made: list[Any] = []
 
     def make(data: Data) -> Any:

@@ -5,23 +5,20 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mpi4py import MPI
 
 import numpy as np
 
+from ufl_beam.arrays import State
 from ufl_beam.collective_errors import on_first
-from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError, require_count
 from ufl_beam.output.line_data import LineData, LineFields
-from ufl_beam.output.output_files import require_path, require_writable
-from ufl_beam.output.recorders import Recorder
+from ufl_beam.output.output_files import require_path
+from ufl_beam.output.recorders import RecordedState, Recorder
 from ufl_beam.output.vtkhdf import VtkhdfWriter
 from ufl_beam.output.xdmf import Complete, XdmfWriter, data_path
-
-if TYPE_CHECKING:
-    from ufl_beam.output.state_view import StateView
 
 
 class TimeSeries(Recorder):
@@ -38,18 +35,13 @@ class TimeSeries(Recorder):
             raise SceneError(f"{kind} {path}: the name of the file must end in {self.ending}")
         self._writers: list[Any] = []
 
-    def require_writable(self) -> None:
-        """Raise :class:`SceneError` if a file cannot be written."""
-        for path in self.files:
-            require_writable(path)
-
-    def open(self, simulation: StateView) -> None:
+    def open(self, simulation: RecordedState) -> None:
         """Write the mesh and the initial state."""
         self._count = 0
         fields = self._prepare(simulation)
         on_first(simulation.comm, lambda: self._begin(simulation.t, fields))
 
-    def _prepare(self, simulation: StateView) -> LineFields:
+    def _prepare(self, simulation: RecordedState) -> LineFields:
         """Note the mesh; the fields of the present state."""
         self._comm: MPI.Intracomm = simulation.comm
         self._lines = LineData(simulation)
@@ -64,28 +56,24 @@ class TimeSeries(Recorder):
     def _writer(self, fields: LineFields, complete: list[int] | None = None) -> Any:
         """Make the writer of a file, or of one that is complete up to some sizes."""
 
-    def write(self, simulation: StateView) -> None:
+    def write(self, simulation: RecordedState) -> None:
         """Write the state, every so many steps."""
         self._count += 1
         if self._count % self._every == 0:
             fields = self._lines.fields(simulation)
             on_first(self._comm, lambda: self._writers[0].write(simulation.t, fields))
 
-    @abstractmethod
-    def _complete(self, writer: Any) -> list[int]:
-        """Sizes of what is complete in the files of a writer."""
-
     def state(self) -> State:
-        """The number of steps, and the sizes of what is complete; that is on the disk."""
+        """Return the number of steps and the sizes of the complete parts, which are on the disk."""
         on_first(self._comm, self._sync)
-        sizes = [n for writer in self._writers for n in self._complete(writer)]
+        sizes = [n for writer in self._writers for n in writer.complete]
         return {"sizes": np.array([self._count, *sizes], dtype=float)}
 
     def _sync(self) -> None:
         for writer in self._writers:
             writer.sync()
 
-    def resume(self, simulation: StateView, state: State) -> None:
+    def resume(self, simulation: RecordedState, state: State) -> None:
         """Cut off what was written after the state, and go on."""
         self._count, *sizes = (int(n) for n in state["sizes"])
         fields = self._prepare(simulation)
@@ -138,7 +126,7 @@ class XDMF(TimeSeries):
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """The file, and that of its numbers."""
+        """Paths of the file, and of that of its numbers."""
         return self._path, data_path(self._path)
 
     def require_writable(self) -> None:
@@ -155,9 +143,6 @@ class XDMF(TimeSeries):
         lines = self._lines
         sizes = None if complete is None else Complete(*complete)
         return XdmfWriter(self._path, lines.points, lines.cells, {"part": lines.parts}, sizes)
-
-    def _complete(self, writer: XdmfWriter) -> list[int]:
-        return [*writer.complete]
 
 
 class VTKHDF(TimeSeries):
@@ -192,6 +177,3 @@ class VTKHDF(TimeSeries):
         lines, steps = self._lines, None if complete is None else complete[0]
         mesh = lines.points, lines.cells, {"part": lines.parts}
         return VtkhdfWriter(self._path, *mesh, fields, steps)
-
-    def _complete(self, writer: VtkhdfWriter) -> list[int]:
-        return [writer.steps]

@@ -12,33 +12,22 @@ from __future__ import annotations
 import errno
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.output.line_data import LineFields
 from ufl_beam.output.output_files import OutputFile, failure, is_at, removed, warn_of_removal
 
-LAYOUT = (2, 0)
-"""Of the format; VTK 9.3 warns of later ones."""
-
-LINE = 3
-"""VTK's number of the type of a cell."""
-
-KINDS = ("PointData", "CellData")
-"""Groups of fields."""
-
-ROWS = 1024
-"""Steps in a chunk of what has one number a step."""
-
-BLOCK = 4096
-"""Rows in a chunk of a field, at least those of one step."""
-
-INDEX = 1 << 20
-"""Bytes that the indices of all data sets grow by in a step, and some more."""
+Fields = Sequence[Mapping[str, Array]]  # at points and in cells, by name
+LAYOUT = (2, 0)  # of the format; VTK 9.3 warns of later ones
+LINE = 3  # VTK's number of the type of a cell
+KINDS = ("PointData", "CellData")  # groups of fields
+ROWS = 1024  # steps in a chunk of what has one number a step
+BLOCK = 4096  # rows in a chunk of a field, at least those of one step
+INDEX = 1 << 20  # bytes that the indices of all data sets grow by in a step, and some more
 
 
 class VtkhdfWriter:
@@ -46,10 +35,10 @@ class VtkhdfWriter:
 
     Args:
         path: The file.
-        points: (n, 3); m.
+        points: Points of all lines; (n, 3); m.
         cells: Both points of each line; (m, 2).
         constant: Fields in cells that do not change, by name; (m,).
-        fields: Those of any step: their names and shapes.
+        fields: Fields of any step: their names and shapes.
         steps: Number of steps of a file of the same mesh to go on from; later ones are cut off.
 
     Raises:
@@ -66,7 +55,7 @@ class VtkhdfWriter:
         points: Array,
         cells: Index,
         constant: Mapping[str, Array],
-        fields: LineFields,
+        fields: Fields,
         steps: int | None = None,
     ) -> None:
         import h5py
@@ -100,26 +89,28 @@ class VtkhdfWriter:
         self._find(fields)
         self._cut()
 
+    @property
+    def complete(self) -> tuple[int]:
+        """Number of complete steps, for a checkpoint."""
+        return (self.steps,)
+
     # -- data sets -----------------------------------------------------------------------------
 
-    def _is_same(self, mesh: Mapping[str, Array], fields: LineFields) -> bool:
+    def _is_same(self, mesh: Mapping[str, Array], fields: Fields) -> bool:
         """Return whether the file has this mesh, these fields, and enough steps."""
         try:
             root = self._file["VTKHDF"]
-            return (
-                int(root["Steps"].attrs["NSteps"]) >= self.steps
-                and all(np.array_equal(root[name][()], values) for name, values in mesh.items())
-                and all(
-                    root[kind][name].shape[1:] == values.shape[1:]
-                    and len(root[kind][name]) >= self.steps * len(values)
-                    for kind, by_name in zip(KINDS, fields, strict=True)
-                    for name, values in by_name.items()
-                )
-            )
+            same = [np.array_equal(root[name][()], values) for name, values in mesh.items()]
+            for kind, by_name in zip(KINDS, fields, strict=True):
+                for name, values in by_name.items():
+                    length, *shape = root[kind][name].shape
+                    same.append(tuple(shape) == values.shape[1:])
+                    same.append(length >= self.steps * len(values))
+            return all(same) and int(root["Steps"].attrs["NSteps"]) >= self.steps
         except KeyError:
             return False
 
-    def _find(self, fields: LineFields) -> None:
+    def _find(self, fields: Fields) -> None:
         """Note the data sets that grow, and by how many rows a step."""
         root, steps = self._file["VTKHDF"], self._file["VTKHDF/Steps"]
         self._attributes = steps.attrs
@@ -141,7 +132,7 @@ class VtkhdfWriter:
 
     # -- steps ---------------------------------------------------------------------------------
 
-    def write(self, t: float, fields: LineFields) -> None:
+    def write(self, t: float, fields: Fields) -> None:
         """Append a step with its fields."""
         n = self.steps
         numbers = (*(n * count for count in self._counts), 0, 0, 1)
@@ -210,7 +201,7 @@ class VtkhdfWriter:
             warn_of_removal(self._path)
 
 
-def _empty_file(mesh: Mapping[str, Array], constant: list[str], fields: LineFields) -> bytes:
+def _empty_file(mesh: Mapping[str, Array], constant: list[str], fields: Fields) -> bytes:
     """A file without steps, made in memory."""
     import h5py
 

@@ -11,13 +11,12 @@ them.
 from __future__ import annotations
 
 import mmap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 from xml.sax.saxutils import escape
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.output.line_data import LineFields
 from ufl_beam.output.output_files import OutputFile
 
 HEAD = (
@@ -34,24 +33,17 @@ PAGE, ROOM = mmap.PAGESIZE, 1 << 16
 
 
 def data_path(path: Path) -> Path:
-    """The file of the numbers of an XDMF file."""
+    """Return the path of the numbers of an XDMF file."""
     return path.with_name(path.name + ".bin")
 
 
 class Complete(NamedTuple):
-    """Sizes of the complete part of both files.
+    """Sizes of the complete part of both files."""
 
-    Attributes:
-        steps: Number of steps.
-        tail: Position of :data:`TAIL`, the end of the document.
-        room: Position of :data:`CLOSING`, the end of the spare instruction.
-        data: Length of the numbers.
-    """
-
-    steps: int
-    tail: int
-    room: int
-    data: int
+    steps: int  # their number
+    tail: int  # position of TAIL, the end of the document
+    room: int  # position of CLOSING, the end of the spare instruction
+    data: int  # length of the numbers
 
 
 class XdmfWriter:
@@ -116,7 +108,7 @@ class XdmfWriter:
         ):
             raise ValueError("not the files that were written up to there")
 
-    def write(self, t: float, fields: LineFields) -> None:
+    def write(self, t: float, fields: Sequence[Mapping[str, Array]]) -> None:
         """Append a step with its fields."""
         if self._writing:  # an interrupt has left a part of a step
             self._cut()
@@ -140,19 +132,16 @@ class XdmfWriter:
         new_tail = start + len(grid)
         if new_tail % PAGE + len(TAIL) > PAGE:  # it lies within one page
             new_tail += -new_tail % PAGE
-        if new_tail + len(TAIL) > room:
-            room = self._make_room(room, new_tail + len(TAIL) + ROOM)
+        if (least := new_tail + len(TAIL)) > room:
+            new_room = least + ROOM + -(least + ROOM) % PAGE  # CLOSING lies within one page, too
+            after = room + len(CLOSING)
+            self._xml.put(after, b" " * (new_room - after))
+            self._xml.put(new_room, CLOSING)
+            self._xml.put(room, b" " * len(CLOSING))
+            room = new_room
         self._xml.put(start, grid.ljust(new_tail - start) + TAIL)  # still in the instruction
         self._xml.put(tail, b" " * len(TAIL))  # now in the document
         return new_tail, room
-
-    def _make_room(self, room: int, new_room: int) -> int:
-        new_room += -new_room % PAGE  # so that what closes lies within one page
-        after = room + len(CLOSING)
-        self._xml.put(after, b" " * (new_room - after))
-        self._xml.put(new_room, CLOSING)
-        self._xml.put(room, b" " * len(CLOSING))
-        return new_room
 
     def _cut(self) -> None:
         """Cut off what is behind the last complete step; the document is valid all the time."""

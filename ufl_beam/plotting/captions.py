@@ -13,17 +13,12 @@ from ufl_beam.model.connector_laws import Coulomb, Damper, Law, RigidPlastic, Sp
 from ufl_beam.model.damping import Damping, KelvinVoigt, Rayleigh
 from ufl_beam.model.material_laws import HingeLaw
 from ufl_beam.model.scene import Scene
-from ufl_beam.plotting.plots import with_unit
+from ufl_beam.plotting.style import with_unit
 
 
 @singledispatch
 def law_in_words(law: Law, turns: bool) -> str:
-    """A law and its size.
-
-    Args:
-        law: Of a connector.
-        turns: Whether its motion is a rotation.
-    """
+    """Describe the law of a connector, which turns or not, and its size."""
     return type(law).__name__.lower()
 
 
@@ -64,13 +59,13 @@ def _(law: RigidPlastic, turns: bool) -> str:
 
 
 def hinge_in_words(law: HingeLaw) -> str:
-    """The moment at which a hinge opens."""
+    """Describe the moment at which a hinge opens."""
     return f"hinge {with_unit(float(law.limit), 'N m')}"
 
 
 @singledispatch
 def damping_in_words(damping: Damping) -> str:
-    """A kind of damping and its size."""
+    """Describe a kind of damping and its size."""
     return type(damping).__name__
 
 
@@ -88,16 +83,16 @@ def _(damping: KelvinVoigt) -> str:
 
 
 def names_of(scene: Scene) -> dict[Member | Body, str]:
-    """Names of beams and bodies; equal ones with their number in the scene."""
-    named: dict[Member | Body, str] = {}
+    """Return names of beams and bodies; equal ones with their number in the scene."""
     groups: tuple[Sequence[Member | Body], ...] = (scene.beams, scene.bodies)
-    for parts in groups:
-        known = Counter(part.name for part in parts)
-        for k, part in enumerate(parts):
-            named[part] = f"{part.name} {k}" if known[part.name] > 1 else part.name
-    return named
+    known = [Counter(part.name for part in parts) for parts in groups]
+    return {
+        part: f"{part.name} {k}" if known[g][part.name] > 1 else part.name
+        for g, parts in enumerate(groups)
+        for k, part in enumerate(parts)
+    }
 
 
 def counted(number: int, one: str, many: str = "") -> str:
-    """A number and what it counts: "1 body", "20 000 beams"."""
+    """Write a number and the noun that it counts: "1 body", "20 000 beams"."""
     return f"{number:,}".replace(",", " ") + " " + (one if number == 1 else many or f"{one}s")

@@ -24,42 +24,24 @@ from ufl_beam.model.connector_laws import (
     Spring,
     Stop,
 )
-
-# Okabe and Ito's palette, which the colour-blind can tell apart.
-BLUE, RED, GREEN, PINK, ORANGE, SKY = (
-    "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9",
-)  # fmt: skip
-INK, GREY, WHITE = "#222222", "#B5B5B5", "#FFFFFF"
+from ufl_beam.plotting.style import ORANGE, WHITE
 
 
 class Piece(NamedTuple):
-    """A line of a glyph, or an area if it is filled.
+    """Line of a glyph, or an area if it is filled."""
 
-    Attributes:
-        points: Coordinates (s, t).
-        fill: Colour of the area.
-        weight: Width of the line; points.
-        inside: Whether it is drawn upon an area.
-    """
-
-    points: list[tuple[float, float]]
-    fill: str | None = None
-    weight: float = 1.6
-    inside: bool = False
+    points: list[tuple[float, float]]  # (s, t)
+    fill: str | None = None  # colour of the area
+    weight: float = 1.6  # width of the line; points
+    inside: bool = False  # drawn upon an area
 
 
 class Glyph(NamedTuple):
-    """A symbol around a pin.
+    """Symbol around a pin."""
 
-    Attributes:
-        pieces: Its lines, bent.
-        sweep: Angle from place a to place b in the undeformed scene; rad.
-        spins: Whether it turns with b as a whole; others begin at a and end at b.
-    """
-
-    pieces: list[Piece]
-    sweep: float = math.pi + 1.0
-    spins: bool = False
+    pieces: list[Piece]  # lines, bent
+    sweep: float = math.pi + 1.0  # angle from place a to place b in the undeformed scene; rad
+    spins: bool = False  # turns with b as a whole; others begin at a and end at b
 
 
 def _box(low: float, high: float, half: float, fill: str) -> Piece:
@@ -118,14 +100,10 @@ STRAIGHT: dict[type, list[Piece]] = {
 }
 """Along a line; what drives is orange, filled if its motion is given."""
 
-CENTRE = -9.0
-"""The coordinate t of the pin."""
+CENTRE = -9.0  # the coordinate t of the pin
 
 
-def _bent(law: type) -> Glyph:
-    """The straight glyph around the pin, with a spoke at both ends."""
-    spokes = [Piece([(s, CENTRE), (s, 0.0)]) for s in (-2.0, 2.0)]
-    return Glyph([*STRAIGHT[law], *spokes])
+_SPOKES = [Piece([(s, CENTRE), (s, 0.0)]) for s in (-2.0, 2.0)]
 
 
 def _turning(fill: str, *more: Piece, tail: float = -2.0) -> Glyph:
@@ -137,7 +115,10 @@ def _turning(fill: str, *more: Piece, tail: float = -2.0) -> Glyph:
 
 AROUND: dict[type, Glyph] = {
     Spring: Glyph([Piece([(2.0, CENTRE), (2.0, -2.1), (-2.0, 0.0)])], sweep=4.3 * math.pi),
-    **{law: _bent(law) for law in (Damper, Stop, Coulomb, ForceLaw, RigidPlastic)},
+    **{
+        law: Glyph([*STRAIGHT[law], *_SPOKES])  # the straight one, with a spoke at both ends
+        for law in (Damper, Stop, Coulomb, ForceLaw, RigidPlastic)
+    },
     Motor: _turning(ORANGE),
     Actuator: _turning(WHITE),
     Controller: _turning(WHITE, _box(-2.0, -1.4, 0.5, WHITE), tail=-1.4),
@@ -146,14 +127,10 @@ AROUND: dict[type, Glyph] = {
 
 
 def along(piece: Piece, a: Array, b: Array, sides: tuple[Array, float], body: float) -> Array:
-    """Points of a piece of a straight glyph; (n, 2); m.
+    """Compute points of a piece of a straight glyph from a to b (m); (n, 2); m.
 
-    Args:
-        piece: Of ``STRAIGHT``.
-        a: First end; (2,); m.
-        b: Last end; (2,); m.
-        sides: Unit vector across, and the length of 1 in it; m.
-        body: Part of the way that the body of the glyph takes.
+    ``sides`` are the unit vector across and the length of 1 in it (m), ``body`` is the part of the
+    way that the body of the glyph takes.
     """
     s, t = np.array(piece.points).T
     part = np.interp(s, [-2.0, -1.0, 1.0, 2.0], [0.0, (1 - body) / 2, (1 + body) / 2, 1.0])
@@ -162,13 +139,9 @@ def along(piece: Piece, a: Array, b: Array, sides: tuple[Array, float], body: fl
 
 
 def around(piece: Piece, pin: Array, radius: float, angles: tuple[float, float]) -> Array:
-    """Points of a piece of a glyph around a pin; (n, 2); m.
+    """Compute points of a piece of a glyph around a pin; (n, 2); m.
 
-    Args:
-        piece: Of ``AROUND``.
-        pin: Its centre; (2,); m.
-        radius: Where t is 0; three units of t; m.
-        angles: Where s is -2 and 2; rad.
+    The ``radius`` is that of t = 0, three units of t (m); ``angles`` are those of s = -2 and 2.
     """
     points = np.array(piece.points)
     # Steps of 5 degrees, such that what is straight between two points is bent.

@@ -6,25 +6,24 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from itertools import groupby
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.model.bodies import Member
-from ufl_beam.plotting.connector_glyphs import BLUE, INK, RED
+from ufl_beam.plotting import drawing
 from ufl_beam.plotting.labels import Label, Spot, leader_of, place
-from ufl_beam.plotting.plots import (
+from ufl_beam.plotting.style import (
+    BLUE,
+    INK,
+    POINTS,
+    RED,
     RESULTANTS,
-    draw_axes,
-    draw_symbols,
-    draw_undeformed,
-    make_room,
-    moved_points,
+    half_size,
+    magnified,
     picture,
     plane_axes,
-    plane_size,
-    plane_stage,
     require_choice,
     with_unit,
 )
@@ -35,71 +34,43 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.text import Annotation
 
-NOTHING = 1e-6
+DRAWN_AS_ZERO = 1e-6
 """Part of the largest value below which a value is drawn as zero and is not written."""
 
-LABEL_SIZE, TITLE_SIZE = 13.0, 14.0
-"""Sizes of the texts and of the title; points."""
+LABEL_SIZE, TITLE_SIZE = 13.0, 14.0  # sizes of the texts and of the title; points
 
 AROUND, LEAST, MOST = (1.0, 1.2), (3.6, 2.6), (9.0, 6.8)
 """Room for words and numbers around the axes; least and largest size of a figure; inch."""
 
-POINTS = 72.0
-"""Points of an inch."""
 
-
-def plot(solution: Solution, what: str = "shape", *, n: int = -1, magnify: float = 1.0) -> Figure:
-    """The frame at the n-th kept time, with the diagram of a section force if ``what`` says so.
-
-    Diagrams stand on the deformed axis: M on the side in tension, positive N and V to the left of
-    the way from start to end.  Positive values are red, negative ones blue; the extreme values are
-    written beside them.  N and V are constant in each cell; M is linear between the moments that
-    act at its ends, see :func:`moments_at_ends`.
-
-    Bodies are outlined around their centre, a quartered circle, and all points where something is
-    attached.  What is orange drives: filled if it gives the motion, hollow if it gives the force.
-
-    Args:
-        solution: What to show.
-        what: "shape", "N", "V" or "M".
-        n: Number of the kept time; negative from the end.
-        magnify: Factor on the displacements.
-
-    Raises:
-        SceneError: Unknown ``what``, no such time, or ``magnify`` is not positive.
-    """
+def plot_state(solution: Solution, what: str, *, n: int, magnify: float) -> Figure:
+    """Draw the frame at a time, with a diagram of a section force; see :func:`plot`."""
     require_choice(what, ("shape", *RESULTANTS), "plot: what")
-    points = moved_points(solution, n, magnify)
-    stage = plane_stage(solution, [n], magnify)
+    points = drawing.moved_points(solution, n, magnify)
+    stage = drawing.plane_stage(solution, [n], magnify)
     pose = stage.pose(n)
     name = f"{RESULTANTS[what][0]} {what}" if what in RESULTANTS else "shape"
-    factor = f", displacements × {magnify:g}" if magnify != 1 else ""
-    with picture(plane_size(solution.grid.points, points, pose.points())) as figure:
-        axes = plane_axes(figure, f"{name} at {solution.parameter.at(solution.times[n])}{factor}")
-        draw_undeformed(axes, stage)
+    time = solution.parameter.at(solution.times[n])
+    with picture(drawing.plane_size(solution.grid.points, points, pose.points())) as figure:
+        axes = plane_axes(figure, f"{name} at {time}{magnified(magnify)}")
+        drawing.draw_undeformed(axes, solution, stage)
         extremes: list[Extreme] = []
         if what in RESULTANTS:
-            beams = solution.scene.beams
-            values = [_values(solution, beam, what, n) for beam in beams]
+            values = [_values(solution, beam, what, n) for beam in solution.scene.beams]
             extremes = draw_diagrams(axes, solution, what, [values], points)
-        draw_axes(axes, solution, points, color=INK, linewidth=2.6, zorder=4)
-        draw_symbols(axes, pose)
+        drawing.draw_axes(axes, solution, points, color=INK, linewidth=2.6, zorder=4)
+        drawing.draw_symbols(axes, pose)
         finish(figure, axes, extremes)
     return figure
 
 
 def moments_at_ends(solution: Solution, beam: Member, n: int = -1) -> Array:
-    """Moments that act at both ends of each cell; (num_cells, 2); N m.
+    """Compute the moments at both ends of each cell; (num_cells, 2); N m.
 
     The moment of a cell is that in its middle.  From there it changes by ``N Γ - V (1 + Σ)`` over a
     unit of length, which is what equilibrium of the cell asks for: moments at the ends of cells are
     in equilibrium with loads, joints and supports at the nodes.  With ``Mesh(degree=1)`` loads on
     beams act at the nodes, too.
-
-    Args:
-        solution: What to show.
-        beam: One of its beams.
-        n: Number of the kept time; negative from the end.
     """
     N, V, M = solution.section_forces(beam, n).T
     axial, shear, _ = solution.strains(beam, n).T
@@ -118,19 +89,12 @@ def _values(solution: Solution, beam: Member, what: str, n: int) -> Array:
 
 
 class Extreme(NamedTuple):
-    """Largest or least value of a diagram.
-
-    Attributes:
-        text: What is written.
-        color: Its colour.
-        tip: Point of the diagram; (2,); m.
-        outward: Unit vector away from the axis; (2,).
-    """
+    """Largest or least value of a diagram."""
 
     text: str
     color: str
-    tip: Array
-    outward: Array
+    tip: Array  # point of the diagram; (2,); m
+    outward: Array  # unit vector away from the axis; (2,)
 
 
 def draw_diagrams(
@@ -138,13 +102,8 @@ def draw_diagrams(
 ) -> list[Extreme]:
     """Draw diagrams of a section force on the frame, to one scale.
 
-    Args:
-        axes: Where to draw.
-        solution: Of the frame.
-        what: "N", "V" or "M".
-        diagrams: Each a list of the values at both ends of the cells of all beams,
-            (num_cells, 2) each; N, N m.
-        points: Nodes of all beams; (num_nodes, 2); m.
+    Each has the values at both ends of the cells of all beams, (num_cells, 2) each; N, N m; the
+    nodes are at ``points``, (num_nodes, 2); m.
 
     Returns:
         The largest and the least value, for :func:`finish` to write.
@@ -164,7 +123,7 @@ def draw_diagrams(
     every, tips, outward = [], [], []
     for forces in diagrams:
         for beam, found in zip(beams, forces, strict=True):
-            values = np.where(np.abs(found) > NOTHING * largest, found, 0.0)
+            values = np.where(np.abs(found) > DRAWN_AS_ZERO * largest, found, 0.0)
             chain = points[solution.grid.vertices_of(beam)]
             along = np.diff(chain, axis=0)
             left = along[:, ::-1] * (-1.0, 1.0) / np.linalg.norm(along, axis=1)[:, None]
@@ -182,55 +141,30 @@ def draw_diagrams(
     ]
 
 
-class Piece(NamedTuple):
-    """Part of a cell in which a value has one sign.
-
-    Attributes:
-        a: Point of the axis at which it begins; (2,); m.
-        b: Point at which it ends; (2,); m.
-        first: Value at ``a``; N, N m.
-        last: Value at ``b``; N, N m.
-        ordinate: Ordinate of the value one; (2,); m.
-    """
-
-    a: Array
-    b: Array
-    first: float
-    last: float
-    ordinate: Array
-
-
 def _draw_areas(axes: Axes, ends: Array, values: Array, left: Array) -> None:
     """Draw the diagram of a beam: an area for each part of it with one sign.
 
-    Args:
-        axes: Where to draw.
-        ends: Points of the axis at both ends of each cell; (num_cells, 2, 2); m.
-        values: Values there; (num_cells, 2).
-        left: Ordinate of the value one in each cell; (num_cells, 2); m.
+    The axis has ``ends`` of each cell (num_cells, 2, 2), where the values are (num_cells, 2); the
+    ordinate of the value one is ``left`` (num_cells, 2); m.
     """
-    pieces: list[Piece] = []
+    # Parts of cells: points of the axis, values there, ordinate of the value one
+    parts: list[tuple[Array, Array, Array]] = []
     for k in range(len(values)):
-        (a, b), (first, last), ordinate = ends[k], values[k].tolist(), np.asarray(left[k])
-        if first * last < 0.0:
-            middle = a + first / (first - last) * (b - a)
-            pieces += [
-                Piece(a, middle, first, 0.0, ordinate),
-                Piece(middle, b, 0.0, last, ordinate),
-            ]
+        axis, pair, ordinate = ends[k], values[k], left[k]
+        if pair[0] * pair[1] < 0.0:
+            middle = axis[0] + pair[0] / (pair[0] - pair[1]) * (axis[1] - axis[0])
+            parts.append((np.array([axis[0], middle]), pair * (1.0, 0.0), ordinate))
+            parts.append((np.array([middle, axis[1]]), pair * (0.0, 1.0), ordinate))
         else:
-            pieces.append(Piece(a, b, first, last, ordinate))
-    for sign, run in groupby(pieces, lambda piece: np.sign(piece.first + piece.last)):
-        if sign == 0.0:
-            continue
-        cells = list(run)
-        axis = np.array([point for piece in cells for point in (piece.a, piece.b)])
-        tips = axis + np.array(
-            [value * piece.ordinate for piece in cells for value in (piece.first, piece.last)]
-        )
-        outline = np.concatenate([axis[:1], tips, axis[:0:-1]])
-        color = RED if sign > 0 else BLUE
-        axes.fill(*outline.T, facecolor=(color, 0.28), edgecolor=color, linewidth=1.0, zorder=2)
+            parts.append((axis, pair, ordinate))
+    for sign, run in groupby(parts, lambda part: np.sign(part[1].sum())):
+        if sign != 0.0:
+            cells = list(run)
+            axis = np.concatenate([points for points, _, _ in cells])
+            tips = axis + np.concatenate([np.outer(pair, x) for _, pair, x in cells])
+            outline = np.concatenate([axis[:1], tips, axis[:0:-1]])
+            color = RED if sign > 0 else BLUE
+            axes.fill(*outline.T, facecolor=(color, 0.28), edgecolor=color, linewidth=1.0, zorder=2)
 
 
 # -- words and sizes -------------------------------------------------------------------------------
@@ -247,7 +181,7 @@ def finish(figure: Figure, axes: Axes, extremes: Sequence[Extreme] = ()) -> None
             text.remove()
         written = _write(figure, axes, extremes)
         axes.dataLim.set(without_texts)
-        make_room(figure, axes)
+        drawing.make_room(figure, axes)
         _fit(figure, axes)
 
 
@@ -255,7 +189,7 @@ def _fit(figure: Figure, axes: Axes) -> None:
     """Make the figure as wide and high as what is drawn, at the largest scale that fits."""
     axes.autoscale_view()
     figure.draw_without_rendering()
-    title = 2 * _half_size(figure, axes, axes.get_title(loc="left"), TITLE_SIZE)[0]
+    title = 2 * half_size(figure, axes, axes.get_title(loc="left"), TITLE_SIZE)[0]
     width, height = np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())
     least = np.array([max(LEAST[0], title / POINTS + AROUND[0]), LEAST[1]])
     room = np.array(MOST) - AROUND
@@ -275,13 +209,13 @@ def _write(figure: Figure, axes: Axes, extremes: Sequence[Extreme]) -> list[Anno
     lines = _segments(axes, in_points)
     labels, halves = [], []
     for text, color, tip, outward in extremes:
-        way = math.atan2(outward[1], outward[0])
         # Straight away from the axis first, then more and more aside
-        ways = (way + math.radians(turn) for turn in (0, 40, -40, 75, -75, 105, -105))
+        turns = np.radians((0, 40, -40, 75, -75, 105, -105))
+        ways = math.atan2(outward[1], outward[0]) + turns
         at = in_points(tip)
         spots = [Spot(at, np.array([math.cos(a), math.sin(a)])) for a in ways]
         labels.append(Label(text, color, 0, tuple(spots)))
-        halves.append(_half_size(figure, axes, text, LABEL_SIZE, weight="bold"))
+        halves.append(half_size(figure, axes, text, LABEL_SIZE, weight="bold"))
     written = []
     for one in place(labels, halves, lines):
         tip = next(e.tip for e in extremes if e.text == one.label.text)
@@ -298,14 +232,6 @@ def _write(figure: Figure, axes: Axes, extremes: Sequence[Extreme]) -> list[Anno
     return written
 
 
-def _half_size(figure: Figure, axes: Axes, text: str, size: float, **style: Any) -> Array:
-    """Half of the width and height of a text; (2,); points."""
-    probe = axes.text(0.0, 0.0, text, fontsize=size, **style)
-    box = probe.get_window_extent()
-    probe.remove()
-    return np.asarray(np.array([box.width, box.height]) / 2 * POINTS / figure.dpi)
-
-
 def _segments(axes: Axes, in_points: Callable[[Array], Array]) -> Array:
     """Lines that texts should not cover, those within areas too; (n, 4); points."""
     found = []
@@ -320,10 +246,8 @@ def _segments(axes: Axes, in_points: Callable[[Array], Array]) -> Array:
         found.append(np.hstack([outline[:-1], outline[1:]]))
         count = len(outline) // 2
         # Ordinates, from a point of the outline to the one across the axis
-        for k in range(5):
-            tips = outline[1:count] + k / 4 * (outline[2 : count + 1] - outline[1:count])
-            feet = outline[::-1][1:count] + k / 4 * (
-                outline[::-1][2 : count + 1] - outline[::-1][1:count]
-            )
-            found.append(np.hstack([tips, feet[: len(tips)]]))
+        for part in np.linspace(0.0, 1.0, 5):
+            between = outline[:-1] + part * np.diff(outline, axis=0)
+            feet = (outline[1:] + part * (outline[:-1] - outline[1:]))[::-1]
+            found.append(np.hstack([between[1:count], feet[1:count]]))
     return np.concatenate(found) if found else np.empty((0, 4))

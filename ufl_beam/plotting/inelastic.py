@@ -1,13 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Pictures of what yields and breaks, by Matplotlib: where, along which path, at what cost.
-
-They look like those of :mod:`ufl_beam.plotting.plots`, and need no screen either.
-"""
+"""Pictures of yielding and fracture, by Matplotlib: places, paths and dissipation."""
 
 from __future__ import annotations
 
 import math
-from itertools import cycle, islice, pairwise
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,20 +13,22 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.plastic_hinges import law_of
-from ufl_beam.plotting.connector_glyphs import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY
-from ufl_beam.plotting.plots import (
+from ufl_beam.plotting import drawing
+from ufl_beam.plotting.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    PINK,
+    RED,
+    SKY,
+    color_cycle,
     decimal_prefix,
-    draw_axes,
     draw_bar,
-    draw_symbols,
-    draw_undeformed,
-    make_room,
-    moved_points,
-    open_hinges,
+    magnified,
     picture,
     plane_axes,
-    plane_size,
-    plane_stage,
     scale,
     time_axes,
     with_unit,
@@ -40,8 +39,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FULLY_OPEN = 0.99
-"""Part of the fracture energy from which on a hinge is drawn as a joint."""
+FULLY_OPEN = 0.99  # part of the fracture energy from which on a hinge is drawn as a joint
 
 
 # -- what users call ---------------------------------------------------------------------------
@@ -105,7 +103,7 @@ def plot_hinge(solution: Solution, place: Place) -> Figure:
         _prefix(axes, "x", jump, "jump of rotation", "rad")
         spent = f"{with_unit(lost, 'J')} dissipated"
         if math.isfinite(law.energy):
-            spent += f", {_percent(lost / law.energy)} of {with_unit(law.energy, 'J')}"
+            spent += f", {100 * lost / law.energy:.3g} % of {with_unit(law.energy, 'J')}"
         axes.set_title(f"hinge at {place}: {spent}", loc="left", color=INK)
     return figure
 
@@ -130,21 +128,26 @@ def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Fig
     """
     from matplotlib.collections import LineCollection
 
-    points, grid = moved_points(solution, n, magnify), solution.grid
+    points, grid = drawing.moved_points(solution, n, magnify), solution.grid
     density = _dissipated_per_length(solution, n)
-    factor = f", displacements × {magnify:g}" if magnify != 1 else ""
-    stage = plane_stage(solution, [n], magnify)
+    stage = drawing.plane_stage(solution, [n], magnify)
     pose = stage.pose(n)
-    room = _room(np.concatenate([grid.points, points, pose.points()]))
-    width, height = plane_size(room)
+    # Corners of a box that is in no direction less than a third of the other: the broad lines of a
+    # slender frame would else be cut at the edge.
+    everything = np.concatenate([grid.points, points, pose.points()])
+    low, high = everything.min(axis=0), everything.max(axis=0)
+    more = np.maximum(0.0, (high - low).max() / 3 - (high - low)) / 2
+    room = np.array([low - more, high + more])
+    width, height = drawing.plane_size(room)
     # Upright frames need less; the bar and the legend have their own widths.
     across = height * float(np.divide(*np.ptp(room, axis=0)))
     with picture((min(width, max(6.0, across + 3.0)), height)) as figure:
-        axes = plane_axes(figure, f"damage at {solution.parameter.at(solution.times[n])}{factor}")
+        time = solution.parameter.at(solution.times[n])
+        axes = plane_axes(figure, f"damage at {time}{magnified(magnify)}")
         axes.update_datalim(room)
-        draw_undeformed(axes, stage)
-        draw_axes(axes, solution, points, color=INK, linewidth=2.0, zorder=2)
-        draw_symbols(axes, pose)
+        drawing.draw_undeformed(axes, solution, stage)
+        drawing.draw_axes(axes, solution, points, color=INK, linewidth=2.0, zorder=2)
+        drawing.draw_symbols(axes, pose)
         yielded = density > 0.0
         if yielded.any():
             unit, prefix = decimal_prefix(float(density.max()))
@@ -155,9 +158,12 @@ def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Fig
                 linewidths=11.0, capstyle="butt", zorder=3,
             )  # fmt: skip
             axes.add_collection(zones)
-            draw_bar(figure, axes, colors, f"{_what_dissipates(solution)} ({prefix}J/m)")
+            placed = [beam.section.fibres for beam in solution.scene.beams]
+            cracks = any(p is not None and p.fibres.softening is not None for p in placed)
+            title = "dissipated by plastic strains" + (" and cracks" if cracks else "")
+            draw_bar(figure, axes, colors, f"{title} ({prefix}J/m)")
         _draw_hinges(figure, axes, solution, n, points)
-        make_room(figure, axes)
+        drawing.make_room(figure, axes)
     return figure
 
 
@@ -175,15 +181,17 @@ def plot_dissipation(solution: Solution) -> Figure:
         >>> ub.plot_dissipation(broken).savefig("dissipation.png")
     """
     if not solution.scene.connectors:
-        _require_inelastic(solution)
+        if not solution.scene.beams:
+            raise SceneError("plot_dissipation: the scene has neither beams nor connectors")
+        solution.material(solution.scene.beams[0])  # or its error
     energy, t = solution.energy, solution.progress
     held = energy.total
     supplied = held[0] + sum(energy.supplied.values(), np.zeros_like(t))
     start = held[0] > 1e-12 * energy.throughput
     with picture((8.0, 5.0)) as figure:
-        axes = time_axes(figure.add_subplot(), solution)
+        axes = time_axes(figure.add_subplot())
         # Blue is the energy in the scene.
-        colors = islice(cycle((ORANGE, RED, GREEN, PINK, SKY)), len(energy.lost))
+        colors = color_cycle(len(energy.lost), (ORANGE, RED, GREEN, PINK, SKY))
         axes.stackplot(
             t, *energy.lost.values(), labels=[f"lost: {name}" for name in energy.lost],
             colors=[(color, 0.75) for color in colors],
@@ -193,11 +201,8 @@ def plot_dissipation(solution: Solution) -> Figure:
         axes.plot(t, held, color=BLUE, label="in the scene")
         _prefix(axes, "y", np.concatenate([supplied, held]), "energy", "J")
         axes.set_xlabel(solution.parameter.progress)
-        axes.set_title(
-            f"worst imbalance {_scientific(energy.worst)} of {with_unit(energy.throughput, 'J')} "
-            "throughput",
-            loc="left", color=INK,
-        )  # fmt: skip
+        worst, through = _scientific(energy.worst), with_unit(energy.throughput, "J")
+        axes.set_title(f"worst imbalance {worst} of {through} throughput", loc="left", color=INK)
         figure.legend(loc="outside upper left", ncols=3)
     return figure
 
@@ -205,31 +210,11 @@ def plot_dissipation(solution: Solution) -> Figure:
 # -- words and numbers -------------------------------------------------------------------------
 
 
-def _require_inelastic(solution: Solution) -> None:
-    if not solution.scene.beams:
-        raise SceneError("plot_dissipation: the scene has neither beams nor connectors")
-    solution.material(solution.scene.beams[0])  # or its error
-
-
-def _percent(part: float) -> str:
-    return f"{100 * part:.3g} %"
-
-
 def _scientific(value: float) -> str:
     """A value with two digits and a power of ten: "3.1 × 10⁻¹²"."""
     digits, power = f"{value:.1e}".split("e")
     raised = str(int(power)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
     return f"{digits} × 10{raised}" if value else "0"
-
-
-def _room(points: Array) -> Array:
-    """Corners of a box around points, in no direction less than a third of the other; (2, 2); m.
-
-    The broad lines of a slender frame would else be cut at the edge.
-    """
-    low, high = points.min(axis=0), points.max(axis=0)
-    more = np.maximum(0.0, (high - low).max() / 3 - (high - low)) / 2
-    return np.array([low - more, high + more])
 
 
 def _dissipated_per_length(solution: Solution, n: int) -> Array:
@@ -242,12 +227,6 @@ def _dissipated_per_length(solution: Solution, n: int) -> Array:
         cracks = state.hinge if beam.section.fibres is not None else 0.0
         energy[grid.cells_of(beam)] = state.plastic + cracks
     return np.asarray(energy / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
-
-
-def _what_dissipates(solution: Solution) -> str:
-    placed = [beam.section.fibres for beam in solution.scene.beams]
-    cracks = any(p is not None and p.fibres.softening is not None for p in placed)
-    return "dissipated by plastic strains" + (" and cracks" if cracks else "")
 
 
 def _monotone(x: Array) -> list[slice]:
@@ -272,9 +251,9 @@ def _prefix(axes: Axes, which: str, values: Array, quantity: str, unit: str) -> 
 
 def _draw_path(figure: Figure, axes: Axes, solution: Solution, x: Array, M: Array) -> None:
     """M against x, from light to dark in time; a ring at the beginning, a dot at the end."""
-    times, named = solution.progress, solution.parameter
     from matplotlib.collections import LineCollection
 
+    times, named = solution.progress, solution.parameter
     colors = scale("viridis_r", 0.12, 1.0, float(times[0]), float(times[-1]))
     path = np.column_stack([x, M])
     middle = (times[1:] + times[:-1]) / 2
@@ -285,11 +264,9 @@ def _draw_path(figure: Figure, axes: Axes, solution: Solution, x: Array, M: Arra
     for at_zero in (axes.axhline, axes.axvline):
         at_zero(0.0, color=GREY, linewidth=1.0, zorder=1)
     axes.add_collection(pieces)
+    ring: dict[str, Any] = {"ms": 8.0, "mec": INK, "mew": 1.6, "zorder": 5, "ls": "none"}
     for i, inside in ((0, "white"), (-1, INK)):
-        label = named.at(solution.times[i])
-        axes.plot(
-            *path[i], "o", ms=8.0, mfc=inside, mec=INK, mew=1.6, zorder=5, ls="none", label=label
-        )
+        axes.plot(*path[i], "o", mfc=inside, label=named.at(solution.times[i]), **ring)
     axes.autoscale_view()
     axes.tick_params(labelsize=12, color="#888888")
     _prefix(axes, "y", M, "bending moment M", "N m")
@@ -299,7 +276,7 @@ def _draw_path(figure: Figure, axes: Axes, solution: Solution, x: Array, M: Arra
 
 def _draw_hinges(figure: Figure, axes: Axes, solution: Solution, n: int, points: Array) -> None:
     """Circles at the hinges that have opened, and what their sizes mean."""
-    hinges = open_hinges(solution, n, points)
+    hinges = drawing.open_hinges(solution, n, points)
     if not hinges:
         return
 

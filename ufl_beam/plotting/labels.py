@@ -10,67 +10,44 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 
-GAPS = (4.0, 12.0, 24.0, 40.0, 60.0)
-"""Distances of a label from its spot that are tried; points."""
+GAPS = (4.0, 12.0, 24.0, 40.0, 60.0)  # distances of a label from its spot that are tried; points
+CLEARANCE = 2.0  # room around a label; points
 
-CLEAR = 2.0
-"""Room around a label; points."""
-
-LINE, LABEL, OUTSIDE, AWAY, LATER, CROSSING = 8.0, 40.0, 100.0, 0.6, 0.4, 25.0
+LINE_COST, LABEL_COST, OUTSIDE_COST, DISTANCE_COST, RANK_COST = 8.0, 40.0, 100.0, 0.6, 0.4
 """Costs of a candidate: of a point of length of lines under the label, of a square point of another
-label and of a point beyond the frame, of a point of distance, of a place in the list of spots, and
-of a label that the leader crosses; a line that it crosses costs a tenth of that."""
+label, of a point beyond the frame, of a point of distance, and of a place in the list of spots."""
 
-LEADER = 10.0
-"""Distance of a label from its spot from which on a line leads to it; points."""
+CROSSING_COST = 25.0
+"""Cost of a label that the leader crosses; a line that it crosses costs a tenth of that."""
+
+LEADER = 10.0  # distance of a label from its spot from which on a line leads to it; points
 
 
 class Spot(NamedTuple):
-    """Place that a label belongs to, and the direction in which the label lies from it.
+    """Place that a label belongs to, and the direction in which the label lies from it."""
 
-    Attributes:
-        at: Shape (2,).
-        way: Unit vector; (2,).
-        gap: Least distance of the label; points.
-    """
-
-    at: Array
-    way: Array
-    gap: float = 0.0
+    at: Array  # (2,)
+    way: Array  # unit vector; (2,)
+    gap: float = 0.0  # least distance of the label; points
 
 
 class Label(NamedTuple):
-    """Text and the places where it may stand, the best first.
-
-    Attributes:
-        text: The text.
-        color: Its colour.
-        rank: Labels of lower ranks are placed first.
-        spots: Where it may stand.
-    """
+    """Text and the places where it may stand, the best first."""
 
     text: str
     color: str
-    rank: int
+    rank: int  # labels of lower ranks are placed first
     spots: tuple[Spot, ...]
 
 
 class Placed(NamedTuple):
-    """Label with its place.
-
-    Attributes:
-        label: The label.
-        center: Of its box; (2,); points.
-        half: Half the width and height of its box; (2,); points.
-        spot: The spot it belongs to; (2,); points.
-        overlap: Part of its box that other labels cover.
-    """
+    """Label with its place; lengths in points."""
 
     label: Label
-    center: Array
-    half: Array
-    spot: Array
-    overlap: float
+    center: Array  # of its box; (2,)
+    half: Array  # half the width and height of its box; (2,)
+    spot: Array  # that it belongs to; (2,)
+    overlap: float  # part of its box that other labels cover
 
 
 def place(
@@ -101,6 +78,7 @@ def _best(
     sides = np.concatenate([boxes, boxes[:, [0, 3, 2, 1]]])  # diagonals, which leaders would cross
     leaders = [leader.ravel() for x in others if len(leader := leader_of(x))]
     lines = np.vstack([lines, *leaders])
+    ends_of_lines = lines[:, :2], lines[:, 2:]
     at = np.array([spot.at for spot in label.spots])
     way = np.array([spot.way for spot in label.spots])
     least = np.array([spot.gap for spot in label.spots])
@@ -109,20 +87,23 @@ def _best(
     spots = at + least[:, None] * way
     found, lowest = None, np.inf
     for gap in GAPS:
-        if AWAY * gap >= lowest:
+        if DISTANCE_COST * gap >= lowest:
             break
         centers = spots + way * (gap + reach)[:, None]
-        low, high = centers - half - CLEAR, centers + half + CLEAR
+        low, high = centers - half - CLEARANCE, centers + half + CLEARANCE
         ends = np.hstack([spots, np.clip(spots, centers - half, centers + half)])
         leads = np.linalg.norm(ends[:, 2:] - ends[:, :2], axis=1) >= LEADER
-        near = _near(lines, low.min(axis=0), high.max(axis=0))
+        # Segments whose own boxes meet one of these
+        first, last = np.minimum(*ends_of_lines), np.maximum(*ends_of_lines)
+        meets = (first <= high.max(axis=0)) & (last >= low.min(axis=0))
+        near = lines[meets.all(axis=1)]
         covered = areas_covered(low, high, boxes)
-        cost = AWAY * gap + LATER * np.arange(len(at))
-        cost += LINE * lengths_inside(low, high, near) + LABEL * covered
-        cost += CROSSING * leads * (crossings(ends, sides) + 0.1 * crossings(ends, near))
+        cost = DISTANCE_COST * gap + RANK_COST * np.arange(len(at))
+        cost += LINE_COST * lengths_inside(low, high, near) + LABEL_COST * covered
+        cost += CROSSING_COST * leads * (crossings(ends, sides) + 0.1 * crossings(ends, near))
         if frame is not None:
             beyond = np.maximum(frame[:2] - low, 0.0) + np.maximum(high - frame[2:], 0.0)
-            cost += OUTSIDE * beyond.sum(axis=1)
+            cost += OUTSIDE_COST * beyond.sum(axis=1)
         best = int(np.argmin(cost))
         if found is None or cost[best] < lowest:
             overlap = float(covered[best] / np.prod(high[best] - low[best]))
@@ -133,27 +114,15 @@ def _best(
 
 
 def leader_of(placed: Placed) -> Array:
-    """Line from the spot of a label to its box, if it stands away from it; (2, 2) or (0, 2)."""
+    """Return the line from a spot to a box that stands away from it; (2, 2) or (0, 2)."""
     edge = np.clip(placed.spot, placed.center - placed.half, placed.center + placed.half)
     if np.linalg.norm(edge - placed.spot) < LEADER:
         return np.empty((0, 2))
     return np.array([placed.spot, edge])
 
 
-def _near(lines: Array, low: Array, high: Array) -> Array:
-    """Segments whose own boxes meet a box; (n, 4)."""
-    first, last = lines[:, :2], lines[:, 2:]
-    meets = (np.minimum(first, last) <= high) & (np.maximum(first, last) >= low)
-    return np.asarray(lines[meets.all(axis=1)])
-
-
 def crossings(first: Array, second: Array) -> Array:
-    """Number of segments that each of some segments crosses; (num_first,).
-
-    Args:
-        first: Segments; (num_first, 4).
-        second: The other ones; (n, 4).
-    """
+    """Count segments (n, 4) that each of the first segments (num_first, 4) crosses."""
     a, b, c, d = first[:, None, :2], first[:, None, 2:], second[None, :, :2], second[None, :, 2:]
 
     def side(p: Array, q: Array, r: Array) -> Array:
@@ -166,13 +135,7 @@ def crossings(first: Array, second: Array) -> Array:
 
 
 def lengths_inside(low: Array, high: Array, lines: Array) -> Array:
-    """Length of segments inside each of some boxes; (num_boxes,).
-
-    Args:
-        low: Lower left corners; (num_boxes, 2).
-        high: Upper right corners; (num_boxes, 2).
-        lines: Segments; (n, 4).
-    """
+    """Measure segments (n, 4) inside each box, given by its corners (num_boxes, 2)."""
     first, way = lines[None, :, :2], (lines[:, 2:] - lines[:, :2])[None]
     with np.errstate(divide="ignore", invalid="ignore"):
         enter, leave = (low[:, None] - first) / way, (high[:, None] - first) / way
@@ -186,14 +149,6 @@ def lengths_inside(low: Array, high: Array, lines: Array) -> Array:
 
 
 def areas_covered(low: Array, high: Array, boxes: Array) -> Array:
-    """Area of each of some boxes that other boxes cover; (num_boxes,).
-
-    Args:
-        low: Lower left corners; (num_boxes, 2).
-        high: Upper right corners; (num_boxes, 2).
-        boxes: The other ones: both corners; (n, 4).
-    """
-    sides = np.minimum(high[:, None], boxes[None, :, 2:]) - np.maximum(
-        low[:, None], boxes[None, :, :2]
-    )
-    return np.asarray(np.prod(np.maximum(sides, 0.0), axis=2).sum(axis=1))
+    """Measure the area of boxes with corners (num_boxes, 2) that others (n, 4) cover."""
+    ends, starts = np.minimum(high[:, None], boxes[:, 2:]), np.maximum(low[:, None], boxes[:, :2])
+    return np.asarray(np.prod(np.maximum(ends - starts, 0.0), axis=2).sum(axis=1))

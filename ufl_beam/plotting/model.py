@@ -1,74 +1,112 @@
 # SPDX-License-Identifier: MIT
-"""Picture of a model before any run."""
+"""Pictures of a model before a run, and of a solution at one of its times."""
 
 from __future__ import annotations
 
 import math
 from collections import defaultdict
+from collections.abc import Callable
+from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ufl_beam.arrays import Array
+from ufl_beam.errors import SceneError
+from ufl_beam.model.constraint_checks import require_independent
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.wireframe import spots_of
-from ufl_beam.plotting.captions import (
-    counted,
-    damping_in_words,
-)
-from ufl_beam.plotting.connector_glyphs import INK, RED
+from ufl_beam.output.line_data import spots_of
+from ufl_beam.plotting.captions import counted, damping_in_words
+from ufl_beam.plotting.diagrams import plot_state
 from ufl_beam.plotting.labels import Placed, leader_of, place
-from ufl_beam.plotting.load_symbols import (
-    CAPTIONS,
-    NAMES,
-    badge,
-)
+from ufl_beam.plotting.load_symbols import CAPTIONS, NAMES, badge
 from ufl_beam.plotting.model_symbols import MOST_LABELS, TEXT, Drawing, Subject, draw
-from ufl_beam.plotting.plots import picture, with_unit
+from ufl_beam.plotting.style import INK, POINTS, RED, half_size, picture, with_unit
+from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-POINTS = 72.0
-"""Points of an inch."""
-
-WIDTH, HEIGHT = (5.5, 9.0), (3.0, 6.8)
-"""Least and largest size of the figure; inch."""
+WIDTH, HEIGHT = (5.5, 9.0), (3.0, 6.8)  # least and largest size of the figure; inch
 
 LEFT, RIGHT, BELOW, ABOVE, NOTE = 66.0, 14.0, 46.0, 34.0, 16.0
 """Room for what is around the axes, and for a line of notes; points."""
 
-LABEL_SIZE, TITLE_SIZE = 11.0, 14.0
-"""Sizes of labels and of the title; points."""
+LABEL_SIZE, TITLE_SIZE = 11.0, 14.0  # sizes of labels and of the title; points
+BADGE = 60.0  # room for the symbol of a load on the whole scene, and between two of them; points
 
-BADGE = 60.0
-"""Room for the symbol of a load on the whole scene, and between two of them; points."""
+
+Measure = Callable[[str], Array]  # half of width and height of a text; (2,); points
 
 
 class Plan(NamedTuple):
-    """Size of a picture.
+    """Size of a picture."""
 
-    Attributes:
-        scale: Length of a point in the scene; m.
-        frame: Lower left and upper right corner of the axes, in the scene; (4,); points.
-        size: Of the figure; inch.
+    scale: float  # length of a point in the scene; m
+    frame: Array  # lower left and upper right corner of the axes, in the scene; (4,); points
+    size: tuple[float, float]  # of the figure; inch
+
+
+def plot(
+    shown: Scene | Solution, what: str = "shape", *, n: int = -1, magnify: float = 1.0
+) -> Figure:
+    """Draw a model before any run, or a solution at one of its times.
+
+    Of a :class:`Scene` it draws the undeformed model: beams, their cells and names, bodies, joints,
+    supports, connectors with their sizes, hinges, loads (red), prescribed motions (orange), masses
+    and initial velocities (green).  Hollow heads of arrows are loads that turn with their place.
+    Names and sizes for which there is no room are left out.
+
+    Of a :class:`Solution` it draws the frame at the n-th kept time, with the diagram of a section
+    force if ``what`` names one: M on the side in tension, positive N and V to the left of the way
+    from start to end, positive values red, negative ones blue.  N and V are constant in each cell;
+    M is linear between the moments at its ends.
+
+    What is orange drives: filled if it gives the motion, hollow if it gives the force.
+
+    Args:
+        shown: The scene or the solution.
+        what: Of a solution: "shape", "N", "V" or "M".
+        n: Number of the kept time of a solution; negative from the end.
+        magnify: Factor on the displacements of a solution.
+
+    Raises:
+        SceneError: Neither a scene nor a solution; a scene whose constraints repeat; anything but
+            the shape of a scene; an unknown ``what``, no such time, or ``magnify`` not positive.
+
+    Example:
+        >>> ub.plot(scene).savefig("model.png")
+        >>> ub.plot(solution, "M", magnify=10).savefig("moments.png")
     """
-
-    scale: float
-    frame: Array
-    size: tuple[float, float]
+    if isinstance(shown, Solution):
+        return plot_state(shown, what, n=n, magnify=magnify)
+    if not isinstance(shown, Scene):
+        raise SceneError(
+            f"plot: {shown!r} is a {type(shown).__name__}; give a Scene, or the Solution of a run"
+        )
+    given = {"what": (what, "shape"), "n": (n, -1), "magnify": (magnify, 1.0)}
+    if said := [f"{name} = {x!r}" for name, (x, default) in given.items() if x != default]:
+        raise SceneError(
+            f"plot: a scene has no {', '.join(said)} before a run; plot(scene) draws the model, "
+            f"plot(solution, {what!r}) what a run found"
+        )
+    require_independent(shown)
+    return plot_model(shown)
 
 
 def plot_model(scene: Scene) -> Figure:
-    """Draw the undeformed model with all that is in it; see :func:`ufl_beam.plot`."""
+    """Draw the undeformed model with all that is in it; see :func:`plot`."""
     subject = Subject.of(scene)
     skeleton = _skeleton(subject)
     notes = notes_of(scene)
     with picture((WIDTH[1], HEIGHT[1])) as figure:
         figure.set_layout_engine("none")
-        plan = _first_plan(skeleton, scene.size)
-        measure = _Measure(figure)
+        width, height = np.ptp(skeleton, axis=0)
+        scale = max(width / 400.0, height / 250.0, scene.size / 500.0)
+        plan = Plan(scale, np.empty(4), (0.0, 0.0))
+        probe = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        measure: Measure = cache(lambda text: half_size(figure, probe, text, LABEL_SIZE))
         least = _width_of_words(subject, notes, measure)
         # What stands around the beams has a size in points: with the second plan it fits.
         for again in (False, True):
@@ -82,6 +120,7 @@ def plot_model(scene: Scene) -> Figure:
         _paint(axes, drawing)
         _write(axes, placed, plan.scale)
         _badges(axes, scene, plan, measure)
+        probe.remove()
     return figure
 
 
@@ -89,11 +128,9 @@ def plot_model(scene: Scene) -> Figure:
 
 
 def _title(subject: Subject) -> str:
-    scene, cells = subject.scene, counted(subject.cells, "cell")
-    parts = [
-        *([counted(len(scene.beams), "beam"), cells] if scene.beams else []),
-        *([counted(len(scene.bodies), "body", "bodies")] if scene.bodies else []),
-    ]
+    beams, bodies = subject.scene.beams, subject.scene.bodies
+    parts = [counted(len(beams), "beam"), counted(subject.cells, "cell")] if beams else []
+    parts += [counted(len(bodies), "body", "bodies")] if bodies else []
     return "model: " + ", ".join(parts)
 
 
@@ -118,31 +155,7 @@ def _skeleton(subject: Subject) -> Array:
     return np.concatenate(points)
 
 
-class _Measure:
-    """Sizes of texts."""
-
-    def __init__(self, figure: Figure) -> None:
-        self._axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-        self._points = POINTS / figure.dpi
-        self._known: dict[str, Array] = {}
-
-    def __call__(self, text: str) -> Array:
-        """Half of width and height; (2,); points."""
-        if text not in self._known:
-            probe = self._axes.text(0.0, 0.0, text, fontsize=LABEL_SIZE)
-            box = probe.get_window_extent()
-            probe.remove()
-            self._known[text] = 0.5 * self._points * np.array([box.width, box.height])
-        return self._known[text]
-
-    def finish(self) -> None:
-        """Remove what texts were measured in."""
-        self._axes.remove()
-
-
-def _arrange(
-    drawing: Drawing, scale: float, measure: _Measure, frame: Array | None
-) -> list[Placed]:
+def _arrange(drawing: Drawing, scale: float, measure: Measure, frame: Array | None) -> list[Placed]:
     """Labels at their places; those that others would cover are left out."""
     labels = drawing.labels
     for rank in (NAMES, CAPTIONS):
@@ -159,9 +172,7 @@ def _arrange(
 
 def _segments(chains: list[Array]) -> Array:
     """Segments of some lines; (n, 4)."""
-    points = np.concatenate(chains)
-    last = np.cumsum([len(chain) for chain in chains]) - 1
-    return np.delete(np.hstack([points[:-1], points[1:]]), last[:-1], axis=0)
+    return np.concatenate([np.hstack([chain[:-1], chain[1:]]) for chain in chains])
 
 
 def _box(drawing: Drawing, placed: list[Placed], scale: float) -> Array:
@@ -172,7 +183,7 @@ def _box(drawing: Drawing, placed: list[Placed], scale: float) -> Array:
     return np.array([*everything.min(axis=0), *everything.max(axis=0)])
 
 
-def _width_of_words(subject: Subject, notes: list[str], measure: _Measure) -> float:
+def _width_of_words(subject: Subject, notes: list[str], measure: Measure) -> float:
     """Width of the words above the axes; points."""
     badges = [found[0] for load in subject.scene.loads if (found := badge(load)) is not None]
     first = TITLE_SIZE / LABEL_SIZE * 2 * measure(_title(subject))[0]
@@ -180,20 +191,11 @@ def _width_of_words(subject: Subject, notes: list[str], measure: _Measure) -> fl
     return float(max([first, *(2 * measure(note)[0] for note in notes)]))
 
 
-def _first_plan(skeleton: Array, size: float) -> Plan:
-    width, height = np.ptp(skeleton, axis=0)
-    return Plan(max(width / 400.0, height / 250.0, size / 500.0), np.empty(4), (0.0, 0.0))
-
-
 def _plan(skeleton: Array, scale: float, box: Array, notes: int, words: float) -> Plan:
     """The largest scale at which everything fits, and the frame around it.
 
-    Args:
-        skeleton: Points of the scene; (n, 2); m.
-        scale: At which the box was found; m.
-        box: Corners of everything; (4,); points.
-        notes: Number of lines of notes.
-        words: Width of the words above the axes; points.
+    The ``box`` around everything (points) was found at a scale; above it are so many lines of
+    ``notes``, and words of a width (points).
     """
     low, high = skeleton.min(axis=0), skeleton.max(axis=0)
     # What stands out beyond the skeleton has a size in points.
@@ -281,7 +283,7 @@ def _write(axes: Axes, placed: list[Placed], scale: float) -> None:
         )  # fmt: skip
 
 
-def _badges(axes: Axes, scene: Scene, plan: Plan, measure: _Measure) -> None:
+def _badges(axes: Axes, scene: Scene, plan: Plan, measure: Measure) -> None:
     """Write the loads of the whole scene right above the axes."""
     x, y = plan.frame[2:] - plan.frame[:2] + (0.0, 17.0)
     for load in scene.loads:
@@ -306,4 +308,3 @@ def _badges(axes: Axes, scene: Scene, plan: Plan, measure: _Measure) -> None:
                 },
             )  # fmt: skip
         x -= 0.65 * BADGE
-    measure.finish()

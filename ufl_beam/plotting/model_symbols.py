@@ -18,28 +18,28 @@ from ufl_beam.model.plastic_hinges import law_of, place_of
 from ufl_beam.model.scene import Scene
 from ufl_beam.plotting import symbols
 from ufl_beam.plotting.captions import hinge_in_words, law_in_words, names_of
-from ufl_beam.plotting.connector_glyphs import GREY, INK, ORANGE, WHITE
 from ufl_beam.plotting.labels import Label, Spot
 from ufl_beam.plotting.load_symbols import (
     CAPTIONS,
     NAMES,
-    Bench,
+    Sizes,
     along_axis,
     around,
+    left_of,
     load_symbol,
     prescribed_symbol,
     velocity_symbol,
 )
 from ufl_beam.plotting.scene_layout import Model, Pose
-from ufl_beam.plotting.symbols import Footing, Stroke
+from ufl_beam.plotting.style import GREY, INK, ORANGE, WHITE, Stroke
+from ufl_beam.plotting.symbols import Footing
 
 HINGE, TEXT = "#B0508A", "#444444"
 """Colours of hinges, and of words that are no loads."""
 
-MOST_LABELS, MOST_CELLS = 80, 300
-"""Numbers beyond which names, and marks of cells, are left out."""
+MOST_LABELS, MOST_CELLS = 80, 300  # numbers beyond which names, and marks of cells, are left out
 
-SYMBOL, SHORT, SMALLEST = 12.0, 45.0, 0.3
+SYMBOL, SHORT_BEAM, SMALLEST = 12.0, 45.0, 0.3
 """Half the size of a symbol of a support where beams are not short; length of a beam below which it
 shrinks, in proportion; points.  It shrinks at most to this part."""
 
@@ -52,7 +52,7 @@ class Drawing:
     labels: list[Label] = field(default_factory=list)
 
     def add(self, group: str, strokes: Iterable[Stroke], labels: Iterable[Label] = ()) -> None:
-        """Add what an object looks like."""
+        """Add the strokes and labels of an object to a group."""
         self.strokes[group] += strokes
         self.labels += labels
 
@@ -63,27 +63,18 @@ class Drawing:
 
 
 class Subject(NamedTuple):
-    """A scene, and what drawings of any scale have in common.
-
-    Attributes:
-        scene: The scene.
-        axes: Vertices of each beam; (n, 2); m.
-        names: Of beams and bodies.
-        ways: Directions in which beams leave a place; (n, 2).
-        typical: Median of the lengths of beams; m.
-        largest: Largest point force, line load and initial velocity; N, N/m, m/s.
-    """
+    """Scene, and the properties that drawings of any scale have in common."""
 
     scene: Scene
-    axes: dict[Member, Array]
+    axes: dict[Member, Array]  # vertices of each beam; (n, 2); m
     names: dict[Member | Body, str]
-    ways: Callable[[Anchor], Array]
-    typical: float
-    largest: tuple[float, float, float]
+    ways: Callable[[Anchor], Array]  # directions in which beams leave a place; (n, 2)
+    typical: float  # median of the lengths of beams; m
+    largest: tuple[float, float, float]  # point force, line load and velocity; N, N/m, m/s
 
     @classmethod
     def of(cls, scene: Scene) -> Subject:
-        """The subject that a scene is."""
+        """Make the subject of a scene."""
         attached = scene.attached
         axes: dict[Member, Array] = {
             beam: np.array([beam.curve(s) for s in beam.vertices(attached[beam])], dtype=float)
@@ -101,18 +92,13 @@ class Subject(NamedTuple):
 
 
 def draw(subject: Subject, scale: float) -> Drawing:
-    """Draw all objects of a scene.
-
-    Args:
-        subject: The scene.
-        scale: Length of a point; m.
-    """
+    """Draw all objects of a scene; the length of a point is ``scale`` (m)."""
     scene, typical = subject.scene, subject.typical / scale
-    unit = SYMBOL * scale * min(max(typical / SHORT, SMALLEST), 1.0)
+    unit = SYMBOL * scale * min(max(typical / SHORT_BEAM, SMALLEST), 1.0)
     few = len(scene.supports) + len(scene.loads) <= MOST_LABELS / 2
     outside = max(unit, 0.7 * SYMBOL * scale) if few else unit
     pose = Model(scene, unit).undeformed
-    bench = Bench(outside, 1 / scale, subject.axes, subject.ways, subject.largest, {})
+    sizes = Sizes(outside, 1 / scale, subject.axes, subject.ways, subject.largest, {})
     drawing = Drawing()
     _draw_beams(drawing, subject, unit, scale)
     _draw_hinges(drawing, subject, unit, scale)
@@ -123,18 +109,18 @@ def draw(subject: Subject, scale: float) -> Drawing:
         drawing.add("supports", _support(footing, outside))
     for support in scene.supports:
         if support.moving:
-            ways = bench.ways(support.place)
+            ways = sizes.ways(support.place)
             inward = ways[0] if len(ways) else np.array([0.0, 1.0])
-            drawing.add("motions", *prescribed_symbol(support, inward, bench))
+            drawing.add("motions", *prescribed_symbol(support, inward, sizes))
     for mass in scene.masses:
         at, r = np.array(mass.place.point), 0.45 * unit
         label = Label(f"{mass.mass:.4g} kg", INK, CAPTIONS, around(at, r / scale))
         drawing.add("masses", [_disc(at, r, INK, INK)], [label])
     # Line loads come first, so that forces stand out from them.
     for load in sorted(scene.loads, key=lambda load: not isinstance(load, LineLoad)):
-        drawing.add("loads", *load_symbol(load, bench))
+        drawing.add("loads", *load_symbol(load, sizes))
     for velocity in scene.initial:
-        drawing.add("velocities", *velocity_symbol(velocity, bench))
+        drawing.add("velocities", *velocity_symbol(velocity, sizes))
     return drawing
 
 
@@ -206,12 +192,10 @@ def _draw_bodies(
     drawing: Drawing, pose: Pose, names: dict[Member | Body, str], scale: float
 ) -> None:
     """Outlines, centres, names; many bodies as dots."""
-    stage = pose.stage
-    bodies = stage.scene.bodies
+    stage, bodies = pose.stage, pose.stage.scene.bodies
     if len(bodies) > MOST_CELLS:
-        drawing.add(
-            "bodies", (_disc(np.array(b.center), 0.4 * stage.unit, INK, GREY) for b in bodies)
-        )
+        r = 0.4 * stage.unit
+        drawing.add("bodies", (_disc(np.array(b.center), r, INK, GREY) for b in bodies))
         return
     drawing.add("bodies", [*symbols.bodies(pose), *symbols.centres(pose)])
     for body, outline in stage.outlines.items():
@@ -228,32 +212,26 @@ def _draw_joints(drawing: Drawing, pose: Pose, radius: float) -> None:
     drawing.add("joints", [*symbols.rods(pose), *symbols.rails(pose)])
     square = 0.8 * radius * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)])
     for pin in symbols.pins(pose):
-        mark = (
-            _disc(pin.at, radius, INK, WHITE)
-            if pin.turns
-            else Stroke(pin.at + square, INK, 1.0, INK, 5.0)
-        )
-        drawing.add("joints", [mark])
+        disc = _disc(pin.at, radius, INK, WHITE)
+        drawing.add("joints", [disc if pin.turns else Stroke(pin.at + square, INK, 1.0, INK, 5.0)])
 
 
 def _draw_connectors(drawing: Drawing, pose: Pose, scale: float) -> None:
     drawing.add("connectors", symbols.connectors(pose))
     unit = pose.stage.unit
     for connector in pose.stage.scene.connectors:
-        lane = pose.stage.lanes[connector]
+        offset = pose.stage.offsets[connector]
         b = np.array(connector.b.point)
         if connector.turns:
-            spots = around(b, (1.6 + lane + 0.8) * unit / scale)
+            spots = around(b, (1.6 + offset + 0.8) * unit / scale)
         else:
             a = np.array(connector.a.point)
-            x, y = (
-                (b - a) / np.linalg.norm(b - a) if math.dist(a, b) > 0.1 * unit else connector.axis
-            )
-            across = np.array([-y, x])
+            apart = math.dist(a, b) > 0.1 * unit
+            across = left_of(_direction(a, b) if apart else np.array(connector.axis))
             spots = tuple(
-                Spot(a + part * (b - a) + lane * unit * across, sign * across, 0.8 * unit / scale)
+                Spot(a + part * (b - a) + offset * unit * across, sign * across, 0.8 * unit / scale)
                 for part in (0.5, 0.3, 0.7)
-                for sign in ((1.0, -1.0) if lane >= 0.0 else (-1.0, 1.0))
+                for sign in ((1.0, -1.0) if offset >= 0.0 else (-1.0, 1.0))
             )
         text = law_in_words(connector.law, connector.turns)
         drawing.labels.append(Label(text, TEXT, CAPTIONS, spots))
@@ -263,27 +241,20 @@ class _Ways:
     """Directions in which beams leave a place, of all beams that meet there."""
 
     def __init__(self, scene: Scene, axes_of: dict[Member, Array]) -> None:
-        self._size, self._axes = scene.size, axes_of
+        self._near, self._axes = 1e-7 * scene.size, axes_of
         ends: Array = np.reshape([(x[0], x[1], x[-1], x[-2]) for x in axes_of.values()], (-1, 2, 2))
-        keys = np.round(ends[:, 0] / self._size, 7)
         ways = ends[:, 1] - ends[:, 0]
-        ways /= np.linalg.norm(ways, axis=1)[:, None]
-        self._found: defaultdict[tuple[float, float], list[Array]] = defaultdict(list)
-        for k, key in enumerate(keys):
-            self._found[float(key[0]), float(key[1])].append(np.asarray(ways[k]))
-
-    def _key(self, point: tuple[float, float]) -> tuple[float, float]:
-        x, y = np.round(np.array(point) / self._size, 7)
-        return float(x), float(y)
+        self._ends, self._ways = ends[:, 0], ways / np.linalg.norm(ways, axis=1)[:, None]
 
     def __call__(self, anchor: Anchor) -> Array:
         """Unit vectors; (n, 2)."""
-        found = list(self._found.get(self._key(anchor.point), ()))
+        found = self._ways[np.abs(self._ends - anchor.point).max(axis=1) < self._near]
         if isinstance(anchor, Place) and 0.0 < anchor.s < 1.0:
             axis = self._axes[anchor.beam]
             k = int(np.argmin(np.linalg.norm(axis - anchor.point, axis=1)))
-            found += [_direction(axis[k], axis[j]) for j in (k - 1, k + 1) if 0 <= j < len(axis)]
-        return np.reshape(found, (-1, 2))
+            more = [_direction(axis[k], axis[j]) for j in (k - 1, k + 1) if 0 <= j < len(axis)]
+            found = np.vstack([found, *more])
+        return np.asarray(found)
 
 
 def _direction(start: Array, end: Array) -> Array:

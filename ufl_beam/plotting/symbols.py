@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Symbols of bodies, joints, connectors and supports as lines and areas.
 
-Pictures of all kinds draw these: :mod:`ufl_beam.plotting.plots` in the plane,
-:mod:`ufl_beam.plotting.render3d` solid.
+Pictures of all kinds draw these, in the plane and solid.
 """
 
 from __future__ import annotations
@@ -18,26 +17,18 @@ from ufl_beam.model.bodies import GROUND, Anchor, Place, Spot, node
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
+from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 from ufl_beam.output.joint_histories import turned
-from ufl_beam.plotting.connector_glyphs import (
-    AROUND,
-    GREY,
-    INK,
-    ORANGE,
-    STRAIGHT,
-    WHITE,
-    Piece,
-    along,
-    around,
-)
+from ufl_beam.plotting.connector_glyphs import AROUND, STRAIGHT, Piece, along, around
 from ufl_beam.plotting.scene_layout import Pose
+from ufl_beam.plotting.style import BACK, FRONT, GREY, INK, MIDDLE, ORANGE, UPON, WHITE, Stroke
 
 FILLED, EDGE = "#D6E2ED", "#5F7A94"
 """Colours of bodies."""
 
-BACK, MIDDLE, UPON, FRONT = 2.5, 4.2, 4.3, 5.5
-"""Layers: beneath the beams, over them, upon the areas there, and over the pins of joints."""
+STEEL, DARK, GROUND_GREY = "#6E6E6E", "#4A4A4A", "#808080"
+"""Colours of rails and guides, of rods, and of supports that stand still."""
 
 # Outlines of the symbols of supports; half a symbol is 1, the place is the origin, the beam comes
 # from above.
@@ -49,53 +40,21 @@ _TRACK = [(-1.0, -1.0), (1.0, -1.0), (1.0, -1.1), (-1.0, -1.1), (-1.0, -1.0)]
 _DIAMOND = [(-0.6, 0.0), (0.0, 0.6), (0.6, 0.0), (0.0, -0.6), (-0.6, 0.0)]
 
 
-class Stroke(NamedTuple):
-    """A line, or an area if it is filled.
-
-    Attributes:
-        points: Shape (n, 2); m.
-        color: Of the line.
-        weight: Width of the line; points.
-        fill: Colour of the area.
-        layer: ``BACK``, ``MIDDLE``, ``UPON`` or ``FRONT``.
-    """
-
-    points: Array
-    color: str = INK
-    weight: float = 1.6
-    fill: str | None = None
-    layer: float = MIDDLE
-
-
 class Pin(NamedTuple):
-    """Symbol of a joint of places at one point.
+    """Symbol of a joint of places at one point."""
 
-    Attributes:
-        at: Shape (2,); m.
-        turns: Whether they turn freely.
-        places: What is joined.
-    """
-
-    at: Array
-    turns: bool
+    at: Array  # (2,); m
+    turns: bool  # freely
     places: tuple[Anchor, ...]
 
 
 class Footing(NamedTuple):
-    """The symbol of a support, or of a point of the ground.
+    """Symbol of a support, or of a point of the ground."""
 
-    Attributes:
-        at: Shape (2,); m.
-        angle: By which it is turned; rad.
-        outlines: Half a symbol is 1, the place is the origin.
-        color: Orange ones move.
-        place: What it holds.
-    """
-
-    at: Array
-    angle: float
-    outlines: list[Outline]
-    color: str
+    at: Array  # (2,); m
+    angle: float  # by which it is turned; rad
+    outlines: list[Outline]  # half a symbol is 1, the place is the origin
+    color: str  # orange ones move
     place: Anchor
 
 
@@ -103,15 +62,13 @@ class Footing(NamedTuple):
 
 
 def bodies(pose: Pose) -> list[Stroke]:
-    """Outlines of the rigid bodies."""
+    """Draw outlines of the rigid bodies."""
     outlines = pose.stage.outlines.items()
-    return [
-        Stroke(pose.of_body(body, outline), EDGE, 1.6, FILLED, BACK) for body, outline in outlines
-    ]
+    return [Stroke(pose.of_body(body, line), EDGE, 1.6, FILLED, BACK) for body, line in outlines]
 
 
 def centres(pose: Pose) -> Iterator[Stroke]:
-    """Marks of the centres of mass: circles, two quarters dark."""
+    """Draw centres of mass as circles, two quarters dark."""
     angle = np.linspace(0.0, math.pi / 2, 13)
     arc = 0.45 * pose.stage.unit * np.column_stack([np.cos(angle), np.sin(angle)])
     quarter = np.vstack([(0.0, 0.0), arc, (0.0, 0.0)])
@@ -126,22 +83,31 @@ def centres(pose: Pose) -> Iterator[Stroke]:
 
 
 def rods(pose: Pose) -> Iterator[Stroke]:
-    """Rigid links, thick, and links, thin."""
+    """Draw rigid links, thick, and links, thin."""
     for joint in pose.stage.scene.joints:
         if joint.look in ("RigidLink", "Link"):
             weight = 6.0 if joint.look == "RigidLink" else 2.6
             ends = np.array([pose.at(place) for place in joint.places])
-            yield Stroke(ends, "#4A4A4A", weight)
+            yield Stroke(ends, DARK, weight)
 
 
 def pins(pose: Pose) -> Iterator[Pin]:
-    """Circles where joints turn, squares where they do not."""
+    """Draw circles where joints turn, squares where they do not."""
     for joint in pose.stage.scene.joints:
-        yield from _PINS[joint.look](pose, joint)
+        places, apart = joint.places, 2 not in joint.shared
+        match joint.look:
+            case "Link":
+                yield from (Pin(pose.at(place), True, (place,)) for place in places)
+            case "Prismatic" | "Guided" if apart:
+                yield Pin(pose.at(places[1]), True, places[1:])
+            case "Rigid" | "Revolute":
+                yield Pin(pose.at(places[0]), _turns(joint), places)
+            case "Release" if apart or 0 in joint.shared:  # else it only slides: rails show it
+                yield Pin(pose.at(places[0]), _turns(joint), places)
 
 
 def rails(pose: Pose) -> Iterator[Stroke]:
-    """Rails, guide curves, and the blocks on them."""
+    """Draw rails, guide curves, and the blocks on them."""
     for joint in pose.stage.scene.joints:
         if joint.look in _RAILS:
             yield from _RAILS[joint.look](pose, joint)
@@ -151,7 +117,7 @@ def rails(pose: Pose) -> Iterator[Stroke]:
 
 
 def connectors(pose: Pose) -> Iterator[Stroke]:
-    """Springs, dampers, motors and their like."""
+    """Draw springs, dampers, motors and their like."""
     for connector in pose.stage.scene.connectors:
         draw = _around if connector.turns else _straight
         yield from draw(pose, connector)
@@ -159,16 +125,14 @@ def connectors(pose: Pose) -> Iterator[Stroke]:
 
 def _straight(pose: Pose, connector: Connector) -> Iterator[Stroke]:
     a, b = pose.at(connector.a), pose.at(connector.b)
-    unit, lane = pose.stage.unit, pose.stage.lanes[connector]
+    unit, offset = pose.stage.unit, pose.stage.offsets[connector]
     length = float(np.linalg.norm(b - a))
-    if length > 0.1 * unit:
-        x, y = (b - a) / length
-    else:
-        x, y = pose.turned(connector.axis, connector.a)
+    straight = length > 0.1 * unit
+    x, y = (b - a) / length if straight else pose.turned(connector.axis, connector.a)
     across = np.array([-y, x])
     ends = a, b
-    if lane:
-        aside = lane * unit * across
+    if offset:
+        aside = offset * unit * across
         ends = a + 0.06 * (b - a), b - 0.06 * (b - a)
         yield Stroke(np.array([a, ends[0], ends[0] + aside]))
         yield Stroke(np.array([b, ends[1], ends[1] + aside]))
@@ -181,7 +145,7 @@ def _straight(pose: Pose, connector: Connector) -> Iterator[Stroke]:
 
 def _around(pose: Pose, connector: Connector) -> Iterator[Stroke]:
     glyph, pin = AROUND[type(connector.law)], pose.at(connector.b)
-    radius = (1.6 + pose.stage.lanes[connector]) * pose.stage.unit
+    radius = (1.6 + pose.stage.offsets[connector]) * pose.stage.unit
     a, b = pose.turn(connector.a), pose.turn(connector.b)
     first, sweep = (b, 0.0) if glyph.spins else (a, b - a)
     first -= 0.5
@@ -199,22 +163,30 @@ def _around(pose: Pose, connector: Connector) -> Iterator[Stroke]:
 
 
 def footings(pose: Pose) -> Iterator[Footing]:
-    """Symbols of supports, and of the points of the ground that hold something."""
+    """Draw supports, and points of the ground that hold something."""
     for support in pose.stage.scene.supports:
         angle = support_direction(support, pose.turn(support.place))
-        color = ORANGE if support.moving else "#808080"
+        color = ORANGE if support.moving else GROUND_GREY
         symbol = support_symbol(support)
         yield Footing(pose.at(support.place), angle, symbol, color, support.place)
-    for spot, (inward, turns) in _grounds(pose).items():
+    for spot, (inward, turns) in _grounds(pose.stage.scene).items():
         symbol = [_TRIANGLE, _PLATE] if turns else [_CLAMP]
         angle = _upright(inward) if turns else inward - math.pi / 2
-        yield Footing(np.array(spot.point), angle, symbol, "#808080", spot)
+        yield Footing(np.array(spot.point), angle, symbol, GROUND_GREY, spot)
 
 
-def _grounds(pose: Pose) -> dict[Spot, tuple[float, bool]]:
-    """Where what a point of the ground holds is, and whether it all turns freely."""
+def _turns(joint: Joint) -> bool:
+    return 2 not in joint.shared and not any(holder.turns for holder in joint.holders)
+
+
+def _grounds(scene: Scene) -> dict[Spot, tuple[float, bool]]:
+    """Direction in which a point of the ground holds something; True if that turns freely."""
+    held: list[tuple[Sequence[Anchor], bool]] = [
+        (j.places, _turns(j)) for j in scene.joints if j.look not in ("Prismatic", "Guided")
+    ]
+    held += [((c.a, c.b), False) for c in scene.connectors if not c.turns]
     found: dict[Spot, tuple[float, bool]] = {}
-    for places, turns in _held(pose):
+    for places, turns in held:
         for spot in places:
             if isinstance(spot, Spot) and spot.body is GROUND:
                 inward = _towards(spot, next(p for p in places if p != spot))
@@ -223,57 +195,7 @@ def _grounds(pose: Pose) -> dict[Spot, tuple[float, bool]]:
     return found
 
 
-def _held(pose: Pose) -> Iterator[tuple[Sequence[Anchor], bool]]:
-    scene = pose.stage.scene
-    for joint in scene.joints:
-        if joint.kind not in ("Prismatic", "Guided"):
-            yield joint.places, 2 not in joint.shared and not _holds_turning(joint)
-    for connector in scene.connectors:
-        if not connector.turns:
-            yield (connector.a, connector.b), False
-
-
-# -- joints, by kind ---------------------------------------------------------------------------
-
-
-def _holds_turning(joint: Joint) -> bool:
-    return any(holder.turns for holder in joint.holders)
-
-
-def _one_pin(pose: Pose, joint: Joint) -> Iterator[Pin]:
-    turns = 2 not in joint.shared and not _holds_turning(joint)
-    yield Pin(pose.at(joint.places[0]), turns, joint.places)
-
-
-def _pin_at_ends(pose: Pose, joint: Joint) -> Iterator[Pin]:
-    for place in joint.places:
-        yield Pin(pose.at(place), True, (place,))
-
-
-def _pin_that_slides(pose: Pose, joint: Joint) -> Iterator[Pin]:
-    if 2 not in joint.shared:
-        yield Pin(pose.at(joint.places[1]), True, joint.places[1:])
-
-
-def _pin_of_release(pose: Pose, joint: Joint) -> Iterator[Pin]:
-    """None if it only slides, which rails show."""
-    if 2 not in joint.shared or 0 in joint.shared:
-        yield from _one_pin(pose, joint)
-
-
-def _no_pin(pose: Pose, joint: Joint) -> Iterator[Pin]:
-    return iter(())
-
-
-_PINS: dict[str, Callable[[Pose, Joint], Iterator[Pin]]] = {
-    "Rigid": _one_pin,
-    "Revolute": _one_pin,
-    "Release": _pin_of_release,
-    "Link": _pin_at_ends,
-    "RigidLink": _no_pin,
-    "Prismatic": _pin_that_slides,
-    "Guided": _pin_that_slides,
-}
+# -- rails, by kind of joint -------------------------------------------------------------------
 
 
 def _rail(pose: Pose, joint: Joint) -> Iterator[Stroke]:
@@ -288,12 +210,12 @@ def _rail(pose: Pose, joint: Joint) -> Iterator[Stroke]:
     low, high = min(low, s), max(high, s)  # magnified rotations lead elsewhere
     first = block + (low - 1.8 * unit - s) * ahead
     last = block + (high + 1.8 * unit - s) * ahead
-    yield Stroke(np.array([first, last]), "#6E6E6E", 2.2)
+    yield Stroke(np.array([first, last]), STEEL, 2.2)
     if node(base) is GROUND:
         yield from _hatches(np.array([first, last]), unit)
     else:
         foot = min(max(0.0, low - 1.8 * unit), high + 1.8 * unit)
-        yield Stroke(np.array([start, block + (foot - s) * ahead]), "#6E6E6E", 2.2)
+        yield Stroke(np.array([start, block + (foot - s) * ahead]), STEEL, 2.2)
     corners = [(-0.95, 0.55), (0.95, 0.55), (0.95, -0.55), (-0.95, -0.55), (-0.95, 0.55)]
     outline = block + unit * (np.array(corners) @ np.array([ahead, left]))
     yield Stroke(outline, INK, 1.8, WHITE)
@@ -305,7 +227,7 @@ def _guide(pose: Pose, joint: Joint) -> Iterator[Stroke]:
     assert isinstance(holder.law, Guide)
     low, high = pose.stage.travels[holder]
     curve = np.array([holder.law.curve(s) for s in np.linspace(low, high, 200)], dtype=float)
-    yield Stroke(curve, "#6E6E6E", 2.2, layer=BACK)
+    yield Stroke(curve, STEEL, 2.2, layer=BACK)
     yield from (h._replace(layer=BACK) for h in _hatches(curve, pose.stage.unit))
 
 
@@ -335,20 +257,15 @@ _RAILS: dict[str, Callable[[Pose, Joint], Iterator[Stroke]]] = {
 
 
 def support_symbol(support: Support) -> list[Outline]:
-    """Outlines of the symbol of a support; half a symbol is 1, the place is the origin."""
-    if len(support.held) == 3:
-        return [_CLAMP]
-    return {0: [_DIAMOND], 1: [_TRIANGLE, _TRACK], 2: [_TRIANGLE, _PLATE]}[
-        len({0, 1} & set(support.held))
-    ]
+    """Return outlines of the symbol of a support; half a symbol is 1, its place the origin."""
+    held = 3 if len(support.held) == 3 else len({0, 1} & set(support.held))
+    return [[_DIAMOND], [_TRIANGLE, _TRACK], [_TRIANGLE, _PLATE], [_CLAMP]][held]
 
 
 def support_direction(support: Support, turned: float) -> float:
-    """Angle by which the symbol of a support is turned, away from its beam; rad.
+    """Return the angle of the symbol of a support, away from its beam; rad.
 
-    Args:
-        support: The support.
-        turned: Rotation ψ of its place, which a clamp follows; rad.
+    A clamp follows the rotation of its place, by which it is ``turned`` (rad).
     """
     inward = _inward(support.place)
     if len(support.held) == 3:
@@ -393,4 +310,4 @@ def _hatches(line: Array, unit: float) -> Iterator[Stroke]:
         k = min(int(np.searchsorted(way, s)), len(steps)) - 1
         dx, dy = steps[k] / (np.linalg.norm(steps[k]) or 1.0)
         foot = np.array([x - 0.4 * unit * (dx - dy), y - 0.4 * unit * (dy + dx)])
-        yield Stroke(np.array([[x, y], foot]), "#6E6E6E", 1.0)
+        yield Stroke(np.array([[x, y], foot]), STEEL, 1.0)

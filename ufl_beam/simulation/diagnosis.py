@@ -192,7 +192,7 @@ def _singularity_at(simulation: Failed, q: Array) -> str:
     grid, scene = simulation.grid, simulation.scene
     motions: Array = np.abs(x)
     turns = np.zeros(grid.size, dtype=bool)
-    turns[[*grid.dofs[:, 2], *grid.dofs_of_bodies[:, 2]]] = True
+    turns[grid.rotations] = True
     motions[~turns] /= scene.size
     motions[grid.multipliers] = 0.0
     largest = float(motions.max())

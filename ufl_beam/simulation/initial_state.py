@@ -25,7 +25,7 @@ class Start(Protocol):
 
     @property
     def q(self) -> Array:
-        """Configurations."""
+        """Configurations of the solution; (n+1, size)."""
 
     @property
     def v(self) -> Array:

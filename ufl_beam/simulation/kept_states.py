@@ -26,7 +26,7 @@ class KeptStates:
         self.connections: list[Array] = []
 
     def keep(self, state: Snapshot) -> None:
-        """Append a state."""
+        """Append a state of a run."""
         self.times.append(state.t)
         self.q.append(state.q)
         if state.v is not None:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -18,8 +19,8 @@ from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import take
-from ufl_beam.output.recorders import UNLIMITED, Recorder, close_all, recorders_of
-from ufl_beam.parallel import communicator, in_study, ours
+from ufl_beam.output.recorders import Recorder, close_all, recorders_of
+from ufl_beam.parallel import communicator, in_study, say
 from ufl_beam.simulation.checkpoint import (
     Checkpoint,
     Keeper,
@@ -45,7 +46,7 @@ def simulate(
     dt: float | Adaptive,
     record: Sequence[Recorder] | Recorder = (),
     every: int = 1,
-    most: int = UNLIMITED,
+    most: int = sys.maxsize,
     start: Solution | None = None,
     newton: Newton | None = None,
     mesh: Mesh | None = None,
@@ -225,14 +226,3 @@ def _require_step(dt: float | Adaptive, scheme: Scheme, t: tuple[float, float]) 
             "simulate: dt = Adaptive(...) estimates the error of accelerations, and a static "
             "scheme has none; give a number"
         )
-
-
-def say(*words: object, sep: str = " ") -> None:
-    """Print from the first process only, as scripts do that may run under ``mpirun``.
-
-    Example:
-        >>> ub.say("steps:", len(solution.times) - 1)  # once, on any number of processes
-        steps: 20
-    """
-    if ours().rank == 0:
-        print(*words, sep=sep, flush=True)  # noqa: T201

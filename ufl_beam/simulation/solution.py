@@ -52,17 +52,17 @@ class Solution:
     It can be saved, see :meth:`save`, and pickled, with what a file has.
 
     Attributes:
-        scene: What was modelled.
+        scene: Model.
         grid: Its vertices, cells and numbering.
         parts: Number of steps that were taken, parts of cut steps counted each.
         iterations: Number of Newton iterations.
-        time_error: Sum of the errors of :class:`Adaptive` steps as they estimated them; of a part
-            of the size of the scene, rad; NaN if nobody did.
+        time_error: Sum of the estimated errors of :class:`Adaptive` steps, relative to the size of
+            the scene, or in rad; NaN with equal steps.
         seconds: Wall time of the run, building the scene included; s.
         every: Steps from one that was kept to the next.
         parameter: Words for :attr:`times`, which are load factors in a path.
         open_ledger: How far the energy ledger is open, in words; empty if it closes as claimed.
-        internal: What cells and connectors remember at the end of the run.
+        internal: Internal variables of cells and connectors at the end of the run.
 
     Example:
         >>> print((1e3 * solution.displacement(beam.end)[-1]).round(1))  # mm, mm, mrad, at t = 1 s
@@ -85,12 +85,12 @@ class Solution:
         self._cells = CellResults(grid, self._kept)
 
     def keep(self, state: Snapshot) -> None:
-        """Append a state."""
+        """Append a state of a run."""
         self._kept.keep(state)
         self.parts, self.iterations = state.parts, state.iterations
 
     def history(self) -> State:
-        """All that was kept, as arrays by name."""
+        """Return all kept states, as arrays by name."""
         return {**self._kept.arrays(), "every": np.array([self.every])}
 
     def resume(self, history: State) -> None:
@@ -118,7 +118,7 @@ class Solution:
         on_first(ours(), lambda: write(file, FORMAT, *self._content()))
 
     def _content(self) -> tuple[dict[str, Any], State]:
-        """All that is saved: text and arrays."""
+        """Text and arrays that are saved."""
         return text_of(self), arrays_of(self)
 
     def _take(self, text: dict[str, Any], arrays: State) -> None:
@@ -267,7 +267,7 @@ class Solution:
         return self._cells.material(n, self.grid.cells_of(beam))
 
     def material_at(self, place: Place) -> Material:
-        """The same in the cell at a place at all kept times; the arrays begin with (n+1,).
+        """Material states in the cell at a place at all kept times; arrays begin with (n+1,).
 
         Where a plastic hinge is at the place, M, the jump and the energy are those of the hinge; M
         is the moment during the step that ends at each time.

@@ -51,7 +51,7 @@ class Saved(Protocol):
         """Coordinates of a place at these times; m."""
 
     def history(self) -> State:
-        """All that was kept."""
+        """Return all kept states, as arrays by name."""
 
     def resume(self, history: State) -> None:
         """Take over a :meth:`history`."""

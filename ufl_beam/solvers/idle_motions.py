@@ -50,7 +50,7 @@ class IdleMotions:
         self._owned[share.multipliers()] = False
         grid = share.grid
         self._radians = np.full(grid.size, 1 / grid.scene.size)
-        self._radians[np.r_[grid.dofs[:, 2], grid.dofs_of_bodies[:, 2]]] = 1.0
+        self._radians[grid.rotations] = 1.0
         self._radians[grid.multipliers] = 0.0
         self.stiffness: Array = np.zeros(share.size)
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from petsc4py import PETSc
@@ -55,29 +56,29 @@ class ChainsFirst:
 
     def setUp(self, pc: PETSc.PC) -> None:
         """Factor; PETSc asks for it where the matrix has changed."""
-        self._good = self._elimination.factor() and self._factor()
+        self._matrix.stateIncrease()
+        self._good = self._elimination.factor() and self._succeeds(self._factors.setUp)
+        self._good = self._good and int(self._factors.getFailedReason()) == GOOD
         pc.setFailedReason(GOOD if self._good else BAD_PIVOT)
 
-    def _factor(self) -> bool:
-        self._matrix.stateIncrease()
+    def _succeeds(self, function: Callable[..., None], *vectors: PETSc.Vec) -> bool:
+        """Return False if KLU finds that the matrix is singular; its next factorisation works."""
         try:
-            self._factors.setUp()
+            function(*vectors)
         except PETSc.Error as error:
             if error.ierr != lib.OF_LIBRARY:
                 raise
-            # KLU says so of a matrix that is singular; its next factorisation does not mind.
             return False
-        return int(self._factors.getFailedReason()) == GOOD
-
-    def _solve(self) -> None:
-        self._rhs.stateIncrease()
-        self._factors.apply(self._rhs, self._solution)
+        return True
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, x: PETSc.Vec) -> None:
-        """Solve; nothing after a failure, where an error would leave objects of PETSc half done."""
-        if not self._good:
+        """Solve; zero after a failure, where an error would leave objects of PETSc half done."""
+        if self._good:
+            self._elimination.reduce(b.array_r)
+            self._rhs.stateIncrease()
+            self._good = self._succeeds(self._factors.apply, self._rhs, self._solution)
+        if self._good:
+            self._elimination.expand(self._solution.array_r, x.array_w)
+        else:
             x.array_w[:] = 0.0
-            return
-        self._elimination.reduce(b.array_r)
-        self._solve()
-        self._elimination.expand(self._solution.array_r, x.array_w)
+            pc.setFailedReason(BAD_PIVOT)

@@ -188,9 +188,9 @@ class Elimination:
         }
         of_doubles = {
             "data": A.data,
-            "pivots": np.empty(9 * vertices),  # sizes as in elimination.c
-            "to_next": np.empty(9 * vertices),
-            "sides": np.empty(18 * vertices if chains.spikes.any() else 0),
+            "pivots": np.empty(lib.BLOCK * vertices),
+            "to_next": np.empty(lib.BLOCK * vertices),
+            "sides": np.empty(lib.SIDES * vertices if chains.spikes.any() else 0),
             "f": np.zeros(3 * vertices),
             "left_data": self.data,
             "left_f": self.f,

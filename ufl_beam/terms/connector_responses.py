@@ -56,7 +56,7 @@ class Response(Protocol):
 
     @property
     def openable(self) -> Openable | None:
-        """Those that open beyond a limit, if there are."""
+        """Connectors that open beyond a limit, if there are any."""
 
     def motion(self, e: Array) -> Array:
         """Motions of the accepted state as solutions show them; ``e`` are those of the nodes."""
@@ -115,7 +115,7 @@ class Response(Protocol):
         """Begin at motions that no step has led to."""
 
     def freeze(self) -> None:
-        """From now on nothing yields or breaks further."""
+        """Keep everything elastic from now on: nothing yields or breaks further."""
 
 
 @singledispatch
@@ -155,35 +155,35 @@ class Working:
         """Prepare a step."""
 
     def motion(self, e: Array) -> Array:
-        """Those of the nodes."""
+        """Motions of the nodes."""
         return e
 
     def again(self) -> None:
-        """Nothing depends on iterates."""
+        """Do nothing: laws do not depend on iterates."""
 
     def accept(self, e1: Array, work: float) -> None:
-        """Enter the work."""
+        """Enter the work into the ledger."""
         if self._entry:
             self._entries[self._entry] += self._sign * work
 
     def add_state(self, e: Array) -> None:
-        """Nothing is stored."""
+        """Add nothing: no energy is stored."""
 
     def change(self, e1: Array, work: float) -> float:
-        """The work."""
+        """Energy of the step: the work of the connectors."""
         return work
 
     def dissipation(self, e1: Array, λ: Array) -> float:
-        """None by plastic flow."""
+        """Zero: there is no plastic dissipation."""
         return 0.0
 
     def flows(self) -> bool:
-        """None does."""
+        """False: there is no plastic flow."""
         return False
 
     @property
     def dissipated(self) -> Array:
-        """None by plastic flow."""
+        """Zero: there is no plastic dissipation."""
         return np.zeros(len(self._links))
 
     def about_force(self, rows: Array) -> Array:
@@ -192,7 +192,7 @@ class Working:
         return np.where(about_motion, 0.0, 1.0)
 
     def remaining(self) -> Array:
-        """All of it: nothing yields."""
+        """Part of the elastic stiffness that is left: 1, as nothing yields."""
         return np.ones(len(self._links))
 
     def bends(self, e1: Array) -> Array:
@@ -200,17 +200,17 @@ class Working:
         return np.zeros(len(self._links))
 
     def state(self) -> Array:
-        """Nothing is remembered."""
+        """Return nothing: there are no internal variables."""
         return np.zeros((len(self._links), 0))
 
     def restore(self, rows: Array) -> None:
-        """Nothing was remembered."""
+        """Restore nothing: there are no internal variables."""
 
     def start(self, e: Array) -> None:
-        """Nothing depends on them."""
+        """Do nothing: there are no internal variables."""
 
     def freeze(self) -> None:
-        """Nothing yields."""
+        """Do nothing: these laws do not yield."""
 
     def _numbers(self, name: str) -> Array:
         return np.array([getattr(law, name) for law in self._laws], dtype=np.float64)

@@ -170,7 +170,8 @@ class Points:
             self._resist()
 
         cells = len(storage)
-        self.kept, self.sums = np.zeros((cells, 6)), np.zeros(7)
+        self.kept = np.zeros((cells, int(lib.POINT_KEPT)))
+        self.sums = np.zeros(int(lib.POINT_SUMS))
         self.r, self.D = np.zeros((cells, 3)), np.zeros((cells, 9))
         self._e0, self.strains = np.zeros((cells, 3)), np.zeros((cells, 3))
         self._over = np.zeros(1)

@@ -44,7 +44,7 @@ class _Sprung:
         self.openable = self.points if self.points.softens else None
 
     def motion(self, e: Array) -> Array:
-        """Those of the nodes."""
+        """Motions of the nodes."""
         return e
 
     def _at(self, e: Array) -> Array:
@@ -88,7 +88,7 @@ class _Sprung:
         return self.points.dissipation()
 
     def flows(self) -> bool:
-        """Their motions tell."""
+        """True if a spring flows, which its motions tell."""
         return False
 
     @property
@@ -101,7 +101,7 @@ class _Sprung:
         return self.points.remaining(np.eye(1, 3).repeat(len(self._strains), axis=0))
 
     def bends(self, e1: Array) -> Array:
-        """Nothing bends until something yields."""
+        """Zero until something yields."""
         return np.zeros(len(e1))
 
     def state(self) -> Array:
@@ -118,5 +118,5 @@ class _Sprung:
         self.points.refresh(self._at(e))
 
     def freeze(self) -> None:
-        """From now on nothing yields or breaks further."""
+        """Keep everything elastic from now on: nothing yields or breaks further."""
         self.points.freeze()

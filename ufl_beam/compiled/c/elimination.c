@@ -8,9 +8,8 @@
  * vertex before, of v and of the vertex after are among them.
  */
 
-/* What is kept of a vertex: its pivot block as LU, and what that makes of the coupling to the vertex
- * after; where there is a spike, what it makes of that to the left end, and the coupling from there. */
-enum { BLOCK = 9, TO_LEFT = 0, FROM_LEFT = 9, SIDES = 18 };
+/* In the sides of a vertex: what its pivot makes of the coupling to the left end, that from there. */
+enum { TO_LEFT = 0, FROM_LEFT = 9 };
 
 /* D = LU with the largest pivot of each column; the reciprocals of the pivots on the diagonal */
 static void factor_block(double *D, int32_t *swap)

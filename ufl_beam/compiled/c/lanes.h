@@ -20,9 +20,9 @@ typedef int64_t mask __attribute__((vector_size(8 * LANES), aligned(8), may_alia
  * is preserved.
  */
 
-/* sin(x + quarter π/2): the nearest multiple of π/2 is taken off in three parts (Cody and Waite);
- * the polynomials between -π/4 and π/4 are those of fdlibm (Sun Microsystems, 1993), good to the
- * last digit. x loses digits beyond 1e6, where it has few itself, and must stay below 1e15. */
+/* sin(x + quarter π/2): the nearest multiple of π/2 is taken off in three parts (Cody and Waite); the
+ * polynomials between -π/4 and π/4 are good to the last digit. x loses digits beyond 1e6, where it has
+ * few itself, and must stay below 1e15. */
 static inline lanes trigonometric(lanes x, int64_t quarter)
 {
   const lanes shifted = x * 0x1.45f306dc9c883p-1 + 0x1.8p52, k = shifted - 0x1.8p52;

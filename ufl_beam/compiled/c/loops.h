@@ -65,8 +65,8 @@ void add_first_cells(void *self, const double *q, double *b);
 void subtract_vector(void *self, const double *q, double *b);
 void add_step_force(void *self, const double *q, double *r);
 void add_step_tangent(void *self, const double *q, double *tangent);
-int find_entries(const int32_t *indptr, const int32_t *indices, int number, const int32_t *row,
-                 const int32_t *column, int32_t *found);
+int find_entries(int rows, const int32_t *indptr, const int32_t *indices, int number,
+                 const int32_t *row, const int32_t *column, int32_t *found);
 void add_product(int rows, const int32_t *indptr, const int32_t *indices, const double *data,
                  const double *x, double *y);
 double quadratic_form(int rows, const int32_t *indptr, const int32_t *indices, const double *data,
@@ -98,6 +98,8 @@ enum { CLOSED, FLOWING, RELEASED };
 enum point_output {
   FLOW, WORKED, BROKEN, LOST, ELASTIC, HARDENING, STRESS, RESISTANCE, POINT_OUTPUTS
 };
+
+enum { POINT_KEPT = 6, POINT_SUMS = 7 }; /* numbers of a cell, and of all: `kept` and `sum` of points */
 
 /* Flags that all points of a scene share in a step; see Course in material_points.py. */
 enum course { OPENED, RELIEF, HOLD, OVER, COURSE_FLAGS };
@@ -162,7 +164,6 @@ typedef struct {
 } couplings;
 
 void find_motions(const couplings *c, const double *q);
-void set_rows_of_rigid_plastic(const couplings *c, const double *q);
 double dissipation_of_rigid_plastic(const rigid_plastic *p, const double *e1, const double *force);
 void commit_rigid_plastic(const rigid_plastic *p, const double *e1, double *sums);
 void add_couplings_force(void *self, const double *q, double *r);
@@ -177,6 +178,10 @@ void add_inelastic_tangent(void *self, const double *q, double *tangent);
 void commit(const points *p);
 
 /* -- elimination along chains ------------------------------------------------------------------ */
+
+/* What is kept of a vertex: its pivot block as LU, what that makes of the coupling to the vertex after;
+ * where there is a spike, the couplings to and from the left end. */
+enum { BLOCK = 9, SIDES = 18 };
 
 typedef struct {
   int chains;
@@ -292,7 +297,6 @@ void residual(equation *e, const double *q, double *r);
 void assemble(equation *e, const double *q);
 int factor_tangent(const equation *e, int *failed);
 int solve_tangent(const equation *e);
-double motion_of(const equation *e, const double *q);
 void find_last_digits(const equation *e, const double *q, double *digits);
 double size_of_forces(const equation *e, const double *f);
 int judge(equation *e, const double *q, int iteration, double residual, double scale,

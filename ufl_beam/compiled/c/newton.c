@@ -79,7 +79,7 @@ int judge(equation *e, const double *q, int iteration, double residual, double s
 }
 
 /* Largest motion in the scene, at most its size. */
-double motion_of(const equation *e, const double *q)
+static double motion_of(const equation *e, const double *q)
 {
   return fmin(largest_motion(e->size, e->weight, q), e->scene);
 }

@@ -43,7 +43,7 @@ static int direction_of_slip(const rigid_plastic *p, int i, double *w, double mo
 
 /* Rows of the connectors at their motions c->e1 and forces in q: the equations above over -r, which
  * leaves the tangent of held ones symmetric. */
-void set_rows_of_rigid_plastic(const couplings *c, const double *q)
+static void set_rows_of_rigid_plastic(const couplings *c, const double *q)
 {
   const rigid_plastic *p = c->rigid_plastic;
   double *w = p->w, s[2];

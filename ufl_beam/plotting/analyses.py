@@ -1,0 +1,227 @@
+# SPDX-License-Identifier: MIT
+"""Pictures of analyses: modes, trade-offs, envelopes of a run, cycles of stress and damage."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import cycle, product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ufl_beam.analysis.modes import AMPLITUDE, Shapes
+from ufl_beam.analysis.tradeoff_result import Tradeoff
+from ufl_beam.arrays import Array
+from ufl_beam.errors import SceneError
+from ufl_beam.output.extremes import Extremes
+from ufl_beam.output.fatigue import Fatigue, HotSpot
+from ufl_beam.plotting import drawing, style
+from ufl_beam.plotting.diagrams import draw_diagrams, finish
+from ufl_beam.plotting.style import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY, picture
+from ufl_beam.simulation.solution import Solution
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+LEAST_ERROR = 1e-12  # errors below are drawn there, in the unit of the quantity
+CLASSES = 40  # classes of ranges and of means of cycles in pictures
+
+
+def plot_modes(
+    shapes: Shapes, which: Sequence[int] = (), *, amplitude: float = AMPLITUDE
+) -> Figure:
+    """Draw modes side by side, in both directions from the grey undeformed scene.
+
+    Args:
+        shapes: Of :func:`modes` or :func:`buckling`.
+        which: Their numbers; all by default.
+        amplitude: Largest displacement, as a part of the size of the scene.
+
+    Raises:
+        SceneError: There is no such shape, or ``amplitude`` is not positive.
+
+    Example:
+        >>> ub.plot_modes(ub.modes(scene, 3)).savefig("modes.png")
+    """
+    chosen = list(which) if len(which) else list(range(len(shapes)))
+    if not chosen:
+        raise SceneError("plot_modes: there is no shape")
+    swings = [shapes.motion(k, amplitude=amplitude, count=2) for k in chosen]
+    stages = [drawing.plane_stage(swing, [0, 1], 1.0) for swing in swings]
+    ends = [(drawing.moved_points(s, 0, 1.0), drawing.moved_points(s, 1, 1.0)) for s in swings]
+    bodies = [stage.pose(n).points() for stage in stages for n in (0, 1)]
+    box = np.concatenate(
+        [shapes.grid.points, *bodies, *(points for pair in ends for points in pair)]
+    )
+    low, high = box.min(axis=0), box.max(axis=0)
+    # Room for the symbols of supports.
+    room = 0.08 * np.hypot(*(high - low))
+    width, height = high - low + 2 * room
+    columns = min(len(chosen), 3 if height < 0.8 * width else 4)
+    rows = -(-len(chosen) // columns)
+    with picture((4.0 * columns, rows * (4.0 * height / width + 0.5))) as figure:
+        grid = np.ravel(figure.subplots(rows, columns, squeeze=False))
+        for axes in grid:
+            axes.set_axis_off()
+        for k, swing, stage, (there, back), axes in zip(
+            chosen, swings, stages, ends, grid, strict=False
+        ):
+            drawing.draw_undeformed(axes, swing, stage)
+            drawing.draw_axes(axes, swing, back, color=SKY, linewidth=1.6, zorder=2)
+            drawing.draw_axes(axes, swing, there, color=BLUE, linewidth=2.6, zorder=4)
+            drawing.draw_symbols(axes, stage.pose(0))
+            axes.set_title(f"{k}: {shapes.titles[k]}", loc="left")
+            axes.set(aspect="equal", xlim=(low[0] - room, high[0] + room))
+            axes.set_ylim(low[1] - room, high[1] + room)
+    return figure
+
+
+def plot_tradeoff(tradeoff: Tradeoff) -> Figure:
+    """Draw errors over wall times of all runs, and the recommended run in a ring.
+
+    Each kind of scheme, steps and cells has a colour; the line is that of runs that no other one
+    beats in both.  The error is a part of the tolerance, or, with a budget, of the quantity.
+
+    Args:
+        tradeoff: What :func:`tradeoff` returned.
+
+    Example:
+        >>> tip = {"tip": lambda run: run.position(beam.end)[-1]}
+        >>> found = ub.tradeoff(scene, tip, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance=0.01)
+        >>> ub.plot_tradeoff(found).savefig("tradeoff.png")
+    """
+    with picture((9.0, 6.0)) as figure:
+        axes = figure.subplots()
+        looks = cycle(product("os^", (BLUE, RED, GREEN, ORANGE, PINK, SKY)))
+        for family, (name, look) in enumerate(zip(tradeoff.families, looks, strict=False)):
+            marker, color = look
+            runs = [run for run in tradeoff.runs if run.refinement.family == family]
+            axes.scatter(
+                [run.seconds for run in runs],
+                [max(tradeoff.ratio(run), LEAST_ERROR) for run in runs],
+                s=[30 + 12 * np.log2(run.cells) for run in runs],
+                marker=marker, color=color, alpha=0.75, lw=0, label=f"from {name}", zorder=3,
+            )  # fmt: skip
+        front = tradeoff.front
+        seconds, errors = [r.seconds for r in front], [tradeoff.ratio(r) for r in front]
+        axes.plot(seconds, np.maximum(errors, LEAST_ERROR), color=INK, lw=1.2, zorder=2)
+        best = (tradeoff.best.seconds, max(tradeoff.ratio(tradeoff.best), LEAST_ERROR))
+        axes.plot(*best, "o", ms=18, mfc="none", mec=INK, mew=1.8, zorder=4)
+        axes.set(xscale="log", yscale="log", xlabel="wall time of a run (s)")
+        axes.set_ylabel(f"error ({tradeoff.target.measure})")
+        axes.set_title(f"recommended: {tradeoff.best.dials}", loc="left", fontsize=11)
+        time, ratio = tradeoff.target.bounds
+        for draw, bound in ((axes.axvline, time), (axes.axhline, ratio)):
+            if np.isfinite(bound):
+                draw(bound, color=GREY, ls="--", lw=1.2, zorder=1)
+        figure.legend(
+            loc="outside lower center", ncols=2, fontsize=9, title="size: cells", title_fontsize=9
+        )
+    return figure
+
+
+def plot_extremes(solution: Solution, extremes: Extremes, what: str = "M") -> Figure:
+    """Draw the envelope of a section force on the frame: maxima red, minima blue.
+
+    As in :func:`plot`, on the undeformed axis; the values of each cell may be of different times.
+
+    Args:
+        solution: Of the run that the extremes were recorded in.
+        extremes: The recorder.
+        what: "N", "V" or "M".
+
+    Raises:
+        SceneError: Unknown ``what``, or the extremes are of another scene or of no run.
+
+    Example:
+        >>> extremes = ub.Extremes()
+        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=extremes)
+        >>> ub.plot_extremes(run, extremes, "M").savefig("extremes.png")
+    """
+    style.require_choice(what, style.RESULTANTS, "plot_extremes: what")
+    index, points = list(style.RESULTANTS).index(what), solution.grid.points
+    reached = [extremes.section_forces(beam) for beam in solution.scene.beams]
+    # Constant in each cell
+    diagrams = [
+        [np.repeat(values[:, index, None], 2, axis=1) for values in one]
+        for one in ([e.high for e in reached], [e.low for e in reached])
+    ]
+    stage = drawing.plane_stage(solution, [0], 1.0)
+    pose = stage.pose(0)
+    with picture(drawing.plane_size(points, pose.points())) as figure:
+        until = solution.parameter.at(solution.times[-1])
+        axes = style.plane_axes(
+            figure, f"extremes of the {style.RESULTANTS[what][0]} {what} until {until}"
+        )
+        found = draw_diagrams(axes, solution, what, diagrams, points)
+        drawing.draw_axes(axes, solution, points, color=INK, linewidth=2.6, zorder=4)
+        drawing.draw_symbols(axes, pose)
+        finish(figure, axes, found)
+    return figure
+
+
+def plot_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:
+    """Draw rainflow matrix, spectrum and damage of the stress cycles at a place.
+
+    On the left the rainflow matrix; in the middle how many cycles have at least a range, and the
+    curve that they can be borne for; on the right which part of the damage each class does.
+
+    Args:
+        fatigue: Recorder of a run.
+        spot: One of its places.
+
+    Raises:
+        SceneError: The spot is none of them, nothing was run, or the stress never turned.
+
+    Example:
+        >>> spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
+        >>> fatigue = ub.Fatigue(spot, ub.SNCurve.eurocode(71e6))
+        >>> shake = ub.PointLoad(beam.end, force=(0, 5e4), time=np.sin)
+        >>> shaken = ub.Scene([beam], supports=scene.supports, loads=[shake])
+        >>> run = ub.simulate(shaken, ub.Static(), t=(0, 20), dt=0.2, record=fatigue)
+        >>> ub.plot_cycles(fatigue, spot).savefig("cycles.png")
+    """
+    cycles, curve = fatigue.cycles(spot), fatigue.curve
+    if not len(cycles.range):
+        raise SceneError(f"plot_cycles: the stress at {spot} never turned")
+    ranges, means = 1e-6 * cycles.range, 1e-6 * cycles.mean
+    done = cycles.count / curve.endurance(cycles.range, cycles.mean)
+    edges = np.linspace(0.0, ranges[-1] * (1 + 1e-9), CLASSES + 1)
+    with picture((13.0, 5.0)) as figure:
+        matrix, spectrum, damage = figure.subplots(1, 3, sharey=True, width_ratios=(1.25, 1, 0.8))
+        _draw_matrix(figure, matrix, edges, ranges, means, cycles.count)
+        matrix.set(xlabel="mean stress (MPa)", ylabel="stress range (MPa)", title="cycles")
+        more = np.cumsum(cycles.count[::-1])[::-1]
+        spectrum.plot(more, ranges, color=BLUE, drawstyle="steps-post", label="reached")
+        some = np.linspace(edges[1] / 10, 1.1 * edges[-1], 1000)
+        spectrum.plot(curve.endurance(1e6 * some), some, color=INK, lw=1.4, ls="--", label="borne")
+        spectrum.set(xscale="log", xlabel="number of cycles", title="spectrum and S-N curve")
+        spectrum.legend(loc="lower left")
+        total = done.sum()
+        parts, _ = np.histogram(ranges, edges, weights=done / (total or 1.0))
+        damage.barh(edges[:-1], 100 * parts, np.diff(edges), align="edge", color=RED, alpha=0.6)
+        damage.set(xlabel="part of the damage (%)", title=f"damage {total:.3g}")
+        for axes in (matrix, spectrum, damage):
+            axes.set_title(axes.get_title(), loc="left")
+            axes.set_title("")
+            axes.tick_params(labelsize=12, color="#888888")
+            axes.set_ylim(0.0, 1.1 * edges[-1])
+    return figure
+
+
+def _draw_matrix(
+    figure: Figure, axes: Axes, edges: Array, ranges: Array, means: Array, count: Array
+) -> None:
+    """Number of cycles by range and mean; none is white."""
+    from matplotlib.colors import LogNorm
+
+    middle, half = (means.max() + means.min()) / 2, 0.6 * max(np.ptp(means), edges[-1] / 4)
+    columns = np.linspace(middle - half, middle + half, CLASSES + 1)
+    found, _, _ = np.histogram2d(means, ranges, (columns, edges), weights=count)
+    shown = np.where(found > 0, found, np.nan).T
+    colors = axes.pcolormesh(
+        columns, edges, shown, norm=LogNorm(0.5, max(10.0, found.max())),
+        cmap="viridis_r", rasterized=True,
+    )  # fmt: skip
+    style.draw_bar(figure, axes, colors, "number")

@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: MIT
+"""Geometry and drawing of a solution in its plane, shared by all its pictures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.errors import SceneError, require_number
+from ufl_beam.model.bodies import Member
+from ufl_beam.model.material_laws import HingeLaw
+from ufl_beam.model.plastic_hinges import law_of, place_of
+from ufl_beam.plotting import symbols
+from ufl_beam.plotting.scene_layout import Pose, Stage
+from ufl_beam.plotting.style import GREY, INK, Stroke
+from ufl_beam.simulation.solution import Solution
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+# -- geometry ----------------------------------------------------------------------------------
+
+
+def moved_points(solution: Solution, n: int, magnify: float) -> Array:
+    """Return the vertices of all beams at the n-th kept time; (num_vertices, 2); m.
+
+    Raises:
+        SceneError: No such time, or ``magnify`` is not positive.
+    """
+    kept = len(solution.times)
+    if not -kept <= n < kept:
+        raise SceneError(f"n = {n}: the solution kept {kept} times; give {-kept} to {kept - 1}")
+    require_number(magnify, "magnify", positive=True)
+    grid = solution.grid
+    return np.asarray(grid.points + magnify * solution.q[n][grid.dofs[:, :2]])
+
+
+class OpenHinge(NamedTuple):
+    """Hinge that has opened."""
+
+    beam: Member
+    at: Array  # where it is now; (2,); m
+    part: float  # of its fracture energy, from 0 (closed) to 1 (a joint); 0 if it hardens
+
+
+def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
+    """Find hinges that have opened at the n-th kept time: in cells, and of zero length.
+
+    Args:
+        solution: What to show.
+        n: Number of the kept time.
+        points: Nodes of the grid as drawn; (num_nodes, 2); m.
+    """
+    grid, found = solution.grid, []
+    for beam in solution.scene.beams:
+        laws = grid.hinges(beam)
+        if all(law is None or math.isinf(law.limit) for law in laws):
+            continue
+        state = solution.material(beam, n)
+        rows = zip(grid.cells_of(beam), laws, state.jump, state.hinge, strict=True)
+        for cell, law, jump, lost in rows:
+            if law is not None and (jump != 0.0 or lost > 0.0):
+                at = points[grid.cells[cell]].mean(axis=0)
+                found.append(OpenHinge(beam, at, _spent(law, lost)))
+    for hinge, vertex in zip(solution.scene.hinges, grid.vertices_at_hinges, strict=True):
+        kept = solution.connector(hinge)
+        if kept.motion[n] != 0.0 or kept.dissipated[n] > 0.0:
+            part = _spent(law_of(hinge), float(kept.dissipated[n]))
+            found.append(OpenHinge(place_of(hinge).beam, points[vertex], part))
+    return found
+
+
+def _spent(law: HingeLaw, dissipated: float) -> float:
+    """Part of the fracture energy that is spent; a hinge that never resisted is a joint."""
+    return min(dissipated / law.energy, 1.0) if law.limit > 0.0 else 1.0
+
+
+def evenly(solution: Solution, count: int) -> list[int]:
+    """Choose numbers of so many kept states, evenly spaced in time or along a path."""
+    progress = solution.progress
+    return nearest(progress, np.linspace(progress[0], progress[-1], count))
+
+
+def nearest(kept: Array, times: Sequence[float] | Array) -> list[int]:
+    """Find the numbers of the kept times nearest to ``times``, ascending."""
+    return [int(np.argmin(np.abs(kept - t))) for t in sorted(times)]
+
+
+def plane_size(*shapes: Array) -> tuple[float, float]:
+    """Choose the size of a figure: 9 inches wide unless its points stand upright."""
+    width, height = np.ptp(np.concatenate(shapes), axis=0)
+    return 9.0, float(np.clip(8.0 * height / max(width, 1e-12), 3.2, 6.8))
+
+
+def plane_stage(solution: Solution, shown: Sequence[int], magnify: float) -> Stage:
+    """Make a stage whose symbols are as large as those of supports in pictures of some states.
+
+    Supports are drawn in points, which do not depend on the scale; what moves and stretches in m.
+    """
+    rough = Stage(solution, magnify, 0.02 * solution.scene.size)
+    shapes = [moved_points(solution, n, magnify) for n in shown]
+    points = np.concatenate(
+        [solution.grid.points, *shapes, *(rough.pose(n).points() for n in shown)]
+    )
+    width, height = np.ptp(points, axis=0)
+    inches = plane_size(points)
+    scale = max(1.12 * width / (inches[0] - 0.9), 1.20 * height / (inches[1] - 1.1))
+    return Stage(solution, magnify, scale / 6.0, shown)  # 12 points
+
+
+# -- drawing -----------------------------------------------------------------------------------
+
+
+def draw_axes(axes: Axes, solution: Solution, points: Array, **line: Any) -> None:
+    """Draw the axes of all beams through these points."""
+    for beam in solution.scene.beams:
+        axes.plot(*points[solution.grid.nodes_along(beam)].T, **line)
+
+
+def draw_undeformed(axes: Axes, solution: Solution, stage: Stage) -> None:
+    """Draw undeformed beams, bodies and rods in grey."""
+    pose = stage.undeformed
+    draw_axes(axes, solution, solution.grid.points, color=GREY, linewidth=1.2, zorder=1)
+    for stroke in (*symbols.bodies(pose), *symbols.rods(pose)):
+        axes.plot(*stroke.points.T, color=GREY, linewidth=1.2, zorder=1)
+
+
+def make_room(figure: Figure, axes: Axes) -> None:
+    """Extend the limits such that texts stay off the edge."""
+    figure.draw_without_rendering()
+    for text in axes.texts:
+        axes.update_datalim(axes.transData.inverted().transform(text.get_window_extent()))
+    axes.autoscale_view()
+
+
+def draw_symbols(axes: Axes, pose: Pose) -> None:
+    """Draw bodies, joints, connectors, supports and masses."""
+    draw_strokes(axes, (*symbols.bodies(pose), *symbols.rods(pose)))
+    draw_fixings(axes, pose)
+    draw_strokes(axes, symbols.centres(pose))
+    for pin in symbols.pins(pose):
+        marker, size, inside = ("o", 8.0, "white") if pin.turns else ("s", 6.0, INK)
+        axes.plot(*pin.at, marker, ms=size, mfc=inside, mec=INK, mew=1.6, zorder=5)
+    draw_masses(axes, pose, INK)
+
+
+def draw_strokes(axes: Axes, strokes: Iterable[Stroke], color: Any = None) -> None:
+    """Draw lines and areas, in their own colours or all in one."""
+    for points, own, weight, fill, layer in strokes:
+        line: dict[str, Any] = {"linewidth": weight, "zorder": layer}
+        edge = own if color is None else color
+        if fill is None:
+            axes.plot(*points.T, color=edge, solid_joinstyle="round", **line)
+        else:
+            inside = fill if color is None else (color, 0.15)
+            axes.fill(*points.T, facecolor=inside, edgecolor=edge, joinstyle="round", **line)
+
+
+def draw_masses(axes: Axes, pose: Pose, color: Any) -> None:
+    """Draw dots at the point masses."""
+    for mass in pose.stage.scene.masses:
+        axes.plot(*pose.at(mass.place), "o", ms=10.0, color=color, zorder=5)
+
+
+def draw_fixings(axes: Axes, pose: Pose) -> None:
+    """Draw rails, connectors, and symbols at the supports; orange ones move."""
+    from matplotlib.markers import MarkerStyle
+    from matplotlib.path import Path
+
+    draw_strokes(axes, (*symbols.rails(pose), *symbols.connectors(pose)))
+    for footing in symbols.footings(pose):
+        symbol = MarkerStyle(Path.make_compound_path(*map(Path, footing.outlines)))
+        axes.plot(
+            *footing.at, marker=symbol.rotated(rad=footing.angle), ms=24.0, mfc=footing.color,
+            mec=footing.color, mew=0.5, zorder=3.5,
+        )  # fmt: skip
