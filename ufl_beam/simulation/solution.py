@@ -215,12 +215,9 @@ class Solution:
     def reaction(self, support: Support) -> Array:
         """Force and moment of a support on the scene; (n+1, 3); N, N, N m.
 
-        In statics the first row is what the initial state bears: nothing where the run begins with
-        the undeformed scene, for loads act from the first step on; and the reactions of that
-        equilibrium where it begins with ``start=``.
-
-        In dynamics they are those that act during the step that ends at each time; the first row is
-        NaN, for no step came before.
+        In statics the first row is what the initial state bears: nothing in the undeformed scene,
+        for loads act from the first step on; with ``start=`` the reactions of its equilibrium.  In
+        dynamics they act during the step that ends at each time; the first row is NaN.
 
         Raises:
             SceneError: The support is not in the scene.
@@ -241,10 +238,7 @@ class Solution:
         Raises:
             SceneError: The beam of the place is not in the scene.
         """
-        cell = self.grid.cell(place)
-        return np.array([self._cells.forces(n)[cell] for n in range(len(self))])
-
-    # -- material ------------------------------------------------------------------------------
+        return self._cells.at(place, self._cells.forces)
 
     def strains(self, beam: Member, n: int = -1) -> Array:
         """(Σ, Γ, K) in the cells of a beam at the n-th kept time; (num_cells, 3); 1, 1, 1/m.
@@ -255,8 +249,7 @@ class Solution:
 
     def strains_at(self, place: Place) -> Array:
         """(Σ, Γ, K) in the cell at a place, as :meth:`section_forces_at`; (n+1, 3); 1, 1, 1/m."""
-        cell = self.grid.cell(place)
-        return np.array([self._cells.strains(n)[cell] for n in range(len(self))])
+        return self._cells.at(place, self._cells.strains)
 
     def material(self, beam: Member, n: int = -1) -> Material:
         """Forces, jumps and dissipated energies in the cells of a beam at the n-th kept time.
@@ -275,9 +268,7 @@ class Solution:
         Raises:
             SceneError: The scene is elastic, or the beam of the place is not in it.
         """
-        cell = self.grid.cell(place)
-        kept = [self._cells.material(n, cell) for n in range(len(self))]
-        forces, jump, plastic, energy = (np.array(field) for field in zip(*kept, strict=True))
+        forces, jump, plastic, energy = self._cells.material_at(place)
         hinge = self.grid.hinge_at(place)
         if hinge is not None:
             of_hinge = self.connector(hinge)
@@ -312,8 +303,6 @@ class Solution:
         Raises:
             SceneError: The run was static.
         """
-        if not self._kept.v:
-            raise SceneError("momentum: the run was static; there is none")
         return self._cells.momentum()
 
     def __str__(self) -> str:
