@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
+from functools import partial
 from typing import NoReturn
 
 from mpi4py import MPI
@@ -111,6 +111,7 @@ class Simulation(StateView):
         self.equation, self.terms = parts.equation, parts.equation.terms
 
         self.t, self.parts, self.last_dt = t0, 0, math.inf
+        self._dynamic = has_inertia(scheme)
         self.q: Array = q[share.dofs]
         self._q_before: Array = self.q
         self._continues = start is not None
@@ -148,13 +149,11 @@ class Simulation(StateView):
         fresh = self.parts == 0 and not self._continues
         if fresh and begins_loaded(self.scene, self.scheme, self.t):
             begin, end = self.t, self.t + APPLYING * (t1 - self.t)
-            self._go_in_parts(end, lambda part: self._attempt_loads(begin, part, end))
-        self._go_in_parts(t1, lambda part: self.attempt(part, t1))
+            attempt = partial(self._attempt_loads, begin=begin, end=end)
+            go_in_parts(begin, end, attempt, self.accept, self.give_up)
+        go_in_parts(self.t, t1, partial(self.attempt, end=t1), self.accept, self.give_up)
 
-    def _go_in_parts(self, t1: float, attempt: Callable[[float], Trial]) -> None:
-        go_in_parts(self.t, t1, lambda end: self.accept(attempt(end)), self.give_up)
-
-    def _attempt_loads(self, begin: float, t1: float, end: float) -> Trial:
+    def _attempt_loads(self, t1: float, begin: float, end: float) -> Trial:
         """Solve a part of the application of the loads of the time ``begin``, up to ``end``."""
         step = self.scheme.step(self.t, t1, end, self.q)
         trial = self._attempt(step._replace(load_time=begin, motion_time=begin))
@@ -171,7 +170,7 @@ class Simulation(StateView):
         Raises:
             StepFailed: There is no equilibrium, or it is too far away.
         """
-        if has_inertia(self.scheme) and not self.inertia.ready:
+        if self._dynamic and not self.inertia.ready:
             t = self.t + FIRST * (t1 - self.t)
             first = self._attempt(self.scheme.step(self.t, t, t1, self.q))
             self.inertia.prepare(first.s)
@@ -183,7 +182,7 @@ class Simulation(StateView):
     def _attempt(self, step: Step) -> Trial:
         """Solve a step; see :meth:`attempt`."""
         guess = self.together(self._begin, step)
-        alike = has_inertia(self.scheme) and math.isclose(step.dt, self.last_dt, rel_tol=1e-6)
+        alike = self._dynamic and math.isclose(step.dt, self.last_dt, rel_tol=1e-6)
         return self._steps.solve(step, guess, like_last=alike)
 
     def _begin(self, step: Step) -> Array:
@@ -222,13 +221,9 @@ class Simulation(StateView):
         self._q_before, self.last_dt = self.q, step.dt
         self.q, self.t = q1, step.t1
         self.parts += 1
-        self._enter_state()
-
-    def _enter_state(self) -> None:
-        """Enter the energies of the state into the ledger."""
         self.ledger.begin()
         for term in self.terms:
-            term.add_state(self.q)
+            term.add_state(q1)
 
     def ask(self) -> None:
         """Ask controllers and friction for their forces and limits in the next step.
@@ -313,7 +308,9 @@ class Simulation(StateView):
     def resume(self, state: State) -> None:
         """Go on from a :meth:`state`, perhaps of other processes."""
         self._pass_on(Restoring(self.share, state))
-        self._enter_state()
+        self.ledger.begin()
+        for term in self.terms:
+            term.add_state(self.q)
 
     def _pass_on(self, memory: Memory) -> None:
         self.t = memory.number("t", self.t)
