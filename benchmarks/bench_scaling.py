@@ -27,7 +27,7 @@ from mpi4py import MPI
 from records import keep
 
 import ufl_beam as ub
-from ufl_beam.simulation import simulation as one_process_below
+from ufl_beam.simulation import replicas as one_process_below
 
 STEEL = {"E": 210e9, "nu": 0.3, "rho": 7850.0}  # Pa, -, kg/m^3
 BAY, MEMBER_CELLS = 3.0, 10  # m
