@@ -26,6 +26,7 @@ from ufl_beam.output.output_files import take
 from ufl_beam.output.recorders import Recorder, close_all, recorders_of
 from ufl_beam.parallel import communicator
 from ufl_beam.parameter import FACTOR
+from ufl_beam.simulation.run import partial_results
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.solution_files import arrays_of
@@ -157,7 +158,7 @@ def follow(
         return until is not None and bool(until(simulation))
 
     try:
-        with simulation.partial_results():
+        with partial_results(simulation):
             stepper.begin(branch, fresh=state is None)
             for recorder in recorders:
                 simulation.together(recorder.open, simulation)

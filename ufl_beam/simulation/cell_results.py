@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import NamedTuple
 
@@ -21,6 +22,7 @@ from ufl_beam.discretization.function_spaces import (
 )
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import SceneError
+from ufl_beam.model.bodies import Place
 from ufl_beam.simulation.kept_states import KeptStates
 
 
@@ -93,8 +95,25 @@ class CellResults:
         chosen = everything[cells].T
         return Material(chosen[:3].T, *chosen[3:])
 
+    def at(self, place: Place, of: Callable[[int], Array]) -> Array:
+        """Results of the cell at a place at all kept times; (n+1, 3)."""
+        cell = self._grid.cell(place)
+        return np.array([of(n)[cell] for n in range(len(self._kept.times))])
+
+    def material_at(self, place: Place) -> Material:
+        """State of the material in the cell at a place; arrays begin with (n+1,)."""
+        cell = self._grid.cell(place)
+        kept = [self.material(n, cell) for n in range(len(self._kept.times))]
+        return Material(*map(np.array, zip(*kept, strict=True)))
+
     def momentum(self) -> Array:
-        """(p_x, p_y, L) at all kept times, L about the origin; (n+1, 3); N s, N s, N m s."""
+        """(p_x, p_y, L) at all kept times, L about the origin; (n+1, 3); N s, N s, N m s.
+
+        Raises:
+            SceneError: The run was static.
+        """
+        if not self._kept.v:
+            raise SceneError("momentum: the run was static; there is none")
         times, grid = Product(mass_matrix(self._fields)), self._grid
         dofs = np.vstack([grid.dofs, grid.dofs_of_bodies])
         centers = np.array([body.center for body in grid.scene.movers]).reshape(-1, 2)

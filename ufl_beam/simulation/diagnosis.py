@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Diagnosis of failed steps: sizes of forces, and what gives way if the tangent is singular."""
+"""Diagnosis of failed steps and open ledgers: forces, what gives way, round-off."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from ufl_beam.errors import ConvergenceError, StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.scene import Scene
 from ufl_beam.parameter import Parameter
+from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.solvers.null_vectors import SINGULAR, free_matrix, null_vector
@@ -34,6 +35,9 @@ SOFT = 1e-3
 NEAR = 1e-3
 """Motion from the state before a step, of the size of the scene or a radian, that tells what yields
 as the step begins."""
+
+ROOM = 10.0
+"""Largest imbalance of an exact ledger over the tolerance of the solver."""
 
 NAMED = 3
 """Largest number of names in a list."""
@@ -88,7 +92,7 @@ class Softest(NamedTuple):
 def no_equilibrium(
     simulation: Failed,
     newton: Solver,
-    solution: object,
+    solution: Solution,
     failure: StepFailed,
     end: float,
     advice: str,
@@ -125,6 +129,17 @@ def no_equilibrium(
         forces=forces,
         reason=failure.reason,
     )
+
+
+def open_ledger(solution: Solution, share: Share, newton: Solver) -> str:
+    """Describe how far an exact ledger is open; empty if it closes as claimed."""
+    energy, claimed = solution.energy, ROOM * newton.rtol
+    if not energy.opened(claimed, 0.0):
+        return ""
+    # Errors of steps are independent: their squares add up.
+    q = solution.q[:, share.dofs]
+    steps = np.sqrt(np.sum(np.diff(q, axis=0) ** 2, axis=0))
+    return energy.opened(claimed, newton.random_work(np.abs(q).max(axis=0), steps))
 
 
 def _forces_by_kind(simulation: Failed, newton: Solver, q1: Array) -> dict[str, float]:

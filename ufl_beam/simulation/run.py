@@ -6,8 +6,9 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from typing import Any
 
 from mpi4py import MPI
 
@@ -152,7 +153,7 @@ def simulate(
 
         stack.callback(close_all, recorders)
         stack.callback(take(outputs))
-        stack.enter_context(simulation.partial_results())
+        stack.enter_context(partial_results(simulation))
         solution.every = every
         if keeper is not None and keeper.found:
             simulation.together(go_on, keeper)
@@ -173,6 +174,23 @@ def simulate(
     if comm.rank == 0:
         solution.opened.warn(scheme, solution.times)
     return solution
+
+
+@contextmanager
+def partial_results(simulation: Simulation) -> Iterator[None]:
+    """Let what is raised in this context carry the solution so far, ``error.solution``.
+
+    Whatever stops a run, an interrupt or a user's function, what was reached is not lost.
+    """
+    try:
+        yield
+    except BaseException as error:
+        simulation.leave()
+        if simulation.share.comm.size == 1 or error is simulation.together.raised:
+            simulation.end()  # else the processes may not all be here
+        stopped: Any = error
+        stopped.solution = simulation.solution
+        raise
 
 
 def _end_of(start: Solution | None) -> str:

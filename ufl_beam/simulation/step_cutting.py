@@ -32,7 +32,8 @@ class Trial(NamedTuple):
 def go_in_parts(
     t0: float,
     t1: float,
-    go: Callable[[float], None],
+    attempt: Callable[[float], Trial],
+    accept: Callable[[Trial], None],
     give_up: Callable[[StepFailed, float], NoReturn],
 ) -> None:
     """Go from ``t0`` to ``t1`` at once or, where that fails, in parts.
@@ -40,7 +41,8 @@ def go_in_parts(
     Args:
         t0: Beginning; s.
         t1: End; s.
-        go: Goes on to a time, or raises :class:`StepFailed` and stays.
+        attempt: Solves a step to a time, or raises :class:`StepFailed`.
+        accept: Goes there.
         give_up: Ends the run, because even the smallest part, to a time, has failed.
     """
     done, part = 0, MOST_PARTS
@@ -48,7 +50,7 @@ def go_in_parts(
         last = done + part == MOST_PARTS
         end = t1 if last else t0 + (t1 - t0) * (done + part) / MOST_PARTS
         try:
-            go(end)
+            accept(attempt(end))
         except StepFailed as failure:
             if part == 1:
                 give_up(failure, end)

@@ -176,7 +176,10 @@ class Solver:
         if reason <= 0 and self._may_go_on() and self._equation.relieve(True):
             self._go_to(guess)
             reason = self._relieved()
-        return self._found(reason)
+        if reason <= 0:
+            raise self._failure(reason)
+        self._vectors.update_ghosts(self._x)
+        return self._q.copy()
 
     def solve_along(self, guess: Array, loads: list[Array], border: Border) -> Array:
         """Find the configuration as :meth:`solve` does, together with the unknown of a border.
@@ -186,7 +189,11 @@ class Solver:
         """
         self._convergence.take_loads(loads)
         self._go_to(guess)
-        return self._found(self._iterate(self._along(border), 12))
+        reason = self._iterate(self._along(border), 12)
+        if reason <= 0:
+            raise self._failure(reason)
+        self._vectors.update_ghosts(self._x)
+        return self._q.copy()
 
     @cached_property
     def _idle(self) -> IdleMotions:
@@ -263,13 +270,10 @@ class Solver:
         self._agreement.settle(None if isinstance(error, StepFailed) else error)
         return True
 
-    def _found(self, reason: int) -> Array:
-        """Return the configuration, if it was found."""
-        if reason <= 0:
-            self._agreement.settle(self._equation.error)
-            raise self._convergence.failure(reason, self._done)
-        self._vectors.update_ghosts(self._x)
-        return self.iterate()
+    def _failure(self, reason: int) -> StepFailed:
+        """Describe the failure; raise what a function of the user has raised on any process."""
+        self._agreement.settle(self._equation.error)
+        return self._convergence.failure(reason, self._done)
 
     # -- what is known of it -------------------------------------------------------------------
 

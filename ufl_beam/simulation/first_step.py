@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Application of loads that act from the beginning of a static run on.
+"""First step of a run: loads that act at once, and accelerations at the beginning.
 
-Where forces act over the step, a step that turns a node far does not end in equilibrium.  So these
-loads are applied in parts that turn nodes little, and the rest of the first step has nothing left
-to do but to follow them.
+In statics, where forces act over the step, a step that turns a node far does not end in
+equilibrium.  So these loads are applied in parts that turn nodes little, and the rest of the first
+step has nothing left to do but to follow them.
 """
 
 from __future__ import annotations
@@ -16,6 +16,12 @@ from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.scene import Scene
+
+FIRST = 1 / 16
+"""Part of the first step after which accelerations are taken for those at the beginning.
+
+Shorter ones are nearer to it, but magnify the velocities of supports that do not begin with theirs.
+"""
 
 APPLYING = 1 / 8
 """Part of the first step in which loads that are there from the start are applied."""
