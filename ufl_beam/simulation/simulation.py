@@ -32,12 +32,18 @@ from ufl_beam.parallel import communicator
 from ufl_beam.parameter import Parameter
 from ufl_beam.simulation.assembly import assemble
 from ufl_beam.simulation.diagnosis import no_equilibrium, open_ledger
-from ufl_beam.simulation.first_step import APPLYING, FIRST, begins_loaded, require_small_turn
 from ufl_beam.simulation.initial_state import initial_state, mesh_of
 from ufl_beam.simulation.replicas import Copies, sharing
 from ufl_beam.simulation.scene_checks import checked_grid
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.step_cutting import Trial, go_in_parts
+from ufl_beam.simulation.step_cutting import (
+    APPLYING,
+    FIRST,
+    Trial,
+    begins_loaded,
+    go_in_parts,
+    require_small_turn,
+)
 from ufl_beam.simulation.step_solver import StepSolver
 from ufl_beam.solvers.equation import Border
 from ufl_beam.solvers.newton_options import Newton
