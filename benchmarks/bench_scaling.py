@@ -100,7 +100,7 @@ def watched(simulation):
         (solver.convergence, ("_size", "_round_off"), "convergence test"),
         (chains_first._elimination, ("factor", "reduce", "expand"), "elimination"),
         (chains_first._elimination, ("_sum",), "communication"),
-        (chains_first, ("_factor", "_solve"), "what is left"),
+        (chains_first, ("_succeeds",), "what is left"),
     ):
         for name in names:
             watch.watch(owner, name, part)
@@ -122,7 +122,7 @@ def measure(cells, bays, steps):
     begin = time.perf_counter()
     for n in range(2, steps + 2):
         simulation.step_to(n * dt)
-        simulation.solution.keep(simulation)
+        simulation.keep()
     comm.Barrier()
     seconds = time.perf_counter() - begin
     memory = comm.gather(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)

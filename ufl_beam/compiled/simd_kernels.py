@@ -67,9 +67,8 @@ def in_vectors(kernel: str) -> str:
             line = re.sub(r"= ([^;?]+) \? ([^;:]+) : ([^;:]+);", r"= PICK(\1, \2, \3);", line)
             line = re.sub(rf"\b({'|'.join(FUNCTIONS)})\(", r"lanes_\1(", line)
         lines.append(line)
-    names = ("lanes *restrict A", *(f"const lanes *restrict {x}" for x in ("w", "c")))
-    arguments = ", ".join((*names, "const lanes *restrict coordinate_dofs"))
-    return f"static inline void tabulate({arguments})\n" + "\n".join(lines)
+    inputs = ", ".join(f"const lanes *restrict {x}" for x in ("w", "c", "coordinate_dofs"))
+    return "\n".join([f"static inline void tabulate(lanes *restrict A, {inputs})", *lines])
 
 
 def written(source: Path) -> str:

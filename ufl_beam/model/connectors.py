@@ -7,11 +7,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from ufl_beam.errors import (
-    SceneError,
-    require_kind,
-    require_vector,
-)
+from ufl_beam.errors import SceneError, require_kind, require_vector
 from ufl_beam.model.bodies import Anchor, arm, require_anchor
 from ufl_beam.model.connector_laws import Coulomb, Guide, Law, Motor, RigidPlastic
 from ufl_beam.model.curves import Point

@@ -6,12 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from ufl_beam.errors import (
-    SceneError,
-    require_kind,
-    require_switch,
-    require_text,
-)
+from ufl_beam.errors import SceneError, require_kind, require_switch, require_text
 from ufl_beam.model.bodies import Anchor, Place, carries, ground, require_anchor
 from ufl_beam.model.connector_laws import HELD, Bearing, Guide
 from ufl_beam.model.connectors import Connector, _axis, _require_apart

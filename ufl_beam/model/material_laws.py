@@ -106,15 +106,10 @@ class Bulk(ABC):
 
     @abstractmethod
     def flow(self, strain: Values, p: Values, ξ: Values, θ: Values, dt: Values) -> Values:
-        """Increment of the plastic strain over a step.
+        """Increment of the plastic strain over a step of the length dt; s.
 
-        Args:
-            strain: Strain at t_n+θ.
-            p: Plastic strain at t_n.
-            ξ: Accumulated plastic strain at t_n.
-            θ: Part of the step at which the law is stated: 1/2 is of second order, 1 is backward
-                Euler.
-            dt: Length of the step; s.
+        From the strain at t_n+θ, the plastic strain and its accumulated amount at t_n; θ = 1/2 is
+        of second order, 1 is backward Euler.
         """
 
     @abstractmethod
@@ -150,13 +145,7 @@ class BulkLaw(ABC):
 
 @dataclass(frozen=True, eq=False)
 class HardeningBulk(Bulk):
-    """Statement of :class:`Hardening`.
-
-    Attributes:
-        H: Isotropic hardening modulus.
-        B: Kinematic hardening modulus.
-        eta: Viscosity.
-    """
+    """Statement of :class:`Hardening`: moduli H, isotropic, and B, kinematic; viscosity eta."""
 
     H: Values
     B: Values

@@ -10,24 +10,9 @@ from functools import cached_property, singledispatch
 
 import numpy as np
 
-from ufl_beam.errors import (
-    SceneError,
-    clip,
-    require_kind,
-    require_sequence,
-)
+from ufl_beam.errors import SceneError, clip, require_kind, require_sequence
 from ufl_beam.model.beams import Beam
-from ufl_beam.model.bodies import (
-    GROUND,
-    Anchor,
-    Body,
-    Member,
-    Place,
-    Spot,
-    carries,
-    ground,
-    node,
-)
+from ufl_beam.model.bodies import GROUND, Anchor, Body, Member, Place, Spot, carries, ground, node
 from ufl_beam.model.connector_laws import Actuator, Bearing, Coulomb, Motor
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import enclosing_diameter

@@ -83,13 +83,7 @@ class InelasticBeams:
     kind = "beams"
 
     def __init__(
-        self,
-        fields: Fields,
-        layout: Layout,
-        scheme: Scheme,
-        A: Csr,
-        ledger: Ledger,
-        course: Course,
+        self, fields: Fields, layout: Layout, scheme: Scheme, A: Csr, ledger: Ledger, course: Course
     ) -> None:
         self._layout, self._scheme, self._A, self._ledger = layout, scheme, A, ledger
         self._order = fields.order
