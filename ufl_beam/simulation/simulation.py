@@ -117,10 +117,9 @@ class Simulation(StateView):
         self.equation, self.terms = parts.equation, parts.equation.terms
 
         self.t, self.parts, self.last_dt = t0, 0, math.inf
-        self._dynamic = has_inertia(scheme)
         self.q: Array = q[share.dofs]
         self._q_before: Array = self.q
-        self._continues = start is not None
+        self._continues, self._dynamic = start is not None, has_inertia(scheme)
         loaded: list[Array] = []
         if self._continues or (has_inertia(scheme) and scheme.kept):
             # The initial state is taken as one in equilibrium with the loads.
