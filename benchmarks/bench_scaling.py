@@ -97,7 +97,7 @@ def watched(simulation):
         (simulation.equation, ("residual", "tangent"), "assembly"),
         (simulation.equation, ("complete",), "supports and ghosts"),
         (solver._vectors, ("update_ghosts",), "supports and ghosts"),
-        (solver._convergence, ("_size", "_round_off"), "convergence test"),
+        (solver.convergence, ("_size", "_round_off"), "convergence test"),
         (chains_first._elimination, ("factor", "reduce", "expand"), "elimination"),
         (chains_first._elimination, ("_sum",), "communication"),
         (chains_first, ("_succeeds",), "what is left"),

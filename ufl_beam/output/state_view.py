@@ -13,7 +13,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import Fields, SectionForces
 from ufl_beam.discretization.partition import Share
-from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.bodies import Anchor
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
@@ -88,7 +88,7 @@ class StateView:
 
     def velocities(self) -> list[Array]:
         """Velocities at the local degrees of freedom; none in statics."""
-        return [self.inertia.v] if self.scheme.dynamic else []
+        return [self.inertia.v] if has_inertia(self.scheme) else []
 
     def reactions(self) -> Array:
         """Forces of all supports on the scene; (num_supports, 3); N, N, N m."""

@@ -43,12 +43,7 @@ class Material(NamedTuple):
 
 
 class CellResults:
-    """Results that follow from the kept states; those of the n-th kept time, in all cells.
-
-    Args:
-        grid: The grid of the run.
-        kept: The states.
-    """
+    """Results that follow from the kept states; those of the n-th kept time, in all cells."""
 
     def __init__(self, grid: Grid, kept: KeptStates) -> None:
         self._grid, self._kept = grid, kept

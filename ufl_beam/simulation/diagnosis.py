@@ -97,16 +97,7 @@ def no_equilibrium(
     end: float,
     advice: str,
 ) -> ConvergenceError:
-    """Describe why even the smallest step, to ``end``, failed; all processes call it together.
-
-    Args:
-        simulation: The state before the step.
-        newton: The solver, with its latest iterate.
-        solution: The solution so far.
-        failure: Why the step failed.
-        end: Its end; s.
-        advice: What to try; that of the scheme if it is empty.
-    """
+    """Describe why even the smallest step, to ``end``, failed; all processes call it together."""
     q1 = simulation.supports.in_plane(newton.iterate())
     dt, forces, named = (
         end - simulation.t,
@@ -133,13 +124,13 @@ def no_equilibrium(
 
 def open_ledger(solution: Solution, share: Share, newton: Solver) -> str:
     """Describe how far an exact ledger is open; empty if it closes as claimed."""
-    energy, claimed = solution.energy, ROOM * newton.rtol
+    energy, claimed = solution.energy, ROOM * newton.convergence.c.rtol
     if not energy.opened(claimed, 0.0):
         return ""
     # Errors of steps are independent: their squares add up.
     q = solution.q[:, share.dofs]
     steps = np.sqrt(np.sum(np.diff(q, axis=0) ** 2, axis=0))
-    return energy.opened(claimed, newton.random_work(np.abs(q).max(axis=0), steps))
+    return energy.opened(claimed, newton.convergence.random_work(np.abs(q).max(axis=0), steps))
 
 
 def _forces_by_kind(simulation: Failed, newton: Solver, q1: Array) -> dict[str, float]:
@@ -150,7 +141,7 @@ def _forces_by_kind(simulation: Failed, newton: Solver, q1: Array) -> dict[str, 
             term.add_residual(q1, forces[term.kind])
         except Exception:
             forces[term.kind].fill(np.nan)  # it is why the step has failed
-    sizes = {kind: newton.size(force) for kind, force in forces.items()}
+    sizes = {kind: newton.convergence.size(force) for kind, force in forces.items()}
     return {kind: size for kind, size in sizes.items() if size}
 
 

@@ -32,12 +32,18 @@ from ufl_beam.parallel import communicator
 from ufl_beam.parameter import Parameter
 from ufl_beam.simulation.assembly import assemble
 from ufl_beam.simulation.diagnosis import no_equilibrium, open_ledger
-from ufl_beam.simulation.first_step import APPLYING, FIRST, begins_loaded, require_small_turn
 from ufl_beam.simulation.initial_state import initial_state, mesh_of
 from ufl_beam.simulation.replicas import Copies, sharing
 from ufl_beam.simulation.scene_checks import checked_grid
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.step_cutting import Trial, go_in_parts
+from ufl_beam.simulation.step_cutting import (
+    APPLYING,
+    FIRST,
+    Trial,
+    begins_loaded,
+    go_in_parts,
+    require_small_turn,
+)
 from ufl_beam.simulation.step_solver import StepSolver
 from ufl_beam.solvers.equation import Border
 from ufl_beam.solvers.newton_options import Newton
@@ -111,10 +117,9 @@ class Simulation(StateView):
         self.equation, self.terms = parts.equation, parts.equation.terms
 
         self.t, self.parts, self.last_dt = t0, 0, math.inf
-        self._dynamic = has_inertia(scheme)
         self.q: Array = q[share.dofs]
         self._q_before: Array = self.q
-        self._continues = start is not None
+        self._continues, self._dynamic = start is not None, has_inertia(scheme)
         loaded: list[Array] = []
         if self._continues or (has_inertia(scheme) and scheme.kept):
             # The initial state is taken as one in equilibrium with the loads.

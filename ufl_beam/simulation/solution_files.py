@@ -117,13 +117,7 @@ def grid_of(text: dict[str, Any]) -> Grid:
 
 
 class UsedFunctions:
-    """Replaces functions of a scene by records, see :func:`to_data`.
-
-    Args:
-        grid: The grid of the run.
-        times: The kept times.
-        position: Coordinates of a place at these times.
-    """
+    """Replaces functions of a scene by records, see :func:`to_data`."""
 
     def __init__(
         self, grid: Grid, times: Sequence[float], position: Callable[[Anchor], Array]

@@ -30,14 +30,6 @@ REASONS = {
 class Convergence:
     """Sizes of residuals and motions, and the decision to go on or to stop.
 
-    Args:
-        share: The degrees of freedom of this process.
-        equation: Its data in C are completed.
-        x: Local values of the iterate.
-        r: Those of its residual.
-        newton: Tolerances.
-        least: Iterations at least, unless a residual is far below its tolerance.
-
     Attributes:
         c: Data in C, see :func:`judge` of newton.c.
         diagonal: Positions of the diagonal in the data of the tangent.

@@ -171,13 +171,7 @@ def add_in_python(handle: Any, q: Any, out: Any) -> None:
 
 
 class Demand:
-    """Residual of the constraints of connectors, evaluated by Python.
-
-    Args:
-        missed: See :meth:`Equation.missed`.
-        size: Number of unknowns.
-        failed: Told of exceptions.
-    """
+    """Residual of the constraints of connectors, evaluated by Python."""
 
     def __init__(
         self,

@@ -11,11 +11,7 @@ from ufl_beam.discretization.partition import Share
 
 
 class Vectors:
-    """Vectors of the unknowns; where processes share a scene, with ghosts.
-
-    Args:
-        share: The degrees of freedom of this process.
-    """
+    """Vectors of the unknowns; where processes share a scene, with ghosts."""
 
     def __init__(self, share: Share) -> None:
         self._share, self._views = share, dict[int, Array]()

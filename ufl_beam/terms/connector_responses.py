@@ -127,7 +127,7 @@ class Response:
         return np.zeros((len(self._links), 0))
 
     def restore(self, rows: Array) -> None:
-        """Take over :meth:`state`."""
+        """Take over the internal variables of :meth:`state`."""
 
     def start(self, e: Array) -> None:
         """Begin at motions that no step has led to."""
