@@ -69,8 +69,8 @@ class CriticalPoint:
         factor: The load factor.
         n: Number of the state in the path.
         state: The state alone, as a solution.
-        mode: What moves without a change of load; root mean square 1 of displacements over the
-            size of the scene, and of rotations; all degrees of freedom in the order of the grid.
+        mode: Critical mode with the root mean square 1 of displacements over the size of the scene,
+            and of rotations; all degrees of freedom in the order of the grid.
 
     Example:
         >>> push = ub.PointLoad(beam.end, force=(-2e7, 0), time=lambda t: t)

@@ -54,7 +54,7 @@ class Perzyna:
         _require_from_zero_to_infinity(self.eta, "Perzyna: eta")
 
     def coefficient(self, stiffness: Values) -> Values:
-        """The same for all."""
+        """Viscosity, the same for any stiffness."""
         return np.full_like(stiffness, self.eta)
 
 
@@ -62,8 +62,7 @@ class Perzyna:
 class DuvautLions:
     """Duvaut-Lions viscoplasticity: relaxation towards the rate-independent stress, P(45).
 
-    The same law as :class:`Perzyna` with ``eta = tau (C + H)``; the relaxation time is what the
-    user knows.
+    The same law as :class:`Perzyna` with ``eta = tau (C + H)``, given by its relaxation time.
 
     Args:
         tau: Relaxation time; s.  Zero is rate-independent, infinity elastic.
@@ -276,7 +275,7 @@ class Softening:
         return self.limit < np.inf
 
     def of(self, limit: Values, energy: Values) -> Softening:
-        """The same law with other numbers, or with symbols."""
+        """Return the same law with other numbers, or with symbols."""
         law = object.__new__(type(self))
         object.__setattr__(law, "limit", limit)
         object.__setattr__(law, "energy", energy)

@@ -57,7 +57,7 @@ def simulate(
     """Simulate the motion of a scene in time, or its equilibria under growing loads.
 
     Args:
-        scene: What is modelled.
+        scene: Model.
         scheme: :class:`Static`, :class:`Midpoint` or another one, see docs/schemes.md.
         t: Beginning and end; s.  In statics time is the load parameter.
         dt: Step; s.  All steps are a little shorter if ``dt`` does not divide the time.  A step
@@ -65,13 +65,14 @@ def simulate(
             accuracy allows.
         record: Files to write on the way, such as :class:`XDMF` and :class:`History`.
         every: Keep every so many steps in the solution; the last one always.
-        most: States, besides the initial and the last one, that the solution may have.  When there
-            are more, every other one goes, and only half as many steps are kept from then on.
+        most: Largest number of states in the solution, besides the initial and the last one.  When
+            it is exceeded, every other state is deleted, and half as many steps are kept from then
+            on.
         start: Solution of the same beams whose last state is the initial state.  Joints may be
             removed, or added where places are together.
         newton: Tolerances and PETSc options.
-        mesh: How finely it is discretised; as ``start``, or with the cells of the beams.
-        checkpoint: File from which the run goes on if it is run again after whatever stopped it.
+        mesh: Discretization; as ``start``, or with the cells of the beams.
+        checkpoint: Checkpoint file from which the run goes on if the script is run again.
         progress: Show a progress bar if the output is a terminal.
         comm: Processes that share the scene; all of them, or in a :func:`study` this one alone.  A
             small scene is computed by each of them.

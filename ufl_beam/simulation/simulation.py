@@ -55,13 +55,13 @@ class Simulation(StateView):
     :func:`simulate` is a loop over :meth:`step_to`; use this class for loops of your own.
 
     Args:
-        scene: What is modelled.
+        scene: Model.
         scheme: :class:`Static`, :class:`Midpoint` or another one, see docs/schemes.md.
         t0: Time of the initial state; s.
         start: Solution of the same beams whose last state is the initial state.  Joints may be
             removed, or added where places are together.
         newton: Tolerances and PETSc options.
-        mesh: How finely it is discretised; as ``start``, or with the cells of the beams.
+        mesh: Discretization; as ``start``, or with the cells of the beams.
         comm: Processes that share the scene; all of them, or in a :func:`study` this one alone.
         kind: Class of the solution.
 
@@ -305,7 +305,7 @@ class Simulation(StateView):
         return now
 
     def state(self) -> State:
-        """All that later steps depend on; all processes call it together."""
+        """Return the state on which later steps depend; all processes call it together."""
         memory = Saving(self.share)
         self._pass_on(memory)
         return memory.state()

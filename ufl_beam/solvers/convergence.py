@@ -67,7 +67,7 @@ class Convergence:
         c.most, c.least = newton.max_iterations, least
 
     def _force_weights(self) -> Array:
-        """One for forces, one over the size of the scene for moments."""
+        """Weights of residuals: 1 of forces, 1 over the size of the scene of moments."""
         weights = np.ones(self._share.size)
         weights[self._share.rotations()] = 1 / self._share.grid.scene.size
         weights[self._share.multipliers()] = 0.0

@@ -107,7 +107,7 @@ class PythonEquation(Equation):
 
 
 class Border(Protocol):
-    """One more unknown on which the residual depends, and one more equation.
+    """Additional unknown on which the residual depends, with its equation.
 
     Attributes:
         t: The unknown.

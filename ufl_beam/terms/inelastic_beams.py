@@ -202,7 +202,7 @@ class InelasticBeams:
         self.points.hold()
 
     def freeze(self) -> None:
-        """From now on nothing yields or opens further."""
+        """Keep everything elastic from now on: nothing yields or breaks further."""
         self.points.freeze()
 
     # -- the state -----------------------------------------------------------------------------
