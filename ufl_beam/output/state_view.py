@@ -102,7 +102,7 @@ class StateView:
         """Forces of all supports in the latest residual; (num_supports, 3); N, N, N m."""
         dofs, mine = self._support_dofs
         here = np.where(mine, self.supports.all_reactions(self.share.size)[dofs], 0.0)
-        if self.share.comm.size > 1:
+        if not self.share.alone:
             self.share.comm.Allreduce(MPI.IN_PLACE, here)
         return here
 
@@ -119,7 +119,7 @@ class StateView:
         """The ledger over all processes: state, supplied, lost; J."""
         ledger = self.ledger
         groups = (dict(ledger.state), dict(ledger.supplied), dict(ledger.lost))
-        if self.share.comm.size == 1:
+        if self.share.alone:
             return groups
         everyone = self.share.comm.allgather(groups)
         return tuple(
@@ -143,7 +143,7 @@ class StateView:
                 [coupling.shown_motion(q), coupling.force(q), coupling.work, coupling.rate,
                  coupling.dissipated()]
             )  # fmt: skip
-        if self.share.comm.size > 1:
+        if not self.share.alone:
             self.share.comm.Allreduce(MPI.IN_PLACE, here)
         return here
 
@@ -224,6 +224,6 @@ class StateView:
         return jump, dissipated
 
     def _gather(self, here: list[tuple[Index, Array]]) -> list[tuple[Index, Array]]:
-        if not self._has_inelastic or self.share.comm.size == 1:
+        if not self._has_inelastic or self.share.alone:
             return here
         return [group for groups in self.share.comm.allgather(here) for group in groups]

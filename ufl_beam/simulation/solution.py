@@ -130,7 +130,7 @@ class Solution:
 
     def __len__(self) -> int:
         """Number of kept states."""
-        return len(self._kept.times)
+        return len(self._kept)
 
     def thin(self) -> None:
         """Forget every other kept state; the first one stays."""
@@ -208,7 +208,7 @@ class Solution:
     def shape(self, beam: Member, n: int = -1) -> Array:
         """Coordinates of the vertices of a beam at the n-th kept time; (num_vertices, 2); m."""
         vertices, grid = self.grid.vertices_of(beam), self.grid
-        return np.asarray(grid.points[vertices] + self._kept.q[n][grid.dofs[vertices, :2]])
+        return np.asarray(grid.points[vertices] + self._kept[n].q[grid.dofs[vertices, :2]])
 
     # -- forces --------------------------------------------------------------------------------
 

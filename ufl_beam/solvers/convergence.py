@@ -44,7 +44,7 @@ class Convergence:
         newton: Newton,
         least: int,
     ) -> None:
-        self._share, self._A, self._parallel = share, equation.A, share.comm.size > 1
+        self._share, self._A, self._parallel = share, equation.A, not share.alone
         self._x, self._r = x, r
         self._weights = self._force_weights()
         self._norm = (len(self._weights), doubles(self._weights))

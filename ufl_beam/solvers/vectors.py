@@ -15,7 +15,7 @@ class Vectors:
 
     def __init__(self, share: Share) -> None:
         self._share, self._views = share, dict[int, Array]()
-        self.parallel = share.comm.size > 1
+        self.parallel = not share.alone
 
     def new(self) -> PETSc.Vec:
         """Make a vector of the unknowns, shared like them."""
