@@ -45,7 +45,7 @@ class KeptStates:
 
     @property
     def v(self) -> list[Array]:
-        """Velocities, as ``q``."""
+        """Velocities, all degrees of freedom."""
         return [state.v for state in self._states if state.v is not None]
 
     @property
@@ -104,13 +104,17 @@ class KeptStates:
              for name, values in arrays.items() if name.startswith(f"{kind}: ")}
             for kind in LEDGER
         ]  # fmt: skip
-        connections = arrays["connections"]
+        # Shapes that are no run have no velocities and reactions.
+        reactions, connections = (
+            arrays[name] if len(arrays[name]) else np.zeros((n, 0))
+            for name in ("reactions", "connections")
+        )
+        v = arrays["v"] if len(arrays["v"]) else [None] * n
         self._states = [
             Snapshot(
-                float(arrays["times"][k]), arrays["q"][k],
-                arrays["v"][k] if len(arrays["v"]) else None, arrays["reactions"][k],
+                float(arrays["times"][k]), arrays["q"][k], v[k], reactions[k],
                 tuple({name: float(x[k]) for name, x in part.items()} for part in parts),
-                material[k], connections[k] if len(connections) else connections,
+                material[k], connections[k],
             )
             for k in range(n)
         ]  # fmt: skip
