@@ -27,7 +27,7 @@ from mpi4py import MPI
 from records import keep
 
 import ufl_beam as ub
-from ufl_beam import simulation as one_process_below
+from ufl_beam.simulation import replicas as one_process_below
 
 STEEL = {"E": 210e9, "nu": 0.3, "rho": 7850.0}  # Pa, -, kg/m^3
 BAY, MEMBER_CELLS = 3.0, 10  # m
@@ -97,10 +97,10 @@ def watched(simulation):
         (simulation.equation, ("residual", "tangent"), "assembly"),
         (simulation.equation, ("complete",), "supports and ghosts"),
         (solver._vectors, ("update_ghosts",), "supports and ghosts"),
-        (solver._convergence, ("_size", "_round_off"), "convergence test"),
+        (solver.convergence, ("_size", "_round_off"), "convergence test"),
         (chains_first._elimination, ("factor", "reduce", "expand"), "elimination"),
         (chains_first._elimination, ("_sum",), "communication"),
-        (chains_first, ("_factor", "_solve"), "what is left"),
+        (chains_first, ("_succeeds",), "what is left"),
     ):
         for name in names:
             watch.watch(owner, name, part)
@@ -122,7 +122,7 @@ def measure(cells, bays, steps):
     begin = time.perf_counter()
     for n in range(2, steps + 2):
         simulation.step_to(n * dt)
-        simulation.solution.keep(simulation)
+        simulation.keep()
     comm.Barrier()
     seconds = time.perf_counter() - begin
     memory = comm.gather(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)

@@ -38,7 +38,7 @@ def time_loop(scene, steps, dt):
     begin = time.perf_counter()
     for n in range(1, steps + 1):
         simulation.step_to(n * dt)
-        simulation.solution.keep(simulation)
+        simulation.keep()
     return time.perf_counter() - begin, simulation.iterations, simulation
 
 
@@ -61,7 +61,7 @@ def microseconds(function, seconds=0.2):
 def parts(simulation):
     """Microseconds of the parts of an iteration; the call itself takes half of one."""
     solver = simulation._solver
-    x, equation = solver.iterate(), simulation.equation.c
+    x, equation = solver.iterate(), solver._equation.c
     r = np.zeros_like(x)
     at_x, at_r = doubles(x), doubles(r)
     failed = ffi.new("int *")

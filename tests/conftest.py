@@ -9,12 +9,12 @@ from mpi4py import MPI
 
 import pytest
 
-from ufl_beam.simulation import simulation
+from ufl_beam.simulation import replicas
 
 sys.path.insert(0, str(Path(__file__).parent))
 
 # Under mpirun the tests' small scenes, too, are shared among all processes.
-simulation.SMALLEST_SHARE = 1
+replicas.SMALLEST_SHARE = 1
 
 COMM = MPI.COMM_WORLD
 

@@ -44,7 +44,6 @@ __all__ = [
     "jit_directory",
     "line_mesh",
     "pack",
-    "space_with_dofs",
 ]
 
 VERSION = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
@@ -146,24 +145,3 @@ def cell_coordinates(domain: mesh.Mesh) -> Array:
     geometry = domain.geometry
     dofmap = geometry.dofmap if VERSION < (0, 11) else geometry.dofmaps[0]
     return np.ascontiguousarray(geometry.x[dofmap])
-
-
-def space_with_dofs(
-    domain: mesh.Mesh, element: Any, cell_dofs: npt.NDArray[np.int32], size: int
-) -> fem.FunctionSpace:
-    """Make a function space with given degrees of freedom of the cells.
-
-    Args:
-        domain: Mesh on this process.
-        element: Scalar, vector or mixed element with unblocked dofs.
-        cell_dofs: Degrees of freedom of each cell; shape (num_cells, dofs per cell).
-        size: Number of degrees of freedom.
-    """
-    plain = fem.functionspace(domain, element)
-    index_map = cpp.common.IndexMap(MPI.COMM_SELF, size)
-    adjacency = cpp.graph.AdjacencyList_int32(np.ascontiguousarray(cell_dofs, dtype=np.int32))
-    dofmap = cpp.fem.DofMap(plain.dofmap.dof_layout, index_map, 1, adjacency, 1)
-    arguments = [domain._cpp_object, plain._cpp_object.element, dofmap]
-    if VERSION < (0, 11):
-        arguments.append(list(element.reference_value_shape))
-    return fem.FunctionSpace(domain, element, cpp.fem.FunctionSpace_float64(*arguments))

@@ -65,7 +65,7 @@ class StepFailed(Exception):
         self.reason = ""
 
     def saying(self, message: str) -> StepFailed:
-        """The same failure with another message."""
+        """Return the same failure with another message."""
         other = StepFailed(message)
         other.residuals = self.residuals
         return other
@@ -79,13 +79,12 @@ class ConvergenceError(RuntimeError):
         dt: The smallest step that was tried, on a path the change of the load factor; s.
         solution: The :class:`~ufl_beam.simulation.solution.Solution` up to ``time``;
             ``start=solution`` goes on from there with another step or scheme.
-        residuals: What is left of the equilibrium where it is largest in each beam, body and
-            connector, the largest first; N, moments over the size of the scene.  Empty if
-            equilibria were found but refused.
-        forces: Sizes of the forces that should be in equilibrium, by kind: "beams", "connectors",
-            "loads", "inertia", "damping"; N.
-        reason: Name that PETSc has for why its solver stopped, such as "DIVERGED_MAX_IT"; empty if
-            equilibria were found but refused.
+        residuals: Largest residual in each beam, body and connector, in descending order; N,
+            moments over the size of the scene.  Empty if equilibria were found but refused.
+        forces: Magnitudes of the forces by kind: "beams", "connectors", "loads", "inertia",
+            "damping"; N.
+        reason: PETSc's name of the reason, such as "DIVERGED_MAX_IT"; empty if equilibria were
+            found but refused.
 
     Example:
         >>> pull = ub.PointLoad(weak.end, force=(0, -5e4), time=lambda t: t)
@@ -132,7 +131,7 @@ class TradeoffError(RuntimeError):
     """No setting can be recommended: the runs do not converge, or it would take too long.
 
     Attributes:
-        runs: What was run, see :class:`~ufl_beam.analysis.refinement_runs.Run`.
+        runs: Runs so far, as in :attr:`Tradeoff.runs`.
 
     Example:
         >>> jumps = {"jumps": lambda run: 1.0 + len(run.times) % 3}

@@ -14,11 +14,11 @@ from mpi4py import MPI
 
 import ufl_beam as ub
 from ufl_beam import collective_errors
-from ufl_beam.simulation import simulation
+from ufl_beam.simulation import replicas
 
 WORLD = MPI.COMM_WORLD
 ALL = -1
-simulation.SMALLEST_SHARE = 1
+replicas.SMALLEST_SHARE = 1
 
 SECTION = ub.Section(EA=1e6, GA=1e6, EI=1e2, rhoA=1.0, rhoI=1e-3)
 BEAM = ub.Beam((0, 0), (1, 0), SECTION, cells=8)
@@ -232,7 +232,7 @@ def asked(fail):
 
 def own(fail):
     """A small scene, which each process computes for itself."""
-    simulation.SMALLEST_SHARE = 10**6
+    replicas.SMALLEST_SHARE = 10**6
     load(fail)
 
 

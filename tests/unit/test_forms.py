@@ -15,7 +15,7 @@ from ufl_beam.discretization import compiled_forms
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Share
-from ufl_beam.dolfinx_compat import fem, line_mesh, space_with_dofs
+from ufl_beam.dolfinx_compat import VERSION, cpp, fem, line_mesh
 from ufl_beam.mechanics.kinematics import Axis, strain
 
 SECTION = ub.Section(EA=60.0, GA=40.0, EI=30.0, rhoA=2.0, rhoI=1.0)
@@ -266,6 +266,18 @@ def forms_of(q, axis, dx):
     energy = sum(c * e[i] ** 2 for i, c in enumerate((3.0, 2.0, 1.0))) * dx
     force = ufl.derivative(energy, q, ufl.TestFunction(space))
     return energy, force, ufl.derivative(force, q, ufl.TrialFunction(space))
+
+
+def space_with_dofs(domain, element, cell_dofs, size):
+    """Make a function space with given degrees of freedom of the cells."""
+    plain = fem.functionspace(domain, element)
+    index_map = cpp.common.IndexMap(MPI.COMM_SELF, size)
+    adjacency = cpp.graph.AdjacencyList_int32(np.ascontiguousarray(cell_dofs, dtype=np.int32))
+    dofmap = cpp.fem.DofMap(plain.dofmap.dof_layout, index_map, 1, adjacency, 1)
+    arguments = [domain._cpp_object, plain._cpp_object.element, dofmap]
+    if VERSION < (0, 11):
+        arguments.append(list(element.reference_value_shape))
+    return fem.FunctionSpace(domain, element, cpp.fem.FunctionSpace_float64(*arguments))
 
 
 def test_kernels_give_what_dolfinx_assembles():

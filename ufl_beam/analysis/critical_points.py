@@ -69,8 +69,8 @@ class CriticalPoint:
         factor: The load factor.
         n: Number of the state in the path.
         state: The state alone, as a solution.
-        mode: What moves without a change of load; root mean square 1 of displacements over the
-            size of the scene, and of rotations; all degrees of freedom in the order of the grid.
+        mode: Critical mode with the root mean square 1 of displacements over the size of the scene,
+            and of rotations; all degrees of freedom in the order of the grid.
 
     Example:
         >>> push = ub.PointLoad(beam.end, force=(-2e7, 0), time=lambda t: t)
@@ -137,10 +137,10 @@ class Stiffness:
     def __init__(self, share: Share, A: Csr, held: Index, rate: Array) -> None:
         grid = share.grid
         here = (share.dofs[A.rows()], share.dofs[A.indices], A.data, share.dofs, rate)
-        parts = share.comm.allgather(here) if share.comm.size > 1 else [here]
+        parts = share.comm.allgather(here) if not share.alone else [here]
         rows, columns, data, dofs, rates = (np.concatenate(x) for x in zip(*parts, strict=True))
         of_all = share.dofs[held]
-        if share.comm.size > 1:
+        if not share.alone:
             of_all = np.concatenate(share.comm.allgather(of_all))
         free = np.setdiff1d(np.arange(grid.size), of_all)
         shape = (grid.size, grid.size)

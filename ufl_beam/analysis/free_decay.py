@@ -150,18 +150,18 @@ def peaks(
 ) -> tuple[Array, Array]:
     """Find times (s) and amplitudes (unit of x) of the maxima of a vibration; (m,) each.
 
-    Of x and not of its magnitude: these are one period apart, wherever the equilibrium is.  Each
-    is that of the parabola through three samples; an end of the history is no maximum.
+    They are maxima of x, not of its magnitude, and so one period apart for any equilibrium.  Each
+    is interpolated by a parabola through three samples; ends of the history do not count.
 
     Noise raises small peaks more than large ones: filter it first if it is more than 0.3 % of the
     amplitudes.
 
     Args:
         t: Increasing times, in any steps; (n,); s.
-        x: Values of the free vibration, without what came before it; (n,).
+        x: Values of the free vibration alone; (n,).
         about: Equilibrium from which amplitudes count; unit of x.
-        prominence: By how much of the range of x it must fall on both sides of a maximum: more
-            than what rides on the vibration at high frequency, less than its last peaks.
+        prominence: Part of the range of x by which it must fall on both sides of a maximum: more
+            than superposed vibrations of high frequency, less than the last peaks.
 
     Raises:
         SceneError: t and x are not as many, not finite, or t does not increase.
@@ -224,7 +224,8 @@ def damping_ratio(decrement: npt.ArrayLike) -> Array:
 def fit_decay(t: npt.ArrayLike, amplitudes: npt.ArrayLike) -> Decay:
     """Fit a linear and an exponential law to peaks that are one period apart, by least squares.
 
-    Both to the amplitudes, not to their logarithms, so that their residuals may be compared.
+    Both laws are fitted to the amplitudes, not to their logarithms, so that their residuals can be
+    compared.
 
     Args:
         t: Increasing times of the peaks; (n,); s.
@@ -280,7 +281,7 @@ def _exponential(t: Array, initial: float, rate: float) -> Array:
 
 
 def _gradient(t: Array, initial: float, rate: float) -> Array:
-    """Of :func:`_exponential`, for its two parameters; (n, 2).  Differences fail at rate 0."""
+    """Derivatives of :func:`_exponential` by parameters; (n, 2).  Differences fail at rate 0."""
     e = np.exp(-rate * t)
     return np.stack([e, -initial * t * e], axis=1)
 

@@ -173,7 +173,7 @@ class SmallMotions:
         return np.asarray(np.abs(works) <= ZERO * sizes)
 
     def _damped(self, C: csr_array, free: Array, n: int, lowest: float) -> tuple[Complex, Complex]:
-        """At least n exponents and motions with velocity-dependent forces, whose matrix is C.
+        """Compute at least n exponents and motions with velocity-dependent forces C.
 
         Nothing resists the motions ``free``, in columns; ``lowest`` is the first frequency; rad/s.
         """

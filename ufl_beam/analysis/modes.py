@@ -243,21 +243,22 @@ class Buckling(Shapes):
 def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None = None) -> Modes:
     """Compute natural frequencies, damping ratios and shapes of small vibrations.
 
-    About the undeformed, unloaded scene; or about the last state of a solution, with its section
-    forces, what loads and a :class:`RotatingFrame` add, and with the elastic stiffness of what has
-    yielded: nothing yields or opens further, and hinges that bear nothing any more are joints.
-    What friction holds is held, what slides slides freely; controllers do not answer.
+    They are vibrations about the undeformed, unloaded scene, or about the last state of a solution:
+    with its section forces, the stiffness of its loads and of a :class:`RotatingFrame`, and the
+    elastic stiffness of yielded material.  Nothing yields or opens further, and hinges that bear no
+    moment any more are joints.  Sticking friction is a constraint, sliding friction and controllers
+    are ignored.
 
-    Without damping they are eigenvalues of K x = ω² M x.  Damping, Coriolis and follower forces
-    make it (K + s C + s² M) x = 0, solved as it is: no modal damping is assumed, what decays
-    without oscillating counts as a mode, and a negative damping ratio is flutter, or buckling if
+    Without damping they are eigenvalues of K x = ω² M x.  With damping, Coriolis or follower forces
+    they are those of (K + s C + s² M) x = 0, without the assumption of modal damping.  Motions that
+    decay without oscillation count as modes.  A negative damping ratio is flutter, or buckling if
     it is -1.
 
     Args:
-        scene: What is modelled.
-        n: How many, from the lowest; fewer are given if the scene has fewer.
+        scene: Model.
+        n: Number of modes, from the lowest frequency; fewer if the scene has fewer.
         at: Solution whose last state is meant, of the same beams joined alike.
-        mesh: How finely it is discretised; as ``at``, or with the cells of the beams.
+        mesh: Discretization; as ``at``, or with the cells of the beams.
 
     Raises:
         SceneError: The call or the scene is wrong, or nothing that moves has mass.
@@ -288,17 +289,17 @@ def buckling(
 ) -> Buckling:
     """Compute buckling load factors and modes, (K + λ K') x = 0.
 
-    Loads and prescribed motions grow in proportion, from those of the state ``at`` (λ = 0; nothing
-    without it) to those at the time ``t`` (λ = 1).  K' is the change of stiffness along the first,
-    linear part of their path, by forces and by displacements.  So factors are exact as the state
-    comes near to buckling, and else as good as that path is straight.
+    Loads and prescribed motions grow in proportion, from those of the state ``at`` (λ = 0; none
+    without it) to those at the time ``t`` (λ = 1).  K' is the derivative of the stiffness along the
+    first, linear part of their path, by forces and by displacements.  So factors are exact if the
+    state is close to buckling, and otherwise as accurate as the path is straight.
 
     Args:
-        scene: What is modelled.
-        n: How many, from the smallest |λ|.
+        scene: Model.
+        n: Number of factors, from the smallest |λ|.
         t: Time at which loads are taken; s.
         at: Solution whose last state the loads grow from, of the same beams joined alike.
-        mesh: How finely it is discretised; as ``at``, or with the cells of the beams.
+        mesh: Discretization; as ``at``, or with the cells of the beams.
 
     Raises:
         SceneError: The call is wrong, the scene is free to move, nothing acts on it, or what acts

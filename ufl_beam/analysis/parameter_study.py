@@ -47,7 +47,7 @@ def study(
     first process hands cases out and writes the file at once; it computes nothing and hardly takes
     time, so ``mpirun -n 9`` occupies eight cores.  Alone, it calls one after the other.
 
-    A member that raises is a failed one: it is reported, and the others go on.
+    A member that raises an exception has failed: it is reported, and the others are computed.
 
     Args:
         member: Makes and simulates a scene and returns numbers and arrays by name, the same names
@@ -57,7 +57,8 @@ def study(
         path: HDF5 file of the results, written on the way, which takes a twentieth of the time.
             Cases that the file has are not computed again, unless they failed; what it has of
             other cases stays.
-        anew: Compute all cases and forget what the file has: when the member has changed.
+        anew: Compute all cases again and discard the results in the file, after a change of the
+            member.
         progress: Show a progress bar if the output is a terminal.
         comm: Processes; all of them, or this one alone in a member of another study.  A member
             leaves out ``comm`` of :func:`simulate`.
@@ -180,7 +181,7 @@ def _outcomes(
 
 
 def _run(case: Case) -> tuple[Outcome, float]:
-    """One member, on the process that serves; its error is an outcome as well."""
+    """Run one member on the process that serves; its error is an outcome as well."""
     begin = time.perf_counter()
     try:
         with alone():

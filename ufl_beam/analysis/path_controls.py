@@ -169,11 +169,11 @@ class _QuantityControl(Control):
         return corrector.share.total(float(normal.q @ way.q)) + normal.t * way.t
 
     def begins_along(self, corrector: PathCorrector, way: Direction) -> float:
-        """As the quantity changes."""
+        """Sense in which the quantity changes as ``step`` says."""
         return self.step * self._along(corrector, way)
 
     def continues_along(self, corrector: PathCorrector, gone: Direction, way: Direction) -> float:
-        """As the quantity changes."""
+        """Sense in which the quantity changes as ``step`` says."""
         return self.begins_along(corrector, way)
 
     def solve_step(self, corrector: PathCorrector, part: float) -> Trial:

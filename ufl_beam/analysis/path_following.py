@@ -26,6 +26,7 @@ from ufl_beam.output.output_files import take
 from ufl_beam.output.recorders import Recorder, close_all, recorders_of
 from ufl_beam.parallel import communicator
 from ufl_beam.parameter import FACTOR
+from ufl_beam.simulation.run import partial_results
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.solution_files import arrays_of
@@ -93,15 +94,14 @@ def follow(
 ) -> Path:
     """Follow a path of static equilibria through limit points and snap-backs.
 
-    The time of loads and motions is the load factor; it is found with the displacements.  A path
-    begins at 0, where the loads that are there at once are borne, in the direction of the control;
-    it goes on in the direction in which it arrives.  It is infinitely slow: what is viscous, or has
-    mass, does nothing.
+    The load factor is the time of loads and motions, and an unknown like the displacements.  A path
+    begins with the equilibrium at the factor 0, in the direction of the control, and goes on in its
+    own direction.  It is quasi-static: viscosity and masses have no effect.
 
-    Where the load factor turns, or where another branch begins, the path has a state.
+    Limit points of the load factor and bifurcation points become states of the path.
 
     Args:
-        scene: What is modelled; some load or motion must vary in time, ``time=lambda t: t``.
+        scene: Model; some load or motion must vary in time, ``time=lambda t: t``.
         control: :class:`ArcLength`, :class:`LoadControl`, :class:`DisplacementControl` or
             :class:`DissipationControl`.
         until: The path ends after the first step for which this is true, as in
@@ -110,7 +110,7 @@ def follow(
         start: Branch of a :class:`CriticalPoint`, or a solution whose last state is the beginning.
         record: Files to write on the way.
         newton: Tolerances and PETSc options; line searches and Krylov methods are not used.
-        mesh: How finely it is discretised; as ``start``, or with the cells of the beams.
+        mesh: Discretization; as ``start``, or with the cells of the beams.
         comm: Processes that share the scene.
 
     Raises:
@@ -157,7 +157,7 @@ def follow(
         return until is not None and bool(until(simulation))
 
     try:
-        with simulation.partial_results():
+        with partial_results(simulation):
             stepper.begin(branch, fresh=state is None)
             for recorder in recorders:
                 simulation.together(recorder.open, simulation)

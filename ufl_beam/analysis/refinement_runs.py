@@ -29,7 +29,7 @@ SHORT_RUN = 0.1
 
 
 class RefinementRuns:
-    """All runs of a trade-off, see :func:`tradeoff`.
+    """Runs of a trade-off, see :func:`tradeoff`.
 
     Args:
         simulate: Function that runs the scene.
@@ -155,7 +155,7 @@ class RefinementRuns:
             yield name, value
 
     def _member(self, short: float, **case: Any) -> dict[str, Any]:
-        """One run of a study."""
+        """Compute one run, as a member of a study."""
         refinement = Refinement(**case)
         solution = self._simulate(refinement)
         seconds = [solution.seconds]

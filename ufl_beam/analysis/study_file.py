@@ -28,8 +28,8 @@ class Study:
 
     Attributes:
         member: Name of the function.
-        cases: What it was called with; lists where these were tuples or arrays.
-        results: What it returned; (len(cases), ...) each.
+        cases: Arguments of each member; lists where these were tuples or arrays.
+        results: Returned values by name; (len(cases), ...) each.
         failed: Number of a case that failed, and its error.
         seconds: Wall time of each member; (len(cases),); s.
 

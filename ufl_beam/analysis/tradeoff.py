@@ -65,13 +65,13 @@ def tradeoff(
 ) -> Tradeoff:
     """Find the cheapest setting for a tolerance, or the most accurate one for a time.
 
-    The scene is run with finer and finer steps, cells and both.  Where the changes fall as they
-    should, they tell the error of each run, and which one is needed; that one is run as well and
-    compared with the limit that the others are extrapolated to.  All dials are arguments of
-    :func:`simulate`; several schemes, steps, meshes compete.
+    The scene is run with finer steps, finer cells and both.  From the convergence of the quantities
+    the errors of the runs and the required setting are estimated.  That setting is run as well and
+    compared with the limit that the others are extrapolated to.  All settings are arguments of
+    :func:`simulate`; several schemes, steps and meshes compete.
 
     Args:
-        scene: What is simulated; ``cells`` of its beams are the coarsest.
+        scene: Model; ``cells`` of its beams are the coarsest.
         quantities: Functions of a :class:`Solution` by name that return a number, or an array of
             the same shape whatever the steps and cells: ``{"tip": lambda s:
             s.position(beam.end)[-1]}``.  The error of an array is that of its worst entry.
@@ -288,7 +288,7 @@ class _Search:
         return _Found(self._runs.runs[one], choice, prediction)
 
     def _all(self, prediction: Prediction) -> list[_Found]:
-        """All runs of the family as if they had been chosen."""
+        """Return all runs of the family, as if they had been chosen."""
         found = []
         for run in self._runs.of(self._family):
             _, refine, level, _ = run.refinement

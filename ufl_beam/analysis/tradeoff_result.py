@@ -100,7 +100,7 @@ class Tradeoff:
             quantities.
         target: What was asked.
         families: The kinds of dials, in words.
-        notes: What else should be known.
+        notes: Further remarks on the result.
         spent: Wall time of all runs, repetitions and compiling included; s.
 
     Example:

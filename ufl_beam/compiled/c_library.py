@@ -79,11 +79,14 @@ doubles = partial(ffi.from_buffer, ffi.typeof("double[]"))
 """Pointer to a contiguous array of float64; it keeps the array alive."""
 
 
+_INT32, _INT32_ARRAY = np.dtype(np.int32), ffi.typeof("int32_t[]")
+
+
 def integers(array: Index) -> Any:
     """Return a pointer to a contiguous array of int32; it keeps the array alive."""
-    if array.dtype != np.int32:
+    if array.dtype != _INT32:
         raise TypeError(f"C takes integers of 32 bits, not {array.dtype}")
-    return ffi.from_buffer("int32_t[]", array)
+    return ffi.from_buffer(_INT32_ARRAY, array)
 
 
 def names(enum: str, prefix: str = "") -> tuple[str, ...]:

@@ -67,9 +67,8 @@ def in_vectors(kernel: str) -> str:
             line = re.sub(r"= ([^;?]+) \? ([^;:]+) : ([^;:]+);", r"= PICK(\1, \2, \3);", line)
             line = re.sub(rf"\b({'|'.join(FUNCTIONS)})\(", r"lanes_\1(", line)
         lines.append(line)
-    names = ("lanes *restrict A", *(f"const lanes *restrict {x}" for x in ("w", "c")))
-    arguments = ", ".join((*names, "const lanes *restrict coordinate_dofs"))
-    return f"static inline void tabulate({arguments})\n" + "\n".join(lines)
+    inputs = ", ".join(f"const lanes *restrict {x}" for x in ("w", "c", "coordinate_dofs"))
+    return "\n".join([f"static inline void tabulate(lanes *restrict A, {inputs})", *lines])
 
 
 def written(source: Path) -> str:
@@ -100,8 +99,11 @@ def in_batches(rows: npt.NDArray[Any], lanes: int) -> npt.NDArray[Any]:
     return np.ascontiguousarray(rows.reshape(-1, lanes, rows.shape[1]).transpose(0, 2, 1))
 
 
-AGREEMENT = 1e-12
-"""Tolerance on the difference from FFCx's kernel, relative to the largest entry of a cell."""
+AGREEMENT = 1e-10
+"""Tolerance on the difference from FFCx's kernel, relative to the largest entry of a cell.
+
+Round-off of the tangent of a cell of degree 3 is 1e-12 of it; a wrong kernel errs by far more.
+"""
 
 
 def require_agreement(module: ModuleType, kernel: int, sizes: tuple[int, int, int]) -> None:

@@ -168,26 +168,11 @@ class Kernel:
         """Make the data of the loop over the cells."""
         numbers = (self._packed, self._form.constants, self._coordinates)
         self._arrays = (*map(integers, (self._dofs, self._rows)), *map(doubles, numbers))
-        dofs, row, packed, constants, coordinates = self._arrays
-        self.cells = ffi.new(
-            "cells *",
-            {
-                "tabulate": self._form.tabulate,
-                "several": self._in_lanes,
-                "lanes": self._lanes,
-                "number": len(self._dofs),
-                "of_cell": self._dofs.shape[1],
-                "unknowns": self._unknowns,
-                "dofs": dofs,
-                "at": self._at,
-                "width": self._packed.shape[1],
-                "w": packed,
-                "constants": constants,
-                "coordinates": coordinates,
-                "rows": self._entries,
-                "row": row,
-            },
-        )
+        self.cells = c = ffi.new("cells *")
+        c.tabulate, c.several, c.lanes = self._form.tabulate, self._in_lanes, self._lanes
+        c.dofs, c.row, c.w, c.constants, c.coordinates = self._arrays
+        (c.number, c.of_cell), c.rows = self._dofs.shape, self._entries
+        c.at, c.unknowns, c.width = self._at, self._unknowns, self._packed.shape[1]
 
     def uses(self, function: fem.Function) -> bool:
         """Return whether a function appears in the form."""

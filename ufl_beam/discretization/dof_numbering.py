@@ -90,7 +90,7 @@ class Grid(BeamMesh):
 
     @cached_property
     def dofs_of_links(self) -> Index:
-        """Of each connector: both u, both v, both ψ of its nodes, and its force; (num_links, 7)."""
+        """Degrees of freedom of each connector: u, v, ψ of both nodes, force; (num_links, 7)."""
         links = self.scene.links
         nodes = np.array([(self.node(c.a), self.node(c.b)) for c in links]).reshape(-1, 2, 3)
         both = nodes.transpose(0, 2, 1).reshape(-1, 6)

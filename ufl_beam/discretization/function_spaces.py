@@ -50,7 +50,7 @@ class Element:
         )
 
     def _along(self) -> fem.Function:
-        """From 0 to 1 along the cell."""
+        """Coordinate from 0 to 1 along the cell."""
         function = fem.Function(fem.functionspace(self._cell, ("DG", 1)))
         function.x.array[:] = 0.0, 1.0
         return function
@@ -142,7 +142,7 @@ class Fields:
         return kernel
 
     def hot_kernel(self, form: ufl.Form, unknown: fem.Function) -> Kernel:
-        """The same for what steps ask again and again: several cells at once."""
+        """Kernel as :meth:`kernel`, with several cells at once, for forms of each iteration."""
         kernel = self.kernel(form, unknown)
         vectorise([kernel], self._coordinates_in_lanes)
         return kernel

@@ -71,6 +71,7 @@ class Share:
     order of the grid.  Global numbers, those of PETSc, are contiguous on each process.
 
     Attributes:
+        alone: True if there is only one process; asking MPI takes longer.
         cells: Numbers of the cells of this process; contiguous.
         dofs: Degrees of freedom, in numbers of the grid, by local number.
         num_owned: How many of them this process owns.
@@ -85,7 +86,7 @@ class Share:
 
     def __init__(self, grid: Numbering, comm: MPI.Intracomm) -> None:
         self.grid = grid
-        self.comm = comm
+        self.comm, self.alone = comm, comm.size == 1
         num_cells = len(grid.cells)
         limits = np.arange(comm.size + 1) * num_cells // comm.size
         self.cells = np.arange(limits[comm.rank], limits[comm.rank + 1])
@@ -193,7 +194,7 @@ class Share:
 
         One process alone gets ``values`` back: states are new arrays in each step.
         """
-        if self.comm.size == 1:
+        if self.alone:
             return values
         parts, result = np.empty((2, self.grid.size))
         owned = np.ascontiguousarray(values[: self.num_owned])
@@ -203,7 +204,7 @@ class Share:
 
     def added(self, values: Array) -> Array:
         """Sums over the processes of values at the local degrees of freedom."""
-        if self.comm.size == 1:
+        if self.alone:
             return values
         sums = np.zeros(self.grid.size)
         sums[self.dofs] = values
@@ -212,13 +213,13 @@ class Share:
 
     def gather_cells(self, values: Array) -> Array:
         """Values of all cells, in the order of the grid, on every process."""
-        if self.comm.size == 1:
+        if self.alone:
             return values.copy()
         return np.concatenate(self.comm.allgather(values))
 
     def total(self, value: float) -> float:
         """Sum over the processes."""
-        return value if self.comm.size == 1 else float(self.comm.allreduce(value))
+        return value if self.alone else float(self.comm.allreduce(value))
 
     def largest(self, value: float) -> float:
         """Largest over the processes; infinite where one has no number.
@@ -226,6 +227,6 @@ class Share:
         MPI does not say what the largest of numbers is with one that is none, and processes that
         learn different ones part.
         """
-        if self.comm.size == 1:
+        if self.alone:
             return value
         return float(self.comm.allreduce(math.inf if math.isnan(value) else value, op=MPI.MAX))

@@ -46,7 +46,7 @@ class _AtEnd:
         return scaled(C, e1)
 
     def losses(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> tuple[Expr, ...]:
-        """None."""
+        """No numerical losses in the ledger."""
         return ()
 
     def average(self, before: Expr, now: Expr) -> Expr:
@@ -63,7 +63,7 @@ class _AtEnd:
         return f, np.where(f != 0, 1.0, 0.0)
 
     def way_to_rest(self, dt: float) -> float:
-        """None: friction sticks where it is."""
+        """No way to rest: friction sticks at its place."""
         return 0.0
 
     def nodal_step(self, q0: Array, q1: Array, rotations: Index) -> tuple[Array, float]:
@@ -79,9 +79,9 @@ class _AtEnd:
 class Static(_AtEnd):
     """Static equilibrium at the end of each step; time is the load parameter.
 
-    The ledger counts works by the trapezoidal rule, so its imbalance is of second order in the
-    step and a measure of it.  A step is cut whose forces leave a twentieth of what it stores and
-    dissipates unexplained, for it may have leapt to another branch of equilibria.
+    The ledger counts works by the trapezoidal rule, so its imbalance is of second order in the step
+    and a measure of it.  A step is cut if its forces do not account for the stored and dissipated
+    energy up to a twentieth, since it may have jumped to another branch of equilibria.
 
     Example:
         >>> run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1)
@@ -108,7 +108,7 @@ class Static(_AtEnd):
 
 
 class Weights(NamedTuple):
-    """Of Newmark's formulas, and of the mean accelerations that generalised-α relates.
+    """Weights of Newmark's formulas and of the mean accelerations of generalised-α.
 
     With a an acceleration that follows u and v, and ü that of the forces,
 
@@ -144,7 +144,7 @@ class _Accelerated(_AtEnd):
         return Step(t0, t1, q0, load_time=t1, motion_time=t1, toward=1.0)
 
     def half_tangents(self, rotations: Index) -> Index:
-        """None."""
+        """No rotations: steps are the increments themselves."""
         return rotations[:0]
 
     @property
@@ -177,7 +177,7 @@ class _Accelerated(_AtEnd):
         return factor, 1.0, v
 
     def velocity(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
-        """That at the end."""
+        """Velocity at the end of the step."""
         (_, _, γ, β), a, _ = self._beginning(dt, rates)
         return γ / (β * dt), 1.0, (γ / β - 1) * rates.v + (γ / (2 * β) - 1) * dt * a
 
@@ -200,7 +200,7 @@ class _Accelerated(_AtEnd):
         return v, acceleration, lead * (acceleration - rates.more[0])
 
     def slip(self, dt: float, change: Array, rates: Rates) -> Array:
-        """None that is known."""
+        """Zero: no such difference of velocities is known."""
         return np.zeros_like(change)
 
     def error_weights(self) -> tuple[float, float]:
@@ -270,8 +270,8 @@ class GeneralizedAlpha(_Accelerated):
     multipliers if ``rho_inf < 1``.  Where the step changes, the auxiliary acceleration is adjusted,
     so that the order remains.
 
-    What :class:`Newmark` says about ledger, beginning and laws holds here too.  Nothing proves that
-    energy never grows in large motion; :class:`DecayingMidpoint` has that proof.
+    Ledger, initial accelerations and rate-dependent laws are as in :class:`Newmark`.  In large
+    motion the energy may grow; with :class:`DecayingMidpoint` it cannot.
 
     Args:
         rho_inf: Spectral radius at infinite frequency, from 0 (gone in a step) to 1 (undamped).
@@ -295,7 +295,7 @@ class GeneralizedAlpha(_Accelerated):
 
     @property
     def weights(self) -> Weights:  # type: ignore[override]
-        """Those of Chung and Hulbert."""
+        """Weights of Chung and Hulbert."""
         α_m = (2 * self.rho_inf - 1) / (self.rho_inf + 1)
         α_f = self.rho_inf / (self.rho_inf + 1)
         return Weights(α_m, α_f, 0.5 - α_m + α_f, (1 - α_m + α_f) ** 2 / 4)

@@ -14,22 +14,22 @@ from ufl_beam.mechanics.time_schemes import Rates, require_between
 class DecayingMidpoint(ExactStep, Midway):
     """Midpoint rule of second order that dissipates the energy of high frequencies.
 
-    :class:`Midpoint` loses energy in proportion to the changes of strains and velocities in a step,
-    which is of first order.  Here it is in proportion to how these changes change from step to
-    step: a mode of circular frequency ω loses the part c (ω dt)⁴ of its energy in a step, with
-    c = rho_inf (1 - rho_inf) / (2 (1 + rho_inf)²), and what no step resolves falls to ``rho_inf``
-    of its amplitude.  The equations of the step are
+    The dissipation of :class:`Midpoint` is proportional to the changes of strains and velocities in
+    a step, and of first order.  Here it is proportional to second differences of both: a mode of
+    circular frequency ω loses the part c (ω dt)⁴ of its energy in a step, with c = rho_inf (1 -
+    rho_inf) / (2 (1 + rho_inf)²), and unresolved modes are reduced to ``rho_inf`` of their
+    amplitude.  The equations of the step are
 
         resultants  C ((e0 + e1)/2 + c (Δe - r Δe')),     Δu/dt = (v0 + v1)/2 + c (Δv - r Δv'),
 
     Δe' and Δv' being the changes in the step before, and r the ratio of both steps, 1 at most.
 
-    The energy, and c/2 times that of Δe and Δv beside it, never grows, whatever the steps, for
-    Δe (Δe - r Δe') = (Δe² - r² Δe'² + (Δe - r Δe')²)/2: the motion never has more energy than it
-    began with and was given.  The loss is the entry "numerical" of the ledger, exactly; it is never
-    negative, but a single step may give back a part of what steps before it took.  Linear momentum
-    is kept, angular momentum to second order.  Resultants of cells that may yield or break are not
-    damped, so that open hinges turn freely, nor are connectors.
+    The sum of the energy and of c/2 times the energy of Δe and Δv never grows by the scheme, for
+    any steps, because Δe (Δe - r Δe') = (Δe² - r² Δe'² + (Δe - r Δe')²)/2.  The total loss is the
+    entry "numerical" of the ledger and never negative; a single step may give back a part of the
+    loss of previous steps.  Linear momentum is conserved exactly, angular momentum to second order.
+    Resultants of cells that may yield or break are not damped, so that open hinges turn freely, nor
+    are connectors.
 
     Args:
         rho_inf: Spectral radius at infinite frequency, from 1/3 to 1; 1 loses nothing.
@@ -62,7 +62,7 @@ class DecayingMidpoint(ExactStep, Midway):
         return self.part * min(1.0, dt / rates.last_dt) * (rates.v - rates.v_before)
 
     def way_to_rest(self, dt: float) -> float:
-        """From v1 = 0, were there no step before."""
+        """Way to v1 = 0, as if there were no previous step."""
         return (0.5 - self.part) * dt
 
     def inertia(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
@@ -79,7 +79,7 @@ class DecayingMidpoint(ExactStep, Midway):
         return (v,)
 
     def slip(self, dt: float, change: Array, rates: Rates) -> Array:
-        """In proportion to how the change changes."""
+        """Difference of velocities in proportion to second differences."""
         return self.part * change - self._remembered(dt, rates)
 
     def error_weights(self) -> tuple[float, float]:

@@ -108,19 +108,19 @@ class ExactStep(_OverStep):
 class ExactStatic(ExactStep):
     """Static equilibrium with an exact ledger: works are exact increments of energy.
 
-    :class:`Static` finds equilibrium at the ends of the steps and counts works by the trapezoidal
-    rule; here the equation of the step is that of :class:`Midpoint`.  Inelastic material follows
-    its laws over the step, not only at its end.  The ledger is exact, the solution is of first
-    order in the step with ``theta=1`` and of second order with ``theta=1/2``; docs/schemes.md has
-    measured errors.  Loads that are there from the start are applied in the first step, in parts
-    that turn nodes little.  A leap to another branch of equilibria does not
-    stop it, but what that sets free is in the entry "numerical"; :class:`Static` stops.
+    :class:`Static` is in equilibrium at the ends of steps and counts works by the trapezoidal rule;
+    here the equation of the step is that of :class:`Midpoint`.  Inelastic material follows its laws
+    over the step, not only at its end.  The ledger is exact; the solution is of first order in the
+    step with ``theta=1`` and of second order with ``theta=1/2``, see docs/schemes.md for measured
+    errors.  Loads that act from the start are applied in the first step, in parts that turn nodes
+    little.  At a jump to another branch of equilibria the run goes on, and the released energy is
+    in the entry "numerical"; :class:`Static` stops there.
 
     Args:
-        theta: Part of the step at which resultants and loads are in equilibrium.  1/2 loses
-            nothing, but leaves the states at the ends free to oscillate about equilibrium; 1
-            brings them there, and what that costs is the entry "numerical" of the ledger.
-            Uniform moments differ along a beam by (Δψ/2)² of a step.
+        theta: Part of the step at which resultants and loads are in equilibrium.  With 1/2 no
+            energy is lost, but the states at the ends may oscillate about equilibrium.  With 1 they
+            tend to it, and the loss is the entry "numerical" of the ledger.  Uniform moments vary
+            along a beam by (Δψ/2)² of a step.
 
     Raises:
         SceneError: A number outside [1/2, 1].
@@ -151,7 +151,7 @@ class ExactStatic(ExactStep):
         return self.theta
 
     def way_to_rest(self, dt: float) -> float:
-        """None: everything is at rest."""
+        """No way to rest: everything is at rest."""
         return 0.0
 
     def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
@@ -203,7 +203,7 @@ class _Velocities(Midway):
         return 1 / (dt * keep), (0.5 - self.beta) / keep  # P(87)
 
     def way_to_rest(self, dt: float) -> float:
-        """From v1 = a s - b v0 = 0."""
+        """Way to v1 = a s - b v0 = 0."""
         a, b = self._weights(dt)
         return b / a
 
@@ -218,7 +218,7 @@ class _Velocities(Midway):
         return (combined(a, s, -b, rates.v),)
 
     def slip(self, dt: float, change: Array, rates: Rates) -> Array:
-        """In proportion to the change; what it loses is D_K of the paper."""
+        """Difference of velocities in proportion to the change; its loss is D_K of the paper."""
         return self.beta * change  # P(88)
 
 
@@ -227,15 +227,15 @@ class Midpoint(ExactStep, _Velocities):
     """Midpoint rule that conserves energy and momentum exactly, with dissipation on request.
 
     ``alpha = beta = 0`` conserves energy, linear and angular momentum to solver tolerance at any
-    step size.  Positive values take energy out of the high frequencies, never in: ``alpha`` through
-    the resultants, which keeps the momenta exact; ``beta`` through the velocities, which gives
-    up angular momentum.  What they take is the entry "numerical" of the ledger.
+    step size.  Positive values dissipate energy of high frequencies: ``alpha`` by the resultants,
+    with exact momenta; ``beta`` by the velocities, without conservation of angular momentum.  The
+    loss is the entry "numerical" of the ledger.
 
-    Laws of inelastic material are stated in the middle of the step, which is of second order;
-    ``alpha = 1/2`` states them at its end: backward Euler, of first order.  In the middle of the
-    step stresses lie on the yield surface, and an open hinge bears nothing; at the ends they
-    alternate about that by the order of a step, which a small ``alpha`` damps.  The elastic energy
-    of what breaks completely is lost at once, as "numerical".
+    Laws of inelastic material hold in the middle of the step, which is of second order; with
+    ``alpha = 1/2`` they hold at its end: backward Euler, of first order.  In the middle of the step
+    stresses lie on the yield surface, and an open hinge bears no moment; at the ends they alternate
+    about these values by the order of a step, which a small ``alpha`` damps.  The elastic energy of
+    material that breaks completely is lost at once, as "numerical".
 
     Args:
         alpha: Dissipation by the resultants, from 0 to 1/2.
@@ -270,10 +270,10 @@ class Midpoint(ExactStep, _Velocities):
 class PrintedMidpoint(_OverStep, _Velocities):
     """The midpoint rule as the paper prints it, for comparison; :class:`Midpoint` is better.
 
-    Strains vary as in the middle of the step, which is not how they grow over it: energy drifts by
-    the square of the rotation of a step.  Linear and angular momentum are kept.  The ledger counts
-    the works of the step, and its imbalance is that drift.  Joints that are held by multipliers do
-    work of the same size.
+    The variation of the strains is that in the middle of the step, which differs from their
+    increment: energy drifts by the square of the rotation of a step.  Linear and angular momentum
+    are conserved.  The ledger counts the works of the step, and its imbalance is this drift.
+    Joints that are held by multipliers do work of the same size.
 
     Equations:
         P(77)-P(84), with the sign of P(79) mended; see docs/errata.md.

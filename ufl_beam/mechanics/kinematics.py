@@ -51,7 +51,7 @@ class Axis:
         ]
 
     def interpolate(self, values: Sequence[Expr]) -> tuple[Expr, Expr]:
-        """Of values in the nodes of the cell: value and derivative at the point, by Lagrange."""
+        """Interpolate nodal values at the point by Lagrange: value and derivative."""
         X = ufl.variable(self.X)
         f = 0
         for a, value in zip(self.nodes, values, strict=True):

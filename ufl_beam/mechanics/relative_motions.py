@@ -22,7 +22,7 @@ class Averaging(Protocol):
     """Variations of relative motions over a step, as time schemes define them."""
 
     def average(self, before: Expr, now: Expr) -> Expr:
-        """Of a vector that turns or of a distance: the one that variations are taken with."""
+        """Average of a vector or a distance over the step, as variations take it."""
 
     def virtual_turn(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
         """Variation of a relative rotation whose virtual motion is ``w``."""
@@ -68,7 +68,7 @@ def _moved(q: Pair, n: Numbers) -> Expr:
 
 
 def _between(q: Pair, n: Numbers) -> Expr:
-    """From point a to point b."""
+    """Vector from point a to point b."""
     return n.apart + _moved(q, n)
 
 

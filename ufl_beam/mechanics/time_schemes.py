@@ -103,7 +103,7 @@ class Scheme(Protocol):
         """Energies per length that the resultants lose numerically in the step; often none."""
 
     def average(self, before: Expr, now: Expr) -> Expr:
-        """Of a vector or a distance between frames: the one that variations are taken with."""
+        """Average of a vector or a distance between frames, as variations take it."""
 
     def virtual_turn(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
         """Variation of a relative rotation whose virtual motion is ``w``."""
@@ -156,7 +156,7 @@ class DynamicScheme(Scheme, Protocol):
     """True if the accelerations of a motion that is given oscillate for ever."""
 
     def half_tangents(self, rotations: Index) -> Index:
-        """Those rotations whose step of the nodes is 2 tan(Δψ/2); it is Δψ for the others."""
+        """Rotations whose nodal step is 2 tan(Δψ/2); for the others it is Δψ."""
 
     def inertia(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
         """(factor, back, v) of the force of inertia M (factor s - back v), s being the step."""

@@ -36,7 +36,7 @@ class Beam(Member):
         section: Its cross-section.
         cells: Number of cells, of equal length in the parameter of the curve.  Places that
             something is attached to, and corners, become vertices too.
-        name: What error messages and pictures call it.
+        name: Name in messages and pictures.
         curve: Axis from ``s = 0`` at ``a`` to ``s = 1`` at ``b``.
         corners: Parameters ``s`` that must be vertices.
         hinges: Plastic hinges of zero length, by their parameter ``s``, which becomes a vertex:

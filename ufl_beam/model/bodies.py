@@ -77,8 +77,8 @@ class Place:
     Attributes:
         beam: The beam, by identity.
         s: Parameter of its axis, from 0 to 1.
-        beyond: Whether the cross-section beyond the plastic hinge at ``s`` is meant, the one that
-            no joint, support or load is attached to.
+        beyond: True for the cross-section beyond the plastic hinge at ``s``, to which no joint,
+            support or load is attached.
 
     Example:
         >>> middle = beam.at(0.5)
@@ -134,7 +134,7 @@ class Body:
         center: Centre of mass in the undeformed scene; m.
         mass: kg.
         inertia: About the centre of mass; kg m².
-        name: What error messages and pictures call it.
+        name: Name in messages and pictures.
 
     Raises:
         SceneError: Coordinates that are no finite numbers, a negative mass or inertia.
@@ -223,7 +223,7 @@ def node(anchor: Anchor) -> Node:
 
 
 def arm(anchor: Anchor, point: Point | None = None) -> Point:
-    """From the node of an anchor to a point that moves with it, by default its own; m.
+    """Return the vector from the node of an anchor to a point, by default its own; m.
 
     All points of the ground are one: they do not move.
     """

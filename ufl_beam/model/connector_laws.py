@@ -209,8 +209,8 @@ class ForceLaw:
 
     Args:
         force: ``force(motion, rate)``; arrays or numbers; N or N m; a positive one resists growth.
-            It is asked for the middle of the step.  What it takes is the entry "functions" of the
-            ledger, because nobody knows what it stores.
+            It is evaluated in the middle of the step.  Its work is the entry "functions" of the
+            ledger.
 
     Example:
         >>> law = ub.ForceLaw(lambda motion, rate: 1e6 * motion + 1e9 * motion**3)
@@ -231,14 +231,14 @@ class ForceLaw:
 class Coulomb:
     """Coulomb friction: sticks below a limit of the force, slides at the limit.
 
-    The limit is ``force`` and ``coefficient`` times the force of a joint at the end of the step
-    before.  There is no stiffness of sticking: the motion stops exactly, with its velocity.
+    The limit is ``force``, plus ``coefficient`` times the force of a joint at the end of the
+    previous step.  Sticking has no stiffness: the motion is held exactly.
 
     Args:
-        force: Limit whatever the joint bears; N or N m.
+        force: Constant part of the limit; N or N m.
         coefficient: Coefficient of friction; for rotations times the radius of the pin; 1 or m.
-        joint: The joint or support whose force presses.  Joints must be ``measured``, or hold
-            their places with forces anyway, as :func:`Prismatic` and :func:`Link` do.
+        joint: Joint or support that provides the normal force.  Joints must be ``measured``, or
+            hold their places with forces anyway, as :func:`Prismatic` and :func:`Link` do.
 
     Raises:
         SceneError: No limit, or a coefficient without a joint.

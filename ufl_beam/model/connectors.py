@@ -7,11 +7,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from ufl_beam.errors import (
-    SceneError,
-    require_kind,
-    require_vector,
-)
+from ufl_beam.errors import SceneError, require_kind, require_vector
 from ufl_beam.model.bodies import Anchor, arm, require_anchor
 from ufl_beam.model.connector_laws import Coulomb, Guide, Law, Motor, RigidPlastic
 from ufl_beam.model.curves import Point
@@ -39,7 +35,7 @@ class Connector:
         kind: Name for messages.
         motion: Which relative motion; a name of ``relative.MOTIONS``.
         a, b: The anchors.
-        law: What it follows.
+        law: Law of its force.
         axis: Unit vector, for motions along one.
         corner: The point of frame a that is meant, if it is not that of the anchor.
 
@@ -75,12 +71,12 @@ class Connector:
 
     @property
     def arms(self) -> tuple[Point, Point]:
-        """From both nodes to the points that are meant; m."""
+        """Vectors from both nodes to the points of the connector; m."""
         return arm(self.a, self.corner), arm(self.b)
 
     @property
     def apart(self) -> Point:
-        """From the point of a to the point of b in the undeformed scene; m."""
+        """Vector from the point of a to the point of b in the undeformed scene; m."""
         (ax, ay), (bx, by) = self.corner or self.a.point, self.b.point
         return bx - ax, by - ay
 
@@ -143,8 +139,8 @@ def Slide(a: Anchor, b: Anchor, law: Law, *, axis: Point | None = None) -> Conne
 
     Args:
         a: Whose axis it is; it may be on the ground.
-        b: What moves along it.
-        law: What acts along the axis.
+        b: Place that moves along the axis.
+        law: Law of the force along the axis.
         axis: Direction in the undeformed scene; from ``a`` to ``b`` by default.
 
     Raises:

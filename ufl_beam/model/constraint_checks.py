@@ -13,7 +13,7 @@ from scipy.sparse.linalg import eigsh
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError
-from ufl_beam.model.bodies import GROUND, Anchor, Body, Member, Node, Spot, node
+from ufl_beam.model.bodies import GROUND, Anchor, Body, Member, Node, node
 from ufl_beam.model.connector_laws import (
     Coulomb,
     Damper,
@@ -28,7 +28,7 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import Point
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.masses import PointMass
-from ufl_beam.model.plastic_hinges import Slot
+from ufl_beam.model.plastic_hinges import Slot, shared_by_joints
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.time_functions import value_at
 
@@ -39,11 +39,8 @@ DENSE = 90
 def require_masses(scene: Scene) -> None:
     """Raise :class:`SceneError` if a body that may move has no mass, unless a beam carries it."""
     same, moved = scene.representatives, _fixed(scene)
-    for joint in scene.joints:
-        for component in joint.shared:
-            alike = joint.places if component == 2 else joint.carriers
-            slots = [(node(place), component) for place in alike if not isinstance(place, Spot)]
-            moved |= {same.get(slot, slot) for slot in slots}
+    for alike in shared_by_joints(scene.joints):
+        moved |= {same.get(slot, slot) for slot in alike if not isinstance(slot[0], Body)}
     for body in scene.bodies:
         for name, components in (("mass", (0, 1)), ("inertia", (2,))):
             slots = [(body, component) for component in components]
@@ -252,9 +249,8 @@ def _constraints(
     entries: list[tuple[int, int, float]] = []
     row = 0
 
-    def add(anchor: Anchor, factors: Sequence[float] | Array) -> None:
-        """Factors of (u, v, size ψ) of what an anchor moves with, in the present row."""
-        of = node(anchor)
+    def add(of: Node, factors: Sequence[float] | Array) -> None:
+        """Factors of (u, v, size ψ) of a node, in the present row."""
         if of is GROUND:
             return
         part = of if isinstance(of, Body) else of.beam
@@ -264,27 +260,25 @@ def _constraints(
         demand = np.asarray(factors) @ motion
         entries.extend((row, 3 * number[part] + k, float(demand[k])) for k in range(3))
 
-    for joint in scene.joints:
-        for component in joint.shared:
-            alike = joint.places if component == 2 else joint.carriers
-            for place in alike[1:]:
-                add(alike[0], -np.eye(3)[component])
-                add(place, np.eye(3)[component])
-                row += 1
+    for (first, component), *others in shared_by_joints(scene.joints):
+        for other, _ in others:
+            add(first, -np.eye(3)[component])
+            add(other, np.eye(3)[component])
+            row += 1
     for link in scene.links:
         if acts(link):
             unit = np.array([1.0, 1.0, 1.0 if link.turns else 1 / scene.size])
             for anchor, factors in zip((link.a, link.b), link.rigidly(), strict=True):
-                add(anchor, factors * unit)
+                add(node(anchor), factors * unit)
             row += 1
     for support in scene.supports:
         cos, sin = math.cos(support.angle), math.sin(support.angle)
         turned = np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
         for component in support.held:
-            add(support.place, turned[component])
+            add(node(support.place), turned[component])
             row += 1
     for place, component in also:
-        add(place, np.eye(3)[component])
+        add(node(place), np.eye(3)[component])
         row += 1
     return _sparse(entries, (max(row, 1), 3 * len(number)))
 

@@ -122,7 +122,7 @@ def tangent(curve: Curve, s: float, step: float) -> Array:
 
 
 def tangent_within(curve: Curve, s: float, low: float, high: float) -> Array:
-    """The same where the curve is smooth between two parameters only; (2,); m."""
+    """Return the tangent of a curve that is smooth between two parameters only; (2,); m."""
     step = min(REACH, (high - low) / 8)
     left, right = int((s - low) / step), int((high - s) / step)
     before = left if left < 2 else max(2, 4 - right)

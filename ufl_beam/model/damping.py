@@ -47,7 +47,7 @@ class Rayleigh:
 class KelvinVoigt:
     """Kelvin-Voigt damping: C times the strain rates, beside the elastic resultants; objective.
 
-    Rigid motion is free of it; the damping ratio of a mode of circular frequency ω in small
+    Rigid motion is not damped.  The damping ratio of a mode of circular frequency ω in small
     vibration is time ω/2, that of ``Rayleigh(stiffness=time)``.  Cells with a hinge are left out,
     so that an open hinge turns freely.
 

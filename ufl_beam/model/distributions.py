@@ -107,7 +107,8 @@ class Weibull(Distribution):
     """Weibull distribution of positive values, for strengths.
 
     Args:
-        scale: What a part exp(-1) of the values exceeds; Pa for fibres, N or N m for resultants.
+        scale: Value that a part exp(-1) of all values exceeds; Pa for fibres, N or N m for
+            resultants.
         shape: Weibull's modulus; the larger, the less scatter.
         seed: The same seed gives the same scene again.
 

@@ -192,7 +192,7 @@ class PlacedFibres:
         return float(self.E * self.A @ self.y**2)
 
     def layout(self, GA: float) -> Layout:
-        """One material point for each fibre; shear stays elastic."""
+        """Layout with one material point for each fibre; shear stays elastic."""
         n, softening = len(self.y), self.fibres.softening
         return Layout(
             strains=np.column_stack([np.ones(n), np.zeros(n), -self.y]),

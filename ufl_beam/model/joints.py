@@ -6,12 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from ufl_beam.errors import (
-    SceneError,
-    require_kind,
-    require_switch,
-    require_text,
-)
+from ufl_beam.errors import SceneError, require_kind, require_switch, require_text
 from ufl_beam.model.bodies import Anchor, Place, carries, ground, require_anchor
 from ufl_beam.model.connector_laws import HELD, Bearing, Guide
 from ufl_beam.model.connectors import Connector, _axis, _require_apart
@@ -27,7 +22,7 @@ class Joint(Bearing):
         places: The anchors.
         shared: Components that are equal: 0, 1 displacement, 2 rotation.  Those of rotation are one
             unknown; so are displacements of anchors that their nodes carry.
-        holders: What is held besides, by connectors.
+        holders: Connectors that hold the other components.
         meets: Whether the anchors are at one point of the undeformed scene.
         advice: For anchors that should meet and do not.
         look: Kind of joint whose picture it has; its own by default.
@@ -97,7 +92,7 @@ def Rigid(*places: Anchor, measured: bool = False) -> Joint:
     """Rigid joint at one point: displacement and rotation are shared by all ``places``.
 
     Args:
-        places: What is joined.
+        places: Places to be joined, at one point.
         measured: Keep separate unknowns and hold them with forces, which solutions and
             controllers can ask for, in the place of sharing the unknowns, which costs nothing.
 
@@ -112,7 +107,7 @@ def Revolute(*places: Anchor, measured: bool = False) -> Joint:
     """Revolute joint: displacement is shared by all ``places``, each turns freely.
 
     Args:
-        places: What is joined.
+        places: Places to be joined, at one point.
         measured: As in :func:`Rigid`; friction needs it.
 
     Example:
@@ -129,7 +124,7 @@ def Prismatic(
 
     Args:
         rail: Where the axis is; it may be on the ground.
-        slider: What slides.
+        slider: Place that slides.
         axis: Direction in the undeformed scene; from rail to slider by default.
         turning: Whether the slider may turn on the rail, like a pin in a slot.
 
@@ -191,7 +186,7 @@ def Guided(place: Anchor, curve: Curve) -> Joint:
     """Joint that keeps a point on a guide curve of the ground, free along it and free to turn.
 
     Args:
-        place: What is guided; of bodies the centre, other points by a :func:`Revolute` to a beam.
+        place: Guided place; of bodies the centre, other points by a :func:`Revolute` to a beam.
         curve: ``s -> (x, y)`` for all s that the motion may reach; ``curve(0)`` is at the place; m.
 
     Raises:
@@ -221,9 +216,9 @@ def Release(a: Place, b: Anchor, *, free: str, measured: bool = False) -> Joint:
     """Joint at one point that releases some of the resultants of the beam of ``a``.
 
     Args:
-        a: The place on a beam whose axis says what is axial.
-        b: What it is joined to there.
-        free: What is not transmitted: letters of "NVM".
+        a: Place on a beam, whose axis defines the axial direction.
+        b: Place to which it is joined.
+        free: Resultants that are not transmitted: letters of "NVM".
         measured: As in :func:`Rigid`.
 
     Raises:

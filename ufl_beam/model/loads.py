@@ -146,8 +146,8 @@ class Gravity:
 class RotatingFrame:
     """Centrifugal and Coriolis forces on all masses, in a frame that turns steadily.
 
-    Motions, velocities and all other loads are those that somebody sees who turns with the frame.
-    In statics it gives the steady rotation, with all that it stretches and bends.
+    Motions, velocities and all other loads refer to the rotating frame.  A static run gives the
+    state of steady rotation, with its deformation.
 
     Args:
         rate: Angular velocity of the frame, counter-clockwise; rad/s.

@@ -5,13 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ufl_beam.errors import (
-    SceneError,
-    require_number,
-    require_sequence,
-    require_vector,
-    shorten,
-)
+from ufl_beam.errors import SceneError, require_number, require_sequence, require_vector, shorten
 from ufl_beam.model.bodies import Anchor, Body, Member, require_node
 from ufl_beam.model.curves import Point
 

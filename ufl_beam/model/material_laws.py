@@ -54,7 +54,7 @@ class Perzyna:
         _require_from_zero_to_infinity(self.eta, "Perzyna: eta")
 
     def coefficient(self, stiffness: Values) -> Values:
-        """The same for all."""
+        """Viscosity, the same for any stiffness."""
         return np.full_like(stiffness, self.eta)
 
 
@@ -62,8 +62,7 @@ class Perzyna:
 class DuvautLions:
     """Duvaut-Lions viscoplasticity: relaxation towards the rate-independent stress, P(45).
 
-    The same law as :class:`Perzyna` with ``eta = tau (C + H)``; the relaxation time is what the
-    user knows.
+    The same law as :class:`Perzyna` with ``eta = tau (C + H)``, given by its relaxation time.
 
     Args:
         tau: Relaxation time; s.  Zero is rate-independent, infinity elastic.
@@ -106,15 +105,10 @@ class Bulk(ABC):
 
     @abstractmethod
     def flow(self, strain: Values, p: Values, ξ: Values, θ: Values, dt: Values) -> Values:
-        """Increment of the plastic strain over a step.
+        """Increment of the plastic strain over a step of the length dt; s.
 
-        Args:
-            strain: Strain at t_n+θ.
-            p: Plastic strain at t_n.
-            ξ: Accumulated plastic strain at t_n.
-            θ: Part of the step at which the law is stated: 1/2 is of second order, 1 is backward
-                Euler.
-            dt: Length of the step; s.
+        From the strain at t_n+θ, the plastic strain and its accumulated amount at t_n; θ = 1/2 is
+        of second order, 1 is backward Euler.
         """
 
     @abstractmethod
@@ -150,13 +144,7 @@ class BulkLaw(ABC):
 
 @dataclass(frozen=True, eq=False)
 class HardeningBulk(Bulk):
-    """Statement of :class:`Hardening`.
-
-    Attributes:
-        H: Isotropic hardening modulus.
-        B: Kinematic hardening modulus.
-        eta: Viscosity.
-    """
+    """Statement of :class:`Hardening`: moduli H, isotropic, and B, kinematic; viscosity eta."""
 
     H: Values
     B: Values
@@ -287,7 +275,7 @@ class Softening:
         return self.limit < np.inf
 
     def of(self, limit: Values, energy: Values) -> Softening:
-        """The same law with other numbers, or with symbols."""
+        """Return the same law with other numbers, or with symbols."""
         law = object.__new__(type(self))
         object.__setattr__(law, "limit", limit)
         object.__setattr__(law, "energy", energy)

@@ -28,8 +28,8 @@ class Mesh:
             divides each cell, ``Fraction(1, 2)`` joins two and two.
         degree: Polynomial degree of displacements and rotations in a cell, 1, 2 or 3, integrated
             with as many points; more than 1 for elastic beams only.
-        lumped: Whether the mass of the beams is that of their nodes: a diagonal matrix, the row
-            sums of the consistent one.
+        lumped: Take the lumped mass matrix of the beams: diagonal, with the row sums of the
+            consistent one.
 
     Raises:
         SceneError: A number that makes no mesh.
@@ -60,7 +60,7 @@ class Mesh:
 
     @cached_property
     def nodes(self) -> npt.NDArray[np.float64]:
-        """Where in a cell, from 0 to 1, its nodes are; ascending: Gauss-Lobatto points."""
+        """Places of the nodes in a cell, from 0 to 1, ascending: Gauss-Lobatto points."""
         inner = np.polynomial.legendre.Legendre.basis(self.degree).deriv().roots()
         return np.array([0.0, *((1 + x) / 2 for x in inner.tolist()), 1.0])
 

@@ -21,7 +21,7 @@ class Sharing(Protocol):
 
     @property
     def places(self) -> tuple[Anchor, ...]:
-        """All that it joins."""
+        """Places that share unknowns."""
 
     @property
     def shared(self) -> tuple[int, ...]:

@@ -10,24 +10,9 @@ from functools import cached_property, singledispatch
 
 import numpy as np
 
-from ufl_beam.errors import (
-    SceneError,
-    clip,
-    require_kind,
-    require_sequence,
-)
+from ufl_beam.errors import SceneError, clip, require_kind, require_sequence
 from ufl_beam.model.beams import Beam
-from ufl_beam.model.bodies import (
-    GROUND,
-    Anchor,
-    Body,
-    Member,
-    Place,
-    Spot,
-    carries,
-    ground,
-    node,
-)
+from ufl_beam.model.bodies import GROUND, Anchor, Body, Member, Place, Spot, carries, ground, node
 from ufl_beam.model.connector_laws import Actuator, Bearing, Coulomb, Motor
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import enclosing_diameter
@@ -139,7 +124,7 @@ class Scene:
 
     @cached_property
     def links(self) -> tuple[Connector, ...]:
-        """All connectors: of joints, of the scene, of off-centre loads, and plastic hinges."""
+        """Connectors of joints, of the scene and of off-centre loads, and plastic hinges."""
         return (*self._links_but_hinges, *self.hinges)
 
     @cached_property
@@ -184,7 +169,7 @@ class Scene:
         return (*self.bodies, *((GROUND,) if any(node(p) is GROUND for p in attached) else ()))
 
     def time_functions(self) -> Iterator[tuple[object, TimeFunction]]:
-        """All functions of time, of loads, prescribed motions and drives, and whose they are."""
+        """Iterate over functions of time of loads, motions and drives, and their owners."""
         for load in self.loads:
             if not isinstance(load, RotatingFrame):
                 yield load, load.time

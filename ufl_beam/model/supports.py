@@ -6,15 +6,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ufl_beam.errors import (
-    SceneError,
-    require_number,
-    require_vector,
-)
-from ufl_beam.model.bodies import (
-    Anchor,
-    require_node,
-)
+from ufl_beam.errors import SceneError, require_number, require_vector
+from ufl_beam.model.bodies import Anchor, require_node
 from ufl_beam.model.connector_laws import Bearing
 from ufl_beam.model.curves import Point
 from ufl_beam.model.time_functions import Constant, TimeFunction, require_time_function

@@ -10,13 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ufl_beam.errors import (
-    SceneError,
-    require_number,
-    require_returned,
-    require_sequence,
-    shorten,
-)
+from ufl_beam.errors import SceneError, require_number, require_returned, require_sequence, shorten
 
 TimeFunction = Callable[[float], float]
 

@@ -61,9 +61,9 @@ class Event(NamedTuple):
 class Events(Recorder):
     """Recorder of events, for scenes with hinges, inelastic material, stops or friction.
 
-    A hinge "is free" when it has dissipated 99.9 % of its energy; stops touch and let go, friction
-    slides and sticks as often as they do, the rest happens once in a cell or hinge.  A hinge that
-    hardens "yields".
+    A hinge "is free" when it has dissipated 99.9 % of its energy; a hinge that hardens "yields".
+    Contact and sliding may begin and end repeatedly; all other events occur once in a cell or
+    hinge.
 
     Args:
         tell: Called on the first process with each event as it happens, such as ``print``.

@@ -75,7 +75,7 @@ class Fatigue(Recorder):
 
     Args:
         spots: Where.
-        curve: Cycles that the stress ranges there can be borne for.
+        curve: S-N curve of all spots.
         resolution: Stresses are rounded to multiples of it; Pa.  By default a hundredth of the
             range that the curve is named by.
 

@@ -39,8 +39,8 @@ class History(Recorder):
             :class:`~ufl_beam.output.joint_histories.Connection`; of joints, all the connectors that
             hold them.
         every: Write every so many steps.
-        most: Rows, besides the initial one, that the file may have.  When there are more, every
-            other one goes, and only half as many steps are written from then on.
+        most: Largest number of rows, besides the initial one.  When it is exceeded, every other row
+            is deleted, and half as many steps are written from then on.
 
     Raises:
         SceneError: ``every`` or ``most`` is no whole number, at least 1.

@@ -27,8 +27,8 @@ Ends = tuple[float, float]  # lower and upper end of a cycle
 class Goodman:
     """Goodman's line: equivalent range S / (1 − mean / ultimate) about a tensile mean stress.
 
-    The straight line of the Haigh diagram; with the yield stress it is Soderberg's.  Compression is
-    of no help.  A mean stress of ``ultimate`` breaks at once.
+    The straight line of the Haigh diagram; with the yield stress it is Soderberg's.  Compression
+    has no effect.  At a mean stress of ``ultimate`` the life is zero.
 
     Args:
         ultimate: Ultimate stress; Pa.
@@ -88,12 +88,12 @@ class SNCurve:
     """S-N curve: cycles to failure over the stress range, by Basquin's law.
 
     Args:
-        range: Stress range that is borne for ``cycles``; Pa.
-        cycles: Their number.
+        range: Stress range that leads to failure after ``cycles``; Pa.
+        cycles: Number of cycles to failure at ``range``.
         slope: m of N = cycles (range / S)^m.
         knee: Number of cycles from which on the slope is another.
         slope_beyond: The other slope, above ``knee`` cycles.
-        limit: Ranges that are borne for more cycles than this do no damage.
+        limit: Ranges with more cycles to failure than this do no damage.
         mean: Equivalent range of ranges about mean stresses, such as :class:`Goodman`.
 
     Raises:

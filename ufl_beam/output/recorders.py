@@ -75,7 +75,7 @@ class Recorder(ABC):
     Example:
         >>> class Speed(ub.Recorder):
         ...     largest = 0.0
-        ...     open = lambda self, simulation: None
+        ...     require_writable = open = close = lambda self, *simulation: None
         ...     def write(self, simulation):
         ...         self.largest = max(self.largest, abs(simulation.velocity(beam.end)[1]))
         >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=Speed())

@@ -30,5 +30,5 @@ class Snapshot(NamedTuple):
     entries: tuple[dict[str, float], ...]
     material: list[tuple[Index, Array]]
     connections: Array
-    parts: int
-    iterations: int
+    parts: int = 0
+    iterations: int = 0

@@ -13,7 +13,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import Fields, SectionForces
 from ufl_beam.discretization.partition import Share
-from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.bodies import Anchor
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
@@ -88,7 +88,7 @@ class StateView:
 
     def velocities(self) -> list[Array]:
         """Velocities at the local degrees of freedom; none in statics."""
-        return [self.inertia.v] if self.scheme.dynamic else []
+        return [self.inertia.v] if has_inertia(self.scheme) else []
 
     def reactions(self) -> Array:
         """Forces of all supports on the scene; (num_supports, 3); N, N, N m."""
@@ -102,7 +102,7 @@ class StateView:
         """Forces of all supports in the latest residual; (num_supports, 3); N, N, N m."""
         dofs, mine = self._support_dofs
         here = np.where(mine, self.supports.all_reactions(self.share.size)[dofs], 0.0)
-        if self.share.comm.size > 1:
+        if not self.share.alone:
             self.share.comm.Allreduce(MPI.IN_PLACE, here)
         return here
 
@@ -119,7 +119,7 @@ class StateView:
         """The ledger over all processes: state, supplied, lost; J."""
         ledger = self.ledger
         groups = (dict(ledger.state), dict(ledger.supplied), dict(ledger.lost))
-        if self.share.comm.size == 1:
+        if self.share.alone:
             return groups
         everyone = self.share.comm.allgather(groups)
         return tuple(
@@ -143,7 +143,7 @@ class StateView:
                 [coupling.shown_motion(q), coupling.force(q), coupling.work, coupling.rate,
                  coupling.dissipated()]
             )  # fmt: skip
-        if self.share.comm.size > 1:
+        if not self.share.alone:
             self.share.comm.Allreduce(MPI.IN_PLACE, here)
         return here
 
@@ -224,6 +224,6 @@ class StateView:
         return jump, dissipated
 
     def _gather(self, here: list[tuple[Index, Array]]) -> list[tuple[Index, Array]]:
-        if not self._has_inelastic or self.share.comm.size == 1:
+        if not self._has_inelastic or self.share.alone:
             return here
         return [group for groups in self.share.comm.allgather(here) for group in groups]

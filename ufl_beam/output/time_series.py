@@ -148,8 +148,8 @@ class XDMF(TimeSeries):
 class VTKHDF(TimeSeries):
     """Time series for ParaView, VTK and PyVista in one HDF5 file, with the fields of :class:`XDMF`.
 
-    Each step is flushed: the file can be opened while the run goes on, and has all complete steps
-    after a kill unless it comes within the microseconds in which HDF5 rearranges its index.
+    Each step is flushed, so the file can be read during the run.  After a kill it has all complete
+    steps, except if HDF5 was just rearranging its index, for some microseconds.
 
     Args:
         path: File, ending in ``.vtkhdf``.

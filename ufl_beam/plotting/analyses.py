@@ -99,7 +99,7 @@ def plot_tradeoff(tradeoff: Tradeoff) -> Figure:
     beats in both.  The error is a part of the tolerance, or, with a budget, of the quantity.
 
     Args:
-        tradeoff: What :func:`tradeoff` returned.
+        tradeoff: Result of :func:`tradeoff`.
 
     Example:
         >>> tip = {"tip": lambda run: run.position(beam.end)[-1]}
@@ -179,8 +179,8 @@ def plot_extremes(solution: Solution, extremes: Extremes, what: str = "M") -> Fi
 def plot_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:
     """Draw rainflow matrix, spectrum and damage of the stress cycles at a place.
 
-    On the left the rainflow matrix; in the middle how many cycles have at least a range, and the
-    curve that they can be borne for; on the right which part of the damage each class does.
+    On the left the rainflow matrix; in the middle the number of cycles above each range, with the
+    S-N curve; on the right the part of the damage by each class of ranges.
 
     Args:
         fatigue: Recorder of a run.

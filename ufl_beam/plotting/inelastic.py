@@ -48,11 +48,11 @@ FULLY_OPEN = 0.99  # part of the fracture energy from which on a hinge is drawn 
 def plot_moment_curvature(solution: Solution, place: Place) -> Figure:
     """Draw the moment M (N m) of a cell against its curvature K (1/m), coloured by time.
 
-    The curvature includes the jump of a hinge over the length of the cell; loops enclose what is
-    dissipated per length.  A ring marks the first kept time, a dot the last one.
+    The curvature includes the jump of a hinge over the length of the cell; the area of loops is the
+    dissipated energy per length.  A ring marks the first kept time, a dot the last one.
 
     Args:
-        solution: What to show.
+        solution: Solution to draw.
         place: Where; at a vertex it is the cell before it.
 
     Raises:
@@ -77,7 +77,7 @@ def plot_hinge(solution: Solution, place: Place) -> Figure:
     how much it is (J), and how much of its fracture energy.
 
     Args:
-        solution: What to show.
+        solution: Solution to draw.
         place: Where; without a plastic hinge at the place it is that of the cell, at a vertex of
             the cell before it.
 
@@ -116,7 +116,7 @@ def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Fig
     the more of their fracture energy is spent; from 99 % they are as hollow as a joint.
 
     Args:
-        solution: What to show.
+        solution: Solution to draw.
         n: Number of the kept time; negative from the end.
         magnify: Factor on the displacements.
 
@@ -170,9 +170,9 @@ def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Fig
 def plot_dissipation(solution: Solution) -> Figure:
     """Draw the energy losses over time (J) by their sinks, as stacked areas.
 
-    The line above them is what was supplied, with what the scene held at the first kept time, if
-    anything; the gap between is the energy in the scene, a line of its own.  The title says the
-    worst imbalance of the ledger.
+    The line above them is the supplied work, plus the initial energy of the scene; the gap between
+    is the energy in the scene, which also has a line of its own.  The title states the worst
+    imbalance of the ledger.
 
     Raises:
         SceneError: The scene is elastic, and has no connectors.
@@ -218,7 +218,7 @@ def _scientific(value: float) -> str:
 
 
 def _dissipated_per_length(solution: Solution, n: int) -> Array:
-    """By plastic strains, and by the cracks of fibres, in all cells; (num_cells,); J/m."""
+    """Energy dissipated by plastic strains and cracks in all cells; (num_cells,); J/m."""
     grid = solution.grid
     ends = grid.points[grid.cells]
     energy = np.zeros(len(grid.cells))

@@ -249,7 +249,7 @@ def _axes(figure: Figure, plan: Plan, title: str, notes: list[str]) -> Axes:
 
 
 def _paint(axes: Axes, drawing: Drawing) -> None:
-    """One collection for all strokes of a group that look alike."""
+    """Draw all strokes of a group that look alike as one collection."""
     from matplotlib.collections import LineCollection, PolyCollection
 
     for group, strokes in drawing.strokes.items():

@@ -36,7 +36,7 @@ def plot_shapes(
     """Draw successive shapes in one picture, coloured by time or load factor.
 
     Args:
-        solution: What to show.
+        solution: Solution to draw.
         times: The times, or the load factors of a path, each replaced by the nearest that was
             kept; s.  Without, ``count`` of them from the first to the last, evenly spaced in time,
             or along the path.
@@ -82,7 +82,7 @@ def plot_history(
     """Draw a component of the motion of one or more places over time.
 
     Args:
-        solution: What to show.
+        solution: Solution to draw.
         places: The places.
         component: "u", "v", "psi", "du/dt", "dv/dt" or "dpsi/dt".
 

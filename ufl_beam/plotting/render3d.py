@@ -42,10 +42,10 @@ def render(
     that have opened.  Needs no screen, see :func:`animate`.
 
     Args:
-        solution: What to show.
+        solution: Solution to draw.
         path: File, ending in ``.png``.
         n: Number of the kept time; negative from the end.
-        color: What colours the beams: "N", "V", "M" or "rotation".
+        color: Quantity that colours the beams: "N", "V", "M" or "rotation".
         thickness: Factor on the depth of the sections.
         magnify: Factor on the displacements.
         size: Width and height; pixels.
@@ -82,15 +82,15 @@ def animate(
 ) -> None:
     """Write an animation of the whole motion as GIF or MP4.
 
-    The camera stands still and sees all of the motion; colours mean the same in all frames.  Works
-    without a screen: where VTK cannot (before 9.4), an Xvfb is started for the time being.
+    The camera is fixed and sees the whole motion; colours have the same meaning in all frames.  No
+    screen is needed: for VTK before 9.4 an Xvfb is started for the time being.
 
     Args:
-        solution: What to show.
+        solution: Solution to draw.
         path: File, ending in ``.gif``, or in ``.mp4`` if imageio-ffmpeg is installed.
         fps: Frames per second.
         seconds: Duration of the film, whatever the duration of the motion; s.
-        color: What colours the beams: "N", "V", "M" or "rotation".
+        color: Quantity that colours the beams: "N", "V", "M" or "rotation".
         thickness: Factor on the depth of the sections.
         magnify: Factor on the displacements.
         size: Width and height; pixels.

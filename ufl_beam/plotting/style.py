@@ -92,7 +92,7 @@ def require_choice(choice: str, choices: Iterable[str], what: str) -> None:
 
 @contextmanager
 def picture(size: tuple[float, float]) -> Iterator[Figure]:
-    """Open a new figure in the style of this package, for pictures of your own.
+    """Open a new figure in the style of this module, for pictures of your own.
 
     Only the first process saves it, as all of them run the same script.
 

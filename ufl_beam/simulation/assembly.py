@@ -14,11 +14,12 @@ from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import NOWHERE, Restoring, Saving, State
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
-from ufl_beam.model.connector_laws import Controller, Coulomb
+from ufl_beam.model.connector_laws import Controller, Coulomb, Running
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.constraint_checks import friction_repeats
 from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.scene import Scene
+from ufl_beam.simulation.branch_check import StaticPath
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.c_equation import CEquation
 from ufl_beam.solvers.equation import Equation
@@ -80,6 +81,21 @@ class Assembly:
         """Terms with internal variables."""
         return [*self.inelastic, *self.couplings]
 
+    def ask(self, simulation: Running, q: Array) -> None:
+        """Ask controllers and friction for forces and limits; note the rates of what may slip."""
+        laws = ((link, link.law) for link in self.asked)
+        self.asked.update(
+            {
+                link: law.ask(simulation, link)
+                for link, law in laws
+                if isinstance(law, Controller | Coulomb)
+            }
+        )
+        if self.inertia is not None:
+            for one in self.couplings:
+                if isinstance(one.links[0].law, Coulomb):
+                    self.rates.update(zip(one.links, one.rates(q, self.inertia.v), strict=True))
+
     def compiled(self) -> Equation:
         """Return the equation in C, or as it is where several processes or axes need Python."""
         python = self.equation
@@ -115,17 +131,27 @@ class Assembly:
             known = sum(name in internal for name in self.inertia.scheme.kept)
             self.inertia.carry_on(memory, known)
 
-    def bear(self, force: Array, loads: list[Array]) -> None:
-        """Set the reactions to those of the initial state of a static run.
+    def static_path(
+        self, scheme: Scheme, q: Array, t0: float, loads: list[Array], together: Agreement
+    ) -> StaticPath | None:
+        """Begin a static path, and set the reactions to those of its state; None in dynamics.
 
         Args:
-            force: The internal forces of that state.
+            scheme: The time scheme.
+            q: The initial configuration at the local degrees of freedom.
+            t0: Its time; s.
             loads: The loads that it is in equilibrium with; none if nothing acts yet.
+            together: Raises on all processes what one of them raises.
         """
-        r = np.asarray(force - sum(loads))
+        if self.inertia is not None:
+            return None
+        share, state = self.equation.share, (self.ledger, q, t0)
+        path = together(StaticPath, share, scheme, self.beams, self.couplings, *state)
+        r = np.asarray(path.force - sum(loads))
         self.supports.enter(r)
-        self.supports.hold(self.equation.share.added(r))
+        self.supports.hold(share.added(r))
         self.supports.take()
+        return path
 
 
 def assemble(share: Share, scheme: Scheme, v: Array, together: Agreement) -> Assembly:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import NamedTuple
 
@@ -21,6 +22,7 @@ from ufl_beam.discretization.function_spaces import (
 )
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import SceneError
+from ufl_beam.model.bodies import Place
 from ufl_beam.simulation.kept_states import KeptStates
 
 
@@ -41,12 +43,7 @@ class Material(NamedTuple):
 
 
 class CellResults:
-    """Results that follow from the kept states; those of the n-th kept time, in all cells.
-
-    Args:
-        grid: The grid of the run.
-        kept: The states.
-    """
+    """Results that follow from the kept states; those of the n-th kept time, in all cells."""
 
     def __init__(self, grid: Grid, kept: KeptStates) -> None:
         self._grid, self._kept = grid, kept
@@ -67,15 +64,15 @@ class CellResults:
     def forces(self, n: int) -> Array:
         """(N, V, M), kept where history decides, else computed from the motion; (num_cells, 3)."""
         forces = np.empty((len(self._grid.cells), 3))
-        self._section_forces.write(self._kept.q[n], forces)
-        for cells, rows in self._kept.material[n]:
+        self._section_forces.write(self._kept[n].q, forces)
+        for cells, rows in self._kept[n].material:
             forces[cells] = rows[:, :3]
         return forces
 
     def strains(self, n: int) -> Array:
         """(Σ, Γ, K); (num_cells, 3); 1, 1, 1/m."""
         strains = np.empty((len(self._grid.cells), 3))
-        strains[self._fields.order] = self._strains.mean(self._kept.q[n])
+        strains[self._fields.order] = self._strains.mean(self._kept[n].q)
         return strains
 
     def material(self, n: int, cells: Index | int) -> Material:
@@ -84,17 +81,34 @@ class CellResults:
         Raises:
             SceneError: The scene is elastic.
         """
-        if not self._kept.material[n] and not self._grid.scene.hinges:
+        if not self._kept[n].material and not self._grid.scene.hinges:
             raise SceneError("material: nothing in the scene yields or breaks; it is elastic")
         everything = np.zeros((len(self._grid.cells), 6))
         everything[:, :3] = self.forces(n)
-        for inelastic, rows in self._kept.material[n]:
+        for inelastic, rows in self._kept[n].material:
             everything[inelastic, 3:] = rows[:, 3:]
         chosen = everything[cells].T
         return Material(chosen[:3].T, *chosen[3:])
 
+    def at(self, place: Place, of: Callable[[int], Array]) -> Array:
+        """Results of the cell at a place at all kept times; (n+1, 3)."""
+        cell = self._grid.cell(place)
+        return np.array([of(n)[cell] for n in range(len(self._kept))])
+
+    def material_at(self, place: Place) -> Material:
+        """State of the material in the cell at a place; arrays begin with (n+1,)."""
+        cell = self._grid.cell(place)
+        kept = [self.material(n, cell) for n in range(len(self._kept))]
+        return Material(*map(np.array, zip(*kept, strict=True)))
+
     def momentum(self) -> Array:
-        """(p_x, p_y, L) at all kept times, L about the origin; (n+1, 3); N s, N s, N m s."""
+        """(p_x, p_y, L) at all kept times, L about the origin; (n+1, 3); N s, N s, N m s.
+
+        Raises:
+            SceneError: The run was static.
+        """
+        if not self._kept.v:
+            raise SceneError("momentum: the run was static; there is none")
         times, grid = Product(mass_matrix(self._fields)), self._grid
         dofs = np.vstack([grid.dofs, grid.dofs_of_bodies])
         centers = np.array([body.center for body in grid.scene.movers]).reshape(-1, 2)

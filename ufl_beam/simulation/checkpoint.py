@@ -35,16 +35,16 @@ from ufl_beam.simulation.step_control import Pace
 class Checkpoint:
     """Checkpoint file from which a run is restarted, and the interval of writing it.
 
-    If the file exists when the run begins, it goes on from there, as the same run to the last bit:
-    after a crash the same script is simply run again.
+    If the file exists when the run begins, the run continues from it, bit for bit: after a crash,
+    run the same script again.
 
     Args:
         path: File; HDF5.
         every: Write every so many steps.
-        minutes: Write when so much wall time is over since the last time.
-        also: What else has a state, besides what functions in the scene use: random generators of
-            NumPy, and objects with ``state()`` and ``restore(state)``, where the state is made of
-            numbers, texts, lists and dicts.
+        minutes: Write after so many minutes of wall time.
+        also: Further objects with a state, besides those that functions in the scene use: random
+            generators of NumPy, and objects with ``state()`` and ``restore(state)``, where the
+            state consists of numbers, texts, lists and dicts.
 
     Raises:
         SceneError: Neither ``every`` nor ``minutes``, or a bad number; no state in ``also``.
@@ -98,7 +98,7 @@ class Running(Protocol):
         """Newton iterations so far."""
 
     def state(self) -> State:
-        """All that later steps depend on."""
+        """Return the state on which later steps depend."""
 
     def resume(self, state: State) -> None:
         """Go on from a state."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Diagnosis of failed steps: sizes of forces, and what gives way if the tangent is singular."""
+"""Diagnosis of failed steps and open ledgers: forces, what gives way, round-off."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from ufl_beam.errors import ConvergenceError, StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.scene import Scene
 from ufl_beam.parameter import Parameter
+from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.solvers.null_vectors import SINGULAR, free_matrix, null_vector
@@ -34,6 +35,9 @@ SOFT = 1e-3
 NEAR = 1e-3
 """Motion from the state before a step, of the size of the scene or a radian, that tells what yields
 as the step begins."""
+
+ROOM = 10.0
+"""Largest imbalance of an exact ledger over the tolerance of the solver."""
 
 NAMED = 3
 """Largest number of names in a list."""
@@ -88,21 +92,12 @@ class Softest(NamedTuple):
 def no_equilibrium(
     simulation: Failed,
     newton: Solver,
-    solution: object,
+    solution: Solution,
     failure: StepFailed,
     end: float,
     advice: str,
 ) -> ConvergenceError:
-    """Describe why even the smallest step, to ``end``, failed; all processes call it together.
-
-    Args:
-        simulation: The state before the step.
-        newton: The solver, with its latest iterate.
-        solution: The solution so far.
-        failure: Why the step failed.
-        end: Its end; s.
-        advice: What to try; that of the scheme if it is empty.
-    """
+    """Describe why even the smallest step, to ``end``, failed; all processes call it together."""
     q1 = simulation.supports.in_plane(newton.iterate())
     dt, forces, named = (
         end - simulation.t,
@@ -127,6 +122,17 @@ def no_equilibrium(
     )
 
 
+def open_ledger(solution: Solution, share: Share, newton: Solver) -> str:
+    """Describe how far an exact ledger is open; empty if it closes as claimed."""
+    energy, claimed = solution.energy, ROOM * newton.convergence.c.rtol
+    if not energy.opened(claimed, 0.0):
+        return ""
+    # Errors of steps are independent: their squares add up.
+    q = solution.q[:, share.dofs]
+    steps = np.sqrt(np.sum(np.diff(q, axis=0) ** 2, axis=0))
+    return energy.opened(claimed, newton.convergence.random_work(np.abs(q).max(axis=0), steps))
+
+
 def _forces_by_kind(simulation: Failed, newton: Solver, q1: Array) -> dict[str, float]:
     """Sizes of the forces at the latest iterate; N."""
     forces = {kind: np.zeros(simulation.share.size) for kind in KINDS}
@@ -135,7 +141,7 @@ def _forces_by_kind(simulation: Failed, newton: Solver, q1: Array) -> dict[str, 
             term.add_residual(q1, forces[term.kind])
         except Exception:
             forces[term.kind].fill(np.nan)  # it is why the step has failed
-    sizes = {kind: newton.size(force) for kind, force in forces.items()}
+    sizes = {kind: newton.convergence.size(force) for kind, force in forces.items()}
     return {kind: size for kind, size in sizes.items() if size}
 
 

@@ -14,40 +14,66 @@ LEDGER = ("state", "supplied", "lost")
 
 
 class KeptStates:
-    """Lists of what was kept, see :class:`Snapshot`; ``v`` is empty in statics."""
+    """States that were kept; ``v`` is empty in statics, ``connections`` in scenes without any."""
 
     def __init__(self) -> None:
-        self.times: list[float] = []
-        self.q: list[Array] = []
-        self.v: list[Array] = []
-        self.reactions: list[Array] = []
-        self.entries: list[tuple[dict[str, float], ...]] = []
-        self.material: list[list[tuple[Index, Array]]] = []
-        self.connections: list[Array] = []
+        self._states: list[Snapshot] = []
 
     def keep(self, state: Snapshot) -> None:
         """Append a state of a run."""
-        self.times.append(state.t)
-        self.q.append(state.q)
-        if state.v is not None:
-            self.v.append(state.v)
-        self.reactions.append(state.reactions)
-        self.entries.append(state.entries)
-        self.material.append(state.material)
-        if len(state.connections):
-            self.connections.append(state.connections)
+        self._states.append(state)
+
+    def __len__(self) -> int:
+        return len(self._states)
+
+    def __getitem__(self, n: int) -> Snapshot:
+        return self._states[n]
 
     def thin(self) -> None:
         """Forget every other state; the first one stays."""
-        for kept in vars(self).values():
-            del kept[1::2]
+        del self._states[1::2]
+
+    @property
+    def times(self) -> list[float]:
+        """Times, or load factors of a path; s."""
+        return [state.t for state in self._states]
+
+    @property
+    def q(self) -> list[Array]:
+        """Configurations, all degrees of freedom."""
+        return [state.q for state in self._states]
+
+    @property
+    def v(self) -> list[Array]:
+        """Velocities, all degrees of freedom."""
+        return [state.v for state in self._states if state.v is not None]
+
+    @property
+    def reactions(self) -> list[Array]:
+        """Forces of the supports on the scene."""
+        return [state.reactions for state in self._states]
+
+    @property
+    def entries(self) -> list[tuple[dict[str, float], ...]]:
+        """Entries of the ledger; J."""
+        return [state.entries for state in self._states]
+
+    @property
+    def material(self) -> list[list[tuple[Index, Array]]]:
+        """Groups of cells that can yield or break, and rows for their material."""
+        return [state.material for state in self._states]
+
+    @property
+    def connections(self) -> list[Array]:
+        """Columns of ``Connection`` for all links."""
+        return [state.connections for state in self._states if len(state.connections)]
 
     def ledger(self) -> list[dict[str, Array]]:
         """Return the parts of the ledger, with arrays by name; each (n+1,); J."""
         parts = []
-        for k in range(len(LEDGER)):
-            names = dict.fromkeys(name for entries in self.entries for name in entries[k])
-            parts.append({n: np.array([e[k].get(n, 0.0) for e in self.entries]) for n in names})
+        for part in zip(*self.entries, strict=True) if self._states else ((),) * len(LEDGER):
+            names = dict.fromkeys(name for entries in part for name in entries)
+            parts.append({n: np.array([e.get(n, 0.0) for e in part]) for n in names})
         return parts
 
     def arrays(self) -> State:
@@ -59,7 +85,7 @@ class KeptStates:
             "reactions": np.array(self.reactions),
             "connections": np.array(self.connections),
         }
-        if self.material and self.material[0]:
+        if self._states and self._states[0].material:
             # Groups are those of laws and processes.
             tables = [np.concatenate([np.c_[group] for group in one]) for one in self.material]
             arrays["material"] = np.array([table[np.argsort(table[:, 0])] for table in tables])
@@ -69,19 +95,26 @@ class KeptStates:
 
     def take(self, arrays: State) -> None:
         """Go on after :meth:`arrays`."""
-        self.times = [float(t) for t in arrays["times"]]
-        self.q, self.v = list(arrays["q"]), list(arrays["v"])
-        self.reactions, self.connections = list(arrays["reactions"]), list(arrays["connections"])
-        self.material = [[] for _ in self.times]
+        n = len(arrays["times"])
+        material: list[list[tuple[Index, Array]]] = [[] for _ in range(n)]
         if "material" in arrays:
-            tables = [*arrays["material"]]
-            self.material = [[(one[:, 0].astype(np.int64), one[:, 1:])] for one in tables]
+            material = [[(one[:, 0].astype(np.int64), one[:, 1:])] for one in arrays["material"]]
         parts = [
             {name.removeprefix(f"{kind}: "): values
              for name, values in arrays.items() if name.startswith(f"{kind}: ")}
             for kind in LEDGER
         ]  # fmt: skip
-        self.entries = [
-            tuple({name: float(values[n]) for name, values in part.items()} for part in parts)
-            for n in range(len(self.times))
-        ]
+        # Shapes that are no run have no velocities and reactions.
+        reactions, connections = (
+            arrays[name] if len(arrays[name]) else np.zeros((n, 0))
+            for name in ("reactions", "connections")
+        )
+        v = arrays["v"] if len(arrays["v"]) else [None] * n
+        self._states = [
+            Snapshot(
+                float(arrays["times"][k]), arrays["q"][k], v[k], reactions[k],
+                tuple({name: float(x[k]) for name, x in part.items()} for part in parts),
+                material[k], connections[k],
+            )
+            for k in range(n)
+        ]  # fmt: skip

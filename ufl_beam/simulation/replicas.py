@@ -18,6 +18,13 @@ from ufl_beam.errors import CopiesDiffer, warn
 TOLERANCE = 1e-8
 """Difference of motions that counts, as a part of their size: far above round-off."""
 
+SMALLEST_SHARE = 6_000
+"""Scenes with fewer cells per process are computed by each process.
+
+Measured on two cores with lattices: two processes break even at some 3 000 cells each, and are 1.2
+times as fast at 6 000; see benchmarks/README.md.
+"""
+
 INTERVAL = 256
 """Most steps from one comparison to the next."""
 
@@ -26,6 +33,11 @@ PATIENCE = 20.0
 
 _left: list[tuple[MPI.Request, Array]] = []
 """Comparisons that nobody waits for; MPI needs their buffers until they are complete."""
+
+
+def sharing(comm: MPI.Intracomm, cells: int) -> MPI.Intracomm:
+    """Return the processes that share a scene with so many cells: all, or this one alone."""
+    return comm if cells >= comm.size * SMALLEST_SHARE else MPI.COMM_SELF
 
 
 class Copies:

@@ -6,8 +6,9 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from typing import Any
 
 from mpi4py import MPI
 
@@ -56,7 +57,7 @@ def simulate(
     """Simulate the motion of a scene in time, or its equilibria under growing loads.
 
     Args:
-        scene: What is modelled.
+        scene: Model.
         scheme: :class:`Static`, :class:`Midpoint` or another one, see docs/schemes.md.
         t: Beginning and end; s.  In statics time is the load parameter.
         dt: Step; s.  All steps are a little shorter if ``dt`` does not divide the time.  A step
@@ -64,13 +65,14 @@ def simulate(
             accuracy allows.
         record: Files to write on the way, such as :class:`XDMF` and :class:`History`.
         every: Keep every so many steps in the solution; the last one always.
-        most: States, besides the initial and the last one, that the solution may have.  When there
-            are more, every other one goes, and only half as many steps are kept from then on.
+        most: Largest number of states in the solution, besides the initial and the last one.  When
+            it is exceeded, every other state is deleted, and half as many steps are kept from then
+            on.
         start: Solution of the same beams whose last state is the initial state.  Joints may be
             removed, or added where places are together.
         newton: Tolerances and PETSc options.
-        mesh: How finely it is discretised; as ``start``, or with the cells of the beams.
-        checkpoint: File from which the run goes on if it is run again after whatever stopped it.
+        mesh: Discretization; as ``start``, or with the cells of the beams.
+        checkpoint: Checkpoint file from which the run goes on if the script is run again.
         progress: Show a progress bar if the output is a terminal.
         comm: Processes that share the scene; all of them, or in a :func:`study` this one alone.  A
             small scene is computed by each of them.
@@ -152,7 +154,7 @@ def simulate(
 
         stack.callback(close_all, recorders)
         stack.callback(take(outputs))
-        stack.enter_context(simulation.partial_results())
+        stack.enter_context(partial_results(simulation))
         solution.every = every
         if keeper is not None and keeper.found:
             simulation.together(go_on, keeper)
@@ -173,6 +175,23 @@ def simulate(
     if comm.rank == 0:
         solution.opened.warn(scheme, solution.times)
     return solution
+
+
+@contextmanager
+def partial_results(simulation: Simulation) -> Iterator[None]:
+    """Let what is raised in this context carry the solution so far, ``error.solution``.
+
+    Whatever stops a run, an interrupt or a user's function, what was reached is not lost.
+    """
+    try:
+        yield
+    except BaseException as error:
+        simulation.leave()
+        if simulation.share.comm.size == 1 or error is simulation.together.raised:
+            simulation.end()  # else the processes may not all be here
+        stopped: Any = error
+        stopped.solution = simulation.solution
+        raise
 
 
 def _end_of(start: Solution | None) -> str:

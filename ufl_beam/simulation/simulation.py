@@ -5,13 +5,10 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import Any, NoReturn
+from functools import partial
+from typing import NoReturn
 
 from mpi4py import MPI
-
-import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.collective_errors import Agreement
@@ -28,40 +25,28 @@ from ufl_beam.errors import (
     shorten,
 )
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
-from ufl_beam.model.connector_laws import Controller, Coulomb
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.state_view import StateView
 from ufl_beam.parallel import communicator
 from ufl_beam.parameter import Parameter
 from ufl_beam.simulation.assembly import assemble
-from ufl_beam.simulation.branch_check import StaticPath
-from ufl_beam.simulation.diagnosis import no_equilibrium
-from ufl_beam.simulation.first_loads import APPLYING, begins_loaded, require_small_turn
+from ufl_beam.simulation.diagnosis import no_equilibrium, open_ledger
 from ufl_beam.simulation.initial_state import initial_state, mesh_of
-from ufl_beam.simulation.replicas import Copies
+from ufl_beam.simulation.replicas import Copies, sharing
 from ufl_beam.simulation.scene_checks import checked_grid
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.step_cutting import Trial, go_in_parts
+from ufl_beam.simulation.step_cutting import (
+    APPLYING,
+    FIRST,
+    Trial,
+    begins_loaded,
+    go_in_parts,
+    require_small_turn,
+)
 from ufl_beam.simulation.step_solver import StepSolver
 from ufl_beam.solvers.equation import Border
 from ufl_beam.solvers.newton_options import Newton
-
-SMALLEST_SHARE = 6_000
-"""Scenes with fewer cells per process are computed by each process.
-
-Measured on two cores with lattices: two processes break even at some 3 000 cells each, and are 1.2
-times as fast at 6 000; see benchmarks/README.md.
-"""
-
-ROOM = 10.0
-"""Largest imbalance of an exact ledger over the tolerance of the solver."""
-
-FIRST = 1 / 16
-"""Part of the first step after which accelerations are taken for those at the beginning.
-
-Shorter ones are nearer to it, but magnify the velocities of supports that do not begin with theirs.
-"""
 
 
 class Simulation(StateView):
@@ -70,13 +55,13 @@ class Simulation(StateView):
     :func:`simulate` is a loop over :meth:`step_to`; use this class for loops of your own.
 
     Args:
-        scene: What is modelled.
+        scene: Model.
         scheme: :class:`Static`, :class:`Midpoint` or another one, see docs/schemes.md.
         t0: Time of the initial state; s.
         start: Solution of the same beams whose last state is the initial state.  Joints may be
             removed, or added where places are together.
         newton: Tolerances and PETSc options.
-        mesh: How finely it is discretised; as ``start``, or with the cells of the beams.
+        mesh: Discretization; as ``start``, or with the cells of the beams.
         comm: Processes that share the scene; all of them, or in a :func:`study` this one alone.
         kind: Class of the solution.
 
@@ -120,29 +105,21 @@ class Simulation(StateView):
         if start is not None:
             require_kind(start, Solution, "start")
         grid = checked_grid(scene, scheme, mesh_of(start, mesh))
-        shared = len(grid.cells) >= comm.size * SMALLEST_SHARE
-        share = Share(grid, comm if shared else MPI.COMM_SELF)
+        share = Share(grid, sharing(comm, len(grid.cells)))
         self.scene, self.scheme, self.comm, self.grid, self.share = scene, scheme, comm, grid, share
         self.together = together = Agreement(share.comm)
-        self._copies = None if shared or comm.size == 1 else Copies(comm, share)
+        self._copies = Copies(comm, share) if comm.size > share.comm.size else None
         q, v, internal = initial_state(grid, start)
         self._assembly = parts = assemble(share, scheme, v[share.dofs], together)
         self.fields, self.ledger, self.asked = parts.fields, parts.ledger, parts.asked
-        self.beams, self.inelastic, self._has_inelastic = (
-            parts.beams, parts.inelastic, parts.yields
-        )  # fmt: skip
-        self._rates = parts.rates
-        self.couplings, self.loads, self.supports = parts.couplings, parts.loads, parts.supports
+        self.beams, self.inelastic, self.couplings = parts.beams, parts.inelastic, parts.couplings
+        self.loads, self.supports, self._has_inelastic = parts.loads, parts.supports, parts.yields
         self.equation, self.terms = parts.equation, parts.equation.terms
-        self._asking = [
-            (link, link.law) for link in self.asked if isinstance(link.law, Controller | Coulomb)
-        ]
-        self._rubbing = [one for one in self.couplings if isinstance(one.links[0].law, Coulomb)]
 
         self.t, self.parts, self.last_dt = t0, 0, math.inf
         self.q: Array = q[share.dofs]
         self._q_before: Array = self.q
-        self._continues = start is not None
+        self._continues, self._dynamic = start is not None, has_inertia(scheme)
         loaded: list[Array] = []
         if self._continues or (has_inertia(scheme) and scheme.kept):
             # The initial state is taken as one in equilibrium with the loads.
@@ -152,16 +129,12 @@ class Simulation(StateView):
             parts.take_over(self.q, internal, same=same)
         for term in self.terms:
             term.add_state(self.q)
-        self._branch: StaticPath | None = None
         if parts.inertia is not None:
             self.inertia = parts.inertia
             if scene.links or scene.supports:
                 together(warn_of_jumps, grid, t0, q, self.connections()[:, 0])
-        else:
-            state = (self.ledger, self.q, t0)
-            self._branch = together(StaticPath, share, scheme, self.beams, self.couplings, *state)
-            parts.bear(self._branch.force, loaded)
-            self.reactions_known = True
+        self._branch = parts.static_path(scheme, self.q, t0, loaded, together)
+        self.reactions_known = self._branch is not None
 
         self._steps = StepSolver(
             scheme, self.equation, parts.compiled(), parts.openings, self._branch, newton, together
@@ -181,18 +154,12 @@ class Simulation(StateView):
         fresh = self.parts == 0 and not self._continues
         if fresh and begins_loaded(self.scene, self.scheme, self.t):
             begin, end = self.t, self.t + APPLYING * (t1 - self.t)
-            self._go_in_parts(end, lambda part: self._attempt_loads(begin, part, end))
-        self._go_in_parts(t1, lambda part: self.attempt(part, t1))
+            attempt = partial(self._attempt_loads, begin=begin, end=end)
+            go_in_parts(begin, end, attempt, self.accept, self.give_up)
+        go_in_parts(self.t, t1, partial(self.attempt, end=t1), self.accept, self.give_up)
 
-    def _go_in_parts(self, t1: float, attempt: Callable[[float], Trial]) -> None:
-        go_in_parts(self.t, t1, lambda end: self.accept(attempt(end)), self.give_up)
-
-    def _attempt_loads(self, begin: float, t1: float, end: float) -> Trial:
-        """Solve a part of the application of the loads at the time ``begin``; it lasts to ``end``.
-
-        Raises:
-            StepFailed: There is no equilibrium; or a node turns far, and shorter parts may help.
-        """
+    def _attempt_loads(self, t1: float, begin: float, end: float) -> Trial:
+        """Solve a part of the application of the loads of the time ``begin``, up to ``end``."""
         step = self.scheme.step(self.t, t1, end, self.q)
         trial = self._attempt(step._replace(load_time=begin, motion_time=begin))
         require_small_turn(self.share, trial.q1 - self.q, trial.step.dt, end - begin)
@@ -208,7 +175,7 @@ class Simulation(StateView):
         Raises:
             StepFailed: There is no equilibrium, or it is too far away.
         """
-        if has_inertia(self.scheme) and not self.inertia.ready:
+        if self._dynamic and not self.inertia.ready:
             t = self.t + FIRST * (t1 - self.t)
             first = self._attempt(self.scheme.step(self.t, t, t1, self.q))
             self.inertia.prepare(first.s)
@@ -220,7 +187,7 @@ class Simulation(StateView):
     def _attempt(self, step: Step) -> Trial:
         """Solve a step; see :meth:`attempt`."""
         guess = self.together(self._begin, step)
-        alike = has_inertia(self.scheme) and math.isclose(step.dt, self.last_dt, rel_tol=1e-6)
+        alike = self._dynamic and math.isclose(step.dt, self.last_dt, rel_tol=1e-6)
         return self._steps.solve(step, guess, like_last=alike)
 
     def _begin(self, step: Step) -> Array:
@@ -259,37 +226,22 @@ class Simulation(StateView):
         self._q_before, self.last_dt = self.q, step.dt
         self.q, self.t = q1, step.t1
         self.parts += 1
-        self._enter_state()
-
-    def _enter_state(self) -> None:
-        """Enter the energies of the state into the ledger."""
         self.ledger.begin()
         for term in self.terms:
-            term.add_state(self.q)
+            term.add_state(q1)
 
     def ask(self) -> None:
         """Ask controllers and friction for their forces and limits in the next step.
 
         All processes ask together, whoever computes the connector.
         """
-        if not self._asking:
-            return
-        self.asked.update({link: law.ask(self, link) for link, law in self._asking})
-        for coupling in self._rubbing if has_inertia(self.scheme) else ():
-            rates = coupling.rates(self.q, self.inertia.v)
-            self._rates.update(zip(coupling.links, rates, strict=True))
+        if self.asked:
+            self._assembly.ask(self, self.q)
 
     def linearise(self, q: Array, dt: float) -> tuple[Array, Array]:
-        """Return all forces but those of inertia at ``q``, as they answer this state; derivatives.
+        """Return :meth:`StepEquation.linearise` at ``q`` as this state answers it, K + C / dt.
 
         Nothing yields or opens any further, now and later: no step may follow.
-
-        Args:
-            q: Configuration at the local degrees of freedom.
-            dt: What velocities are divided by: the derivatives are K + C / dt; s.
-
-        Returns:
-            The residual; and the entries of the matrix; in the axes of the plane, nothing held.
         """
         self.ask()
         for one in self._assembly.remembering:
@@ -337,22 +289,6 @@ class Simulation(StateView):
         """Append the state to the solution; all processes call it together."""
         self.solution.keep(self.gather())
 
-    @contextmanager
-    def partial_results(self) -> Iterator[None]:
-        """Let what is raised in this context carry the solution so far, ``error.solution``.
-
-        Whatever stops a run, an interrupt or a user's function, what was reached is not lost.
-        """
-        try:
-            yield
-        except BaseException as error:
-            self.leave()
-            if self.share.comm.size == 1 or error is self.together.raised:
-                self.end()  # else the processes may not all be here
-            stopped: Any = error
-            stopped.solution = self.solution
-            raise
-
     def end(self) -> None:
         """Let the solution have the last state, and what another run that starts there needs."""
         self.settle()
@@ -369,7 +305,7 @@ class Simulation(StateView):
         return now
 
     def state(self) -> State:
-        """All that later steps depend on; all processes call it together."""
+        """Return the state on which later steps depend; all processes call it together."""
         memory = Saving(self.share)
         self._pass_on(memory)
         return memory.state()
@@ -377,7 +313,9 @@ class Simulation(StateView):
     def resume(self, state: State) -> None:
         """Go on from a :meth:`state`, perhaps of other processes."""
         self._pass_on(Restoring(self.share, state))
-        self._enter_state()
+        self.ledger.begin()
+        for term in self.terms:
+            term.add_state(self.q)
 
     def _pass_on(self, memory: Memory) -> None:
         self.t = memory.number("t", self.t)
@@ -386,9 +324,7 @@ class Simulation(StateView):
         self._solver.remember(memory)
         self.q = memory.at_dofs("q", self.q)
         self._q_before = memory.at_dofs("q before", self._q_before)
-        for kind, entries in (("supplied", self.ledger.supplied), ("lost", self.ledger.lost)):
-            for name, value in entries.items():
-                entries[name] = memory.total(f"{kind}: {name}", value)
+        self.ledger.remember(memory)
         for term in self.terms:
             term.remember(memory, self.q)
         self.supports.remember(memory, self.q)
@@ -403,16 +339,8 @@ class Simulation(StateView):
         Warns:
             ModelWarning: It is open, perhaps by round-off.
         """
-        if not getattr(self.scheme, "exact_ledger", False) or len(self.solution) < 2:
-            return
-        energy, claimed = self.solution.energy, ROOM * self._solver.rtol
-        if not energy.opened(claimed, 0.0):
-            return
-        # Errors of steps are independent: their squares add up.
-        q = self.solution.q[:, self.share.dofs]
-        steps = np.sqrt(np.sum(np.diff(q, axis=0) ** 2, axis=0))
-        round_off = self._solver.random_work(np.abs(q).max(axis=0), steps)
-        self.solution.open_ledger = energy.opened(claimed, round_off)
+        if getattr(self.scheme, "exact_ledger", False) and len(self.solution) > 1:
+            self.solution.open_ledger = open_ledger(self.solution, self.share, self._solver)
         if self.solution.open_ledger and self.comm.rank == 0:
             warnings.warn(self.solution.open_ledger, ModelWarning, stacklevel=3)
 

@@ -19,7 +19,7 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
-from ufl_beam.output.archive import read, write
+from ufl_beam.output.archive import write
 from ufl_beam.output.joint_histories import (
     Connection,
     JointHistory,
@@ -35,11 +35,15 @@ from ufl_beam.parameter import TIME
 from ufl_beam.simulation.cell_results import CellResults, Material
 from ufl_beam.simulation.kept_states import KeptStates
 from ufl_beam.simulation.opened_hinges import Opened
-from ufl_beam.simulation.solution_files import FORMAT, arrays_of, grid_of, take, text_of
+from ufl_beam.simulation.solution_files import (
+    FORMAT,
+    arrays_of,
+    grid_of,
+    made_of_file,
+    take,
+    text_of,
+)
 from ufl_beam.terms.energy_ledger import Energy
-
-KINDS: dict[str, type[Solution]] = {}
-"""Classes of solutions, by name."""
 
 
 class Solution:
@@ -73,12 +77,9 @@ class Solution:
 
     def __init__(self, scene: Scene, grid: Grid) -> None:
         self.scene, self.grid = scene, grid
-        self.parts = 0
-        self.iterations = 0
-        self.time_error = math.nan
-        self.seconds = 0.0
-        self.every = 1
-        self.open_ledger = ""
+        self.parts = self.iterations = 0
+        self.time_error, self.seconds = math.nan, 0.0
+        self.every, self.open_ledger = 1, ""
         self.internal: State = {}
         self._kept = KeptStates()
         self._cells = CellResults(grid, self._kept)
@@ -127,12 +128,9 @@ class Solution:
     def __reduce__(self) -> tuple[Any, ...]:
         return restored, self._content()
 
-    def __init_subclass__(cls) -> None:
-        KINDS[cls.__name__] = cls
-
     def __len__(self) -> int:
         """Number of kept states."""
-        return len(self._kept.times)
+        return len(self._kept)
 
     def thin(self) -> None:
         """Forget every other kept state; the first one stays."""
@@ -210,19 +208,16 @@ class Solution:
     def shape(self, beam: Member, n: int = -1) -> Array:
         """Coordinates of the vertices of a beam at the n-th kept time; (num_vertices, 2); m."""
         vertices, grid = self.grid.vertices_of(beam), self.grid
-        return np.asarray(grid.points[vertices] + self._kept.q[n][grid.dofs[vertices, :2]])
+        return np.asarray(grid.points[vertices] + self._kept[n].q[grid.dofs[vertices, :2]])
 
     # -- forces --------------------------------------------------------------------------------
 
     def reaction(self, support: Support) -> Array:
         """Force and moment of a support on the scene; (n+1, 3); N, N, N m.
 
-        In statics the first row is what the initial state bears: nothing where the run begins with
-        the undeformed scene, for loads act from the first step on; and the reactions of that
-        equilibrium where it begins with ``start=``.
-
-        In dynamics they are those that act during the step that ends at each time; the first row is
-        NaN, for no step came before.
+        In statics the first row is what the initial state bears: nothing in the undeformed scene,
+        for loads act from the first step on; with ``start=`` the reactions of its equilibrium.  In
+        dynamics they act during the step that ends at each time; the first row is NaN.
 
         Raises:
             SceneError: The support is not in the scene.
@@ -243,10 +238,7 @@ class Solution:
         Raises:
             SceneError: The beam of the place is not in the scene.
         """
-        cell = self.grid.cell(place)
-        return np.array([self._cells.forces(n)[cell] for n in range(len(self))])
-
-    # -- material ------------------------------------------------------------------------------
+        return self._cells.at(place, self._cells.forces)
 
     def strains(self, beam: Member, n: int = -1) -> Array:
         """(Σ, Γ, K) in the cells of a beam at the n-th kept time; (num_cells, 3); 1, 1, 1/m.
@@ -257,8 +249,7 @@ class Solution:
 
     def strains_at(self, place: Place) -> Array:
         """(Σ, Γ, K) in the cell at a place, as :meth:`section_forces_at`; (n+1, 3); 1, 1, 1/m."""
-        cell = self.grid.cell(place)
-        return np.array([self._cells.strains(n)[cell] for n in range(len(self))])
+        return self._cells.at(place, self._cells.strains)
 
     def material(self, beam: Member, n: int = -1) -> Material:
         """Forces, jumps and dissipated energies in the cells of a beam at the n-th kept time.
@@ -277,9 +268,7 @@ class Solution:
         Raises:
             SceneError: The scene is elastic, or the beam of the place is not in it.
         """
-        cell = self.grid.cell(place)
-        kept = [self._cells.material(n, cell) for n in range(len(self))]
-        forces, jump, plastic, energy = (np.array(field) for field in zip(*kept, strict=True))
+        forces, jump, plastic, energy = self._cells.material_at(place)
         hinge = self.grid.hinge_at(place)
         if hinge is not None:
             of_hinge = self.connector(hinge)
@@ -314,21 +303,16 @@ class Solution:
         Raises:
             SceneError: The run was static.
         """
-        if not self._kept.v:
-            raise SceneError("momentum: the run was static; there is none")
         return self._cells.momentum()
 
     def __str__(self) -> str:
         scene = self.scene
-        counts = {
-            "beam": len(scene.beams), "cell": len(self.grid.cells),
-            "bod": len(scene.bodies), "link": len(scene.links),
-        }  # fmt: skip
+        counts = (
+            (len(scene.beams), "beam", "beams"), (len(self.grid.cells), "cell", "cells"),
+            (len(scene.bodies), "body", "bodies"), (len(scene.links), "link", "links"),
+        )  # fmt: skip
         span = f"{self._kept.times[0]:g} to {self._kept.times[-1]:g}"
-        endings = {"bod": ("y", "ies")}
-        parts = [
-            f"{n} {name}{endings.get(name, ('', 's'))[n != 1]}" for name, n in counts.items() if n
-        ]
+        parts = [f"{n} {one if n == 1 else many}" for n, one, many in counts if n]
         return (
             f"{', '.join(parts)}, {self.grid.size} degrees of freedom\n"
             f"{self.parameter.value.format(span)} in {self.parts} steps, "
@@ -336,9 +320,6 @@ class Solution:
             f"{self.seconds:.2f} s of wall time\n{self.opened.summary()}{self.energy}"
             + (f"\n{self.open_ledger}" if self.open_ledger else "")
         )
-
-
-KINDS["Solution"] = Solution
 
 
 def load(path: str | Path) -> Solution:
@@ -356,19 +337,13 @@ def load(path: str | Path) -> Solution:
         >>> bool((loaded.q == solution.q).all())
         True
     """
-    file = require_path(path, "load")
-    text, arrays = read(file, FORMAT)
-    try:
-        return restored(text, arrays)
-    except SceneError as error:
-        raise SceneError(f"solution {file}: {error}") from None
-    except (KeyError, TypeError, ValueError, IndexError) as error:
-        raise SceneError(f"solution {file}: the file is damaged: {error!r}") from None
+    return made_of_file(require_path(path, "load"), restored)
 
 
 def restored(text: dict[str, Any], arrays: State) -> Solution:
     """Make a solution from what was saved of it."""
     grid = grid_of(text)
-    solution = KINDS[text["kind"]](grid.scene, grid)
+    kinds = {kind.__name__: kind for kind in (Solution, *Solution.__subclasses__())}
+    solution = kinds[text["kind"]](grid.scene, grid)
     solution._take(text, arrays)
     return solution

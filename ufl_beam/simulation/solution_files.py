@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -16,10 +17,12 @@ from ufl_beam.model.bodies import Anchor, Member
 from ufl_beam.model.connector_laws import Controller, ForceLaw, Guide
 from ufl_beam.model.curves import Curve, nearest, parameter_step
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.archive import above, below
+from ufl_beam.output.archive import above, below, read
 from ufl_beam.output.saved_functions import SavedCurve, SavedFunction
 from ufl_beam.output.saved_scene import from_data, lost, to_data
 from ufl_beam.version import version
+
+T = TypeVar("T")
 
 FORMAT = "solution of ufl_beam, 1"
 """To be counted up whenever files of before mean something else."""
@@ -52,6 +55,21 @@ class Saved(Protocol):
 
     def resume(self, history: State) -> None:
         """Take over a :meth:`history`."""
+
+
+def made_of_file(file: Path, make: Callable[[dict[str, Any], State], T]) -> T:
+    """Read a file and make a solution of it.
+
+    Raises:
+        SceneError: It cannot be read, or no solution can be made of it.
+    """
+    text, arrays = read(file, FORMAT)
+    try:
+        return make(text, arrays)
+    except SceneError as error:
+        raise SceneError(f"solution {file}: {error}") from None
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise SceneError(f"solution {file}: the file is damaged: {error!r}") from None
 
 
 def text_of(solution: Saved) -> dict[str, Any]:
@@ -99,13 +117,7 @@ def grid_of(text: dict[str, Any]) -> Grid:
 
 
 class UsedFunctions:
-    """Replaces functions of a scene by records, see :func:`to_data`.
-
-    Args:
-        grid: The grid of the run.
-        times: The kept times.
-        position: Coordinates of a place at these times.
-    """
+    """Replaces functions of a scene by records, see :func:`to_data`."""
 
     def __init__(
         self, grid: Grid, times: Sequence[float], position: Callable[[Anchor], Array]

@@ -72,7 +72,7 @@ class Pace(Protocol):
         """Part of the way that is done, from 0 to 1."""
 
     def advance(self, simulation: Stepper) -> None:
-        """One step.
+        """Take one step.  Errors are those of the simulation.
 
         Raises:
             ConvergenceError: It failed.
@@ -117,7 +117,7 @@ class EqualSteps:
         return self.steps / self._all
 
     def advance(self, simulation: Stepper) -> None:
-        """One step; where it fails, in parts."""
+        """Take one step, in parts if it fails."""
         n = self.steps + 1
         simulation.step_to(self._t0 + (self._t1 - self._t0) * n / self._all)
         self.steps = n
@@ -135,20 +135,18 @@ class EqualSteps:
 class Adaptive:
     """Adaptive time steps of a given local error; given in the place of ``dt``.
 
-    Each step estimates its own error: what its mean velocity and acceleration miss of a motion
-    whose acceleration changes, and what the middle of the step misses of the loads.  As with other
-    integrators of differential equations the tolerance is that of a step; what the steps of a run
-    add up to is :attr:`Solution.time_error`, of which the motion may forget or magnify a part.  A
-    share of the time in the place of the step's would have every vibration of the mesh resolved,
-    however small.  All this is about the time steps, not about the cells.
+    The error of a step is estimated from the change of accelerations between steps, and from the
+    error of loads that are taken in the middle of the step.  As in other integrators, the tolerance
+    is that of one step; the sum over a run is :attr:`Solution.time_error`.  Errors of the cells are
+    not included.
 
     Steps end at the times of every :class:`Table` in the scene, at those that other functions of
     time name in an attribute ``kinks``, and at ``stops``.
 
     Args:
-        tolerance: Error that a step may add; to positions as a part of the size of the scene, to
-            rotations in rad, to the impulse of a load as a part of that of its largest value.
-        first: Where the search for the first step begins; s.  By default a hundredth of the run.
+        tolerance: Largest error of a step: of positions relative to the size of the scene, of
+            rotations in rad, of the impulse of a load relative to that of its largest value.
+        first: First step to be tried; s.  By default a hundredth of the run.
         longest: Longest step; s.
         shortest: A run that needs shorter steps ends with an error; s.  By default 1e-12 of it.
         stops: More times at which steps must end; s.
@@ -229,7 +227,7 @@ class AdaptiveSteps:
         return (self._t - self._t0) / (self._t1 - self._t0)
 
     def advance(self, simulation: Stepper) -> None:
-        """One step that is accurate, after as many as it takes that are not."""
+        """Take one step that is accurate, after rejected ones."""
         stop = next(t for t in self._stops if t > self._t)
         while True:
             try:

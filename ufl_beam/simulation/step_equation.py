@@ -29,14 +29,6 @@ class Load(Term, Protocol):
 class StepEquation(PythonEquation):
     """Sum of the virtual works of all terms, less what supports carry.
 
-    Args:
-        share: The degrees of freedom of this process.
-        A: Matrix of the tangent, which the terms were made with.
-        beams, couplings: Terms whose forces are internal forces.
-        loads, others: The other terms.
-        supports: Hold degrees of freedom.
-        course: Flags that all material points share.
-
     Attributes:
         others: All terms but those of internal forces.
         terms: All terms.

@@ -34,15 +34,6 @@ its inertia holds it meanwhile.
 class StepSolver:
     """Solves steps of a scene; whoever accepts them keeps its state.
 
-    Args:
-        scheme: The time scheme.
-        equation: The equation of a step.
-        compiled: The same for the solver, perhaps in C.
-        openings: Search for what opens; None if nothing can.
-        branch: In statics, whether a step has stayed on its branch of equilibria.
-        newton: Tolerances and PETSc options.
-        together: Raises on all processes what one of them raises.
-
     Attributes:
         newton: The solver of the equation.
     """
@@ -131,5 +122,5 @@ class StepSolver:
                 f"a node turns by {turn:.3g} rad in the step, and |Δψ| must stay below π; reduce dt"
             )
         if self._branch is not None:
-            self._branch.require(q1, s, self._equation.force, self.newton.least_work(s))
+            self._branch.require(q1, s, self._equation.force, self.newton.convergence.least_work(s))
         return Trial(step, q1, s)

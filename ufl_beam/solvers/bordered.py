@@ -46,17 +46,7 @@ class Bordered:
 
 
 class BorderedNewton:
-    """SNES of the bordered equation; its steps are full ones.
-
-    Args:
-        callbacks: The equation without its border.
-        vectors: Make vectors, and know their local values.
-        factors: An exact preconditioner of the tangent.
-        moves: One at degrees of freedom that are free, zero at those that are held.
-        snes: A solver whose equation is replaced.
-        f, matrix: Take residuals and tangents.
-        border: The border, of which there may be another one later.
-    """
+    """SNES of the bordered equation; its steps are full ones."""
 
     def __init__(
         self,

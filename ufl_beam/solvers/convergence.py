@@ -30,14 +30,6 @@ REASONS = {
 class Convergence:
     """Sizes of residuals and motions, and the decision to go on or to stop.
 
-    Args:
-        share: The degrees of freedom of this process.
-        equation: Its data in C are completed.
-        x: Local values of the iterate.
-        r: Those of its residual.
-        newton: Tolerances.
-        least: Iterations at least, unless a residual is far below its tolerance.
-
     Attributes:
         c: Data in C, see :func:`judge` of newton.c.
         diagonal: Positions of the diagonal in the data of the tangent.
@@ -52,7 +44,7 @@ class Convergence:
         newton: Newton,
         least: int,
     ) -> None:
-        self._share, self._A, self._parallel = share, equation.A, share.comm.size > 1
+        self._share, self._A, self._parallel = share, equation.A, not share.alone
         self._x, self._r = x, r
         self._weights = self._force_weights()
         self._norm = (len(self._weights), doubles(self._weights))
@@ -75,7 +67,7 @@ class Convergence:
         c.most, c.least = newton.max_iterations, least
 
     def _force_weights(self) -> Array:
-        """One for forces, one over the size of the scene for moments."""
+        """Weights of residuals: 1 of forces, 1 over the size of the scene of moments."""
         weights = np.ones(self._share.size)
         weights[self._share.rotations()] = 1 / self._share.grid.scene.size
         weights[self._share.multipliers()] = 0.0

@@ -101,7 +101,7 @@ def quadratic(
 
 
 def small(A: Array, B: Array) -> tuple[Array, Array]:
-    """All eigenvalues of ``A x = λ B x`` of small matrices; values (n,), vectors (size, n).
+    """Compute all eigenvalues of small ``A x = λ B x``; values (n,), vectors (size, n).
 
     Args:
         A: Symmetric; rows and columns may differ in size.
@@ -123,7 +123,7 @@ def _inverse(A: Array, B: Array) -> tuple[Complex, Complex]:
 
 
 def _inverse_definite(A: Array, B: Array) -> tuple[Array, Array]:
-    """The same by a symmetric matrix, which has a full set of vectors: Fᵀ A⁻¹ F with B = F Fᵀ."""
+    """Compute the same by the symmetric matrix Fᵀ A⁻¹ F with B = F Fᵀ."""
     scale = np.sqrt(B.diagonal())
     there = np.flatnonzero(scale)
     F = np.zeros((len(A), len(there)))

@@ -107,7 +107,7 @@ class PythonEquation(Equation):
 
 
 class Border(Protocol):
-    """One more unknown on which the residual depends, and one more equation.
+    """Additional unknown on which the residual depends, with its equation.
 
     Attributes:
         t: The unknown.
@@ -171,13 +171,7 @@ def add_in_python(handle: Any, q: Any, out: Any) -> None:
 
 
 class Demand:
-    """Residual of the constraints of connectors, evaluated by Python.
-
-    Args:
-        missed: See :meth:`Equation.missed`.
-        size: Number of unknowns.
-        failed: Told of exceptions.
-    """
+    """Residual of the constraints of connectors, evaluated by Python."""
 
     def __init__(
         self,

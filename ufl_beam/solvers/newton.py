@@ -38,15 +38,9 @@ Those that wander longer find a solution by luck: the last digits of the data wo
 class Solver:
     """Finds the configuration in which the residual of an equation vanishes.
 
-    Args:
-        share: The degrees of freedom of this process.
-        equation: The equation.
-        newton: Tolerances.
-        least: Iterations at least, unless a residual is far below its tolerance.
-        agreement: Raises on all processes what one has raised.
-
     Attributes:
         iterations: Number of iterations so far.
+        convergence: Sizes of forces and works at the latest iterate.
     """
 
     def __init__(
@@ -61,9 +55,9 @@ class Solver:
         self._agreement, self._vectors = agreement, Vectors(share)
         self._x, self._f = self._vectors.new(), self._vectors.new()
         self._q, r = (self._vectors.view(one, writable=True) for one in (self._x, self._f))
-        self._convergence = Convergence(share, equation, self._q, r, newton, least)
+        self.convergence = Convergence(share, equation, self._q, r, newton, least)
         equation.c.x = ffi.cast("void *", self._x.handle)
-        self._callbacks = SnesCallbacks(equation, self._vectors, self._convergence.test)
+        self._callbacks = SnesCallbacks(equation, self._vectors, self.convergence.test)
         self._matrix = self._make_matrix()
         # A connector alone may hold a part whose own stiffness leaves zeros, or nothing but
         # round-off, on the diagonal; PETSc's factorisation does not exchange rows, KLU's does.
@@ -130,7 +124,7 @@ class Solver:
             y=self._vectors.new(),
             w=self._vectors.new(),
             matrix=self._matrix,
-            test=self._convergence.test,
+            test=self.convergence.test,
             near=lambda: bool(self._equation.c.near),
             work=self._work_on,
             most=self._newton.max_iterations,
@@ -141,13 +135,13 @@ class Solver:
         for vector in (self._x, y):
             self._vectors.update_ghosts(vector)
         step = self._equation.working(self._q, self._vectors.view(y))
-        return lambda: self._convergence.work(step)
+        return lambda: self.convergence.work(step)
 
     def _along(self, border: Border) -> PETSc.SNES:
         """SNES of the equation with a border."""
         if self._bordered is None:
             self._bordered = BorderedNewton(
-                self._callbacks, self._vectors, self._ksp.getPC(), self._convergence.moves,
+                self._callbacks, self._vectors, self._ksp.getPC(), self.convergence.moves,
                 self._make_snes(), self._f, self._matrix, border,
             )  # fmt: skip
         self._bordered.border = border
@@ -166,7 +160,7 @@ class Solver:
         Raises:
             StepFailed: No convergence.
         """
-        self._convergence.take_loads(loads)
+        self.convergence.take_loads(loads)
         self._go_to(guess)
         reason = self._iterate(self._snes, 2, like_last=like_last)
         if reason == lib.SINGULAR and self._may_go_on():
@@ -176,7 +170,10 @@ class Solver:
         if reason <= 0 and self._may_go_on() and self._equation.relieve(True):
             self._go_to(guess)
             reason = self._relieved()
-        return self._found(reason)
+        if reason <= 0:
+            raise self._failure(reason)
+        self._vectors.update_ghosts(self._x)
+        return self._q.copy()
 
     def solve_along(self, guess: Array, loads: list[Array], border: Border) -> Array:
         """Find the configuration as :meth:`solve` does, together with the unknown of a border.
@@ -184,15 +181,19 @@ class Solver:
         Raises:
             StepFailed: No convergence.
         """
-        self._convergence.take_loads(loads)
+        self.convergence.take_loads(loads)
         self._go_to(guess)
-        return self._found(self._iterate(self._along(border), 12))
+        reason = self._iterate(self._along(border), 12)
+        if reason <= 0:
+            raise self._failure(reason)
+        self._vectors.update_ghosts(self._x)
+        return self._q.copy()
 
     @cached_property
     def _idle(self) -> IdleMotions:
         """Idle motions; only scenes in which a tangent was singular have any."""
         return IdleMotions(
-            self._share, self._equation.A, self._convergence.diagonal, self._equation.held
+            self._share, self._equation.A, self.convergence.diagonal, self._equation.held
         )
 
     def _hold_idle(self, guess: Array) -> int:
@@ -203,7 +204,7 @@ class Solver:
             self._go_to(guess)
             return self._iterate(self._snes, 2)
 
-        reason, convergence = int(lib.SINGULAR), self._convergence
+        reason, convergence = int(lib.SINGULAR), self.convergence
         while reason == lib.SINGULAR and self._idle.find(
             convergence.residuals(), convergence.scale()
         ):
@@ -239,7 +240,7 @@ class Solver:
         self, snes: PETSc.SNES | SearchingNewton, patience: int, *, like_last: bool = False
     ) -> int:
         """Solve; give up after so many iterations in a row without half the least residual."""
-        self._convergence.begin(patience, like_last=like_last)
+        self.convergence.begin(patience, like_last=like_last)
         self._equation.error = None
         try:
             snes.solve(None, self._x)
@@ -263,36 +264,16 @@ class Solver:
         self._agreement.settle(None if isinstance(error, StepFailed) else error)
         return True
 
-    def _found(self, reason: int) -> Array:
-        """Return the configuration, if it was found."""
-        if reason <= 0:
-            self._agreement.settle(self._equation.error)
-            raise self._convergence.failure(reason, self._done)
-        self._vectors.update_ghosts(self._x)
-        return self.iterate()
+    def _failure(self, reason: int) -> StepFailed:
+        """Describe the failure; raise what a function of the user has raised on any process."""
+        self._agreement.settle(self._equation.error)
+        return self.convergence.failure(reason, self._done)
 
     # -- what is known of it -------------------------------------------------------------------
-
-    @property
-    def rtol(self) -> float:
-        """Residual to be reached, as a part of the forces in the scene."""
-        return self._newton.rtol
 
     def iterate(self) -> Array:
         """Return the latest configuration, converged or not; local values, ghosts included."""
         return self._q.copy()
-
-    def size(self, forces: Array) -> float:
-        """Euclidean norm over the scene of forces, and moments over its size; N."""
-        return self._convergence.size(forces)
-
-    def least_work(self, s: Array) -> float:
-        """Work in a step ``s`` of what the last digit of displacements makes; less is none; J."""
-        return self._convergence.least_work(s)
-
-    def random_work(self, x: Array, s: Array) -> float:
-        """Work in a step ``s`` of the last digits at ``x``, were they independent; J."""
-        return self._convergence.random_work(x, s)
 
     def remember(self, memory: Memory) -> None:
         """Pass on the number of iterations, and motions found to be idle."""

@@ -23,14 +23,14 @@ class Newton:
     """Options of Newton's method: tolerance, number of iterations, PETSc options.
 
     Args:
-        rtol: Residual to be reached, as a part of the forces in the scene.
+        rtol: Tolerance of the residual, as a part of the forces in the scene.
         max_iterations: Iterations before a step is cut.
-        modified: Keep the tangent, also from step to step, while residuals fall fast enough.  What
-            is saved grows with the number of cells; solutions end closer to ``rtol``.
+        modified: Keep the tangent, also from step to step, while residuals decrease fast enough.
+            This saves more with more cells; final residuals are closer to ``rtol``.
         petsc: PETSc options without their prefix, such as ``{"snes_monitor": None}``; in
-            ``PETSC_OPTIONS`` they have the prefix ``ub_``.  With any of them Newton's method is
-            that of PETSc, else one in C that does the same, faster where cells are few.  A
-            ``snes_linesearch_type`` takes the place of the search that follows full steps.
+            ``PETSC_OPTIONS`` they have the prefix ``ub_``.  With any option PETSc's Newton method
+            is used, otherwise an equivalent one in C, which is faster for few cells.  A
+            ``snes_linesearch_type`` replaces the line search after full steps.
 
     Example:
         >>> newton = ub.Newton(rtol=1e-12, petsc={"snes_linesearch_type": "bt"})

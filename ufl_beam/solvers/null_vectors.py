@@ -33,7 +33,7 @@ def free_matrix(share: Share, A: Csr, held: Index) -> tuple[csc_array, Index]:
         The matrix; and its degrees of freedom, in numbers of the grid.
     """
     here = (share.dofs[A.rows()], share.dofs[A.indices], A.data, share.dofs[held])
-    parts = share.comm.allgather(here) if share.comm.size > 1 else [here]
+    parts = share.comm.allgather(here) if not share.alone else [here]
     rows, columns, data, of_all = (np.concatenate(x) for x in zip(*parts, strict=True))
     n = share.grid.size
     free = np.setdiff1d(np.arange(n), of_all)

@@ -19,11 +19,6 @@ from ufl_beam.solvers.vectors import Vectors
 class SnesCallbacks:
     """Residual and tangent of an equation in vectors of PETSc.
 
-    Args:
-        equation: Says what they are.
-        vectors: Local values of vectors.
-        stop: Returns why to stop after an iteration, or zero.
-
     Attributes:
         idle: Entries of the tangent and stiffnesses that hold idle motions, if there are any.
     """

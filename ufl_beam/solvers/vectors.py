@@ -11,15 +11,11 @@ from ufl_beam.discretization.partition import Share
 
 
 class Vectors:
-    """Vectors of the unknowns; where processes share a scene, with ghosts.
-
-    Args:
-        share: The degrees of freedom of this process.
-    """
+    """Vectors of the unknowns; where processes share a scene, with ghosts."""
 
     def __init__(self, share: Share) -> None:
         self._share, self._views = share, dict[int, Array]()
-        self.parallel = share.comm.size > 1
+        self.parallel = not share.alone
 
     def new(self) -> PETSc.Vec:
         """Make a vector of the unknowns, shared like them."""

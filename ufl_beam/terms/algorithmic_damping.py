@@ -74,7 +74,7 @@ class SecondDifferences(OfForms):
         self._change, self._q, self._e, self._last_dt = e1 - self._e, q1, e1, self._dt
 
     def add_state(self, q: Array) -> None:
-        """Nothing is stored in the scene."""
+        """Add nothing: no energy is stored in the scene."""
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The changes of the strains in the last step, and its length."""

@@ -107,7 +107,7 @@ class ElasticBeams(OfForms):
         self._ledger.state["stored"] += self._held
 
     def remember(self, memory: Memory, q: Array) -> None:
-        """Nothing to remember: the stored energy follows from the configuration."""
+        """Save nothing: the stored energy follows from the configuration."""
 
     def change(self, q1: Array) -> float:
         """Energy that cells of this process store in the step to ``q1``; J."""

@@ -151,7 +151,7 @@ class _Asked(Working):
         return -slope, 1.0, force - slope * e1
 
     def bends(self, e1: Array) -> Array:
-        """Of the slope of a function that only Python knows: the difference of fourth order.
+        """Second derivative of a force function, by a fourth-order difference.
 
         Over a thousandth of the scene, or of a radian, it leaves 1e-10 of round-off, and less of
         the sixth derivative of a law that bends over a thirtieth of the scene or more.

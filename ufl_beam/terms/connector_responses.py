@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import singledispatch
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -45,49 +45,36 @@ class Setting(NamedTuple):
     course: Course
 
 
-class Response(Protocol):
-    """Some connectors whose laws are of one kind; motions and forces are arrays of them."""
+class Response:
+    """Some connectors whose laws are of one kind; motions and forces are arrays of them.
 
-    steady: bool
+    By default nothing is stored, yields or is remembered.
+    """
+
+    steady = False
     """True if the rows stay the same during a step."""
 
-    in_c: dict[str, Any]
+    in_c: Mapping[str, Any] = {}
     """Data of laws that C evaluates, by their names in ``couplings`` of loops.h."""
+
+    _links: Sequence[Connector]
 
     @property
     def openable(self) -> Openable | None:
         """Connectors that open beyond a limit, if there are any."""
-
-    def motion(self, e: Array) -> Array:
-        """Motions of the accepted state as solutions show them; ``e`` are those of the nodes."""
+        return None
 
     def begin(self, e0: Array, step: Step) -> None:
         """Begin a step at the motions ``e0``."""
-
-    def again(self) -> None:
-        """Begin the step again: forget what its iterates have tried."""
+        raise NotImplementedError
 
     def rows(self, e1: Array, λ: Array) -> Rows:
         """α, β, γ around an iterate."""
+        raise NotImplementedError
 
     def accept(self, e1: Array, work: float) -> None:
         """Take the end of the step as the new state; ``work`` is what the connectors have taken."""
-
-    def add_state(self, e: Array) -> None:
-        """Enter what is stored."""
-
-    def change(self, e1: Array, work: float) -> float:
-        """Energy that the step stores, dissipates or gives away; J."""
-
-    def dissipation(self, e1: Array, λ: Array) -> float:
-        """Energy dissipated plastically in a step to the motions ``e1``; J."""
-
-    def flows(self) -> bool:
-        """Return whether one slips plastically in the latest iterate."""
-
-    @property
-    def dissipated(self) -> Array:
-        """Energy that each connector has dissipated plastically; (num_links,); J."""
+        raise NotImplementedError
 
     def about_force(self, rows: Array) -> Array:
         """Factor by which rows about the force are divided, zero for rows about the motion.
@@ -98,18 +85,49 @@ class Response(Protocol):
         Returns:
             Shape (num_links,).
         """
+        raise NotImplementedError
+
+    def motion(self, e: Array) -> Array:
+        """Motions of the accepted state as solutions show them; ``e`` are those of the nodes."""
+        return e
+
+    def again(self) -> None:
+        """Begin the step again: forget what its iterates have tried."""
+
+    def add_state(self, e: Array) -> None:
+        """Enter what is stored."""
+
+    def change(self, e1: Array, work: float) -> float:
+        """Energy that the step stores, dissipates or gives away; J."""
+        return work
+
+    def dissipation(self, e1: Array, λ: Array) -> float:
+        """Energy dissipated plastically in a step to the motions ``e1``; J."""
+        return 0.0
+
+    def flows(self) -> bool:
+        """Return whether one slips plastically in the latest iterate."""
+        return False
+
+    @property
+    def dissipated(self) -> Array:
+        """Energy that each connector has dissipated plastically; (num_links,); J."""
+        return np.zeros(len(self._links))
 
     def remaining(self) -> Array:
         """Part of the elastic stiffness that is left in the latest iterate; (num_links,)."""
+        return np.ones(len(self._links))
 
     def bends(self, e1: Array) -> Array:
         """Derivative of α by the motion, internal variables kept; (num_links,)."""
+        return np.zeros(len(self._links))
 
     def state(self) -> Array:
         """Return the internal variables; (num_links, k)."""
+        return np.zeros((len(self._links), 0))
 
     def restore(self, rows: Array) -> None:
-        """Restore the variables that :meth:`state` returned."""
+        """Take over the internal variables of :meth:`state`."""
 
     def start(self, e: Array) -> None:
         """Begin at motions that no step has led to."""
@@ -124,12 +142,9 @@ def respond(law: Any, links: Sequence[Connector], setting: Setting) -> Response:
     raise TypeError(f"{law!r} is no law of a connector")
 
 
-class Working:
+class Working(Response):
     """Base of responses that store nothing: the work of their forces is entered."""
 
-    steady = False
-    in_c: dict[str, Any] = {}  # noqa: RUF012
-    openable: Openable | None = None
     _group = "lost"
     _entry = ""
     _sign = 1.0
@@ -154,63 +169,15 @@ class Working:
     def _note(self, step: Step) -> None:
         """Prepare a step."""
 
-    def motion(self, e: Array) -> Array:
-        """Motions of the nodes."""
-        return e
-
-    def again(self) -> None:
-        """Do nothing: laws do not depend on iterates."""
-
     def accept(self, e1: Array, work: float) -> None:
         """Enter the work into the ledger."""
         if self._entry:
             self._entries[self._entry] += self._sign * work
 
-    def add_state(self, e: Array) -> None:
-        """Add nothing: no energy is stored."""
-
-    def change(self, e1: Array, work: float) -> float:
-        """Energy of the step: the work of the connectors."""
-        return work
-
-    def dissipation(self, e1: Array, λ: Array) -> float:
-        """Zero: there is no plastic dissipation."""
-        return 0.0
-
-    def flows(self) -> bool:
-        """False: there is no plastic flow."""
-        return False
-
-    @property
-    def dissipated(self) -> Array:
-        """Zero: there is no plastic dissipation."""
-        return np.zeros(len(self._links))
-
     def about_force(self, rows: Array) -> Array:
         """Factors of one, but for those that are held in the iterate."""
         about_motion = np.array([link.holds for link in self._links]) & (rows[:, 1] != 1.0)
         return np.where(about_motion, 0.0, 1.0)
-
-    def remaining(self) -> Array:
-        """Part of the elastic stiffness that is left: 1, as nothing yields."""
-        return np.ones(len(self._links))
-
-    def bends(self, e1: Array) -> Array:
-        """The law is linear."""
-        return np.zeros(len(self._links))
-
-    def state(self) -> Array:
-        """Return nothing: there are no internal variables."""
-        return np.zeros((len(self._links), 0))
-
-    def restore(self, rows: Array) -> None:
-        """Restore nothing: there are no internal variables."""
-
-    def start(self, e: Array) -> None:
-        """Do nothing: there are no internal variables."""
-
-    def freeze(self) -> None:
-        """Do nothing: these laws do not yield."""
 
     def _numbers(self, name: str) -> Array:
         return np.array([getattr(law, name) for law in self._laws], dtype=np.float64)

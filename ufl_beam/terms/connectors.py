@@ -195,7 +195,7 @@ class Couplings(Links):
             kernel.put(self._forms.row, self._rows)
 
     def loops(self) -> tuple[Loop, Loop | None] | None:
-        """Those of laws that are steady or of material points."""
+        """C loops of the laws that are steady or of material points."""
         if self._asks_python:
             return None
         return loop("add_couplings_force", self._in_c), loop("add_cells", self._tangent.cells)
@@ -278,7 +278,7 @@ class Couplings(Links):
         return TangentChange(self._forms.change, self._forms.u, self._kernel, self._A)
 
     def freeze(self) -> None:
-        """From now on nothing yields or breaks further."""
+        """Keep everything elastic from now on: nothing yields or breaks further."""
         self.response.freeze()
 
     # -- the state -----------------------------------------------------------------------------
@@ -301,7 +301,7 @@ class Couplings(Links):
 
 
 def _split(q: Expr) -> tuple[Pair, Expr]:
-    """Both configurations, which are values at the ends of a cell, and the force."""
+    """Split coefficients into both configurations, values at the ends of a cell, and the force."""
     *components, force = ufl.split(q)
 
     def at(end: float) -> Expr:

@@ -31,12 +31,7 @@ class Inertia(Rates, Protocol):
 
 @singledispatch
 def damping_forces(
-    damping: object,
-    fields: Fields,
-    scheme: Scheme,
-    A: Csr,
-    ledger: Ledger,
-    inertia: Inertia | None,
+    damping: object, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger, inertia: Inertia | None
 ) -> list[Term]:
     """Forces of one kind of damping on the cells of a process; none if it has no such cells."""
     raise TypeError(f"{damping!r} is not a damping")

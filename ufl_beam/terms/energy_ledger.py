@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ufl_beam.arrays import Array
+from ufl_beam.discretization.state_io import Memory
 
 EXPLAINED = 0.1
 """Part of an imbalance from which on an estimate of round-off explains it."""
@@ -39,6 +40,12 @@ class Ledger:
         """Sum of the sizes of all entries; J."""
         entries = (*self.state.values(), *self.supplied.values(), *self.lost.values())
         return sum(map(abs, entries))
+
+    def remember(self, memory: Memory) -> None:
+        """Pass on the works and losses since the beginning."""
+        for kind, entries in (("supplied", self.supplied), ("lost", self.lost)):
+            for name, value in entries.items():
+                entries[name] = memory.total(f"{kind}: {name}", value)
 
     def begin(self) -> None:
         """Forget the state; what was supplied and lost remains."""

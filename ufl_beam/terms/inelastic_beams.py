@@ -83,13 +83,7 @@ class InelasticBeams:
     kind = "beams"
 
     def __init__(
-        self,
-        fields: Fields,
-        layout: Layout,
-        scheme: Scheme,
-        A: Csr,
-        ledger: Ledger,
-        course: Course,
+        self, fields: Fields, layout: Layout, scheme: Scheme, A: Csr, ledger: Ledger, course: Course
     ) -> None:
         self._layout, self._scheme, self._A, self._ledger = layout, scheme, A, ledger
         self._order = fields.order
@@ -208,7 +202,7 @@ class InelasticBeams:
         self.points.hold()
 
     def freeze(self) -> None:
-        """From now on nothing yields or opens further."""
+        """Keep everything elastic from now on: nothing yields or breaks further."""
         self.points.freeze()
 
     # -- the state -----------------------------------------------------------------------------

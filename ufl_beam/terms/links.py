@@ -103,4 +103,4 @@ class Links(Beams):
         return None
 
     def freeze(self) -> None:
-        """From now on nothing yields or breaks further."""
+        """Keep everything elastic from now on: nothing yields or breaks further."""

@@ -125,12 +125,7 @@ class FollowerLoads:
     kind = "loads"
 
     def __init__(
-        self,
-        loads: Sequence[FollowerLoad],
-        share: Share,
-        scheme: Scheme,
-        ledger: Ledger,
-        A: Csr,
+        self, loads: Sequence[FollowerLoad], share: Share, scheme: Scheme, ledger: Ledger, A: Csr
     ) -> None:
         here = [i for i, load in enumerate(loads) if share.computes(load.place)]
         self._numbers, mine = np.array(here, dtype=np.int64), [loads[i] for i in here]

@@ -281,7 +281,7 @@ class Points:
         return sums
 
     def freeze(self) -> None:
-        """From now on nothing yields or opens further; hinges that bear nothing any more are free.
+        """Keep everything elastic from now on; hinges that bear no moment any more are free.
 
         So points answer a vibration, however small, of what has yielded: elastic unloading.
         """

@@ -25,13 +25,10 @@ from ufl_beam.model.connector_laws import RigidPlastic
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.material_laws import Hardening, HardeningBulk, Softening
 from ufl_beam.model.plastic_hinges import law_of
-from ufl_beam.terms.connector_responses import Rows, Setting, respond
+from ufl_beam.terms.connector_responses import Response, Rows, Setting, respond
 from ufl_beam.terms.openings import NOTHING, RELEASED, SPENT, Openable
 
-INPUTS = (
-    *names("slip_input", "slip_"),
-    *("θ", "dt", "limit", "energy", "H", "B", "eta"),
-)
+INPUTS = (*names("slip_input", "slip_"), *("θ", "dt", "limit", "energy", "H", "B", "eta"))
 """Inputs of the compiled laws: the slip of the step and its direction (1 or -1); accumulated slip
 and motion at t_n, which loops.h names as well; numbers of the scheme and the law."""
 
@@ -152,12 +149,11 @@ def slip_forms(law: Softening | Hardening, scheme: Scheme) -> SlipForms:
 
 
 @respond.register(RigidPlastic)
-class RigidPlasticResponse:
+class RigidPlasticResponse(Response):
     """Rigid-plastic connectors whose laws are of one kind."""
 
-    steady = False
-
     def __init__(self, law: RigidPlastic, links: Sequence[Connector], setting: Setting) -> None:
+        self._links = links
         n, ledger = len(links), setting.ledger
         self._ledger, self._scheme = ledger, setting.scheme
         ledger.lost["hinges"] += 0.0
@@ -176,12 +172,12 @@ class RigidPlasticResponse:
         self._limit, self._back_force = self._at["limit"].copy(), np.zeros(n)
         self._slipped, self._way, self._way_before = np.zeros((3, n), dtype=np.int32)
         self._rows, self._sums, self._stored = np.zeros((n, 3)), np.zeros(3), 0.0
-        self.dissipated: Array = np.zeros(n)
+        self._dissipated: Array = np.zeros(n)
         self._excess = np.zeros(n)
         self._slope = np.array([_slope(link, setting.size) for link in links])
         self._c = c = ffi.new("rigid_plastic *")
         c.force, c.end, c.number, c.width = self._forms.force, self._forms.end, n, len(INPUTS)
-        arrays = (self._storage, self._limit, self._back_force, self.dissipated, self._rows)
+        arrays = (self._storage, self._limit, self._back_force, self._dissipated, self._rows)
         self._alive = [
             *map(doubles, (*arrays, self._slope, self._excess)),
             *map(integers, (self._slipped, self._way)),
@@ -253,10 +249,6 @@ class RigidPlasticResponse:
         dissipated: float = lib.dissipation_of_rigid_plastic(self._c, *arrays)
         return dissipated
 
-    def bends(self, e1: Array) -> Array:
-        """None: held connectors stay held, internal variables kept."""
-        return np.zeros(len(e1))
-
     def again(self) -> None:
         """Go on from the accepted state."""
         self._way[:] = self._way_before
@@ -268,6 +260,11 @@ class RigidPlasticResponse:
     def remaining(self) -> Array:
         """Part of the stiffness that is left in the latest iterate, 0 of what slips."""
         return np.where(self._way == 0, 1.0, 0.0)
+
+    @property
+    def dissipated(self) -> Array:
+        """Energy that each has dissipated; (num_links,); J."""
+        return self._dissipated
 
     def flows(self) -> bool:
         """Return whether one slips in the latest iterate."""
@@ -292,7 +289,7 @@ class RigidPlasticResponse:
     @property
     def _variables(self) -> tuple[npt.NDArray[Any], ...]:
         at = self._at["slipped"], self._at["start"]
-        return (*at, self._limit, self._back_force, self.dissipated, self._way_before)
+        return (*at, self._limit, self._back_force, self._dissipated, self._way_before)
 
     def start(self, e: Array) -> None:
         """Begin at motions that no step has led to."""

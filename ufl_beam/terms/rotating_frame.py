@@ -114,7 +114,7 @@ class FrameForces:
 
 
 def _positions(fields: Fields, about: tuple[float, float]) -> Array:
-    """From a point to where each displacement belongs, in the undeformed scene; (size,); m."""
+    """Vectors from a point to the places of all displacements; (size,); m."""
     share = fields.share
     grid, x = share.grid, np.zeros(share.grid.size)
     centers = np.array([body.center for body in grid.scene.movers]).reshape(-1, 2)

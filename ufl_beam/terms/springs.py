@@ -13,17 +13,17 @@ from ufl_beam.model.connector_laws import Spring
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.fibres import Layout
 from ufl_beam.model.material_laws import Hardening
-from ufl_beam.terms.connector_responses import Rows, Setting, respond
+from ufl_beam.terms.connector_responses import Response, Rows, Setting, respond
 from ufl_beam.terms.material_points import Points, expect_entries, inputs
+from ufl_beam.terms.openings import Openable
 
 
 @respond.register(Spring)
-class _Sprung:
+class _Sprung(Response):
     """Springs of one law: material points whose strain is the motion."""
 
-    steady = False
-
     def __init__(self, law: Spring, links: Sequence[Connector], setting: Setting) -> None:
+        self._links = links
         layout = Layout(
             strains=np.array([[1.0, 0.0, 0.0]]),
             weights=np.ones(1),
@@ -41,11 +41,11 @@ class _Sprung:
         expect_entries(layout, setting.scheme, setting.ledger)
         self._strains = np.zeros((number, 3))
         self.in_c = {"points": self.points.points}
-        self.openable = self.points if self.points.softens else None
 
-    def motion(self, e: Array) -> Array:
-        """Motions of the nodes."""
-        return e
+    @property
+    def openable(self) -> Openable | None:
+        """The points, if they can break."""
+        return self.points if self.points.softens else None
 
     def _at(self, e: Array) -> Array:
         self._strains[:, 0] = e
@@ -59,9 +59,6 @@ class _Sprung:
         """The force around the iterate."""
         r, D = self.points.respond(self._at(e1))
         return -D[:, 0], 1.0, r[:, 0] - D[:, 0] * e1
-
-    def again(self) -> None:
-        """Points answer each iterate anew."""
 
     def about_force(self, rows: Array) -> Array:
         """Factors of one."""
@@ -87,10 +84,6 @@ class _Sprung:
         self.points.respond(self._at(e1))
         return self.points.dissipation()
 
-    def flows(self) -> bool:
-        """True if a spring flows, which its motions tell."""
-        return False
-
     @property
     def dissipated(self) -> Array:
         """Energy that each spring has dissipated; (num_links,); J."""
@@ -99,10 +92,6 @@ class _Sprung:
     def remaining(self) -> Array:
         """Part of the elastic stiffness that is left in the latest iterate; (num_links,)."""
         return self.points.remaining(np.eye(1, 3).repeat(len(self._strains), axis=0))
-
-    def bends(self, e1: Array) -> Array:
-        """Zero until something yields."""
-        return np.zeros(len(e1))
 
     def state(self) -> Array:
         """Internal variables."""

@@ -28,12 +28,12 @@ class TurnedAxes:
         self._columns = [np.flatnonzero(A.indices == d) for d in dofs]
 
     def enter(self, x: Array) -> None:
-        """From the axes of the plane to the turned axes, in place."""
+        """Transform from the axes of the plane to the turned axes, in place."""
         i, j, c, s = self._i, self._j, self._c, self._s
         x[i], x[j] = c * x[i] + s * x[j], c * x[j] - s * x[i]
 
     def leave(self, x: Array) -> None:
-        """From the turned axes to the axes of the plane, in place."""
+        """Transform from the turned axes to the axes of the plane, in place."""
         i, j, c, s = self._i, self._j, self._c, self._s
         x[i], x[j] = c * x[i] - s * x[j], c * x[j] + s * x[i]
 
@@ -47,7 +47,7 @@ class TurnedAxes:
 
 
 class Supports:
-    """All supports of a scene.
+    """Supports of a scene: held and prescribed degrees of freedom, reactions.
 
     Unknowns and residuals of the solver are in the turned axes of the supports, those of the terms
     in the axes of the plane; :meth:`enter` and :meth:`leave` change between them.
@@ -100,12 +100,12 @@ class Supports:
         return bool(self._turned)
 
     def enter(self, x: Array) -> None:
-        """From the axes of the plane to those of the supports, in place."""
+        """Transform from the axes of the plane to those of the supports, in place."""
         for axes in self._turned:
             axes.enter(x)
 
     def leave(self, x: Array) -> None:
-        """From the axes of the supports to those of the plane, in place."""
+        """Transform from the axes of the supports to those of the plane, in place."""
         for axes in self._turned:
             axes.leave(x)
 
