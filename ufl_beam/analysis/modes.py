@@ -28,7 +28,7 @@ from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.joint_histories import Connection, velocity_of
 from ufl_beam.output.time_series import VTKHDF, XDMF, TimeSeries
-from ufl_beam.parallel import ours
+from ufl_beam.parallel import active_comm
 from ufl_beam.simulation.initial_state import mesh_of
 from ufl_beam.simulation.solution import Solution
 
@@ -113,7 +113,7 @@ class Shapes(ABC):
         require_number(amplitude, "write: amplitude", positive=True)
         self._require(0)
         recorder = VTKHDF(path) if Path(path).suffix == VTKHDF.ending else XDMF(path)
-        on_first(ours(), lambda: self._write(recorder, amplitude))
+        on_first(active_comm(), lambda: self._write(recorder, amplitude))
 
     def _write(self, recorder: TimeSeries, amplitude: float) -> None:
         recorder.require_writable()

@@ -214,7 +214,7 @@ class PathCorrector:
 
     def step_at(self, t: float) -> Step:
         """Return an infinitely slow step to a load factor: rates and viscous forces vanish."""
-        return Step(-math.inf, t, self.simulation.q, load_time=t, motion_time=t, toward=1.0)
+        return Step(-math.inf, t, self.simulation.q, load_time=t, motion_time=t, fraction=1.0)
 
     @staticmethod
     def _give(step: Step, terms: Sequence[Term]) -> None:

@@ -37,7 +37,7 @@ class Grid(BeamMesh):
 
     Attributes:
         dofs: Degrees of freedom of each node; shape (num_nodes, 3).
-        dofs_of_bodies: Degrees of freedom of each of the scene's movers; shape (num_movers, 3).
+        dofs_of_bodies: Degrees of freedom of the rigid bodies; shape (num_bodies, 3).
         multipliers: Degrees of freedom that are the forces of connectors; shape (num_links,).
         size: Number of degrees of freedom.
     """
@@ -79,9 +79,9 @@ class Grid(BeamMesh):
         of = node(anchor)
         if not isinstance(of, Body):
             return np.asarray(self.dofs[self.vertex(of)])
-        if of not in self.scene.movers:
+        if of not in self.scene.rigid_bodies:
             raise SceneError(f"{anchor}: {of.name} is not in the scene")
-        return np.asarray(self.dofs_of_bodies[self.scene.movers.index(of)])
+        return np.asarray(self.dofs_of_bodies[self.scene.rigid_bodies.index(of)])
 
     @cached_property
     def rotations(self) -> Index:
@@ -112,7 +112,7 @@ class Grid(BeamMesh):
             return f"what holds {self.scene.links[dof - self.multipliers[0]]}"
         if dof not in self.dofs:
             body, component = np.argwhere(self.dofs_of_bodies == dof)[0]
-            return f"{COMPONENTS[component]} of {self.scene.movers[body].name}"
+            return f"{COMPONENTS[component]} of {self.scene.rigid_bodies[body].name}"
         node, component = np.argwhere(self.dofs == dof)[0]
         x, y = self.points[node]
         beam = next(b for b in self.scene.beams if node in self._nodes_of(b))
@@ -130,14 +130,14 @@ class Grid(BeamMesh):
         return {self.describe(dof): float(sizes[dof]) for dof in worst if sizes[dof]}
 
     def _number(self) -> None:
-        nodes, movers = len(self.points), self.scene.movers
-        row = {body: nodes + i for i, body in enumerate(movers)}
+        nodes, rigid_bodies = len(self.points), self.scene.rigid_bodies
+        row = {body: nodes + i for i, body in enumerate(rigid_bodies)}
 
         @cache
         def at(of: Node) -> int:
             return row[of] if isinstance(of, Body) else self.vertex(of)
 
-        slots = np.arange(3 * (nodes + len(movers)))
+        slots = np.arange(3 * (nodes + len(rigid_bodies)))
         shared = slots >= 3 * nodes
         for (one, component), (other, _) in self.scene.representatives.items():
             same = 3 * at(other) + component
@@ -145,7 +145,7 @@ class Grid(BeamMesh):
             shared[same] = True
         kept = slots == np.arange(len(slots))
         inner = self.nodes_of_cells[:, 2:]
-        position = np.arange(nodes + len(movers), dtype=np.float64)
+        position = np.arange(nodes + len(rigid_bodies), dtype=np.float64)
         position[list(self._beyond.values())] = self.vertices_at_hinges
         position[inner] = position[self.cells[:, :1]] + self.mesh.nodes[1:-1]
         ordered = (3 * np.argsort(position)[:, None] + np.arange(3)).ravel()

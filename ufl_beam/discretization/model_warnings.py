@@ -125,7 +125,7 @@ def _groups(grid: Grid) -> Index:
     links = grid.dofs_of_links[:, :2]
     held = [support for support in grid.scene.supports if {0, 1} <= support.held.keys()]
     ground = grid.size
-    if GROUND in grid.scene.movers:
+    if GROUND in grid.scene.rigid_bodies:
         ground = int(grid.node(GROUND.middle)[0])
     fast = np.array([(grid.node(s.place)[0], ground) for s in held], dtype=np.int64).reshape(-1, 2)
     rows, columns = np.concatenate([links, fast]).T

@@ -40,7 +40,7 @@ class Transfer:
     def __init__(self, old: Grid, new: Grid) -> None:
         self._old, self._new = old, new
         self._require_alike()
-        bodies = [body for body in new.scene.movers if body in old.scene.movers]
+        bodies = [body for body in new.scene.rigid_bodies if body in old.scene.rigid_bodies]
         news, olds = (
             np.vstack([grid.dofs, *(self._dofs_of(grid, body) for body in bodies)]).ravel()
             for grid in (new, old)
@@ -52,7 +52,7 @@ class Transfer:
 
     @staticmethod
     def _dofs_of(grid: Grid, body: Body) -> Index:
-        return np.asarray(grid.dofs_of_bodies[grid.scene.movers.index(body)]).reshape(1, 3)
+        return np.asarray(grid.dofs_of_bodies[grid.scene.rigid_bodies.index(body)]).reshape(1, 3)
 
     def _require_alike(self) -> None:
         """Raise unless beams and vertices are the same, and every body is known."""
@@ -124,7 +124,7 @@ class Transfer:
                     f"at the end of the solution: {where}. Join them by springs, or where they "
                     "are together"
                 )
-        if GROUND in self._new.scene.movers:
+        if GROUND in self._new.scene.rigid_bodies:
             mapped[self._new.node(GROUND.middle)] = 0.0
         return mapped
 
@@ -151,7 +151,7 @@ def same_unknowns(old: Grid, new: Grid) -> bool:
     return (
         new.agrees(old)
         and old.size == new.size
-        and old.scene.movers == new.scene.movers
+        and old.scene.rigid_bodies == new.scene.rigid_bodies
         and next(links) == next(links)
     )
 

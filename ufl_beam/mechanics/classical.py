@@ -104,7 +104,7 @@ class Static(_AtEnd):
 
         So loads that are there at once can be reached in parts as well as those that grow.
         """
-        return Step(t0, t1, q0, load_time=end, motion_time=end, toward=(t1 - t0) / (end - t0))
+        return Step(t0, t1, q0, load_time=end, motion_time=end, fraction=(t1 - t0) / (end - t0))
 
 
 class Weights(NamedTuple):
@@ -141,7 +141,7 @@ class _Accelerated(_AtEnd):
 
     def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
         """Loads and motions are those of the end."""
-        return Step(t0, t1, q0, load_time=t1, motion_time=t1, toward=1.0)
+        return Step(t0, t1, q0, load_time=t1, motion_time=t1, fraction=1.0)
 
     def half_tangents(self, rotations: Index) -> Index:
         """No rotations: steps are the increments themselves."""

@@ -160,8 +160,8 @@ class ExactStatic(ExactStep):
         Parts of a step go in proportion, as those of :class:`Static`; so loads and motions that are
         there at once can be reached in parts.
         """
-        toward = (t1 - t0) / (end - t0)
-        return Step(t0, t1, q0, load_time=end, motion_time=end, toward=toward, at=self.theta)
+        fraction = (t1 - t0) / (end - t0)
+        return Step(t0, t1, q0, load_time=end, motion_time=end, fraction=fraction, at=self.theta)
 
 
 class Midway:
@@ -180,7 +180,7 @@ class Midway:
 
     def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
         """Loads act in the middle of the step, motions arrive at its end."""
-        return Step(t0, t1, q0, load_time=(t0 + t1) / 2, motion_time=t1, toward=1.0)
+        return Step(t0, t1, q0, load_time=(t0 + t1) / 2, motion_time=t1, fraction=1.0)
 
     def velocity(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
         """The mean velocity of the step."""

@@ -46,7 +46,7 @@ class Step(NamedTuple):
         q0: Configuration at the beginning, local degrees of freedom.
         load_time: Time at which loads are taken; s.
         motion_time: Time at which prescribed motions are taken; s.
-        toward: How far the step goes from the loads and motions before it to these; 1: there.
+        fraction: Part of the way to these loads and motions that the step goes; 1: all of it.
         at: Part of the way from the loads at the beginning to those at the end of the step at which
             they are in its equation; 1: at the end.
     """
@@ -56,7 +56,7 @@ class Step(NamedTuple):
     q0: Array
     load_time: float
     motion_time: float
-    toward: float
+    fraction: float
     at: float = 1.0
 
     @property

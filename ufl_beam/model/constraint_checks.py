@@ -28,7 +28,7 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import Point
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.masses import PointMass
-from ufl_beam.model.plastic_hinges import Slot, shared_by_joints
+from ufl_beam.model.plastic_hinges import NodeDof, shared_by_joints
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.time_functions import value_at
 
@@ -40,11 +40,11 @@ def require_masses(scene: Scene) -> None:
     """Raise :class:`SceneError` if a body that may move has no mass, unless a beam carries it."""
     same, moved = scene.representatives, _fixed(scene)
     for alike in shared_by_joints(scene.joints):
-        moved |= {same.get(slot, slot) for slot in alike if not isinstance(slot[0], Body)}
+        moved |= {same.get(dof, dof) for dof in alike if not isinstance(dof[0], Body)}
     for body in scene.bodies:
         for name, components in (("mass", (0, 1)), ("inertia", (2,))):
-            slots = [(body, component) for component in components]
-            free = any(same.get(slot, slot) not in moved for slot in slots)
+            dofs = [(body, component) for component in components]
+            free = any(same.get(dof, dof) not in moved for dof in dofs)
             if free and getattr(body, name) == 0.0:
                 raise SceneError(
                     f"{body.name}: {name} = 0, but dynamics needs it to be positive; use RigidLink "
@@ -109,18 +109,18 @@ def no_number(scene: Scene, times: Iterable[float]) -> str:
     return ""
 
 
-def _fixed(scene: Scene) -> set[Slot]:
+def _fixed(scene: Scene) -> set[NodeDof]:
     """Return the components of motion that the ground and supports give."""
     same = scene.representatives
-    fixed: set[Slot] = {(GROUND, component) for component in range(3)}
+    fixed: set[NodeDof] = {(GROUND, component) for component in range(3)}
     fixed |= {(node(s.place), c) for s in scene.supports if not s.angle for c in s.held}
-    return {same.get(slot, slot) for slot in fixed}
+    return {same.get(dof, dof) for dof in fixed}
 
 
 HOLDING = (Motor, Guide)
 """Laws of connectors that give the motion."""
 
-Demand = tuple[str, list[tuple[Slot, float]]]
+Demand = tuple[str, list[tuple[NodeDof, float]]]
 """Who demands, and the factors of what moves in it; rotations times the size of the scene."""
 
 
@@ -153,11 +153,11 @@ def friction_repeats(scene: Scene) -> bool:
 
 def _dependences(demands: list[Demand]) -> Array:
     """Combinations of demands that demand nothing; (num_demands, k)."""
-    columns = {slot: i for i, slot in enumerate({s: 0 for _, f in demands for s, _ in f})}
+    columns = {dof: i for i, dof in enumerate({s: 0 for _, f in demands for s, _ in f})}
     entries = [
-        (columns[slot], row, factor)
+        (columns[dof], row, factor)
         for row, (_, factors) in enumerate(demands)
-        for slot, factor in factors
+        for dof, factor in factors
     ]
     return _null_space(_sparse(entries, (max(len(columns), 1), len(demands))))
 
@@ -166,10 +166,10 @@ def _demands(scene: Scene, laws: tuple[type, ...]) -> list[Demand]:
     """Return the constraints that connectors of some laws and supports in turned axes make."""
     same, fixed = scene.representatives, _fixed(scene)
 
-    def free(factors: Iterable[tuple[Node, int, float]]) -> list[tuple[Slot, float]]:
-        slots = (((of, c), factor) for of, c, factor in factors if factor)
-        known = ((same.get(slot, slot), factor) for slot, factor in slots)
-        return [(slot, factor) for slot, factor in known if slot not in fixed]
+    def free(factors: Iterable[tuple[Node, int, float]]) -> list[tuple[NodeDof, float]]:
+        dofs = (((of, c), factor) for of, c, factor in factors if factor)
+        known = ((same.get(dof, dof), factor) for dof, factor in dofs)
+        return [(dof, factor) for dof, factor in known if dof not in fixed]
 
     demands: list[Demand] = []
     for link in scene.links:

@@ -20,7 +20,7 @@ from ufl_beam.model.damping import Damping, KelvinVoigt, Rayleigh
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame
 from ufl_beam.model.masses import PointMass, Velocity
-from ufl_beam.model.plastic_hinges import Slot, merged, plastic_hinges, shared_by_joints
+from ufl_beam.model.plastic_hinges import NodeDof, merged, plastic_hinges, shared_by_joints
 from ufl_beam.model.supports import COMPONENTS, Support
 from ufl_beam.model.time_functions import TimeFunction, value_at
 
@@ -162,7 +162,7 @@ class Scene:
                 yield mass.place
 
     @cached_property
-    def movers(self) -> tuple[Body, ...]:
+    def rigid_bodies(self) -> tuple[Body, ...]:
         """The bodies, and the ground if something is attached to it."""
         attached = [place for _, place in self.attachments()]
         attached += [link.a for link in self.links]
@@ -266,30 +266,30 @@ class Scene:
             )
 
     @cached_property
-    def representatives(self) -> dict[Slot, Slot]:
+    def representatives(self) -> dict[NodeDof, NodeDof]:
         """Which component of a node stands for it, for all components that joints share."""
         hinges = ([(node(link.a), c), (node(link.b), c)] for link in self.hinges for c in (0, 1))
         return merged([*shared_by_joints(self.joints), *hinges])
 
     def _require_single_supports(self) -> None:
         same = self.representatives
-        holders: dict[Slot, str] = {}
-        slot: Slot
+        holders: dict[NodeDof, str] = {}
+        dof: NodeDof
         for component in (0, 1, 2):
-            slot = (GROUND, component)
-            holders[same.get(slot, slot)] = "the ground"
+            dof = (GROUND, component)
+            holders[same.get(dof, dof)] = "the ground"
         for support in self.supports:
             # A support in turned axes takes both displacements of its place.
             components = {*support.held, *((0, 1) if support.angle else ())}
             for component in sorted(components):
-                slot = (node(support.place), component)
-                slot = same.get(slot, slot)
-                if slot in holders:
+                dof = (node(support.place), component)
+                dof = same.get(dof, dof)
+                if dof in holders:
                     raise SceneError(
-                        f"supports in conflict: {holders[slot]} and {support} both hold "
+                        f"supports in conflict: {holders[dof]} and {support} both hold "
                         f"{COMPONENTS[component]}; remove one"
                     )
-                holders[slot] = str(support)
+                holders[dof] = str(support)
 
 
 @singledispatch

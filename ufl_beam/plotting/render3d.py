@@ -13,7 +13,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import require_number
-from ufl_beam.parallel import ours
+from ufl_beam.parallel import active_comm
 from ufl_beam.plotting.drawing import evenly, moved_points, open_hinges
 from ufl_beam.plotting.offscreen import film_writer, optional, require_suffix, screen
 from ufl_beam.plotting.solids import Look, Solids
@@ -63,7 +63,7 @@ def render(
     look = Look(solution, color, thickness, magnify, size)
     path = require_suffix(path, (".png",))
     moved_points(solution, n, magnify)
-    if ours().rank == 0:
+    if active_comm().rank == 0:
         with _film(look, [n]) as frames:
             for frame in frames:
                 imsave(path, frame)
@@ -108,7 +108,7 @@ def animate(
     require_number(fps, "animate: fps", positive=True)
     require_number(seconds, "animate: seconds", positive=True)
     shown = evenly(solution, max(1, round(fps * seconds)))
-    if ours().rank == 0:
+    if active_comm().rank == 0:
         with _film(look, shown) as frames, film_writer(path, fps) as film:
             for frame in frames:
                 film.append_data(frame)

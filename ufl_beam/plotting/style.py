@@ -16,7 +16,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError
-from ufl_beam.parallel import ours
+from ufl_beam.parallel import active_comm
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -109,7 +109,7 @@ def picture(size: tuple[float, float]) -> Iterator[Figure]:
 
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=size, dpi=150, layout="constrained")
-        if ours().rank > 0:
+        if active_comm().rank > 0:
             figure.savefig = lambda *args, **options: None  # type: ignore[method-assign]
         yield figure
 

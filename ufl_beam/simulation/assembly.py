@@ -35,7 +35,7 @@ from ufl_beam.terms.inelastic_beams import InelasticBeams, inelastic_cells
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.loads import DeadLoads, FollowerLoads
 from ufl_beam.terms.material_points import expect_entries
-from ufl_beam.terms.openings import Course, Openable, Openings
+from ufl_beam.terms.openings import Openable, Openings, SearchFlags
 from ufl_beam.terms.rotating_frame import FrameForces
 from ufl_beam.terms.supports import Supports
 
@@ -163,7 +163,7 @@ def assemble(share: Share, scheme: Scheme, v: Array, together: Agreement) -> Ass
         v: Initial velocities at the local degrees of freedom; supports stop them in place.
         together: Raises on all processes what one of them raises.
     """
-    scene, ledger, fields, course = share.grid.scene, Ledger(), Fields(share), Course()
+    scene, ledger, fields, search = share.grid.scene, Ledger(), Fields(share), SearchFlags()
     A = fields.matrix()
     setting = (scheme, A, ledger)
 
@@ -175,7 +175,7 @@ def assemble(share: Share, scheme: Scheme, v: Array, together: Agreement) -> Ass
         part = np.flatnonzero(np.isin(share.cells, cells))
         if len(part):
             elastic[part] = False
-            inelastic.append(InelasticBeams(Fields(share, part), layout, *setting, course))
+            inelastic.append(InelasticBeams(Fields(share, part), layout, *setting, search))
     beams: list[Cells] = [*inelastic]
     numerical: list[Term] = []
     if elastic.any():
@@ -186,9 +186,9 @@ def assemble(share: Share, scheme: Scheme, v: Array, together: Agreement) -> Ass
 
     asked = {link: 0.0 for link in scene.links if isinstance(link.law, Controller | Coulomb)}
     rates = dict(asked)
-    connectors = Setting(asked, rates, scene.size, scheme, ledger, friction_repeats(scene), course)
+    connectors = Setting(asked, rates, scene.size, scheme, ledger, friction_repeats(scene), search)
     coupled = together(lambda: [*couplings(share, connectors, A), *guides(share, scheme, A)])
-    openings = Openings.of(course, _openable(inelastic, coupled), share.comm)
+    openings = Openings.of(search, _openable(inelastic, coupled), share.comm)
 
     loads = _loads(scene, fields, scheme, ledger, A)
     inertia = Inertia(fields, scheme, A, ledger, v) if has_inertia(scheme) else None
@@ -198,7 +198,7 @@ def assemble(share: Share, scheme: Scheme, v: Array, together: Agreement) -> Ass
     supports = Supports(share, scheme, ledger, A)
     if inertia:
         supports.stop(inertia.v)
-    equation = StepEquation(share, A, beams, coupled, loads, others, supports, course)
+    equation = StepEquation(share, A, beams, coupled, loads, others, supports, search)
     return Assembly(
         fields, ledger, asked, rates, beams, inelastic, bool(groups), coupled, loads, inertia,
         supports, openings, equation,

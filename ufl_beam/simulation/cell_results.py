@@ -111,7 +111,7 @@ class CellResults:
             raise SceneError("momentum: the run was static; there is none")
         times, grid = Product(mass_matrix(self._fields)), self._grid
         dofs = np.vstack([grid.dofs, grid.dofs_of_bodies])
-        centers = np.array([body.center for body in grid.scene.movers]).reshape(-1, 2)
+        centers = np.array([body.center for body in grid.scene.rigid_bodies]).reshape(-1, 2)
         _, first = np.unique(dofs[:, 0], return_index=True)
         u, v, ψ = dofs[first, 0], dofs[first, 1], np.unique(dofs[:, 2])
         X, Y = np.vstack([grid.points, centers])[first].T

@@ -246,7 +246,7 @@ class Simulation(StateView):
         self.ask()
         for one in self._assembly.remembering:
             one.freeze()
-        step = Step(0.0, dt, self.q, self.t, self.t, toward=1.0)
+        step = Step(0.0, dt, self.q, self.t, self.t, fraction=1.0)
         return self.equation.linearise(q, step)
 
     def give_up(self, failure: StepFailed, end: float, advice: str = "") -> NoReturn:

@@ -16,7 +16,7 @@ from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.solvers.equation import PythonEquation
 from ufl_beam.terms.base import Beams, Cells, Term
 from ufl_beam.terms.links import Links
-from ufl_beam.terms.openings import Course
+from ufl_beam.terms.openings import SearchFlags
 from ufl_beam.terms.supports import Supports
 
 
@@ -43,10 +43,10 @@ class StepEquation(PythonEquation):
         loads: Sequence[Load],
         others: Sequence[Term],
         supports: Supports,
-        course: Course,
+        search: SearchFlags,
     ) -> None:
         super().__init__(A, np.zeros(share.size), supports.dofs)
-        self.share, self.supports, self._course = share, supports, course
+        self.share, self.supports, self._search = share, supports, search
         self._beams, self._couplings, self._loads = beams, couplings, loads
         self._inner: list[Beams] = [*beams, *couplings]
         self.others: list[Term] = [*loads, *others]
@@ -109,11 +109,11 @@ class StepEquation(PythonEquation):
             failed = 1.0
         return self.share.largest(failed) == 0.0
 
-    def relieve(self, relief: bool) -> bool:
-        """Begin again with relieved points, or end that; return if it makes a difference."""
-        opened = bool(self.share.largest(float(self._course.opened)))
-        self._course.relieve(relief and opened)
-        if relief:
+    def stiffen(self, stiff: bool) -> bool:
+        """Begin again with stiff points, or end that; return whether it makes a difference."""
+        opened = bool(self.share.largest(float(self._search.opened)))
+        self._search.stiffen(stiff and opened)
+        if stiff:
             for coupling in self._couplings:
                 coupling.again()
         return opened

@@ -44,7 +44,7 @@ class CEquation:
         self.A, self.force, self.held = A, force, _ = python.A, python.force, python.held
         self.residual, self.complete = python.residual, python.complete
         self.tangent, self.missed = python.tangent, python.missed
-        self.relieve, self.working = python.relieve, python.working
+        self.stiffen, self.working = python.stiffen, python.working
         self.error: BaseException | None = None
         self._in_python: list[InPython | Demand] = []
         self._size, self._entries = len(force), len(A.data)

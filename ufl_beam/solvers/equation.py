@@ -69,7 +69,7 @@ class Equation(Protocol):
             moved: Largest motion; m.
         """
 
-    def relieve(self, relief: bool) -> bool:
+    def stiffen(self, stiff: bool) -> bool:
         """Begin again with stiffer tangents, or end that; return whether they differ."""
 
     def working(self, x: Array, y: Array) -> Array:

@@ -167,9 +167,9 @@ class Solver:
             reason = self._hold_idle(guess)
         if reason == lib.STALLED:
             reason = self._iterate(self._careful, PATIENCE)
-        if reason <= 0 and self._may_go_on() and self._equation.relieve(True):
+        if reason <= 0 and self._may_go_on() and self._equation.stiffen(True):
             self._go_to(guess)
-            reason = self._relieved()
+            reason = self._stiffened()
         if reason <= 0:
             raise self._failure(reason)
         self._vectors.update_ghosts(self._x)
@@ -220,10 +220,10 @@ class Solver:
         c = self._equation.c
         c.idle, (c.idle_entry, c.idle_stiffness) = len(entries), self._at_idle
 
-    def _relieved(self) -> int:
+    def _stiffened(self) -> int:
         """Iterate with stiffer tangents, which come near but slowly, then with true ones."""
         slow = self._iterate(self._snes, PATIENCE)
-        self._equation.relieve(False)
+        self._equation.stiffen(False)
         if slow != lib.TOO_MANY and slow <= 0:
             return slow
         near = self.iterate()

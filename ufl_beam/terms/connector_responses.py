@@ -17,7 +17,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.connectors import Connector
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.openings import Course, Openable
+from ufl_beam.terms.openings import Openable, SearchFlags
 
 Rows = tuple[Any, Any, Any]
 """α, β, γ of some connectors: arrays or numbers."""
@@ -33,7 +33,7 @@ class Setting(NamedTuple):
         scheme: Says what acts in a step.
         ledger: Takes energies and works.
         friction_repeats: Whether places that stick may hold what is held already.
-        course: Flags that all points of the scene share.
+        search: Flags that all points of the scene share.
     """
 
     asked: Mapping[Connector, float]
@@ -42,7 +42,7 @@ class Setting(NamedTuple):
     scheme: Scheme
     ledger: Ledger
     friction_repeats: bool
-    course: Course
+    search: SearchFlags
 
 
 class Response:

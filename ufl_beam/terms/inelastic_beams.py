@@ -23,7 +23,7 @@ from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.fibres import Layout
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.material_points import Points, inputs
-from ufl_beam.terms.openings import Course
+from ufl_beam.terms.openings import SearchFlags
 from ufl_beam.terms.tangent_derivatives import CellTangent
 
 
@@ -83,7 +83,13 @@ class InelasticBeams:
     kind = "beams"
 
     def __init__(
-        self, fields: Fields, layout: Layout, scheme: Scheme, A: Csr, ledger: Ledger, course: Course
+        self,
+        fields: Fields,
+        layout: Layout,
+        scheme: Scheme,
+        A: Csr,
+        ledger: Ledger,
+        search: SearchFlags,
     ) -> None:
         self._layout, self._scheme, self._A, self._ledger = layout, scheme, A, ledger
         self._order = fields.order
@@ -99,7 +105,7 @@ class InelasticBeams:
             fields.share.cell_lengths()[fields.order],
             scheme,
             self._variables.x.array.reshape(cells, n, width),
-            course,
+            search,
         )
 
         forms = _forms(fields.element, scheme)

@@ -55,12 +55,12 @@ class DeadLoads:
     def begin(self, step: Step) -> None:
         """The loads of the step; nothing is to do for those that stay."""
         factors = self._factors_at(step.load_time)
-        if factors == self._factors and step.toward == step.at == 1:
+        if factors == self._factors and step.fraction == step.at == 1:
             return
         self.force = self._end = self._times(factors)
         self._factors = factors
-        if step.toward < 1 or step.at < 1:
-            change = step.toward * (self._end - self._before)
+        if step.fraction < 1 or step.at < 1:
+            change = step.fraction * (self._end - self._before)
             self._end = self._before + change
             self.force = self._end if step.at == 1 else self._before + step.at * change
             self._factors = []
@@ -146,7 +146,7 @@ class FollowerLoads:
     def begin(self, step: Step) -> None:
         """The size of the loads in the step."""
         before, target = self._sizes_before, self._sizes_at(step.load_time)
-        self._sizes_at_end = before + step.toward * (target - before)
+        self._sizes_at_end = before + step.fraction * (target - before)
         self._sizes = before + step.at * (self._sizes_at_end - before)
         self._ψ0 = step.q0[self._dofs[:, 2]]
 

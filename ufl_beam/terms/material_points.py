@@ -20,7 +20,7 @@ from ufl_beam.model import law_functions
 from ufl_beam.model.fibres import Layout
 from ufl_beam.model.material_laws import Bulk, Softening
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.openings import NOTHING, RELEASED, SPENT, Course
+from ufl_beam.terms.openings import NOTHING, RELEASED, SPENT, SearchFlags
 
 law_functions.where.register(Condition, ufl.conditional)
 law_functions.below.register(Expr, ufl.lt)
@@ -123,7 +123,7 @@ class Points:
         length: Of the cells; (cells,); m.
         scheme: The time scheme.
         storage: Zeros, for all that is known of the points; (cells, n, number of inputs).
-        course: Shared by all points of a scene.
+        search: Shared by all points of a scene.
 
     Attributes:
         softens: Whether they can open.
@@ -146,9 +146,9 @@ class Points:
         length: Array,
         scheme: Scheme,
         storage: Array,
-        course: Course | None = None,
+        search: SearchFlags | None = None,
     ) -> None:
-        course = course or Course()
+        search = search or SearchFlags()
         self._forms = point_forms(layout.statement, layout.softening, scheme)
         self._layout, self._storage, self._loss = layout, storage, scheme.loss
         self._yields, self.softens = layout.yields, layout.softening is not None
@@ -179,16 +179,16 @@ class Points:
             np.ascontiguousarray(x, dtype=np.float64)
             for x in (layout.strains, layout.weights, layout.rest)
         )
-        self._course, forms = course, self._forms
+        self._search, forms = search, self._forms
         self._alive = [
             *map(doubles, (B, weights, rest, np.ascontiguousarray(length))),
             *map(doubles, (self._e0, self.strains, storage, self.r, self.D, self.kept, self.sums)),
-            integers(course.flags),
+            integers(search.flags),
             doubles(self._over),
         ]
         self.points = c = ffi.new("points *")
         c.B, c.weight, c.rest, c.length = self._alive[:4]
-        c.e0, c.e1, c.w, c.r, c.D, c.kept, c.sum, c.course, c.over = self._alive[4:]
+        c.e0, c.e1, c.w, c.r, c.D, c.kept, c.sum, c.search, c.over = self._alive[4:]
         c.bulk, c.opening, c.excess, c.end = forms.bulk, forms.opening, forms.excess, forms.end
         c.cells, c.of_cell, c.width, c.theta = *storage.shape, scheme.theta
 

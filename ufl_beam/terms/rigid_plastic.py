@@ -184,8 +184,8 @@ class RigidPlasticResponse(Response):
         ]
         c.w, c.limit, c.back_force, c.dissipated, c.rows, c.slope = self._alive[:6]
         c.excess, c.slipped, c.way = self._alive[6:]
-        self._course = integers(setting.course.flags)
-        c.course = self._course
+        self._search = integers(setting.search.flags)
+        c.search = self._search
         self.in_c = {"rigid_plastic": c}
 
     # -- the step ------------------------------------------------------------------------------

@@ -75,7 +75,7 @@ class FrameForces:
     def begin(self, step: Step) -> None:
         """Remember the beginning, and how much of the forces acts."""
         self._q0, self._dt = step.q0, step.dt
-        growth = step.toward * (1.0 - self._grown)
+        growth = step.fraction * (1.0 - self._grown)
         self._growth, self._growth_at_end = self._grown + step.at * growth, self._grown + growth
 
     def carry_on(self, t: float, q: Array) -> Array:
@@ -117,7 +117,7 @@ def _positions(fields: Fields, about: tuple[float, float]) -> Array:
     """Vectors from a point to the places of all displacements; (size,); m."""
     share = fields.share
     grid, x = share.grid, np.zeros(share.grid.size)
-    centers = np.array([body.center for body in grid.scene.movers]).reshape(-1, 2)
+    centers = np.array([body.center for body in grid.scene.rigid_bodies]).reshape(-1, 2)
     # Beams last: those joined to the ground share its displacement, not the place of its centre.
     points = np.concatenate([centers, grid.points]) - about
     x[np.concatenate([grid.dofs_of_bodies, grid.dofs])[:, :2]] = points

@@ -36,7 +36,7 @@ class _Sprung(Response):
         number = len(links)
         keys = [(0, i) for i in range(number)]
         storage = np.zeros((number, 1, len(inputs(layout.statement))))
-        self.points = Points(layout, keys, np.ones(number), setting.scheme, storage, setting.course)
+        self.points = Points(layout, keys, np.ones(number), setting.scheme, storage, setting.search)
         self._ledger = setting.ledger
         expect_entries(layout, setting.scheme, setting.ledger)
         self._strains = np.zeros((number, 3))

@@ -65,7 +65,7 @@ class Supports:
         self._turned: list[TurnedAxes] = []
         held: list[int] = []
         self._motions: list[tuple[int, TimeFunction, Support]] = []
-        if GROUND in share.grid.scene.movers:
+        if GROUND in share.grid.scene.rigid_bodies:
             held.extend(share.local(share.at(GROUND.middle)))
         for support in share.grid.scene.supports:
             dofs = share.at(support.place)
@@ -129,7 +129,7 @@ class Supports:
         """Set in ``x`` what is prescribed for the step that begins at ``x0``."""
         for dof, motion, support in self._motions:
             target = value_at(motion, step.motion_time, support)
-            x[dof] = x0[dof] + step.toward * (target - x0[dof])
+            x[dof] = x0[dof] + step.fraction * (target - x0[dof])
 
     def hold(self, r: Array) -> None:
         """Note the reactions in a residual that is complete, and remove them from it."""
