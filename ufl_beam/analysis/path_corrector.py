@@ -7,26 +7,18 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NoReturn, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from ufl_beam.analysis.critical_points import Direction, Stiffness, metric
 from ufl_beam.arrays import Array
-from ufl_beam.collective_errors import Agreement
-from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.model.scene import Scene
-from ufl_beam.simulation.assembly import Loads
-from ufl_beam.simulation.solution import Solution
+from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.step_cutting import Trial
-from ufl_beam.simulation.step_equation import StepEquation
-from ufl_beam.solvers.equation import Border
 from ufl_beam.terms.base import Term
-from ufl_beam.terms.inelastic_beams import InelasticBeams
-from ufl_beam.terms.links import Links
-from ufl_beam.terms.supports import Supports
 
 MOST_DOUBLINGS = 30  # doublings of a step until something dissipates in it
 ONSET_PART = 1e-6  # part of the dissipated energy of a step at which its onset is looked at
@@ -59,40 +51,6 @@ class GivenLoadFactor:
         return way.t
 
 
-class Statics(Protocol):
-    """Static simulation as path following moves it, see :class:`Simulation`."""
-
-    share: Share
-    t: float
-    q: Array
-    couplings: list[Links]
-    inelastic: list[InelasticBeams]
-    loads: Loads
-    terms: list[Term]
-    supports: Supports
-    equation: StepEquation
-    solution: Solution
-    together: Agreement
-
-    @property
-    def iterations(self) -> int:
-        """Newton iterations of the run so far."""
-
-    def attempt_along(
-        self, step: Step, guess: Array, border: Border, *, hold: bool = True
-    ) -> Trial:
-        """Solve the next step together with the load factor."""
-
-    def accept(self, trial: Trial) -> None:
-        """Go to the end of the latest attempt."""
-
-    def give_up(self, failure: StepFailed, end: float, advice: str = "") -> NoReturn:
-        """End the run, because even the smallest step, to ``end``, failed."""
-
-    def snapshot(self) -> Solution:
-        """Return the present state alone, as a solution."""
-
-
 class PathCorrector:
     """Corrector of path following: equilibrium augmented by the equation of the control.
 
@@ -109,7 +67,7 @@ class PathCorrector:
         sought: Where the latest attempt began, seen from the accepted state.
     """
 
-    def __init__(self, simulation: Statics, factor: float) -> None:
+    def __init__(self, simulation: Simulation, factor: float) -> None:
         self.simulation, self.factor = simulation, factor
         self.share = simulation.share
         self.weights = metric(self.share)

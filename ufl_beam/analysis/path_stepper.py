@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ufl_beam.analysis.critical_points import Branch, CriticalPoint, Direction, Stiffness
-from ufl_beam.analysis.path_corrector import Control, GivenLoadFactor, PathCorrector, Statics
+from ufl_beam.analysis.path_corrector import Control, GivenLoadFactor, PathCorrector
 from ufl_beam.arrays import Array
 from ufl_beam.errors import StepFailed
+from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.step_cutting import Trial
 
 ADVICE = (
@@ -69,7 +70,7 @@ class PathStepper:
         critical: The critical points so far.
     """
 
-    def __init__(self, simulation: Statics, control: Control) -> None:
+    def __init__(self, simulation: Simulation, control: Control) -> None:
         self._corrector, self._control = PathCorrector(simulation, control.factor), control
         self.critical: list[CriticalPoint] = []
         self._weights = simulation.share.gather(self._corrector.weights)

@@ -8,19 +8,18 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.model.bodies import GROUND, Anchor, Body, Spot
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import Curve, nearest, parameter_step, tangent
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.joint_histories import Motion, motion_of, turned
+from ufl_beam.output.joint_histories import motion_of, turned
 from ufl_beam.output.line_data import spots_of
+from ufl_beam.simulation.solution import Solution
 
 Range = tuple[float, float]
 """Least and largest position of a slider along its rail from its place, m; or guide parameter."""
@@ -105,28 +104,11 @@ class Model(Setting):
         return start, start
 
 
-class Shown(Motion, Protocol):
-    """Solution as it is drawn: configurations of a grid at all kept times."""
-
-    grid: Grid
-
-    @property
-    def q(self) -> Array:
-        """Configurations at all kept times; (n+1, grid.size)."""
-
-
 class Stage(Setting):
-    """Solution, and how large its symbols are.
-
-    Args:
-        solution: What is shown.
-        magnify: Factor on the displacements.
-        unit: Half the size of a symbol of a support; m.
-        shown: Numbers of the kept times that are shown, for which rails must do; all by default.
-    """
+    """Solution, of which rails must do for the kept times ``shown``; all by default."""
 
     def __init__(
-        self, solution: Shown, magnify: float, unit: float, shown: Sequence[int] | None = None
+        self, solution: Solution, magnify: float, unit: float, shown: Sequence[int] | None = None
     ) -> None:
         self.scene, self._solution = solution.scene, solution
         self.magnify, self.unit = magnify, unit
