@@ -13,17 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.model.connector_laws import (
-    Actuator,
-    Controller,
-    Coulomb,
-    Damper,
-    ForceLaw,
-    Motor,
-    RigidPlastic,
-    Spring,
-    Stop,
-)
+from ufl_beam.model import connector_laws as laws
 from ufl_beam.plotting.style import ORANGE, WHITE
 
 
@@ -62,37 +52,37 @@ _ARROW = [
 _CYLINDER = [*_PUSHED, _box(-0.8, 0.35, 0.6, WHITE)]
 
 STRAIGHT: dict[type, list[Piece]] = {
-    Spring: [Piece([(-2.0, 0.0), (-1.0, 0.0), *_zigzag(6), (1.0, 0.0), (2.0, 0.0)])],
-    Damper: [
+    laws.Spring: [Piece([(-2.0, 0.0), (-1.0, 0.0), *_zigzag(6), (1.0, 0.0), (2.0, 0.0)])],
+    laws.Damper: [
         Piece([(-2.0, 0.0), (-0.5, 0.0)]),
         Piece([(0.6, 0.6), (-0.5, 0.6), (-0.5, -0.6), (0.6, -0.6)]),
         Piece([(0.15, 0.42), (0.15, -0.42)], weight=2.6),
         Piece([(0.15, 0.0), (2.0, 0.0)]),
     ],
-    Stop: [
+    laws.Stop: [
         Piece([(-2.0, 0.0), (-0.25, 0.0)]),
         Piece([(-0.25, 0.7), (-0.25, -0.7)], weight=3.6),
         Piece([(0.25, 0.7), (0.25, -0.7)], weight=3.6),
         Piece([(0.25, 0.0), (2.0, 0.0)]),
     ],
-    Coulomb: [
+    laws.Coulomb: [
         Piece([(-2.0, 0.0), (-0.8, 0.0), (-0.8, 0.3), (0.6, 0.3)], weight=2.2),
         Piece([(2.0, 0.0), (0.8, 0.0), (0.8, -0.3), (-0.6, -0.3)], weight=2.2),
         *(Piece([(s - 0.1, -0.3), (s + 0.1, 0.3)], weight=1.0) for s in (-0.4, -0.13, 0.13, 0.4)),
     ],
-    Motor: [*_PUSHED, _box(-0.8, 0.35, 0.6, ORANGE)],
-    Actuator: [*_CYLINDER, *_ARROW],
-    Controller: [
+    laws.Motor: [*_PUSHED, _box(-0.8, 0.35, 0.6, ORANGE)],
+    laws.Actuator: [*_CYLINDER, *_ARROW],
+    laws.Controller: [
         *_CYLINDER,
         *_ARROW,
         Piece([(0.9, 0.0), (0.9, 1.15), (-0.25, 1.15), (-0.25, 0.6)], weight=1.0),
     ],
-    ForceLaw: [
+    laws.ForceLaw: [
         *_LEADS,
         _box(-0.8, 0.8, 0.6, WHITE),
         Piece([(-0.55, -0.35), (-0.25, -0.27), (0.25, 0.27), (0.55, 0.35)], inside=True),
     ],
-    RigidPlastic: [  # nothing below a limit, flow at it
+    laws.RigidPlastic: [  # nothing below a limit, flow at it
         *_LEADS,
         _box(-0.8, 0.8, 0.6, WHITE),
         Piece([(-0.55, -0.35), (0.0, -0.35), (0.0, 0.35), (0.55, 0.35)], inside=True),
@@ -114,14 +104,14 @@ def _turning(fill: str, *more: Piece, tail: float = -2.0) -> Glyph:
 
 
 AROUND: dict[type, Glyph] = {
-    Spring: Glyph([Piece([(2.0, CENTRE), (2.0, -2.1), (-2.0, 0.0)])], sweep=4.3 * math.pi),
+    laws.Spring: Glyph([Piece([(2.0, CENTRE), (2.0, -2.1), (-2.0, 0.0)])], sweep=4.3 * math.pi),
     **{
         law: Glyph([*STRAIGHT[law], *_SPOKES])  # the straight one, with a spoke at both ends
-        for law in (Damper, Stop, Coulomb, ForceLaw, RigidPlastic)
+        for law in (laws.Damper, laws.Stop, laws.Coulomb, laws.ForceLaw, laws.RigidPlastic)
     },
-    Motor: _turning(ORANGE),
-    Actuator: _turning(WHITE),
-    Controller: _turning(WHITE, _box(-2.0, -1.4, 0.5, WHITE), tail=-1.4),
+    laws.Motor: _turning(ORANGE),
+    laws.Actuator: _turning(WHITE),
+    laws.Controller: _turning(WHITE, _box(-2.0, -1.4, 0.5, WHITE), tail=-1.4),
 }
 """Around a pin."""
 

@@ -12,21 +12,9 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.model.bodies import Member
-from ufl_beam.plotting import drawing
+from ufl_beam.plotting import drawing, style
 from ufl_beam.plotting.labels import Label, Spot, leader_of, place
-from ufl_beam.plotting.style import (
-    BLUE,
-    INK,
-    POINTS,
-    RED,
-    RESULTANTS,
-    half_size,
-    magnified,
-    picture,
-    plane_axes,
-    require_choice,
-    with_unit,
-)
+from ufl_beam.plotting.style import BLUE, INK, POINTS, RED, RESULTANTS, half_size, with_unit
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
@@ -45,14 +33,14 @@ AROUND, LEAST, MOST = (1.0, 1.2), (3.6, 2.6), (9.0, 6.8)
 
 def plot_state(solution: Solution, what: str, *, n: int, magnify: float) -> Figure:
     """Draw the frame at a time, with a diagram of a section force; see :func:`plot`."""
-    require_choice(what, ("shape", *RESULTANTS), "plot: what")
+    style.require_choice(what, ("shape", *RESULTANTS), "plot: what")
     points = drawing.moved_points(solution, n, magnify)
     stage = drawing.plane_stage(solution, [n], magnify)
     pose = stage.pose(n)
     name = f"{RESULTANTS[what][0]} {what}" if what in RESULTANTS else "shape"
     time = solution.parameter.at(solution.times[n])
-    with picture(drawing.plane_size(solution.grid.points, points, pose.points())) as figure:
-        axes = plane_axes(figure, f"{name} at {time}{magnified(magnify)}")
+    with style.picture(drawing.plane_size(solution.grid.points, points, pose.points())) as figure:
+        axes = style.plane_axes(figure, f"{name} at {time}{style.magnified(magnify)}")
         drawing.draw_undeformed(axes, solution, stage)
         extremes: list[Extreme] = []
         if what in RESULTANTS:
@@ -198,7 +186,7 @@ def _fit(figure: Figure, axes: Axes) -> None:
 
 
 def _write(figure: Figure, axes: Axes, extremes: Sequence[Extreme]) -> list[Annotation]:
-    """Write extreme values beside the areas and lines of a picture."""
+    """Write extreme values beside the areas and lines of a style.picture."""
     if not extremes:
         return []
     figure.draw_without_rendering()

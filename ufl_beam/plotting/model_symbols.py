@@ -16,20 +16,10 @@ from ufl_beam.model.bodies import Anchor, Body, Member, Place
 from ufl_beam.model.loads import FollowerLoad, LineLoad, PointLoad
 from ufl_beam.model.plastic_hinges import law_of, place_of
 from ufl_beam.model.scene import Scene
-from ufl_beam.plotting import symbols
+from ufl_beam.plotting import load_symbols, symbols
 from ufl_beam.plotting.captions import hinge_in_words, law_in_words, names_of
 from ufl_beam.plotting.labels import Label, Spot
-from ufl_beam.plotting.load_symbols import (
-    CAPTIONS,
-    NAMES,
-    Sizes,
-    along_axis,
-    around,
-    left_of,
-    load_symbol,
-    prescribed_symbol,
-    velocity_symbol,
-)
+from ufl_beam.plotting.load_symbols import CAPTIONS, NAMES, Sizes, along_axis, around, left_of
 from ufl_beam.plotting.scene_layout import Model, Pose
 from ufl_beam.plotting.style import GREY, INK, ORANGE, WHITE, Stroke
 from ufl_beam.plotting.symbols import Footing
@@ -111,16 +101,16 @@ def draw(subject: Subject, scale: float) -> Drawing:
         if support.moving:
             ways = sizes.ways(support.place)
             inward = ways[0] if len(ways) else np.array([0.0, 1.0])
-            drawing.add("motions", *prescribed_symbol(support, inward, sizes))
+            drawing.add("motions", *load_symbols.prescribed_symbol(support, inward, sizes))
     for mass in scene.masses:
         at, r = np.array(mass.place.point), 0.45 * unit
         label = Label(f"{mass.mass:.4g} kg", INK, CAPTIONS, around(at, r / scale))
         drawing.add("masses", [_disc(at, r, INK, INK)], [label])
     # Line loads come first, so that forces stand out from them.
     for load in sorted(scene.loads, key=lambda load: not isinstance(load, LineLoad)):
-        drawing.add("loads", *load_symbol(load, sizes))
+        drawing.add("loads", *load_symbols.load_symbol(load, sizes))
     for velocity in scene.initial:
-        drawing.add("velocities", *velocity_symbol(velocity, sizes))
+        drawing.add("velocities", *load_symbols.velocity_symbol(velocity, sizes))
     return drawing
 
 
