@@ -25,14 +25,7 @@ LEAST_REST = 1e-3  # part of a step of arc length that is gone at least beyond a
 
 
 class Plane:
-    """Linear constraint: a step goes so far along a normal.
-
-    Args:
-        corrector: Of the path.
-        normal: In the space of configurations and load factors.
-        reach: Distance.
-        gone: Start of the distance, seen from the accepted state; by default that state.
-    """
+    """Linear constraint: a step goes a distance ``reach`` along a normal, from ``gone`` on."""
 
     def __init__(
         self,

@@ -54,17 +54,7 @@ class GivenLoadFactor:
 class PathCorrector:
     """Corrector of path following: equilibrium augmented by the equation of the control.
 
-    Args:
-        simulation: In statics, where the path begins.
-        factor: Change of the load factor that counts as much as a unit of displacement.
-
-    Attributes:
-        share: The degrees of freedom of this process.
-        weights: See :func:`~ufl_beam.analysis.critical_points.metric`.
-        t: The load factor of the latest iterate.
-        direction: That of the path at the accepted state.
-        dissipates: Whether the last step did.
-        sought: Where the latest attempt began, seen from the accepted state.
+    A change ``factor`` of the load factor counts as much as a unit of displacement.
     """
 
     def __init__(self, simulation: Simulation, factor: float) -> None:
@@ -117,10 +107,7 @@ class PathCorrector:
         return self._until(energy, gone, way)
 
     def kink(self, length: float) -> tuple[Direction, Direction] | None:
-        """Find the state in which dissipation begins, and the path's direction beyond it.
-
-        It is sought in the direction of the path up to a ``length``; None if nothing does.
-        """
+        """Find the state in which dissipation begins within a length; the direction beyond it."""
         way, q = self.direction, self.simulation.q
         self.begin()
         if self.dissipates or not self.dissipation(q + length * way.q) > 0:
@@ -236,8 +223,7 @@ class PathCorrector:
         """Solve for an equilibrium under a constraint, beginning so far along a direction.
 
         Closed openings that do not flow are held closed if they can be, see openings.py, unless
-        ``hold`` is false, as in a direction in which they open.  Without an equilibrium it raises
-        :class:`StepFailed`.
+        ``hold`` is false, as in a direction in which they open.
         """
         simulation = self.simulation
         self._constraint = constraint
@@ -300,8 +286,4 @@ class Control(ABC):
 
     @abstractmethod
     def solve_step(self, corrector: PathCorrector, part: float) -> Trial:
-        """Solve for the end of a step, or of a part of it.
-
-        Raises:
-            StepFailed: There is none.
-        """
+        """Solve for the end of a step, or of a part of it; :class:`StepFailed` if there is none."""

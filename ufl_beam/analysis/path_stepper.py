@@ -51,24 +51,13 @@ class Candidate(NamedTuple):
     way: Direction
 
     def passed(self, before: Candidate) -> bool:
-        """Return whether a critical point lies between ``before`` and this state.
-
-        An eigenvalue of the stiffness has passed zero there, or the load factor has turned.
-        """
+        """Return whether an eigenvalue passed zero, or the load factor turned, since ``before``."""
         turned = (self.way.t < 0) != (before.way.t < 0)
         return turned or self.stiffness.passed(before.stiffness)
 
 
 class PathStepper:
-    """Stepper of a path: it sets lengths of steps and locates critical points.
-
-    Args:
-        simulation: In statics, at the beginning of the path.
-        control: Of the lengths of steps.
-
-    Attributes:
-        critical: The critical points so far.
-    """
+    """Stepper of a path: it sets lengths of steps and locates critical points."""
 
     def __init__(self, simulation: Simulation, control: Control) -> None:
         self._corrector, self._control = PathCorrector(simulation, control.factor), control
@@ -79,11 +68,7 @@ class PathStepper:
         self._landed = False
 
     def begin(self, branch: Branch | None, *, fresh: bool) -> None:
-        """Find the direction in which the path begins; if it is fresh, its first equilibrium too.
-
-        Raises:
-            ConvergenceError: There is none.
-        """
+        """Find the direction in which the path begins; if fresh, its first equilibrium too."""
         corrector, simulation = self._corrector, self._corrector.simulation
         if branch is not None:
             corrector.direction = Direction(branch.mode[corrector.share.dofs], 0.0)
@@ -103,11 +88,7 @@ class PathStepper:
         return self._corrector.simulation.t + self._corrector.sought.t
 
     def advance(self) -> None:
-        """Take a step, a shorter one where it fails, only up to a critical point in it.
-
-        Raises:
-            ConvergenceError: Even the smallest part failed.
-        """
+        """Take a step, a shorter one where it fails, only up to a critical point in it."""
         simulation = self._corrector.simulation
         while True:
             iterations = simulation.iterations

@@ -29,19 +29,7 @@ SHORT_RUN = 0.1
 
 
 class RefinementRuns:
-    """Runs of a trade-off, see :func:`tradeoff`.
-
-    Args:
-        simulate: Function that runs the scene.
-        families: Coarsest dials to begin with.
-        newtons: Tolerances of Newton's method; runs have the first unless they say so.
-        most: Wall time that all runs together may take; s.
-
-    Attributes:
-        runs: Those that are done.
-        failed: Why runs failed.
-        spent: Wall time of all runs, and of compiling; s.
-    """
+    """Runs of a trade-off, see :func:`tradeoff`; they have the first of ``newtons`` by default."""
 
     def __init__(
         self,
@@ -64,11 +52,7 @@ class RefinementRuns:
         self._shapes: dict[str, tuple[int, ...]] = {}
 
     def begin(self, family: int) -> None:
-        """Compile and require comparable quantities, on every process.
-
-        Raises:
-            SceneError: The scene, its dials or a quantity are wrong.
-        """
+        """Compile and require comparable quantities, on every process."""
         seconds = 0.0
         with alone():
             for level in (0.0, 1.0):
@@ -90,10 +74,7 @@ class RefinementRuns:
     def run(self, refinements: Sequence[Refinement], *, short: float = SHORT_RUN) -> None:
         """Run what is missing, several at a time where there are processes.
 
-        Runs that take less than ``short`` seconds are done three times.
-
-        Raises:
-            TradeoffError: It would take more time than all runs may.
+        Runs that take less than ``short`` seconds are done three times; all may take ``most`` (s).
         """
         missing = [r for r in refinements if r not in self.runs and r not in self.failed]
         if not missing:

@@ -52,10 +52,7 @@ class Convergence:
     def of(
         cls, values: tuple[Array, Array, Array], finest: int, method: float, floor: float
     ) -> Convergence:
-        """Judge values on three levels up to the finest; changes up to ``floor`` do not count.
-
-        ``method`` is the order that the method has in theory.
-        """
+        """Judge values on three levels; ``method`` is the order in theory, ``floor`` negligible."""
         first, second = values[1] - values[0], values[2] - values[1]
         a, b = size(first), size(second)
         if max(a, b) <= floor:

@@ -197,11 +197,7 @@ class _Search:
         self._slower: list[float] = []
 
     def find(self, others: Sequence[_Found]) -> _Found | None:
-        """The setting; none if ``others`` are better.
-
-        Raises:
-            TradeoffError: Self-convergence is not seen, or no setting serves.
-        """
+        """Find the setting, none if ``others`` are better; TradeoffError if no setting serves."""
         base: Level = (0, 0)
         doubts: list[str] = []
         tried: list[_Found] = []

@@ -80,11 +80,6 @@ class LineData:
 
     Beams come first, node after node; behind them each line of a body or connector with two points
     of its own.  N is the force of a connector that acts along its line; V and M are zero there.
-
-    Attributes:
-        points: Undeformed; (n, 3); m.
-        cells: Both points of each line; (m, 2).
-        parts: 0 in beams, 1 in bodies, 2 in joints and connectors; (m,).
     """
 
     def __init__(self, simulation: RecordedState) -> None:
@@ -104,12 +99,7 @@ class LineData:
         self._pieces_of_cell, self._num_rods = grid.mesh.degree, len(rods)
 
     def fields(self, simulation: RecordedState) -> LineFields:
-        """Compute the fields of the present state; all processes call it together.
-
-        At points the displacement (m) and rotation (rad), in dynamics also the velocity (m/s) and
-        angular velocity (rad/s); in cells N, V (N), M (N m), and where anything yields or breaks
-        also the jump of the hinge (rad) and the dissipated energy (J).
-        """
+        """Compute the fields of the present state, see :class:`XDMF`; all processes call it."""
         q = simulation.share.gather(simulation.q)[self._nodes]
         arms = turned(self._arms, q[self._ends, 2]) if self._num_rods else self._arms
         displacement = np.insert(q[:, :2], 2, 0.0, axis=1)

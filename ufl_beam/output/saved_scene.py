@@ -73,11 +73,7 @@ def lost(owner: Any, field: str, function: Any) -> LostFunction:
 
 
 def to_data(value: Any, sampling: Sampling = lost) -> Data:
-    """Describe a scene, or another record, with a sampling of the functions of a user.
-
-    Raises:
-        SceneError: Something in it is neither a record of the package nor a function.
-    """
+    """Describe a scene, or another record, with a sampling of the functions of a user."""
     records: list[Data] = []
     # By identity; the objects are kept, so that none gets the identity of another.
     numbers: dict[int, tuple[int, Any]] = {}
@@ -130,16 +126,12 @@ def from_data(data: Data) -> Any:
         if not isinstance(data, dict):
             return data
         ((kind, content),) = data.items()
-        if kind == "fraction":
-            return Fraction(content)
-        if kind == "array":
-            return np.array(content)
-        if kind == "mapping":
-            return {make(key): make(value) for key, value in content}
-        if kind == "known":
-            return KNOWN[content]
-        return made[content]
+        return makers[kind](content)
 
+    makers: dict[str, Callable[[Any], Any]] = {
+        "fraction": Fraction, "array": np.array, "known": KNOWN.__getitem__,
+        "record": made.__getitem__, "mapping": lambda pairs: dict(map(make, pairs)),
+    }  # fmt: skip
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ModelWarning)
         for record in data["records"]:

@@ -47,22 +47,10 @@ class Complete(NamedTuple):
 
 
 class XdmfWriter:
-    """Writer of one time series.
+    """Writer of one time series; ``complete`` are its sizes after the last complete step.
 
-    Args:
-        path: The file; its numbers go to :func:`data_path`.
-        points: (n, 3); m.
-        cells: Both points of each line; (m, 2).
-        constant: Fields in cells that do not change, by name; (m,).
-        complete: Sizes of files that a writer of the same mesh wrote, to go on from there; what is
-            behind them is cut off.
-
-    Raises:
-        ValueError: The files are not those that were written up to there.
-        OSError: A file cannot be opened or written.
-
-    Attributes:
-        complete: Sizes after the last complete step.
+    Given, it goes on from there, and raises :class:`ValueError` if the files are not those that
+    were written up to there.  ``constant`` are fields in cells that do not change, (m,).
     """
 
     def __init__(

@@ -117,7 +117,7 @@ AROUND: dict[type, Glyph] = {
 
 
 def along(piece: Piece, a: Array, b: Array, sides: tuple[Array, float], body: float) -> Array:
-    """Compute points of a piece of a straight glyph from a to b (m); (n, 2); m.
+    """Compute points of a piece of a straight glyph from a to b; (n, 2); m.
 
     ``sides`` are the unit vector across and the length of 1 in it (m), ``body`` is the part of the
     way that the body of the glyph takes.
@@ -131,7 +131,7 @@ def along(piece: Piece, a: Array, b: Array, sides: tuple[Array, float], body: fl
 def around(piece: Piece, pin: Array, radius: float, angles: tuple[float, float]) -> Array:
     """Compute points of a piece of a glyph around a pin; (n, 2); m.
 
-    The ``radius`` is that of t = 0, three units of t (m); ``angles`` are those of s = -2 and 2.
+    The ``radius`` is that of t = 0, three units of t; ``angles`` are those of s = -2 and 2.
     """
     points = np.array(piece.points)
     # Steps of 5 degrees, such that what is straight between two points is bent.

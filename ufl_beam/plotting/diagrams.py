@@ -88,13 +88,10 @@ class Extreme(NamedTuple):
 def draw_diagrams(
     axes: Axes, solution: Solution, what: str, diagrams: Sequence[Sequence[Array]], points: Array
 ) -> list[Extreme]:
-    """Draw diagrams of a section force on the frame, to one scale.
+    """Draw diagrams of a section force on the frame, to one scale; return both extreme values.
 
     Each has the values at both ends of the cells of all beams, (num_cells, 2) each; N, N m; the
     nodes are at ``points``, (num_nodes, 2); m.
-
-    Returns:
-        The largest and the least value, for :func:`finish` to write.
     """
     index, side = list(RESULTANTS).index(what), -1.0 if what == "M" else 1.0
     beams = solution.scene.beams
@@ -132,8 +129,7 @@ def draw_diagrams(
 def _draw_areas(axes: Axes, ends: Array, values: Array, left: Array) -> None:
     """Draw the diagram of a beam: an area for each part of it with one sign.
 
-    The axis has ``ends`` of each cell (num_cells, 2, 2), where the values are (num_cells, 2); the
-    ordinate of the value one is ``left`` (num_cells, 2); m.
+    ``left`` is the ordinate of the value one, (num_cells, 2); the axis has ``ends`` of each cell.
     """
     # Parts of cells: points of the axis, values there, ordinate of the value one
     parts: list[tuple[Array, Array, Array]] = []
@@ -153,9 +149,6 @@ def _draw_areas(axes: Axes, ends: Array, values: Array, left: Array) -> None:
             outline = np.concatenate([axis[:1], tips, axis[:0:-1]])
             color = RED if sign > 0 else BLUE
             axes.fill(*outline.T, facecolor=(color, 0.28), edgecolor=color, linewidth=1.0, zorder=2)
-
-
-# -- words and sizes -------------------------------------------------------------------------------
 
 
 def finish(figure: Figure, axes: Axes, extremes: Sequence[Extreme] = ()) -> None:

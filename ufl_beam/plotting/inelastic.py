@@ -24,9 +24,6 @@ if TYPE_CHECKING:
 FULLY_OPEN = 0.99  # part of the fracture energy from which on a hinge is drawn as a joint
 
 
-# -- what users call ---------------------------------------------------------------------------
-
-
 def plot_moment_curvature(solution: Solution, place: Place) -> Figure:
     """Draw the moment M (N m) of a cell against its curvature K (1/m), coloured by time.
 
@@ -189,9 +186,6 @@ def plot_dissipation(solution: Solution) -> Figure:
     return figure
 
 
-# -- words and numbers -------------------------------------------------------------------------
-
-
 def _scientific(value: float) -> str:
     """A value with two digits and a power of ten: "3.1 × 10⁻¹²"."""
     digits, power = f"{value:.1e}".split("e")
@@ -218,9 +212,6 @@ def _monotone(x: Array) -> list[slice]:
     turns = moves[1:][np.diff(np.sign(steps[moves])) != 0]
     ends = [0, *(int(turn) for turn in turns), len(x) - 1]
     return [slice(a, b + 1) for a, b in pairwise(ends)]
-
-
-# -- drawing -----------------------------------------------------------------------------------
 
 
 def _prefix(axes: Axes, which: str, values: Array, quantity: str, unit: str) -> None:

@@ -55,11 +55,8 @@ def place(
 ) -> list[Placed]:
     """Place labels where they cover least; each again when all others have a place.
 
-    Args:
-        labels: With spots in points.
-        halves: Half the width and height of each; points.
-        lines: Segments that should stay visible; (n, 4); points.
-        frame: Lower left and upper right corner that labels should not leave; (4,); points.
+    Spots, half widths and heights, segments that should stay visible, (n, 4), and the corners of a
+    frame that labels should not leave, (4,), are all in points.
     """
     order = sorted(range(len(labels)), key=lambda k: labels[k].rank)
     placed: dict[int, Placed] = {}

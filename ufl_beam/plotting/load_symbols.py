@@ -141,10 +141,9 @@ def _(load: PointLoad | FollowerLoad, sizes: Sizes) -> Drawn:
 
 
 def _stand(place: Anchor, way: Array, part: float, sizes: Sizes) -> tuple[Array, Array]:
-    """Tail and tip of the arrow of a force at a place.
+    """Tail and tip of the arrow of a force: it ends at its place, or begins there.
 
-    It ends at the place, or begins there where it would lie on a beam otherwise; where it would lie
-    on beams in both cases, it is beside them.
+    It begins where it would lie on a beam else; where it would in both cases, it is beside it.
     """
     at, length = np.array(place.point), (2.6 + 1.4 * part) * sizes.unit
     if isinstance(place, Place):  # it stands out from a line load on the beam
@@ -234,10 +233,7 @@ def _(load: RotatingFrame) -> tuple[str, tuple[float, float] | float]:
 
 
 def prescribed_symbol(support: Support, inward: Array, sizes: Sizes) -> Drawn:
-    """Draw the motions that a support prescribes, with labels; hollow heads.
-
-    Its beam leaves the place in the direction ``inward``; (2,).
-    """
+    """Draw motions that a support prescribes, hollow; its beam goes ``inward``, a vector."""
     strokes, labels = [], []
     at, unit = np.array(support.place.point), sizes.unit
     cos, sin = math.cos(support.angle), math.sin(support.angle)

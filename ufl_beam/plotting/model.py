@@ -194,8 +194,7 @@ def _width_of_words(subject: Subject, notes: list[str], measure: Measure) -> flo
 def _plan(skeleton: Array, scale: float, box: Array, notes: int, words: float) -> Plan:
     """The largest scale at which everything fits, and the frame around it.
 
-    The ``box`` around everything (points) was found at a scale; above it are so many lines of
-    ``notes``, and words of a width (points).
+    The ``box`` around everything and the width of the ``words`` above it are in points.
     """
     low, high = skeleton.min(axis=0), skeleton.max(axis=0)
     # What stands out beyond the skeleton has a size in points.

@@ -170,9 +170,6 @@ class Pose:
         return np.asarray(points + self.stage.magnify * moved)
 
 
-# -- geometry -----------------------------------------------------------------------------------
-
-
 def _along(holder: Connector) -> tuple[float, float]:
     """Direction of a rail, whose holder holds across it."""
     return holder.axis[1], -holder.axis[0]

@@ -59,9 +59,6 @@ class Stroke(NamedTuple):
     layer: float = MIDDLE
 
 
-# -- words -------------------------------------------------------------------------------------
-
-
 def decimal_prefix(value: float) -> tuple[float, str]:
     """Find the power of 1000 that leaves 1 to 1000 of a value, and its prefix: (1000.0, "k")."""
     rounded = abs(float(f"{value:.3g}"))
@@ -85,9 +82,6 @@ def require_choice(choice: str, choices: Iterable[str], what: str) -> None:
     if choice not in choices:
         names = ", ".join(f'"{name}"' for name in choices)
         raise SceneError(f"{what} = {choice!r} is not one of {names}")
-
-
-# -- figures -----------------------------------------------------------------------------------
 
 
 @contextmanager
@@ -139,10 +133,7 @@ def color_cycle(count: int, colors: Iterable[str] = (BLUE, RED, GREEN, PINK, ORA
 
 
 def scale(name: str, first: float, last: float, low: float, high: float) -> Any:
-    """Make a part of a colour map of Matplotlib for values from ``low`` to ``high``.
-
-    The bright end of a colour map would not be seen on white.
-    """
+    """Make a colour map for values from low to high, without the end that is not seen on white."""
     import matplotlib as mpl
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import ListedColormap, Normalize

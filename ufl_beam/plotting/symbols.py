@@ -263,10 +263,7 @@ def support_symbol(support: Support) -> list[Outline]:
 
 
 def support_direction(support: Support, turned: float) -> float:
-    """Return the angle of the symbol of a support, away from its beam; rad.
-
-    A clamp follows the rotation of its place, by which it is ``turned`` (rad).
-    """
+    """Angle of the symbol of a support, away from its beam; a clamp is ``turned`` with it; rad."""
     inward = _inward(support.place)
     if len(support.held) == 3:
         return inward + turned - math.pi / 2
