@@ -32,8 +32,7 @@ from ufl_beam.parallel import active_comm
 from ufl_beam.simulation.initial_state import mesh_of
 from ufl_beam.simulation.solution import Solution
 
-AMPLITUDE = 0.1
-"""Largest displacement of what is shown of a mode, as a part of the size of the scene."""
+AMPLITUDE = 0.1  # largest displacement of a mode that is shown, as a part of the scene's size
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,26 +21,15 @@ ADVICE = (
 )
 
 SMALLEST_STEP_PART = 2.0**-12  # a step is cut down to this part of it
-
-TARGET_ITERATIONS = 12
-"""Steps of more Newton iterations are followed by shorter ones, of fewer by longer ones."""
-
-MOST_FAILURES = 4
-"""Steps that fail before the search for a critical point goes on from another state."""
-
+TARGET_ITERATIONS = 12  # steps of more are followed by shorter ones, of fewer by longer ones
+MOST_FAILURES = 4  # of steps, before a critical point is sought from another state
 LOCATION_TOLERANCE = 1e-7  # critical points are located to this part of a step
 MOST_LOCATION_STEPS = 60  # steps in which a critical point is sought
 LEAST_COSINE = 0.5  # cosine of the angle by which a step may leave the direction of its predictor
 LARGEST_LENGTH_RATIO = 10.0  # ratio by which a step may be longer than its predictor
-
-UNCHECKED_PART = 2.0**-6
-"""Part of a step from which on that is not asked, for a law may have a kink."""
-
-SAME_POINT_PART = 1e-3
-"""Part of a step within which a critical point is the one that the path has just reached."""
-
-SINGULAR_RATIO = 1e-3
-"""Part of its size at the ends of a step below which what vanishes at a critical point is zero."""
+UNCHECKED_PART = 2.0**-6  # part of a step up to which that is not asked: a law may have a kink
+SAME_POINT_PART = 1e-3  # within this part of a step a critical point is the one just reached
+SINGULAR_RATIO = 1e-3  # part of its size at the ends of a step below which what vanishes is zero
 
 
 class Candidate(NamedTuple):

@@ -24,8 +24,7 @@ from ufl_beam.solvers.newton_options import Newton
 
 Quantity = Callable[[Solution], npt.ArrayLike]
 
-SHORT_RUN = 0.1
-"""Runs below are done three times, and the median counts, unless others are asked for; s."""
+SHORT_RUN = 0.1  # runs below are done three times, and the median counts; s
 
 
 class RefinementRuns:

@@ -16,15 +16,9 @@ from ufl_beam.errors import SceneError, require_number
 
 STEPS_PER_LEVEL = 16  # choices of steps from one level of refinement to the next
 EXTRAPOLATED_LEVELS = 2  # levels beyond those that were run which a choice may ask for
-
-BUDGET_AIM, BUDGET_SLACK = 0.9, 0.2
-"""Part of a budget that is aimed at; part by which a run may fall short of it."""
-
+BUDGET_AIM, BUDGET_SLACK = 0.9, 0.2  # part that is aimed at; part that a run may fall short by
 LARGEST_ERROR = 0.3  # errors of this part of a quantity are none to recommend
-
-NEARLY_BEST = 2.0
-"""Where nothing is accurate enough, the cheapest with so many times the least error is next."""
-
+NEARLY_BEST = 2.0  # if nothing serves, the cheapest with so many times the least error is next
 NEGLIGIBLE = 0.1  # changes up to this part of a tolerance need not converge
 
 

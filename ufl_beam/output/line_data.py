@@ -17,9 +17,7 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.output.joint_histories import turned
 from ufl_beam.output.recorders import RecordedState
 
-LineFields = tuple[dict[str, Array], dict[str, Array]]
-"""Fields at points, (n,) or (n, 3), and in cells, (m,), by name."""
-
+LineFields = tuple[dict[str, Array], dict[str, Array]]  # at points, (n,) or (n, 3); in cells, (m,)
 BEAM, BODY, LINK = 0, 1, 2  # numbers of the parts of a scene in files
 
 

@@ -23,12 +23,8 @@ HEAD = (
     b'<?xml version="1.0"?>\n<Xdmf Version="3.0"><Domain>'
     b'<Grid Name="scene" GridType="Collection" CollectionType="Temporal">\n'
 )
-TAIL = b"</Grid></Domain></Xdmf>\n<?spare "
-"""End of the document; the steps to come are written into the instruction that it begins."""
-
-CLOSING = b"<?e?>"
-"""End of that instruction; one of its own once the instruction before has lost its end."""
-
+TAIL = b"</Grid></Domain></Xdmf>\n<?spare "  # steps to come are written into the instruction
+CLOSING = b"<?e?>"  # its end; an instruction of its own once the one before has lost its end
 PAGE, ROOM = mmap.PAGESIZE, 1 << 16
 
 

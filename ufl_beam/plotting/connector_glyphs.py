@@ -44,6 +44,7 @@ def _zigzag(teeth: int) -> list[tuple[float, float]]:
 
 
 _LEADS = [Piece([(-2.0, 0.0), (-0.8, 0.0)]), Piece([(0.8, 0.0), (2.0, 0.0)])]
+_BOXED = [*_LEADS, _box(-0.8, 0.8, 0.6, WHITE)]
 _PUSHED = [Piece([(-2.0, 0.0), (-0.8, 0.0)]), Piece([(0.35, 0.0), (2.0, 0.0)], weight=3.2)]
 _ARROW = [
     Piece([(-0.6, 0.0), (0.0, 0.0)], weight=2.2, inside=True),
@@ -51,6 +52,7 @@ _ARROW = [
 ]
 _CYLINDER = [*_PUSHED, _box(-0.8, 0.35, 0.6, WHITE)]
 
+# Along a line; what drives is orange, filled if its motion is given.
 STRAIGHT: dict[type, list[Piece]] = {
     laws.Spring: [Piece([(-2.0, 0.0), (-1.0, 0.0), *_zigzag(6), (1.0, 0.0), (2.0, 0.0)])],
     laws.Damper: [
@@ -73,26 +75,20 @@ STRAIGHT: dict[type, list[Piece]] = {
     laws.Motor: [*_PUSHED, _box(-0.8, 0.35, 0.6, ORANGE)],
     laws.Actuator: [*_CYLINDER, *_ARROW],
     laws.Controller: [
-        *_CYLINDER,
-        *_ARROW,
+        *(*_CYLINDER, *_ARROW),
         Piece([(0.9, 0.0), (0.9, 1.15), (-0.25, 1.15), (-0.25, 0.6)], weight=1.0),
     ],
     laws.ForceLaw: [
-        *_LEADS,
-        _box(-0.8, 0.8, 0.6, WHITE),
+        *_BOXED,
         Piece([(-0.55, -0.35), (-0.25, -0.27), (0.25, 0.27), (0.55, 0.35)], inside=True),
     ],
     laws.RigidPlastic: [  # nothing below a limit, flow at it
-        *_LEADS,
-        _box(-0.8, 0.8, 0.6, WHITE),
+        *_BOXED,
         Piece([(-0.55, -0.35), (0.0, -0.35), (0.0, 0.35), (0.55, 0.35)], inside=True),
     ],
 }
-"""Along a line; what drives is orange, filled if its motion is given."""
 
 CENTRE = -9.0  # the coordinate t of the pin
-
-
 _SPOKES = [Piece([(s, CENTRE), (s, 0.0)]) for s in (-2.0, 2.0)]
 
 
@@ -113,7 +109,6 @@ AROUND: dict[type, Glyph] = {
     laws.Actuator: _turning(WHITE),
     laws.Controller: _turning(WHITE, _box(-2.0, -1.4, 0.5, WHITE), tail=-1.4),
 }
-"""Around a pin."""
 
 
 def along(piece: Piece, a: Array, b: Array, sides: tuple[Array, float], body: float) -> Array:

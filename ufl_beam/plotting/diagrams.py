@@ -22,9 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.text import Annotation
 
-DRAWN_AS_ZERO = 1e-6
-"""Part of the largest value below which a value is drawn as zero and is not written."""
-
+DRAWN_AS_ZERO = 1e-6  # part of the largest value below which a value is drawn as zero
 LABEL_SIZE, TITLE_SIZE = 13.0, 14.0  # sizes of the texts and of the title; points
 
 AROUND, LEAST, MOST = (1.0, 1.2), (3.6, 2.6), (9.0, 6.8)

@@ -19,14 +19,11 @@ from ufl_beam.model.time_functions import TimeFunction, steady
 from ufl_beam.plotting.labels import Label, Spot
 from ufl_beam.plotting.style import FRONT, GREEN, RED, WHITE, Stroke, with_unit
 
-MOVED = "#A86E00"
-"""Colour of prescribed motions: the orange of what drives, dark enough for text."""
-
+MOVED = "#A86E00"  # of prescribed motions: the orange of what drives, dark enough for text
 LOADS, MOTIONS, CAPTIONS, NAMES = range(4)  # ranks of labels: those of loads are placed first
 HEAD, SHAFT = 0.85, 1.9  # length of the head of an arrow in units, and width of its line in points
 
 Spots = tuple[Spot, ...]
-
 Drawn = tuple[list[Stroke], list[Label]]  # strokes and labels of one object
 
 

@@ -29,13 +29,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WIDTH, HEIGHT = (5.5, 9.0), (3.0, 6.8)  # least and largest size of the figure; inch
-
-LEFT, RIGHT, BELOW, ABOVE, NOTE = 66.0, 14.0, 46.0, 34.0, 16.0
-"""Room for what is around the axes, and for a line of notes; points."""
-
+LEFT, RIGHT, BELOW, ABOVE, NOTE = 66.0, 14.0, 46.0, 34.0, 16.0  # room around axes; points
 LABEL_SIZE, TITLE_SIZE = 11.0, 14.0  # sizes of labels and of the title; points
 BADGE = 60.0  # room for the symbol of a load on the whole scene, and between two of them; points
-
 
 Measure = Callable[[str], Array]  # half of width and height of a text; (2,); points
 

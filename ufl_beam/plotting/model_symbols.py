@@ -24,9 +24,7 @@ from ufl_beam.plotting.scene_layout import Model, Pose
 from ufl_beam.plotting.style import GREY, INK, ORANGE, WHITE, Stroke
 from ufl_beam.plotting.symbols import Footing
 
-HINGE, TEXT = "#B0508A", "#444444"
-"""Colours of hinges, and of words that are no loads."""
-
+HINGE, TEXT = "#B0508A", "#444444"  # colours of hinges, and of words that are no loads
 MOST_LABELS, MOST_CELLS = 80, 300  # numbers beyond which names, and marks of cells, are left out
 
 SYMBOL, SHORT_BEAM, SMALLEST = 12.0, 45.0, 0.3

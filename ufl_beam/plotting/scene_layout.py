@@ -21,8 +21,7 @@ from ufl_beam.output.joint_histories import motion_of, turned
 from ufl_beam.output.line_data import spots_of
 from ufl_beam.simulation.solution import Solution
 
-Range = tuple[float, float]
-"""Least and largest position of a slider along its rail from its place, m; or guide parameter."""
+Range = tuple[float, float]  # of a slider along its rail from its place, m; or guide parameter
 
 
 class Setting(ABC):

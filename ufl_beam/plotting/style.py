@@ -28,25 +28,17 @@ BLUE, RED, GREEN, PINK, ORANGE, SKY = (
 )  # fmt: skip
 INK, GREY, WHITE = "#222222", "#B5B5B5", "#FFFFFF"
 
+# Layers: beneath the beams, over them, upon the areas there, and over the pins of joints
 BACK, MIDDLE, UPON, FRONT = 2.5, 4.2, 4.3, 5.5
-"""Layers: beneath the beams, over them, upon the areas there, and over the pins of joints."""
-
 RESULTANTS = {"N": ("axial force", "N"), "V": ("shear force", "N"), "M": ("bending moment", "N m")}
 
 POINTS = 72.0  # points of an inch
 
 STYLE = {
-    "font.size": 13.0,
-    "axes.titlesize": 14.0,
-    "axes.labelsize": 13.0,
-    "axes.edgecolor": "#888888",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "legend.frameon": False,
-    "legend.fontsize": 12.0,
-    "lines.linewidth": 2.0,
-    "lines.solid_capstyle": "round",
-}
+    "font.size": 13.0, "axes.titlesize": 14.0, "axes.labelsize": 13.0, "axes.edgecolor": "#888888",
+    "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False,
+    "legend.fontsize": 12.0, "lines.linewidth": 2.0, "lines.solid_capstyle": "round",
+}  # fmt: skip
 
 
 class Stroke(NamedTuple):

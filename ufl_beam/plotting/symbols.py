@@ -24,11 +24,8 @@ from ufl_beam.plotting.connector_glyphs import AROUND, STRAIGHT, Piece, along, a
 from ufl_beam.plotting.scene_layout import Pose
 from ufl_beam.plotting.style import BACK, FRONT, GREY, INK, MIDDLE, ORANGE, UPON, WHITE, Stroke
 
-FILLED, EDGE = "#D6E2ED", "#5F7A94"
-"""Colours of bodies."""
-
-STEEL, DARK, GROUND_GREY = "#6E6E6E", "#4A4A4A", "#808080"
-"""Colours of rails and guides, of rods, and of supports that stand still."""
+FILLED, EDGE = "#D6E2ED", "#5F7A94"  # colours of bodies
+STEEL, DARK, GROUND_GREY = "#6E6E6E", "#4A4A4A", "#808080"  # of rails, rods and still supports
 
 # Outlines of the symbols of supports; half a symbol is 1, the place is the origin, the beam comes
 # from above.

@@ -18,8 +18,7 @@ from ufl_beam.model.connector_laws import Controller, ForceLaw, Guide
 from ufl_beam.model.curves import Curve, nearest, parameter_step
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.archive import above, below, read
-from ufl_beam.output.saved_functions import SavedCurve, SavedFunction
-from ufl_beam.output.saved_scene import from_data, lost, to_data
+from ufl_beam.output.saved_scene import SavedCurve, SavedFunction, from_data, lost, to_data
 from ufl_beam.version import version
 
 T = TypeVar("T")
