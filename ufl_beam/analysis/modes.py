@@ -189,8 +189,7 @@ class Modes(Shapes):
     @property
     def omega(self) -> Array:
         """Natural circular frequencies |s|; (n,); rad/s."""
-        ω: Array = np.abs(self.exponents)
-        return ω
+        return np.asarray(np.abs(self.exponents))
 
     @property
     def frequencies(self) -> Array:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +10,6 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.model.bodies import GROUND, Anchor, Body, Spot, arm
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.joints import Joint
 from ufl_beam.model.loads import FollowerLoad, PointLoad
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.joint_histories import turned
@@ -32,20 +30,14 @@ class Rod(NamedTuple):
 
 def spots_of(scene: Scene) -> dict[Body, list[Spot]]:
     """Find the points of bodies and of the ground that something is attached to, each once."""
+    anchors = [place for joint in scene.joints for place in joint.places]
+    anchors += [place for connector in scene.connectors for place in (connector.a, connector.b)]
+    anchors += [x.place for x in scene.loads if isinstance(x, PointLoad | FollowerLoad)]
     found: dict[Body, dict[Spot, None]] = {body: {} for body in (*scene.bodies, GROUND)}
-    for anchor in _anchors(scene):
+    for anchor in anchors:
         if isinstance(anchor, Spot):
             found[anchor.body][anchor] = None
     return {body: list(spots) for body, spots in found.items()}
-
-
-def _anchors(scene: Scene) -> Iterator[Anchor]:
-    things: tuple[Joint | Connector, ...] = (*scene.joints, *scene.connectors)
-    for thing in things:
-        yield from thing.places if isinstance(thing, Joint) else (thing.a, thing.b)
-    for load in scene.loads:
-        if isinstance(load, PointLoad | FollowerLoad):
-            yield load.place
 
 
 def rods_of(scene: Scene) -> list[Rod]:

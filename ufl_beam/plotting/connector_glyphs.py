@@ -1,20 +1,22 @@
 # SPDX-License-Identifier: MIT
-"""Glyphs of springs, dampers, motors and other laws, along a line or around a pin.
+"""Glyphs and words for springs, dampers, motors and other laws of connectors.
 
-A glyph is drawn in coordinates (s, t): s runs along the connector, from -2 at its place a to 2 at
-its place b, its body from -1 to 1; t is across, half a symbol of a support being 1.
+A glyph, along a line or around a pin, is drawn in coordinates (s, t): s runs along the connector,
+from -2 at its place a to 2 at its place b, its body from -1 to 1; t is across, half a symbol of a
+support being 1.
 """
 
 from __future__ import annotations
 
 import math
+from functools import singledispatch
 from typing import NamedTuple
 
 import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.model import connector_laws as laws
-from ufl_beam.plotting.style import ORANGE, WHITE
+from ufl_beam.plotting.style import ORANGE, WHITE, with_unit
 
 
 class Piece(NamedTuple):
@@ -137,3 +139,45 @@ def around(piece: Piece, pin: Array, radius: float, angles: tuple[float, float])
     angle = np.interp(s, [-2.0, 2.0], angles)
     r = np.maximum(radius * (1.0 + t / 3.0), 0.18 * radius)
     return np.asarray(pin + r[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]))
+
+
+@singledispatch
+def law_in_words(law: laws.Law, turns: bool) -> str:
+    """Describe the law of a connector, which turns or not, and its size."""
+    return type(law).__name__.lower()
+
+
+@law_in_words.register
+def _(law: laws.Spring, turns: bool) -> str:
+    ends = [word for word, given in (("yields", law.law), ("breaks", law.softening)) if given]
+    return ", ".join([with_unit(law.stiffness, "N m/rad" if turns else "N/m"), *ends])
+
+
+@law_in_words.register
+def _(law: laws.Damper, turns: bool) -> str:
+    return with_unit(law.viscosity, "N m s/rad" if turns else "N s/m")
+
+
+@law_in_words.register
+def _(law: laws.Stop, turns: bool) -> str:
+    if math.isinf(law.low):
+        return f"stop ≤ {_motion_in_words(law.high, turns)}"
+    if math.isinf(law.high):
+        return f"stop ≥ {_motion_in_words(law.low, turns)}"
+    return "stop " + " … ".join(_motion_in_words(end, turns) for end in (law.low, law.high))
+
+
+def _motion_in_words(motion: float, turns: bool) -> str:
+    return f"{motion:.3g} rad".replace("-", "−") if turns else with_unit(motion, "m")
+
+
+@law_in_words.register
+def _(law: laws.Coulomb, turns: bool) -> str:
+    limit = [with_unit(law.force, "N m" if turns else "N")] if law.force else []
+    rate = [f"{law.coefficient:g}{' m' if turns else ''} × press"] if law.coefficient else []
+    return f"friction {' + '.join([*limit, *rate])}"
+
+
+@law_in_words.register
+def _(law: laws.RigidPlastic, turns: bool) -> str:
+    return f"rigid up to {with_unit(float(law.law.limit), 'N m' if turns else 'N')}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -31,10 +31,15 @@ class Setting(ABC):
     unit: float  # half the size of a symbol of a support; m
     magnify: float  # factor on the displacements
 
-    @property
-    @abstractmethod
-    def travels(self) -> Mapping[Connector, Range]:
+    @cached_property
+    def travels(self) -> dict[Connector, Range]:
         """Ranges of all that slides or is guided, since it was made, by its holder."""
+        joints = [j for j in self.scene.joints if j.look in ("Prismatic", "Guided")]
+        return {holder: self._travel(holder) for holder in (j.holders[0] for j in joints)}
+
+    @abstractmethod
+    def _travel(self, holder: Connector) -> Range:
+        """Range of what a connector holds on its rail or guide curve."""
 
     @property
     def undeformed(self) -> Pose:
@@ -77,12 +82,6 @@ class Setting(ABC):
                     offsets[connector] = 1.6 * (k - (len(group) - 1) / 2)
         return offsets
 
-    @property
-    def sliding(self) -> list[Connector]:
-        """Connectors that hold all that slides on a rail or a guide curve."""
-        kinds = ("Prismatic", "Guided")
-        return [j.holders[0] for j in self.scene.joints if j.look in kinds]
-
 
 class Model(Setting):
     """Scene before any run."""
@@ -90,12 +89,8 @@ class Model(Setting):
     def __init__(self, scene: Scene, unit: float) -> None:
         self.scene, self.unit, self.magnify = scene, unit, 1.0
 
-    @cached_property
-    def travels(self) -> dict[Connector, Range]:
-        """Rails as long as the slider, and some of the guide curves."""
-        return {holder: self._start(holder) for holder in self.sliding}
-
-    def _start(self, holder: Connector) -> Range:
+    def _travel(self, holder: Connector) -> Range:
+        """Rail as long as the slider, or some of the guide curve."""
         if isinstance(holder.law, Guide):
             more, size = 3.0 * self.unit, self.scene.size
             return _used(holder.law.curve, np.empty((0, 2)), (), more, size)
@@ -117,11 +112,6 @@ class Stage(Setting):
         """Return the pose at the n-th kept time."""
         grid, q = self._solution.grid, self._solution.q[n]
         return Pose(self, lambda anchor: np.asarray(motion_of(grid, anchor, [q])[0]))
-
-    @cached_property
-    def travels(self) -> dict[Connector, Range]:
-        """Range of motion of each sliding connector, see :attr:`Setting.travels`."""
-        return {holder: self._travel(holder) for holder in self.sliding}
 
     def _travel(self, holder: Connector) -> Range:
         points = self._solution.position(holder.b)

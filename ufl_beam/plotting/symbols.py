@@ -55,9 +55,6 @@ class Footing(NamedTuple):
     place: Anchor
 
 
-# -- bodies ------------------------------------------------------------------------------------
-
-
 def bodies(pose: Pose) -> list[Stroke]:
     """Draw outlines of the rigid bodies."""
     outlines = pose.stage.outlines.items()
@@ -74,9 +71,6 @@ def centres(pose: Pose) -> Iterator[Stroke]:
         for k, fill in enumerate((EDGE, WHITE, EDGE, WHITE)):
             angles = np.full(len(quarter), ψ + k * math.pi / 2)
             yield Stroke(at + turned(quarter, angles), EDGE, 1.0, fill)
-
-
-# -- joints ------------------------------------------------------------------------------------
 
 
 def rods(pose: Pose) -> Iterator[Stroke]:
@@ -108,9 +102,6 @@ def rails(pose: Pose) -> Iterator[Stroke]:
     for joint in pose.stage.scene.joints:
         if joint.look in _RAILS:
             yield from _RAILS[joint.look](pose, joint)
-
-
-# -- connectors --------------------------------------------------------------------------------
 
 
 def connectors(pose: Pose) -> Iterator[Stroke]:
@@ -156,9 +147,6 @@ def _around(pose: Pose, connector: Connector) -> Iterator[Stroke]:
         yield Stroke(np.array([start, pin]), GREY, 1.0)
 
 
-# -- supports ----------------------------------------------------------------------------------
-
-
 def footings(pose: Pose) -> Iterator[Footing]:
     """Draw supports, and points of the ground that hold something."""
     for support in pose.stage.scene.supports:
@@ -190,9 +178,6 @@ def _grounds(scene: Scene) -> dict[Spot, tuple[float, bool]]:
                 known, before = found.get(spot, (inward, True))
                 found[spot] = known, before and turns
     return found
-
-
-# -- rails, by kind of joint -------------------------------------------------------------------
 
 
 def _rail(pose: Pose, joint: Joint) -> Iterator[Stroke]:
@@ -250,9 +235,6 @@ _RAILS: dict[str, Callable[[Pose, Joint], Iterator[Stroke]]] = {
 }
 
 
-# -- directions --------------------------------------------------------------------------------
-
-
 def support_symbol(support: Support) -> list[Outline]:
     """Return outlines of the symbol of a support; half a symbol is 1, its place the origin."""
     held = 3 if len(support.held) == 3 else len({0, 1} & set(support.held))
@@ -286,9 +268,6 @@ def _towards(spot: Spot, other: Anchor) -> float:
     if (x, y) == (X, Y) and isinstance(other, Spot):
         X, Y = other.body.center
     return _inward(other) if (x, y) == (X, Y) else math.atan2(Y - y, X - x)
-
-
-# -- lines -------------------------------------------------------------------------------------
 
 
 def _inked(piece: Piece, points: Array) -> Stroke:
