@@ -169,12 +169,10 @@ def plot_dissipation(solution: Solution) -> Figure:
     start = held[0] > 1e-12 * energy.throughput
     with style.picture((8.0, 5.0)) as figure:
         axes = style.time_axes(figure.add_subplot())
-        # Blue is the energy in the scene.
-        colors = style.color_cycle(len(energy.lost), (ORANGE, RED, GREEN, PINK, SKY))
-        axes.stackplot(
-            t, *energy.lost.values(), labels=[f"lost: {name}" for name in energy.lost],
-            colors=[(color, 0.75) for color in colors],
-        )  # fmt: skip
+        # Blue is the energy in the scene; colours come again after the last.
+        colors = [(color, 0.75) for color in (ORANGE, RED, GREEN, PINK, SKY)]
+        labels = [f"lost: {name}" for name in energy.lost]
+        axes.stackplot(t, *energy.lost.values(), labels=labels, colors=colors)
         label = "at the start, and supplied" if start else "supplied"
         axes.plot(t, supplied, color=INK, label=label)
         axes.plot(t, held, color=BLUE, label="in the scene")

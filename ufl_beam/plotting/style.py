@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from itertools import cycle, islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
 BLUE, RED, GREEN, PINK, ORANGE, SKY = (
     "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9",
 )  # fmt: skip
+COLORS = (BLUE, RED, GREEN, PINK, ORANGE, SKY)  # of lines in one picture
 INK, GREY, WHITE = "#222222", "#B5B5B5", "#FFFFFF"
 
 # Layers: beneath the beams, over them, upon the areas there, and over the pins of joints
@@ -117,11 +117,6 @@ def time_axes(axes: Axes) -> Axes:
     axes.set_axisbelow(True)
     axes.tick_params(labelsize=12, color="#888888")
     return axes
-
-
-def color_cycle(count: int, colors: Iterable[str] = (BLUE, RED, GREEN, PINK, ORANGE, SKY)) -> Any:
-    """Iterate over so many colours, from the first again after the last."""
-    return islice(cycle(colors), count)
 
 
 def scale(name: str, first: float, last: float, low: float, high: float) -> Any:

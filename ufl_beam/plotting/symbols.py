@@ -7,7 +7,7 @@ Pictures of all kinds draw these, in the plane and solid.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -99,9 +99,10 @@ def pins(pose: Pose) -> Iterator[Pin]:
 
 def rails(pose: Pose) -> Iterator[Stroke]:
     """Draw rails, guide curves, and the blocks on them."""
+    draw = {"Prismatic": _rail, "Guided": _guide, "Release": _sleeve}
     for joint in pose.stage.scene.joints:
-        if joint.look in _RAILS:
-            yield from _RAILS[joint.look](pose, joint)
+        if joint.look in draw:
+            yield from draw[joint.look](pose, joint)
 
 
 def connectors(pose: Pose) -> Iterator[Stroke]:
@@ -226,13 +227,6 @@ def _sleeve(pose: Pose, joint: Joint) -> Iterator[Stroke]:
         if not joint.holders:
             across = at + unit * np.array([0.6 * held, -0.6 * held]) + side * 0.9 * unit * free
             yield Stroke(across, INK, 2.4, layer=FRONT)
-
-
-_RAILS: dict[str, Callable[[Pose, Joint], Iterator[Stroke]]] = {
-    "Prismatic": _rail,
-    "Guided": _guide,
-    "Release": _sleeve,
-}
 
 
 def support_symbol(support: Support) -> list[Outline]:
