@@ -10,7 +10,6 @@ import numpy as np
 
 from ufl_beam.analysis.critical_points import Branch, CriticalPoint, Direction, Stiffness
 from ufl_beam.analysis.path_corrector import Control, GivenLoadFactor, PathCorrector
-from ufl_beam.arrays import Array
 from ufl_beam.errors import StepFailed
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.step_cutting import Trial
@@ -116,7 +115,7 @@ class PathStepper:
             self._pass_kink(found, reached - 2 * LOCATION_TOLERANCE * part, part, limit)
             return
         # What yields or opens may change signs without an eigenvalue of zero.
-        λ, *ends = (abs(self._softest(one)[0]) for one in (found, before, after))
+        λ, *ends = (abs(one.stiffness.softest(self._weights)[0]) for one in (found, before, after))
         soft = limit or λ < SINGULAR_RATIO * max(ends)
         way = corrector.direction
         self._take(found)
@@ -202,7 +201,7 @@ class PathStepper:
         """Size of what vanishes at the critical point before ``after``."""
         if after.way.t * self._corrector.direction.t < 0:
             return self._slope
-        return lambda found: abs(self._softest(found)[0])
+        return lambda found: abs(found.stiffness.softest(self._weights)[0])
 
     def _slope(self, found: Candidate) -> float:
         """Change of the load factor along the path over that of the configuration.
@@ -223,9 +222,6 @@ class PathStepper:
         slope, *ends = (self._slope(one) for one in (found, before, after))
         return slope < SINGULAR_RATIO * max(ends)
 
-    def _softest(self, found: Candidate) -> tuple[float, Array]:
-        return found.stiffness.softest(self._weights)
-
     def _note(self, found: Candidate, before: Direction, n: int, limit: bool) -> None:
         """Remember the state as a critical point, the n-th of the path; ``found`` is beyond it."""
         corrector, simulation, way = self._corrector, self._corrector.simulation, found.way
@@ -233,7 +229,8 @@ class PathStepper:
             # At a limit point the path goes along the mode.
             mode = np.asarray(way.q / corrector.size(way), dtype=np.float64)
         else:
-            mode = np.asarray(self._softest(found)[1][corrector.share.dofs], dtype=np.float64)
+            critical = found.stiffness.softest(self._weights)[1]
+            mode = np.asarray(critical[corrector.share.dofs], dtype=np.float64)
             simulation.supports.leave(mode)
             # What the path goes along the mode is lost in a singular stiffness.
             strayed = Direction(way.q - before.q, 0.0)

@@ -52,17 +52,14 @@ def rods_of(scene: Scene) -> list[Rod]:
     for joint in scene.joints:
         if joint.look in ("RigidLink", "Link"):
             a, b = joint.places
-            rods.append(Rod(a, b, LINK, _pulls(joint.holders)))
+            pulls = next((c for c in joint.holders if c.stretches), None)
+            rods.append(Rod(a, b, LINK, pulls))
     rods += [
-        Rod(c.a, c.b, LINK, _pulls((c,)))
+        Rod(c.a, c.b, LINK, c if c.stretches else None)
         for c in scene.connectors
         if not c.turns and c.apart != (0.0, 0.0)
     ]
     return rods
-
-
-def _pulls(connectors: tuple[Connector, ...]) -> Connector | None:
-    return next((c for c in connectors if c.stretches), None)
 
 
 class LineData:

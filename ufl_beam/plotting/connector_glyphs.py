@@ -40,11 +40,7 @@ def _box(low: float, high: float, half: float, fill: str) -> Piece:
     return Piece([(low, half), (high, half), (high, -half), (low, -half), (low, half)], fill)
 
 
-def _zigzag(teeth: int) -> list[tuple[float, float]]:
-    s = np.linspace(-1.0, 1.0, 2 * teeth + 1)[1::2]
-    return [(float(x), 0.55 * (-1.0) ** k) for k, x in enumerate(s)]
-
-
+_TEETH = [(float(s), 0.55 * (-1.0) ** k) for k, s in enumerate(np.linspace(-1.0, 1.0, 13)[1::2])]
 _LEADS = [Piece([(-2.0, 0.0), (-0.8, 0.0)]), Piece([(0.8, 0.0), (2.0, 0.0)])]
 _BOXED = [*_LEADS, _box(-0.8, 0.8, 0.6, WHITE)]
 _PUSHED = [Piece([(-2.0, 0.0), (-0.8, 0.0)]), Piece([(0.35, 0.0), (2.0, 0.0)], weight=3.2)]
@@ -56,7 +52,7 @@ _CYLINDER = [*_PUSHED, _box(-0.8, 0.35, 0.6, WHITE)]
 
 # Along a line; what drives is orange, filled if its motion is given.
 STRAIGHT: dict[type, list[Piece]] = {
-    laws.Spring: [Piece([(-2.0, 0.0), (-1.0, 0.0), *_zigzag(6), (1.0, 0.0), (2.0, 0.0)])],
+    laws.Spring: [Piece([(-2.0, 0.0), (-1.0, 0.0), *_TEETH, (1.0, 0.0), (2.0, 0.0)])],
     laws.Damper: [
         Piece([(-2.0, 0.0), (-0.5, 0.0)]),
         Piece([(0.6, 0.6), (-0.5, 0.6), (-0.5, -0.6), (0.6, -0.6)]),

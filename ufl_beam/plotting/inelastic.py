@@ -19,6 +19,7 @@ from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 FULLY_OPEN = 0.99  # part of the fracture energy from which on a hinge is drawn as a joint
@@ -79,7 +80,7 @@ def plot_hinge(solution: Solution, place: Place) -> Figure:
         for part in _monotone(jump):
             axes.fill_between(jump[part], M[part], facecolor=(ORANGE, 0.3), linewidth=0.0, zorder=2)
         _draw_path(figure, axes, solution, jump, M)
-        _prefix(axes, "x", jump, "jump of rotation", "rad")
+        _prefix(axes.xaxis, jump, "jump of rotation", "rad")
         spent = f"{with_unit(lost, 'J')} dissipated"
         if math.isfinite(law.energy):
             spent += f", {100 * lost / law.energy:.3g} % of {with_unit(law.energy, 'J')}"
@@ -176,7 +177,7 @@ def plot_dissipation(solution: Solution) -> Figure:
         label = "at the start, and supplied" if start else "supplied"
         axes.plot(t, supplied, color=INK, label=label)
         axes.plot(t, held, color=BLUE, label="in the scene")
-        _prefix(axes, "y", np.concatenate([supplied, held]), "energy", "J")
+        _prefix(axes.yaxis, np.concatenate([supplied, held]), "energy", "J")
         axes.set_xlabel(solution.parameter.progress)
         worst, through = _scientific(energy.worst), with_unit(energy.throughput, "J")
         axes.set_title(f"worst imbalance {worst} of {through} throughput", loc="left", color=INK)
@@ -212,10 +213,9 @@ def _monotone(x: Array) -> list[slice]:
     return [slice(a, b + 1) for a, b in pairwise(ends)]
 
 
-def _prefix(axes: Axes, which: str, values: Array, quantity: str, unit: str) -> None:
+def _prefix(axis: Axis, values: Array, quantity: str, unit: str) -> None:
     """Label an axis in a unit that suits the values; the data stay in SI units."""
     factor, prefix = style.decimal_prefix(float(np.max(np.abs(values))))
-    axis = axes.xaxis if which == "x" else axes.yaxis
     axis.set_major_formatter(lambda x, _: f"{x / factor:.6g}".replace("-", "−"))
     axis.set_label_text(f"{quantity} ({prefix}{unit})")
 
@@ -240,7 +240,7 @@ def _draw_path(figure: Figure, axes: Axes, solution: Solution, x: Array, M: Arra
         axes.plot(*path[i], "o", mfc=inside, label=named.at(solution.times[i]), **ring)
     axes.autoscale_view()
     axes.tick_params(labelsize=12, color="#888888")
-    _prefix(axes, "y", M, "bending moment M", "N m")
+    _prefix(axes.yaxis, M, "bending moment M", "N m")
     style.draw_bar(figure, axes, colors, named.progress)
     figure.legend(loc="outside upper left", ncols=2)
 

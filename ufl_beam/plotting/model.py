@@ -120,9 +120,6 @@ def plot_model(scene: Scene) -> Figure:
     return figure
 
 
-# -- words -------------------------------------------------------------------------------------
-
-
 def _title(subject: Subject) -> str:
     beams, bodies = subject.scene.beams, subject.scene.bodies
     parts = [_counted(len(beams), "beam"), _counted(subject.cells, "cell")] if beams else []
@@ -162,9 +159,6 @@ def notes_of(scene: Scene) -> list[str]:
         limits = sorted({with_unit(law.limit, "N m") for law in laws})
         notes.append(f"dots: hinges may form, from {', '.join(limits[:4])}")
     return notes
-
-
-# -- where it is drawn -------------------------------------------------------------------------
 
 
 def _skeleton(subject: Subject) -> Array:
@@ -228,9 +222,6 @@ def _plan(skeleton: Array, scale: float, box: Array, notes: int, words: float) -
     frame += np.concatenate([-more, more])
     width, height = (frame[2:] - frame[:2] + around_axes) / POINTS
     return Plan(scale, frame, (float(width), float(height)))
-
-
-# -- Matplotlib --------------------------------------------------------------------------------
 
 
 def _axes(figure: Figure, plan: Plan, title: str, notes: list[str]) -> Axes:

@@ -153,7 +153,8 @@ def footings(pose: Pose) -> Iterator[Footing]:
     for support in pose.stage.scene.supports:
         angle = support_direction(support, pose.turn(support.place))
         color = ORANGE if support.moving else GROUND_GREY
-        symbol = support_symbol(support)
+        held = 3 if len(support.held) == 3 else len({0, 1} & set(support.held))
+        symbol = [[_DIAMOND], [_TRIANGLE, _TRACK], [_TRIANGLE, _PLATE], [_CLAMP]][held]
         yield Footing(pose.at(support.place), angle, symbol, color, support.place)
     for spot, (inward, turns) in _grounds(pose.stage.scene).items():
         symbol = [_TRIANGLE, _PLATE] if turns else [_CLAMP]
@@ -227,12 +228,6 @@ def _sleeve(pose: Pose, joint: Joint) -> Iterator[Stroke]:
         if not joint.holders:
             across = at + unit * np.array([0.6 * held, -0.6 * held]) + side * 0.9 * unit * free
             yield Stroke(across, INK, 2.4, layer=FRONT)
-
-
-def support_symbol(support: Support) -> list[Outline]:
-    """Return outlines of the symbol of a support; half a symbol is 1, its place the origin."""
-    held = 3 if len(support.held) == 3 else len({0, 1} & set(support.held))
-    return [[_DIAMOND], [_TRIANGLE, _TRACK], [_TRIANGLE, _PLATE], [_CLAMP]][held]
 
 
 def support_direction(support: Support, turned: float) -> float:
