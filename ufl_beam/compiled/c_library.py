@@ -34,11 +34,7 @@ extern "Python" double missed_in_python(void *self, const double *q, const doubl
 
 _SOURCE = "\n".join([HEADERS, DECLARATIONS, *(text(f"{name}.c") for name in SOURCES)])
 module = compiled(
-    "ufl_beam_loops",
-    DECLARATIONS + _CALLBACKS,
-    lambda: _SOURCE,
-    made_of=[_SOURCE],
-    flags=["-O3"],
+    "ufl_beam_loops", DECLARATIONS + _CALLBACKS, lambda: _SOURCE, made_of=[_SOURCE], flags=["-O3"]
 )
 ffi: Any = module.ffi
 lib: Any = module.lib

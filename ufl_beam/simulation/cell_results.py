@@ -14,12 +14,7 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Product
 from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.discretization.function_spaces import (
-    Fields,
-    SectionForces,
-    Strains,
-    mass_matrix,
-)
+from ufl_beam.discretization.function_spaces import Fields, SectionForces, Strains, mass_matrix
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import Place

@@ -123,11 +123,7 @@ class Keeper:
     """
 
     def __init__(
-        self,
-        choice: Checkpoint,
-        call: Mapping[str, Any],
-        step: float | None,
-        comm: MPI.Intracomm,
+        self, choice: Checkpoint, call: Mapping[str, Any], step: float | None, comm: MPI.Intracomm
     ) -> None:
         self._choice, self._call, self._comm = choice, call, comm
         self.path = Path(choice.path)

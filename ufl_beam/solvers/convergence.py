@@ -36,13 +36,7 @@ class Convergence:
     """
 
     def __init__(
-        self,
-        share: Share,
-        equation: Equation,
-        x: Array,
-        r: Array,
-        newton: Newton,
-        least: int,
+        self, share: Share, equation: Equation, x: Array, r: Array, newton: Newton, least: int
     ) -> None:
         self._share, self._A, self._parallel = share, equation.A, not share.alone
         self._x, self._r = x, r

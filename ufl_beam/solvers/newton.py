@@ -44,12 +44,7 @@ class Solver:
     """
 
     def __init__(
-        self,
-        share: Share,
-        equation: Equation,
-        newton: Newton,
-        least: int,
-        agreement: Agreement,
+        self, share: Share, equation: Equation, newton: Newton, least: int, agreement: Agreement
     ) -> None:
         self._share, self._equation, self._newton = share, equation, newton
         self._agreement, self._vectors = agreement, Vectors(share)
