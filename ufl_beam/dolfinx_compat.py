@@ -84,11 +84,7 @@ TABULATE = (
 
 
 def jit_directory() -> Path:
-    """Return the directory in which DOLFINx keeps compiled forms.
-
-    Raises:
-        RuntimeError: The options of DOLFINx cannot be read.
-    """
+    """Return the directory in which DOLFINx keeps compiled forms."""
     return Path(_jit_options()["cache_dir"])
 
 
@@ -129,12 +125,7 @@ def pack(form: fem.Form) -> tuple[Array, Array]:
 
 
 def line_mesh(points: Array, cells: npt.NDArray[np.int64]) -> mesh.Mesh:
-    """Make a mesh of straight cells in the plane, on this process alone.
-
-    Args:
-        points: Vertices; shape (num_points, 2); m.
-        cells: Vertices of each cell; shape (num_cells, 2).
-    """
+    """Make a mesh of straight cells in the plane, on this process alone; points (n, 2) in m."""
     line = ufl.Mesh(basix.ufl.element("Lagrange", "interval", 1, shape=(2,)))
     more = {} if VERSION < (0, 10) else {"max_facet_to_cell_links": 2}
     return mesh.create_mesh(MPI.COMM_SELF, cells=cells, x=points, e=line, **more)

@@ -90,10 +90,6 @@ def compiled(
         made_of: Texts that the C, and the effect of the flags, depend on.
         flags: For the compiler.
         check: Called with the module once it has been compiled; may raise :class:`Refused`.
-
-    Raises:
-        CompilerError: The compiler is missing, or refuses.
-        Refused: As by ``source`` or ``check``, now or when the module was made.
     """
     flags = [*flags, "-fvisibility=hidden", *EXTRA]
     name = f"{stem}_{_digest(declarations, *made_of, *flags, sys.version)}"
@@ -144,14 +140,7 @@ def _imported(name: str, directory: Path) -> ModuleType:
 
 
 def compiled_form(form: ufl.Form) -> tuple[fem.Form, Path]:
-    """Load a form, compiled first if it is not in the cache.
-
-    Returns:
-        The form, and the C that FFCx wrote for it.
-
-    Raises:
-        CompilerError: The compiler is missing, or refuses.
-    """
+    """Load a form, compiled first if it is not in the cache; and the C that FFCx wrote for it."""
 
     def build(directory: Path) -> fem.Form:
         with _explained("a form"):

@@ -21,17 +21,10 @@ from ufl_beam.model.mesh_options import Mesh
 class BeamMesh:
     """Base of :class:`Grid`: vertices and cells of all beams.
 
-    Cells of a higher degree have nodes between their vertices, too.
-
-    Args:
-        beams: The beams.
-        attached: Parameters of the places of each that must be vertices.
-        hinges: Places of the plastic hinges.
-        mesh: How finely.
-        size: Of the scene; m.
+    ``attached`` are the parameters of the places of each beam that must be vertices.  Cells of a
+    higher degree have nodes between their vertices, too.
 
     Attributes:
-        beams, mesh: As given.
         points: Nodes of all beams: the vertices, beam after beam, those inside of cells, and the
             second vertex of each plastic hinge; shape (num_nodes, 2); m.
         cells: Vertices of the cells; shape (num_cells, 2).
@@ -136,11 +129,7 @@ class BeamMesh:
         return np.arange(self._first[i] - i, self._first[i + 1] - i - 1)
 
     def weights(self, place: Place) -> tuple[Index, Array]:
-        """Nodes of the cell at a place, the vertices first, and their weights there; (degree + 1,).
-
-        Raises:
-            SceneError: The beam of the place is not in the scene.
-        """
+        """Nodes of the cell at a place, vertices first, and their weights there; (degree + 1,)."""
         cell, part = self._cell_and_part(place)
         first, *between, last = self.mesh.weights(part)
         nodes = self.nodes_of_cells[cell].copy()

@@ -29,12 +29,7 @@ from ufl_beam.dolfinx_compat import VERSIONS, fem, line_mesh, pack
 
 
 def vectorise(kernels: Sequence[Kernel], coordinates: Array) -> None:
-    """Switch kernels to SIMD, all of them or none: they may share numbers.
-
-    Args:
-        kernels: On the same cells.
-        coordinates: Of the cells, in batches of ``LANES``.
-    """
+    """Switch kernels on the same cells to SIMD, all or none: they may share numbers."""
     addresses = [kernel.address_in_lanes() for kernel in kernels]
     if None not in addresses:
         for one, address in zip(kernels, addresses, strict=True):
@@ -60,12 +55,8 @@ class Prepared(NamedTuple):
     """A form compiled for all scenes.
 
     Attributes:
-        form: The DOLFINx form.
         source: The C that FFCx wrote for it.
-        tabulate: Its kernel.
-        coefficients: Its coefficients.
-        columns: Place of the values of each, by identity, in the row of numbers of a cell.
-        constants: Values of its constants.
+        columns: Place of the values of each coefficient, by identity, in the numbers of a cell.
         packed: Values of the coefficients in the cells that the form was stated on.
         entries: Number of entries of the vector or matrix of a cell.
     """
@@ -82,11 +73,7 @@ class Prepared(NamedTuple):
 
 @lru_cache(maxsize=512)
 def prepared(form: ufl.Form) -> Prepared:
-    """Compile a form, once in a process.
-
-    Raises:
-        ValueError: Its cells have more entries than C has room for, or others than FFCx packs.
-    """
+    """Compile a form, once in a process."""
     compiled, source = compiled_form(form)
     ufcx, (constants, packed) = compiled.ufcx_form, pack(compiled)
     positions = ufcx.original_coefficient_positions[0 : ufcx.num_coefficients]
@@ -130,9 +117,6 @@ class Kernel:
     Attributes:
         cells: Argument of ``add_cells`` of loops.c; a new one after :meth:`share`, :meth:`place`,
             :meth:`compute_in_lanes`.
-
-    Raises:
-        ValueError: The arrays are of other cells than each other, or than the form.
     """
 
     def __init__(
@@ -201,11 +185,7 @@ class Kernel:
         self._prepare()
 
     def place(self, A: Entries) -> None:
-        """Let a bilinear form on the degrees of freedom of the cells add to ``A``.
-
-        Raises:
-            ValueError: It has other entries.
-        """
+        """Let a bilinear form on the degrees of freedom of the cells add to ``A``."""
         per_cell = self._dofs.shape[1]
         if self._entries != per_cell**2:
             raise ValueError(f"a form of {self._entries} entries on {per_cell} degrees of freedom")
@@ -244,15 +224,9 @@ class Kernel:
 
 
 class Pointwise:
-    """Compiler of functions from the numbers of a point to other numbers.
+    """Compiler of functions from the numbers of a point, named ``inputs``, to other numbers.
 
     A form on a cell of unit length with one quadrature point is such a function.
-
-    Args:
-        inputs: Names of the numbers that functions depend on, in the order of their storage.
-
-    Attributes:
-        at: UFL symbols of the inputs, by name.
     """
 
     def __init__(self, inputs: Sequence[str]) -> None:

@@ -221,13 +221,9 @@ def _outside(point: Array, points: Array) -> float:
 
 
 def warn_of_jumps(grid: Grid, t: float, q: Array, motions: Array) -> None:
-    """Warn of prescribed motions that are not where the motion begins; in dynamics.
+    """Warn of prescribed motions that do not begin where the scene is, ``q`` at ``t``; in dynamics.
 
-    Args:
-        grid: The scene.
-        t: Time of the beginning; s.
-        q: Configuration there, all degrees of freedom.
-        motions: Relative motions of the connectors there; (num_links,).
+    ``motions`` are the relative motions of the connectors there; (num_links,).
     """
     size = grid.scene.size
     for support in grid.scene.supports:

@@ -168,7 +168,7 @@ class Share:
         return self.grid.lengths(self.cells)
 
     def lengths(self) -> Array:
-        """Change of each local degree of freedom by a strain of one: a cell's length, or a radian.
+        """Change of each local dof by a strain of one: a cell's length, or a radian.
 
         Bodies are as large as the scene; forces of connectors have no length.
         """

@@ -38,10 +38,7 @@ class Memory(Protocol):
         """Values at the local degrees of freedom whose sums over the processes mean something."""
 
     def rows(self, name: str, numbers: Index, rows: Array) -> Array:
-        """Rows of numbered things, such as cells, each of which is on one process only.
-
-        Those of one name may have different lengths, as laws remember more or less.
-        """
+        """Rows of numbered things, each on one process only; of any lengths under one name."""
 
 
 class Part(Protocol):

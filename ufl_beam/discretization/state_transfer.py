@@ -28,13 +28,6 @@ class Transfer:
     Nodes of beams and bodies are the same if their records are, connectors if they join the same
     points by laws of one kind.  Where a joint was removed, both places begin where the joint was;
     where one was added, its places must be together.
-
-    Args:
-        old: Scene that the state is of.
-        new: Scene that begins with it.
-
-    Raises:
-        SceneError: The scenes have other beams or vertices, or the new one has another body.
     """
 
     def __init__(self, old: Grid, new: Grid) -> None:
@@ -90,20 +83,12 @@ class Transfer:
         return found
 
     def state(self, q: Array) -> Array:
-        """Configuration in the numbering of the new scene.
-
-        Raises:
-            SceneError: Places that a new joint joins are apart.
-        """
+        """Configuration in the new numbering; places that a new joint joins must be together."""
         size = self._new.scene.size
         return self._map(q, lambda c: APART * (size if c < 2 else 1.0), ("m", "rad"), "are")
 
     def velocity(self, v: Array) -> Array:
-        """Velocities in the numbering of the new scene.
-
-        Raises:
-            SceneError: Places that a new joint joins have different velocities.
-        """
+        """Velocities in the new numbering; places that a new joint joins must have the same."""
         fastest = float(np.abs(v).max(initial=0.0)) * max(self._new.scene.size, 1.0)
         return self._map(v, lambda c: APART * fastest, ("m/s", "rad/s"), "move")
 

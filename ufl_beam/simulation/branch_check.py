@@ -26,16 +26,9 @@ KINK = 1e-6
 
 
 class StaticPath:
-    """Checks of a static step before it is accepted.
+    """Checks of a static step before it is accepted, from the state in which the path begins.
 
-    Args:
-        share: The degrees of freedom of this process.
-        scheme: A static scheme; its ``slack`` says how much may stay unexplained.
-        beams: What stores and dissipates.
-        couplings: Connectors, which may store, dissipate, supply.
-        ledger: Energies before the step.
-        q: Configuration at the beginning.
-        t0: Time at the beginning; s.
+    The ``slack`` of the scheme says how much work may stay unexplained.
     """
 
     def __init__(
@@ -71,16 +64,9 @@ class StaticPath:
         self._before = memory.added("internal forces", self._before)
 
     def require(self, q1: Array, s: Array, force: Array, least_work: float) -> None:
-        """Raise unless the step was followed.
+        """Raise :class:`StepFailed` unless the step ``s`` of the nodes to ``q1`` was followed.
 
-        Args:
-            q1: Its end.
-            s: Its step of the nodes.
-            force: Internal forces in it.
-            least_work: Work that round-off makes; J.
-
-        Raises:
-            StepFailed: It was not.
+        ``force`` are the internal forces in it; round-off makes the work ``least_work``; J.
         """
         self._require_near(s)
         if math.isfinite(self._scheme.slack):

@@ -71,11 +71,7 @@ class CellResults:
         return strains
 
     def material(self, n: int, cells: Index | int) -> Material:
-        """State of the material of some cells.
-
-        Raises:
-            SceneError: The scene is elastic.
-        """
+        """State of the material of some cells."""
         if not self._kept[n].material and not self._grid.scene.hinges:
             raise SceneError("material: nothing in the scene yields or breaks; it is elastic")
         everything = np.zeros((len(self._grid.cells), 6))
@@ -97,11 +93,7 @@ class CellResults:
         return Material(*map(np.array, zip(*kept, strict=True)))
 
     def momentum(self) -> Array:
-        """(p_x, p_y, L) at all kept times, L about the origin; (n+1, 3); N s, N s, N m s.
-
-        Raises:
-            SceneError: The run was static.
-        """
+        """(p_x, p_y, L) at all kept times, L about the origin; (n+1, 3); N s, N s, N m s."""
         if not self._kept.v:
             raise SceneError("momentum: the run was static; there is none")
         times, grid = Product(mass_matrix(self._fields)), self._grid

@@ -105,21 +105,13 @@ class Running(Protocol):
 
 
 class Keeper:
-    """The checkpoint of one run.
+    """The checkpoint of one run; its file is locked until :meth:`close`.
 
     Args:
         choice: What the user asks for.
         call: What the run is, by name.
         step: Size of its steps if they are equal; then the run may have another end.
         comm: Processes of the run.
-
-    Raises:
-        SceneError: Another run writes the file, or it is damaged, or of another run, or cannot be
-            written.
-
-    Attributes:
-        path: The file; locked until :meth:`close`.
-        found: What it has; empty if there is none.
     """
 
     def __init__(
@@ -192,11 +184,7 @@ class Keeper:
         self._lock.release()
 
     def resume(self, simulation: Running, pace: Pace, t1: float) -> Iterator[Content]:
-        """Take over what the file has, then give what it has of each recorder.
-
-        Raises:
-            SceneError: The run is beyond ``t1``.
-        """
+        """Take over what the file has, then give what it has of each recorder."""
         found = self.found
         state = below("state/", found)
         t = float(state["t"][0])
@@ -219,12 +207,7 @@ class Keeper:
     # -- writing -------------------------------------------------------------------------------
 
     def note(self, simulation: Running, pace: Pace, recorders: Sequence[Recorder]) -> None:
-        """Write if it is time to; all processes call it together after each step.
-
-        Raises:
-            SceneError: A function of the scene remembers something that it does not tell.
-            OSError: The file cannot be written; the one before is still there.
-        """
+        """Write if it is time to; all processes call it together after each step."""
         if self._last_step < 0:  # better now than after an hour
             self._require_told()
             self._last_step = 0

@@ -41,13 +41,7 @@ def mesh_of(start: Start | None, mesh: Mesh | None) -> Mesh:
 
 
 class InitialState(NamedTuple):
-    """State that a run begins with, in the numbering of its grid.
-
-    Attributes:
-        q: Configuration at all degrees of freedom.
-        v: Velocities at all degrees of freedom.
-        internal: Internal variables of cells and connectors; empty at the beginning.
-    """
+    """State that a run begins with, in the numbering of its grid; ``internal`` may be empty."""
 
     q: Array
     v: Array
@@ -55,11 +49,7 @@ class InitialState(NamedTuple):
 
 
 def initial_state(grid: Grid, start: Start | None) -> InitialState:
-    """Find the state that a run begins with, before anything is built.
-
-    Raises:
-        SceneError: The solution is of a scene whose state cannot be taken over.
-    """
+    """Find the state that a run begins with, before anything is built."""
     v = _initial_velocity(grid)
     if start is None:
         return InitialState(np.zeros(grid.size), v, {})

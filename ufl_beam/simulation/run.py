@@ -179,10 +179,7 @@ def simulate(
 
 @contextmanager
 def partial_results(simulation: Simulation) -> Iterator[None]:
-    """Let what is raised in this context carry the solution so far, ``error.solution``.
-
-    Whatever stops a run, an interrupt or a user's function, what was reached is not lost.
-    """
+    """Let whatever stops a run in this context carry the solution so far, ``error.solution``."""
     try:
         yield
     except BaseException as error:

@@ -25,14 +25,7 @@ from ufl_beam.model.scene import Scene
 
 
 def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh) -> Grid:
-    """Make the grid of a scene that the scheme can compute.
-
-    Raises:
-        SceneError: It cannot; the message names what is wrong.
-
-    Warns:
-        ModelWarning: Something in the scene may not be meant.
-    """
+    """Make the grid of a scene, once the scheme is known to be able to compute it."""
     require_kind(scene, Scene, "scene")
     if not isinstance(scheme, Scheme) or isinstance(scheme, type):
         raise SceneError(

@@ -19,11 +19,6 @@ class Bordered:
 
     By elimination of the border: one factorisation and two solutions, as the tangent alone is
     banded.  Where that is nearly singular, the next iteration makes up for the lost digits.
-
-    Args:
-        factors: An exact preconditioner of the tangent.
-        rate: The derivative by the unknown.
-        correct: See :class:`Border`; of vectors.
     """
 
     def __init__(

@@ -26,11 +26,7 @@ from ufl_beam.terms.supports import Supports
 class CEquation:
     """The equation of a step in C, on one process and with no support at an angle.
 
-    Args:
-        python: The same equation, for what C does not do.
-        beams, couplings: Terms whose forces are internal forces.
-        others: The other terms.
-        supports: What holds; none at an angle.
+    The same in ``python`` does what C does not; forces of beams and couplings are internal forces.
     """
 
     def __init__(

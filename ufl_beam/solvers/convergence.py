@@ -28,12 +28,7 @@ REASONS = {
 
 
 class Convergence:
-    """Sizes of residuals and motions, and the decision to go on or to stop.
-
-    Attributes:
-        c: Data in C, see :func:`judge` of newton.c.
-        diagonal: Positions of the diagonal in the data of the tangent.
-    """
+    """Sizes of residuals and motions, and the decision to stop; ``c``: ``judge`` of newton.c."""
 
     def __init__(
         self, share: Share, equation: Equation, x: Array, r: Array, newton: Newton, least: int

@@ -60,13 +60,9 @@ class Equation(Protocol):
         """Fill the matrix with the derivative at ``x``."""
 
     def missed(self, x: Array, r: Array, scale: float, moved: float) -> float:
-        """Return how far the laws of connectors are missed, without dimension.
+        """Return how far the laws of connectors are missed by ``x`` with residual ``r``, relative.
 
-        Args:
-            x: Iterate.
-            r: Its residual.
-            scale: Size of the forces in the scene; N.
-            moved: Largest motion; m.
+        ``scale`` is the size of the forces in the scene (N), ``moved`` the largest motion (m).
         """
 
     def stiffen(self, stiff: bool) -> bool:
@@ -107,11 +103,7 @@ class PythonEquation(Equation):
 
 
 class Border(Protocol):
-    """Additional unknown on which the residual depends, with its equation.
-
-    Attributes:
-        t: The unknown.
-    """
+    """Additional unknown ``t`` on which the residual depends, with its equation."""
 
     t: float
 
@@ -124,9 +116,8 @@ class Border(Protocol):
     def correct(self, y: Array, z: Array) -> None:
         """Change the unknown by what solves the equation, and ``y`` accordingly.
 
-        Args:
-            y: What Newton's method subtracts from the iterate if the unknown does not change.
-            z: What the inverse of the tangent makes of the rate.
+        Newton's method subtracts ``y`` from the iterate; ``z`` is what the inverse of the tangent
+        makes of the rate.
         """
 
     def met(self) -> bool:
@@ -137,13 +128,7 @@ class Border(Protocol):
 
 
 class InPython:
-    """A part of a residual or tangent that Python computes.
-
-    Args:
-        add: Adds to its second argument what the part is at the first.
-        size: Number of unknowns, and of what is added to.
-        failed: Told of exceptions, which cannot pass through C.
-    """
+    """A part of a residual or tangent at its first argument that Python adds to its second."""
 
     def __init__(
         self,

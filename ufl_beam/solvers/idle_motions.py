@@ -30,17 +30,7 @@ DRIVEN = 1e-6
 
 
 class IdleMotions:
-    """Stiffnesses that the tangent has against idle motions; none until one is found.
-
-    Args:
-        share: The degrees of freedom of this process.
-        A: The tangent.
-        diagonal: Positions of the diagonal in its data.
-        held: Local degrees of freedom that supports hold.
-
-    Attributes:
-        stiffness: At the local degrees of freedom; N/m, N m/rad.
-    """
+    """Stiffnesses that the tangent has against idle motions, if any were found; N/m, N m/rad."""
 
     def __init__(self, share: Share, A: Csr, diagonal: Index, held: Index) -> None:
         self._share, self._A, self._diagonal, self._held = share, A, diagonal, held
@@ -61,15 +51,10 @@ class IdleMotions:
         return self._diagonal[here].astype(np.int32), self.stiffness[here]
 
     def find(self, forces: Array, scale: float) -> bool:
-        """Look for idle motions of the latest tangent; all processes call it together.
+        """Look for idle motions of the latest tangent; false if one that meets no force is driven.
 
-        Args:
-            forces: Sizes of the latest residual at the local degrees of freedom, moments over the
-                size of the scene; N.
-            scale: Size of the forces in the scene; N.
-
-        Returns:
-            Whether there are any; not if a motion that meets no force is driven.
+        All processes call it together.  ``forces`` are the sizes of the latest residual, moments
+        over the size of the scene, ``scale`` that of the forces in the scene; N.
         """
         share = self._share
         K, free = free_matrix(share, self._A, self._held)

@@ -26,21 +26,10 @@ class SearchingNewton:
     one branch to the other and back for ever.  Work is the only product of residuals and steps that
     adds forces and moments, and it is the same in all units.  Forces of connectors are unknowns of
     their own, so the line search of PETSc would add products of forces; here the law of a
-    connector, in the place of its force, does work on the change of its motion.
-
-    It answers like the SNES whose function and Jacobian it uses.
-
-    Args:
-        snes: Computes residuals and tangents.
-        ksp: Solves linear equations.
-        x, f: Vectors of the iterate, and of its residual.
-        y, w: Two more.
-        matrix: The tangent.
-        test: Reason to stop after an iteration, or zero.
-        near: Whether the latest tangent is to be used again.
-        work: Of a residual on a step, from the iterate of the tangent: ``work(step)`` makes a
-            function of no arguments that takes the latest residual; J.
-        most: Largest number of iterations.
+    connector, in the place of its force, does work on the change of its motion. It answers like the
+    SNES whose function and Jacobian it uses.  ``test`` gives the reason to stop after an iteration,
+    ``near`` says to keep the tangent, and ``work(step)`` makes a function that gives the work (J)
+    of the latest residual on a step from the iterate of the tangent.
     """
 
     def __init__(

@@ -36,12 +36,7 @@ Those that wander longer find a solution by luck: the last digits of the data wo
 
 
 class Solver:
-    """Finds the configuration in which the residual of an equation vanishes.
-
-    Attributes:
-        iterations: Number of iterations so far.
-        convergence: Sizes of forces and works at the latest iterate.
-    """
+    """Finds the configuration in which the residual of an equation vanishes."""
 
     def __init__(
         self, share: Share, equation: Equation, newton: Newton, least: int, agreement: Agreement
@@ -147,13 +142,8 @@ class Solver:
     def solve(self, guess: Array, loads: list[Array], like_last: bool = False) -> Array:
         """Find the configuration from ``guess``; local values, ghosts included; a new array.
 
-        Args:
-            guess: Where to begin.
-            loads: Vectors of the loads, for the scale of convergence; new arrays where they change.
-            like_last: Whether the tangent of the last solution may do for this one.
-
-        Raises:
-            StepFailed: No convergence.
+        The ``loads``, for the scale of convergence, are new arrays where they change; ``like_last``
+        lets the tangent of the last solution do for this one.
         """
         self.convergence.take_loads(loads)
         self._go_to(guess)
@@ -171,11 +161,7 @@ class Solver:
         return self._q.copy()
 
     def solve_along(self, guess: Array, loads: list[Array], border: Border) -> Array:
-        """Find the configuration as :meth:`solve` does, together with the unknown of a border.
-
-        Raises:
-            StepFailed: No convergence.
-        """
+        """Find the configuration as :meth:`solve` does, together with the unknown of a border."""
         self.convergence.take_loads(loads)
         self._go_to(guess)
         reason = self._iterate(self._along(border), 12)

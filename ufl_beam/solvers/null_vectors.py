@@ -22,15 +22,9 @@ ROUNDS = 40
 
 
 def free_matrix(share: Share, A: Csr, held: Index) -> tuple[csc_array, Index]:
-    """Assemble the tangent of the whole scene at what supports leave free; all processes call it.
+    """Assemble the tangent at what supports leave free, and its dofs in numbers of the grid.
 
-    Args:
-        share: The degrees of freedom of this process.
-        A: The part of the tangent of this process.
-        held: Local degrees of freedom that supports hold.
-
-    Returns:
-        The matrix; and its degrees of freedom, in numbers of the grid.
+    All processes call it together, each with its part ``A``, and local numbers of what is ``held``.
     """
     here = (share.dofs[A.rows()], share.dofs[A.indices], A.data, share.dofs[held])
     parts = share.comm.allgather(here) if not share.alone else [here]
@@ -42,11 +36,7 @@ def free_matrix(share: Share, A: Csr, held: Index) -> tuple[csc_array, Index]:
 
 
 def null_vector(K: csc_array) -> tuple[float, Array]:
-    """Compute the vector that a matrix, its rows and columns scaled to size one, makes least of.
-
-    Returns:
-        How much it makes of it, without dimension; and the vector, in the units of the unknowns.
-    """
+    """Compute the vector that an equilibrated matrix makes least of, and how much; see below."""
     sizes, vectors = null_vectors(K)
     return float(sizes[-1]), vectors[:, -1]
 
@@ -54,9 +44,8 @@ def null_vector(K: csc_array) -> tuple[float, Array]:
 def null_vectors(K: csc_array) -> tuple[Array, Array]:
     """Compute vectors that a matrix, its rows and columns scaled to size one, makes nothing of.
 
-    Returns:
-        How much it makes of them, without dimension, the least last; and the vectors in columns, in
-        the units of the unknowns.  One at least; of large matrices one only.
+    The result is how much it makes of them, without dimension, the least last; and the vectors in
+    columns, in the units of the unknowns.  One at least; of large matrices one only.
     """
     scaled, factors = _equilibrated(K)
     n = scaled.shape[0]

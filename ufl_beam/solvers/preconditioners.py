@@ -18,14 +18,9 @@ BAD_PIVOT = int(PETSc.PC.FailedReason.FACTOR_NUMERIC_ZEROPIVOT)
 
 
 class ChainsFirst:
-    """Direct solver: condensation along the beams, then factorization of what remains.
+    """Direct solver: condensation along the beams, then factorization by ``package`` of the rest.
 
     Every process factors what is left, which is small, instead of waiting for another.
-
-    Args:
-        share: The degrees of freedom of this process.
-        A: The matrix.
-        package: What factors the matrix that is left.
     """
 
     def __init__(self, share: Share, A: Csr, package: str) -> None:

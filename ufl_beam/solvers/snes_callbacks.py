@@ -19,8 +19,7 @@ from ufl_beam.solvers.vectors import Vectors
 class SnesCallbacks:
     """Residual and tangent of an equation in vectors of PETSc.
 
-    Attributes:
-        idle: Entries of the tangent and stiffnesses that hold idle motions, if there are any.
+    ``idle`` are entries of the tangent and stiffnesses that hold idle motions, if there are any.
     """
 
     def __init__(self, equation: Equation, vectors: Vectors, stop: Callable[[int], int]) -> None:
@@ -29,10 +28,7 @@ class SnesCallbacks:
 
     @contextmanager
     def noted(self) -> Iterator[None]:
-        """Note exceptions, which must not pass through PETSc while other processes go on.
-
-        From then on the residual is no number, so that all processes stop together.
-        """
+        """Note exceptions instead of raising them through PETSc: processes must stop together."""
         try:
             yield
         except BaseException as error:

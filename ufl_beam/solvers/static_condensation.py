@@ -24,11 +24,7 @@ class Chains:
     """Vertices of the cells of one process that couple to their two neighbours and to nothing else.
 
     They are found in the structure of the matrix, so they remain right whatever comes to couple.
-
-    Args:
-        cell_dofs: Local degrees of freedom of the cells, see :class:`Share`.
-        A: Matrix with the columns of each row in order.
-        alone: Which local degrees of freedom no other process has; (A.size,).
+    ``alone`` marks local degrees of freedom that no other process has.
 
     Attributes:
         dofs: Degrees of freedom of the vertices, chain after chain; (num_vertices, 3).
@@ -108,13 +104,8 @@ class Elimination:
     small system by the caller, and :meth:`expand`.  The entries of ``A`` must not change meanwhile.
     On one process C does the same with :attr:`c`, see newton.c.
 
-    Args:
-        share: Degrees of freedom of this process.
-        A: The matrix; of degrees of freedom that several processes have, a summand on each.
-
     Attributes:
-        indptr: First entry of each row of the small matrix, which all processes have.
-        indices: Column of each entry.
+        indptr, indices: Rows of the small matrix, which all processes have, and columns of entries.
         data: Its entries; summed over the processes by :meth:`factor`.
         f: Right-hand side of the small system, of :meth:`reduce`.
         c: All of it in C, see loops.h.
@@ -143,16 +134,11 @@ class Elimination:
         return ~np.isin(share.dofs, ghosts)
 
     def _make_matrix(self, number: Index, ends: Index, size: int) -> tuple[Index, Index, Index]:
-        """Structure of the small matrix, and where its entries come from.
-
-        Args:
-            number: In the small matrix, of each local degree of freedom; -1 of those eliminated.
-            ends: Those of the ends of the chains; (num_chains, 6).
-            size: Of the small matrix.
+        """Make the structure of the small matrix; ``number`` in it is -1 of what is eliminated.
 
         Returns:
             Entries of ``A`` that stay, where they are in :attr:`data`, and where the blocks of the
-            ends of the chains are.
+            ``ends`` (num_chains, 6) of the chains are.
         """
         rows, columns, left = self._A.rows(), self._A.indices, number >= 0
         entries = np.flatnonzero(left[rows] & left[columns])
