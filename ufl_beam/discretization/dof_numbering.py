@@ -111,7 +111,7 @@ class Grid(BeamMesh):
         return f"{COMPONENTS[component]} of {beam.name} at ({x:g}, {y:g})"
 
     def worst(self, sizes: Array) -> dict[str, float]:
-        """Largest degree of freedom of each beam, body and connector, in words, unless it is zero."""
+        """Largest degree of freedom of each beam, body and connector, in words; zeros left out."""
         dofs_of_beams = [self.nodes_of(beam)[1] for beam in self.scene.beams]
         groups = [*dofs_of_beams, *self.dofs_of_bodies, *self.multipliers.reshape(-1, 1)]
         worst = sorted({int(g.flat[np.argmax(sizes[g])]) for g in groups}, key=lambda d: -sizes[d])
