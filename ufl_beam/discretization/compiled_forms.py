@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache
 from itertools import accumulate
 from pathlib import Path
-from typing import Any, NamedTuple, ParamSpec, Protocol, TypeVar, cast
+from typing import Any, NamedTuple, ParamSpec, TypeVar, cast
 
 import basix.ufl
 import numpy as np
@@ -23,6 +23,7 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, integers, kernel, lib
+from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.jit import compiled_form
 from ufl_beam.compiled.simd_kernels import LANES, in_batches, in_lanes
 from ufl_beam.dolfinx_compat import VERSIONS, fem, line_mesh, pack
@@ -92,13 +93,6 @@ def prepared(form: ufl.Form) -> Prepared:
         )
     tabulate = tabulator(compiled)
     return Prepared(compiled, source, tabulate, used, columns, constants, packed, entries)
-
-
-class Entries(Protocol):
-    """Matrix of a fixed pattern, see :class:`Csr`."""
-
-    def positions(self, rows: Index, columns: Index) -> Index:
-        """Positions of entries in its data."""
 
 
 class Kernel:
@@ -184,7 +178,7 @@ class Kernel:
         self._packed = other._packed
         self._prepare()
 
-    def place(self, A: Entries) -> None:
+    def place(self, A: Csr) -> None:
         """Let a bilinear form on the degrees of freedom of the cells add to ``A``."""
         per_cell = self._dofs.shape[1]
         if self._entries != per_cell**2:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,24 +15,10 @@ from ufl_beam.errors import SceneError, require_kind, warn
 from ufl_beam.model.connector_laws import HELD
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.supports import COMPONENTS, Support
+from ufl_beam.simulation.solution import Solution
 
 
-class Start(Protocol):
-    """A solution whose last state a run begins with; see there."""
-
-    grid: Grid
-    internal: State
-
-    @property
-    def q(self) -> Array:
-        """Configurations of the solution; (n+1, size)."""
-
-    @property
-    def v(self) -> Array:
-        """Velocities; empty in statics."""
-
-
-def mesh_of(start: Start | None, mesh: Mesh | None) -> Mesh:
+def mesh_of(start: Solution | None, mesh: Mesh | None) -> Mesh:
     """The mesh of a call: the one it says, that of the solution it starts with, or that given."""
     if mesh is not None:
         require_kind(mesh, Mesh, "mesh")
@@ -48,7 +34,7 @@ class InitialState(NamedTuple):
     internal: State
 
 
-def initial_state(grid: Grid, start: Start | None) -> InitialState:
+def initial_state(grid: Grid, start: Solution | None) -> InitialState:
     """Find the state that a run begins with, before anything is built."""
     v = _initial_velocity(grid)
     if start is None:
