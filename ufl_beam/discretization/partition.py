@@ -129,11 +129,6 @@ class Share:
         """Number of local degrees of freedom, ghosts included."""
         return len(self.dofs)
 
-    @property
-    def num_global(self) -> int:
-        """Number of degrees of freedom of all processes."""
-        return self.grid.size
-
     def at(self, anchor: Anchor) -> Index:
         """Degrees of freedom (numbers of the grid) of what an anchor moves with; shape (3,)."""
         return self.grid.node(anchor)

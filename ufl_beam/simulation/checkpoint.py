@@ -26,7 +26,7 @@ from ufl_beam.output.archive import above, below
 from ufl_beam.output.output_files import require_path
 from ufl_beam.output.recorders import Recorder
 from ufl_beam.simulation.checkpoint_file import Content, read, write
-from ufl_beam.simulation.fingerprint import CODE, Description, difference, has_state, kind_of
+from ufl_beam.simulation.fingerprint import CODE, Description, difference, has_state
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_control import Pace
 
@@ -282,17 +282,6 @@ def _restore(one: Any, state: Any) -> None:
         one.set_state(state)
     else:
         one.restore(state)
-
-
-def kinds_of(recorders: Sequence[Recorder]) -> list[str]:
-    """Return the fingerprint of recorders."""
-    return [kind_of(recorder) for recorder in recorders]
-
-
-def require_continuable(recorder: Recorder) -> None:
-    """Raise :class:`SceneError` if a recorder does not say how to go on."""
-    if type(recorder).state is Recorder.state:
-        recorder.state()
 
 
 def digest_of(arrays: Mapping[str, Array]) -> str:

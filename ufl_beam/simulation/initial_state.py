@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The state that a run begins with."""
+"""The grid and the state that a run begins with, and checks before anything is computed."""
 
 from __future__ import annotations
 
@@ -9,13 +9,54 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.model_warnings import (
+    warn_of_far_points,
+    warn_of_free_hinges,
+    warn_of_masses,
+    warn_of_origin,
+    warn_of_touching,
+)
 from ufl_beam.discretization.state_io import State
 from ufl_beam.discretization.state_transfer import Transfer, same_unknowns
-from ufl_beam.errors import SceneError, require_kind, warn
+from ufl_beam.errors import SceneError, require_kind, shorten, warn
+from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.connector_laws import HELD
+from ufl_beam.model.constraint_checks import (
+    require_independent,
+    require_inertia,
+    require_masses,
+    require_no_mechanism,
+    require_rates,
+)
 from ufl_beam.model.mesh_options import Mesh
+from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS, Support
 from ufl_beam.simulation.solution import Solution
+
+
+def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh) -> Grid:
+    """Make the grid of a scene, once the scheme is known to be able to compute it."""
+    require_kind(scene, Scene, "scene")
+    if not isinstance(scheme, Scheme) or isinstance(scheme, type):
+        raise SceneError(
+            f"scheme = {shorten(scheme)} must be a scheme, such as Static() or Midpoint()"
+        )
+    if has_inertia(scheme):
+        require_masses(scene)
+        require_inertia(scene)
+        warn_of_masses(scene)
+        if scene.initial:
+            warn_of_origin(scene)
+        require_rates(scene, scheme)
+    else:
+        require_no_mechanism(scene)
+    require_independent(scene)
+    warn_of_far_points(scene)
+    warn_of_free_hinges(scene)
+    grid = Grid(scene, mesh)
+    if has_inertia(scheme):
+        warn_of_touching(grid)
+    return grid
 
 
 def mesh_of(start: Solution | None, mesh: Mesh | None) -> Mesh:

@@ -9,8 +9,7 @@ from petsc4py import PETSc
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import lib
-from ufl_beam.solvers.equation import Border
-from ufl_beam.solvers.snes_callbacks import SnesCallbacks
+from ufl_beam.solvers.equation import Border, SnesCallbacks
 from ufl_beam.solvers.vectors import Vectors
 
 

@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, Protocol
 
 import numpy as np
@@ -12,19 +13,7 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import ffi, lib
 from ufl_beam.compiled.csr import Csr
-
-
-class Callbacks(Protocol):
-    """Functions in Python that SNES calls, with the arguments of PETSc."""
-
-    def function(self, snes: Any, x: Any, f: Any) -> None:
-        """Compute the residual at an iterate."""
-
-    def jacobian(self, snes: Any, x: Any, J: Any, P: Any) -> None:
-        """Compute the tangent at an iterate."""
-
-    def test(self, snes: Any, iteration: int, norms: Any) -> int:
-        """Return why to stop, or zero."""
+from ufl_beam.solvers.vectors import Vectors
 
 
 class Equation(Protocol):
@@ -71,7 +60,7 @@ class Equation(Protocol):
     def working(self, x: Array, y: Array) -> Array:
         """Return what the residual works on in a step ``y`` from ``x``; a new array."""
 
-    def attach(self, snes: Any, callbacks: Callbacks, f: Any, matrix: Any) -> None:
+    def attach(self, snes: Any, callbacks: SnesCallbacks, f: Any, matrix: Any) -> None:
         """Let SNES evaluate the equation, by these callbacks or faster, with the residual in f."""
 
     def drive(self, snes: Any, factors: Any) -> None:
@@ -92,7 +81,7 @@ class PythonEquation(Equation):
         """Keep the first exception."""
         self.error = self.error or error
 
-    def attach(self, snes: Any, callbacks: Callbacks, f: Any, matrix: Any) -> None:
+    def attach(self, snes: Any, callbacks: SnesCallbacks, f: Any, matrix: Any) -> None:
         """Let SNES call Python."""
         snes.setFunction(callbacks.function, f)
         snes.setJacobian(callbacks.jacobian, matrix)
@@ -122,6 +111,54 @@ class Border(Protocol):
 
     def met(self) -> bool:
         """Return whether the equation is."""
+
+
+class SnesCallbacks:
+    """Residual and tangent of an equation in vectors of PETSc.
+
+    ``idle`` are entries of the tangent and stiffnesses that hold idle motions, if there are any.
+    """
+
+    def __init__(self, equation: Equation, vectors: Vectors, stop: Callable[[int], int]) -> None:
+        self._equation, self._vectors, self._stop = equation, vectors, stop
+        self.idle: tuple[Index, Array] | None = None
+
+    @contextmanager
+    def noted(self) -> Iterator[None]:
+        """Note exceptions instead of raising them through PETSc: processes must stop together."""
+        try:
+            yield
+        except BaseException as error:
+            self._equation.note(error)
+
+    def function(self, snes: Any, x: Any, f: Any) -> None:
+        """Compute the residual ``f`` at ``x``."""
+        self._vectors.update_ghosts(x)
+        r = self._vectors.view(f, writable=True)
+        with self.noted():
+            self._equation.residual(self._vectors.view(x), r)
+        if self._equation.error is not None:
+            # It may have failed on this process alone; by the sum all give up together.
+            r.fill(np.nan)
+        self._vectors.add_ghosts(f)
+        f.stateIncrease()
+        self._equation.complete(r)
+
+    def jacobian(self, snes: Any, x: Any, J: Any, P: Any) -> None:
+        """Compute the tangent at ``x``, unless the last one is near enough."""
+        if self._equation.c.near:
+            return
+        self._vectors.update_ghosts(x)
+        with self.noted():
+            self._equation.tangent(self._vectors.view(x))
+            if self.idle is not None:
+                entries, stiffnesses = self.idle
+                self._equation.A.data[entries] += stiffnesses
+        P.stateIncrease()
+
+    def test(self, snes: Any, iteration: int, norms: Any) -> int:
+        """Return why to stop after an iteration, or zero."""
+        return self._stop(iteration)
 
 
 # -- parts that C leaves to Python ---------------------------------------------------------------

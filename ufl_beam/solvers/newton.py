@@ -17,12 +17,11 @@ from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
 from ufl_beam.solvers.bordered import BorderedNewton
 from ufl_beam.solvers.convergence import Convergence
-from ufl_beam.solvers.equation import Border, Equation
-from ufl_beam.solvers.idle_motions import IdleMotions
+from ufl_beam.solvers.equation import Border, Equation, SnesCallbacks
 from ufl_beam.solvers.line_search import SearchingNewton
 from ufl_beam.solvers.newton_options import PREFIX, Newton
+from ufl_beam.solvers.null_vectors import IdleMotions
 from ufl_beam.solvers.preconditioners import ChainsFirst
-from ufl_beam.solvers.snes_callbacks import SnesCallbacks
 from ufl_beam.solvers.vectors import Vectors, unlock
 
 FULL_STEPS = {"snes_linesearch_type": "basic"}

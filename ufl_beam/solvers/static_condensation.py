@@ -46,7 +46,7 @@ class Chains:
         plain = alone & (np.diff(A.indptr) == 9)
         plain &= np.bincount(A.indices, minlength=A.size) == 9
         inside &= plain[end[:-1]].all(axis=1)
-        inside &= _is_first(end[:-1, 0])
+        inside &= np.isin(np.arange(len(inside)), np.unique(end[:-1, 0], return_index=True)[1])
         # Beams side by side may make an end of a chain the middle of another.
         middle = np.zeros(A.size, dtype=bool)
         middle[end[:-1][inside]] = True
@@ -83,13 +83,6 @@ class Chains:
         self.order = np.argsort(np.argsort(around, axis=1), axis=1).astype(np.int32)
 
 
-def _is_first(values: Index) -> npt.NDArray[np.bool_]:
-    """Which of the values did not occur before."""
-    first = np.zeros(len(values), dtype=bool)
-    first[np.unique(values, return_index=True)[1]] = True
-    return first
-
-
 def _runs(mask: npt.NDArray[np.bool_]) -> tuple[Index, Index, Index]:
     """Runs of true values: the run of each of them; first and last position of each run."""
     edges = np.diff(np.concatenate([[0], mask.astype(np.int8), [0]]))
@@ -113,7 +106,8 @@ class Elimination:
 
     def __init__(self, share: Share, A: Csr) -> None:
         self._comm, self._A = share.comm, A
-        chains = Chains(share.cell_dofs, A, self._alone(share))
+        ghosts = np.concatenate(self._comm.allgather(share.dofs[share.num_owned :]))
+        chains = Chains(share.cell_dofs, A, ~np.isin(share.dofs, ghosts))
         left = np.ones(share.size, dtype=bool)
         left[chains.dofs] = False
         here = np.flatnonzero(left)
@@ -127,11 +121,6 @@ class Elimination:
             "entry": entries, "place": places[0], "places": places[1],
             "dof": owned, "number": number[owned], "ends": ends,
         })  # fmt: skip
-
-    @staticmethod
-    def _alone(share: Share) -> npt.NDArray[np.bool_]:
-        ghosts = np.concatenate(share.comm.allgather(share.dofs[share.num_owned :]))
-        return ~np.isin(share.dofs, ghosts)
 
     def _make_matrix(self, number: Index, ends: Index, size: int) -> tuple[Index, Index, Index]:
         """Make the structure of the small matrix; ``number`` in it is -1 of what is eliminated.
