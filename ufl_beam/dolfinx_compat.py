@@ -22,29 +22,13 @@ try:
     import dolfinx
     import ffcx
     import ufl
-    from dolfinx import cpp, fem, io, jit, mesh
+    from dolfinx import cpp, jit, mesh
+    from dolfinx import fem as fem
 except ImportError as error:  # pragma: no cover - depends on the machine
     raise ImportError(
         "ufl_beam needs DOLFINx 0.9 or newer with PETSc, which is not on PyPI "
         f"({error}). Run through ./env of the source tree, or see docs/installation.md."
     ) from error
-
-
-__all__ = [
-    "TABULATE",
-    "VERSION",
-    "VERSIONS",
-    "cell_coordinates",
-    "compile_form",
-    "cpp",
-    "dolfinx",
-    "fem",
-    "form_key",
-    "io",
-    "jit_directory",
-    "line_mesh",
-    "pack",
-]
 
 VERSION = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
 VERSIONS = f"DOLFINx {dolfinx.__version__} and FFCx {ffcx.__version__}"

@@ -98,13 +98,8 @@ def compiled(
         builder = cffi.FFI()
         builder.cdef(declarations)
         try:
-            builder.set_source(
-                name,
-                source(),
-                extra_compile_args=flags,
-                extra_link_args=list(EXTRA),
-                libraries=["m"],
-            )
+            of_compiler = {"extra_compile_args": flags, "extra_link_args": [*EXTRA]}
+            builder.set_source(name, source(), libraries=["m"], **of_compiler)
             with _explained(stem):
                 builder.compile(tmpdir=directory)
             check(module := _imported(name, directory))

@@ -77,14 +77,12 @@ class Assembly:
 
     def ask(self, simulation: Running, q: Array) -> None:
         """Ask controllers and friction for forces and limits; note the rates of what may slip."""
-        laws = ((link, link.law) for link in self.asked)
-        self.asked.update(
-            {
-                link: law.ask(simulation, link)
-                for link, law in laws
-                if isinstance(law, Controller | Coulomb)
-            }
-        )
+        new = {
+            link: law.ask(simulation, link)
+            for link, law in ((link, link.law) for link in self.asked)
+            if isinstance(law, Controller | Coulomb)
+        }
+        self.asked.update(new)
         if self.inertia is not None:
             for one in self.couplings:
                 if isinstance(one.links[0].law, Coulomb):

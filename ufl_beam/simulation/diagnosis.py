@@ -90,27 +90,19 @@ def no_equilibrium(
 ) -> ConvergenceError:
     """Describe why even the smallest step, to ``end``, failed; all processes call it together."""
     q1 = simulation.supports.in_plane(newton.iterate())
-    dt, forces, named = (
-        end - simulation.t,
-        _forces_by_kind(simulation, newton, q1),
-        simulation.parameter,
-    )
+    dt, named = end - simulation.t, simulation.parameter
+    forces = _forces_by_kind(simulation, newton, q1)
     sizes = ", ".join(f"{kind} {size:.1e} N" for kind, size in forces.items())
     where = f"at {named.at(simulation.t, '.9g')}"
     if dt != 0:
         where = f"after {named.at(simulation.t, '.9g')}, even with {named.over(dt)}"
     why = singularity(simulation, q1)
     said = f"{failure} ({sizes})" if sizes else str(failure)
+    advice = advice or simulation.scheme.advice
     return ConvergenceError(
-        f"no equilibrium {where}: {why}{'; ' if why else ''}{said}. "
-        f"{advice or simulation.scheme.advice}",
-        time=simulation.t,
-        dt=dt,
-        solution=solution,
-        residuals=failure.residuals,
-        forces=forces,
-        reason=failure.reason,
-    )
+        f"no equilibrium {where}: {why}{'; ' if why else ''}{said}. {advice}", time=simulation.t,
+        dt=dt, solution=solution, residuals=failure.residuals, forces=forces, reason=failure.reason,
+    )  # fmt: skip
 
 
 def open_ledger(solution: Solution, share: Share, newton: Solver) -> str:

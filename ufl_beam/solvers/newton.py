@@ -21,7 +21,7 @@ from ufl_beam.solvers.equation import Border, Equation, SnesCallbacks
 from ufl_beam.solvers.line_search import SearchingNewton
 from ufl_beam.solvers.newton_options import PREFIX, Newton
 from ufl_beam.solvers.null_vectors import IdleMotions
-from ufl_beam.solvers.preconditioners import ChainsFirst
+from ufl_beam.solvers.static_condensation import ChainsFirst
 from ufl_beam.solvers.vectors import Vectors, unlock
 
 FULL_STEPS = {"snes_linesearch_type": "basic"}
