@@ -26,12 +26,12 @@ import ufl
 from ufl_beam.compiled.code_cache import kept
 from ufl_beam.dolfinx_compat import TABULATE, compile_form, fem, form_key
 
-HEADERS = "\n".join(
-    [
-        *(f"#include <{name}.h>" for name in ("float", "math", "stdint", "string")),
-        f"#define CALL(f, e, w, c, x) f(e, w, c, x, 0, 0{TABULATE[1]})",
-    ]
-)
+HEADERS = f"""\
+#include <float.h>
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+#define CALL(f, e, w, c, x) f(e, w, c, x, 0, 0{TABULATE[1]})"""
 """Head of all files of C; CALL calls a kernel of FFCx."""
 
 
@@ -40,27 +40,21 @@ def text(name: str) -> str:
     return (Path(__file__).parent / "c" / name).read_text()
 
 
-DECLARATIONS = "\n".join(
-    [
-        f"typedef void (kernel)({TABULATE[0]});",
-        f"typedef int{8 * np.dtype(PETSc.IntType).itemsize}_t petsc_int;",
-        text("loops.h"),
-    ]
-)
+DECLARATIONS = f"""\
+typedef void (kernel)({TABULATE[0]});
+typedef int{8 * np.dtype(PETSc.IntType).itemsize}_t petsc_int;
+{text("loops.h")}"""
 """Declarations that all files of C share."""
 
-SANITIZERS = (
-    "-O1",
-    "-g1",  # line numbers
-    "-fno-omit-frame-pointer",
-    "-fno-wrapv",
-    "-fsanitize=address,undefined,bounds-strict",
-    "-fno-sanitize-recover=all",
+SANITIZERS = [
+    *("-O1", "-g1", "-fno-omit-frame-pointer", "-fno-wrapv"),
+    *("-fsanitize=address,undefined,bounds-strict", "-fno-sanitize-recover=all"),
     *("-Wall", "-Wextra", "-Wno-unused-parameter", "-Werror"),
-)
-"""Flags that make the compiler check addresses and undefined behaviour; see `make sanitize`."""
+]
+"""Flags, -g1 for line numbers, that make the compiler check addresses and undefined behaviour; see
+`make sanitize`."""
 
-EXTRA = SANITIZERS if os.environ.get("UFL_BEAM_SANITIZE", "0") != "0" else ()
+EXTRA = SANITIZERS if os.environ.get("UFL_BEAM_SANITIZE", "0") != "0" else []
 """Flags after those of each library: the sanitizers if ``UFL_BEAM_SANITIZE=1``, else none."""
 
 
@@ -98,7 +92,7 @@ def compiled(
         builder = cffi.FFI()
         builder.cdef(declarations)
         try:
-            of_compiler = {"extra_compile_args": flags, "extra_link_args": [*EXTRA]}
+            of_compiler = {"extra_compile_args": flags, "extra_link_args": EXTRA}
             builder.set_source(name, source(), libraries=["m"], **of_compiler)
             with _explained(stem):
                 builder.compile(tmpdir=directory)

@@ -202,11 +202,6 @@ class Kernel:
         self._lanes, self._coordinates = LANES, coordinates
         self._prepare()
 
-    @property
-    def vectorised(self) -> bool:
-        """True with the SIMD loop."""
-        return self._lanes > 1
-
     def add(self, q: Array, b: Array) -> None:
         """Add the form at the unknown ``q`` to a vector, or to the entries of the matrix."""
         lib.add_cells(self.cells, doubles(q), doubles(b))

@@ -225,13 +225,14 @@ class Keeper:
     def write(self, simulation: Running, pace: Pace, recorders: Sequence[Recorder]) -> None:
         """Write; all processes call it together."""
         self._require_told()
+        stateful = self._stateful.items()
         content: Content = {
             "python": PYTHON,
             "call": self._described.texts,
             "step": self._step,
             "seconds": time.perf_counter() - self._begin,
             "pace": pace.state(),
-            "stateful": simulation.together(self._states),
+            "stateful": simulation.together(lambda: {name: _state(one) for name, one in stateful}),
             **above("state/", simulation.state()),
         }
         parts = [recorder.state() for recorder in recorders]
@@ -244,10 +245,6 @@ class Keeper:
 
         on_first(self._comm, put)
         self._last_time, self._last_step = time.perf_counter(), pace.steps
-
-    def _states(self) -> dict[str, Any]:
-        """States of the user's objects, by name."""
-        return {name: _state(one) for name, one in self._stateful.items()}
 
     def _require_told(self) -> None:
         """Raise if what functions use changes without their saying so: it would be lost."""

@@ -57,13 +57,8 @@ class KeptStates(list[Snapshot]):
 
     def arrays(self) -> State:
         """Return all of it, as arrays by name."""
-        arrays = {
-            "times": np.array(self.times),
-            "q": np.array(self.q),
-            "v": np.array(self.v),
-            "reactions": np.array(self.reactions),
-            "connections": np.array(self.connections),
-        }
+        names = ("times", "q", "v", "reactions", "connections")
+        arrays = {name: np.array(getattr(self, name)) for name in names}
         if self and self[0].material:
             # Groups are those of laws and processes.
             tables = [np.concatenate([np.c_[group] for group in one]) for one in self.material]

@@ -106,18 +106,11 @@ class Solver:
         if "snes_linesearch_type" in self._chosen():
             return self._snes
         return SearchingNewton(
-            self._snes,
-            self._ksp,
-            x=self._x,
-            f=self._f,
-            y=self._vectors.new(),
-            w=self._vectors.new(),
-            matrix=self._matrix,
-            test=self.convergence.test,
-            near=lambda: bool(self._equation.c.near),
-            work=self._work_on,
+            self._snes, self._ksp, x=self._x, f=self._f, y=self._vectors.new(),
+            w=self._vectors.new(), matrix=self._matrix, test=self.convergence.test,
+            near=lambda: bool(self._equation.c.near), work=self._work_on,
             most=self._newton.max_iterations,
-        )
+        )  # fmt: skip
 
     def _work_on(self, y: PETSc.Vec) -> Callable[[], float]:
         """Work of the latest residual on a step from the present iterate; J."""
