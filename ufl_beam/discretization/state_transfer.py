@@ -7,11 +7,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Index
+from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError
-from ufl_beam.model.bodies import GROUND, Body
+from ufl_beam.model.bodies import GROUND
 from ufl_beam.model.connectors import Connector
 
 APART = 1e-6
@@ -35,17 +35,13 @@ class Transfer:
         self._require_alike()
         bodies = [body for body in new.scene.rigid_bodies if body in old.scene.rigid_bodies]
         news, olds = (
-            np.vstack([grid.dofs, *(self._dofs_of(grid, body) for body in bodies)]).ravel()
+            np.vstack([grid.dofs, *(grid.node(body.middle) for body in bodies)]).ravel()
             for grid in (new, old)
         )
         links = self._links()
         self._numbers = {a: b for b, a in links.items()}
         self._to = np.concatenate([news, new.multipliers[list(links)]])
         self._from = np.concatenate([olds, old.multipliers[list(links.values())]])
-
-    @staticmethod
-    def _dofs_of(grid: Grid, body: Body) -> Index:
-        return np.asarray(grid.dofs_of_bodies[grid.scene.rigid_bodies.index(body)]).reshape(1, 3)
 
     def _require_alike(self) -> None:
         """Raise unless beams and vertices are the same, and every body is known."""

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -164,25 +165,24 @@ class SnesCallbacks:
 # -- parts that C leaves to Python ---------------------------------------------------------------
 
 
+@dataclass
 class InPython:
     """A part of a residual or tangent at its first argument that Python adds to its second."""
 
-    def __init__(
-        self,
-        add: Callable[[Array, Array], None],
-        size: tuple[int, int],
-        failed: Callable[[BaseException], None],
-    ) -> None:
-        self._add, self._size, self._failed = add, size, failed
+    add: Callable[[Array, Array], None]
+    size: tuple[int, int]
+    failed: Callable[[BaseException], None]
+
+    def __post_init__(self) -> None:
         self.handle = ffi.new_handle(self)
 
     def __call__(self, q: Any, out: Any) -> None:
         """Add, to arrays that C lends; not a number where that fails."""
-        result = _lent(out, self._size[1])
+        result = _lent(out, self.size[1])
         try:
-            self._add(_lent(q, self._size[0]), result)
+            self.add(_lent(q, self.size[0]), result)
         except BaseException as error:
-            self._failed(error)
+            self.failed(error)
             result.fill(np.nan)
 
 
@@ -192,25 +192,23 @@ def add_in_python(handle: Any, q: Any, out: Any) -> None:
     ffi.from_handle(handle)(q, out)
 
 
+@dataclass
 class Demand:
     """Residual of the constraints of connectors, evaluated by Python."""
 
-    def __init__(
-        self,
-        missed: Callable[[Array, Array, float, float], float],
-        size: int,
-        failed: Callable[[BaseException], None],
-    ) -> None:
-        self._missed, self._size, self._failed = missed, size, failed
-        self._handle = ffi.new_handle(self)
-        self.loop = (lib.missed_in_python, self._handle)
+    missed: Callable[[Array, Array, float, float], float]
+    size: int
+    failed: Callable[[BaseException], None]
+
+    def __post_init__(self) -> None:
+        self.loop = lib.missed_in_python, ffi.new_handle(self)
 
     def __call__(self, q: Any, r: Any, scale: float, moved: float) -> float:
         """Return the residual; not a number where it fails."""
         try:
-            return self._missed(_lent(q, self._size), _lent(r, self._size), scale, moved)
+            return self.missed(_lent(q, self.size), _lent(r, self.size), scale, moved)
         except BaseException as error:
-            self._failed(error)
+            self.failed(error)
             return math.nan
 
 
