@@ -57,6 +57,9 @@ class Numbering(Protocol):
     def keys(self, cells: Index) -> list[tuple[int, int]]:
         """Two numbers for each of some cells that tell it from others."""
 
+    def weights(self, place: Place) -> tuple[Index, Array]:
+        """Nodes of the cell at a place, and their weights there."""
+
     def worst(self, sizes: Array) -> dict[str, float]:
         """The degree of freedom of each beam, body and connector with the largest size."""
 
