@@ -31,10 +31,6 @@ class Grid(BeamMesh):
     numbered along the beams, the shared ones last: eliminating them in this order fills in nothing
     but the coupling of the joints.
 
-    Args:
-        scene: What is modelled.
-        mesh: How finely; with the cells of its beams by default.
-
     Attributes:
         dofs: Degrees of freedom of each node; shape (num_nodes, 3).
         dofs_of_bodies: Degrees of freedom of the rigid bodies; shape (num_bodies, 3).
@@ -71,11 +67,7 @@ class Grid(BeamMesh):
         return self.points[nodes], self.dofs[nodes]
 
     def node(self, anchor: Anchor) -> Index:
-        """Degrees of freedom of what an anchor that has a vertex, or a body, moves with; (3,).
-
-        Raises:
-            SceneError: Its beam or body is not in the scene.
-        """
+        """Degrees of freedom of what an anchor that has a vertex, or a body, moves with; (3,)."""
         of = node(anchor)
         if not isinstance(of, Body):
             return np.asarray(self.dofs[self.vertex(of)])
@@ -119,11 +111,7 @@ class Grid(BeamMesh):
         return f"{COMPONENTS[component]} of {beam.name} at ({x:g}, {y:g})"
 
     def worst(self, sizes: Array) -> dict[str, float]:
-        """The degree of freedom of each beam, body and connector with the largest size, in words.
-
-        Args:
-            sizes: One for each degree of freedom; those that are zero are left out.
-        """
+        """Largest degree of freedom of each beam, body and connector, in words; zeros left out."""
         dofs_of_beams = [self.nodes_of(beam)[1] for beam in self.scene.beams]
         groups = [*dofs_of_beams, *self.dofs_of_bodies, *self.multipliers.reshape(-1, 1)]
         worst = sorted({int(g.flat[np.argmax(sizes[g])]) for g in groups}, key=lambda d: -sizes[d])

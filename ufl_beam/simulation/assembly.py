@@ -48,18 +48,12 @@ class Assembly:
 
     Attributes:
         fields: Function spaces on the cells of this process.
-        ledger: Energies of this process.
         asked: Forces of controllers, and limits of friction, in the step; N or N m.
         rates: Rates of the motions with friction as the step begins; m/s or rad/s.
-        beams: Beams of the cells of this process; those with material points first.
-        inelastic: Those with material points.
+        beams: Beams of the cells of this process; the inelastic ones, with material points, first.
         yields: Whether any process has such cells.
         couplings: Connectors, those alike together.
-        loads: Loads.
-        inertia: Inertia; None in statics.
-        supports: Supports.
         openings: Search for what opens; None if nothing can.
-        equation: The equation of a step, which consists of all of them.
     """
 
     fields: Fields
@@ -83,14 +77,12 @@ class Assembly:
 
     def ask(self, simulation: Running, q: Array) -> None:
         """Ask controllers and friction for forces and limits; note the rates of what may slip."""
-        laws = ((link, link.law) for link in self.asked)
-        self.asked.update(
-            {
-                link: law.ask(simulation, link)
-                for link, law in laws
-                if isinstance(law, Controller | Coulomb)
-            }
-        )
+        new = {
+            link: law.ask(simulation, link)
+            for link, law in ((link, link.law) for link in self.asked)
+            if isinstance(law, Controller | Coulomb)
+        }
+        self.asked.update(new)
         if self.inertia is not None:
             for one in self.couplings:
                 if isinstance(one.links[0].law, Coulomb):
@@ -115,12 +107,9 @@ class Assembly:
         return memory.state()
 
     def take_over(self, q: Array, internal: State, *, same: bool) -> None:
-        """Take over :meth:`internal_variables` of another run.
+        """Take over :meth:`internal_variables` of another run at the local configuration ``q``.
 
-        Args:
-            q: The initial configuration at the local degrees of freedom.
-            internal: What the other run has passed on.
-            same: Whether no force has changed since, so that accelerations are what they were.
+        ``same`` says that no force has changed since, so that accelerations are what they were.
         """
         memory = Restoring(self.equation.share, internal)
         for one in self.remembering:
@@ -136,12 +125,7 @@ class Assembly:
     ) -> StaticPath | None:
         """Begin a static path, and set the reactions to those of its state; None in dynamics.
 
-        Args:
-            scheme: The time scheme.
-            q: The initial configuration at the local degrees of freedom.
-            t0: Its time; s.
-            loads: The loads that it is in equilibrium with; none if nothing acts yet.
-            together: Raises on all processes what one of them raises.
+        The state, ``q`` at ``t0``, is in equilibrium with ``loads``; none if nothing acts yet.
         """
         if self.inertia is not None:
             return None
@@ -155,14 +139,7 @@ class Assembly:
 
 
 def assemble(share: Share, scheme: Scheme, v: Array, together: Agreement) -> Assembly:
-    """Make the terms of a scene.
-
-    Args:
-        share: The degrees of freedom of this process, of the grid of the scene.
-        scheme: The time scheme.
-        v: Initial velocities at the local degrees of freedom; supports stop them in place.
-        together: Raises on all processes what one of them raises.
-    """
+    """Make the terms of a scene; supports stop the initial local velocities ``v`` in place."""
     scene, ledger, fields, search = share.grid.scene, Ledger(), Fields(share), SearchFlags()
     A = fields.matrix()
     setting = (scheme, A, ledger)

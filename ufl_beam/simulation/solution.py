@@ -86,7 +86,7 @@ class Solution:
 
     def keep(self, state: Snapshot) -> None:
         """Append a state of a run."""
-        self._kept.keep(state)
+        self._kept.append(state)
         self.parts, self.iterations = state.parts, state.iterations
 
     def history(self) -> State:
@@ -134,7 +134,7 @@ class Solution:
 
     def thin(self) -> None:
         """Forget every other kept state; the first one stays."""
-        self._kept.thin()
+        del self._kept[1::2]
 
     # -- motion --------------------------------------------------------------------------------
 

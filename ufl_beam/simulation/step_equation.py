@@ -29,9 +29,7 @@ class Load(Term, Protocol):
 class StepEquation(PythonEquation):
     """Sum of the virtual works of all terms, less what supports carry.
 
-    Attributes:
-        others: All terms but those of internal forces.
-        terms: All terms.
+    The ``others`` are all terms but those of internal forces.
     """
 
     def __init__(
@@ -136,8 +134,7 @@ class StepEquation(PythonEquation):
     def linearise(self, q: Array, step: Step) -> tuple[Array, Array]:
         """Return all forces but those of inertia in a step to ``q``, and their derivatives.
 
-        Returns:
-            The residual; and the entries of the matrix; in the axes of the plane, nothing held.
+        Both are in the axes of the plane, nothing held; the derivatives as entries of the matrix.
         """
         r = np.zeros(self.share.size)
         self.A.data.fill(0.0)
@@ -149,25 +146,14 @@ class StepEquation(PythonEquation):
         return r, self.A.data.copy()
 
     def tangent_change(self, q: Array, u: Array) -> Array:
-        """Derivative of the tangent of :meth:`linearise` along ``u``; entries of the matrix.
-
-        Args:
-            q: Configuration at the local degrees of freedom, which was linearised about last.
-            u: Direction, forces of connectors included.
-        """
+        """Derivative along ``u`` of the latest tangent of :meth:`linearise`, at ``q``; entries."""
         self.A.data.fill(0.0)
         for one in self._inner:
             one.add_tangent_change(q, u)
         return self.A.data.copy()
 
     def stiffness_works(self, q: Array, X: Array, Y: Array) -> Array:
-        """Works of the tangent of :meth:`linearise` for the motions X, each on its own of Y; J.
-
-        Args:
-            q: See :meth:`tangent_change`.
-            X: Motions, in columns.
-            Y: Virtual motions, in columns.
-        """
+        """Works of the tangent of :meth:`linearise`, each column of X on its own of Y; J."""
         self.A.data.fill(0.0)
         for term in (*self._couplings, *self.others):
             if term.kind != "inertia":
@@ -179,17 +165,7 @@ class StepEquation(PythonEquation):
         return works
 
     def tangent_works(self, q: Array, u: Array, X: Array, Y: Array) -> tuple[Array, Array]:
-        """Works of the tangent for the motions X on Y, and of its derivative along u; J.
-
-        Args:
-            q: See :meth:`tangent_change`.
-            u: See :meth:`tangent_change`.
-            X: Motions, in columns.
-            Y: Virtual motions, in columns.
-
-        Returns:
-            Two symmetric matrices.
-        """
+        """Works of the tangent for motions X on Y, and of its derivative along u; symmetric; J."""
         works = np.zeros((2, X.shape[1], Y.shape[1]))
         for i, j in zip(*np.triu_indices(X.shape[1]), strict=True):
             x, y = (np.ascontiguousarray(one) for one in (X[:, i], Y[:, j]))

@@ -28,25 +28,18 @@ REASONS = {
 
 
 class Convergence:
-    """Sizes of residuals and motions, and the decision to go on or to stop.
-
-    Attributes:
-        c: Data in C, see :func:`judge` of newton.c.
-        diagonal: Positions of the diagonal in the data of the tangent.
-    """
+    """Sizes of residuals and motions, and the decision to stop; ``c``: ``judge`` of newton.c."""
 
     def __init__(
-        self,
-        share: Share,
-        equation: Equation,
-        x: Array,
-        r: Array,
-        newton: Newton,
-        least: int,
+        self, share: Share, equation: Equation, x: Array, r: Array, newton: Newton, least: int
     ) -> None:
         self._share, self._A, self._parallel = share, equation.A, not share.alone
         self._x, self._r = x, r
-        self._weights = self._force_weights()
+        # Residuals count 1 if forces, 1 over the size of the scene if moments.
+        weights = np.ones(share.size)
+        weights[share.rotations()] = 1 / share.grid.scene.size
+        weights[share.multipliers()] = 0.0
+        self._weights = weights[: share.num_owned].copy()
         self._norm = (len(self._weights), doubles(self._weights))
         self.moves = np.ones(share.size)
         self.moves[equation.held] = 0.0
@@ -65,13 +58,6 @@ class Convergence:
         c.weight, c.residual = self._norm[1], self._at_r
         c.lengths, c.moves, c.space, c.change, c.diagonal = self._alive
         c.most, c.least = newton.max_iterations, least
-
-    def _force_weights(self) -> Array:
-        """Weights of residuals: 1 of forces, 1 over the size of the scene of moments."""
-        weights = np.ones(self._share.size)
-        weights[self._share.rotations()] = 1 / self._share.grid.scene.size
-        weights[self._share.multipliers()] = 0.0
-        return weights[: self._share.num_owned].copy()
 
     # -- sizes ---------------------------------------------------------------------------------
 

@@ -265,7 +265,7 @@ typedef struct {
   int held, zeros; /* degrees of freedom and entries that supports hold */
   const int32_t *hold, *zero, *pivot; /* pivot: the entry of each that is held on the diagonal */
   double *reactions, *pivots;
-  int idle; /* motions that the tangent holds, their entries and stiffnesses, see idle_motions.py */
+  int idle; /* motions that the tangent holds, their entries and stiffnesses, see null_vectors.py */
   const int32_t *idle_entry;
   const double *idle_stiffness;
 
