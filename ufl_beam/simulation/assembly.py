@@ -24,7 +24,7 @@ from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.c_equation import CEquation
 from ufl_beam.solvers.equation import Equation
 from ufl_beam.terms.algorithmic_damping import numerical_forces
-from ufl_beam.terms.base import Cells, Term
+from ufl_beam.terms.base import Term
 from ufl_beam.terms.beams import ElasticBeams, Inertia
 from ufl_beam.terms.connector_responses import Setting
 from ufl_beam.terms.connectors import couplings
@@ -38,6 +38,7 @@ from ufl_beam.terms.material_points import expect_entries
 from ufl_beam.terms.openings import Openable, Openings, SearchFlags
 from ufl_beam.terms.rotating_frame import FrameForces
 from ufl_beam.terms.supports import Supports
+from ufl_beam.terms.tangent_derivatives import Cells
 
 Loads = list[DeadLoads | FollowerLoads | FrameForces]
 

@@ -73,9 +73,6 @@ class SecondDifferences(OfForms):
         e1 = self._strains(q1)
         self._change, self._q, self._e, self._last_dt = e1 - self._e, q1, e1, self._dt
 
-    def add_state(self, q: Array) -> None:
-        """Add nothing: no energy is stored in the scene."""
-
     def remember(self, memory: Memory, q: Array) -> None:
         """The changes of the strains in the last step, and its length."""
         self._change = memory.rows("changes of strains", self._cells, self._change)

@@ -57,7 +57,8 @@ class Response:
     in_c: Mapping[str, Any] = {}
     """Data of laws that C evaluates, by their names in ``couplings`` of loops.h."""
 
-    _links: Sequence[Connector]
+    def __init__(self, links: Sequence[Connector]) -> None:
+        self._links = links
 
     @property
     def openable(self) -> Openable | None:
@@ -77,13 +78,9 @@ class Response:
         raise NotImplementedError
 
     def about_force(self, rows: Array) -> Array:
-        """Factor by which rows about the force are divided, zero for rows about the motion.
+        """Factors by which rows about the force are divided, zero for rows about the motion.
 
-        Args:
-            rows: The latest ones that Python has put; (num_links, 3).
-
-        Returns:
-            Shape (num_links,).
+        ``rows`` are the latest ones that Python has put; (num_links, 3).
         """
         raise NotImplementedError
 
@@ -150,8 +147,9 @@ class Working(Response):
     _sign = 1.0
 
     def __init__(self, law: Any, links: Sequence[Connector], setting: Setting) -> None:
+        super().__init__(links)
         self._laws: list[Any] = [link.law for link in links]
-        self._links, self._setting = links, setting
+        self._setting = setting
         self._entries = getattr(setting.ledger, self._group)
         if self._entry:
             self._entries[self._entry] += 0.0

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from functools import singledispatch
-from typing import Protocol
 
 import numpy as np
 import ufl
@@ -13,20 +12,14 @@ from ufl_beam.arrays import Array
 from ufl_beam.compiled.csr import Csr, StepProduct
 from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
-from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.kinematics import strain, virtual_strain
-from ufl_beam.mechanics.time_schemes import DynamicScheme, Rates, Scheme, Step
+from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.damping import KelvinVoigt, Rayleigh
 from ufl_beam.terms.base import OfForms, OfMatrix, Term
+from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.energy_ledger import Ledger
-
-
-class Inertia(Rates, Protocol):
-    """Velocities of a scene in motion, and its scheme."""
-
-    scheme: DynamicScheme
 
 
 @singledispatch
@@ -73,12 +66,6 @@ class KelvinVoigtForces(OfForms):
         """Enter the energy that was damped."""
         self._ledger.lost["damping"] += self._lost.value(q1)
 
-    def add_state(self, q: Array) -> None:
-        """Add nothing: damping stores no energy."""
-
-    def remember(self, memory: Memory, q: Array) -> None:
-        """Save nothing: damping has no internal variables."""
-
 
 @stated
 def _reference_stiffness(of: Element) -> ufl.Form:
@@ -110,12 +97,6 @@ class RayleighForces(OfMatrix):
         """Enter the energy that was damped."""
         self._ledger.lost["damping"] += self._times.square(s) / self._dt
 
-    def add_state(self, q: Array) -> None:
-        """Add nothing: damping stores no energy."""
-
-    def remember(self, memory: Memory, q: Array) -> None:
-        """Save nothing: damping has no internal variables."""
-
 
 @damping_forces.register
 def _rayleigh(
@@ -144,12 +125,8 @@ def _kelvin_voigt(
     ledger.lost["damping"] += 0.0
     grid = fields.share.grid
     beams = grid.scene.beams if damping.beams is None else damping.beams
-    cells = [
-        cell
-        for beam in beams
-        for cell, hinge in zip(grid.cells_of(beam), grid.hinges(beam), strict=True)
-        if hinge is None
-    ]
+    pairs = (zip(grid.cells_of(beam), grid.hinges(beam), strict=True) for beam in beams)
+    cells = [cell for of_beam in pairs for cell, hinge in of_beam if hinge is None]
     part = np.flatnonzero(np.isin(fields.share.cells, cells))
     if not len(part):
         return []

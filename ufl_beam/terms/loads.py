@@ -19,23 +19,12 @@ from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.bodies import carries
 from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad
 from ufl_beam.model.time_functions import value_at
+from ufl_beam.terms.base import LoadTerm
 from ufl_beam.terms.energy_ledger import Ledger
 
 
-class DeadLoads:
-    """Forces and moments that keep their direction: vectors times functions of time.
-
-    Args:
-        loads: What acts; all but follower loads.
-        share: The degrees of freedom of this process.
-        scheme: Says which forces do the work of a step.
-        ledger: Takes their work.
-
-    Attributes:
-        force: The loads in the equation of the step.
-    """
-
-    kind = "loads"
+class DeadLoads(LoadTerm):
+    """Forces and moments that keep their direction: vectors times functions of time."""
 
     def __init__(self, loads: Sequence[Load], share: Share, scheme: Scheme, ledger: Ledger) -> None:
         # Loads of one time function are one vector; functions need not be hashable.
@@ -90,17 +79,11 @@ class DeadLoads:
         """Subtract the loads from the residual."""
         r -= self.force
 
-    def add_tangent(self, q1: Array) -> None:
-        """Dead loads do not depend on the configuration."""
-
     def accept(self, q1: Array, s: Array) -> None:
         """Work of the loads."""
         if any(self._factors) or self._before is not self.force:
             self._ledger.supplied["loads"] += float(self._acting(self._before, self.force) @ s)
             self._before = self._end
-
-    def add_state(self, q: Array) -> None:
-        """Loads hold no energy; what a potential would hold is in their work."""
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The forces at the end of the last step."""
@@ -108,21 +91,8 @@ class DeadLoads:
         self._factors = []
 
 
-class FollowerLoads:
-    """Forces that turn with the cross-section they act on.
-
-    Args:
-        loads: What acts.
-        share: The degrees of freedom of this process.
-        scheme: Says where in the step loads act, and which forces do the work of a step.
-        ledger: Takes their work.
-        A: Matrix that takes the tangent.
-
-    Attributes:
-        force: The loads in the latest residual.
-    """
-
-    kind = "loads"
+class FollowerLoads(LoadTerm):
+    """Forces that turn with the cross-section they act on."""
 
     def __init__(
         self, loads: Sequence[FollowerLoad], share: Share, scheme: Scheme, ledger: Ledger, A: Csr
@@ -175,9 +145,6 @@ class FollowerLoads:
         x, y = self._sizes[:, 0], self._sizes[:, 1]
         return cos * x - sin * y, sin * x + cos * y
 
-    def loops(self) -> None:
-        """None: follower loads are evaluated in Python."""
-
     def add_residual(self, q1: Array, r: Array) -> None:
         """Subtract the loads from the residual."""
         self.force = self._in_plane(q1)
@@ -193,9 +160,6 @@ class FollowerLoads:
         """Work of the loads."""
         self._ledger.supplied["loads"] += float(self._acting(self._before, self.force) @ s)
         self._before, self._sizes_before = self.force, self._sizes_at_end
-
-    def add_state(self, q: Array) -> None:
-        """Loads hold no energy; what a potential would hold is in their work."""
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The forces in the equation of the last step."""

@@ -14,6 +14,7 @@ from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.kinematics import split, turn
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.loads import RotatingFrame
+from ufl_beam.terms.base import LoadTerm
 from ufl_beam.terms.energy_ledger import Ledger
 
 
@@ -36,23 +37,11 @@ def turned_mass_matrix(fields: Fields) -> Csr:
     return G
 
 
-class FrameForces:
+class FrameForces(LoadTerm):
     """Centrifugal and Coriolis forces; the first have a potential, the second do no work.
 
     Rotary inertia keeps its spin in steady rotation, so no moments come of it.
-
-    Args:
-        frame: Rate and centre.
-        fields: The cells and degrees of freedom of this process.
-        scheme: Says where in a step forces act, and which do its work.
-        ledger: Takes the work.
-        A: Matrix that takes the tangent.
-
-    Attributes:
-        force: The centrifugal forces in the latest residual.
     """
-
-    kind = "loads"
 
     def __init__(
         self, frame: RotatingFrame, fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr
@@ -84,9 +73,6 @@ class FrameForces:
         self.force = self._before = self._pull(self._from_centre + q)
         return self.force
 
-    def loops(self) -> None:
-        """None: frame forces are evaluated in Python."""
-
     def add_residual(self, q1: Array, r: Array) -> None:
         """Subtract centrifugal and Coriolis forces from the residual."""
         q: Array = self._q0 + self._share_of_end * (q1 - self._q0)
@@ -103,9 +89,6 @@ class FrameForces:
         """Work of the centrifugal forces."""
         self._ledger.supplied["loads"] += float(self._acting(self._before, self.force) @ s)
         self._before, self._grown = self.force, self._growth_at_end
-
-    def add_state(self, q: Array) -> None:
-        """Loads hold no energy; what a potential would hold is in their work."""
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The forces in the equation of the last step, and how much of them acts."""
