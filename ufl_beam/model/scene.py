@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, singledispatch
 
@@ -16,9 +16,9 @@ from ufl_beam.model.bodies import GROUND, Anchor, Body, Member, Place, Spot, car
 from ufl_beam.model.connector_laws import Actuator, Bearing, Coulomb, Motor
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import enclosing_diameter
-from ufl_beam.model.damping import Damping, KelvinVoigt, Rayleigh
+from ufl_beam.model.damping import Damping, KelvinVoigt
 from ufl_beam.model.joints import Joint
-from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame
+from ufl_beam.model.loads import FollowerLoad, LineLoad, Load, PointLoad, RotatingFrame
 from ufl_beam.model.masses import PointMass, Velocity
 from ufl_beam.model.plastic_hinges import NodeDof, merged, plastic_hinges, shared_by_joints
 from ufl_beam.model.supports import COMPONENTS, Support
@@ -62,15 +62,19 @@ class Scene:
     connectors: Sequence[Connector] = ()
 
     def __post_init__(self) -> None:
-        for part in (
-            "beams", "joints", "supports", "loads", "masses", "initial", "damping", "bodies",
-            "connectors",
-        ):  # fmt: skip
+        kinds: dict[str, type | tuple[type, ...]] = {
+            "beams": Beam, "joints": Joint, "supports": Support, "loads": Load.__args__,
+            "masses": PointMass, "initial": Velocity, "damping": Damping.__args__, "bodies": Body,
+            "connectors": Connector,
+        }  # fmt: skip
+        for part in kinds:
             records = require_sequence(getattr(self, part), f"Scene: {part}")
             object.__setattr__(self, part, records)
         if not self.beams and not self.bodies:
             raise SceneError("Scene: no beams and no bodies")
-        _require_kinds(self)
+        for part, kind in kinds.items():
+            for i, record in enumerate(getattr(self, part)):
+                require_kind(record, kind, f"Scene: {part}[{i}]")
         known: dict[Beam | Body, str] = {GROUND: "ground"}
         for part in ("beams", "bodies"):
             for i, one in enumerate(getattr(self, part)):
@@ -313,20 +317,3 @@ def _(load: PointLoad) -> tuple[Connector, ...]:
         push("parting", y, (0.0, 1.0)),
         *((push("turning", moment),) if moment else ()),
     )
-
-
-def _require_kinds(scene: Scene) -> None:
-    kinds: tuple[tuple[str, Iterable[object], tuple[type, ...]], ...] = (
-        ("beams", scene.beams, (Beam,)),
-        ("joints", scene.joints, (Joint,)),
-        ("supports", scene.supports, (Support,)),
-        ("loads", scene.loads, (PointLoad, FollowerLoad, LineLoad, Gravity, RotatingFrame)),
-        ("masses", scene.masses, (PointMass,)),
-        ("initial", scene.initial, (Velocity,)),
-        ("damping", scene.damping, (Rayleigh, KelvinVoigt)),
-        ("bodies", scene.bodies, (Body,)),
-        ("connectors", scene.connectors, (Connector,)),
-    )
-    for name, records, kind in kinds:
-        for i, record in enumerate(records):
-            require_kind(record, kind, f"Scene: {name}[{i}]")

@@ -24,25 +24,15 @@ Rows = tuple[Any, Any, Any]
 
 
 class Setting(NamedTuple):
-    """Arguments that all responses are made with.
+    """Arguments that all responses are made with."""
 
-    Attributes:
-        asked: Forces of controllers, and limits of friction, in the present step; N or N m.
-        rates: Rates of relative motions with friction as the step begins; m/s or rad/s.
-        size: Size of the scene; m.
-        scheme: Says what acts in a step.
-        ledger: Takes energies and works.
-        friction_repeats: Whether places that stick may hold what is held already.
-        search: Flags that all points of the scene share.
-    """
-
-    asked: Mapping[Connector, float]
-    rates: Mapping[Connector, float]
-    size: float
+    asked: Mapping[Connector, float]  # forces of controllers, limits of friction; N or N m
+    rates: Mapping[Connector, float]  # of motions with friction as the step begins; m/s or rad/s
+    size: float  # of the scene; m
     scheme: Scheme
     ledger: Ledger
-    friction_repeats: bool
-    search: SearchFlags
+    friction_repeats: bool  # True if places that stick may hold what is held already
+    search: SearchFlags  # of all points of the scene
 
 
 class Response:

@@ -27,18 +27,13 @@ class TurnedAxes:
         self._rows = [slice(A.indptr[d], A.indptr[d + 1]) for d in dofs]
         self._columns = [np.flatnonzero(A.indices == d) for d in dofs]
 
-    def enter(self, x: Array) -> None:
-        """Transform from the axes of the plane to the turned axes, in place."""
-        i, j, c, s = self._i, self._j, self._c, self._s
+    def turn(self, x: Array, way: int) -> None:
+        """Transform to the turned axes (1) or to the axes of the plane (-1), in place."""
+        i, j, c, s = self._i, self._j, self._c, way * self._s
         x[i], x[j] = c * x[i] + s * x[j], c * x[j] - s * x[i]
 
-    def leave(self, x: Array) -> None:
-        """Transform from the turned axes to the axes of the plane, in place."""
-        i, j, c, s = self._i, self._j, self._c, self._s
-        x[i], x[j] = c * x[i] - s * x[j], c * x[j] + s * x[i]
-
-    def enter_matrix(self, data: Array) -> None:
-        """Rows and columns of a matrix to the turned axes, in place."""
+    def turn_matrix(self, data: Array) -> None:
+        """Transform rows and columns of a matrix to the turned axes, in place."""
         c, s = self._c, self._s
         # Both dofs belong to the same cells, so their rows, and their columns, have one sparsity.
         for i, j in (self._rows, self._columns):
@@ -102,12 +97,12 @@ class Supports:
     def enter(self, x: Array) -> None:
         """Transform from the axes of the plane to those of the supports, in place."""
         for axes in self._turned:
-            axes.enter(x)
+            axes.turn(x, 1)
 
     def leave(self, x: Array) -> None:
         """Transform from the axes of the supports to those of the plane, in place."""
         for axes in self._turned:
-            axes.leave(x)
+            axes.turn(x, -1)
 
     def in_axes(self, q: Array) -> Array:
         """``q`` in the axes of the supports; a copy only if an axis is turned."""
@@ -140,7 +135,7 @@ class Supports:
     def hold_matrix(self, data: Array) -> None:
         """Turn a tangent into the axes of the supports and hold what is held."""
         for axes in self._turned:
-            axes.enter_matrix(data)
+            axes.turn_matrix(data)
         if len(self.dofs):
             # What stands on the diagonal has the right dimension and size for what is held.
             # Where material that flows freely leaves nothing, what stood there before does as well.
