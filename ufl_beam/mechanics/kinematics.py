@@ -94,7 +94,7 @@ def strain(q: Expr, axis: Axis) -> Expr:
 
 
 def virtual_strain(q: Expr, w: Expr, axis: Axis) -> Expr:
-    """Variation of :func:`strain` at ``q`` in the direction ``w``, (w_u, w_ψ); P(21), pulled back."""
+    """Variation of :func:`strain` at ``q`` in the direction ``w`` (w_u, w_ψ); P(21) pulled back."""
     (u, ψ), (w_u, w_ψ) = split(q), split(w)
     w_Σ, w_Γ = _pull_back(axis.d(w_u) - turn(axis.t0 + axis.d(u)) * w_ψ, ψ, axis)  # P(21)
     return ufl.as_vector([w_Σ, w_Γ, axis.d(w_ψ)])

@@ -46,23 +46,12 @@ class Step(NamedTuple):
 class Scheme(Protocol):
     """Protocol of time schemes."""
 
-    dynamic: bool
-    """True if the scene has inertia."""
-
-    advice: str
-    """Advice where a step finds no equilibrium."""
-
-    load_weight: float
-    """Follower loads turn with the rotation at this part of the step."""
-
-    theta: float
-    """Laws of inelastic material are stated at this part of the step."""
-
-    slack: float
-    """A step is cut if its forces do not account for this part of what it stores and dissipates."""
-
-    loss: float
-    """Part of twice the energy of a change of strain that is lost numerically."""
+    dynamic: bool  # True if the scene has inertia
+    advice: str  # where a step finds no equilibrium
+    load_weight: float  # part of the step at whose rotation follower loads act
+    theta: float  # part of the step at which laws of inelastic material are stated
+    slack: float  # part of what a step stores and dissipates that its forces may not account for
+    loss: float  # part of twice the energy of a change of strain that is lost numerically
 
     def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
         """The step from ``t0`` to ``t1``, perhaps a part of one that goes on to ``end``."""
@@ -113,17 +102,10 @@ class Rates(Protocol):
 class DynamicScheme(Scheme, Protocol):
     """Protocol of time schemes with inertia."""
 
-    kept: tuple[str, ...]
-    """Names of the rates that it keeps besides the velocities, such as accelerations."""
-
-    slips: bool
-    """True if it loses energy by :meth:`slip`."""
-
-    has_mean_velocity: bool
-    """True if a step has a mean velocity in its equation; friction and rotating frames need it."""
-
-    rings: bool
-    """True if the accelerations of a motion that is given oscillate for ever."""
+    kept: tuple[str, ...]  # names of the rates kept besides velocities, such as accelerations
+    slips: bool  # True if it loses energy by :meth:`slip`
+    has_mean_velocity: bool  # in the equation of a step; friction and rotating frames need it
+    rings: bool  # True if the accelerations of a motion that is given oscillate for ever
 
     def half_tangents(self, rotations: Index) -> Index:
         """Rotations whose nodal step is 2 tan(Δψ/2); for the others it is Δψ."""

@@ -27,7 +27,6 @@ from ufl_beam.model.connector_laws import (
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import Point
 from ufl_beam.model.loads import RotatingFrame
-from ufl_beam.model.masses import PointMass
 from ufl_beam.model.plastic_hinges import NodeDof, shared_by_joints
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.time_functions import value_at
@@ -61,7 +60,12 @@ def require_inertia(scene: Scene) -> None:
     loose = _without_inertia(scene)
     if not loose:
         return
-    masses = [(one.place, c) for one in scene.masses for c in range(3) if _weighs(one, c)]
+    masses = [
+        (one.place, component)
+        for one in scene.masses
+        for component, inertia in enumerate((one.mass, one.mass, one.inertia))
+        if inertia
+    ]
     rows = _constraints(scene, _determines, masses)
     free = _null_space(csr_array(rows[:, loose]))
     if free.shape[1] == 0:
@@ -86,11 +90,6 @@ def _without_inertia(scene: Scene) -> list[int]:
     for i, (mass, inertia) in enumerate((*beams, *bodies)):
         loose += [3 * i, 3 * i + 1] * bool(mass == 0.0) + [3 * i + 2] * bool(inertia == 0.0)
     return loose
-
-
-def _weighs(mass: PointMass, component: int) -> bool:
-    """Return true if a point mass has inertia in a component of motion."""
-    return bool(mass.inertia if component == 2 else mass.mass)
 
 
 def _determines(link: Connector) -> bool:
@@ -177,7 +176,8 @@ def _demands(scene: Scene, laws: tuple[type, ...]) -> list[Demand]:
             unit = (1.0, 1.0, 1.0 if link.turns else 1 / scene.size)
             pairs = zip((link.a, link.b), link.rigidly(), strict=True)
             factors = [(node(at), c, f[c] * unit[c]) for at, f in pairs for c in range(3)]
-            demands.append((_owner(scene, link), free(factors)))
+            owner = next((joint for joint in scene.joints if link in joint.holders), link)
+            demands.append((str(owner), free(factors)))
     for support in scene.supports:
         if support.angle:
             of, cos, sin = node(support.place), math.cos(support.angle), math.sin(support.angle)
@@ -185,13 +185,6 @@ def _demands(scene: Scene, laws: tuple[type, ...]) -> list[Demand]:
             for c in support.held.keys() & rows.keys():
                 demands.append((str(support), free((of, k, rows[c][k]) for k in range(2))))
     return demands
-
-
-def _owner(scene: Scene, link: Connector) -> str:
-    for joint in scene.joints:
-        if link in joint.holders:
-            return str(joint)
-    return str(link)
 
 
 def require_no_mechanism(scene: Scene) -> None:
@@ -226,24 +219,15 @@ RESISTING = (Motor, Guide, Spring, ForceLaw, RigidPlastic)
 """Laws of connectors that resist every motion; others bear nothing, or what they are told."""
 
 
-def _resists(link: Connector) -> bool:
-    return isinstance(link.law, RESISTING)
-
-
 def _constraints(
     scene: Scene,
-    acts: Callable[[Connector], bool] = _resists,
+    acts: Callable[[Connector], bool] = lambda link: isinstance(link.law, RESISTING),
     also: Iterable[tuple[Anchor, int]] = (),
 ) -> csr_array:
     """Rows that joints, supports and connectors make of (u, v, size ψ) of all parts.
 
-    Args:
-        scene: What is modelled.
-        acts: Whether a connector makes a row.
-        also: More places with a component of motion that makes a row.
-
-    Returns:
-        A matrix of shape (constraints, 3 parts).
+    A connector makes a row if it ``acts``, and so do the components of motion that are there
+    ``also``.  The shape is (constraints, 3 parts).
     """
     number = {part: i for i, part in enumerate(_parts(scene))}
     entries: list[tuple[int, int, float]] = []

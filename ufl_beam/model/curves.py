@@ -83,11 +83,7 @@ def between(p: Point, q: Point, s: float) -> Point:
 
 
 def point_of(curve: Curve, s: float, what: str) -> Point:
-    """Evaluate a curve of a user.
-
-    Raises:
-        SceneError: It fails there, or returns no pair of finite numbers; the message has ``what``.
-    """
+    """Evaluate a curve of a user, or raise :class:`SceneError` naming ``what``."""
     require_function(curve, what, "s that returns (x, y)")
     try:
         point = curve(s)

@@ -9,9 +9,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ufl_beam.array_checks import require_array
 from ufl_beam.arrays import Array
-from ufl_beam.errors import SceneError, require_count, require_kind
+from ufl_beam.errors import SceneError, require_array, require_count, require_kind
 from ufl_beam.model.law_functions import Values
 from ufl_beam.model.material_laws import Bulk, BulkLaw, Softening, require_bulk_law
 

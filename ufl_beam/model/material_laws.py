@@ -124,11 +124,8 @@ class Bulk(ABC):
 class BulkLaw(ABC):
     """Base of records of laws of the bulk, such as :class:`Hardening`."""
 
-    statement: ClassVar[type[Bulk]]
-    """The law of many points."""
-
-    limit: Any
-    """Yield stress, a number or a distribution; infinite if the bulk stays elastic."""
+    statement: ClassVar[type[Bulk]]  # the law of many points
+    limit: Any  # yield stress, a number or a distribution; infinite if the bulk stays elastic
 
     @abstractmethod
     def numbers(self, C: Values) -> dict[str, Any]:

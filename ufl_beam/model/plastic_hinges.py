@@ -73,7 +73,7 @@ def plastic_hinges(
 
     Args:
         may_have: Laws of the hinges that the beams may have, by place.
-        joints: Its joints.
+        joints: Joints of the scene.
         bearing: Places where supports, connectors or masses bear a moment.
         loaded: Places where loads are moments.
     """
@@ -103,22 +103,14 @@ def plastic_hinges(
 
 
 def law_of(link: Connector) -> HingeLaw:
-    """Return the law of a plastic hinge, or of another rigid-plastic connector.
-
-    Raises:
-        SceneError: The connector follows another law.
-    """
+    """Return the law of a plastic hinge, or of another rigid-plastic connector."""
     if not isinstance(link.law, RigidPlastic):
         raise SceneError(f"{link}: its law is not rigid-plastic")
     return link.law.law
 
 
 def place_of(hinge: Connector) -> Place:
-    """Return the place of a plastic hinge, on the side that joints and loads are attached to.
-
-    Raises:
-        SceneError: The connector does not act between places of beams.
-    """
+    """Return the place of a plastic hinge, on the side that joints and loads are attached to."""
     if not isinstance(hinge.a, Place):
         raise SceneError(f"{hinge}: it is not a plastic hinge of a beam")
     return hinge.a.beam.at(hinge.a.s)

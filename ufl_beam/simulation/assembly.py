@@ -23,12 +23,11 @@ from ufl_beam.simulation.branch_check import StaticPath
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.c_equation import CEquation
 from ufl_beam.solvers.equation import Equation
-from ufl_beam.terms.algorithmic_damping import numerical_forces
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.beams import ElasticBeams, Inertia
 from ufl_beam.terms.connector_responses import Setting
 from ufl_beam.terms.connectors import couplings
-from ufl_beam.terms.damping import damping_forces
+from ufl_beam.terms.damping import damping_forces, numerical_forces
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.guide_curves import guides
 from ufl_beam.terms.inelastic_beams import InelasticBeams, inelastic_cells

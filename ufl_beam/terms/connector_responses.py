@@ -41,11 +41,8 @@ class Response:
     By default nothing is stored, yields or is remembered.
     """
 
-    steady = False
-    """True if the rows stay the same during a step."""
-
-    in_c: Mapping[str, Any] = {}
-    """Data of laws that C evaluates, by their names in ``couplings`` of loops.h."""
+    steady = False  # True if the rows stay the same during a step
+    in_c: Mapping[str, Any] = {}  # data of laws evaluated in C, by names in ``couplings``, loops.h
 
     def __init__(self, links: Sequence[Connector]) -> None:
         self._links = links

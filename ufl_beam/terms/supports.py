@@ -106,19 +106,15 @@ class Supports:
 
     def in_axes(self, q: Array) -> Array:
         """``q`` in the axes of the supports; a copy only if an axis is turned."""
-        if not self._turned:
-            return q
-        x = q.copy()
-        self.enter(x)
-        return x
+        if self._turned:
+            self.enter(q := q.copy())
+        return q
 
     def in_plane(self, x: Array) -> Array:
         """``x`` in the axes of the plane; a copy only if an axis is turned."""
-        if not self._turned:
-            return x
-        q = x.copy()
-        self.leave(q)
-        return q
+        if self._turned:
+            self.leave(x := x.copy())
+        return x
 
     def move(self, x: Array, x0: Array, step: Step) -> None:
         """Set in ``x`` what is prescribed for the step that begins at ``x0``."""
