@@ -72,9 +72,7 @@ def require_inertia(scene: Scene) -> None:
         return
     mode = np.zeros(rows.shape[1])
     mode[loose] = free[:, 0] / np.abs(free[:, 0]).max()
-    mode = mode.reshape(-1, 3)
-    moving = [i for i in range(len(mode)) if np.abs(mode[i]).max() > 1e-6]
-    parts = "; ".join(_describe(scene, i, mode[i]) for i in moving[:4])
+    parts = "; ".join(_moving(scene, mode)[:4])
     raise SceneError(
         f"dynamics needs mass or something that holds: {parts}, without mass (rhoA or mass = "
         "0), and nothing determines this motion. Give it mass (a section rho or rhoA), or hold or "
@@ -196,14 +194,12 @@ def require_no_mechanism(scene: Scene) -> None:
     free = _null_space(_constraints(scene))
     if free.shape[1] == 0:
         return
-    mode = free[:, 0].reshape(-1, 3) / np.abs(free[:, 0]).max()
-    moving = [i for i in range(len(mode)) if np.abs(mode[i]).max() > 1e-6]
-    parts = "; ".join(_describe(scene, i, mode[i]) for i in moving[:4])
+    moving = _moving(scene, free[:, 0] / np.abs(free[:, 0]).max())
     more = f"; and {len(moving) - 4} more" if len(moving) > 4 else ""
     ways = "way" if free.shape[1] == 1 else "independent ways"
     raise SceneError(
         f"the scene is free to move in {free.shape[1]} {ways}, so statics has no unique answer: "
-        f"{parts}{more}. Add supports or joints, or run dynamics (Midpoint)"
+        f"{'; '.join(moving[:4])}{more}. Add supports or joints, or run dynamics (Midpoint)"
     )
 
 
@@ -287,6 +283,12 @@ def _null_space(constraints: csr_array) -> Array:
     gram = (constraints.T @ constraints).tocsc()
     values, vectors = eigsh(gram, k=6, sigma=-1e-9, which="LM", v0=np.ones(unknowns))
     return np.asarray(vectors[:, values < 1e-13 * abs(gram).max()])
+
+
+def _moving(scene: Scene, mode: Array) -> list[str]:
+    """Describe the motions of the parts that move in a mode."""
+    motions = enumerate(mode.reshape(-1, 3))
+    return [_describe(scene, i, motion) for i, motion in motions if np.abs(motion).max() > 1e-6]
 
 
 def _describe(scene: Scene, number: int, mode: Array) -> str:

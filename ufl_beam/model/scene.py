@@ -277,16 +277,13 @@ class Scene:
 
     def _require_single_supports(self) -> None:
         same = self.representatives
-        holders: dict[NodeDof, str] = {}
-        dof: NodeDof
-        for component in (0, 1, 2):
-            dof = (GROUND, component)
-            holders[same.get(dof, dof)] = "the ground"
+        fixed: list[NodeDof] = [(GROUND, component) for component in range(3)]
+        holders = {same.get(dof, dof): "the ground" for dof in fixed}
         for support in self.supports:
             # A support in turned axes takes both displacements of its place.
             components = {*support.held, *((0, 1) if support.angle else ())}
             for component in sorted(components):
-                dof = (node(support.place), component)
+                dof: NodeDof = (node(support.place), component)
                 dof = same.get(dof, dof)
                 if dof in holders:
                     raise SceneError(

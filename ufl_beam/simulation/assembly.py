@@ -13,6 +13,7 @@ from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import NOWHERE, Restoring, Saving, State
+from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.connector_laws import Controller, Coulomb, Running
 from ufl_beam.model.connectors import Connector
@@ -27,7 +28,7 @@ from ufl_beam.terms.base import Term
 from ufl_beam.terms.beams import ElasticBeams, Inertia
 from ufl_beam.terms.connector_responses import Setting
 from ufl_beam.terms.connectors import couplings
-from ufl_beam.terms.damping import damping_forces, numerical_forces
+from ufl_beam.terms.damping import SecondDifferences, damping_forces
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.guide_curves import guides
 from ufl_beam.terms.inelastic_beams import InelasticBeams, inelastic_cells
@@ -182,7 +183,8 @@ def assemble(share: Share, scheme: Scheme, v: Array, together: Agreement) -> Ass
         part = np.flatnonzero(elastic)
         on_part = fields if elastic.all() else Fields(share, part)
         beams.append(ElasticBeams(on_part, *setting))
-        numerical = numerical_forces(scheme, on_part, A, ledger)
+        if isinstance(scheme, DecayingMidpoint):
+            numerical.append(SecondDifferences(scheme, on_part, A, ledger))
 
     asked = {link: 0.0 for link in scene.links if isinstance(link.law, Controller | Coulomb)}
     rates = dict(asked)

@@ -27,10 +27,10 @@ from ufl_beam.terms.energy_ledger import Ledger
 
 @singledispatch
 def damping_forces(
-    damping: object, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger, inertia: Inertia | None
+    of: object, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger, inertia: Inertia | None
 ) -> list[Term]:
     """Forces of one kind of damping on the cells of a process; none if it has no such cells."""
-    raise TypeError(f"{damping!r} is not a damping")
+    raise TypeError(f"{of!r} is not a damping")
 
 
 @stated
@@ -102,47 +102,31 @@ class RayleighForces(OfMatrix):
 
 
 @damping_forces.register
-def _rayleigh(
-    damping: Rayleigh,
-    fields: Fields,
-    scheme: Scheme,
-    A: Csr,
-    ledger: Ledger,
-    inertia: Inertia | None,
+def _(
+    of: Rayleigh, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger, inertia: Inertia | None
 ) -> list[Term]:
     if inertia is None:
         raise SceneError("Rayleigh: it damps velocities, and statics has none; use KelvinVoigt")
     ledger.lost["damping"] += 0.0
-    return [RayleighForces(damping, fields, A, ledger, inertia)]
+    return [RayleighForces(of, fields, A, ledger, inertia)]
 
 
 @damping_forces.register
-def _kelvin_voigt(
-    damping: KelvinVoigt,
-    fields: Fields,
-    scheme: Scheme,
-    A: Csr,
-    ledger: Ledger,
-    inertia: Inertia | None,
+def _(
+    of: KelvinVoigt, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger, inertia: Inertia | None
 ) -> list[Term]:
     ledger.lost["damping"] += 0.0
     grid = fields.share.grid
-    beams = grid.scene.beams if damping.beams is None else damping.beams
+    beams = grid.scene.beams if of.beams is None else of.beams
     pairs = (zip(grid.cells_of(beam), grid.hinges(beam), strict=True) for beam in beams)
     cells = [cell for of_beam in pairs for cell, hinge in of_beam if hinge is None]
     part = np.flatnonzero(np.isin(fields.share.cells, cells))
     if not len(part):
         return []
-    return [KelvinVoigtForces(damping, Fields(fields.share, part), scheme, A, ledger)]
+    return [KelvinVoigtForces(of, Fields(fields.share, part), scheme, A, ledger)]
 
 
 # -- of schemes ----------------------------------------------------------------------------------
-
-
-@singledispatch
-def numerical_forces(scheme: object, fields: Fields, A: Csr, ledger: Ledger) -> list[Term]:
-    """Forces of elastic cells that only the scheme asks for; for most schemes none."""
-    return []
 
 
 @stated
@@ -195,8 +179,3 @@ class SecondDifferences(OfForms):
         self._change = memory.rows("changes of strains", self._cells, self._change)
         self._last_dt = memory.number("step of strains", self._last_dt)
         self._q, self._e = q, self._strains(q)
-
-
-@numerical_forces.register
-def _(scheme: DecayingMidpoint, fields: Fields, A: Csr, ledger: Ledger) -> list[Term]:
-    return [SecondDifferences(scheme, fields, A, ledger)]
