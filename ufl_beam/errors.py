@@ -53,14 +53,7 @@ class ModelWarning(UserWarning):
 
 
 class StepFailed(Exception):
-    """No equilibrium was found for a step; the message says why.
-
-    Attributes:
-        residuals: What is left where it is largest in each beam, body and connector; N, moments
-            over the size of the scene.
-        reason: Name that PETSc has for why its solver stopped, such as "DIVERGED_MAX_IT"; empty if
-            it did not fail.
-    """
+    """No equilibrium was found for a step; attributes are as in :class:`ConvergenceError`."""
 
     def __init__(self, message: str) -> None:
         super().__init__(message)
@@ -175,12 +168,7 @@ def clip(text: str) -> str:
 
 
 def as_float(value: object) -> float:
-    """Convert a real number, also one of NumPy, to ``float``; text and arrays are refused.
-
-    Raises:
-        TypeError, ValueError: Not a real number.
-        OverflowError: An integer beyond the range of ``float``.
-    """
+    """Convert a real number, also one of NumPy, to ``float``; text and arrays are refused."""
     scalar: Any = value
     if getattr(scalar, "ndim", None) == 0:
         scalar = scalar.item()

@@ -299,13 +299,9 @@ class RigidPlastic:
 
 @dataclass(frozen=True)
 class Guide:
-    """The point stays on a curve of the plane, free along it; see :func:`Guided`.
+    """The point stays on a curve of the plane, free along it; see :func:`Guided`."""
 
-    Args:
-        curve: ``s -> (x, y)``, smooth, for all s that the motion may reach; m.
-    """
-
-    curve: Curve
+    curve: Curve  # ``s -> (x, y)``, smooth, for all s that the motion may reach; m
 
     def __post_init__(self) -> None:
         require_function(self.curve, "Guide: curve", "s that returns (x, y)")

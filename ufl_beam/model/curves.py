@@ -129,10 +129,9 @@ def parameter_step(curve: Curve, s: float, length: float) -> float:
 
 
 def nearest(curve: Curve, point: Array, s: float, step: float, length: float) -> float:
-    """Parameter of the point of a curve that is nearest to another; not a number if none is found.
+    """Parameter of the point of a curve nearest to another, from ``s`` on; NaN if none is found.
 
-    The search begins at ``s``; ``step`` is that of :func:`tangent`, ``length`` the size of what the
-    curve guides; m.
+    ``step`` is that of :func:`tangent`, ``length`` the size of what the curve guides; m.
     """
     last_digits = 4 * np.spacing(length + math.hypot(*point))
     for _ in range(PROJECTIONS):

@@ -43,11 +43,7 @@ class Layout:
 
     @cached_property
     def statement(self) -> type[Bulk]:
-        """The law that points of the bulk follow, with numbers of their own.
-
-        Raises:
-            SceneError: They follow laws of different kinds.
-        """
+        """The law of one kind that points of the bulk follow, with numbers of their own."""
         laws = [law for law, _ in self.laws if law.limit != np.inf] or [self.laws[0][0]]
         kinds = dict.fromkeys(type(law) for law in laws)
         if len(kinds) > 1:

@@ -82,14 +82,10 @@ class Bulk(ABC):
     The internal variables of a point are its plastic strain and the sum of the sizes of its
     increments.  A law has further numbers as fields; those of :attr:`numbers` are the inputs of
     the compiled law.
-
-    Attributes:
-        C: Stiffness; arrays of one shape, or numbers.
-        limit: Yield stress; infinite where the bulk stays elastic.
     """
 
-    C: Values
-    limit: Values
+    C: Values  # stiffness; all fields are arrays of one shape, or numbers
+    limit: Values  # yield stress; infinite where the bulk stays elastic
 
     @classmethod
     def numbers(cls) -> tuple[str, ...]:

@@ -24,12 +24,8 @@ NOTHING_HELD = 1e-3
 class Ledger:
     """Energies of one process at one time; terms write into it when a step is accepted.
 
-    Terms make their entries when they are made, so that all processes know the same ones.
-
-    Attributes:
-        state: Energies that depend on the state: kinetic, stored; J.
-        supplied: Work that came in since the beginning, by source; J.
-        lost: Energy that went out since the beginning, by sink; never negative; J.
+    Terms make their entries when they are made, so that all processes know the same ones; see
+    :class:`Energy` for the three parts.
     """
 
     state: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))

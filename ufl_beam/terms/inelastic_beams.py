@@ -27,11 +27,7 @@ from ufl_beam.terms.tangent_derivatives import Cells
 
 
 def inelastic_cells(grid: Numbering) -> list[tuple[Layout, Index]]:
-    """Layouts of material points, and the cells (numbers of the grid) that have them.
-
-    Raises:
-        SceneError: There are some, and cells have a higher degree than 1.
-    """
+    """Layouts of material points, and the cells (numbers of the grid) that have them."""
     groups: dict[Layout, list[int]] = {}
     layouts: dict[object, Layout | None] = {}
     for beam in grid.scene.beams:

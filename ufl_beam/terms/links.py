@@ -20,10 +20,8 @@ class Links(Beams):
 
     Attributes:
         numbers: Of the connectors in the scene's links.
-        links: The connectors.
         work: That they have taken since the beginning; (num_links,); J.
         rate: Mean rate of the motions in the last step; (num_links,); m/s or rad/s.
-        response: Their laws.
     """
 
     kind = "connectors"

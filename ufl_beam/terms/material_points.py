@@ -57,12 +57,8 @@ def point_forms(bulk: type[Bulk], softening: Softening | None, scheme: Scheme) -
 class PointForms:
     """Compiled laws: C functions from the inputs of a point to what the loops need.
 
-    Attributes:
-        bulk: Stress of a point that does not open, and its derivative.
-        opening: The same of a point that opens, its growth being known.
-        excess: What the bulk bears more than the discontinuity resists, and its derivative by the
-            growth.
-        end: What the end of the step brings, see ``point_output`` in loops.h.
+    They are the stress of the bulk, that of a point that opens by a known growth, and the excess of
+    the bulk over the discontinuity, each with its derivative; and ``point_output`` of loops.h.
     """
 
     def __init__(self, statement: type[Bulk], softening: Softening | None, scheme: Scheme) -> None:

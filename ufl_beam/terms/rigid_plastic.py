@@ -98,12 +98,7 @@ def _slope(link: Connector, size: float) -> float:
 
 
 class SlipForms:
-    """Compiled laws of slip: C functions of :data:`INPUTS`; see :func:`slip_forms`.
-
-    Attributes:
-        force: Force in the step, and its derivative by the slip.
-        end: Numbers that the end of the step brings, see ``slip_output`` in loops.h.
-    """
+    """Compiled laws of slip: force and its derivative by the slip; ``slip_output`` of loops.h."""
 
     def __init__(self, law: Softening | Hardening, scheme: Scheme) -> None:
         self._pointwise = pointwise = Pointwise(INPUTS)

@@ -54,7 +54,6 @@ class Supports:
         pivots: What stands on the diagonal.
         turned: Axes of the supports at an angle to those of the plane.
         moving: Local degrees of freedom whose values depend on time.
-        work: Whether there are such anywhere in the scene.
     """
 
     def __init__(self, share: Share, scheme: Scheme, ledger: Ledger, A: Csr) -> None:
@@ -84,6 +83,7 @@ class Supports:
         self.pivots: Array = np.ones(len(self.dofs))
         self._owned = self.dofs < share.num_owned
         self._acting, self._ledger = scheme.acting, ledger
+        # True if values depend on time anywhere in the scene
         self.work = any(support.moving for support in share.grid.scene.supports)
         if self.work:
             ledger.supplied["supports"] += 0.0
