@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, singledispatch
+from functools import cached_property
 
 import numpy as np
 
@@ -134,7 +134,8 @@ class Scene:
     @cached_property
     def _links_but_hinges(self) -> tuple[Connector, ...]:
         held = [holder for joint in self.joints for holder in joint.holders]
-        loads = [push for load in self.loads for push in _off_center(load)]
+        pushing = (load for load in self.loads if isinstance(load, PointLoad))
+        loads = [push for load in pushing for push in _off_center(load)]
         return (*held, *self.connectors, *loads)
 
     @cached_property
@@ -293,14 +294,8 @@ class Scene:
                 holders[dof] = str(support)
 
 
-@singledispatch
-def _off_center(load: Load) -> tuple[Connector, ...]:
+def _off_center(load: PointLoad) -> tuple[Connector, ...]:
     """Connectors that push like a load at a point of a body that is not its centre."""
-    return ()
-
-
-@_off_center.register
-def _(load: PointLoad) -> tuple[Connector, ...]:
     if carries(load.place):
         return ()
 

@@ -33,10 +33,9 @@ from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.guide_curves import guides
 from ufl_beam.terms.inelastic_beams import InelasticBeams, inelastic_cells
 from ufl_beam.terms.links import Links
-from ufl_beam.terms.loads import DeadLoads, FollowerLoads
+from ufl_beam.terms.loads import DeadLoads, FollowerLoads, FrameForces
 from ufl_beam.terms.material_points import expect_entries
 from ufl_beam.terms.openings import Openable, Openings, SearchFlags
-from ufl_beam.terms.rotating_frame import FrameForces
 from ufl_beam.terms.supports import Supports
 from ufl_beam.terms.tangent_derivatives import Cells
 

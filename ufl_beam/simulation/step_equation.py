@@ -13,8 +13,9 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.solvers.equation import PythonEquation
-from ufl_beam.terms.base import Beams, LoadTerm, Term
+from ufl_beam.terms.base import Beams, Term
 from ufl_beam.terms.links import Links
+from ufl_beam.terms.loads import LoadTerm
 from ufl_beam.terms.openings import SearchFlags
 from ufl_beam.terms.supports import Supports
 from ufl_beam.terms.tangent_derivatives import Cells

@@ -62,19 +62,6 @@ class Beams(Term):
         """Add the derivative of the tangent at ``q1`` along ``u``; no internal variable changes."""
 
 
-class LoadTerm(Term):
-    """Forces that the state or time gives."""
-
-    kind = "loads"
-
-    force: Array
-    """The forces in the latest residual."""
-
-    def carry_on(self, t: float, q: Array) -> Array:
-        """Take ``q`` at time ``t`` as a state in equilibrium with the forces, and return them."""
-        raise NotImplementedError
-
-
 class OfForms(Term):
     """A term whose forces and their derivative are two forms on cells."""
 
