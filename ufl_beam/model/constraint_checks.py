@@ -292,10 +292,8 @@ def _moving(scene: Scene, mode: Array) -> list[str]:
 
 
 def _describe(scene: Scene, number: int, mode: Array) -> str:
-    part = _parts(scene)[number]
-    bodies = number - len(scene.beams)
-    which = f"body {bodies}" if isinstance(part, Body) else f"beam {number}"
-    name = f"{part.name} ({which})"
+    part, bodies = _parts(scene)[number], number - len(scene.beams)
+    name = f"{part.name} ({f'body {bodies}' if isinstance(part, Body) else f'beam {number}'})"
     u, v, ψ = mode
     if abs(ψ) < 1e-6:
         return f"{name} can shift along ({u:.3g}, {v:.3g})"

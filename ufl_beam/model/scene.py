@@ -153,18 +153,14 @@ class Scene:
 
     def _bearing_moments(self) -> Iterator[Anchor]:
         """Places where supports, connectors or masses bear a moment."""
-        for support in self.supports:
-            if 2 in support.held:
-                yield support.place
+        yield from (support.place for support in self.supports if 2 in support.held)
+        yield from (mass.place for mass in self.masses if mass.inertia)
         for link in self._links_but_hinges:
             by_a, by_b = link.rigidly()
             if by_a[2] or link.follows_a:
                 yield link.a
             if by_b[2]:
                 yield link.b
-        for mass in self.masses:
-            if mass.inertia:
-                yield mass.place
 
     @cached_property
     def rigid_bodies(self) -> tuple[Body, ...]:
@@ -175,12 +171,8 @@ class Scene:
 
     def time_functions(self) -> Iterator[tuple[object, TimeFunction]]:
         """Iterate over functions of time of loads, motions and drives, and their owners."""
-        for load in self.loads:
-            if not isinstance(load, RotatingFrame):
-                yield load, load.time
-        for support in self.supports:
-            for motion in support.held.values():
-                yield support, motion
+        yield from ((one, one.time) for one in self.loads if not isinstance(one, RotatingFrame))
+        yield from ((one, motion) for one in self.supports for motion in one.held.values())
         for link in self.links:
             if isinstance(link.law, Motor):
                 yield link, link.law.motion
@@ -189,16 +181,10 @@ class Scene:
 
     def attachments(self) -> Iterator[tuple[object, Anchor]]:
         """Iterate over all that has a place, and its place."""
-        for joint in self.joints:
-            for place in joint.places:
-                yield joint, place
-        for connector in self.connectors:
-            yield connector, connector.a
-            yield connector, connector.b
-        for support in self.supports:
-            yield support, support.place
-        for mass in self.masses:
-            yield "PointMass", mass.place
+        yield from ((joint, place) for joint in self.joints for place in joint.places)
+        yield from ((link, place) for link in self.connectors for place in (link.a, link.b))
+        yield from ((support, support.place) for support in self.supports)
+        yield from (("PointMass", mass.place) for mass in self.masses)
         for load in self.loads:
             if isinstance(load, PointLoad | FollowerLoad):
                 yield type(load).__name__, load.place
