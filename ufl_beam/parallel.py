@@ -20,11 +20,7 @@ def active_comm() -> MPI.Intracomm:
 
 
 def communicator(comm: MPI.Intracomm | None, what: str) -> MPI.Intracomm:
-    """Return the processes of a call: those that it names, or by default :func:`active_comm`.
-
-    Raises:
-        SceneError: Not a communicator of mpi4py.
-    """
+    """Return the processes of a call: those that it names, or by default :func:`active_comm`."""
     if comm is None:
         return active_comm()
     if not isinstance(comm, MPI.Intracomm) or comm == MPI.COMM_NULL:

@@ -9,9 +9,8 @@ import numpy as np
 import numpy.typing as npt
 import scipy  # its parts are loaded when they are used
 
-from ufl_beam.array_checks import require_array, require_row
 from ufl_beam.arrays import Array
-from ufl_beam.errors import SceneError, require_number
+from ufl_beam.errors import SceneError, require_array, require_number, require_row
 
 
 @dataclass(frozen=True)

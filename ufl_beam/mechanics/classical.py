@@ -15,15 +15,9 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.mechanics import kinematics
 from ufl_beam.mechanics.kinematics import Axis
-from ufl_beam.mechanics.time_schemes import (
-    Constant,
-    Opening,
-    Rates,
-    Step,
-    Values,
-    require_between,
-    scaled,
-)
+from ufl_beam.mechanics.time_schemes import Constant, Rates, Step, require_between, scaled
+from ufl_beam.model.law_functions import Values
+from ufl_beam.model.material_laws import Softening
 
 
 class _AtEnd:
@@ -33,7 +27,7 @@ class _AtEnd:
     theta = 1.0
     loss = 0.0
 
-    def resistance(self, softening: Opening, opening: Array, growth: Values) -> Values:
+    def resistance(self, softening: Softening, opening: Array, growth: Values) -> Values:
         """The traction at the end of the step."""
         return softening.traction(opening + growth)
 

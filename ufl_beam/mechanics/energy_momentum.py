@@ -16,15 +16,9 @@ from ufl_beam.compiled.c_library import combined, doubles, integers, lib
 from ufl_beam.mechanics import kinematics
 from ufl_beam.mechanics.classical import Static
 from ufl_beam.mechanics.kinematics import Axis
-from ufl_beam.mechanics.time_schemes import (
-    Constant,
-    Opening,
-    Rates,
-    Step,
-    Values,
-    require_between,
-    scaled,
-)
+from ufl_beam.mechanics.time_schemes import Constant, Rates, Step, require_between, scaled
+from ufl_beam.model.law_functions import Values
+from ufl_beam.model.material_laws import Softening
 
 
 class _OverStep:
@@ -42,7 +36,7 @@ class _OverStep:
         """Return the energy that ``alpha`` dissipates."""
         return self.alpha
 
-    def resistance(self, softening: Opening, opening: Array, growth: Values) -> Values:
+    def resistance(self, softening: Softening, opening: Array, growth: Values) -> Values:
         """The mean traction, so that the work of the step is what the opening dissipates."""
         return softening.mean_traction(opening, growth)
 

@@ -58,10 +58,10 @@ def shared_by_joints(joints: Iterable[Sharing]) -> Iterator[list[NodeDof]]:
 
 
 def plastic_hinges(
-    may_have: Mapping[Place, HingeLaw],
+    may_have: Mapping[Place, HingeLaw],  # laws of the hinges that the beams may have
     joints: Sequence[Sharing],
-    bearing: Iterable[Anchor],
-    loaded: Iterable[Anchor],
+    bearing: Iterable[Anchor],  # where supports, connectors or masses bear a moment
+    loaded: Iterable[Anchor],  # where loads are moments
 ) -> tuple[Connector, ...]:
     """Plastic hinges of zero length, as connectors of both sides.
 
@@ -70,12 +70,6 @@ def plastic_hinges(
     the member, as nothing beyond a hinge could bear it.  Where two members meet and nothing else
     bears a moment, both have the same moment; then only the weaker one has a hinge, as the other
     one never opens.
-
-    Args:
-        may_have: Laws of the hinges that the beams may have, by place.
-        joints: Its joints.
-        bearing: Places where supports, connectors or masses bear a moment.
-        loaded: Places where loads are moments.
     """
     laws = {place: law for place, law in may_have.items() if law.opens}
     same = merged(
@@ -103,22 +97,14 @@ def plastic_hinges(
 
 
 def law_of(link: Connector) -> HingeLaw:
-    """Return the law of a plastic hinge, or of another rigid-plastic connector.
-
-    Raises:
-        SceneError: The connector follows another law.
-    """
+    """Return the law of a plastic hinge, or of another rigid-plastic connector."""
     if not isinstance(link.law, RigidPlastic):
         raise SceneError(f"{link}: its law is not rigid-plastic")
     return link.law.law
 
 
 def place_of(hinge: Connector) -> Place:
-    """Return the place of a plastic hinge, on the side that joints and loads are attached to.
-
-    Raises:
-        SceneError: The connector does not act between places of beams.
-    """
+    """Return the place of a plastic hinge, on the side that joints and loads are attached to."""
     if not isinstance(hinge.a, Place):
         raise SceneError(f"{hinge}: it is not a plastic hinge of a beam")
     return hinge.a.beam.at(hinge.a.s)

@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ufl_beam.array_checks import require_row
 from ufl_beam.arrays import Array
-from ufl_beam.errors import SceneError, is_infinite, require_function, require_number
+from ufl_beam.errors import SceneError, is_infinite, require_function, require_number, require_row
 
 Ends = tuple[float, float]  # lower and upper end of a cycle
 

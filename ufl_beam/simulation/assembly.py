@@ -13,6 +13,7 @@ from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import NOWHERE, Restoring, Saving, State
+from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.connector_laws import Controller, Coulomb, Running
 from ufl_beam.model.connectors import Connector
@@ -23,21 +24,20 @@ from ufl_beam.simulation.branch_check import StaticPath
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.c_equation import CEquation
 from ufl_beam.solvers.equation import Equation
-from ufl_beam.terms.algorithmic_damping import numerical_forces
-from ufl_beam.terms.base import Cells, Term
+from ufl_beam.terms.base import Term
 from ufl_beam.terms.beams import ElasticBeams, Inertia
 from ufl_beam.terms.connector_responses import Setting
 from ufl_beam.terms.connectors import couplings
-from ufl_beam.terms.damping import damping_forces
+from ufl_beam.terms.damping import SecondDifferences, damping_forces
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.guide_curves import guides
 from ufl_beam.terms.inelastic_beams import InelasticBeams, inelastic_cells
 from ufl_beam.terms.links import Links
-from ufl_beam.terms.loads import DeadLoads, FollowerLoads
+from ufl_beam.terms.loads import DeadLoads, FollowerLoads, FrameForces
 from ufl_beam.terms.material_points import expect_entries
 from ufl_beam.terms.openings import Openable, Openings, SearchFlags
-from ufl_beam.terms.rotating_frame import FrameForces
 from ufl_beam.terms.supports import Supports
+from ufl_beam.terms.tangent_derivatives import Cells
 
 Loads = list[DeadLoads | FollowerLoads | FrameForces]
 
@@ -159,7 +159,8 @@ def assemble(share: Share, scheme: Scheme, v: Array, together: Agreement) -> Ass
         part = np.flatnonzero(elastic)
         on_part = fields if elastic.all() else Fields(share, part)
         beams.append(ElasticBeams(on_part, *setting))
-        numerical = numerical_forces(scheme, on_part, A, ledger)
+        if isinstance(scheme, DecayingMidpoint):
+            numerical.append(SecondDifferences(scheme, on_part, A, ledger))
 
     asked = {link: 0.0 for link in scene.links if isinstance(link.law, Controller | Coulomb)}
     rates = dict(asked)

@@ -154,7 +154,8 @@ def _require_held(grid: Grid, v: Array) -> None:
     fastest = np.abs(v[nodes] * [1.0, 1.0, size]).max()
     for link, dofs in zip(grid.scene.links, grid.dofs_of_links, strict=True):
         a, b = v[dofs[0:6:2]], v[dofs[1:6:2]]
-        rate = float(np.dot(link.rigidly().a, a) + np.dot(link.rigidly().b, b))
+        by_a, by_b = link.rigidly()
+        rate = float(np.dot(by_a, a) + np.dot(by_b, b))
         if link.law is HELD and abs(rate) > 1e-9 * fastest / (size if link.turns else 1.0):
             raise SceneError(
                 f"Velocity: the parts that {link} joins would move apart at {rate:.3g} m/s "

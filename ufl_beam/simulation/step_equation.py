@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 
@@ -14,16 +13,12 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.solvers.equation import PythonEquation
-from ufl_beam.terms.base import Beams, Cells, Term
+from ufl_beam.terms.base import Beams, Term
 from ufl_beam.terms.links import Links
+from ufl_beam.terms.loads import LoadTerm
 from ufl_beam.terms.openings import SearchFlags
 from ufl_beam.terms.supports import Supports
-
-
-class Load(Term, Protocol):
-    """A load, with its force in the present step."""
-
-    force: Array
+from ufl_beam.terms.tangent_derivatives import Cells
 
 
 class StepEquation(PythonEquation):
@@ -38,7 +33,7 @@ class StepEquation(PythonEquation):
         A: Csr,
         beams: Sequence[Cells],
         couplings: Sequence[Links],
-        loads: Sequence[Load],
+        loads: Sequence[LoadTerm],
         others: Sequence[Term],
         supports: Supports,
         search: SearchFlags,

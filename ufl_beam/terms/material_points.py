@@ -57,17 +57,8 @@ def point_forms(bulk: type[Bulk], softening: Softening | None, scheme: Scheme) -
 class PointForms:
     """Compiled laws: C functions from the inputs of a point to what the loops need.
 
-    Args:
-        statement: Law of the bulk.
-        softening: Law of the discontinuities, if points can break; its numbers do not matter.
-        scheme: The time scheme.
-
-    Attributes:
-        bulk: Stress of a point that does not open, and its derivative.
-        opening: The same of a point that opens, its growth being known.
-        excess: What the bulk bears more than the discontinuity resists, and its derivative by the
-            growth.
-        end: What the end of the step brings, see ``point_output`` in loops.h.
+    They are the stress of the bulk, that of a point that opens by a known growth, and the excess of
+    the bulk over the discontinuity, each with its derivative; and ``point_output`` of loops.h.
     """
 
     def __init__(self, statement: type[Bulk], softening: Softening | None, scheme: Scheme) -> None:
@@ -119,14 +110,13 @@ class Points:
 
     Args:
         layout: The points of a cell.
-        keys: For each cell two numbers that random limits depend on, besides their seed.
+        keys: See :meth:`Layout.bulk`.
         length: Of the cells; (cells,); m.
         scheme: The time scheme.
         storage: Zeros, for all that is known of the points; (cells, n, number of inputs).
         search: Shared by all points of a scene.
 
     Attributes:
-        softens: Whether they can open.
         strains: Of the cells at the latest response; (cells, 3); may be written to.
         r, D: The latest response, see :meth:`respond`.
         points: What the loops over the points take, see loops.h.
@@ -239,11 +229,7 @@ class Points:
         flows[flows == RELEASED] = 0.0
 
     def remaining(self, change: Array) -> Array:
-        """Part of the elastic stiffness that is left in the latest response; (cells,).
-
-        Args:
-            change: Small changes of the strains of the cells; (cells, 3).
-        """
+        """Part of the elastic stiffness that is left for small changes of the strains; (cells,)."""
         layout, stiffness = self._layout, self._at["theta"][0, 0] * self._at["stiffness"]
         by_point = change @ layout.strains.T
         elastic = self._at["theta"][0, 0] * change**2 @ layout.rest

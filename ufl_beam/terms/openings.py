@@ -91,13 +91,7 @@ class Openable(Protocol):
 
 
 class Openings:
-    """Solves a step with what does not flow held closed, then lets open what bears too much.
-
-    Args:
-        search: Flags that all places share.
-        places: Those of this process.
-        comm: Processes that share the scene.
-    """
+    """Solves a step with what does not flow held closed, then lets open what bears too much."""
 
     def __init__(
         self, search: SearchFlags, places: Sequence[Openable], comm: MPI.Intracomm
@@ -116,12 +110,7 @@ class Openings:
     def solve(
         self, guess: Array, solve: Callable[[Array], Array], again: Callable[[], None]
     ) -> Array:
-        """Find the equilibrium of a step.
-
-        Args:
-            guess: Configuration where the search begins.
-            solve: Finds an equilibrium from a configuration; raises :class:`StepFailed`.
-            again: Begins the step again.
+        """Find the equilibrium of a step from a guess; ``again`` begins the step again.
 
         Raises:
             StepFailed: There is none, neither with places held closed nor with all of them free.

@@ -23,7 +23,7 @@ class _Sprung(Response):
     """Springs of one law: material points whose strain is the motion."""
 
     def __init__(self, law: Spring, links: Sequence[Connector], setting: Setting) -> None:
-        self._links = links
+        super().__init__(links)
         layout = Layout(
             strains=np.array([[1.0, 0.0, 0.0]]),
             weights=np.ones(1),
