@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from petsc4py import PETSc
 
-from ufl_beam.arrays import Array
+from ufl_beam.arrays import Index
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.solvers.equation import Border, SnesCallbacks
 from ufl_beam.solvers.vectors import Vectors
@@ -23,13 +23,13 @@ class BorderedNewton:
         callbacks: SnesCallbacks,
         vectors: Vectors,
         factors: PETSc.PC,
-        moves: Array,
+        held: Index,
         snes: PETSc.SNES,
         f: PETSc.Vec,
         matrix: PETSc.Mat,
         border: Border,
     ) -> None:
-        self._callbacks, self._vectors, self._moves = callbacks, vectors, moves
+        self._callbacks, self._vectors, self._held = callbacks, vectors, held
         self._factors, self._rate, self._y = factors, vectors.new(), vectors.new()
         self._z = self._rate.duplicate()
         self.snes, self.border = snes, border
@@ -56,7 +56,7 @@ class BorderedNewton:
             self.border.tangent(self._vectors.view(x), rate)
         P.stateIncrease()
         self._vectors.add_ghosts(self._rate)
-        rate *= self._moves
+        rate[self._held] = 0.0
         self._rate.stateIncrease()
 
     def setUp(self, pc: PETSc.PC) -> None:

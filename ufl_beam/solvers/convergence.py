@@ -9,6 +9,7 @@ from typing import Any
 from petsc4py import PETSc
 
 import numpy as np
+import numpy.typing as npt
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, integers, lib
@@ -41,15 +42,15 @@ class Convergence:
         weights[share.multipliers()] = 0.0
         self._weights = weights[: share.num_owned].copy()
         self._norm = (len(self._weights), doubles(self._weights))
-        self.moves = np.ones(share.size)
-        self.moves[equation.held] = 0.0
+        self._held, self._moves = equation.held, np.ones(share.size)
+        self.leave_out(np.zeros(share.size, dtype=bool))
         self.diagonal = np.flatnonzero(self._A.rows() == self._A.indices)
         self._at_r, self._at_forces = doubles(self._r), doubles(equation.force)
         self._last_loads: list[Array] = []
         self._loads = 0.0
         self._correction = np.empty(share.size)
         self._alive = [
-            *map(doubles, (share.lengths(), self.moves, np.empty(share.size), self._correction)),
+            *map(doubles, (share.lengths(), self._moves, np.empty(share.size), self._correction)),
             integers(self.diagonal.astype(np.int32)),
         ]
         self.c = c = equation.c
@@ -86,6 +87,11 @@ class Convergence:
         if self._parallel or list(map(id, loads)) != list(map(id, self._last_loads)):
             self._last_loads = loads
             self._loads = self.c.loads = sum(map(self.size, loads))
+
+    def leave_out(self, idle: npt.NDArray[np.bool_]) -> None:
+        """Expect no round-off where supports hold, and where a stiffness holds idle motions."""
+        self._moves[:] = ~idle
+        self._moves[self._held] = 0.0
 
     def scale(self) -> float:
         """Size of the loads and of the internal forces in the latest residual; N."""

@@ -123,7 +123,7 @@ class Solver:
         """SNES of the equation with a border."""
         if self._bordered is None:
             self._bordered = BorderedNewton(
-                self._callbacks, self._vectors, self._ksp.getPC(), self.convergence.moves,
+                self._callbacks, self._vectors, self._ksp.getPC(), self._equation.held,
                 self._make_snes(), self._f, self._matrix, border,
             )  # fmt: skip
         self._bordered.border = border
@@ -192,6 +192,7 @@ class Solver:
         self._at_idle = integers(entries), doubles(stiffnesses)
         c = self._equation.c
         c.idle, (c.idle_entry, c.idle_stiffness) = len(entries), self._at_idle
+        self.convergence.leave_out(self._idle.stiffness > 0.0)
 
     def _stiffened(self) -> int:
         """Iterate with stiffer tangents, which come near but slowly, then with true ones."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from functools import singledispatch
+from typing import Protocol
 
 import numpy as np
 import ufl
@@ -18,11 +19,16 @@ from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
 from ufl_beam.mechanics.kinematics import strain, virtual_strain
-from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.mechanics.time_schemes import DynamicScheme, Rates, Scheme, Step
 from ufl_beam.model.damping import KelvinVoigt, Rayleigh
 from ufl_beam.terms.base import OfForms, OfMatrix, Term
-from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.energy_ledger import Ledger
+
+
+class Inertia(Rates, Protocol):
+    """Velocities of a scene in motion, and its scheme."""
+
+    scheme: DynamicScheme
 
 
 @singledispatch
