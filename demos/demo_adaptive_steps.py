@@ -16,6 +16,8 @@
 # SPDX-License-Identifier: MIT
 from pathlib import Path
 
+from mpi4py import MPI
+
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -149,7 +151,7 @@ bottom.set(
 bottom.legend(frameon=False)
 for axes in (top, bottom):
     axes.grid(alpha=0.3)
-if ub.parallel.ours().rank == 0:
+if MPI.COMM_WORLD.rank == 0:
     figure.savefig(output / "adaptive_steps.png", dpi=150)
 
 # %% [markdown]

@@ -35,17 +35,11 @@ class Agreement:
     On one process they are plain calls.  On several they cost one reduction of an integer.  If the
     others do not come within :data:`GRACE`, because they wait for the failed process elsewhere, it
     prints its exception and aborts all of them.
-
-    Args:
-        comm: The processes.
-
-    Attributes:
-        raised: The latest exception that all processes have raised together.
     """
 
     def __init__(self, comm: MPI.Intracomm) -> None:
         self._comm = duplicate(comm) if comm.size > 1 else None
-        self.raised: BaseException | None = None
+        self.raised: BaseException | None = None  # the latest one, by all processes together
 
     def __call__(self, function: Callable[..., T], *arguments: Any) -> T:
         """Call a function on all processes."""

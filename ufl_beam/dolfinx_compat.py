@@ -22,29 +22,13 @@ try:
     import dolfinx
     import ffcx
     import ufl
-    from dolfinx import cpp, fem, io, jit, mesh
+    from dolfinx import cpp, jit, mesh
+    from dolfinx import fem as fem
 except ImportError as error:  # pragma: no cover - depends on the machine
     raise ImportError(
         "ufl_beam needs DOLFINx 0.9 or newer with PETSc, which is not on PyPI "
         f"({error}). Run through ./env of the source tree, or see docs/installation.md."
     ) from error
-
-
-__all__ = [
-    "TABULATE",
-    "VERSION",
-    "VERSIONS",
-    "cell_coordinates",
-    "compile_form",
-    "cpp",
-    "dolfinx",
-    "fem",
-    "form_key",
-    "io",
-    "jit_directory",
-    "line_mesh",
-    "pack",
-]
 
 VERSION = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
 VERSIONS = f"DOLFINx {dolfinx.__version__} and FFCx {ffcx.__version__}"
@@ -84,11 +68,7 @@ TABULATE = (
 
 
 def jit_directory() -> Path:
-    """Return the directory in which DOLFINx keeps compiled forms.
-
-    Raises:
-        RuntimeError: The options of DOLFINx cannot be read.
-    """
+    """Return the directory in which DOLFINx keeps compiled forms."""
     return Path(_jit_options()["cache_dir"])
 
 
@@ -129,12 +109,7 @@ def pack(form: fem.Form) -> tuple[Array, Array]:
 
 
 def line_mesh(points: Array, cells: npt.NDArray[np.int64]) -> mesh.Mesh:
-    """Make a mesh of straight cells in the plane, on this process alone.
-
-    Args:
-        points: Vertices; shape (num_points, 2); m.
-        cells: Vertices of each cell; shape (num_cells, 2).
-    """
+    """Make a mesh of straight cells in the plane, on this process alone; points (n, 2) in m."""
     line = ufl.Mesh(basix.ufl.element("Lagrange", "interval", 1, shape=(2,)))
     more = {} if VERSION < (0, 10) else {"max_facet_to_cell_links": 2}
     return mesh.create_mesh(MPI.COMM_SELF, cells=cells, x=points, e=line, **more)

@@ -10,6 +10,9 @@ import sys
 import warnings
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 LONGEST = 80
 """Characters that a message shows of a value."""
 
@@ -50,14 +53,7 @@ class ModelWarning(UserWarning):
 
 
 class StepFailed(Exception):
-    """No equilibrium was found for a step; the message says why.
-
-    Attributes:
-        residuals: What is left where it is largest in each beam, body and connector; N, moments
-            over the size of the scene.
-        reason: Name that PETSc has for why its solver stopped, such as "DIVERGED_MAX_IT"; empty if
-            it did not fail.
-    """
+    """No equilibrium was found for a step; attributes are as in :class:`ConvergenceError`."""
 
     def __init__(self, message: str) -> None:
         super().__init__(message)
@@ -150,14 +146,11 @@ class TradeoffError(RuntimeError):
 def warn(message: str) -> None:
     """Issue a :class:`ModelWarning` that points at the line of the user's script."""
     level, frame = 1, sys._getframe()
-    while frame.f_back is not None and _is_library(frame.f_code.co_filename):
+    # Not of this package, nor methods that ``dataclass`` writes.
+    library = (PACKAGE, "<string>")
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(library):
         level, frame = level + 1, frame.f_back
     warnings.warn(message, ModelWarning, stacklevel=level)
-
-
-def _is_library(file: str) -> bool:
-    """Return true for the files of this package, and for methods that ``dataclass`` writes."""
-    return file.startswith((PACKAGE, "<string>"))
 
 
 def shorten(value: object) -> str:
@@ -175,12 +168,7 @@ def clip(text: str) -> str:
 
 
 def as_float(value: object) -> float:
-    """Convert a real number, also one of NumPy, to ``float``; text and arrays are refused.
-
-    Raises:
-        TypeError, ValueError: Not a real number; the message says what it is.
-        OverflowError: An integer beyond the range of ``float``.
-    """
+    """Convert a real number, also one of NumPy, to ``float``; text and arrays are refused."""
     scalar: Any = value
     if getattr(scalar, "ndim", None) == 0:
         scalar = scalar.item()
@@ -209,16 +197,7 @@ def require_number(
 
 
 def require_returned(value: object, function: str, at: str) -> float:
-    """Return what a function of a user returned as a float.
-
-    Args:
-        value: The returned value; NaN and infinity pass.
-        function: Whose function it is, for the message.
-        at: Where it was evaluated, for the message.
-
-    Raises:
-        SceneError: Not a real number.
-    """
+    """Return what a function of a user returned ``at`` some point as a float; NaN may pass."""
     try:
         return as_float(value)
     except (TypeError, ValueError, OverflowError):
@@ -271,13 +250,7 @@ def require_switch(value: Any, what: str) -> None:
 
 
 def require_function(value: Any, what: str, of: str) -> None:
-    """Raise :class:`SceneError` naming ``what`` unless ``value`` can be called.
-
-    Args:
-        value: The function of a user.
-        what: Its owner and name.
-        of: Its arguments and its value, for the message.
-    """
+    """Raise :class:`SceneError` naming ``what`` unless ``value`` is a function ``of`` something."""
     if not callable(value):
         raise SceneError(f"{what} = {shorten(value)} must be a function of {of}")
 
@@ -317,3 +290,29 @@ def require_vector(value: Any, what: str) -> tuple[float, float]:
     except (TypeError, ValueError):
         raise SceneError(f"{what} = {shorten(value)} must be a pair (x, y)") from None
     return require_number(x, f"{what}[0]"), require_number(y, f"{what}[1]")
+
+
+def require_array(values: Any, what: str) -> npt.NDArray[np.float64]:
+    """Return ``values`` as an array of finite numbers, or raise :class:`SceneError`."""
+    try:
+        array = np.asarray(values)
+        objects = array.flat if array.dtype.kind == "O" else ()
+        if array.dtype.kind not in "buifO" or any(
+            value is None or isinstance(value, str | bytes) for value in objects
+        ):
+            raise TypeError
+        array = array.astype(float)
+    except (TypeError, ValueError, OverflowError):
+        raise SceneError(f"{what} = {shorten(values)} must be numbers") from None
+    for i in np.argwhere(~np.isfinite(array)):
+        at = ", ".join(map(str, i))
+        raise SceneError(f"{what}{f'[{at}]' if at else ''} = {array[tuple(i)]} is not finite")
+    return array
+
+
+def require_row(values: Any, what: str) -> npt.NDArray[np.float64]:
+    """Return ``values`` as one row of finite numbers, or raise :class:`SceneError`."""
+    row = require_array(values, what)
+    if row.ndim != 1:
+        raise SceneError(f"{what} has shape {row.shape}; give one row of numbers")
+    return row

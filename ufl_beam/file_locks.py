@@ -25,11 +25,7 @@ def locked(path: Path) -> Iterator[None]:
 
 
 class Lock:
-    """An exclusive lock beside a file, in a file with ``.lock`` after its name.
-
-    Attributes:
-        path: The file of the lock.
-    """
+    """An exclusive lock beside a file, in a file with ``.lock`` after its name."""
 
     def __init__(self, path: Path) -> None:
         self.path = path.with_name(path.name + ".lock")

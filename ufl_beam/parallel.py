@@ -11,22 +11,18 @@ from mpi4py import MPI
 
 from ufl_beam.errors import SceneError, shorten
 
-_OURS: ContextVar[MPI.Intracomm] = ContextVar("processes of a scene", default=MPI.COMM_WORLD)
+_ACTIVE: ContextVar[MPI.Intracomm] = ContextVar("processes of a scene", default=MPI.COMM_WORLD)
 
 
-def ours() -> MPI.Intracomm:
-    """The processes that a scene is computed by, unless a call says others."""
-    return _OURS.get()
+def active_comm() -> MPI.Intracomm:
+    """Return the processes that compute a scene, unless a call names others."""
+    return _ACTIVE.get()
 
 
 def communicator(comm: MPI.Intracomm | None, what: str) -> MPI.Intracomm:
-    """Return the processes of a call: those that it names, or by default :func:`ours`.
-
-    Raises:
-        SceneError: Not a communicator of mpi4py.
-    """
+    """Return the processes of a call: those that it names, or by default :func:`active_comm`."""
     if comm is None:
-        return ours()
+        return active_comm()
     if not isinstance(comm, MPI.Intracomm) or comm == MPI.COMM_NULL:
         raise SceneError(f"{what} = {shorten(comm)} must be a communicator, such as MPI.COMM_SELF")
     return comm
@@ -35,16 +31,16 @@ def communicator(comm: MPI.Intracomm | None, what: str) -> MPI.Intracomm:
 @contextmanager
 def alone() -> Iterator[None]:
     """Within this context a scene is computed by this process alone."""
-    before = _OURS.set(MPI.COMM_SELF)
+    before = _ACTIVE.set(MPI.COMM_SELF)
     try:
         yield
     finally:
-        _OURS.reset(before)
+        _ACTIVE.reset(before)
 
 
 def in_study() -> bool:
     """Return whether this is a member of a study, which shows no progress of its own."""
-    return _OURS.get() != MPI.COMM_WORLD
+    return _ACTIVE.get() != MPI.COMM_WORLD
 
 
 def say(*words: object, sep: str = " ") -> None:
@@ -54,5 +50,5 @@ def say(*words: object, sep: str = " ") -> None:
         >>> ub.say("steps:", len(solution.times) - 1)  # once, on any number of processes
         steps: 20
     """
-    if ours().rank == 0:
+    if active_comm().rank == 0:
         print(*words, sep=sep, flush=True)  # noqa: T201

@@ -7,21 +7,13 @@ from typing import NamedTuple
 
 
 class Parameter(NamedTuple):
-    """Words for the parameter of a solution, in pictures, tables and messages.
+    """Words for the parameter of a solution, in pictures, tables and messages."""
 
-    Attributes:
-        name: Title of an axis or a colour bar.
-        value: Format of a value in a sentence.
-        step: Format of a step in a sentence.
-        column: Title of a column.
-        progress: Title of an axis along which a solution goes one way only.
-    """
-
-    name: str
-    value: str
-    step: str
-    column: str
-    progress: str
+    name: str  # title of an axis or a colour bar
+    value: str  # format of a value in a sentence
+    step: str  # format of a step in a sentence
+    column: str  # title of a column
+    progress: str  # title of an axis along which a solution goes one way only
 
     def at(self, value: float, digits: str = ".4g") -> str:
         """A value in words."""

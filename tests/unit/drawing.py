@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Script of test_copies.py, for two processes: scenes that are not the same on both."""
+"""Script of test_replicas.py, for two processes: scenes that are not the same on both."""
 
 import itertools
 import sys

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Functions of a user that raise on one process or on all; run by test_agreement.py.
+"""Functions of a user that raise on one process or on all; run by test_collective_errors.py.
 
 `mpirun -n 2 python3 raising.py` prints a line for each case: its name, the exceptions of all
 processes; `mpirun -n 2 python3 raising.py CASE RANK` lets one process fail where nobody agrees.

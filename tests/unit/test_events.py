@@ -20,7 +20,7 @@ def run(scene, scheme, *, t=1.0, dt=0.05):
     told = []
     events = ub.Events(tell=told.append)
     ub.simulate(scene, scheme, t=(0, t), dt=dt, record=events)
-    if ub.parallel.ours().rank == 0:
+    if ub.parallel.active_comm().rank == 0:
         assert told == events.found
     return events.found
 

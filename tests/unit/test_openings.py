@@ -11,7 +11,7 @@ import pytest
 
 import ufl_beam as ub
 from ufl_beam.errors import StepFailed
-from ufl_beam.terms.openings import OVER, Course, Openings
+from ufl_beam.terms.openings import OVER, Openings, SearchFlags
 
 LENGTH, EI, STIFF = 2.0, 1000.0, 1e6  # m, N m², N
 LAWS = [ub.Softening, ub.LinearSoftening]
@@ -194,14 +194,14 @@ def test_what_flows_is_part_of_the_state():
 class Fuses:
     """Places that open in the order of what they bear; each one that opens relieves the others."""
 
-    def __init__(self, course, bears, relief):
-        self.course, self.bears, self.relief = course, bears, relief
+    def __init__(self, search, bears, stiff):
+        self.search, self.bears, self.stiff = search, bears, stiff
         self.open = np.zeros(len(bears), dtype=bool)
 
     @property
     def stress(self):
         """In units of the limit."""
-        return self.bears - self.relief * self.open.sum()
+        return self.bears - self.stiff * self.open.sum()
 
     @property
     def excess(self):
@@ -214,20 +214,20 @@ class Fuses:
         self.open[:] = False
 
 
-def search(bears, relief, fails=lambda fuses: False):
+def search(bears, stiff, fails=lambda fuses: False):
     """What is open in each of the solutions that are sought, and whether the step began again."""
     from mpi4py import MPI
 
-    course, seen, again = Course(), [], []
-    fuses = Fuses(course, np.array(bears), relief)
-    openings = Openings.of(course, [fuses], MPI.COMM_SELF)
+    search, seen, again = SearchFlags(), [], []
+    fuses = Fuses(search, np.array(bears), stiff)
+    openings = Openings.of(search, [fuses], MPI.COMM_SELF)
 
     def solve(q):
         if again:
             seen.append("free")
             return q
         seen.append(fuses.open.tolist())
-        course.flags[OVER] |= fuses.excess > 0
+        search.flags[OVER] |= fuses.excess > 0
         if fails(fuses):
             raise StepFailed("on purpose")
         return q + 1
@@ -236,7 +236,7 @@ def search(bears, relief, fails=lambda fuses: False):
         openings.solve(np.zeros(1), solve, lambda: again.append(True))
     finally:
         assert not fuses.open.any()
-        assert not course.flags.any()
+        assert not search.flags.any()
     return seen
 
 

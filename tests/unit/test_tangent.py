@@ -8,7 +8,7 @@ import pytest
 from scipy.sparse import csr_array
 
 import ufl_beam as ub
-from ufl_beam.terms.algorithmic_damping import SecondDifferences
+from ufl_beam.terms.damping import SecondDifferences
 
 # Numbers of one magnitude, so that an error in any term shows in the largest entry.
 SECTION = ub.Section(EA=60.0, GA=40.0, EI=30.0, rhoA=2.0, rhoI=1.0)

@@ -433,7 +433,7 @@ OF_SOLUTIONS = {
     "plot_extremes", "plot_hinge", "plot_history", "plot_modes", "plot_moment_curvature",
     "plot_shapes", "plot_tradeoff", "render",
 }  # fmt: skip
-"""Pictures, whose tests are in test_view.py."""
+"""Pictures, whose tests are in test_plots.py."""
 
 
 def test_every_public_callable_is_in_the_table():

@@ -117,21 +117,14 @@ def metric(share: Share) -> Array:
 
 
 class Stiffness:
-    """Tangent stiffness of the whole scene, factored by every process.
+    """Tangent stiffness of the whole scene, factored by every process; StepFailed if singular.
 
     Of this process are its part A of the tangent, the local degrees of freedom that supports hold,
-    and its part of the residual's derivative by the load factor, ``rate``.
-
-    Attributes:
-        symmetric: False with follower loads.
-        negative: Number of negative eigenvalues of the stiffness that is left when the forces of
-            connectors are eliminated and constraints fulfilled.  Where it is not symmetric: 1 if
-            its determinant is negative, else 0.
-        flow: Change of the configuration for a unit of the load factor; (grid.size,), zero where
-            supports hold.
-
-    Raises:
-        StepFailed: It is exactly singular.
+    and its part of the residual's derivative by the load factor, ``rate``.  ``negative`` is the
+    number of negative eigenvalues when the forces of connectors are eliminated and constraints
+    fulfilled; where it is not symmetric, with follower loads, 1 if its determinant is negative,
+    else 0.  ``flow`` is the change of the configuration for a unit of the load factor;
+    (grid.size,), zero where supports hold.
     """
 
     def __init__(self, share: Share, A: Csr, held: Index, rate: Array) -> None:

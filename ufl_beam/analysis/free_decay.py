@@ -9,9 +9,8 @@ import numpy as np
 import numpy.typing as npt
 import scipy  # its parts are loaded when they are used
 
-from ufl_beam.array_checks import require_array, require_row
 from ufl_beam.arrays import Array
-from ufl_beam.errors import SceneError, require_number
+from ufl_beam.errors import SceneError, require_array, require_number, require_row
 
 
 @dataclass(frozen=True)
@@ -247,11 +246,8 @@ def fit_decay(t: npt.ArrayLike, amplitudes: npt.ArrayLike) -> Decay:
     mean, each = logarithmic_decrement(A)
     s = t - t[0]
     line = scipy.stats.linregress(s, A)
-    linear = _envelope(
-        (line.intercept, -line.slope),
-        (line.intercept_stderr, line.stderr),
-        A - line.intercept - line.slope * s,
-    )
+    values, errors = (line.intercept, -line.slope), (line.intercept_stderr, line.stderr)
+    linear = _envelope(values, errors, A - line.intercept - line.slope * s)
     # Without units; first guess: the line through the logarithms, each weighted by its amplitude
     τ, a, units = s / s[-1], A / np.max(A), np.array([np.max(A), 1 / s[-1]])
     slope, logarithm = np.polyfit(τ, np.log(a), 1, w=a)
@@ -264,8 +260,8 @@ def fit_decay(t: npt.ArrayLike, amplitudes: npt.ArrayLike) -> Decay:
             f"fit_decay: no exponential fits amplitudes from {A.min():g} to {A.max():g}; "
             "are they successive peaks of one free vibration?"
         ) from None
-    errors = units * np.sqrt(np.diag(covariance))
-    exponential = _envelope(found * units, errors, A - _exponential(s, *(found * units)))
+    half = units * np.sqrt(np.diag(covariance))
+    exponential = _envelope(found * units, half, A - _exponential(s, *(found * units)))
     return Decay(t, A, mean, each, linear, exponential)
 
 
@@ -276,8 +272,7 @@ def _envelope(values: npt.ArrayLike, errors: npt.ArrayLike, residuals: Array) ->
 
 
 def _exponential(t: Array, initial: float, rate: float) -> Array:
-    amplitudes: Array = initial * np.exp(-rate * t)
-    return amplitudes
+    return np.asarray(initial * np.exp(-rate * t))
 
 
 def _gradient(t: Array, initial: float, rate: float) -> Array:

@@ -31,10 +31,7 @@ AT_REST = 1e300  # length of a step in which all rates vanish; s
 
 
 class _Standstill(Static):
-    """Scheme of small motions: all terms, inertia included, are taken at the present state.
-
-    Nothing steps with it: nothing accelerates, and velocities are differences over ``dt``.
-    """
+    """Scheme of small motions: all terms, inertia included, are taken at the present state."""
 
     dynamic = True
     slips = False
@@ -64,11 +61,7 @@ class _Standstill(Static):
 class SmallMotions:
     """Matrices of the small motions about a state, without the motions that supports hold.
 
-    Args:
-        scene: What is modelled.
-        at: Solution whose last state is meant; the undeformed scene by default.
-        t: Time of loads; that of the state by default; s.
-        mesh: How finely it is discretised; as ``at``, or with the cells of the beams.
+    The state is the last one of ``at``, by default the undeformed scene; loads are those at t (s).
     """
 
     def __init__(

@@ -28,12 +28,11 @@ from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.joint_histories import Connection, velocity_of
 from ufl_beam.output.time_series import VTKHDF, XDMF, TimeSeries
-from ufl_beam.parallel import ours
+from ufl_beam.parallel import active_comm
 from ufl_beam.simulation.initial_state import mesh_of
 from ufl_beam.simulation.solution import Solution
 
-AMPLITUDE = 0.1
-"""Largest displacement of what is shown of a mode, as a part of the size of the scene."""
+AMPLITUDE = 0.1  # largest displacement of a mode that is shown, as a part of the scene's size
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +112,7 @@ class Shapes(ABC):
         require_number(amplitude, "write: amplitude", positive=True)
         self._require(0)
         recorder = VTKHDF(path) if Path(path).suffix == VTKHDF.ending else XDMF(path)
-        on_first(ours(), lambda: self._write(recorder, amplitude))
+        on_first(active_comm(), lambda: self._write(recorder, amplitude))
 
     def _write(self, recorder: TimeSeries, amplitude: float) -> None:
         recorder.require_writable()
@@ -190,8 +189,7 @@ class Modes(Shapes):
     @property
     def omega(self) -> Array:
         """Natural circular frequencies |s|; (n,); rad/s."""
-        ω: Array = np.abs(self.exponents)
-        return ω
+        return np.asarray(np.abs(self.exponents))
 
     @property
     def frequencies(self) -> Array:

@@ -21,18 +21,8 @@ from ufl_beam.simulation.step_cutting import Trial
 LEAST_REST = 1e-3  # part of a step of arc length that is gone at least beyond a kink
 
 
-# -- equations of steps --------------------------------------------------------------------------
-
-
 class Plane:
-    """Linear constraint: a step goes so far along a normal.
-
-    Args:
-        corrector: Of the path.
-        normal: In the space of configurations and load factors.
-        reach: Distance.
-        gone: Start of the distance, seen from the accepted state; by default that state.
-    """
+    """Linear constraint: a step goes a distance ``reach`` along a normal, from ``gone`` on."""
 
     def __init__(
         self,
@@ -75,9 +65,6 @@ class DissipatedEnergy:
             return 0.0
         ε = 1e-3 * gone / size
         return (self.residual(q + ε * way.q, 0.0) - self.residual(q - ε * way.q, 0.0)) / (2 * ε)
-
-
-# -- controls ----------------------------------------------------------------------------------
 
 
 def _require_step(step: float, what: str) -> None:

@@ -7,26 +7,18 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NoReturn, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from ufl_beam.analysis.critical_points import Direction, Stiffness, metric
 from ufl_beam.arrays import Array
-from ufl_beam.collective_errors import Agreement
-from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.model.scene import Scene
-from ufl_beam.simulation.assembly import Loads
-from ufl_beam.simulation.solution import Solution
+from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.step_cutting import Trial
-from ufl_beam.simulation.step_equation import StepEquation
-from ufl_beam.solvers.equation import Border
 from ufl_beam.terms.base import Term
-from ufl_beam.terms.inelastic_beams import InelasticBeams
-from ufl_beam.terms.links import Links
-from ufl_beam.terms.supports import Supports
 
 MOST_DOUBLINGS = 30  # doublings of a step until something dissipates in it
 ONSET_PART = 1e-6  # part of the dissipated energy of a step at which its onset is looked at
@@ -59,57 +51,13 @@ class GivenLoadFactor:
         return way.t
 
 
-class Statics(Protocol):
-    """Static simulation as path following moves it, see :class:`Simulation`."""
-
-    share: Share
-    t: float
-    q: Array
-    couplings: list[Links]
-    inelastic: list[InelasticBeams]
-    loads: Loads
-    terms: list[Term]
-    supports: Supports
-    equation: StepEquation
-    solution: Solution
-    together: Agreement
-
-    @property
-    def iterations(self) -> int:
-        """Newton iterations of the run so far."""
-
-    def attempt_along(
-        self, step: Step, guess: Array, border: Border, *, hold: bool = True
-    ) -> Trial:
-        """Solve the next step together with the load factor."""
-
-    def accept(self, trial: Trial) -> None:
-        """Go to the end of the latest attempt."""
-
-    def give_up(self, failure: StepFailed, end: float, advice: str = "") -> NoReturn:
-        """End the run, because even the smallest step, to ``end``, failed."""
-
-    def snapshot(self) -> Solution:
-        """Return the present state alone, as a solution."""
-
-
 class PathCorrector:
     """Corrector of path following: equilibrium augmented by the equation of the control.
 
-    Args:
-        simulation: In statics, where the path begins.
-        factor: Change of the load factor that counts as much as a unit of displacement.
-
-    Attributes:
-        share: The degrees of freedom of this process.
-        weights: See :func:`~ufl_beam.analysis.critical_points.metric`.
-        t: The load factor of the latest iterate.
-        direction: That of the path at the accepted state.
-        dissipates: Whether the last step did.
-        sought: Where the latest attempt began, seen from the accepted state.
+    A change ``factor`` of the load factor counts as much as a unit of displacement.
     """
 
-    def __init__(self, simulation: Statics, factor: float) -> None:
+    def __init__(self, simulation: Simulation, factor: float) -> None:
         self.simulation, self.factor = simulation, factor
         self.share = simulation.share
         self.weights = metric(self.share)
@@ -159,10 +107,7 @@ class PathCorrector:
         return self._until(energy, gone, way)
 
     def kink(self, length: float) -> tuple[Direction, Direction] | None:
-        """Find the state in which dissipation begins, and the path's direction beyond it.
-
-        It is sought in the direction of the path up to a ``length``; None if nothing does.
-        """
+        """Find the state in which dissipation begins within a length; the direction beyond it."""
         way, q = self.direction, self.simulation.q
         self.begin()
         if self.dissipates or not self.dissipation(q + length * way.q) > 0:
@@ -214,7 +159,7 @@ class PathCorrector:
 
     def step_at(self, t: float) -> Step:
         """Return an infinitely slow step to a load factor: rates and viscous forces vanish."""
-        return Step(-math.inf, t, self.simulation.q, load_time=t, motion_time=t, toward=1.0)
+        return Step(-math.inf, t, self.simulation.q, load_time=t, motion_time=t, fraction=1.0)
 
     @staticmethod
     def _give(step: Step, terms: Sequence[Term]) -> None:
@@ -278,8 +223,7 @@ class PathCorrector:
         """Solve for an equilibrium under a constraint, beginning so far along a direction.
 
         Closed openings that do not flow are held closed if they can be, see openings.py, unless
-        ``hold`` is false, as in a direction in which they open.  Without an equilibrium it raises
-        :class:`StepFailed`.
+        ``hold`` is false, as in a direction in which they open.
         """
         simulation = self.simulation
         self._constraint = constraint
@@ -342,8 +286,4 @@ class Control(ABC):
 
     @abstractmethod
     def solve_step(self, corrector: PathCorrector, part: float) -> Trial:
-        """Solve for the end of a step, or of a part of it.
-
-        Raises:
-            StepFailed: There is none.
-        """
+        """Solve for the end of a step, or of a part of it; :class:`StepFailed` if there is none."""

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ufl_beam.analysis.critical_points import Branch, CriticalPoint, Direction, Stiffness
-from ufl_beam.analysis.path_corrector import Control, GivenLoadFactor, PathCorrector, Statics
-from ufl_beam.arrays import Array
+from ufl_beam.analysis.path_corrector import Control, GivenLoadFactor, PathCorrector
 from ufl_beam.errors import StepFailed
+from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.step_cutting import Trial
 
 ADVICE = (
@@ -20,26 +20,15 @@ ADVICE = (
 )
 
 SMALLEST_STEP_PART = 2.0**-12  # a step is cut down to this part of it
-
-TARGET_ITERATIONS = 12
-"""Steps of more Newton iterations are followed by shorter ones, of fewer by longer ones."""
-
-MOST_FAILURES = 4
-"""Steps that fail before the search for a critical point goes on from another state."""
-
+TARGET_ITERATIONS = 12  # steps of more are followed by shorter ones, of fewer by longer ones
+MOST_FAILURES = 4  # of steps, before a critical point is sought from another state
 LOCATION_TOLERANCE = 1e-7  # critical points are located to this part of a step
 MOST_LOCATION_STEPS = 60  # steps in which a critical point is sought
 LEAST_COSINE = 0.5  # cosine of the angle by which a step may leave the direction of its predictor
 LARGEST_LENGTH_RATIO = 10.0  # ratio by which a step may be longer than its predictor
-
-UNCHECKED_PART = 2.0**-6
-"""Part of a step from which on that is not asked, for a law may have a kink."""
-
-SAME_POINT_PART = 1e-3
-"""Part of a step within which a critical point is the one that the path has just reached."""
-
-SINGULAR_RATIO = 1e-3
-"""Part of its size at the ends of a step below which what vanishes at a critical point is zero."""
+UNCHECKED_PART = 2.0**-6  # part of a step up to which that is not asked: a law may have a kink
+SAME_POINT_PART = 1e-3  # within this part of a step a critical point is the one just reached
+SINGULAR_RATIO = 1e-3  # part of its size at the ends of a step below which what vanishes is zero
 
 
 class Candidate(NamedTuple):
@@ -50,26 +39,15 @@ class Candidate(NamedTuple):
     way: Direction
 
     def passed(self, before: Candidate) -> bool:
-        """Return whether a critical point lies between ``before`` and this state.
-
-        An eigenvalue of the stiffness has passed zero there, or the load factor has turned.
-        """
+        """Return whether an eigenvalue passed zero, or the load factor turned, since ``before``."""
         turned = (self.way.t < 0) != (before.way.t < 0)
         return turned or self.stiffness.passed(before.stiffness)
 
 
 class PathStepper:
-    """Stepper of a path: it sets lengths of steps and locates critical points.
+    """Stepper of a path: it sets lengths of steps and locates critical points."""
 
-    Args:
-        simulation: In statics, at the beginning of the path.
-        control: Of the lengths of steps.
-
-    Attributes:
-        critical: The critical points so far.
-    """
-
-    def __init__(self, simulation: Statics, control: Control) -> None:
+    def __init__(self, simulation: Simulation, control: Control) -> None:
         self._corrector, self._control = PathCorrector(simulation, control.factor), control
         self.critical: list[CriticalPoint] = []
         self._weights = simulation.share.gather(self._corrector.weights)
@@ -78,11 +56,7 @@ class PathStepper:
         self._landed = False
 
     def begin(self, branch: Branch | None, *, fresh: bool) -> None:
-        """Find the direction in which the path begins; if it is fresh, its first equilibrium too.
-
-        Raises:
-            ConvergenceError: There is none.
-        """
+        """Find the direction in which the path begins; if fresh, its first equilibrium too."""
         corrector, simulation = self._corrector, self._corrector.simulation
         if branch is not None:
             corrector.direction = Direction(branch.mode[corrector.share.dofs], 0.0)
@@ -102,11 +76,7 @@ class PathStepper:
         return self._corrector.simulation.t + self._corrector.sought.t
 
     def advance(self) -> None:
-        """Take a step, a shorter one where it fails, only up to a critical point in it.
-
-        Raises:
-            ConvergenceError: Even the smallest part failed.
-        """
+        """Take a step, a shorter one where it fails, only up to a critical point in it."""
         simulation = self._corrector.simulation
         while True:
             iterations = simulation.iterations
@@ -145,7 +115,7 @@ class PathStepper:
             self._pass_kink(found, reached - 2 * LOCATION_TOLERANCE * part, part, limit)
             return
         # What yields or opens may change signs without an eigenvalue of zero.
-        λ, *ends = (abs(self._softest(one)[0]) for one in (found, before, after))
+        λ, *ends = (abs(one.stiffness.softest(self._weights)[0]) for one in (found, before, after))
         soft = limit or λ < SINGULAR_RATIO * max(ends)
         way = corrector.direction
         self._take(found)
@@ -231,7 +201,7 @@ class PathStepper:
         """Size of what vanishes at the critical point before ``after``."""
         if after.way.t * self._corrector.direction.t < 0:
             return self._slope
-        return lambda found: abs(self._softest(found)[0])
+        return lambda found: abs(found.stiffness.softest(self._weights)[0])
 
     def _slope(self, found: Candidate) -> float:
         """Change of the load factor along the path over that of the configuration.
@@ -252,9 +222,6 @@ class PathStepper:
         slope, *ends = (self._slope(one) for one in (found, before, after))
         return slope < SINGULAR_RATIO * max(ends)
 
-    def _softest(self, found: Candidate) -> tuple[float, Array]:
-        return found.stiffness.softest(self._weights)
-
     def _note(self, found: Candidate, before: Direction, n: int, limit: bool) -> None:
         """Remember the state as a critical point, the n-th of the path; ``found`` is beyond it."""
         corrector, simulation, way = self._corrector, self._corrector.simulation, found.way
@@ -262,7 +229,8 @@ class PathStepper:
             # At a limit point the path goes along the mode.
             mode = np.asarray(way.q / corrector.size(way), dtype=np.float64)
         else:
-            mode = np.asarray(self._softest(found)[1][corrector.share.dofs], dtype=np.float64)
+            critical = found.stiffness.softest(self._weights)[1]
+            mode = np.asarray(critical[corrector.share.dofs], dtype=np.float64)
             simulation.supports.leave(mode)
             # What the path goes along the mode is lost in a singular stiffness.
             strayed = Direction(way.q - before.q, 0.0)

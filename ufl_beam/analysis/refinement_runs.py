@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import statistics
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from mpi4py import MPI
@@ -24,51 +24,28 @@ from ufl_beam.solvers.newton_options import Newton
 
 Quantity = Callable[[Solution], npt.ArrayLike]
 
-SHORT_RUN = 0.1
-"""Runs below are done three times, and the median counts, unless others are asked for; s."""
+SHORT_RUN = 0.1  # runs below are done three times, and the median counts; s
 
 
+@dataclass(eq=False)
 class RefinementRuns:
-    """Runs of a trade-off, see :func:`tradeoff`.
+    """Runs of a trade-off, see :func:`tradeoff`; they have the first of ``newtons`` by default."""
 
-    Args:
-        simulate: Function that runs the scene.
-        families: Coarsest dials to begin with.
-        newtons: Tolerances of Newton's method; runs have the first unless they say so.
-        most: Wall time that all runs together may take; s.
-
-    Attributes:
-        runs: Those that are done.
-        failed: Why runs failed.
-        spent: Wall time of all runs, and of compiling; s.
-    """
-
-    def __init__(
-        self,
-        scene: Scene,
-        quantities: Mapping[str, Quantity],
-        simulate: Callable[..., Solution],
-        families: Sequence[Dials],
-        newtons: Sequence[Newton],
-        *,
-        t: tuple[float, float],
-        most: float,
-        comm: MPI.Intracomm,
-    ) -> None:
-        self.scene, self.quantities, self.t = scene, dict(quantities), t
-        self.families, self.newtons = families, newtons
-        self._most, self._comm, self._run = most, comm, simulate
-        self.runs: dict[Refinement, Run] = {}
-        self.failed: dict[Refinement, str] = {}
-        self.spent = 0.0
-        self._shapes: dict[str, tuple[int, ...]] = {}
+    scene: Scene
+    quantities: Mapping[str, Quantity]
+    simulate: Callable[..., Solution]
+    families: Sequence[Dials]  # coarsest dials to begin with
+    newtons: Sequence[Newton]
+    t: tuple[float, float]
+    most: float  # wall time that all runs together may take; s
+    comm: MPI.Intracomm
+    runs: dict[Refinement, Run] = field(default_factory=dict, init=False)
+    failed: dict[Refinement, str] = field(default_factory=dict, init=False)  # why runs failed
+    spent: float = field(default=0.0, init=False)  # wall time of all runs, and of compiling; s
+    _shapes: dict[str, tuple[int, ...]] = field(default_factory=dict, init=False)
 
     def begin(self, family: int) -> None:
-        """Compile and require comparable quantities, on every process.
-
-        Raises:
-            SceneError: The scene, its dials or a quantity are wrong.
-        """
+        """Compile and require comparable quantities, on every process."""
         seconds = 0.0
         with alone():
             for level in (0.0, 1.0):
@@ -85,30 +62,27 @@ class RefinementRuns:
                             f"{value.shape} in another with other steps or cells; give a number, "
                             "or an array at times and places of your own (np.interp)"
                         )
-        self.spent += float(self._comm.bcast(seconds))
+        self.spent += float(self.comm.bcast(seconds))
 
     def run(self, refinements: Sequence[Refinement], *, short: float = SHORT_RUN) -> None:
         """Run what is missing, several at a time where there are processes.
 
-        Runs that take less than ``short`` seconds are done three times.
-
-        Raises:
-            TradeoffError: It would take more time than all runs may.
+        Runs that take less than ``short`` seconds are done three times; all may take ``most`` (s).
         """
         missing = [r for r in refinements if r not in self.runs and r not in self.failed]
         if not missing:
             return
         needed = sum(map(self._longest, missing))
-        if self.spent + needed > self._most:
+        if self.spent + needed > self.most:
             raise TradeoffError(
                 f"the next {len(missing)} runs would take about {needed:.3g} s after "
-                f"{self.spent:.3g} s of runs, more than most = {self._most:g} s; the finest is "
+                f"{self.spent:.3g} s of runs, more than most = {self.most:g} s; the finest is "
                 f"{self.dials(missing[-1])}",
                 tuple(self.runs.values()),
             )
         cases = [one._asdict() | {"short": short} for one in missing]
         try:
-            done = study(self._member, cases, progress=False, comm=self._comm)
+            done = study(self._member, cases, progress=False, comm=self.comm)
         except RuntimeError as error:  # all of them failed
             self.failed |= dict.fromkeys(missing, str(error))
             return
@@ -145,7 +119,7 @@ class RefinementRuns:
 
     def _simulate(self, refinement: Refinement) -> Solution:
         dials = self.dials(refinement)
-        return self._run(self.scene, t=self.t, progress=False, **dials.arguments)
+        return self.simulate(self.scene, t=self.t, progress=False, **dials.arguments)
 
     def _quantities_of(self, solution: Solution) -> Iterator[tuple[str, Array]]:
         for name, quantity in self.quantities.items():

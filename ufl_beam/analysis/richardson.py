@@ -19,14 +19,9 @@ from ufl_beam.arrays import Array
 Level = tuple[int, int]  # of the cells and of the steps
 LEAST_ORDER = 0.5  # differences that fall more slowly than with this power show no convergence
 ORDER_TOLERANCE = 0.25  # an order so near to a whole one, up to that of the method, is trusted
-
-SURE, UNSURE = 1.25, 3.0
-"""Safety factors on errors that are extrapolated with a trusted order, and on others."""
-
+SURE, UNSURE = 1.25, 3.0  # safety factors on errors by a trusted order, and on others
 LEAST_COSINE = 0.5  # between successive changes; those that turn more are not extrapolated
-
-MOST_MIXED = 0.5
-"""Two dials are taken one by one if the errors of one depend on the other by less than this."""
+MOST_MIXED = 0.5  # part of the errors of two dials that may depend on both
 
 
 def size(values: Array) -> float:
@@ -52,10 +47,7 @@ class Convergence:
     def of(
         cls, values: tuple[Array, Array, Array], finest: int, method: float, floor: float
     ) -> Convergence:
-        """Judge values on three levels up to the finest; changes up to ``floor`` do not count.
-
-        ``method`` is the order that the method has in theory.
-        """
+        """Judge values on three levels; ``method`` is the order in theory, ``floor`` negligible."""
         first, second = values[1] - values[0], values[2] - values[1]
         a, b = size(first), size(second)
         if max(a, b) <= floor:

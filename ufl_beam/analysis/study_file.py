@@ -130,11 +130,7 @@ class Study:
 
 
 def text_of(case: dict[str, Any], what: str = "case") -> str:
-    """Write a case as JSON, by which cases are compared: all digits, names sorted.
-
-    Raises:
-        SceneError: It is no dict, or a value is no number or text and no list of these.
-    """
+    """Write a case as JSON, by which cases are compared: all digits, names sorted."""
     require_kind(case, dict, what)
     for name in case:
         require_kind(name, str, f"{what}: name")
@@ -148,11 +144,7 @@ def text_of(case: dict[str, Any], what: str = "case") -> str:
 
 
 def numbers_of(case: dict[str, Any], returned: Any) -> dict[str, Array]:
-    """Return the result of a member as arrays of floats.
-
-    Raises:
-        SceneError: It is no dict of numbers and arrays.
-    """
+    """Return the result of a member as arrays of floats, or raise :class:`SceneError`."""
     if not isinstance(returned, dict) or not returned:
         raise SceneError(f"study: {case} returned {returned!r}; return a dict of numbers or arrays")
     arrays = {}

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol, cast
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -16,15 +16,9 @@ from ufl_beam.errors import SceneError, require_number
 
 STEPS_PER_LEVEL = 16  # choices of steps from one level of refinement to the next
 EXTRAPOLATED_LEVELS = 2  # levels beyond those that were run which a choice may ask for
-
-BUDGET_AIM, BUDGET_SLACK = 0.9, 0.2
-"""Part of a budget that is aimed at; part by which a run may fall short of it."""
-
+BUDGET_AIM, BUDGET_SLACK = 0.9, 0.2  # part that is aimed at; part that a run may fall short by
 LARGEST_ERROR = 0.3  # errors of this part of a quantity are none to recommend
-
-NEARLY_BEST = 2.0
-"""Where nothing is accurate enough, the cheapest with so many times the least error is next."""
-
+NEARLY_BEST = 2.0  # if nothing serves, the cheapest with so many times the least error is next
 NEGLIGIBLE = 0.1  # changes up to this part of a tolerance need not converge
 
 
@@ -61,10 +55,7 @@ class Prediction:
         return max(cross.error(i, level) / self.units[name] for name, cross in self.crosses.items())
 
     def bottleneck(self, choice: Choice) -> tuple[int, int]:
-        """Refine by a level that dial, cells or steps, which has the larger part of the error.
-
-        None if that is negligible already.
-        """
+        """Refine by a level what has the larger part of the error, if that is not negligible."""
         i = math.log2(choice.refine)
         errors = {n: c.error(i, choice.level) / self.units[n] for n, c in self.crosses.items()}
         worst = self.crosses[max(errors, key=errors.__getitem__)]
@@ -86,46 +77,15 @@ class Prediction:
         return every, np.array(seconds), np.array([self.ratio(*one) for one in every])
 
 
-class Target(Protocol):
-    """Target of a trade-off, a tolerance or a budget."""
-
-    negligible: float  # part of the unit of a quantity up to which changes need not converge
-    measure: str  # words for the sizes that errors are parts of
-
-    @property
-    def bounds(self) -> tuple[float, float]:
-        """Wall time (s) and ratio that are asked for; infinite where none is."""
-
-    def units(self, scales: Mapping[str, float]) -> dict[str, float]:
-        """Return the units of errors by quantity, from the sizes of the quantities."""
-
-    def choose(self, prediction: Prediction) -> Choice:
-        """Choose the setting that serves best."""
-
-    def hopeless(self, choice: Choice, best: Choice) -> bool:
-        """Return whether a choice cannot be better than another one."""
-
-    def accepts(self, seconds: float, ratio: float) -> bool:
-        """Return whether a run of that wall time and error does what is asked."""
-
-    def rank(self, seconds: float, ratio: float, expected: float) -> tuple[bool, float]:
-        """Key of a run by its wall time, its error and the predicted one; the least is best."""
-
-
 @dataclass(frozen=True)
 class Tolerance:
-    """Target of the cheapest setting whose errors are below tolerances.
+    """Target of the cheapest setting whose errors are below tolerances."""
 
-    Args:
-        absolute: By quantity, in its unit; others have ``relative``.
-        relative: Part of the largest magnitude of a quantity.
-    """
-
-    absolute: Mapping[str, float]
-    relative: float
-    negligible = NEGLIGIBLE
-    measure = "tolerances"
-    bounds = math.inf, 1.0
+    absolute: Mapping[str, float]  # by quantity, in its unit; others have ``relative``
+    relative: float  # part of the largest magnitude of a quantity
+    negligible = NEGLIGIBLE  # changes up to this part of a unit need not converge
+    measure = "tolerances"  # words for the sizes that errors are parts of
+    bounds = math.inf, 1.0  # wall time (s) and ratio that are asked for
 
     def __str__(self) -> str:
         if not self.absolute:
@@ -159,13 +119,9 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class Budget:
-    """Target of the most accurate setting that takes no longer; errors are parts of quantities.
+    """Target of the most accurate setting that takes no longer; errors are parts of quantities."""
 
-    Args:
-        seconds: Wall time of a run; s.
-    """
-
-    seconds: float
+    seconds: float  # wall time of a run
     negligible = 0.0
     measure = "largest values"
 
@@ -201,6 +157,9 @@ class Budget:
     def rank(self, seconds: float, ratio: float, expected: float) -> tuple[bool, float]:
         """Rank by the expected error where fast enough, as a single one may be small by chance."""
         return (False, expected) if seconds <= self.seconds else (True, seconds)
+
+
+Target = Tolerance | Budget
 
 
 def target_of(

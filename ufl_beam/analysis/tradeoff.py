@@ -35,15 +35,9 @@ from ufl_beam.simulation.step_control import Adaptive
 from ufl_beam.solvers.newton_options import Newton
 
 NEWTON_SHARE = 0.1  # part of the error that another tolerance of Newton's method may change
-
-MOST_DOUBTS, MOST_TRIALS = 4, 6
-"""Refinements at which self-convergence may not be seen; settings that are tried."""
-
+MOST_DOUBTS, MOST_TRIALS = 4, 6  # refinements without self-convergence; settings tried
 SHORT_CHOICE = 2.0  # of settings that are tried, runs below are done three times; s
-
-ROUNDING = 1e-9
-"""Changes up to this part of a quantity are rounding, or the tolerance of Newton's method."""
-
+ROUNDING = 1e-9  # part of a quantity up to which changes are of rounding or Newton's method
 STEP_ORDER = 2.0  # order of the schemes, at most; that of cells is twice their degree
 
 One = TypeVar("One")
@@ -157,16 +151,10 @@ def tradeoff(
     if not target.accepts(run.seconds, replace(best, run=run).ratio):
         notes.append(f"no setting was found that is nearer to {target}")
     return Tradeoff(
-        runs=tuple(runs.runs.values()),
-        best=run,
-        t=t,
-        crosses=crosses,
-        units=dict(best.prediction.units),
-        target=target,
-        families=tuple(map(str, families)),
-        notes=tuple(notes),
-        spent=runs.spent,
-    )
+        runs=tuple(runs.runs.values()), best=run, t=t, crosses=crosses,
+        units=dict(best.prediction.units), target=target, families=tuple(map(str, families)),
+        notes=tuple(notes), spent=runs.spent,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -197,11 +185,7 @@ class _Search:
         self._slower: list[float] = []
 
     def find(self, others: Sequence[_Found]) -> _Found | None:
-        """The setting; none if ``others`` are better.
-
-        Raises:
-            TradeoffError: Self-convergence is not seen, or no setting serves.
-        """
+        """Find the setting, none if ``others`` are better; TradeoffError if no setting serves."""
         base: Level = (0, 0)
         doubts: list[str] = []
         tried: list[_Found] = []

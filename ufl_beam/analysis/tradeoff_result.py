@@ -30,8 +30,7 @@ class Dials:
     def finer(self, refine: int, level: float, t: tuple[float, float]) -> Dials:
         """Refine each cell into ``refine`` parts and take about ``2**level`` times as many steps.
 
-        The error of an adaptive step is of third order, so that their number goes with the cube
-        root of the tolerance.
+        The error of an adaptive step is of third order: their number is as the cube root of 1/tol.
         """
         if refine == 1 and level == 0:
             return self  # as it was given, to be checked as such

@@ -34,11 +34,7 @@ extern "Python" double missed_in_python(void *self, const double *q, const doubl
 
 _SOURCE = "\n".join([HEADERS, DECLARATIONS, *(text(f"{name}.c") for name in SOURCES)])
 module = compiled(
-    "ufl_beam_loops",
-    DECLARATIONS + _CALLBACKS,
-    lambda: _SOURCE,
-    made_of=[_SOURCE],
-    flags=["-O3"],
+    "ufl_beam_loops", DECLARATIONS + _CALLBACKS, lambda: _SOURCE, made_of=[_SOURCE], flags=["-O3"]
 )
 ffi: Any = module.ffi
 lib: Any = module.lib
@@ -50,11 +46,7 @@ for _name, _field in ffi.typeof("petsc_functions").fields:
 
 
 def petsc(name: str, *arguments: Any) -> None:
-    """Call a function of ``petsc_functions`` in loops.h; objects of petsc4py are theirs in C.
-
-    Raises:
-        RuntimeError: It returns an error.
-    """
+    """Call a function of ``petsc_functions`` in loops.h; objects of petsc4py are theirs in C."""
     in_c = (
         ffi.cast("void *", argument.handle) if isinstance(argument, PETSc.Object) else argument
         for argument in arguments
@@ -96,11 +88,7 @@ def names(enum: str, prefix: str = "") -> tuple[str, ...]:
 
 
 def in_order(enum: str, values: Mapping[str, T], prefix: str = "") -> list[T]:
-    """Sort values by name into the order of an enum of loops.h; see :func:`names`.
-
-    Raises:
-        ValueError: Python and C do not name the same.
-    """
+    """Sort values by name into the order of an enum of loops.h; see :func:`names`."""
     expected = names(enum, prefix)
     if set(values) != set(expected):
         raise ValueError(f"{enum} is {expected} in loops.h, and {tuple(values)} in Python")
@@ -122,11 +110,7 @@ def combined(a: float, x: Array, b: float, y: Array) -> Array:
 
 
 def kernel(pointer: Any, of: Any) -> Any:
-    """Cast an FFCx kernel, a function pointer of the cffi instance ``of``, to that of loops.h.
-
-    Raises:
-        RuntimeError: It takes other arguments than ufl_beam passes.
-    """
+    """Cast an FFCx kernel, a function pointer of the cffi instance ``of``, to that of loops.h."""
     expected, found = ffi.typeof("kernel *").cname, of.typeof(pointer).cname
     if found != expected:
         raise RuntimeError(

@@ -32,17 +32,10 @@ CHECKSUMS = "checksums"
 
 
 def kept(name: str, build: Callable[[Path], T], load: Callable[[Path], T]) -> tuple[T, Path]:
-    """Load an entry of the cache, built first if it is missing or damaged.
+    """Load an entry of the cache and its directory, built first if it is missing or damaged.
 
-    Processes that need the same entry at once build it once; the others wait.
-
-    Args:
-        name: Name of the entry; it must change with whatever the entry is made of.
-        build: Writes the files of the entry into an empty directory and loads them.
-        load: Loads the entry from its directory.
-
-    Returns:
-        The loaded entry and its directory.
+    Processes that need the same entry at once build it once; the others wait.  ``build`` writes its
+    files into an empty directory and loads them.  ``name`` must change with what it is made of.
     """
     place, foreign = _place(), False
     if intact(place / name):
@@ -85,11 +78,7 @@ def intact(entry: Path) -> bool:
 
 
 def _checksums(entry: Path, name: str) -> str:
-    """Name of an entry and SHA-256 of its files.
-
-    Raises:
-        ValueError: Something else than files of this user is in it.
-    """
+    """Name of an entry and SHA-256 of its files; ValueError if not all are files of this user."""
     lines = [name]
     for path in sorted(entry.iterdir()):
         status = path.lstat()

@@ -15,13 +15,7 @@ from ufl_beam.compiled.c_library import Loop, doubles, ffi, integers, lib, loop
 
 
 class Csr:
-    """Compressed sparse rows with indices of 32 bits, as C needs them; SciPy chooses others.
-
-    Args:
-        data: Its entries, row after row.
-        indices: Column of each entry, those of a row in order.
-        indptr: First entry of each row, and the number of entries.
-    """
+    """Compressed sparse rows with indices of 32 bits, as C needs them; SciPy chooses others."""
 
     def __init__(self, data: Array, indices: Index, indptr: Index) -> None:
         self.data = data
@@ -62,12 +56,7 @@ class Csr:
 
 
 def coupling(size: int, *coupled: Index) -> Csr:
-    """Return a matrix of zeros whose pattern has the diagonal and all pairs of coupled dofs.
-
-    Args:
-        size: Number of degrees of freedom.
-        coupled: Degrees of freedom of cells, or of what else couples some; (number, some).
-    """
+    """Return a matrix of zeros whose pattern has the diagonal and all pairs of coupled dofs."""
     groups = [np.arange(size, dtype=np.int32)[:, None], *coupled]
     lengths = np.concatenate([np.full(len(rows), rows.shape[1]) for rows in groups])
     columns = np.concatenate([rows.ravel() for rows in groups]).astype(np.int32)
@@ -114,13 +103,7 @@ class Product:
 class StepProduct(Product):
     """Forces ``A (factor s - back v)``, s being (Δu, 2 tan(Δψ/2)), and their derivative.
 
-    Args:
-        A: Constant matrix.
-        rotations: Degrees of freedom that are rotations, as int32.
-        tangent: Matrix of the same structure that takes the derivative.
-
-    Attributes:
-        product: Argument of ``add_step_force`` and ``add_step_tangent`` of loops.c.
+    ``A`` is constant; the derivative is added to ``tangent``, of the same structure.
     """
 
     def __init__(self, A: Csr, rotations: Index, tangent: Csr) -> None:

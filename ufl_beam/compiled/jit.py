@@ -26,12 +26,12 @@ import ufl
 from ufl_beam.compiled.code_cache import kept
 from ufl_beam.dolfinx_compat import TABULATE, compile_form, fem, form_key
 
-HEADERS = "\n".join(
-    [
-        *(f"#include <{name}.h>" for name in ("float", "math", "stdint", "string")),
-        f"#define CALL(f, e, w, c, x) f(e, w, c, x, 0, 0{TABULATE[1]})",
-    ]
-)
+HEADERS = f"""\
+#include <float.h>
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+#define CALL(f, e, w, c, x) f(e, w, c, x, 0, 0{TABULATE[1]})"""
 """Head of all files of C; CALL calls a kernel of FFCx."""
 
 
@@ -40,27 +40,21 @@ def text(name: str) -> str:
     return (Path(__file__).parent / "c" / name).read_text()
 
 
-DECLARATIONS = "\n".join(
-    [
-        f"typedef void (kernel)({TABULATE[0]});",
-        f"typedef int{8 * np.dtype(PETSc.IntType).itemsize}_t petsc_int;",
-        text("loops.h"),
-    ]
-)
+DECLARATIONS = f"""\
+typedef void (kernel)({TABULATE[0]});
+typedef int{8 * np.dtype(PETSc.IntType).itemsize}_t petsc_int;
+{text("loops.h")}"""
 """Declarations that all files of C share."""
 
-SANITIZERS = (
-    "-O1",
-    "-g1",  # line numbers
-    "-fno-omit-frame-pointer",
-    "-fno-wrapv",
-    "-fsanitize=address,undefined,bounds-strict",
-    "-fno-sanitize-recover=all",
+SANITIZERS = [
+    *("-O1", "-g1", "-fno-omit-frame-pointer", "-fno-wrapv"),
+    *("-fsanitize=address,undefined,bounds-strict", "-fno-sanitize-recover=all"),
     *("-Wall", "-Wextra", "-Wno-unused-parameter", "-Werror"),
-)
-"""Flags that make the compiler check addresses and undefined behaviour; see `make sanitize`."""
+]
+"""Flags, -g1 for line numbers, that make the compiler check addresses and undefined behaviour; see
+`make sanitize`."""
 
-EXTRA = SANITIZERS if os.environ.get("UFL_BEAM_SANITIZE", "0") != "0" else ()
+EXTRA = SANITIZERS if os.environ.get("UFL_BEAM_SANITIZE", "0") != "0" else []
 """Flags after those of each library: the sanitizers if ``UFL_BEAM_SANITIZE=1``, else none."""
 
 
@@ -90,10 +84,6 @@ def compiled(
         made_of: Texts that the C, and the effect of the flags, depend on.
         flags: For the compiler.
         check: Called with the module once it has been compiled; may raise :class:`Refused`.
-
-    Raises:
-        CompilerError: The compiler is missing, or refuses.
-        Refused: As by ``source`` or ``check``, now or when the module was made.
     """
     flags = [*flags, "-fvisibility=hidden", *EXTRA]
     name = f"{stem}_{_digest(declarations, *made_of, *flags, sys.version)}"
@@ -102,13 +92,8 @@ def compiled(
         builder = cffi.FFI()
         builder.cdef(declarations)
         try:
-            builder.set_source(
-                name,
-                source(),
-                extra_compile_args=flags,
-                extra_link_args=list(EXTRA),
-                libraries=["m"],
-            )
+            of_compiler = {"extra_compile_args": flags, "extra_link_args": EXTRA}
+            builder.set_source(name, source(), libraries=["m"], **of_compiler)
             with _explained(stem):
                 builder.compile(tmpdir=directory)
             check(module := _imported(name, directory))
@@ -144,14 +129,7 @@ def _imported(name: str, directory: Path) -> ModuleType:
 
 
 def compiled_form(form: ufl.Form) -> tuple[fem.Form, Path]:
-    """Load a form, compiled first if it is not in the cache.
-
-    Returns:
-        The form, and the C that FFCx wrote for it.
-
-    Raises:
-        CompilerError: The compiler is missing, or refuses.
-    """
+    """Load a form, compiled first if it is not in the cache; and the C that FFCx wrote for it."""
 
     def build(directory: Path) -> fem.Form:
         with _explained("a form"):

@@ -41,14 +41,7 @@ _NUMBER = r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?"
 
 
 def in_vectors(kernel: str) -> str:
-    """Rewrite the text of a kernel of FFCx with vectors in the place of numbers.
-
-    Args:
-        kernel: Its definition in C.
-
-    Raises:
-        Refused: It calls functions that lanes.h does not have.
-    """
+    """Rewrite the C of a kernel of FFCx with vectors in the place of numbers, if lanes.h can."""
     body = kernel[kernel.index("{") :]
     called = re.findall(r"\b(?!for\b)([a-z_]\w*)\(", body)
     whole = re.findall(r"\bpow\([\w\[\]]+, -?\d+\)", body)
@@ -72,14 +65,7 @@ def in_vectors(kernel: str) -> str:
 
 
 def written(source: Path) -> str:
-    """Return the kernel that FFCx wrote for a cell form.
-
-    Args:
-        source: File of its C.
-
-    Raises:
-        Refused: The file has none.
-    """
+    """Return the kernel that FFCx wrote for a cell form in the file ``source``."""
     pattern = r"^void tabulate_tensor_.*?^}(?=\s*^(?:bool|ufcx_integral) )"
     if source.exists() and (found := re.search(pattern, source.read_text(), re.M | re.S)):
         return found[0]
@@ -87,12 +73,7 @@ def written(source: Path) -> str:
 
 
 def in_batches(rows: npt.NDArray[Any], lanes: int) -> npt.NDArray[Any]:
-    """Arrange numbers of cells in batches, see loops.h; (num_batches, numbers, lanes).
-
-    Args:
-        rows: Shape (num_cells, ...).
-        lanes: Number of rows in a batch.
-    """
+    """Arrange rows of cells in batches, see loops.h; (num_batches, numbers, lanes)."""
     rows = rows.reshape(len(rows), math.prod(rows.shape[1:]))
     if missing := -len(rows) % lanes:
         rows = np.concatenate([rows, np.repeat(rows[-1:], missing, axis=0)])
@@ -107,15 +88,9 @@ Round-off of the tangent of a cell of degree 3 is 1e-12 of it; a wrong kernel er
 
 
 def require_agreement(module: ModuleType, kernel: int, sizes: tuple[int, int, int]) -> None:
-    """Compare a kernel in vectors with FFCx's on random cells.
+    """Refuse a kernel in vectors that differs from FFCx's on random cells.
 
-    Args:
-        module: Compiled from lanes.c.
-        kernel: Address of the kernel of FFCx.
-        sizes: Numbers of its entries, values of coefficients, and constants.
-
-    Raises:
-        Refused: The results differ.
+    ``sizes`` are the numbers of its entries, values of coefficients, and constants.
     """
     random, (entries, width, constants) = np.random.default_rng(0), sizes
     at, wrong = partial(module.ffi.from_buffer, "double[]"), 0
@@ -142,13 +117,7 @@ _addresses: dict[tuple[str, int, int, int], int | None] = {}
 
 
 def in_lanes(source: Path, kernel: int, sizes: tuple[int, int, int]) -> int | None:
-    """Return the address of the SIMD loop of a compiled form, or None where there is none.
-
-    Args:
-        source: The C that FFCx wrote for a cell form.
-        kernel: Address of its kernel.
-        sizes: Numbers of its entries, values of coefficients, and constants.
-    """
+    """Return the address of the SIMD loop of a compiled form, or None; see above for ``sizes``."""
     key = (source.name, *sizes)
     if key not in _addresses:
         try:

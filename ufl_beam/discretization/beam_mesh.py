@@ -21,22 +21,16 @@ from ufl_beam.model.mesh_options import Mesh
 class BeamMesh:
     """Base of :class:`Grid`: vertices and cells of all beams.
 
-    Cells of a higher degree have nodes between their vertices, too.
-
-    Args:
-        beams: The beams.
-        attached: Parameters of the places of each that must be vertices.
-        hinges: Places of the plastic hinges.
-        mesh: How finely.
-        size: Of the scene; m.
+    ``attached`` are the parameters of the places of each beam that must be vertices.  Cells of a
+    higher degree have nodes between their vertices, too.
 
     Attributes:
-        beams, mesh: As given.
         points: Nodes of all beams: the vertices, beam after beam, those inside of cells, and the
             second vertex of each plastic hinge; shape (num_nodes, 2); m.
         cells: Vertices of the cells; shape (num_cells, 2).
         nodes_of_cells: Both vertices of the cells and the nodes between; (num_cells, degree + 1).
         beam_of_cell: Number of the beam of each cell; shape (num_cells,).
+        first_vertices: First vertex of each beam, and the number of all; (num_beams + 1,).
     """
 
     def __init__(
@@ -50,13 +44,13 @@ class BeamMesh:
         self.beams, self.mesh = beams, mesh
         self._parameters = [np.array(self.mesh.vertices(b, attached[b])) for b in beams]
         counts = np.array([len(p) for p in self._parameters], dtype=np.int64)
-        self._first = np.concatenate([[0], np.cumsum(counts)])
+        self.first_vertices = np.concatenate([[0], np.cumsum(counts)])
         vertices = np.array(
             [b.curve(s) for b, p in zip(beams, self._parameters, strict=True) for s in p],
             dtype=np.float64,
         ).reshape(-1, 2)
         last = np.zeros(len(vertices), dtype=bool)
-        last[self._first[1:] - 1] = True
+        last[self.first_vertices[1:] - 1] = True
         begin = np.flatnonzero(~last)
         self.cells = np.column_stack([begin, begin + 1])
         self.beam_of_cell = np.repeat(np.arange(len(beams)), counts - 1)
@@ -84,21 +78,16 @@ class BeamMesh:
             raise SceneError(f"{beam.name} is not in the scene")
         return self._number_of_beam[beam]
 
-    @property
-    def first_vertices(self) -> Index:
-        """First vertex of each beam, and the number of all vertices; (num_beams + 1,)."""
-        return self._first
-
     def place(self, vertex: int) -> Place:
         """Place of a vertex."""
-        number = int(np.searchsorted(self._first, vertex, side="right")) - 1
+        number = int(np.searchsorted(self.first_vertices, vertex, side="right")) - 1
         beam: Member = self.beams[number]
-        return beam.at(float(self._parameters[number][vertex - self._first[number]]))
+        return beam.at(float(self._parameters[number][vertex - self.first_vertices[number]]))
 
     def vertices_of(self, beam: Member) -> Index:
         """Vertices of a beam from start to end."""
         i = self._index(beam)
-        return np.arange(self._first[i], self._first[i + 1])
+        return np.arange(self.first_vertices[i], self.first_vertices[i + 1])
 
     def _nodes_of(self, beam: Member) -> Index:
         """Nodes of a beam, both sides of its hinges included."""
@@ -133,14 +122,10 @@ class BeamMesh:
     def cells_of(self, beam: Member) -> Index:
         """Cells of a beam from start to end."""
         i = self._index(beam)
-        return np.arange(self._first[i] - i, self._first[i + 1] - i - 1)
+        return np.arange(self.first_vertices[i] - i, self.first_vertices[i + 1] - i - 1)
 
     def weights(self, place: Place) -> tuple[Index, Array]:
-        """Nodes of the cell at a place, the vertices first, and their weights there; (degree + 1,).
-
-        Raises:
-            SceneError: The beam of the place is not in the scene.
-        """
+        """Nodes of the cell at a place, vertices first, and their weights there; (degree + 1,)."""
         cell, part = self._cell_and_part(place)
         first, *between, last = self.mesh.weights(part)
         nodes = self.nodes_of_cells[cell].copy()
@@ -157,7 +142,7 @@ class BeamMesh:
         s = self._parameters[i]
         left = min(max(bisect_left(s, place.s) - 1, 0), len(s) - 2)
         part = (place.s - s[left]) / (s[left + 1] - s[left])
-        return int(self._first[i]) - i + left, float(part)
+        return int(self.first_vertices[i]) - i + left, float(part)
 
     def vertex(self, place: Place) -> int:
         """The vertex at a place that something is attached to."""
@@ -178,7 +163,7 @@ class BeamMesh:
     def middle(self, cell: int) -> Place:
         """The place in the middle of a cell."""
         number = int(self.beam_of_cell[cell])
-        s, i = self._parameters[number], cell - int(self._first[number] - number)
+        s, i = self._parameters[number], cell - int(self.first_vertices[number] - number)
         beam: Member = self.beams[number]
         return beam.at((s[i] + s[i + 1]) / 2)
 
@@ -190,7 +175,7 @@ class BeamMesh:
         """A number for the ends of the beam, and the number in the beam, of some cells."""
         beams = self.beam_of_cell[cells]
         of_beam = [crc32(struct.pack("4d", *beam.a, *beam.b)) for beam in self.beams]
-        first = (self._first - np.arange(len(self._first)))[beams]
+        first = (self.first_vertices - np.arange(len(self.first_vertices)))[beams]
         return [(of_beam[b], int(c)) for b, c in zip(beams, cells - first, strict=True)]
 
     def _require_length(self, size: float) -> None:

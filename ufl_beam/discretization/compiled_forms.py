@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache
 from itertools import accumulate
 from pathlib import Path
-from typing import Any, NamedTuple, ParamSpec, Protocol, TypeVar, cast
+from typing import Any, NamedTuple, ParamSpec, TypeVar, cast
 
 import basix.ufl
 import numpy as np
@@ -23,18 +23,14 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, integers, kernel, lib
+from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.jit import compiled_form
 from ufl_beam.compiled.simd_kernels import LANES, in_batches, in_lanes
 from ufl_beam.dolfinx_compat import VERSIONS, fem, line_mesh, pack
 
 
 def vectorise(kernels: Sequence[Kernel], coordinates: Array) -> None:
-    """Switch kernels to SIMD, all of them or none: they may share numbers.
-
-    Args:
-        kernels: On the same cells.
-        coordinates: Of the cells, in batches of ``LANES``.
-    """
+    """Switch kernels on the same cells to SIMD, all or none: they may share numbers."""
     addresses = [kernel.address_in_lanes() for kernel in kernels]
     if None not in addresses:
         for one, address in zip(kernels, addresses, strict=True):
@@ -60,12 +56,8 @@ class Prepared(NamedTuple):
     """A form compiled for all scenes.
 
     Attributes:
-        form: The DOLFINx form.
         source: The C that FFCx wrote for it.
-        tabulate: Its kernel.
-        coefficients: Its coefficients.
-        columns: Place of the values of each, by identity, in the row of numbers of a cell.
-        constants: Values of its constants.
+        columns: Place of the values of each coefficient, by identity, in the numbers of a cell.
         packed: Values of the coefficients in the cells that the form was stated on.
         entries: Number of entries of the vector or matrix of a cell.
     """
@@ -82,11 +74,7 @@ class Prepared(NamedTuple):
 
 @lru_cache(maxsize=512)
 def prepared(form: ufl.Form) -> Prepared:
-    """Compile a form, once in a process.
-
-    Raises:
-        ValueError: Its cells have more entries than C has room for, or others than FFCx packs.
-    """
+    """Compile a form, once in a process."""
     compiled, source = compiled_form(form)
     ufcx, (constants, packed) = compiled.ufcx_form, pack(compiled)
     positions = ufcx.original_coefficient_positions[0 : ufcx.num_coefficients]
@@ -107,13 +95,6 @@ def prepared(form: ufl.Form) -> Prepared:
     return Prepared(compiled, source, tabulate, used, columns, constants, packed, entries)
 
 
-class Entries(Protocol):
-    """Matrix of a fixed pattern, see :class:`Csr`."""
-
-    def positions(self, rows: Index, columns: Index) -> Index:
-        """Positions of entries in its data."""
-
-
 class Kernel:
     """A compiled cell form together with the packed values of its coefficients.
 
@@ -130,9 +111,6 @@ class Kernel:
     Attributes:
         cells: Argument of ``add_cells`` of loops.c; a new one after :meth:`share`, :meth:`place`,
             :meth:`compute_in_lanes`.
-
-    Raises:
-        ValueError: The arrays are of other cells than each other, or than the form.
     """
 
     def __init__(
@@ -200,12 +178,8 @@ class Kernel:
         self._packed = other._packed
         self._prepare()
 
-    def place(self, A: Entries) -> None:
-        """Let a bilinear form on the degrees of freedom of the cells add to ``A``.
-
-        Raises:
-            ValueError: It has other entries.
-        """
+    def place(self, A: Csr) -> None:
+        """Let a bilinear form on the degrees of freedom of the cells add to ``A``."""
         per_cell = self._dofs.shape[1]
         if self._entries != per_cell**2:
             raise ValueError(f"a form of {self._entries} entries on {per_cell} degrees of freedom")
@@ -228,11 +202,6 @@ class Kernel:
         self._lanes, self._coordinates = LANES, coordinates
         self._prepare()
 
-    @property
-    def vectorised(self) -> bool:
-        """True with the SIMD loop."""
-        return self._lanes > 1
-
     def add(self, q: Array, b: Array) -> None:
         """Add the form at the unknown ``q`` to a vector, or to the entries of the matrix."""
         lib.add_cells(self.cells, doubles(q), doubles(b))
@@ -244,15 +213,9 @@ class Kernel:
 
 
 class Pointwise:
-    """Compiler of functions from the numbers of a point to other numbers.
+    """Compiler of functions from the numbers of a point, named ``inputs``, to other numbers.
 
     A form on a cell of unit length with one quadrature point is such a function.
-
-    Args:
-        inputs: Names of the numbers that functions depend on, in the order of their storage.
-
-    Attributes:
-        at: UFL symbols of the inputs, by name.
     """
 
     def __init__(self, inputs: Sequence[str]) -> None:

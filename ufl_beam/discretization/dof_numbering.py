@@ -31,13 +31,9 @@ class Grid(BeamMesh):
     numbered along the beams, the shared ones last: eliminating them in this order fills in nothing
     but the coupling of the joints.
 
-    Args:
-        scene: What is modelled.
-        mesh: How finely; with the cells of its beams by default.
-
     Attributes:
         dofs: Degrees of freedom of each node; shape (num_nodes, 3).
-        dofs_of_bodies: Degrees of freedom of each of the scene's movers; shape (num_movers, 3).
+        dofs_of_bodies: Degrees of freedom of the rigid bodies; shape (num_bodies, 3).
         multipliers: Degrees of freedom that are the forces of connectors; shape (num_links,).
         size: Number of degrees of freedom.
     """
@@ -71,17 +67,13 @@ class Grid(BeamMesh):
         return self.points[nodes], self.dofs[nodes]
 
     def node(self, anchor: Anchor) -> Index:
-        """Degrees of freedom of what an anchor that has a vertex, or a body, moves with; (3,).
-
-        Raises:
-            SceneError: Its beam or body is not in the scene.
-        """
+        """Degrees of freedom of what an anchor that has a vertex, or a body, moves with; (3,)."""
         of = node(anchor)
         if not isinstance(of, Body):
             return np.asarray(self.dofs[self.vertex(of)])
-        if of not in self.scene.movers:
+        if of not in self.scene.rigid_bodies:
             raise SceneError(f"{anchor}: {of.name} is not in the scene")
-        return np.asarray(self.dofs_of_bodies[self.scene.movers.index(of)])
+        return np.asarray(self.dofs_of_bodies[self.scene.rigid_bodies.index(of)])
 
     @cached_property
     def rotations(self) -> Index:
@@ -112,32 +104,28 @@ class Grid(BeamMesh):
             return f"what holds {self.scene.links[dof - self.multipliers[0]]}"
         if dof not in self.dofs:
             body, component = np.argwhere(self.dofs_of_bodies == dof)[0]
-            return f"{COMPONENTS[component]} of {self.scene.movers[body].name}"
+            return f"{COMPONENTS[component]} of {self.scene.rigid_bodies[body].name}"
         node, component = np.argwhere(self.dofs == dof)[0]
         x, y = self.points[node]
         beam = next(b for b in self.scene.beams if node in self._nodes_of(b))
         return f"{COMPONENTS[component]} of {beam.name} at ({x:g}, {y:g})"
 
     def worst(self, sizes: Array) -> dict[str, float]:
-        """The degree of freedom of each beam, body and connector with the largest size, in words.
-
-        Args:
-            sizes: One for each degree of freedom; those that are zero are left out.
-        """
+        """Largest degree of freedom of each beam, body and connector, in words; zeros left out."""
         dofs_of_beams = [self.nodes_of(beam)[1] for beam in self.scene.beams]
         groups = [*dofs_of_beams, *self.dofs_of_bodies, *self.multipliers.reshape(-1, 1)]
         worst = sorted({int(g.flat[np.argmax(sizes[g])]) for g in groups}, key=lambda d: -sizes[d])
         return {self.describe(dof): float(sizes[dof]) for dof in worst if sizes[dof]}
 
     def _number(self) -> None:
-        nodes, movers = len(self.points), self.scene.movers
-        row = {body: nodes + i for i, body in enumerate(movers)}
+        nodes, rigid_bodies = len(self.points), self.scene.rigid_bodies
+        row = {body: nodes + i for i, body in enumerate(rigid_bodies)}
 
         @cache
         def at(of: Node) -> int:
             return row[of] if isinstance(of, Body) else self.vertex(of)
 
-        slots = np.arange(3 * (nodes + len(movers)))
+        slots = np.arange(3 * (nodes + len(rigid_bodies)))
         shared = slots >= 3 * nodes
         for (one, component), (other, _) in self.scene.representatives.items():
             same = 3 * at(other) + component
@@ -145,7 +133,7 @@ class Grid(BeamMesh):
             shared[same] = True
         kept = slots == np.arange(len(slots))
         inner = self.nodes_of_cells[:, 2:]
-        position = np.arange(nodes + len(movers), dtype=np.float64)
+        position = np.arange(nodes + len(rigid_bodies), dtype=np.float64)
         position[list(self._beyond.values())] = self.vertices_at_hinges
         position[inner] = position[self.cells[:, :1]] + self.mesh.nodes[1:-1]
         ordered = (3 * np.argsort(position)[:, None] + np.arange(3)).ravel()

@@ -25,9 +25,6 @@ from ufl_beam.model.mesh_options import Mesh
 class Element:
     """The finite element of the beams on one cell, and the functions that forms are written in.
 
-    Args:
-        mesh: Degree of the element, and how it integrates inertia.
-
     Attributes:
         axis: Undeformed axis, in UFL.
         space: Configurations (u_x, u_y, ψ).
@@ -72,8 +69,7 @@ class Element:
     def dx(self, degree: int) -> ufl.Measure:
         """Integration over the cells; one degree per form, see compiled_forms.py.
 
-        Args:
-            degree: Of the rule on cells of degree 1; each degree that they have more adds two.
+        ``degree`` is for cells of degree 1; each degree that they have more adds two.
         """
         rule = {"quadrature_degree": self._rule(degree)}
         return ufl.Measure("dx", domain=self._cell, metadata=rule)
@@ -103,13 +99,7 @@ def _tangent(work: ufl.Form, q1: fem.Function) -> ufl.Form:
 class Fields:
     """Cells of one process, or some of them: what forms of the element are computed on.
 
-    Args:
-        share: The cells and degrees of freedom of this process.
-        part: Positions in ``share.cells`` of the cells that are meant; all by default.
-
     Attributes:
-        share: The cells and degrees of freedom of this process.
-        element: The finite element of the beams.
         cell_dofs: Local degrees of freedom in the order of the cells of the mesh;
             (num_cells, 3 (degree + 1)).
         order: Position in ``share.cells`` of each cell of the mesh.
@@ -220,12 +210,7 @@ def _weighted_strains(of: Element) -> ufl.Form:
 
 
 class Strains:
-    """(Σ, Γ, K) in the points of the cells of some fields.
-
-    Attributes:
-        kernel: Strains times the weights of the points.
-        shape: Cells, and three times the points in each.
-    """
+    """(Σ, Γ, K) in the points of the cells of some fields; the kernel weights them."""
 
     def __init__(self, fields: Fields) -> None:
         self.kernel = fields.hot_kernel(_weighted_strains(fields.element), fields.element.q1)

@@ -31,9 +31,6 @@ FAR_OUT = 10.0
 """Distance of a point from its body's centre that is unlikely, in radii of gyration."""
 
 
-# -- masses --------------------------------------------------------------------------------------
-
-
 def warn_of_masses(scene: Scene) -> None:
     """Warn of beams without mass beside others that have mass, and of scenes without any."""
     light = [beam.name for beam in scene.beams if beam.section.massless_by_default]
@@ -53,9 +50,6 @@ def warn_of_masses(scene: Scene) -> None:
         )
 
 
-# -- hinges --------------------------------------------------------------------------------------
-
-
 def warn_of_free_hinges(scene: Scene) -> None:
     """Warn of hinges given at free ends where a load is a moment, which acts on the member."""
     there = {place_of(hinge) for hinge in scene.hinges}
@@ -69,9 +63,6 @@ def warn_of_free_hinges(scene: Scene) -> None:
                 f"{place.beam.name}: the hinge at s = {place.s:g} has nothing beyond it but "
                 f"{load}, so that the load acts on the member, and the hinge is left out"
             )
-
-
-# -- places that touch ---------------------------------------------------------------------------
 
 
 def warn_of_touching(grid: Grid) -> None:
@@ -125,7 +116,7 @@ def _groups(grid: Grid) -> Index:
     links = grid.dofs_of_links[:, :2]
     held = [support for support in grid.scene.supports if {0, 1} <= support.held.keys()]
     ground = grid.size
-    if GROUND in grid.scene.movers:
+    if GROUND in grid.scene.rigid_bodies:
         ground = int(grid.node(GROUND.middle)[0])
     fast = np.array([(grid.node(s.place)[0], ground) for s in held], dtype=np.int64).reshape(-1, 2)
     rows, columns = np.concatenate([links, fast]).T
@@ -133,9 +124,6 @@ def _groups(grid: Grid) -> Index:
     graph = coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(size, size))
     _, group = connected_components(graph, directed=False)
     return np.asarray(group[grid.dofs[:, 0]])
-
-
-# -- points of bodies ----------------------------------------------------------------------------
 
 
 def warn_of_far_points(scene: Scene) -> None:
@@ -189,9 +177,6 @@ def _is_far(spot: Spot, others: Array) -> bool:
     return _outside(np.array(spot.point), box) > float(np.linalg.norm(np.ptp(box, axis=0))) > 0.0
 
 
-# -- initial velocities --------------------------------------------------------------------------
-
-
 def warn_of_origin(scene: Scene) -> None:
     """Warn of velocities that turn about the origin by default where the scene is far from it."""
     points = np.array([point for point, _ in _points(scene)])
@@ -217,17 +202,10 @@ def _outside(point: Array, points: Array) -> float:
     return float(np.linalg.norm(beyond))
 
 
-# -- prescribed motions --------------------------------------------------------------------------
-
-
 def warn_of_jumps(grid: Grid, t: float, q: Array, motions: Array) -> None:
-    """Warn of prescribed motions that are not where the motion begins; in dynamics.
+    """Warn of prescribed motions that do not begin where the scene is, ``q`` at ``t``; in dynamics.
 
-    Args:
-        grid: The scene.
-        t: Time of the beginning; s.
-        q: Configuration there, all degrees of freedom.
-        motions: Relative motions of the connectors there; (num_links,).
+    ``motions`` are the relative motions of the connectors there; (num_links,).
     """
     size = grid.scene.size
     for support in grid.scene.supports:

@@ -129,11 +129,6 @@ class Share:
         """Number of local degrees of freedom, ghosts included."""
         return len(self.dofs)
 
-    @property
-    def num_global(self) -> int:
-        """Number of degrees of freedom of all processes."""
-        return self.grid.size
-
     def at(self, anchor: Anchor) -> Index:
         """Degrees of freedom (numbers of the grid) of what an anchor moves with; shape (3,)."""
         return self.grid.node(anchor)
@@ -168,7 +163,7 @@ class Share:
         return self.grid.lengths(self.cells)
 
     def lengths(self) -> Array:
-        """Change of each local degree of freedom by a strain of one: a cell's length, or a radian.
+        """Change of each local dof by a strain of one: a cell's length, or a radian.
 
         Bodies are as large as the scene; forces of connectors have no length.
         """

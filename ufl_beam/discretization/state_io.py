@@ -10,12 +10,11 @@ from __future__ import annotations
 from collections import defaultdict
 from typing import Protocol
 
-from mpi4py import MPI
-
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.arrays import State as State
+from ufl_beam.discretization.partition import Share
 
 NOWHERE: Array = np.empty(0)
 """In the place of a configuration: of what is remembered, strains and stored energies are not that
@@ -38,28 +37,13 @@ class Memory(Protocol):
         """Values at the local degrees of freedom whose sums over the processes mean something."""
 
     def rows(self, name: str, numbers: Index, rows: Array) -> Array:
-        """Rows of numbered things, such as cells, each of which is on one process only.
-
-        Those of one name may have different lengths, as laws remember more or less.
-        """
-
-
-class Part(Protocol):
-    """Degrees of freedom of one process, see :class:`Share`."""
-
-    comm: MPI.Intracomm
-    dofs: Index
-    num_owned: int
-
-    @property
-    def num_global(self) -> int:
-        """Number of degrees of freedom of all processes."""
+        """Rows of numbered things, each on one process only; of any lengths under one name."""
 
 
 class Saving:
     """A memory that writes down; :meth:`state` is what came together."""
 
-    def __init__(self, share: Part) -> None:
+    def __init__(self, share: Share) -> None:
         self._share = share
         self._sums: dict[str, tuple[int, Index, Array]] = {}
         self._rows: defaultdict[str, list[Array]] = defaultdict(list)
@@ -77,12 +61,12 @@ class Saving:
     def at_dofs(self, name: str, values: Array) -> Array:
         """Save values at the owned degrees of freedom."""
         share = self._share
-        self._sum(name, share.num_global, share.dofs[: share.num_owned], values)
+        self._sum(name, share.grid.size, share.dofs[: share.num_owned], values)
         return values
 
     def added(self, name: str, values: Array) -> Array:
         """Save a number that is the same on all processes."""
-        self._sum(name, self._share.num_global, self._share.dofs, values)
+        self._sum(name, self._share.grid.size, self._share.dofs, values)
         return values
 
     def _sum(self, name: str, size: int, where: Index, values: Array) -> None:
@@ -114,7 +98,7 @@ class Saving:
 class Restoring:
     """A memory that gives back a state; what that does not have stays as it is."""
 
-    def __init__(self, share: Part, state: State) -> None:
+    def __init__(self, share: Share, state: State) -> None:
         self._share, self._state = share, state
 
     def number(self, name: str, value: float) -> float:

@@ -7,11 +7,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Index
+from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError
-from ufl_beam.model.bodies import GROUND, Body
+from ufl_beam.model.bodies import GROUND
 from ufl_beam.model.connectors import Connector
 
 APART = 1e-6
@@ -28,31 +28,20 @@ class Transfer:
     Nodes of beams and bodies are the same if their records are, connectors if they join the same
     points by laws of one kind.  Where a joint was removed, both places begin where the joint was;
     where one was added, its places must be together.
-
-    Args:
-        old: Scene that the state is of.
-        new: Scene that begins with it.
-
-    Raises:
-        SceneError: The scenes have other beams or vertices, or the new one has another body.
     """
 
     def __init__(self, old: Grid, new: Grid) -> None:
         self._old, self._new = old, new
         self._require_alike()
-        bodies = [body for body in new.scene.movers if body in old.scene.movers]
+        bodies = [body for body in new.scene.rigid_bodies if body in old.scene.rigid_bodies]
         news, olds = (
-            np.vstack([grid.dofs, *(self._dofs_of(grid, body) for body in bodies)]).ravel()
+            np.vstack([grid.dofs, *(grid.node(body.middle) for body in bodies)]).ravel()
             for grid in (new, old)
         )
         links = self._links()
         self._numbers = {a: b for b, a in links.items()}
         self._to = np.concatenate([news, new.multipliers[list(links)]])
         self._from = np.concatenate([olds, old.multipliers[list(links.values())]])
-
-    @staticmethod
-    def _dofs_of(grid: Grid, body: Body) -> Index:
-        return np.asarray(grid.dofs_of_bodies[grid.scene.movers.index(body)]).reshape(1, 3)
 
     def _require_alike(self) -> None:
         """Raise unless beams and vertices are the same, and every body is known."""
@@ -90,20 +79,12 @@ class Transfer:
         return found
 
     def state(self, q: Array) -> Array:
-        """Configuration in the numbering of the new scene.
-
-        Raises:
-            SceneError: Places that a new joint joins are apart.
-        """
+        """Configuration in the new numbering; places that a new joint joins must be together."""
         size = self._new.scene.size
         return self._map(q, lambda c: APART * (size if c < 2 else 1.0), ("m", "rad"), "are")
 
     def velocity(self, v: Array) -> Array:
-        """Velocities in the numbering of the new scene.
-
-        Raises:
-            SceneError: Places that a new joint joins have different velocities.
-        """
+        """Velocities in the new numbering; places that a new joint joins must have the same."""
         fastest = float(np.abs(v).max(initial=0.0)) * max(self._new.scene.size, 1.0)
         return self._map(v, lambda c: APART * fastest, ("m/s", "rad/s"), "move")
 
@@ -124,7 +105,7 @@ class Transfer:
                     f"at the end of the solution: {where}. Join them by springs, or where they "
                     "are together"
                 )
-        if GROUND in self._new.scene.movers:
+        if GROUND in self._new.scene.rigid_bodies:
             mapped[self._new.node(GROUND.middle)] = 0.0
         return mapped
 
@@ -151,7 +132,7 @@ def same_unknowns(old: Grid, new: Grid) -> bool:
     return (
         new.agrees(old)
         and old.size == new.size
-        and old.scene.movers == new.scene.movers
+        and old.scene.rigid_bodies == new.scene.rigid_bodies
         and next(links) == next(links)
     )
 

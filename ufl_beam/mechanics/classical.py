@@ -15,15 +15,9 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.mechanics import kinematics
 from ufl_beam.mechanics.kinematics import Axis
-from ufl_beam.mechanics.time_schemes import (
-    Constant,
-    Opening,
-    Rates,
-    Step,
-    Values,
-    require_between,
-    scaled,
-)
+from ufl_beam.mechanics.time_schemes import Constant, Rates, Step, require_between, scaled
+from ufl_beam.model.law_functions import Values
+from ufl_beam.model.material_laws import Softening
 
 
 class _AtEnd:
@@ -33,7 +27,7 @@ class _AtEnd:
     theta = 1.0
     loss = 0.0
 
-    def resistance(self, softening: Opening, opening: Array, growth: Values) -> Values:
+    def resistance(self, softening: Softening, opening: Array, growth: Values) -> Values:
         """The traction at the end of the step."""
         return softening.traction(opening + growth)
 
@@ -104,7 +98,7 @@ class Static(_AtEnd):
 
         So loads that are there at once can be reached in parts as well as those that grow.
         """
-        return Step(t0, t1, q0, load_time=end, motion_time=end, toward=(t1 - t0) / (end - t0))
+        return Step(t0, t1, q0, load_time=end, motion_time=end, fraction=(t1 - t0) / (end - t0))
 
 
 class Weights(NamedTuple):
@@ -141,7 +135,7 @@ class _Accelerated(_AtEnd):
 
     def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
         """Loads and motions are those of the end."""
-        return Step(t0, t1, q0, load_time=t1, motion_time=t1, toward=1.0)
+        return Step(t0, t1, q0, load_time=t1, motion_time=t1, fraction=1.0)
 
     def half_tangents(self, rotations: Index) -> Index:
         """No rotations: steps are the increments themselves."""

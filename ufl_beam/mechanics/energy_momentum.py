@@ -16,15 +16,9 @@ from ufl_beam.compiled.c_library import combined, doubles, integers, lib
 from ufl_beam.mechanics import kinematics
 from ufl_beam.mechanics.classical import Static
 from ufl_beam.mechanics.kinematics import Axis
-from ufl_beam.mechanics.time_schemes import (
-    Constant,
-    Opening,
-    Rates,
-    Step,
-    Values,
-    require_between,
-    scaled,
-)
+from ufl_beam.mechanics.time_schemes import Constant, Rates, Step, require_between, scaled
+from ufl_beam.model.law_functions import Values
+from ufl_beam.model.material_laws import Softening
 
 
 class _OverStep:
@@ -42,7 +36,7 @@ class _OverStep:
         """Return the energy that ``alpha`` dissipates."""
         return self.alpha
 
-    def resistance(self, softening: Opening, opening: Array, growth: Values) -> Values:
+    def resistance(self, softening: Softening, opening: Array, growth: Values) -> Values:
         """The mean traction, so that the work of the step is what the opening dissipates."""
         return softening.mean_traction(opening, growth)
 
@@ -160,8 +154,8 @@ class ExactStatic(ExactStep):
         Parts of a step go in proportion, as those of :class:`Static`; so loads and motions that are
         there at once can be reached in parts.
         """
-        toward = (t1 - t0) / (end - t0)
-        return Step(t0, t1, q0, load_time=end, motion_time=end, toward=toward, at=self.theta)
+        fraction = (t1 - t0) / (end - t0)
+        return Step(t0, t1, q0, load_time=end, motion_time=end, fraction=fraction, at=self.theta)
 
 
 class Midway:
@@ -180,7 +174,7 @@ class Midway:
 
     def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
         """Loads act in the middle of the step, motions arrive at its end."""
-        return Step(t0, t1, q0, load_time=(t0 + t1) / 2, motion_time=t1, toward=1.0)
+        return Step(t0, t1, q0, load_time=(t0 + t1) / 2, motion_time=t1, fraction=1.0)
 
     def velocity(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
         """The mean velocity of the step."""

@@ -16,14 +16,9 @@ from ufl.core.expr import Expr
 class Axis:
     """Undeformed axis of the beams on a mesh of straight cells.
 
-    Args:
-        mesh: Their mesh.
+    Attributes:
         nodes: Where in a cell, from 0 to 1, the nodes of configurations are; ascending.
         X: From 0 to 1 along each cell; by default the point is in the middle.
-
-    Attributes:
-        nodes: As given.
-        X: As given.
         t0: Unit tangent of the cell, from its first to its last vertex; shape (2,).
         n0: Unit normal, ``t0`` turned by +90°; shape (2,).
         h: Length of the cell; m.
@@ -87,17 +82,9 @@ def split(q: Expr) -> tuple[Expr, Expr]:
 
 
 def strain(q: Expr, axis: Axis) -> Expr:
-    """Reissner's generalised strain (Σ, Γ, K).
+    """Reissner's axial strain, shear strain, curvature (Σ, Γ, K), P(6), P(10); 1, 1, 1/m.
 
-    Args:
-        q: Configuration (u_x, u_y, ψ); shape (3,); m, m, rad.
-        axis: Undeformed axis.
-
-    Returns:
-        (Σ, Γ, K): axial strain, shear strain, curvature; shape (3,); 1, 1, 1/m.
-
-    Equations:
-        P(6), P(10), for any initial direction of the axis.
+    The configuration ``q`` is (u_x, u_y, ψ), m and rad; the axis may have any initial direction.
     """
     u, ψ = split(q)
     Σ, Γ = _pull_back(axis.d(u), ψ, axis)
@@ -107,19 +94,7 @@ def strain(q: Expr, axis: Axis) -> Expr:
 
 
 def virtual_strain(q: Expr, w: Expr, axis: Axis) -> Expr:
-    """Variation of :func:`strain` at ``q`` in the direction ``w``.
-
-    Args:
-        q: Configuration; shape (3,).
-        w: Direction (w_u, w_ψ), usually a test function; shape (3,).
-        axis: Undeformed axis.
-
-    Returns:
-        (w_Σ, w_Γ, w_K); shape (3,).
-
-    Equations:
-        P(21), pulled back.
-    """
+    """Variation of :func:`strain` at ``q`` in the direction ``w`` (w_u, w_ψ); P(21) pulled back."""
     (u, ψ), (w_u, w_ψ) = split(q), split(w)
     w_Σ, w_Γ = _pull_back(axis.d(w_u) - turn(axis.t0 + axis.d(u)) * w_ψ, ψ, axis)  # P(21)
     return ufl.as_vector([w_Σ, w_Γ, axis.d(w_ψ)])
@@ -147,18 +122,6 @@ def virtual_strain_over_step(q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
     printed has neither property beyond O(Δψ²); docs/errata.md derives this form.
 
     Valid for ``|Δψ| < π``; on two-node cells with a one-point rule, on others with any.
-
-    Args:
-        q0: Configuration at t_n; shape (3,).
-        q1: Configuration at t_n+1; shape (3,).
-        w: Direction (w_u, w_ψ); shape (3,).
-        axis: Undeformed axis.
-
-    Returns:
-        (w_Σ, w_Γ, w_K); shape (3,).
-
-    Equations:
-        P(82) in its corrected form.
     """
     (u0, ψ0), (u1, ψ1), (w_u, w_ψ) = split(q0), split(q1), split(w)
     turn_over_step = _turn_of_two_nodes if len(axis.nodes) == 2 else _turn_of_nodes
@@ -192,14 +155,8 @@ def _turn_of_nodes(ψ0: Expr, ψ1: Expr, w: Expr, axis: Axis) -> tuple[Expr, Exp
     """Virtual rotation and curvature at a point: 2 tan δ and 2 δ' if w is 2 tan δ at the nodes.
 
     Both are linear in w, and a uniform w is that rotation, and no curvature; docs/errata.md.
-
-    Args:
-        ψ0: Rotation at the beginning of the step.
-        ψ1: Rotation at its end; 2 δ is the difference.
-        w: Virtual rotation.
-        axis: Undeformed axis.
     """
-    δ = (ψ1 - ψ0) / 2
+    δ = (ψ1 - ψ0) / 2  # half of the increment of rotation
     nodes, virtual = axis.at_nodes(δ), axis.at_nodes(w)
     # Differences of 2 tan δ between neighbours are made differences of 2 δ.
     steps = [

@@ -10,37 +10,22 @@ work, and what a spring is given it stores.  All variations vanish for rigid mot
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.mechanics.kinematics import frame, split, turn
-
-
-class Averaging(Protocol):
-    """Variations of relative motions over a step, as time schemes define them."""
-
-    def average(self, before: Expr, now: Expr) -> Expr:
-        """Average of a vector or a distance over the step, as variations take it."""
-
-    def virtual_turn(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
-        """Variation of a relative rotation whose virtual motion is ``w``."""
+from ufl_beam.mechanics.time_schemes import Scheme
 
 
 class Numbers(NamedTuple):
-    """Numbers that a relative motion depends on besides the frames.
+    """Vectors (2,) that a relative motion depends on besides the frames; m."""
 
-    Attributes:
-        arm_a, arm_b: From the nodes to the points a and b; (2,); m.
-        apart: From point a to point b in the undeformed scene; (2,); m.
-        axis: Unit vector; (2,).
-    """
-
-    arm_a: Expr
-    arm_b: Expr
-    apart: Expr
-    axis: Expr
+    arm_a: Expr  # from the node to the point a
+    arm_b: Expr  # from the node to the point b
+    apart: Expr  # from point a to point b in the undeformed scene
+    axis: Expr  # unit vector
 
 
 class Pair(NamedTuple):
@@ -72,7 +57,7 @@ def _between(q: Pair, n: Numbers) -> Expr:
     return n.apart + _moved(q, n)
 
 
-def _virtually_between(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Averaging) -> Expr:
+def _virtually_between(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Scheme) -> Expr:
     """Variation of :func:`_between`."""
 
     def of_point(x0: Expr, x1: Expr, w: Expr, arm: Expr) -> Expr:
@@ -83,22 +68,17 @@ def _virtually_between(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Averagin
 
 
 class Motion(NamedTuple):
-    """A relative motion.
-
-    Attributes:
-        value: Of a pair; m or rad.
-        variation: Of it over a step, from the pairs at both ends and their virtual motions.
-    """
+    """A relative motion, m or rad; its variation is from the pairs at both ends of a step."""
 
     value: Callable[[Pair, Numbers], Expr]
-    variation: Callable[[Pair, Pair, Pair, Numbers, Averaging], Expr]
+    variation: Callable[[Pair, Pair, Pair, Numbers, Scheme], Expr]
 
 
 def _turning(q: Pair, n: Numbers) -> Expr:
     return q.b[2] - q.a[2]
 
 
-def _virtual_turning(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Averaging) -> Expr:
+def _virtual_turning(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Scheme) -> Expr:
     turn_a, turn_b = (now[2] - before[2] for before, now in zip(q0, q1, strict=True))
     return scheme.virtual_turn(turn_a, turn_b, w.b[2] - w.a[2])
 
@@ -113,7 +93,7 @@ def _stretching(q: Pair, n: Numbers) -> Expr:
     return ufl.dot(n.apart + n.apart + moved, moved) / (_length(_between(q, n)) + _length(n.apart))
 
 
-def _virtual_stretching(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Averaging) -> Expr:
+def _virtual_stretching(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Scheme) -> Expr:
     before, now = _between(q0, n), _between(q1, n)
     along = scheme.average(before, now) / scheme.average(_length(before), _length(now))
     return ufl.dot(along, _virtually_between(q0, q1, w, n, scheme))
@@ -123,7 +103,7 @@ def _parting(q: Pair, n: Numbers) -> Expr:
     return ufl.dot(n.axis, _moved(q, n))
 
 
-def _virtual_parting(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Averaging) -> Expr:
+def _virtual_parting(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Scheme) -> Expr:
     return ufl.dot(n.axis, _virtually_between(q0, q1, w, n, scheme))
 
 
@@ -132,7 +112,7 @@ def _sliding(q: Pair, n: Numbers) -> Expr:
     return ufl.dot(by_turning, _between(q, n)) + ufl.dot(n.axis, _moved(q, n))
 
 
-def _virtual_sliding(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Averaging) -> Expr:
+def _virtual_sliding(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Scheme) -> Expr:
     axis = scheme.average(_turned(n.axis, q0.a[2]), _turned(n.axis, q1.a[2]))
     between = scheme.average(_between(q0, n), _between(q1, n))
     virtual = _virtually_between(q0, q1, w, n, scheme)

@@ -10,7 +10,7 @@ the step are in energy_momentum.py, those whose forces act at its end in classic
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol, TypeGuard, runtime_checkable
+from typing import NamedTuple, Protocol, TypeGuard, runtime_checkable
 
 import ufl
 from ufl.core.expr import Expr
@@ -18,46 +18,23 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array, Index
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.mechanics.kinematics import Axis
+from ufl_beam.model.law_functions import Values
+from ufl_beam.model.material_laws import Softening
 
 Constant = Callable[[float], Expr]
 """Makes a number of the scheme a constant of the form, so that changing it compiles nothing."""
 
 
-Values = Any
-"""Array, or expression of UFL."""
-
-
-class Opening(Protocol):
-    """Law of a discontinuity, such as :class:`Softening`."""
-
-    def traction(self, ξ: Values) -> Values:
-        """Resistance after the accumulated opening ξ."""
-
-    def mean_traction(self, ξ: Values, a: Values) -> Values:
-        """Mean resistance while the opening grows from ξ by a."""
-
-
 class Step(NamedTuple):
-    """A step in time.
+    """A step in time."""
 
-    Attributes:
-        t0: Beginning; s.
-        t1: End; s.
-        q0: Configuration at the beginning, local degrees of freedom.
-        load_time: Time at which loads are taken; s.
-        motion_time: Time at which prescribed motions are taken; s.
-        toward: How far the step goes from the loads and motions before it to these; 1: there.
-        at: Part of the way from the loads at the beginning to those at the end of the step at which
-            they are in its equation; 1: at the end.
-    """
-
-    t0: float
-    t1: float
-    q0: Array
-    load_time: float
-    motion_time: float
-    toward: float
-    at: float = 1.0
+    t0: float  # beginning; s
+    t1: float  # end; s
+    q0: Array  # configuration at the beginning, local degrees of freedom
+    load_time: float  # at which loads are taken; s
+    motion_time: float  # at which prescribed motions are taken; s
+    fraction: float  # part of the way to these loads and motions that the step goes; 1: all of it
+    at: float = 1.0  # part of the way between loads at both ends, in the equation; 1: at the end
 
     @property
     def dt(self) -> float:
@@ -69,28 +46,17 @@ class Step(NamedTuple):
 class Scheme(Protocol):
     """Protocol of time schemes."""
 
-    dynamic: bool
-    """True if the scene has inertia."""
-
-    advice: str
-    """Advice where a step finds no equilibrium."""
-
-    load_weight: float
-    """Follower loads turn with the rotation at this part of the step."""
-
-    theta: float
-    """Laws of inelastic material are stated at this part of the step."""
-
-    slack: float
-    """A step is cut if its forces do not account for this part of what it stores and dissipates."""
-
-    loss: float
-    """Part of twice the energy of a change of strain that is lost numerically."""
+    dynamic: bool  # True if the scene has inertia
+    advice: str  # where a step finds no equilibrium
+    load_weight: float  # part of the step at whose rotation follower loads act
+    theta: float  # part of the step at which laws of inelastic material are stated
+    slack: float  # part of what a step stores and dissipates that its forces may not account for
+    loss: float  # part of twice the energy of a change of strain that is lost numerically
 
     def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
         """The step from ``t0`` to ``t1``, perhaps a part of one that goes on to ``end``."""
 
-    def resistance(self, softening: Opening, opening: Array, growth: Values) -> Values:
+    def resistance(self, softening: Softening, opening: Array, growth: Values) -> Values:
         """Traction of a discontinuity whose opening grows in the step."""
 
     def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
@@ -125,35 +91,21 @@ class Scheme(Protocol):
 
 
 class Rates(Protocol):
-    """Velocities, and accelerations if a scheme has them, at the beginning of a step.
+    """Velocities, and accelerations if a scheme has them, at the beginning of a step."""
 
-    Attributes:
-        v: The velocities; m/s, rad/s.
-        v_before: Those at the beginning of the step before.
-        more: What a scheme keeps besides, as many as are known yet of :attr:`DynamicScheme.kept`.
-        last_dt: Length of the step before; infinite if there was none; s.
-    """
-
-    v: Array
-    v_before: Array
-    more: tuple[Array, ...]
-    last_dt: float
+    v: Array  # velocities; m/s, rad/s
+    v_before: Array  # those at the beginning of the step before
+    more: tuple[Array, ...]  # kept besides, as many as are known of :attr:`DynamicScheme.kept`
+    last_dt: float  # length of the step before; infinite if there was none; s
 
 
 class DynamicScheme(Scheme, Protocol):
     """Protocol of time schemes with inertia."""
 
-    kept: tuple[str, ...]
-    """Names of the rates that it keeps besides the velocities, such as accelerations."""
-
-    slips: bool
-    """True if it loses energy by :meth:`slip`."""
-
-    has_mean_velocity: bool
-    """True if a step has a mean velocity in its equation; friction and rotating frames need it."""
-
-    rings: bool
-    """True if the accelerations of a motion that is given oscillate for ever."""
+    kept: tuple[str, ...]  # names of the rates kept besides velocities, such as accelerations
+    slips: bool  # True if it loses energy by :meth:`slip`
+    has_mean_velocity: bool  # in the equation of a step; friction and rotating frames need it
+    rings: bool  # True if the accelerations of a motion that is given oscillate for ever
 
     def half_tangents(self, rotations: Index) -> Index:
         """Rotations whose nodal step is 2 tan(Δψ/2); for the others it is Δψ."""

@@ -24,7 +24,7 @@ from ufl_beam.model.material_laws import (
     require_bulk_law,
     require_hinge_law,
 )
-from ufl_beam.model.time_functions import TimeFunction, require_time_function
+from ufl_beam.model.time_functions import Constant, TimeFunction, require_time_function
 
 
 @dataclass(frozen=True)
@@ -74,13 +74,10 @@ class Bearing:
 
 
 class Running(Protocol):
-    """A simulation between two steps, as far as laws of connectors ask it.
-
-    Attributes:
-        t: Time; s.
-    """
+    """A simulation between two steps, as far as laws of connectors ask it."""
 
     t: float
+    """Time; s."""
 
     def press(self, joint: Any) -> float:
         """Return the force that a joint or support bears across its motion; N."""
@@ -302,35 +299,18 @@ class RigidPlastic:
 
 @dataclass(frozen=True)
 class Guide:
-    """The point stays on a curve of the plane, free along it; see :func:`Guided`.
+    """The point stays on a curve of the plane, free along it; see :func:`Guided`."""
 
-    Args:
-        curve: ``s -> (x, y)``, smooth, for all s that the motion may reach; m.
-    """
-
-    curve: Curve
+    curve: Curve  # ``s -> (x, y)``, smooth, for all s that the motion may reach; m
 
     def __post_init__(self) -> None:
         require_function(self.curve, "Guide: curve", "s that returns (x, y)")
 
 
 Law = (
-    Guide
-    | Motor
-    | Actuator
-    | Controller
-    | Spring
-    | Damper
-    | Stop
-    | ForceLaw
-    | Coulomb
+    Guide | Motor | Actuator | Controller | Spring | Damper | Stop | ForceLaw | Coulomb
     | RigidPlastic
-)
+)  # fmt: skip
 
-
-def _still(t: float) -> float:
-    return 0.0
-
-
-HELD = Motor(_still)
+HELD = Motor(Constant(0.0))
 """The law of what a joint holds."""

@@ -5,23 +5,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from ufl_beam.errors import SceneError, require_kind, require_vector
 from ufl_beam.model.bodies import Anchor, arm, require_anchor
 from ufl_beam.model.connector_laws import Coulomb, Guide, Law, Motor, RigidPlastic
 from ufl_beam.model.curves import Point
 
-
-class Rigidly(NamedTuple):
-    """Derivatives of a relative motion by (u, v, ψ) of both nodes in the undeformed scene.
-
-    Attributes:
-        a, b: Factors; (3,) each.
-    """
-
-    a: tuple[float, float, float]
-    b: tuple[float, float, float]
+Factors = tuple[float, float, float]
+"""Derivatives of a relative motion by (u, v, ψ) of a node."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,16 +86,16 @@ class Connector:
         """True if the axis turns with the node of ``a``, which then bears a moment."""
         return self.motion == "sliding"
 
-    def rigidly(self) -> Rigidly:
-        """Return the derivatives of the motion by those of the nodes, in the undeformed scene."""
+    def rigidly(self) -> tuple[Factors, Factors]:
+        """Return the derivatives of the motion by those of both nodes, in the undeformed scene."""
         if self.turns:
-            return Rigidly((0.0, 0.0, -1.0), (0.0, 0.0, 1.0))
+            return (0.0, 0.0, -1.0), (0.0, 0.0, 1.0)
         (dx, dy), length = self.apart, math.hypot(*self.apart)
         x, y = (dx / length, dy / length) if self.stretches else self.axis
         (ax, ay), (bx, by) = self.arms
         turned_with_a = x * dy - y * dx if self.follows_a else 0.0
         # d/dψ of axis(ψ)·d is (W axis)·d = -y dx + x dy
-        return Rigidly((-x, -y, x * ay - y * ax + turned_with_a), (x, y, y * bx - x * by))
+        return (-x, -y, x * ay - y * ax + turned_with_a), (x, y, y * bx - x * by)
 
 
 def Turn(a: Anchor, b: Anchor, law: Law) -> Connector:

@@ -27,8 +27,7 @@ from ufl_beam.model.connector_laws import (
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import Point
 from ufl_beam.model.loads import RotatingFrame
-from ufl_beam.model.masses import PointMass
-from ufl_beam.model.plastic_hinges import Slot, shared_by_joints
+from ufl_beam.model.plastic_hinges import NodeDof, shared_by_joints
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.time_functions import value_at
 
@@ -40,11 +39,11 @@ def require_masses(scene: Scene) -> None:
     """Raise :class:`SceneError` if a body that may move has no mass, unless a beam carries it."""
     same, moved = scene.representatives, _fixed(scene)
     for alike in shared_by_joints(scene.joints):
-        moved |= {same.get(slot, slot) for slot in alike if not isinstance(slot[0], Body)}
+        moved |= {same.get(dof, dof) for dof in alike if not isinstance(dof[0], Body)}
     for body in scene.bodies:
         for name, components in (("mass", (0, 1)), ("inertia", (2,))):
-            slots = [(body, component) for component in components]
-            free = any(same.get(slot, slot) not in moved for slot in slots)
+            dofs = [(body, component) for component in components]
+            free = any(same.get(dof, dof) not in moved for dof in dofs)
             if free and getattr(body, name) == 0.0:
                 raise SceneError(
                     f"{body.name}: {name} = 0, but dynamics needs it to be positive; use RigidLink "
@@ -61,16 +60,19 @@ def require_inertia(scene: Scene) -> None:
     loose = _without_inertia(scene)
     if not loose:
         return
-    masses = [(one.place, c) for one in scene.masses for c in range(3) if _weighs(one, c)]
+    masses = [
+        (one.place, component)
+        for one in scene.masses
+        for component, inertia in enumerate((one.mass, one.mass, one.inertia))
+        if inertia
+    ]
     rows = _constraints(scene, _determines, masses)
     free = _null_space(csr_array(rows[:, loose]))
     if free.shape[1] == 0:
         return
     mode = np.zeros(rows.shape[1])
     mode[loose] = free[:, 0] / np.abs(free[:, 0]).max()
-    mode = mode.reshape(-1, 3)
-    moving = [i for i in range(len(mode)) if np.abs(mode[i]).max() > 1e-6]
-    parts = "; ".join(_describe(scene, i, mode[i]) for i in moving[:4])
+    parts = "; ".join(_moving(scene, mode)[:4])
     raise SceneError(
         f"dynamics needs mass or something that holds: {parts}, without mass (rhoA or mass = "
         "0), and nothing determines this motion. Give it mass (a section rho or rhoA), or hold or "
@@ -86,11 +88,6 @@ def _without_inertia(scene: Scene) -> list[int]:
     for i, (mass, inertia) in enumerate((*beams, *bodies)):
         loose += [3 * i, 3 * i + 1] * bool(mass == 0.0) + [3 * i + 2] * bool(inertia == 0.0)
     return loose
-
-
-def _weighs(mass: PointMass, component: int) -> bool:
-    """Return true if a point mass has inertia in a component of motion."""
-    return bool(mass.inertia if component == 2 else mass.mass)
 
 
 def _determines(link: Connector) -> bool:
@@ -109,18 +106,18 @@ def no_number(scene: Scene, times: Iterable[float]) -> str:
     return ""
 
 
-def _fixed(scene: Scene) -> set[Slot]:
+def _fixed(scene: Scene) -> set[NodeDof]:
     """Return the components of motion that the ground and supports give."""
     same = scene.representatives
-    fixed: set[Slot] = {(GROUND, component) for component in range(3)}
+    fixed: set[NodeDof] = {(GROUND, component) for component in range(3)}
     fixed |= {(node(s.place), c) for s in scene.supports if not s.angle for c in s.held}
-    return {same.get(slot, slot) for slot in fixed}
+    return {same.get(dof, dof) for dof in fixed}
 
 
 HOLDING = (Motor, Guide)
 """Laws of connectors that give the motion."""
 
-Demand = tuple[str, list[tuple[Slot, float]]]
+Demand = tuple[str, list[tuple[NodeDof, float]]]
 """Who demands, and the factors of what moves in it; rotations times the size of the scene."""
 
 
@@ -153,11 +150,11 @@ def friction_repeats(scene: Scene) -> bool:
 
 def _dependences(demands: list[Demand]) -> Array:
     """Combinations of demands that demand nothing; (num_demands, k)."""
-    columns = {slot: i for i, slot in enumerate({s: 0 for _, f in demands for s, _ in f})}
+    columns = {dof: i for i, dof in enumerate({s: 0 for _, f in demands for s, _ in f})}
     entries = [
-        (columns[slot], row, factor)
+        (columns[dof], row, factor)
         for row, (_, factors) in enumerate(demands)
-        for slot, factor in factors
+        for dof, factor in factors
     ]
     return _null_space(_sparse(entries, (max(len(columns), 1), len(demands))))
 
@@ -166,10 +163,10 @@ def _demands(scene: Scene, laws: tuple[type, ...]) -> list[Demand]:
     """Return the constraints that connectors of some laws and supports in turned axes make."""
     same, fixed = scene.representatives, _fixed(scene)
 
-    def free(factors: Iterable[tuple[Node, int, float]]) -> list[tuple[Slot, float]]:
-        slots = (((of, c), factor) for of, c, factor in factors if factor)
-        known = ((same.get(slot, slot), factor) for slot, factor in slots)
-        return [(slot, factor) for slot, factor in known if slot not in fixed]
+    def free(factors: Iterable[tuple[Node, int, float]]) -> list[tuple[NodeDof, float]]:
+        dofs = (((of, c), factor) for of, c, factor in factors if factor)
+        known = ((same.get(dof, dof), factor) for dof, factor in dofs)
+        return [(dof, factor) for dof, factor in known if dof not in fixed]
 
     demands: list[Demand] = []
     for link in scene.links:
@@ -177,7 +174,8 @@ def _demands(scene: Scene, laws: tuple[type, ...]) -> list[Demand]:
             unit = (1.0, 1.0, 1.0 if link.turns else 1 / scene.size)
             pairs = zip((link.a, link.b), link.rigidly(), strict=True)
             factors = [(node(at), c, f[c] * unit[c]) for at, f in pairs for c in range(3)]
-            demands.append((_owner(scene, link), free(factors)))
+            owner = next((joint for joint in scene.joints if link in joint.holders), link)
+            demands.append((str(owner), free(factors)))
     for support in scene.supports:
         if support.angle:
             of, cos, sin = node(support.place), math.cos(support.angle), math.sin(support.angle)
@@ -185,13 +183,6 @@ def _demands(scene: Scene, laws: tuple[type, ...]) -> list[Demand]:
             for c in support.held.keys() & rows.keys():
                 demands.append((str(support), free((of, k, rows[c][k]) for k in range(2))))
     return demands
-
-
-def _owner(scene: Scene, link: Connector) -> str:
-    for joint in scene.joints:
-        if link in joint.holders:
-            return str(joint)
-    return str(link)
 
 
 def require_no_mechanism(scene: Scene) -> None:
@@ -203,14 +194,12 @@ def require_no_mechanism(scene: Scene) -> None:
     free = _null_space(_constraints(scene))
     if free.shape[1] == 0:
         return
-    mode = free[:, 0].reshape(-1, 3) / np.abs(free[:, 0]).max()
-    moving = [i for i in range(len(mode)) if np.abs(mode[i]).max() > 1e-6]
-    parts = "; ".join(_describe(scene, i, mode[i]) for i in moving[:4])
+    moving = _moving(scene, free[:, 0] / np.abs(free[:, 0]).max())
     more = f"; and {len(moving) - 4} more" if len(moving) > 4 else ""
     ways = "way" if free.shape[1] == 1 else "independent ways"
     raise SceneError(
         f"the scene is free to move in {free.shape[1]} {ways}, so statics has no unique answer: "
-        f"{parts}{more}. Add supports or joints, or run dynamics (Midpoint)"
+        f"{'; '.join(moving[:4])}{more}. Add supports or joints, or run dynamics (Midpoint)"
     )
 
 
@@ -226,24 +215,15 @@ RESISTING = (Motor, Guide, Spring, ForceLaw, RigidPlastic)
 """Laws of connectors that resist every motion; others bear nothing, or what they are told."""
 
 
-def _resists(link: Connector) -> bool:
-    return isinstance(link.law, RESISTING)
-
-
 def _constraints(
     scene: Scene,
-    acts: Callable[[Connector], bool] = _resists,
+    acts: Callable[[Connector], bool] = lambda link: isinstance(link.law, RESISTING),
     also: Iterable[tuple[Anchor, int]] = (),
 ) -> csr_array:
     """Rows that joints, supports and connectors make of (u, v, size ψ) of all parts.
 
-    Args:
-        scene: What is modelled.
-        acts: Whether a connector makes a row.
-        also: More places with a component of motion that makes a row.
-
-    Returns:
-        A matrix of shape (constraints, 3 parts).
+    A connector makes a row if it ``acts``, and so do the components of motion that are there
+    ``also``.  The shape is (constraints, 3 parts).
     """
     number = {part: i for i, part in enumerate(_parts(scene))}
     entries: list[tuple[int, int, float]] = []
@@ -305,11 +285,15 @@ def _null_space(constraints: csr_array) -> Array:
     return np.asarray(vectors[:, values < 1e-13 * abs(gram).max()])
 
 
+def _moving(scene: Scene, mode: Array) -> list[str]:
+    """Describe the motions of the parts that move in a mode."""
+    motions = enumerate(mode.reshape(-1, 3))
+    return [_describe(scene, i, motion) for i, motion in motions if np.abs(motion).max() > 1e-6]
+
+
 def _describe(scene: Scene, number: int, mode: Array) -> str:
-    part = _parts(scene)[number]
-    bodies = number - len(scene.beams)
-    which = f"body {bodies}" if isinstance(part, Body) else f"beam {number}"
-    name = f"{part.name} ({which})"
+    part, bodies = _parts(scene)[number], number - len(scene.beams)
+    name = f"{part.name} ({f'body {bodies}' if isinstance(part, Body) else f'beam {number}'})"
     u, v, ψ = mode
     if abs(ψ) < 1e-6:
         return f"{name} can shift along ({u:.3g}, {v:.3g})"

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -36,11 +37,7 @@ WEIGHTS = np.array(
 
 @dataclass(frozen=True)
 class Straight:
-    """Straight line.
-
-    Attributes:
-        a, b: Its ends; m.
-    """
+    """Straight line between two ends; m."""
 
     a: Point
     b: Point
@@ -52,13 +49,7 @@ class Straight:
 
 @dataclass(frozen=True)
 class Arc:
-    """Circular arc.
-
-    Attributes:
-        center: m.
-        radius: m.
-        first, last: Angles of its ends, counter-clockwise from x; rad.
-    """
+    """Circular arc, m, between two angles counter-clockwise from x; rad."""
 
     center: Point
     radius: float
@@ -74,20 +65,14 @@ class Arc:
 
 @dataclass(frozen=True)
 class Polyline:
-    """Straight pieces through points.
-
-    Attributes:
-        points: m.
-        at: Part of the length at each point, from 0 to 1.
-    """
+    """Straight pieces through points; m."""
 
     points: tuple[Point, ...]
-    at: tuple[float, ...]
+    at: tuple[float, ...]  # part of the length at each point, from 0 to 1
 
     def __call__(self, s: float) -> Point:
         """The point at part ``s`` of the length."""
-        last = len(self.at) - 2
-        i = next((k for k, limit in enumerate(self.at[1:-1]) if s <= limit), last)
+        i = bisect_left(self.at, s, 1, len(self.at) - 1) - 1
         part = (s - self.at[i]) / (self.at[i + 1] - self.at[i])
         return between(self.points[i], self.points[i + 1], part)
 
@@ -98,11 +83,7 @@ def between(p: Point, q: Point, s: float) -> Point:
 
 
 def point_of(curve: Curve, s: float, what: str) -> Point:
-    """Evaluate a curve of a user.
-
-    Raises:
-        SceneError: It fails there, or returns no pair of finite numbers; the message has ``what``.
-    """
+    """Evaluate a curve of a user, or raise :class:`SceneError` naming ``what``."""
     require_function(curve, what, "s that returns (x, y)")
     try:
         point = curve(s)
@@ -148,14 +129,9 @@ def parameter_step(curve: Curve, s: float, length: float) -> float:
 
 
 def nearest(curve: Curve, point: Array, s: float, step: float, length: float) -> float:
-    """Parameter of the point of a curve that is nearest to another; not a number if none is found.
+    """Parameter of the point of a curve nearest to another, from ``s`` on; NaN if none is found.
 
-    Args:
-        curve: ``s -> (x, y)``; m.
-        point: Shape (2,); m.
-        s: Where to begin.
-        step: Step of :func:`tangent`.
-        length: Size of what the curve guides; m.
+    ``step`` is that of :func:`tangent`, ``length`` the size of what the curve guides; m.
     """
     last_digits = 4 * np.spacing(length + math.hypot(*point))
     for _ in range(PROJECTIONS):

@@ -21,14 +21,10 @@ from ufl_beam.errors import SceneError, require_number, shorten
 
 @dataclass(frozen=True)
 class Distribution(ABC):
-    """A random positive quantity.
-
-    Args:
-        seed: The same seed gives the same scene again.
-    """
+    """Base of the distributions: a random positive quantity."""
 
     _: KW_ONLY
-    seed: int
+    seed: int  # the same seed gives the same scene again
 
     def __post_init__(self) -> None:
         name = type(self).__name__

@@ -9,9 +9,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ufl_beam.array_checks import require_array
 from ufl_beam.arrays import Array
-from ufl_beam.errors import SceneError, require_count, require_kind
+from ufl_beam.errors import SceneError, require_array, require_count, require_kind
 from ufl_beam.model.law_functions import Values
 from ufl_beam.model.material_laws import Bulk, BulkLaw, Softening, require_bulk_law
 
@@ -20,26 +19,17 @@ from ufl_beam.model.material_laws import Bulk, BulkLaw, Softening, require_bulk_
 class Layout:
     """Material points of a cross-section: what strains them, and what their stresses add up to.
 
-    Attributes:
-        strains: Strain of each point per strain (Σ, Γ, K) of the section; shape (n, 3).  The
-            resultants are the sum of weight times stress times the same numbers.
-        weights: Shape (n,); area of fibres, 1 for resultants.
-        stiffness: Elastic stiffness of the points; shape (n,).
-        laws: Laws and the number of points in a row that follow them.
-        rest: Stiffness (axial, shear, bending) of what has no points; shape (3,).
-        softening: Law of the discontinuities, if points can break.
-        breaking: Which points can.
-        hinges: Whether the discontinuity is one hinge, a jump of rotation.
+    The resultants are the sum of weight times stress times the strains per strain of the section.
     """
 
-    strains: Values
-    weights: Values
-    stiffness: Values
-    laws: tuple[tuple[BulkLaw, int], ...]
-    rest: Values
-    softening: Softening | None
-    breaking: slice
-    hinges: bool = False
+    strains: Values  # of each point per strain (Σ, Γ, K) of the section; (n, 3)
+    weights: Values  # area of fibres, 1 for resultants; (n,)
+    stiffness: Values  # elastic; (n,)
+    laws: tuple[tuple[BulkLaw, int], ...]  # with the number of points in a row that follow them
+    rest: Values  # stiffness (axial, shear, bending) of what has no points; (3,)
+    softening: Softening | None  # law of the discontinuities, if points can break
+    breaking: slice  # the points that can
+    hinges: bool = False  # True if the discontinuity is one hinge, a jump of rotation
 
     @property
     def elastic(self) -> bool:
@@ -53,11 +43,7 @@ class Layout:
 
     @cached_property
     def statement(self) -> type[Bulk]:
-        """The law that points of the bulk follow, with numbers of their own.
-
-        Raises:
-            SceneError: They follow laws of different kinds.
-        """
+        """The law of one kind that points of the bulk follow, with numbers of their own."""
         laws = [law for law, _ in self.laws if law.limit != np.inf] or [self.laws[0][0]]
         kinds = dict.fromkeys(type(law) for law in laws)
         if len(kinds) > 1:
@@ -66,11 +52,7 @@ class Layout:
         return laws[0].statement
 
     def bulk(self, keys: list[tuple[int, int]]) -> Bulk:
-        """The laws at the points of many cells.
-
-        Args:
-            keys: For each cell two numbers that random limits depend on, besides their seed.
-        """
+        """The laws at the points of many cells; random limits depend on their keys and a seed."""
         shape, first = (len(keys), len(self.weights)), 0
         columns = {name: np.zeros(shape) for name in self.statement.numbers()}
         for law, n in self.laws:
@@ -118,22 +100,12 @@ class Fibres:
 
 @dataclass(frozen=True, eq=False)
 class PlacedFibres:
-    """Fibres at their places in a section.
-
-    Args:
-        fibres: Their laws.
-        E: Young's modulus; Pa.
-        y: Distances from the axis, positive to the left of its direction; (n,); m.
-        A: Areas; (n,); m².
-
-    Raises:
-        SceneError: Different lengths, an area that is not positive, or no bending stiffness.
-    """
+    """Fibres at their places in a section."""
 
     fibres: Fibres
-    E: float
-    y: Array
-    A: Array
+    E: float  # Young's modulus; Pa
+    y: Array  # distances from the axis, positive to the left of its direction; (n,); m
+    A: Array  # areas; (n,); m²
 
     @classmethod
     def at(cls, fibres: Fibres, E: float, y: Sequence[float], A: Sequence[float]) -> PlacedFibres:
@@ -164,15 +136,9 @@ class PlacedFibres:
         first_moment: Callable[[Array], Array],
         edges: Sequence[float] = (),
     ) -> PlacedFibres:
-        """Layers of equal thickness over the depth ``h``, cut at ``edges`` too.
+        """Layers of equal thickness over the depth ``h``, cut at ``edges`` too; m.
 
-        Args:
-            fibres: Their laws and number.
-            E: Young's modulus; Pa.
-            h: Depth; m.
-            area: Area below y, from any line; m².
-            first_moment: Its first moment about y = 0; m³.
-            edges: Further limits between layers; m.
+        ``area`` is that below y, from any line, ``first_moment`` that of it about y = 0; m², m³.
         """
         if fibres.number < 2:
             raise SceneError("Fibres: number = 1 has no bending stiffness; use 2 or more")

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -26,13 +26,6 @@ def _require_from_zero_to_infinity(value: float, what: str) -> None:
 
 
 # -- bulk --------------------------------------------------------------------------------------
-
-
-class Viscosity(Protocol):
-    """Viscosity of plastic flow."""
-
-    def coefficient(self, stiffness: Values) -> Values:
-        """Overstress per rate of plastic strain; ``stiffness`` is that of plastic flow."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +47,7 @@ class Perzyna:
         _require_from_zero_to_infinity(self.eta, "Perzyna: eta")
 
     def coefficient(self, stiffness: Values) -> Values:
-        """Viscosity, the same for any stiffness."""
+        """Overstress per rate of plastic strain, the same for any stiffness."""
         return np.full_like(stiffness, self.eta)
 
 
@@ -78,7 +71,7 @@ class DuvautLions:
         _require_from_zero_to_infinity(self.tau, "DuvautLions: tau")
 
     def coefficient(self, stiffness: Values) -> Values:
-        """Relaxation time times the stiffness of plastic flow."""
+        """Overstress per rate of plastic strain: tau times the stiffness of plastic flow."""
         return np.asarray(self.tau * stiffness)  # P(46)
 
 
@@ -89,14 +82,10 @@ class Bulk(ABC):
     The internal variables of a point are its plastic strain and the sum of the sizes of its
     increments.  A law has further numbers as fields; those of :attr:`numbers` are the inputs of
     the compiled law.
-
-    Attributes:
-        C: Stiffness; arrays of one shape, or numbers.
-        limit: Yield stress; infinite where the bulk stays elastic.
     """
 
-    C: Values
-    limit: Values
+    C: Values  # stiffness; all fields are arrays of one shape, or numbers
+    limit: Values  # yield stress; infinite where the bulk stays elastic
 
     @classmethod
     def numbers(cls) -> tuple[str, ...]:
@@ -131,11 +120,8 @@ class Bulk(ABC):
 class BulkLaw(ABC):
     """Base of records of laws of the bulk, such as :class:`Hardening`."""
 
-    statement: ClassVar[type[Bulk]]
-    """The law of many points."""
-
-    limit: Any
-    """Yield stress, a number or a distribution; infinite if the bulk stays elastic."""
+    statement: ClassVar[type[Bulk]]  # the law of many points
+    limit: Any  # yield stress, a number or a distribution; infinite if the bulk stays elastic
 
     @abstractmethod
     def numbers(self, C: Values) -> dict[str, Any]:
@@ -191,7 +177,7 @@ class Hardening(BulkLaw):
     limit: Any
     modulus: float = 0.0
     kinematic: float = 0.0
-    viscosity: Viscosity = Perzyna(0.0)
+    viscosity: Perzyna | DuvautLions = Perzyna(0.0)
 
     def __post_init__(self) -> None:
         if not hasattr(self.limit, "draw"):
@@ -273,6 +259,10 @@ class Softening:
     def opens(self) -> bool:
         """True if it ever opens."""
         return self.limit < np.inf
+
+    def numbers(self, C: Values) -> dict[str, Any]:
+        """Limit and fracture energy; they do not depend on a stiffness ``C``."""
+        return {"limit": self.limit, "energy": self.energy}
 
     def of(self, limit: Values, energy: Values) -> Softening:
         """Return the same law with other numbers, or with symbols."""

@@ -12,7 +12,7 @@ from ufl_beam.model.connector_laws import RigidPlastic
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.material_laws import HingeLaw
 
-Slot = tuple[Node, int]
+NodeDof = tuple[Node, int]
 """A component of motion of a node: 0, 1 displacement, 2 rotation."""
 
 
@@ -32,24 +32,24 @@ class Sharing(Protocol):
         """Places that share displacements."""
 
 
-def merged(groups: Iterable[Sequence[Slot]]) -> dict[Slot, Slot]:
+def merged(groups: Iterable[Sequence[NodeDof]]) -> dict[NodeDof, NodeDof]:
     """Representative of each component of motion that equals others, from groups of equal ones."""
-    parent: dict[Slot, Slot] = {}
+    parent: dict[NodeDof, NodeDof] = {}
 
-    def root(slot: Slot) -> Slot:
-        while slot in parent:
-            slot = parent[slot]
-        return slot
+    def root(dof: NodeDof) -> NodeDof:
+        while dof in parent:
+            dof = parent[dof]
+        return dof
 
     for group in groups:
         for other in group[1:]:
             a, b = root(group[0]), root(other)
             if a != b:
                 parent[b] = a
-    return {slot: root(slot) for slot in parent}
+    return {dof: root(dof) for dof in parent}
 
 
-def shared_by_joints(joints: Iterable[Sharing]) -> Iterator[list[Slot]]:
+def shared_by_joints(joints: Iterable[Sharing]) -> Iterator[list[NodeDof]]:
     """Groups of components of motion that joints make equal."""
     for joint in joints:
         for component in joint.shared:
@@ -58,10 +58,10 @@ def shared_by_joints(joints: Iterable[Sharing]) -> Iterator[list[Slot]]:
 
 
 def plastic_hinges(
-    may_have: Mapping[Place, HingeLaw],
+    may_have: Mapping[Place, HingeLaw],  # laws of the hinges that the beams may have
     joints: Sequence[Sharing],
-    bearing: Iterable[Anchor],
-    loaded: Iterable[Anchor],
+    bearing: Iterable[Anchor],  # where supports, connectors or masses bear a moment
+    loaded: Iterable[Anchor],  # where loads are moments
 ) -> tuple[Connector, ...]:
     """Plastic hinges of zero length, as connectors of both sides.
 
@@ -70,55 +70,41 @@ def plastic_hinges(
     the member, as nothing beyond a hinge could bear it.  Where two members meet and nothing else
     bears a moment, both have the same moment; then only the weaker one has a hinge, as the other
     one never opens.
-
-    Args:
-        may_have: Laws of the hinges that the beams may have, by place.
-        joints: Its joints.
-        bearing: Places where supports, connectors or masses bear a moment.
-        loaded: Places where loads are moments.
     """
     laws = {place: law for place, law in may_have.items() if law.opens}
     same = merged(
         [(node(place), 2) for place in joint.places] for joint in joints if 2 in joint.shared
     )
-    members: dict[Slot, list[Node]] = {}
-    for slot in {*same, *same.values()}:
-        members.setdefault(same.get(slot, slot), []).append(slot[0])
+    members: dict[NodeDof, list[Node]] = {}
+    for dof in {*same, *same.values()}:
+        members.setdefault(same.get(dof, dof), []).append(dof[0])
 
-    def at(places: Iterable[Anchor]) -> set[Slot]:
-        return {same.get(slot, slot) for slot in ((node(place), 2) for place in places)}
+    def at(places: Iterable[Anchor]) -> set[NodeDof]:
+        return {same.get(dof, dof) for dof in ((node(place), 2) for place in places)}
 
     borne, acted = at(bearing), at(loaded)
 
     def stays(place: Place) -> bool:
         if 0.0 < place.s < 1.0:
             return True
-        slot: Slot = (place, 2)
-        slot = same.get(slot, slot)
-        others = [other for other in members.get(slot, ()) if other != place]
-        between = len(others) > 0 and (slot in acted or not _outlasts(place, others, laws))
-        return slot in borne or between
+        dof: NodeDof = (place, 2)
+        dof = same.get(dof, dof)
+        others = [other for other in members.get(dof, ()) if other != place]
+        between = len(others) > 0 and (dof in acted or not _outlasts(place, others, laws))
+        return dof in borne or between
 
     return tuple(_hinge(place, law) for place, law in laws.items() if stays(place))
 
 
 def law_of(link: Connector) -> HingeLaw:
-    """Return the law of a plastic hinge, or of another rigid-plastic connector.
-
-    Raises:
-        SceneError: The connector follows another law.
-    """
+    """Return the law of a plastic hinge, or of another rigid-plastic connector."""
     if not isinstance(link.law, RigidPlastic):
         raise SceneError(f"{link}: its law is not rigid-plastic")
     return link.law.law
 
 
 def place_of(hinge: Connector) -> Place:
-    """Return the place of a plastic hinge, on the side that joints and loads are attached to.
-
-    Raises:
-        SceneError: The connector does not act between places of beams.
-    """
+    """Return the place of a plastic hinge, on the side that joints and loads are attached to."""
     if not isinstance(hinge.a, Place):
         raise SceneError(f"{hinge}: it is not a plastic hinge of a beam")
     return hinge.a.beam.at(hinge.a.s)

@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, singledispatch
+from functools import cached_property
 
 import numpy as np
 
@@ -16,11 +16,11 @@ from ufl_beam.model.bodies import GROUND, Anchor, Body, Member, Place, Spot, car
 from ufl_beam.model.connector_laws import Actuator, Bearing, Coulomb, Motor
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import enclosing_diameter
-from ufl_beam.model.damping import Damping, KelvinVoigt, Rayleigh
+from ufl_beam.model.damping import Damping, KelvinVoigt
 from ufl_beam.model.joints import Joint
-from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame
+from ufl_beam.model.loads import FollowerLoad, LineLoad, Load, PointLoad, RotatingFrame
 from ufl_beam.model.masses import PointMass, Velocity
-from ufl_beam.model.plastic_hinges import Slot, merged, plastic_hinges, shared_by_joints
+from ufl_beam.model.plastic_hinges import NodeDof, merged, plastic_hinges, shared_by_joints
 from ufl_beam.model.supports import COMPONENTS, Support
 from ufl_beam.model.time_functions import TimeFunction, value_at
 
@@ -62,15 +62,19 @@ class Scene:
     connectors: Sequence[Connector] = ()
 
     def __post_init__(self) -> None:
-        for part in (
-            "beams", "joints", "supports", "loads", "masses", "initial", "damping", "bodies",
-            "connectors",
-        ):  # fmt: skip
+        kinds: dict[str, type | tuple[type, ...]] = {
+            "beams": Beam, "joints": Joint, "supports": Support, "loads": Load.__args__,
+            "masses": PointMass, "initial": Velocity, "damping": Damping.__args__, "bodies": Body,
+            "connectors": Connector,
+        }  # fmt: skip
+        for part in kinds:
             records = require_sequence(getattr(self, part), f"Scene: {part}")
             object.__setattr__(self, part, records)
         if not self.beams and not self.bodies:
             raise SceneError("Scene: no beams and no bodies")
-        _require_kinds(self)
+        for part, kind in kinds.items():
+            for i, record in enumerate(getattr(self, part)):
+                require_kind(record, kind, f"Scene: {part}[{i}]")
         known: dict[Beam | Body, str] = {GROUND: "ground"}
         for part in ("beams", "bodies"):
             for i, one in enumerate(getattr(self, part)):
@@ -130,7 +134,8 @@ class Scene:
     @cached_property
     def _links_but_hinges(self) -> tuple[Connector, ...]:
         held = [holder for joint in self.joints for holder in joint.holders]
-        loads = [push for load in self.loads for push in _off_center(load)]
+        pushing = (load for load in self.loads if isinstance(load, PointLoad))
+        loads = [push for load in pushing for push in _off_center(load)]
         return (*held, *self.connectors, *loads)
 
     @cached_property
@@ -148,21 +153,17 @@ class Scene:
 
     def _bearing_moments(self) -> Iterator[Anchor]:
         """Places where supports, connectors or masses bear a moment."""
-        for support in self.supports:
-            if 2 in support.held:
-                yield support.place
+        yield from (support.place for support in self.supports if 2 in support.held)
+        yield from (mass.place for mass in self.masses if mass.inertia)
         for link in self._links_but_hinges:
             by_a, by_b = link.rigidly()
             if by_a[2] or link.follows_a:
                 yield link.a
             if by_b[2]:
                 yield link.b
-        for mass in self.masses:
-            if mass.inertia:
-                yield mass.place
 
     @cached_property
-    def movers(self) -> tuple[Body, ...]:
+    def rigid_bodies(self) -> tuple[Body, ...]:
         """The bodies, and the ground if something is attached to it."""
         attached = [place for _, place in self.attachments()]
         attached += [link.a for link in self.links]
@@ -170,12 +171,8 @@ class Scene:
 
     def time_functions(self) -> Iterator[tuple[object, TimeFunction]]:
         """Iterate over functions of time of loads, motions and drives, and their owners."""
-        for load in self.loads:
-            if not isinstance(load, RotatingFrame):
-                yield load, load.time
-        for support in self.supports:
-            for motion in support.held.values():
-                yield support, motion
+        yield from ((one, one.time) for one in self.loads if not isinstance(one, RotatingFrame))
+        yield from ((one, motion) for one in self.supports for motion in one.held.values())
         for link in self.links:
             if isinstance(link.law, Motor):
                 yield link, link.law.motion
@@ -184,16 +181,10 @@ class Scene:
 
     def attachments(self) -> Iterator[tuple[object, Anchor]]:
         """Iterate over all that has a place, and its place."""
-        for joint in self.joints:
-            for place in joint.places:
-                yield joint, place
-        for connector in self.connectors:
-            yield connector, connector.a
-            yield connector, connector.b
-        for support in self.supports:
-            yield support, support.place
-        for mass in self.masses:
-            yield "PointMass", mass.place
+        yield from ((joint, place) for joint in self.joints for place in joint.places)
+        yield from ((link, place) for link in self.connectors for place in (link.a, link.b))
+        yield from ((support, support.place) for support in self.supports)
+        yield from (("PointMass", mass.place) for mass in self.masses)
         for load in self.loads:
             if isinstance(load, PointLoad | FollowerLoad):
                 yield type(load).__name__, load.place
@@ -266,40 +257,31 @@ class Scene:
             )
 
     @cached_property
-    def representatives(self) -> dict[Slot, Slot]:
+    def representatives(self) -> dict[NodeDof, NodeDof]:
         """Which component of a node stands for it, for all components that joints share."""
         hinges = ([(node(link.a), c), (node(link.b), c)] for link in self.hinges for c in (0, 1))
         return merged([*shared_by_joints(self.joints), *hinges])
 
     def _require_single_supports(self) -> None:
         same = self.representatives
-        holders: dict[Slot, str] = {}
-        slot: Slot
-        for component in (0, 1, 2):
-            slot = (GROUND, component)
-            holders[same.get(slot, slot)] = "the ground"
+        fixed: list[NodeDof] = [(GROUND, component) for component in range(3)]
+        holders = {same.get(dof, dof): "the ground" for dof in fixed}
         for support in self.supports:
             # A support in turned axes takes both displacements of its place.
             components = {*support.held, *((0, 1) if support.angle else ())}
             for component in sorted(components):
-                slot = (node(support.place), component)
-                slot = same.get(slot, slot)
-                if slot in holders:
+                dof: NodeDof = (node(support.place), component)
+                dof = same.get(dof, dof)
+                if dof in holders:
                     raise SceneError(
-                        f"supports in conflict: {holders[slot]} and {support} both hold "
+                        f"supports in conflict: {holders[dof]} and {support} both hold "
                         f"{COMPONENTS[component]}; remove one"
                     )
-                holders[slot] = str(support)
+                holders[dof] = str(support)
 
 
-@singledispatch
-def _off_center(load: Load) -> tuple[Connector, ...]:
+def _off_center(load: PointLoad) -> tuple[Connector, ...]:
     """Connectors that push like a load at a point of a body that is not its centre."""
-    return ()
-
-
-@_off_center.register
-def _(load: PointLoad) -> tuple[Connector, ...]:
     if carries(load.place):
         return ()
 
@@ -313,20 +295,3 @@ def _(load: PointLoad) -> tuple[Connector, ...]:
         push("parting", y, (0.0, 1.0)),
         *((push("turning", moment),) if moment else ()),
     )
-
-
-def _require_kinds(scene: Scene) -> None:
-    kinds: tuple[tuple[str, Iterable[object], tuple[type, ...]], ...] = (
-        ("beams", scene.beams, (Beam,)),
-        ("joints", scene.joints, (Joint,)),
-        ("supports", scene.supports, (Support,)),
-        ("loads", scene.loads, (PointLoad, FollowerLoad, LineLoad, Gravity, RotatingFrame)),
-        ("masses", scene.masses, (PointMass,)),
-        ("initial", scene.initial, (Velocity,)),
-        ("damping", scene.damping, (Rayleigh, KelvinVoigt)),
-        ("bodies", scene.bodies, (Body,)),
-        ("connectors", scene.connectors, (Connector,)),
-    )
-    for name, records, kind in kinds:
-        for i, record in enumerate(records):
-            require_kind(record, kind, f"Scene: {name}[{i}]")

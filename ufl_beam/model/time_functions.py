@@ -107,11 +107,7 @@ def require_time_function(function: TimeFunction, what: str) -> None:
 
 
 def value_at(function: TimeFunction, t: float, owner: object) -> float:
-    """Evaluate a time function of a user.
-
-    Raises:
-        SceneError: It returns no number; the message names ``owner``.
-    """
+    """Evaluate a time function of a user, or raise :class:`SceneError` naming its owner."""
     value = function(t)
     if type(value) is float:
         return value

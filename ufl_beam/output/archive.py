@@ -27,15 +27,7 @@ def below(prefix: str, content: Mapping[str, Any]) -> dict[str, Any]:
 def write(path: Path, format: str, text: Mapping[str, Any], arrays: State) -> None:
     """Write a file; there is always a whole one, the new or the one before.
 
-    Args:
-        path: The file.
-        format: What it is and the number of its version, "solution of ufl_beam, 1".
-        text: What JSON can hold, by name.
-        arrays: By name.
-
-    Raises:
-        SceneError: The file cannot be written.
-        OSError: There is no space for it.
+    The ``format`` is what it is and the number of its version: "solution of ufl_beam, 1".
     """
     require_writable(path)
     encoded = json.dumps({**text, "arrays": [*arrays]})
@@ -55,11 +47,7 @@ def image_of(format: str, content: Mapping[str, Any]) -> bytes:
 
 
 def read(path: Path, format: str) -> tuple[dict[str, Any], State]:
-    """Read the text and the arrays of a file.
-
-    Raises:
-        SceneError: There is no such file, or it is another one, or damaged.
-    """
+    """Read the text and the arrays of a file; :class:`SceneError` if it is another or damaged."""
     import h5py
 
     kind, _, number = format.rpartition(", ")

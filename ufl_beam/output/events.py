@@ -21,12 +21,8 @@ from ufl_beam.parameter import TIME, Parameter
 
 Flags = npt.NDArray[np.bool_]
 
-IN_CELLS = ("yields", "opens", "is free")
-"""Events of a cell, once each: plastic flow, the opening of a hinge or crack, its end."""
-
-BETWEEN = {Stop: ("touches", "lets go"), Coulomb: ("slides", "sticks")}
-"""Events of connectors, and their ends."""
-
+IN_CELLS = ("yields", "opens", "is free")  # once in a cell; hinges and cracks open and end
+BETWEEN = {Stop: ("touches", "lets go"), Coulomb: ("slides", "sticks")}  # with their ends
 KINDS = (*IN_CELLS, *(kind for pair in BETWEEN.values() for kind in pair))  # all events
 Row = tuple[float, int, str]  # time, number of the cell or connector, what
 BROKEN_PART = 0.999  # part of the energy of a hinge after which it is called a joint

@@ -157,8 +157,6 @@ class Fatigue(Recorder):
         for i, counter in enumerate(self._counters.values()):
             counter.resume(state[f"counted {i}"], state[f"waiting {i}"])
 
-    # -- what was counted ----------------------------------------------------------------------
-
     @property
     def duration(self) -> float:
         """Time that was counted; s."""

@@ -20,12 +20,7 @@ from ufl_beam.model.scene import Scene
 
 
 class Motion(Protocol):
-    """The motion of a scene at some times.
-
-    Attributes:
-        scene: What moves.
-        times: Times; (n+1,); s.
-    """
+    """The motion of a scene at some times, such as a :class:`Solution`."""
 
     scene: Scene
 
@@ -79,11 +74,7 @@ class JointHistory(NamedTuple):
 
 
 def links_of(scene: Scene, of: Connector | Joint) -> list[int]:
-    """Numbers of the links of a connector, or of those that hold a joint.
-
-    Raises:
-        SceneError: It is not in the scene, or it shares unknowns so that nothing holds it.
-    """
+    """Numbers of the links of a connector, or of those that hold a joint of the scene."""
     if isinstance(of, Connector):
         if of not in scene.links:
             raise SceneError(f"{of} is not in the scene")

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -11,15 +10,12 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.model.bodies import GROUND, Anchor, Body, Spot, arm
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.joints import Joint
 from ufl_beam.model.loads import FollowerLoad, PointLoad
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.joint_histories import turned
 from ufl_beam.output.recorders import RecordedState
 
-LineFields = tuple[dict[str, Array], dict[str, Array]]
-"""Fields at points, (n,) or (n, 3), and in cells, (m,), by name."""
-
+LineFields = tuple[dict[str, Array], dict[str, Array]]  # at points, (n,) or (n, 3); in cells, (m,)
 BEAM, BODY, LINK = 0, 1, 2  # numbers of the parts of a scene in files
 
 
@@ -34,20 +30,14 @@ class Rod(NamedTuple):
 
 def spots_of(scene: Scene) -> dict[Body, list[Spot]]:
     """Find the points of bodies and of the ground that something is attached to, each once."""
+    anchors = [place for joint in scene.joints for place in joint.places]
+    anchors += [place for connector in scene.connectors for place in (connector.a, connector.b)]
+    anchors += [x.place for x in scene.loads if isinstance(x, PointLoad | FollowerLoad)]
     found: dict[Body, dict[Spot, None]] = {body: {} for body in (*scene.bodies, GROUND)}
-    for anchor in _anchors(scene):
+    for anchor in anchors:
         if isinstance(anchor, Spot):
             found[anchor.body][anchor] = None
     return {body: list(spots) for body, spots in found.items()}
-
-
-def _anchors(scene: Scene) -> Iterator[Anchor]:
-    things: tuple[Joint | Connector, ...] = (*scene.joints, *scene.connectors)
-    for thing in things:
-        yield from thing.places if isinstance(thing, Joint) else (thing.a, thing.b)
-    for load in scene.loads:
-        if isinstance(load, PointLoad | FollowerLoad):
-            yield load.place
 
 
 def rods_of(scene: Scene) -> list[Rod]:
@@ -62,17 +52,14 @@ def rods_of(scene: Scene) -> list[Rod]:
     for joint in scene.joints:
         if joint.look in ("RigidLink", "Link"):
             a, b = joint.places
-            rods.append(Rod(a, b, LINK, _pulls(joint.holders)))
+            pulls = next((c for c in joint.holders if c.stretches), None)
+            rods.append(Rod(a, b, LINK, pulls))
     rods += [
-        Rod(c.a, c.b, LINK, _pulls((c,)))
+        Rod(c.a, c.b, LINK, c if c.stretches else None)
         for c in scene.connectors
         if not c.turns and c.apart != (0.0, 0.0)
     ]
     return rods
-
-
-def _pulls(connectors: tuple[Connector, ...]) -> Connector | None:
-    return next((c for c in connectors if c.stretches), None)
 
 
 class LineData:
@@ -80,11 +67,6 @@ class LineData:
 
     Beams come first, node after node; behind them each line of a body or connector with two points
     of its own.  N is the force of a connector that acts along its line; V and M are zero there.
-
-    Attributes:
-        points: Undeformed; (n, 3); m.
-        cells: Both points of each line; (m, 2).
-        parts: 0 in beams, 1 in bodies, 2 in joints and connectors; (m,).
     """
 
     def __init__(self, simulation: RecordedState) -> None:
@@ -104,12 +86,7 @@ class LineData:
         self._pieces_of_cell, self._num_rods = grid.mesh.degree, len(rods)
 
     def fields(self, simulation: RecordedState) -> LineFields:
-        """Compute the fields of the present state; all processes call it together.
-
-        At points the displacement (m) and rotation (rad), in dynamics also the velocity (m/s) and
-        angular velocity (rad/s); in cells N, V (N), M (N m), and where anything yields or breaks
-        also the jump of the hinge (rad) and the dissipated energy (J).
-        """
+        """Compute the fields of the present state, see :class:`XDMF`; all processes call it."""
         q = simulation.share.gather(simulation.q)[self._nodes]
         arms = turned(self._arms, q[self._ends, 2]) if self._num_rods else self._arms
         displacement = np.insert(q[:, :2], 2, 0.0, axis=1)

@@ -17,9 +17,6 @@ Output = tuple[str, tuple[Path, ...]]  # name of a writer in messages, and the f
 _in_use: list[Output] = []  # outputs of the runs that go on in this process, the outer ones first
 
 
-# -- before the run ----------------------------------------------------------------------------
-
-
 def require_path(path: str | Path, what: str) -> Path:
     """Return ``path`` as a :class:`Path`, or raise :class:`SceneError` naming ``what``."""
     if not isinstance(path, str | os.PathLike) or not os.fspath(path):
@@ -47,8 +44,7 @@ def require_writable(path: Path) -> None:
 def require_apart(outputs: Sequence[Output], call: str) -> None:
     """Raise :class:`SceneError` if two outputs, or an outer run's and one of these, share a file.
 
-    Files are compared as the file system knows them: through symbolic and hard links.  Devices
-    such as ``/dev/null`` may be shared.  Messages name the ``call``.
+    Files are compared through symbolic and hard links; devices such as ``/dev/null`` may be shared.
     """
     owners: dict[object, str] = {}
     for owner, paths in (*_in_use, *outputs):
@@ -86,14 +82,8 @@ def take(outputs: Iterable[Output]) -> Callable[[], None]:
     return release
 
 
-# -- during the run ----------------------------------------------------------------------------
-
-
 class OutputFile:
-    """File that is written at given positions; an :class:`OSError` names it.
-
-    A ``new`` one is emptied, or made; else it is opened as it is.
-    """
+    """File that is written at given positions, emptied or made if new; errors name it."""
 
     def __init__(self, path: Path, *, new: bool = True) -> None:
         self.path = path
@@ -136,11 +126,7 @@ class OutputFile:
         self.path = path
 
     def sync(self) -> None:
-        """Bring everything to the disk.
-
-        Raises:
-            FileNotFoundError: The file was removed, or another one stands in its place.
-        """
+        """Bring everything to the disk; :class:`FileNotFoundError` if the file was removed."""
         if not is_at(self._file, self.path):
             raise removed(self.path)
         try:
@@ -160,11 +146,7 @@ class OutputFile:
 
 
 def replace_file(path: Path, data: bytes) -> None:
-    """Write a whole file; the one before stays until the new one is on the disk.
-
-    Raises:
-        OSError: It cannot be written.
-    """
+    """Write a whole file; the one before stays until the new one is on the disk."""
     try:
         put_in_place(path, data)
     except OSError as error:

@@ -13,14 +13,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ufl_beam.array_checks import require_row
 from ufl_beam.arrays import Array
-from ufl_beam.errors import SceneError, is_infinite, require_function, require_number
+from ufl_beam.errors import SceneError, is_infinite, require_function, require_number, require_row
 
 Ends = tuple[float, float]  # lower and upper end of a cycle
-
-
-# -- what a cycle does -------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -183,9 +179,6 @@ class Cycles:
         return float((self.count @ ranges**m / total) ** (1 / m)) if total > 0 else 0.0
 
 
-# -- counting ----------------------------------------------------------------------------------
-
-
 def rainflow(series: npt.ArrayLike) -> Cycles:
     """Count the rainflow cycles of a series, ASTM E1049-85; needs the package `rainflow`.
 
@@ -262,12 +255,8 @@ def _cycles(counts: Mapping[Ends, float], waiting: Sequence[float], unit: float)
 class RainflowCounter:
     """Rainflow counter of a series that comes in pieces, in constant memory.
 
-    Values are rounded to multiples of ``resolution``: cycles are then counts in classes, and the
-    turning points that wait for their cycle to close are no more than the classes.  Apart
-    from the rounding the count is that of :func:`rainflow` for the whole series.
-
-    Args:
-        resolution: Width of the classes; Pa.
+    Values are rounded to multiples of ``resolution`` (Pa): cycles are then counts in classes, and
+    the turning points that wait are no more than the classes.  Else it counts as :func:`rainflow`.
     """
 
     def __init__(self, resolution: float) -> None:
@@ -286,10 +275,7 @@ class RainflowCounter:
         return _cycles(self._counts, self._waiting, self._resolution)
 
     def state(self) -> tuple[Array, Array]:
-        """Return ends and numbers of cycles, (n, 3), and the turning points that wait.
-
-        Both in classes.
-        """
+        """Return ends and numbers of cycles, (n, 3), and waiting turning points, in classes."""
         counted = [(*ends, count) for ends, count in self._counts.items()]
         return np.array(counted, dtype=float).reshape(-1, 3), np.array(self._waiting, dtype=float)
 

@@ -23,10 +23,7 @@ from ufl_beam.parameter import Parameter
 
 
 class RecordedState(Protocol):
-    """State of a simulation as recorders read it; a :class:`Simulation` has more.
-
-    All processes call its methods together.
-    """
+    """State of a simulation as recorders read it; all processes call its methods together."""
 
     scene: Scene
     comm: MPI.Intracomm
@@ -125,12 +122,7 @@ class Recorder(ABC):
 def recorders_of(
     record: Sequence[Recorder] | Recorder, comm: MPI.Intracomm, call: str, *others: Output
 ) -> tuple[tuple[Recorder, ...], list[Output]]:
-    """Check the recorders of a run; return them, and all its outputs with the others.
-
-    Raises:
-        SceneError: Something is no recorder, or given twice; a file cannot be written, or two
-            outputs write the same one; the message names the ``call``.
-    """
+    """Check the recorders of a run; return them, and all its outputs with the others."""
     recorders = (record,) if isinstance(record, Recorder) else require_sequence(record, "record")
     outputs = []
     for i, recorder in enumerate(recorders):

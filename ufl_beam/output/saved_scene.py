@@ -8,11 +8,13 @@ solution, curves by many points; of others the name is left.
 from __future__ import annotations
 
 import dataclasses
+import math
 import warnings
-from collections.abc import Callable, Mapping
+from bisect import bisect_left
+from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 from types import ModuleType
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -36,48 +38,130 @@ from ufl_beam.model import (
     supports,
     time_functions,
 )
-from ufl_beam.output import saved_functions
-from ufl_beam.output.saved_functions import LostFunction
 
 Data = Any  # data of JSON
 
-Sampling = Callable[[Any, str, Any], Any]
-"""Record that stands for a function, given the record and the field that it is in."""
+Sampling = Callable[[Any, str, Any], Any]  # from record, field and function what stands for it
+SAMPLES = 1000  # intervals in which a curve is sampled
+
+
+@dataclasses.dataclass(frozen=True)
+class SavedFunction:
+    """Function of time that is known at some times."""
+
+    name: str  # that of the function
+    times: tuple[float, ...]  # ascending; s
+    values: tuple[float, ...]  # one for each time
+
+    @classmethod
+    def of(cls, function: Callable[[float], float], times: Iterable[float]) -> SavedFunction:
+        """Sample a function, at 0 as well; where it fails it is not known."""
+        known = {}
+        for t in sorted({0.0, *times}):
+            try:
+                known[t] = float(function(t))
+            except Exception:
+                continue
+        return cls(name_of(function), tuple(known), tuple(known.values()))
+
+    def __call__(self, t: float) -> float:
+        """The value at one of the times, or :class:`SceneError` at others."""
+        n = bisect_left(self.times, t)
+        if n == len(self.times) or self.times[n] != t:
+            raise SceneError(
+                f"the function {self.name} is not known at t = {t:g}: a file of a solution has "
+                "the values of functions at its times only; build the scene with the function"
+            )
+        return self.values[n]
+
+
+@dataclasses.dataclass(frozen=True)
+class SavedCurve:
+    """Curve through saved points, cubic between them and straight beyond."""
+
+    name: str  # that of the function
+    s: tuple[float, ...]  # ascending parameters, at least two
+    points: tuple[curves.Point, ...]  # one for each; m
+
+    @classmethod
+    def of(
+        cls, curve: Callable[[float], Any], first: float, last: float, more: Iterable[float] = ()
+    ) -> SavedCurve:
+        """Sample a curve between two parameters, and at more of them; gaps where it fails."""
+        even = (first + (last - first) * k / SAMPLES for k in range(SAMPLES + 1))
+        known = {}
+        for s in sorted({*even, *more}):
+            try:
+                x, y = curve(s)
+                known[s] = float(x), float(y)
+            except Exception:
+                continue
+        return cls(name_of(curve), tuple(known), tuple(known.values()))
+
+    def __call__(self, s: float) -> curves.Point:
+        """The point at a parameter; exact where it was sampled."""
+        n = bisect_left(self.s, s)
+        if n < len(self.s) and self.s[n] == s:
+            return self.points[n]
+        count = 4 if 0 < n < len(self.s) else 2
+        first = max(min(n - count // 2, len(self.s) - count), 0)
+        x = y = 0.0
+        near = range(first, min(first + count, len(self.s)))
+        for i in near:
+            weight = math.prod((s - self.s[j]) / (self.s[i] - self.s[j]) for j in near if j != i)
+            x, y = x + weight * self.points[i][0], y + weight * self.points[i][1]
+        return x, y
+
+
+@dataclasses.dataclass(frozen=True)
+class LostFunction:
+    """Placeholder of a function that cannot be saved, such as a controller."""
+
+    name: str  # that of the function
+
+    def __call__(self, *arguments: object) -> NoReturn:
+        """Raise :class:`SceneError`, as the function is not there."""
+        raise SceneError(
+            f"the function {self.name} is not in the file of the solution, which has results and "
+            "numbers; build the scene with the function to simulate it"
+        )
+
+
+def name_of(function: Any) -> str:
+    """Return the name of a function, or of the class of a callable object."""
+    return str(getattr(function, "__qualname__", type(function).__qualname__))
+
 
 MODULES: tuple[ModuleType, ...] = (
     *(beams, bodies, connector_laws, connectors, curves, damping, distributions, fibres),
-    *(joints, loads, masses, material_laws, mesh_options, saved_functions, scene, sections),
+    *(joints, loads, masses, material_laws, mesh_options, scene, sections),
     *(supports, time_functions),
 )
 
+# Classes of records, by name
 RECORDS: dict[str, type] = {
     name: kind
     for module in MODULES
     for name, kind in vars(module).items()
     if isinstance(kind, type) and dataclasses.is_dataclass(kind)
 }
-"""Classes of records, by name."""
-
+RECORDS |= {kind.__name__: kind for kind in (SavedFunction, SavedCurve, LostFunction)}
+# Objects that all scenes share
 KNOWN: dict[str, Any] = {
     "GROUND": bodies.GROUND,
     "HELD": connector_laws.HELD,
     "steady": time_functions.steady,
     "still": supports.still,
 }
-"""Objects that all scenes share."""
 
 
 def lost(owner: Any, field: str, function: Any) -> LostFunction:
     """Replace a function by its name."""
-    return LostFunction(saved_functions.name_of(function))
+    return LostFunction(name_of(function))
 
 
 def to_data(value: Any, sampling: Sampling = lost) -> Data:
-    """Describe a scene, or another record, with a sampling of the functions of a user.
-
-    Raises:
-        SceneError: Something in it is neither a record of the package nor a function.
-    """
+    """Describe a scene, or another record, with a sampling of the functions of a user."""
     records: list[Data] = []
     # By identity; the objects are kept, so that none gets the identity of another.
     numbers: dict[int, tuple[int, Any]] = {}
@@ -130,16 +214,12 @@ def from_data(data: Data) -> Any:
         if not isinstance(data, dict):
             return data
         ((kind, content),) = data.items()
-        if kind == "fraction":
-            return Fraction(content)
-        if kind == "array":
-            return np.array(content)
-        if kind == "mapping":
-            return {make(key): make(value) for key, value in content}
-        if kind == "known":
-            return KNOWN[content]
-        return made[content]
+        return makers[kind](content)
 
+    makers: dict[str, Callable[[Any], Any]] = {
+        "fraction": Fraction, "array": np.array, "known": KNOWN.__getitem__,
+        "record": made.__getitem__, "mapping": lambda pairs: dict(map(make, pairs)),
+    }  # fmt: skip
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ModelWarning)
         for record in data["records"]:

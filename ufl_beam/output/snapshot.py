@@ -9,26 +9,14 @@ from ufl_beam.arrays import Array, Index
 
 
 class Snapshot(NamedTuple):
-    """State of a scene at one time, the same on every process.
+    """State of a scene at one time, the same on every process."""
 
-    Attributes:
-        t: Time, or the load factor of a path; s.
-        q: Configuration, all degrees of freedom in the order of the grid.
-        v: Velocities, as ``q``; None in statics.
-        reactions: Forces of the supports on the scene; (num_supports, 3); N, N, N m.
-        entries: The ledger: state, supplied, lost; J.
-        material: Groups of cells that can yield or break, and rows for their material.
-        connections: Columns of ``Connection`` for all links; (num_links, 5).
-        parts: Steps so far, parts of cut steps counted each.
-        iterations: Newton iterations so far.
-    """
-
-    t: float
-    q: Array
-    v: Array | None
-    reactions: Array
-    entries: tuple[dict[str, float], ...]
-    material: list[tuple[Index, Array]]
-    connections: Array
-    parts: int = 0
-    iterations: int = 0
+    t: float  # time, s; or the load factor of a path
+    q: Array  # configuration, all degrees of freedom in the order of the grid
+    v: Array | None  # velocities, as q; None in statics
+    reactions: Array  # forces of the supports on the scene; (num_supports, 3); N, N, N m
+    entries: tuple[dict[str, float], ...]  # the ledger: state, supplied, lost; J
+    material: list[tuple[Index, Array]]  # cells that can yield or break, and rows of their material
+    connections: Array  # columns of ``Connection`` for all links; (num_links, 5)
+    parts: int = 0  # steps so far, parts of cut steps counted each
+    iterations: int = 0  # Newton iterations so far

@@ -33,36 +33,22 @@ NO_CONNECTIONS = np.zeros((0, len(Connection._fields)))
 
 
 class StateView:
-    """The state of a scene in words of the scene.
-
-    Unless they say otherwise all processes call these together.
-
-    Attributes:
-        scene: What is modelled.
-        comm: All processes of the run.
-        asked: Forces of controllers, and limits of friction, in the step; N or N m.
-        grid: Its vertices, cells and numbering.
-        share: The degrees of freedom of this process.
-        t: Time; s.
-        q: Configuration at the local degrees of freedom.
-        parts: Number of steps so far, parts of cut steps counted each.
-        reactions_known: Whether the reactions of the initial state are; in dynamics they are not.
-    """
+    """The state of a scene in words of the scene; all processes call its methods together."""
 
     scene: Scene
-    comm: MPI.Intracomm
-    asked: dict[Connector, float]
+    comm: MPI.Intracomm  # all processes of the run
+    asked: dict[Connector, float]  # forces of controllers, and limits of friction; N or N m
     scheme: Scheme
     grid: Grid
-    share: Share
+    share: Share  # degrees of freedom of this process
     fields: Fields
-    t: float
-    q: Array
-    parts: int
+    t: float  # s
+    q: Array  # configuration at the local degrees of freedom
+    parts: int  # steps so far, parts of cut steps counted each
     ledger: Ledger
     supports: Supports
     inertia: Inertia
-    reactions_known: bool = False
+    reactions_known: bool = False  # those of the initial state; in dynamics they are not
     couplings: list[Links]
     inelastic: list[InelasticBeams]
     _has_inelastic: bool
@@ -117,8 +103,7 @@ class StateView:
 
     def entries(self) -> tuple[dict[str, float], ...]:
         """The ledger over all processes: state, supplied, lost; J."""
-        ledger = self.ledger
-        groups = (dict(ledger.state), dict(ledger.supplied), dict(ledger.lost))
+        groups = tuple(map(dict, (self.ledger.state, self.ledger.supplied, self.ledger.lost)))
         if self.share.alone:
             return groups
         everyone = self.share.comm.allgather(groups)
@@ -132,17 +117,12 @@ class StateView:
         return [*self.ledger.state, *self.ledger.supplied, *self.ledger.lost]
 
     def connections(self) -> Array:
-        """The columns of :class:`Connection` for all links of the scene.
-
-        All processes call it together; (num_links, 5).
-        """
+        """Columns of :class:`Connection` for all links of the scene; (num_links, 5)."""
         here = np.zeros((len(self.scene.links), len(Connection._fields)))
-        for coupling in self.couplings:
-            q = self.q
-            here[coupling.numbers] = np.column_stack(
-                [coupling.shown_motion(q), coupling.force(q), coupling.work, coupling.rate,
-                 coupling.dissipated()]
-            )  # fmt: skip
+        q = self.q
+        for one in self.couplings:
+            columns = one.shown_motion(q), one.force(q), one.work, one.rate, one.dissipated()
+            here[one.numbers] = np.column_stack(columns)
         if not self.share.alone:
             self.share.comm.Allreduce(MPI.IN_PLACE, here)
         return here
@@ -179,7 +159,7 @@ class StateView:
         return float(np.linalg.norm(self.connections()[numbers, 1]))
 
     def section_forces(self) -> Array:
-        """(N, V, M) in all cells; (num_cells, 3); N, N, N m; all processes call it together."""
+        """(N, V, M) in all cells; (num_cells, 3); N, N, N m."""
         here = np.empty((len(self.share.cells), 3))
         self._section_forces.write(self.q, here)
         forces = self.share.gather_cells(here)
@@ -192,14 +172,14 @@ class StateView:
         return SectionForces(self.fields)
 
     def material(self) -> list[tuple[Index, Array]]:
-        """Cells that can yield or break, and :attr:`Points.kept`; all processes call together."""
-        return self._gather([inelastic.kept() for inelastic in self.inelastic])
+        """Cells that can yield or break, and :attr:`Points.kept`."""
+        here = [inelastic.kept() for inelastic in self.inelastic]
+        if not self._has_inelastic or self.share.alone:
+            return here
+        return [group for groups in self.share.comm.allgather(here) for group in groups]
 
     def hinges(self) -> Array:
-        """The columns of :class:`Connection` for the plastic hinges of the scene; (num_hinges, 5).
-
-        All processes call it together.
-        """
+        """Columns of :class:`Connection` for the plastic hinges of the scene; (num_hinges, 5)."""
         return self.connections()[len(self.scene.links) - len(self.scene.hinges) :]
 
     @property
@@ -210,8 +190,7 @@ class StateView:
     def damage(self) -> tuple[Array, Array]:
         """Jump of rotation (rad) and dissipated energy (J) of each cell; both (num_cells,).
 
-        Those of plastic hinges at the ends of a cell are included; of several jumps it is the
-        largest.  All processes call it together.
+        Plastic hinges at its ends are included; of several jumps it is the largest.
         """
         jump, dissipated = np.zeros((2, len(self.grid.cells)))
         for cells, rows in self.material():
@@ -222,8 +201,3 @@ class StateView:
             for cell, motion in zip(self.grid.cells_at_hinges, hinges.motion, strict=True):
                 jump[cell] = max(jump[cell], motion, key=abs)
         return jump, dissipated
-
-    def _gather(self, here: list[tuple[Index, Array]]) -> list[tuple[Index, Array]]:
-        if not self._has_inelastic or self.share.alone:
-            return here
-        return [group for groups in self.share.comm.allgather(here) for group in groups]

@@ -65,13 +65,9 @@ class TimeSeries(Recorder):
 
     def state(self) -> State:
         """Return the number of steps and the sizes of the complete parts, which are on the disk."""
-        on_first(self._comm, self._sync)
+        on_first(self._comm, lambda: [writer.sync() for writer in self._writers])
         sizes = [n for writer in self._writers for n in writer.complete]
         return {"sizes": np.array([self._count, *sizes], dtype=float)}
-
-    def _sync(self) -> None:
-        for writer in self._writers:
-            writer.sync()
 
     def resume(self, simulation: RecordedState, state: State) -> None:
         """Cut off what was written after the state, and go on."""

@@ -31,22 +31,10 @@ INDEX = 1 << 20  # bytes that the indices of all data sets grow by in a step, an
 
 
 class VtkhdfWriter:
-    """Writer of one time series.
+    """Writer of one time series, or of the rest of one with as many complete ``steps``.
 
-    Args:
-        path: The file.
-        points: Points of all lines; (n, 3); m.
-        cells: Both points of each line; (m, 2).
-        constant: Fields in cells that do not change, by name; (m,).
-        fields: Fields of any step: their names and shapes.
-        steps: Number of steps of a file of the same mesh to go on from; later ones are cut off.
-
-    Raises:
-        ValueError: The file is not the one that was written up to there.
-        OSError: The file cannot be opened or written.
-
-    Attributes:
-        steps: Number of complete steps.
+    Of the ``fields`` only names and shapes count; ``constant`` ones are in cells, (m,).  It raises
+    :class:`ValueError` if the file is not the one that was written up to there.
     """
 
     def __init__(
@@ -94,8 +82,6 @@ class VtkhdfWriter:
         """Number of complete steps, for a checkpoint."""
         return (self.steps,)
 
-    # -- data sets -----------------------------------------------------------------------------
-
     def _is_same(self, mesh: Mapping[str, Array], fields: Fields) -> bool:
         """Return whether the file has this mesh, these fields, and enough steps."""
         try:
@@ -129,8 +115,6 @@ class VtkhdfWriter:
             8 * math.prod(dataset.get_create_plist().get_chunk())
             for dataset in (self._times, *(dataset for dataset, _ in self._growing))
         )
-
-    # -- steps ---------------------------------------------------------------------------------
 
     def write(self, t: float, fields: Fields) -> None:
         """Append a step with its fields."""
@@ -169,10 +153,7 @@ class VtkhdfWriter:
         dataset.write(there, space, np.ascontiguousarray(values, dtype=dtype))
 
     def _cut(self) -> None:
-        """Cut off what is behind the last complete step.
-
-        VTK 9.3 dies of more times than steps, so times go first.
-        """
+        """Cut off what is behind the last step; times first, of too many of which VTK 9.3 dies."""
         self._times.set_extent((self.steps,))
         self._file.flush()
         self._attributes.modify("NSteps", np.int64(self.steps))

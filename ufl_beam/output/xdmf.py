@@ -23,12 +23,8 @@ HEAD = (
     b'<?xml version="1.0"?>\n<Xdmf Version="3.0"><Domain>'
     b'<Grid Name="scene" GridType="Collection" CollectionType="Temporal">\n'
 )
-TAIL = b"</Grid></Domain></Xdmf>\n<?spare "
-"""End of the document; the steps to come are written into the instruction that it begins."""
-
-CLOSING = b"<?e?>"
-"""End of that instruction; one of its own once the instruction before has lost its end."""
-
+TAIL = b"</Grid></Domain></Xdmf>\n<?spare "  # steps to come are written into the instruction
+CLOSING = b"<?e?>"  # its end; an instruction of its own once the one before has lost its end
 PAGE, ROOM = mmap.PAGESIZE, 1 << 16
 
 
@@ -47,22 +43,10 @@ class Complete(NamedTuple):
 
 
 class XdmfWriter:
-    """Writer of one time series.
+    """Writer of one time series; ``complete`` are its sizes after the last complete step.
 
-    Args:
-        path: The file; its numbers go to :func:`data_path`.
-        points: (n, 3); m.
-        cells: Both points of each line; (m, 2).
-        constant: Fields in cells that do not change, by name; (m,).
-        complete: Sizes of files that a writer of the same mesh wrote, to go on from there; what is
-            behind them is cut off.
-
-    Raises:
-        ValueError: The files are not those that were written up to there.
-        OSError: A file cannot be opened or written.
-
-    Attributes:
-        complete: Sizes after the last complete step.
+    Given, it goes on from there, and raises :class:`ValueError` if the files are not those that
+    were written up to there.  ``constant`` are fields in cells that do not change, (m,).
     """
 
     def __init__(

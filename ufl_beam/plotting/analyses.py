@@ -5,13 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import cycle, product
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ufl_beam.analysis.modes import Shapes
 from ufl_beam.analysis.tradeoff_result import Tradeoff
 from ufl_beam.arrays import Array
-from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import SceneError
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import Fatigue, HotSpot
@@ -28,24 +28,7 @@ LEAST_ERROR = 1e-12  # errors below are drawn there, in the unit of the quantity
 CLASSES = 40  # classes of ranges and of means of cycles in pictures
 
 
-class ModeShapes(Protocol):
-    """Modes as they are drawn, such as :class:`Modes` and :class:`Buckling`."""
-
-    @property
-    def grid(self) -> Grid:
-        """Vertices, cells and numbering of the scene."""
-
-    @property
-    def titles(self) -> list[str]:
-        """Captions of the modes in pictures."""
-
-    def __len__(self) -> int: ...
-
-    def motion(self, k: int, *, amplitude: float, count: int) -> Solution:
-        """Return one period of the k-th mode as a solution."""
-
-
-def plot_modes(shapes: ModeShapes, which: Sequence[int] = (), *, amplitude: float = 0.1) -> Figure:
+def plot_modes(shapes: Shapes, which: Sequence[int] = (), *, amplitude: float = 0.1) -> Figure:
     """Draw modes side by side, in both directions from the grey undeformed scene.
 
     Args:

@@ -12,21 +12,9 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.model.bodies import Member
-from ufl_beam.plotting import drawing
+from ufl_beam.plotting import drawing, style
 from ufl_beam.plotting.labels import Label, Spot, leader_of, place
-from ufl_beam.plotting.style import (
-    BLUE,
-    INK,
-    POINTS,
-    RED,
-    RESULTANTS,
-    half_size,
-    magnified,
-    picture,
-    plane_axes,
-    require_choice,
-    with_unit,
-)
+from ufl_beam.plotting.style import BLUE, INK, POINTS, RED, RESULTANTS, half_size, with_unit
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
@@ -34,9 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.text import Annotation
 
-DRAWN_AS_ZERO = 1e-6
-"""Part of the largest value below which a value is drawn as zero and is not written."""
-
+DRAWN_AS_ZERO = 1e-6  # part of the largest value below which a value is drawn as zero
 LABEL_SIZE, TITLE_SIZE = 13.0, 14.0  # sizes of the texts and of the title; points
 
 AROUND, LEAST, MOST = (1.0, 1.2), (3.6, 2.6), (9.0, 6.8)
@@ -45,14 +31,14 @@ AROUND, LEAST, MOST = (1.0, 1.2), (3.6, 2.6), (9.0, 6.8)
 
 def plot_state(solution: Solution, what: str, *, n: int, magnify: float) -> Figure:
     """Draw the frame at a time, with a diagram of a section force; see :func:`plot`."""
-    require_choice(what, ("shape", *RESULTANTS), "plot: what")
+    style.require_choice(what, ("shape", *RESULTANTS), "plot: what")
     points = drawing.moved_points(solution, n, magnify)
     stage = drawing.plane_stage(solution, [n], magnify)
     pose = stage.pose(n)
     name = f"{RESULTANTS[what][0]} {what}" if what in RESULTANTS else "shape"
     time = solution.parameter.at(solution.times[n])
-    with picture(drawing.plane_size(solution.grid.points, points, pose.points())) as figure:
-        axes = plane_axes(figure, f"{name} at {time}{magnified(magnify)}")
+    with style.picture(drawing.plane_size(solution.grid.points, points, pose.points())) as figure:
+        axes = style.plane_axes(figure, f"{name} at {time}{style.magnified(magnify)}")
         drawing.draw_undeformed(axes, solution, stage)
         extremes: list[Extreme] = []
         if what in RESULTANTS:
@@ -100,13 +86,10 @@ class Extreme(NamedTuple):
 def draw_diagrams(
     axes: Axes, solution: Solution, what: str, diagrams: Sequence[Sequence[Array]], points: Array
 ) -> list[Extreme]:
-    """Draw diagrams of a section force on the frame, to one scale.
+    """Draw diagrams of a section force on the frame, to one scale; return both extreme values.
 
     Each has the values at both ends of the cells of all beams, (num_cells, 2) each; N, N m; the
     nodes are at ``points``, (num_nodes, 2); m.
-
-    Returns:
-        The largest and the least value, for :func:`finish` to write.
     """
     index, side = list(RESULTANTS).index(what), -1.0 if what == "M" else 1.0
     beams = solution.scene.beams
@@ -144,8 +127,7 @@ def draw_diagrams(
 def _draw_areas(axes: Axes, ends: Array, values: Array, left: Array) -> None:
     """Draw the diagram of a beam: an area for each part of it with one sign.
 
-    The axis has ``ends`` of each cell (num_cells, 2, 2), where the values are (num_cells, 2); the
-    ordinate of the value one is ``left`` (num_cells, 2); m.
+    ``left`` is the ordinate of the value one, (num_cells, 2); the axis has ``ends`` of each cell.
     """
     # Parts of cells: points of the axis, values there, ordinate of the value one
     parts: list[tuple[Array, Array, Array]] = []
@@ -165,9 +147,6 @@ def _draw_areas(axes: Axes, ends: Array, values: Array, left: Array) -> None:
             outline = np.concatenate([axis[:1], tips, axis[:0:-1]])
             color = RED if sign > 0 else BLUE
             axes.fill(*outline.T, facecolor=(color, 0.28), edgecolor=color, linewidth=1.0, zorder=2)
-
-
-# -- words and sizes -------------------------------------------------------------------------------
 
 
 def finish(figure: Figure, axes: Axes, extremes: Sequence[Extreme] = ()) -> None:
@@ -198,7 +177,7 @@ def _fit(figure: Figure, axes: Axes) -> None:
 
 
 def _write(figure: Figure, axes: Axes, extremes: Sequence[Extreme]) -> list[Annotation]:
-    """Write extreme values beside the areas and lines of a picture."""
+    """Write extreme values beside the areas and lines of a style.picture."""
     if not extremes:
         return []
     figure.draw_without_rendering()

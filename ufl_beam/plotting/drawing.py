@@ -24,15 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-# -- geometry ----------------------------------------------------------------------------------
-
-
 def moved_points(solution: Solution, n: int, magnify: float) -> Array:
-    """Return the vertices of all beams at the n-th kept time; (num_vertices, 2); m.
-
-    Raises:
-        SceneError: No such time, or ``magnify`` is not positive.
-    """
+    """Vertices of all beams at the n-th kept time, or SceneError; (num_vertices, 2); m."""
     kept = len(solution.times)
     if not -kept <= n < kept:
         raise SceneError(f"n = {n}: the solution kept {kept} times; give {-kept} to {kept - 1}")
@@ -50,13 +43,7 @@ class OpenHinge(NamedTuple):
 
 
 def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
-    """Find hinges that have opened at the n-th kept time: in cells, and of zero length.
-
-    Args:
-        solution: What to show.
-        n: Number of the kept time.
-        points: Nodes of the grid as drawn; (num_nodes, 2); m.
-    """
+    """Find hinges, in cells and of zero length, that are open; ``points`` are nodes as drawn."""
     grid, found = solution.grid, []
     for beam in solution.scene.beams:
         laws = grid.hinges(beam)
@@ -99,10 +86,7 @@ def plane_size(*shapes: Array) -> tuple[float, float]:
 
 
 def plane_stage(solution: Solution, shown: Sequence[int], magnify: float) -> Stage:
-    """Make a stage whose symbols are as large as those of supports in pictures of some states.
-
-    Supports are drawn in points, which do not depend on the scale; what moves and stretches in m.
-    """
+    """Make a stage whose symbols (m) are as large as those of supports, which are in points."""
     rough = Stage(solution, magnify, 0.02 * solution.scene.size)
     shapes = [moved_points(solution, n, magnify) for n in shown]
     points = np.concatenate(
@@ -112,9 +96,6 @@ def plane_stage(solution: Solution, shown: Sequence[int], magnify: float) -> Sta
     inches = plane_size(points)
     scale = max(1.12 * width / (inches[0] - 0.9), 1.20 * height / (inches[1] - 1.1))
     return Stage(solution, magnify, scale / 6.0, shown)  # 12 points
-
-
-# -- drawing -----------------------------------------------------------------------------------
 
 
 def draw_axes(axes: Axes, solution: Solution, points: Array, **line: Any) -> None:

@@ -13,36 +13,16 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.plastic_hinges import law_of
-from ufl_beam.plotting import drawing
-from ufl_beam.plotting.style import (
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    ORANGE,
-    PINK,
-    RED,
-    SKY,
-    color_cycle,
-    decimal_prefix,
-    draw_bar,
-    magnified,
-    picture,
-    plane_axes,
-    scale,
-    time_axes,
-    with_unit,
-)
+from ufl_beam.plotting import drawing, style
+from ufl_beam.plotting.style import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY, with_unit
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 FULLY_OPEN = 0.99  # part of the fracture energy from which on a hinge is drawn as a joint
-
-
-# -- what users call ---------------------------------------------------------------------------
 
 
 def plot_moment_curvature(solution: Solution, place: Place) -> Figure:
@@ -62,7 +42,7 @@ def plot_moment_curvature(solution: Solution, place: Place) -> Figure:
         >>> ub.plot_moment_curvature(broken, weak.start).savefig("loops.png")
     """
     M, K = solution.material_at(place).forces[:, 2], solution.strains_at(place)[:, 2]
-    with picture((8.0, 5.4)) as figure:
+    with style.picture((8.0, 5.4)) as figure:
         axes = figure.add_subplot()
         _draw_path(figure, axes, solution, K, M)
         axes.set_xlabel("curvature K (1/m)")
@@ -95,12 +75,12 @@ def plot_hinge(solution: Solution, place: Place) -> Figure:
     if law is None or np.isinf(law.limit):
         raise SceneError(f"plot_hinge: neither {place} nor the cell there has a hinge")
     M, jump, lost = kept.forces[:, 2], kept.jump, float(kept.hinge[-1])
-    with picture((8.0, 5.4)) as figure:
+    with style.picture((8.0, 5.4)) as figure:
         axes = figure.add_subplot()
         for part in _monotone(jump):
             axes.fill_between(jump[part], M[part], facecolor=(ORANGE, 0.3), linewidth=0.0, zorder=2)
         _draw_path(figure, axes, solution, jump, M)
-        _prefix(axes, "x", jump, "jump of rotation", "rad")
+        _prefix(axes.xaxis, jump, "jump of rotation", "rad")
         spent = f"{with_unit(lost, 'J')} dissipated"
         if math.isfinite(law.energy):
             spent += f", {100 * lost / law.energy:.3g} % of {with_unit(law.energy, 'J')}"
@@ -141,17 +121,17 @@ def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Fig
     width, height = drawing.plane_size(room)
     # Upright frames need less; the bar and the legend have their own widths.
     across = height * float(np.divide(*np.ptp(room, axis=0)))
-    with picture((min(width, max(6.0, across + 3.0)), height)) as figure:
+    with style.picture((min(width, max(6.0, across + 3.0)), height)) as figure:
         time = solution.parameter.at(solution.times[n])
-        axes = plane_axes(figure, f"damage at {time}{magnified(magnify)}")
+        axes = style.plane_axes(figure, f"damage at {time}{style.magnified(magnify)}")
         axes.update_datalim(room)
         drawing.draw_undeformed(axes, solution, stage)
         drawing.draw_axes(axes, solution, points, color=INK, linewidth=2.0, zorder=2)
         drawing.draw_symbols(axes, pose)
         yielded = density > 0.0
         if yielded.any():
-            unit, prefix = decimal_prefix(float(density.max()))
-            colors = scale("YlOrRd", 0.2, 1.0, 0.0, float(density.max()) / unit)
+            unit, prefix = style.decimal_prefix(float(density.max()))
+            colors = style.scale("YlOrRd", 0.2, 1.0, 0.0, float(density.max()) / unit)
             zones = LineCollection(
                 list(points[grid.cells[yielded]]),
                 colors=colors.to_rgba(density[yielded] / unit),
@@ -161,7 +141,7 @@ def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Fig
             placed = [beam.section.fibres for beam in solution.scene.beams]
             cracks = any(p is not None and p.fibres.softening is not None for p in placed)
             title = "dissipated by plastic strains" + (" and cracks" if cracks else "")
-            draw_bar(figure, axes, colors, f"{title} ({prefix}J/m)")
+            style.draw_bar(figure, axes, colors, f"{title} ({prefix}J/m)")
         _draw_hinges(figure, axes, solution, n, points)
         drawing.make_room(figure, axes)
     return figure
@@ -188,26 +168,21 @@ def plot_dissipation(solution: Solution) -> Figure:
     held = energy.total
     supplied = held[0] + sum(energy.supplied.values(), np.zeros_like(t))
     start = held[0] > 1e-12 * energy.throughput
-    with picture((8.0, 5.0)) as figure:
-        axes = time_axes(figure.add_subplot())
-        # Blue is the energy in the scene.
-        colors = color_cycle(len(energy.lost), (ORANGE, RED, GREEN, PINK, SKY))
-        axes.stackplot(
-            t, *energy.lost.values(), labels=[f"lost: {name}" for name in energy.lost],
-            colors=[(color, 0.75) for color in colors],
-        )  # fmt: skip
+    with style.picture((8.0, 5.0)) as figure:
+        axes = style.time_axes(figure.add_subplot())
+        # Blue is the energy in the scene; colours come again after the last.
+        colors = [(color, 0.75) for color in (ORANGE, RED, GREEN, PINK, SKY)]
+        labels = [f"lost: {name}" for name in energy.lost]
+        axes.stackplot(t, *energy.lost.values(), labels=labels, colors=colors)
         label = "at the start, and supplied" if start else "supplied"
         axes.plot(t, supplied, color=INK, label=label)
         axes.plot(t, held, color=BLUE, label="in the scene")
-        _prefix(axes, "y", np.concatenate([supplied, held]), "energy", "J")
+        _prefix(axes.yaxis, np.concatenate([supplied, held]), "energy", "J")
         axes.set_xlabel(solution.parameter.progress)
         worst, through = _scientific(energy.worst), with_unit(energy.throughput, "J")
         axes.set_title(f"worst imbalance {worst} of {through} throughput", loc="left", color=INK)
         figure.legend(loc="outside upper left", ncols=3)
     return figure
-
-
-# -- words and numbers -------------------------------------------------------------------------
 
 
 def _scientific(value: float) -> str:
@@ -238,13 +213,9 @@ def _monotone(x: Array) -> list[slice]:
     return [slice(a, b + 1) for a, b in pairwise(ends)]
 
 
-# -- drawing -----------------------------------------------------------------------------------
-
-
-def _prefix(axes: Axes, which: str, values: Array, quantity: str, unit: str) -> None:
+def _prefix(axis: Axis, values: Array, quantity: str, unit: str) -> None:
     """Label an axis in a unit that suits the values; the data stay in SI units."""
-    factor, prefix = decimal_prefix(float(np.max(np.abs(values))))
-    axis = axes.xaxis if which == "x" else axes.yaxis
+    factor, prefix = style.decimal_prefix(float(np.max(np.abs(values))))
     axis.set_major_formatter(lambda x, _: f"{x / factor:.6g}".replace("-", "−"))
     axis.set_label_text(f"{quantity} ({prefix}{unit})")
 
@@ -254,7 +225,7 @@ def _draw_path(figure: Figure, axes: Axes, solution: Solution, x: Array, M: Arra
     from matplotlib.collections import LineCollection
 
     times, named = solution.progress, solution.parameter
-    colors = scale("viridis_r", 0.12, 1.0, float(times[0]), float(times[-1]))
+    colors = style.scale("viridis_r", 0.12, 1.0, float(times[0]), float(times[-1]))
     path = np.column_stack([x, M])
     middle = (times[1:] + times[:-1]) / 2
     pieces = LineCollection(
@@ -269,8 +240,8 @@ def _draw_path(figure: Figure, axes: Axes, solution: Solution, x: Array, M: Arra
         axes.plot(*path[i], "o", mfc=inside, label=named.at(solution.times[i]), **ring)
     axes.autoscale_view()
     axes.tick_params(labelsize=12, color="#888888")
-    _prefix(axes, "y", M, "bending moment M", "N m")
-    draw_bar(figure, axes, colors, named.progress)
+    _prefix(axes.yaxis, M, "bending moment M", "N m")
+    style.draw_bar(figure, axes, colors, named.progress)
     figure.legend(loc="outside upper left", ncols=2)
 
 

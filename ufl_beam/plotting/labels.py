@@ -17,9 +17,7 @@ LINE_COST, LABEL_COST, OUTSIDE_COST, DISTANCE_COST, RANK_COST = 8.0, 40.0, 100.0
 """Costs of a candidate: of a point of length of lines under the label, of a square point of another
 label, of a point beyond the frame, of a point of distance, and of a place in the list of spots."""
 
-CROSSING_COST = 25.0
-"""Cost of a label that the leader crosses; a line that it crosses costs a tenth of that."""
-
+CROSSING_COST = 25.0  # of a label that the leader crosses; a line costs a tenth of that
 LEADER = 10.0  # distance of a label from its spot from which on a line leads to it; points
 
 
@@ -55,11 +53,8 @@ def place(
 ) -> list[Placed]:
     """Place labels where they cover least; each again when all others have a place.
 
-    Args:
-        labels: With spots in points.
-        halves: Half the width and height of each; points.
-        lines: Segments that should stay visible; (n, 4); points.
-        frame: Lower left and upper right corner that labels should not leave; (4,); points.
+    Spots, half widths and heights, segments that should stay visible, (n, 4), and the corners of a
+    frame that labels should not leave, (4,), are all in points.
     """
     order = sorted(range(len(labels)), key=lambda k: labels[k].rank)
     placed: dict[int, Placed] = {}

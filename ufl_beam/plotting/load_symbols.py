@@ -19,14 +19,11 @@ from ufl_beam.model.time_functions import TimeFunction, steady
 from ufl_beam.plotting.labels import Label, Spot
 from ufl_beam.plotting.style import FRONT, GREEN, RED, WHITE, Stroke, with_unit
 
-MOVED = "#A86E00"
-"""Colour of prescribed motions: the orange of what drives, dark enough for text."""
-
+MOVED = "#A86E00"  # of prescribed motions: the orange of what drives, dark enough for text
 LOADS, MOTIONS, CAPTIONS, NAMES = range(4)  # ranks of labels: those of loads are placed first
 HEAD, SHAFT = 0.85, 1.9  # length of the head of an arrow in units, and width of its line in points
 
 Spots = tuple[Spot, ...]
-
 Drawn = tuple[list[Stroke], list[Label]]  # strokes and labels of one object
 
 
@@ -141,10 +138,9 @@ def _(load: PointLoad | FollowerLoad, sizes: Sizes) -> Drawn:
 
 
 def _stand(place: Anchor, way: Array, part: float, sizes: Sizes) -> tuple[Array, Array]:
-    """Tail and tip of the arrow of a force at a place.
+    """Tail and tip of the arrow of a force: it ends at its place, or begins there.
 
-    It ends at the place, or begins there where it would lie on a beam otherwise; where it would lie
-    on beams in both cases, it is beside them.
+    It begins where it would lie on a beam else; where it would in both cases, it is beside it.
     """
     at, length = np.array(place.point), (2.6 + 1.4 * part) * sizes.unit
     if isinstance(place, Place):  # it stands out from a line load on the beam
@@ -234,10 +230,7 @@ def _(load: RotatingFrame) -> tuple[str, tuple[float, float] | float]:
 
 
 def prescribed_symbol(support: Support, inward: Array, sizes: Sizes) -> Drawn:
-    """Draw the motions that a support prescribes, with labels; hollow heads.
-
-    Its beam leaves the place in the direction ``inward``; (2,).
-    """
+    """Draw motions that a support prescribes, hollow; its beam goes ``inward``, a vector."""
     strokes, labels = [], []
     at, unit = np.array(support.place.point), sizes.unit
     cos, sin = math.cos(support.angle), math.sin(support.angle)

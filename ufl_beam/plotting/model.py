@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Callable
-from functools import cache
+from functools import cache, singledispatch
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -14,9 +14,9 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError
 from ufl_beam.model.constraint_checks import require_independent
+from ufl_beam.model.damping import Damping, KelvinVoigt, Rayleigh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.line_data import spots_of
-from ufl_beam.plotting.captions import counted, damping_in_words
 from ufl_beam.plotting.diagrams import plot_state
 from ufl_beam.plotting.labels import Placed, leader_of, place
 from ufl_beam.plotting.load_symbols import CAPTIONS, NAMES, badge
@@ -29,13 +29,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WIDTH, HEIGHT = (5.5, 9.0), (3.0, 6.8)  # least and largest size of the figure; inch
-
-LEFT, RIGHT, BELOW, ABOVE, NOTE = 66.0, 14.0, 46.0, 34.0, 16.0
-"""Room for what is around the axes, and for a line of notes; points."""
-
+LEFT, RIGHT, BELOW, ABOVE, NOTE = 66.0, 14.0, 46.0, 34.0, 16.0  # room around axes; points
 LABEL_SIZE, TITLE_SIZE = 11.0, 14.0  # sizes of labels and of the title; points
 BADGE = 60.0  # room for the symbol of a load on the whole scene, and between two of them; points
-
 
 Measure = Callable[[str], Array]  # half of width and height of a text; (2,); points
 
@@ -124,27 +120,45 @@ def plot_model(scene: Scene) -> Figure:
     return figure
 
 
-# -- words -------------------------------------------------------------------------------------
-
-
 def _title(subject: Subject) -> str:
     beams, bodies = subject.scene.beams, subject.scene.bodies
-    parts = [counted(len(beams), "beam"), counted(subject.cells, "cell")] if beams else []
-    parts += [counted(len(bodies), "body", "bodies")] if bodies else []
+    parts = [_counted(len(beams), "beam"), _counted(subject.cells, "cell")] if beams else []
+    parts += [_counted(len(bodies), "body", "bodies")] if bodies else []
     return "model: " + ", ".join(parts)
+
+
+def _counted(number: int, one: str, many: str = "") -> str:
+    """Write a number and the noun that it counts: "1 body", "20 000 beams"."""
+    return f"{number:,}".replace(",", " ") + " " + (one if number == 1 else many or f"{one}s")
+
+
+@singledispatch
+def _damping_in_words(damping: Damping) -> str:
+    """Describe a kind of damping and its size."""
+    return type(damping).__name__
+
+
+@_damping_in_words.register
+def _(damping: Rayleigh) -> str:
+    parts = (("mass", damping.mass, "1/s"), ("stiffness", damping.stiffness, "s"))
+    return "Rayleigh damping, " + ", ".join(f"{n} {x:.3g} {u}" for n, x, u in parts if x)
+
+
+@_damping_in_words.register
+def _(damping: KelvinVoigt) -> str:
+    where = "" if damping.beams is None else " of " + ", ".join(b.name for b in damping.beams[:4])
+    more = " ..." if len(damping.beams or ()) > 4 else ""
+    return f"Kelvin–Voigt damping, {with_unit(damping.time, 's')}{where}{more}"
 
 
 def notes_of(scene: Scene) -> list[str]:
     """Return words on loads of the whole scene, and a legend of the symbols."""
-    notes = [damping_in_words(damping) for damping in scene.damping]
+    notes = [_damping_in_words(damping) for damping in scene.damping]
     laws = {b.section.hinge for b in scene.beams if b.section.hinge and b.section.hinge.opens}
     if laws:
         limits = sorted({with_unit(law.limit, "N m") for law in laws})
         notes.append(f"dots: hinges may form, from {', '.join(limits[:4])}")
     return notes
-
-
-# -- where it is drawn -------------------------------------------------------------------------
 
 
 def _skeleton(subject: Subject) -> Array:
@@ -165,14 +179,10 @@ def _arrange(drawing: Drawing, scale: float, measure: Measure, frame: Array | No
         label._replace(spots=tuple(s._replace(at=np.asarray(s.at / scale)) for s in label.spots))
         for label in labels[:MOST_LABELS]
     ]
-    lines = _segments([np.asarray(x.points / scale) for x in drawing.everything()])
+    chains = [np.asarray(stroke.points / scale) for stroke in drawing.everything()]
+    lines = np.concatenate([np.hstack([chain[:-1], chain[1:]]) for chain in chains])
     placed = place(in_points, [measure(label.text) for label in in_points], lines, frame)
     return [one for one in placed if one.overlap < 0.1]
-
-
-def _segments(chains: list[Array]) -> Array:
-    """Segments of some lines; (n, 4)."""
-    return np.concatenate([np.hstack([chain[:-1], chain[1:]]) for chain in chains])
 
 
 def _box(drawing: Drawing, placed: list[Placed], scale: float) -> Array:
@@ -194,8 +204,7 @@ def _width_of_words(subject: Subject, notes: list[str], measure: Measure) -> flo
 def _plan(skeleton: Array, scale: float, box: Array, notes: int, words: float) -> Plan:
     """The largest scale at which everything fits, and the frame around it.
 
-    The ``box`` around everything (points) was found at a scale; above it are so many lines of
-    ``notes``, and words of a width (points).
+    The ``box`` around everything and the width of the ``words`` above it are in points.
     """
     low, high = skeleton.min(axis=0), skeleton.max(axis=0)
     # What stands out beyond the skeleton has a size in points.
@@ -213,9 +222,6 @@ def _plan(skeleton: Array, scale: float, box: Array, notes: int, words: float) -
     frame += np.concatenate([-more, more])
     width, height = (frame[2:] - frame[:2] + around_axes) / POINTS
     return Plan(scale, frame, (float(width), float(height)))
-
-
-# -- Matplotlib --------------------------------------------------------------------------------
 
 
 def _axes(figure: Figure, plan: Plan, title: str, notes: list[str]) -> Axes:
@@ -261,12 +267,10 @@ def _paint(axes: Axes, drawing: Drawing) -> None:
                 "edgecolors": color, "linewidths": weight, "zorder": layer, "gid": group,
                 "joinstyle": "round", "capstyle": "round",
             }  # fmt: skip
-            shape = (
-                LineCollection(chains, **look)
-                if fill is None
-                else PolyCollection(chains, facecolors=fill, **look)
-            )
-            axes.add_collection(shape, autolim=False)
+            if fill is not None:
+                look["facecolors"] = fill
+            kind = LineCollection if fill is None else PolyCollection
+            axes.add_collection(kind(chains, **look), autolim=False)
 
 
 def _write(axes: Axes, placed: list[Placed], scale: float) -> None:
@@ -287,8 +291,7 @@ def _badges(axes: Axes, scene: Scene, plan: Plan, measure: Measure) -> None:
     """Write the loads of the whole scene right above the axes."""
     x, y = plan.frame[2:] - plan.frame[:2] + (0.0, 17.0)
     for load in scene.loads:
-        found = badge(load)
-        if found is None:
+        if (found := badge(load)) is None:
             continue
         text, sense = found
         if not isinstance(sense, tuple):
@@ -300,11 +303,9 @@ def _badges(axes: Axes, scene: Scene, plan: Plan, measure: Measure) -> None:
         x -= 2 * float(measure(text)[0]) + 0.35 * BADGE
         if isinstance(sense, tuple) and math.hypot(*sense) > 0.0:
             way = 12.0 * np.array(sense) / math.hypot(*sense)
+            look = {"color": RED, "arrowstyle": "-|>", "lw": 2.0, "shrinkA": 0, "shrinkB": 0}
             axes.annotate(
                 "", (x + way[0], y + way[1]), (x - way[0], y - way[1]), xycoords="axes points",
-                annotation_clip=False, gid="badges",
-                arrowprops={
-                    "color": RED, "arrowstyle": "-|>", "lw": 2.0, "shrinkA": 0, "shrinkB": 0,
-                },
+                annotation_clip=False, gid="badges", arrowprops=look,
             )  # fmt: skip
         x -= 0.65 * BADGE

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -16,27 +16,15 @@ from ufl_beam.model.bodies import Anchor, Body, Member, Place
 from ufl_beam.model.loads import FollowerLoad, LineLoad, PointLoad
 from ufl_beam.model.plastic_hinges import law_of, place_of
 from ufl_beam.model.scene import Scene
-from ufl_beam.plotting import symbols
-from ufl_beam.plotting.captions import hinge_in_words, law_in_words, names_of
+from ufl_beam.plotting import load_symbols, symbols
+from ufl_beam.plotting.connector_glyphs import law_in_words
 from ufl_beam.plotting.labels import Label, Spot
-from ufl_beam.plotting.load_symbols import (
-    CAPTIONS,
-    NAMES,
-    Sizes,
-    along_axis,
-    around,
-    left_of,
-    load_symbol,
-    prescribed_symbol,
-    velocity_symbol,
-)
+from ufl_beam.plotting.load_symbols import CAPTIONS, NAMES, Sizes, along_axis, around, left_of
 from ufl_beam.plotting.scene_layout import Model, Pose
-from ufl_beam.plotting.style import GREY, INK, ORANGE, WHITE, Stroke
+from ufl_beam.plotting.style import GREY, INK, ORANGE, WHITE, Stroke, with_unit
 from ufl_beam.plotting.symbols import Footing
 
-HINGE, TEXT = "#B0508A", "#444444"
-"""Colours of hinges, and of words that are no loads."""
-
+HINGE, TEXT = "#B0508A", "#444444"  # colours of hinges, and of words that are no loads
 MOST_LABELS, MOST_CELLS = 80, 300  # numbers beyond which names, and marks of cells, are left out
 
 SYMBOL, SHORT_BEAM, SMALLEST = 12.0, 45.0, 0.3
@@ -83,7 +71,7 @@ class Subject(NamedTuple):
         lengths = [math.dist(axis[0], axis[-1]) for axis in axes.values()]
         typical = float(np.median(lengths)) if lengths else math.inf
         largest = _largest(scene, axes)
-        return cls(scene, axes, names_of(scene), _Ways(scene, axes), typical, largest)
+        return cls(scene, axes, _names_of(scene), _Ways(scene, axes), typical, largest)
 
     @property
     def cells(self) -> int:
@@ -111,16 +99,16 @@ def draw(subject: Subject, scale: float) -> Drawing:
         if support.moving:
             ways = sizes.ways(support.place)
             inward = ways[0] if len(ways) else np.array([0.0, 1.0])
-            drawing.add("motions", *prescribed_symbol(support, inward, sizes))
+            drawing.add("motions", *load_symbols.prescribed_symbol(support, inward, sizes))
     for mass in scene.masses:
         at, r = np.array(mass.place.point), 0.45 * unit
         label = Label(f"{mass.mass:.4g} kg", INK, CAPTIONS, around(at, r / scale))
         drawing.add("masses", [_disc(at, r, INK, INK)], [label])
     # Line loads come first, so that forces stand out from them.
     for load in sorted(scene.loads, key=lambda load: not isinstance(load, LineLoad)):
-        drawing.add("loads", *load_symbol(load, sizes))
+        drawing.add("loads", *load_symbols.load_symbol(load, sizes))
     for velocity in scene.initial:
-        drawing.add("velocities", *velocity_symbol(velocity, sizes))
+        drawing.add("velocities", *load_symbols.velocity_symbol(velocity, sizes))
     return drawing
 
 
@@ -173,7 +161,8 @@ def _draw_hinges(drawing: Drawing, subject: Subject, unit: float, scale: float) 
         at = np.array(place.point)
         if s in (0.0, 1.0):
             at = at + 0.7 * unit * _direction(*(axis[:2] if s == 0.0 else axis[:-3:-1]))
-        label = Label(hinge_in_words(law_of(hinge)), HINGE, CAPTIONS, around(at, r / scale))
+        words = f"hinge {with_unit(float(law_of(hinge).limit), 'N m')}"
+        label = Label(words, HINGE, CAPTIONS, around(at, r / scale))
         chosen = [label] if s in place.beam.hinges else []
         drawing.add("hinges", [_disc(at, r, HINGE, HINGE, 5.2)], chosen)
 
@@ -255,6 +244,17 @@ class _Ways:
             more = [_direction(axis[k], axis[j]) for j in (k - 1, k + 1) if 0 <= j < len(axis)]
             found = np.vstack([found, *more])
         return np.asarray(found)
+
+
+def _names_of(scene: Scene) -> dict[Member | Body, str]:
+    """Return names of beams and bodies; equal ones with their number in the scene."""
+    groups: tuple[Sequence[Member | Body], ...] = (scene.beams, scene.bodies)
+    known = [Counter(part.name for part in parts) for parts in groups]
+    return {
+        part: f"{part.name} {k}" if known[g][part.name] > 1 else part.name
+        for g, parts in enumerate(groups)
+        for k, part in enumerate(parts)
+    }
 
 
 def _direction(start: Array, end: Array) -> Array:

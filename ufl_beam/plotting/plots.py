@@ -1,13 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Pictures of a solution over time, by Matplotlib: its shapes, motions and energies.
-
-Every function returns a Matplotlib figure, so that ``plot(solution, "M").savefig("portal.png")``
-works.
-"""
+"""Pictures of a solution over time, by Matplotlib: its shapes, motions and energies."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import cycle
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,13 +18,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COMPONENTS = {
-    "u": ("displacement", "m"),
-    "v": ("displacement", "m"),
-    "psi": ("rotation", "rad"),
-    "du/dt": ("velocity", "m/s"),
-    "dv/dt": ("velocity", "m/s"),
+    "u": ("displacement", "m"), "v": ("displacement", "m"), "psi": ("rotation", "rad"),
+    "du/dt": ("velocity", "m/s"), "dv/dt": ("velocity", "m/s"),
     "dpsi/dt": ("angular velocity", "rad/s"),
-}
+}  # fmt: skip
 
 
 def plot_shapes(
@@ -101,7 +95,7 @@ def plot_history(
     with style.picture((8.0, 4.2)) as figure:
         axes = style.time_axes(figure.add_subplot())
         axes.axhline(0.0, color=style.GREY, linewidth=1.0, zorder=1)
-        for place, color in zip(followed, style.color_cycle(len(followed)), strict=True):
+        for place, color in zip(followed, cycle(style.COLORS), strict=False):
             values = motion(place)[:, number % 3]
             axes.plot(solution.times, values, color=color, label=str(place))
         axes.set_ylabel(f"{quantity} {component.replace('psi', 'ψ')} ({unit})")
@@ -130,9 +124,7 @@ def plot_energy(solution: Solution) -> Figure:
         ledger, check = map(
             style.time_axes, figure.subplots(2, 1, sharex=True, height_ratios=(2.4, 1))
         )
-        for (name, values, line), color in zip(
-            entries, style.color_cycle(len(entries)), strict=True
-        ):
+        for (name, values, line), color in zip(entries, cycle(style.COLORS), strict=False):
             ledger.plot(along, values, line, color=color, label=name)
         ledger.set_ylabel("energy (J)")
         ledger.plot(along, energy.total, color=style.INK, linewidth=1.2, label="in the scene")

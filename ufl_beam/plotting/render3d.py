@@ -1,9 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""Solid pictures and films of a solution, by PyVista."""
+"""Solid pictures and films of a solution, by PyVista, and a screen where VTK needs one."""
 
 from __future__ import annotations
 
 import gc
+import importlib
+import os
+import shutil
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,10 +17,9 @@ from typing import Any
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.errors import require_number
-from ufl_beam.parallel import ours
+from ufl_beam.errors import SceneError, require_number
+from ufl_beam.parallel import active_comm
 from ufl_beam.plotting.drawing import evenly, moved_points, open_hinges
-from ufl_beam.plotting.offscreen import film_writer, optional, require_suffix, screen
 from ufl_beam.plotting.solids import Look, Solids
 from ufl_beam.plotting.style import magnified
 from ufl_beam.simulation.solution import Solution
@@ -61,9 +65,9 @@ def render(
     from matplotlib.image import imsave
 
     look = Look(solution, color, thickness, magnify, size)
-    path = require_suffix(path, (".png",))
+    path = _require_suffix(path, (".png",))
     moved_points(solution, n, magnify)
-    if ours().rank == 0:
+    if active_comm().rank == 0:
         with _film(look, [n]) as frames:
             for frame in frames:
                 imsave(path, frame)
@@ -104,12 +108,12 @@ def animate(
         >>> ub.animate(solution, "beam.gif", fps=5, seconds=0.4, size=(320, 192))
     """
     look = Look(solution, color, thickness, magnify, size)
-    path = require_suffix(path, (".gif", ".mp4"))
+    path = _require_suffix(path, (".gif", ".mp4"))
     require_number(fps, "animate: fps", positive=True)
     require_number(seconds, "animate: seconds", positive=True)
     shown = evenly(solution, max(1, round(fps * seconds)))
-    if ours().rank == 0:
-        with _film(look, shown) as frames, film_writer(path, fps) as film:
+    if active_comm().rank == 0:
+        with _film(look, shown) as frames, _film_writer(path, fps) as film:
             for frame in frames:
                 film.append_data(frame)
 
@@ -117,8 +121,8 @@ def animate(
 @contextmanager
 def _film(look: Look, shown: list[int]) -> Iterator[Iterator[Any]]:
     """The frames of these states, one after the other, as images (height, width, 3)."""
-    pyvista = optional("pyvista", "ufl_beam[view]", "pictures of solid bodies need PyVista")
-    with screen(pyvista):
+    pyvista = _optional("pyvista", "ufl_beam[view]", "pictures of solid bodies need PyVista")
+    with _screen(pyvista):
         plotter = pyvista.Plotter(off_screen=True, window_size=list(look.size))
         try:
             yield _frames(pyvista, plotter, look, shown)
@@ -168,3 +172,65 @@ def _set_camera(plotter: Any, bounds: Array, size: tuple[int, int]) -> None:
     plotter.camera.position = focus - 4 * np.linalg.norm(np.ptp(bounds, axis=0)) * towards
     plotter.camera.up = up
     plotter.camera_set = True
+
+
+def _optional(module: str, package: str, why: str) -> Any:
+    """Import a module that need not be installed, or say how to install it."""
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        raise ImportError(f"{why}; install it by: pip install {package}") from error
+
+
+def _require_suffix(path: str | Path, suffixes: tuple[str, ...]) -> Path:
+    """Return the path of a picture, or raise :class:`SceneError`."""
+    path = Path(path)
+    if path.suffix.lower() not in suffixes:
+        raise SceneError(f"{path}: the name must end in {' or '.join(suffixes)}")
+    if not path.parent.is_dir():
+        raise SceneError(f"{path}: there is no directory {path.parent}; make it first")
+    return path
+
+
+def _film_writer(path: Path, fps: float) -> Any:
+    """Open a GIF or MP4 with so many frames per second."""
+    imageio = _optional("imageio.v2", "ufl_beam[view]", "films need imageio")
+    if path.suffix.lower() == ".gif":
+        return imageio.get_writer(path, mode="I", duration=1000.0 / fps, loop=0)
+    _optional("imageio_ffmpeg", "imageio-ffmpeg", "MP4 needs imageio-ffmpeg, GIF does not")
+    return imageio.get_writer(path, fps=fps, macro_block_size=2)
+
+
+@contextmanager
+def _screen(pyvista: Any) -> Iterator[None]:
+    """Provide a screen if VTK needs one and there is none: without, it ends the interpreter."""
+    needed = sys.platform == "linux" and tuple(pyvista.vtk_version_info) < (9, 4)
+    if not needed or os.environ.get("DISPLAY"):
+        yield
+        return
+    if shutil.which("Xvfb") is None:
+        raise RuntimeError(
+            "PyVista with this VTK needs a screen, and DISPLAY is not set; install Xvfb "
+            "(apt-get install xvfb) or VTK 9.4 or newer"
+        )
+    reader, writer = os.pipe()
+    server = subprocess.Popen(
+        ["Xvfb", "-displayfd", str(writer), "-screen", "0", "1280x1024x24", "-nolisten", "tcp"],
+        pass_fds=[writer],
+        start_new_session=True,  # Ctrl-C is for this process; it still needs its screen to end
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    os.close(writer)
+    try:
+        with os.fdopen(reader) as answer:
+            number = answer.readline().strip()
+        if not number:
+            raise RuntimeError("Xvfb did not start; try: Xvfb -displayfd 1")
+        os.environ["DISPLAY"] = f":{number}"
+        yield
+    finally:
+        os.environ.pop("DISPLAY", None)
+        server.terminate()
+        server.wait()

@@ -5,25 +5,23 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.model.bodies import GROUND, Anchor, Body, Spot
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import Curve, nearest, parameter_step, tangent
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.joint_histories import Motion, motion_of, turned
+from ufl_beam.output.joint_histories import motion_of, turned
 from ufl_beam.output.line_data import spots_of
+from ufl_beam.simulation.solution import Solution
 
-Range = tuple[float, float]
-"""Least and largest position of a slider along its rail from its place, m; or guide parameter."""
+Range = tuple[float, float]  # of a slider along its rail from its place, m; or guide parameter
 
 
 class Setting(ABC):
@@ -33,10 +31,15 @@ class Setting(ABC):
     unit: float  # half the size of a symbol of a support; m
     magnify: float  # factor on the displacements
 
-    @property
-    @abstractmethod
-    def travels(self) -> Mapping[Connector, Range]:
+    @cached_property
+    def travels(self) -> dict[Connector, Range]:
         """Ranges of all that slides or is guided, since it was made, by its holder."""
+        joints = [j for j in self.scene.joints if j.look in ("Prismatic", "Guided")]
+        return {holder: self._travel(holder) for holder in (j.holders[0] for j in joints)}
+
+    @abstractmethod
+    def _travel(self, holder: Connector) -> Range:
+        """Range of what a connector holds on its rail or guide curve."""
 
     @property
     def undeformed(self) -> Pose:
@@ -79,12 +82,6 @@ class Setting(ABC):
                     offsets[connector] = 1.6 * (k - (len(group) - 1) / 2)
         return offsets
 
-    @property
-    def sliding(self) -> list[Connector]:
-        """Connectors that hold all that slides on a rail or a guide curve."""
-        kinds = ("Prismatic", "Guided")
-        return [j.holders[0] for j in self.scene.joints if j.look in kinds]
-
 
 class Model(Setting):
     """Scene before any run."""
@@ -92,12 +89,8 @@ class Model(Setting):
     def __init__(self, scene: Scene, unit: float) -> None:
         self.scene, self.unit, self.magnify = scene, unit, 1.0
 
-    @cached_property
-    def travels(self) -> dict[Connector, Range]:
-        """Rails as long as the slider, and some of the guide curves."""
-        return {holder: self._start(holder) for holder in self.sliding}
-
-    def _start(self, holder: Connector) -> Range:
+    def _travel(self, holder: Connector) -> Range:
+        """Rail as long as the slider, or some of the guide curve."""
         if isinstance(holder.law, Guide):
             more, size = 3.0 * self.unit, self.scene.size
             return _used(holder.law.curve, np.empty((0, 2)), (), more, size)
@@ -105,28 +98,11 @@ class Model(Setting):
         return start, start
 
 
-class Shown(Motion, Protocol):
-    """Solution as it is drawn: configurations of a grid at all kept times."""
-
-    grid: Grid
-
-    @property
-    def q(self) -> Array:
-        """Configurations at all kept times; (n+1, grid.size)."""
-
-
 class Stage(Setting):
-    """Solution, and how large its symbols are.
-
-    Args:
-        solution: What is shown.
-        magnify: Factor on the displacements.
-        unit: Half the size of a symbol of a support; m.
-        shown: Numbers of the kept times that are shown, for which rails must do; all by default.
-    """
+    """Solution, of which rails must do for the kept times ``shown``; all by default."""
 
     def __init__(
-        self, solution: Shown, magnify: float, unit: float, shown: Sequence[int] | None = None
+        self, solution: Solution, magnify: float, unit: float, shown: Sequence[int] | None = None
     ) -> None:
         self.scene, self._solution = solution.scene, solution
         self.magnify, self.unit = magnify, unit
@@ -136,11 +112,6 @@ class Stage(Setting):
         """Return the pose at the n-th kept time."""
         grid, q = self._solution.grid, self._solution.q[n]
         return Pose(self, lambda anchor: np.asarray(motion_of(grid, anchor, [q])[0]))
-
-    @cached_property
-    def travels(self) -> dict[Connector, Range]:
-        """Range of motion of each sliding connector, see :attr:`Setting.travels`."""
-        return {holder: self._travel(holder) for holder in self.sliding}
 
     def _travel(self, holder: Connector) -> Range:
         points = self._solution.position(holder.b)
@@ -186,9 +157,6 @@ class Pose:
         arms = points - body.center
         moved = turned(arms, np.full(len(arms), ψ)) - arms + (u, v)
         return np.asarray(points + self.stage.magnify * moved)
-
-
-# -- geometry -----------------------------------------------------------------------------------
 
 
 def _along(holder: Connector) -> tuple[float, float]:

@@ -82,10 +82,7 @@ class Look:
         return self.solution.section_forces(beam, n)[:, list(style.RESULTANTS).index(self.color)]
 
     def corners(self, beam: Member, n: int, points: Array) -> Array:
-        """Compute the corners of all cross-sections of a beam; (4 num_vertices, 3); m.
-
-        Cross-sections turn with ψ; at a corner of the axis they halve the angle.
-        """
+        """Corners of cross-sections, which turn with ψ and halve angles; (4 num_vertices, 3); m."""
         grid = self.solution.grid
         vertices = grid.vertices_of(beam)
         along = np.diff(grid.points[vertices], axis=0)
@@ -194,10 +191,7 @@ class Solids:
             self._add(parts, color, f"strokes {color}")
 
     def _tubes(self, lines: list[Array], radius: float) -> Any:
-        """Tubes along lines, made at once: one after the other takes long.
-
-        Each piece between two points is a tube of its own, as tubes get thin at sharp corners.
-        """
+        """Tubes along lines at once, which is fast; one for each piece: corners make them thin."""
         starts = np.cumsum([0, *map(len, lines)])
         first = np.delete(np.arange(starts[-1]), starts[1:] - 1)  # not the last of each line
         pieces = np.column_stack([np.full(len(first), 2), first, first + 1])

@@ -9,14 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from itertools import cycle, islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError
-from ufl_beam.parallel import ours
+from ufl_beam.parallel import active_comm
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,27 +25,20 @@ if TYPE_CHECKING:
 BLUE, RED, GREEN, PINK, ORANGE, SKY = (
     "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9",
 )  # fmt: skip
+COLORS = (BLUE, RED, GREEN, PINK, ORANGE, SKY)  # of lines in one picture
 INK, GREY, WHITE = "#222222", "#B5B5B5", "#FFFFFF"
 
+# Layers: beneath the beams, over them, upon the areas there, and over the pins of joints
 BACK, MIDDLE, UPON, FRONT = 2.5, 4.2, 4.3, 5.5
-"""Layers: beneath the beams, over them, upon the areas there, and over the pins of joints."""
-
 RESULTANTS = {"N": ("axial force", "N"), "V": ("shear force", "N"), "M": ("bending moment", "N m")}
 
 POINTS = 72.0  # points of an inch
 
 STYLE = {
-    "font.size": 13.0,
-    "axes.titlesize": 14.0,
-    "axes.labelsize": 13.0,
-    "axes.edgecolor": "#888888",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "legend.frameon": False,
-    "legend.fontsize": 12.0,
-    "lines.linewidth": 2.0,
-    "lines.solid_capstyle": "round",
-}
+    "font.size": 13.0, "axes.titlesize": 14.0, "axes.labelsize": 13.0, "axes.edgecolor": "#888888",
+    "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False,
+    "legend.fontsize": 12.0, "lines.linewidth": 2.0, "lines.solid_capstyle": "round",
+}  # fmt: skip
 
 
 class Stroke(NamedTuple):
@@ -57,9 +49,6 @@ class Stroke(NamedTuple):
     weight: float = 1.6  # width of the line; points
     fill: str | None = None  # colour of the area
     layer: float = MIDDLE
-
-
-# -- words -------------------------------------------------------------------------------------
 
 
 def decimal_prefix(value: float) -> tuple[float, str]:
@@ -87,9 +76,6 @@ def require_choice(choice: str, choices: Iterable[str], what: str) -> None:
         raise SceneError(f"{what} = {choice!r} is not one of {names}")
 
 
-# -- figures -----------------------------------------------------------------------------------
-
-
 @contextmanager
 def picture(size: tuple[float, float]) -> Iterator[Figure]:
     """Open a new figure in the style of this module, for pictures of your own.
@@ -109,7 +95,7 @@ def picture(size: tuple[float, float]) -> Iterator[Figure]:
 
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=size, dpi=150, layout="constrained")
-        if ours().rank > 0:
+        if active_comm().rank > 0:
             figure.savefig = lambda *args, **options: None  # type: ignore[method-assign]
         yield figure
 
@@ -133,16 +119,8 @@ def time_axes(axes: Axes) -> Axes:
     return axes
 
 
-def color_cycle(count: int, colors: Iterable[str] = (BLUE, RED, GREEN, PINK, ORANGE, SKY)) -> Any:
-    """Iterate over so many colours, from the first again after the last."""
-    return islice(cycle(colors), count)
-
-
 def scale(name: str, first: float, last: float, low: float, high: float) -> Any:
-    """Make a part of a colour map of Matplotlib for values from ``low`` to ``high``.
-
-    The bright end of a colour map would not be seen on white.
-    """
+    """Make a colour map for values from low to high, without the end that is not seen on white."""
     import matplotlib as mpl
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import ListedColormap, Normalize

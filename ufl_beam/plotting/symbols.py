@@ -7,7 +7,7 @@ Pictures of all kinds draw these, in the plane and solid.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -24,11 +24,8 @@ from ufl_beam.plotting.connector_glyphs import AROUND, STRAIGHT, Piece, along, a
 from ufl_beam.plotting.scene_layout import Pose
 from ufl_beam.plotting.style import BACK, FRONT, GREY, INK, MIDDLE, ORANGE, UPON, WHITE, Stroke
 
-FILLED, EDGE = "#D6E2ED", "#5F7A94"
-"""Colours of bodies."""
-
-STEEL, DARK, GROUND_GREY = "#6E6E6E", "#4A4A4A", "#808080"
-"""Colours of rails and guides, of rods, and of supports that stand still."""
+FILLED, EDGE = "#D6E2ED", "#5F7A94"  # colours of bodies
+STEEL, DARK, GROUND_GREY = "#6E6E6E", "#4A4A4A", "#808080"  # of rails, rods and still supports
 
 # Outlines of the symbols of supports; half a symbol is 1, the place is the origin, the beam comes
 # from above.
@@ -58,9 +55,6 @@ class Footing(NamedTuple):
     place: Anchor
 
 
-# -- bodies ------------------------------------------------------------------------------------
-
-
 def bodies(pose: Pose) -> list[Stroke]:
     """Draw outlines of the rigid bodies."""
     outlines = pose.stage.outlines.items()
@@ -77,9 +71,6 @@ def centres(pose: Pose) -> Iterator[Stroke]:
         for k, fill in enumerate((EDGE, WHITE, EDGE, WHITE)):
             angles = np.full(len(quarter), ψ + k * math.pi / 2)
             yield Stroke(at + turned(quarter, angles), EDGE, 1.0, fill)
-
-
-# -- joints ------------------------------------------------------------------------------------
 
 
 def rods(pose: Pose) -> Iterator[Stroke]:
@@ -108,12 +99,10 @@ def pins(pose: Pose) -> Iterator[Pin]:
 
 def rails(pose: Pose) -> Iterator[Stroke]:
     """Draw rails, guide curves, and the blocks on them."""
+    draw = {"Prismatic": _rail, "Guided": _guide, "Release": _sleeve}
     for joint in pose.stage.scene.joints:
-        if joint.look in _RAILS:
-            yield from _RAILS[joint.look](pose, joint)
-
-
-# -- connectors --------------------------------------------------------------------------------
+        if joint.look in draw:
+            yield from draw[joint.look](pose, joint)
 
 
 def connectors(pose: Pose) -> Iterator[Stroke]:
@@ -159,15 +148,13 @@ def _around(pose: Pose, connector: Connector) -> Iterator[Stroke]:
         yield Stroke(np.array([start, pin]), GREY, 1.0)
 
 
-# -- supports ----------------------------------------------------------------------------------
-
-
 def footings(pose: Pose) -> Iterator[Footing]:
     """Draw supports, and points of the ground that hold something."""
     for support in pose.stage.scene.supports:
         angle = support_direction(support, pose.turn(support.place))
         color = ORANGE if support.moving else GROUND_GREY
-        symbol = support_symbol(support)
+        held = 3 if len(support.held) == 3 else len({0, 1} & set(support.held))
+        symbol = [[_DIAMOND], [_TRIANGLE, _TRACK], [_TRIANGLE, _PLATE], [_CLAMP]][held]
         yield Footing(pose.at(support.place), angle, symbol, color, support.place)
     for spot, (inward, turns) in _grounds(pose.stage.scene).items():
         symbol = [_TRIANGLE, _PLATE] if turns else [_CLAMP]
@@ -193,9 +180,6 @@ def _grounds(scene: Scene) -> dict[Spot, tuple[float, bool]]:
                 known, before = found.get(spot, (inward, True))
                 found[spot] = known, before and turns
     return found
-
-
-# -- rails, by kind of joint -------------------------------------------------------------------
 
 
 def _rail(pose: Pose, joint: Joint) -> Iterator[Stroke]:
@@ -246,27 +230,8 @@ def _sleeve(pose: Pose, joint: Joint) -> Iterator[Stroke]:
             yield Stroke(across, INK, 2.4, layer=FRONT)
 
 
-_RAILS: dict[str, Callable[[Pose, Joint], Iterator[Stroke]]] = {
-    "Prismatic": _rail,
-    "Guided": _guide,
-    "Release": _sleeve,
-}
-
-
-# -- directions --------------------------------------------------------------------------------
-
-
-def support_symbol(support: Support) -> list[Outline]:
-    """Return outlines of the symbol of a support; half a symbol is 1, its place the origin."""
-    held = 3 if len(support.held) == 3 else len({0, 1} & set(support.held))
-    return [[_DIAMOND], [_TRIANGLE, _TRACK], [_TRIANGLE, _PLATE], [_CLAMP]][held]
-
-
 def support_direction(support: Support, turned: float) -> float:
-    """Return the angle of the symbol of a support, away from its beam; rad.
-
-    A clamp follows the rotation of its place, by which it is ``turned`` (rad).
-    """
+    """Angle of the symbol of a support, away from its beam; a clamp is ``turned`` with it; rad."""
     inward = _inward(support.place)
     if len(support.held) == 3:
         return inward + turned - math.pi / 2
@@ -292,9 +257,6 @@ def _towards(spot: Spot, other: Anchor) -> float:
     if (x, y) == (X, Y) and isinstance(other, Spot):
         X, Y = other.body.center
     return _inward(other) if (x, y) == (X, Y) else math.atan2(Y - y, X - x)
-
-
-# -- lines -------------------------------------------------------------------------------------
 
 
 def _inked(piece: Piece, points: Array) -> Stroke:

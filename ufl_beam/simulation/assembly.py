@@ -13,6 +13,7 @@ from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import NOWHERE, Restoring, Saving, State
+from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.connector_laws import Controller, Coulomb, Running
 from ufl_beam.model.connectors import Connector
@@ -23,21 +24,20 @@ from ufl_beam.simulation.branch_check import StaticPath
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.c_equation import CEquation
 from ufl_beam.solvers.equation import Equation
-from ufl_beam.terms.algorithmic_damping import numerical_forces
-from ufl_beam.terms.base import Cells, Term
+from ufl_beam.terms.base import Term
 from ufl_beam.terms.beams import ElasticBeams, Inertia
 from ufl_beam.terms.connector_responses import Setting
 from ufl_beam.terms.connectors import couplings
-from ufl_beam.terms.damping import damping_forces
+from ufl_beam.terms.damping import SecondDifferences, damping_forces
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.guide_curves import guides
 from ufl_beam.terms.inelastic_beams import InelasticBeams, inelastic_cells
 from ufl_beam.terms.links import Links
-from ufl_beam.terms.loads import DeadLoads, FollowerLoads
+from ufl_beam.terms.loads import DeadLoads, FollowerLoads, FrameForces
 from ufl_beam.terms.material_points import expect_entries
-from ufl_beam.terms.openings import Course, Openable, Openings
-from ufl_beam.terms.rotating_frame import FrameForces
+from ufl_beam.terms.openings import Openable, Openings, SearchFlags
 from ufl_beam.terms.supports import Supports
+from ufl_beam.terms.tangent_derivatives import Cells
 
 Loads = list[DeadLoads | FollowerLoads | FrameForces]
 
@@ -48,18 +48,12 @@ class Assembly:
 
     Attributes:
         fields: Function spaces on the cells of this process.
-        ledger: Energies of this process.
         asked: Forces of controllers, and limits of friction, in the step; N or N m.
         rates: Rates of the motions with friction as the step begins; m/s or rad/s.
-        beams: Beams of the cells of this process; those with material points first.
-        inelastic: Those with material points.
+        beams: Beams of the cells of this process; the inelastic ones, with material points, first.
         yields: Whether any process has such cells.
         couplings: Connectors, those alike together.
-        loads: Loads.
-        inertia: Inertia; None in statics.
-        supports: Supports.
         openings: Search for what opens; None if nothing can.
-        equation: The equation of a step, which consists of all of them.
     """
 
     fields: Fields
@@ -83,14 +77,12 @@ class Assembly:
 
     def ask(self, simulation: Running, q: Array) -> None:
         """Ask controllers and friction for forces and limits; note the rates of what may slip."""
-        laws = ((link, link.law) for link in self.asked)
-        self.asked.update(
-            {
-                link: law.ask(simulation, link)
-                for link, law in laws
-                if isinstance(law, Controller | Coulomb)
-            }
-        )
+        new = {
+            link: law.ask(simulation, link)
+            for link, law in ((link, link.law) for link in self.asked)
+            if isinstance(law, Controller | Coulomb)
+        }
+        self.asked.update(new)
         if self.inertia is not None:
             for one in self.couplings:
                 if isinstance(one.links[0].law, Coulomb):
@@ -115,12 +107,9 @@ class Assembly:
         return memory.state()
 
     def take_over(self, q: Array, internal: State, *, same: bool) -> None:
-        """Take over :meth:`internal_variables` of another run.
+        """Take over :meth:`internal_variables` of another run at the local configuration ``q``.
 
-        Args:
-            q: The initial configuration at the local degrees of freedom.
-            internal: What the other run has passed on.
-            same: Whether no force has changed since, so that accelerations are what they were.
+        ``same`` says that no force has changed since, so that accelerations are what they were.
         """
         memory = Restoring(self.equation.share, internal)
         for one in self.remembering:
@@ -136,12 +125,7 @@ class Assembly:
     ) -> StaticPath | None:
         """Begin a static path, and set the reactions to those of its state; None in dynamics.
 
-        Args:
-            scheme: The time scheme.
-            q: The initial configuration at the local degrees of freedom.
-            t0: Its time; s.
-            loads: The loads that it is in equilibrium with; none if nothing acts yet.
-            together: Raises on all processes what one of them raises.
+        The state, ``q`` at ``t0``, is in equilibrium with ``loads``; none if nothing acts yet.
         """
         if self.inertia is not None:
             return None
@@ -155,15 +139,8 @@ class Assembly:
 
 
 def assemble(share: Share, scheme: Scheme, v: Array, together: Agreement) -> Assembly:
-    """Make the terms of a scene.
-
-    Args:
-        share: The degrees of freedom of this process, of the grid of the scene.
-        scheme: The time scheme.
-        v: Initial velocities at the local degrees of freedom; supports stop them in place.
-        together: Raises on all processes what one of them raises.
-    """
-    scene, ledger, fields, course = share.grid.scene, Ledger(), Fields(share), Course()
+    """Make the terms of a scene; supports stop the initial local velocities ``v`` in place."""
+    scene, ledger, fields, search = share.grid.scene, Ledger(), Fields(share), SearchFlags()
     A = fields.matrix()
     setting = (scheme, A, ledger)
 
@@ -175,20 +152,21 @@ def assemble(share: Share, scheme: Scheme, v: Array, together: Agreement) -> Ass
         part = np.flatnonzero(np.isin(share.cells, cells))
         if len(part):
             elastic[part] = False
-            inelastic.append(InelasticBeams(Fields(share, part), layout, *setting, course))
+            inelastic.append(InelasticBeams(Fields(share, part), layout, *setting, search))
     beams: list[Cells] = [*inelastic]
     numerical: list[Term] = []
     if elastic.any():
         part = np.flatnonzero(elastic)
         on_part = fields if elastic.all() else Fields(share, part)
         beams.append(ElasticBeams(on_part, *setting))
-        numerical = numerical_forces(scheme, on_part, A, ledger)
+        if isinstance(scheme, DecayingMidpoint):
+            numerical.append(SecondDifferences(scheme, on_part, A, ledger))
 
     asked = {link: 0.0 for link in scene.links if isinstance(link.law, Controller | Coulomb)}
     rates = dict(asked)
-    connectors = Setting(asked, rates, scene.size, scheme, ledger, friction_repeats(scene), course)
+    connectors = Setting(asked, rates, scene.size, scheme, ledger, friction_repeats(scene), search)
     coupled = together(lambda: [*couplings(share, connectors, A), *guides(share, scheme, A)])
-    openings = Openings.of(course, _openable(inelastic, coupled), share.comm)
+    openings = Openings.of(search, _openable(inelastic, coupled), share.comm)
 
     loads = _loads(scene, fields, scheme, ledger, A)
     inertia = Inertia(fields, scheme, A, ledger, v) if has_inertia(scheme) else None
@@ -198,7 +176,7 @@ def assemble(share: Share, scheme: Scheme, v: Array, together: Agreement) -> Ass
     supports = Supports(share, scheme, ledger, A)
     if inertia:
         supports.stop(inertia.v)
-    equation = StepEquation(share, A, beams, coupled, loads, others, supports, course)
+    equation = StepEquation(share, A, beams, coupled, loads, others, supports, search)
     return Assembly(
         fields, ledger, asked, rates, beams, inelastic, bool(groups), coupled, loads, inertia,
         supports, openings, equation,

@@ -26,16 +26,10 @@ KINK = 1e-6
 
 
 class StaticPath:
-    """Checks of a static step before it is accepted.
+    """Checks of a static step before it is accepted, from the state in which the path begins.
 
-    Args:
-        share: The degrees of freedom of this process.
-        scheme: A static scheme; its ``slack`` says how much may stay unexplained.
-        beams: What stores and dissipates.
-        couplings: Connectors, which may store, dissipate, supply.
-        ledger: Energies before the step.
-        q: Configuration at the beginning.
-        t0: Time at the beginning; s.
+    The ``slack`` of the scheme says how much work may stay unexplained; ``force`` are the internal
+    forces at the end of the last step.
     """
 
     def __init__(
@@ -51,36 +45,24 @@ class StaticPath:
         self._share, self._scheme, self._ledger = share, scheme, ledger
         self._beams, self._couplings = beams, couplings
         self._rotations = share.rotations()
-        self._before: Array = np.zeros(share.size)
+        self.force: Array = np.zeros(share.size)
         # In so short a step nothing viscous flows; forces of connectors are among the unknowns.
         short = scheme.step(0.0, sys.float_info.min, sys.float_info.min, q)
         for beam in beams:
             beam.begin(short)
-            beam.add_residual(q, self._before)
+            beam.add_residual(q, self.force)
         for coupling in couplings:
             coupling.begin(scheme.step(t0, t0 + 1.0, t0 + 1.0, q))
-            coupling.add_residual(q, self._before)
-
-    @property
-    def force(self) -> Array:
-        """The internal forces at the end of the last step."""
-        return self._before
+            coupling.add_residual(q, self.force)
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The internal forces at the end of the last step."""
-        self._before = memory.added("internal forces", self._before)
+        self.force = memory.added("internal forces", self.force)
 
     def require(self, q1: Array, s: Array, force: Array, least_work: float) -> None:
-        """Raise unless the step was followed.
+        """Raise :class:`StepFailed` unless the step ``s`` of the nodes to ``q1`` was followed.
 
-        Args:
-            q1: Its end.
-            s: Its step of the nodes.
-            force: Internal forces in it.
-            least_work: Work that round-off makes; J.
-
-        Raises:
-            StepFailed: It was not.
+        ``force`` are the internal forces in it; round-off makes the work ``least_work``; J.
         """
         self._require_near(s)
         if math.isfinite(self._scheme.slack):
@@ -88,7 +70,7 @@ class StaticPath:
 
     def accept(self, force: Array) -> None:
         """Take the internal forces of a step as those before the next."""
-        self._before = force.copy()
+        self.force = force.copy()
 
     def _require_near(self, s: Array) -> None:
         size = self._share.grid.scene.size
@@ -108,7 +90,7 @@ class StaticPath:
         beyond a limit load, or where softening lets go more than it dissipates.
         """
         total = self._share.total
-        work = total(float(self._scheme.acting(self._before, force) @ s))
+        work = total(float(self._scheme.acting(self.force, force) @ s))
         in_beams = total(sum(one.change(q1) for one in self._beams))
         change = in_beams + total(sum(one.change(q1) for one in self._couplings))
         # A motor that stretches a spring gives what the spring takes; their sum measures nothing.

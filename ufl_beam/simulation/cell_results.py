@@ -14,12 +14,7 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Product
 from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.discretization.function_spaces import (
-    Fields,
-    SectionForces,
-    Strains,
-    mass_matrix,
-)
+from ufl_beam.discretization.function_spaces import Fields, SectionForces, Strains, mass_matrix
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import Place
@@ -76,11 +71,7 @@ class CellResults:
         return strains
 
     def material(self, n: int, cells: Index | int) -> Material:
-        """State of the material of some cells.
-
-        Raises:
-            SceneError: The scene is elastic.
-        """
+        """State of the material of some cells."""
         if not self._kept[n].material and not self._grid.scene.hinges:
             raise SceneError("material: nothing in the scene yields or breaks; it is elastic")
         everything = np.zeros((len(self._grid.cells), 6))
@@ -102,16 +93,12 @@ class CellResults:
         return Material(*map(np.array, zip(*kept, strict=True)))
 
     def momentum(self) -> Array:
-        """(p_x, p_y, L) at all kept times, L about the origin; (n+1, 3); N s, N s, N m s.
-
-        Raises:
-            SceneError: The run was static.
-        """
+        """(p_x, p_y, L) at all kept times, L about the origin; (n+1, 3); N s, N s, N m s."""
         if not self._kept.v:
             raise SceneError("momentum: the run was static; there is none")
         times, grid = Product(mass_matrix(self._fields)), self._grid
         dofs = np.vstack([grid.dofs, grid.dofs_of_bodies])
-        centers = np.array([body.center for body in grid.scene.movers]).reshape(-1, 2)
+        centers = np.array([body.center for body in grid.scene.rigid_bodies]).reshape(-1, 2)
         _, first = np.unique(dofs[:, 0], return_index=True)
         u, v, ψ = dofs[first, 0], dofs[first, 1], np.unique(dofs[:, 2])
         X, Y = np.vstack([grid.points, centers])[first].T

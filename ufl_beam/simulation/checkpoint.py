@@ -17,7 +17,6 @@ from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.arrays import Array
 from ufl_beam.collective_errors import Agreement, on_first
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError, require_count, require_number, require_sequence, shorten
@@ -26,7 +25,7 @@ from ufl_beam.output.archive import above, below
 from ufl_beam.output.output_files import require_path
 from ufl_beam.output.recorders import Recorder
 from ufl_beam.simulation.checkpoint_file import Content, read, write
-from ufl_beam.simulation.fingerprint import CODE, Description, difference, has_state, kind_of
+from ufl_beam.simulation.fingerprint import CODE, Description, difference, has_state
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_control import Pace
 
@@ -105,29 +104,17 @@ class Running(Protocol):
 
 
 class Keeper:
-    """The checkpoint of one run.
+    """The checkpoint of one run; its file is locked until :meth:`close`.
 
     Args:
         choice: What the user asks for.
         call: What the run is, by name.
         step: Size of its steps if they are equal; then the run may have another end.
         comm: Processes of the run.
-
-    Raises:
-        SceneError: Another run writes the file, or it is damaged, or of another run, or cannot be
-            written.
-
-    Attributes:
-        path: The file; locked until :meth:`close`.
-        found: What it has; empty if there is none.
     """
 
     def __init__(
-        self,
-        choice: Checkpoint,
-        call: Mapping[str, Any],
-        step: float | None,
-        comm: MPI.Intracomm,
+        self, choice: Checkpoint, call: Mapping[str, Any], step: float | None, comm: MPI.Intracomm
     ) -> None:
         self._choice, self._call, self._comm = choice, call, comm
         self.path = Path(choice.path)
@@ -196,11 +183,7 @@ class Keeper:
         self._lock.release()
 
     def resume(self, simulation: Running, pace: Pace, t1: float) -> Iterator[Content]:
-        """Take over what the file has, then give what it has of each recorder.
-
-        Raises:
-            SceneError: The run is beyond ``t1``.
-        """
+        """Take over what the file has, then give what it has of each recorder."""
         found = self.found
         state = below("state/", found)
         t = float(state["t"][0])
@@ -223,12 +206,7 @@ class Keeper:
     # -- writing -------------------------------------------------------------------------------
 
     def note(self, simulation: Running, pace: Pace, recorders: Sequence[Recorder]) -> None:
-        """Write if it is time to; all processes call it together after each step.
-
-        Raises:
-            SceneError: A function of the scene remembers something that it does not tell.
-            OSError: The file cannot be written; the one before is still there.
-        """
+        """Write if it is time to; all processes call it together after each step."""
         if self._last_step < 0:  # better now than after an hour
             self._require_told()
             self._last_step = 0
@@ -246,13 +224,14 @@ class Keeper:
     def write(self, simulation: Running, pace: Pace, recorders: Sequence[Recorder]) -> None:
         """Write; all processes call it together."""
         self._require_told()
+        stateful = self._stateful.items()
         content: Content = {
             "python": PYTHON,
             "call": self._described.texts,
             "step": self._step,
             "seconds": time.perf_counter() - self._begin,
             "pace": pace.state(),
-            "stateful": simulation.together(self._states),
+            "stateful": simulation.together(lambda: {name: _state(one) for name, one in stateful}),
             **above("state/", simulation.state()),
         }
         parts = [recorder.state() for recorder in recorders]
@@ -265,10 +244,6 @@ class Keeper:
 
         on_first(self._comm, put)
         self._last_time, self._last_step = time.perf_counter(), pace.steps
-
-    def _states(self) -> dict[str, Any]:
-        """States of the user's objects, by name."""
-        return {name: _state(one) for name, one in self._stateful.items()}
 
     def _require_told(self) -> None:
         """Raise if what functions use changes without their saying so: it would be lost."""
@@ -305,21 +280,12 @@ def _restore(one: Any, state: Any) -> None:
         one.restore(state)
 
 
-def kinds_of(recorders: Sequence[Recorder]) -> list[str]:
-    """Return the fingerprint of recorders."""
-    return [kind_of(recorder) for recorder in recorders]
-
-
-def require_continuable(recorder: Recorder) -> None:
-    """Raise :class:`SceneError` if a recorder does not say how to go on."""
-    if type(recorder).state is Recorder.state:
-        recorder.state()
-
-
-def digest_of(arrays: Mapping[str, Array]) -> str:
-    """A checksum of arrays by name."""
+def end_of(start: Solution | None) -> str:
+    """A checksum of what a run begins with."""
+    if start is None:
+        return "nothing"
     total = hashlib.sha256()
-    for name, values in arrays.items():
+    for name, values in {"q": start.q[-1:], "v": start.v[-1:], **start.internal}.items():
         total.update(f"{name} {values.shape}".encode())
         total.update(np.ascontiguousarray(values).tobytes())
     return total.hexdigest()[:16]

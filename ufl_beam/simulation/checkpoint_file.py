@@ -31,12 +31,7 @@ Content = dict[str, Any]
 
 
 def write(path: Path, content: Content, what: str) -> None:
-    """Write a file at once: there is always a whole one, the new or the one before.
-
-    Raises:
-        SceneError: A state is no JSON.
-        OSError: It cannot be written; the message says how much space there is.
-    """
+    """Write a file at once: there is always a whole one, the new or the one before."""
     text = {name: value for name, value in content.items() if not isinstance(value, np.ndarray)}
     arrays = {name: value for name, value in content.items() if name not in text}
     try:
@@ -68,11 +63,7 @@ def _plain(value: Any) -> Any:
 
 
 def read(path: Path) -> Content:
-    """Read a file of :func:`write`.
-
-    Raises:
-        SceneError: The file is damaged, or something else.
-    """
+    """Read a file of :func:`write`; :class:`SceneError` if it is damaged, or something else."""
     import h5py
 
     def refuse(why: str) -> SceneError:

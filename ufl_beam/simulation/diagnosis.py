@@ -44,16 +44,7 @@ NAMED = 3
 
 
 class Failed(Protocol):
-    """A simulation whose latest step has failed, as far as a diagnosis asks it.
-
-    Attributes:
-        scene, grid, share: What is modelled, its numbering, and the part of this process.
-        t, q: Time and configuration before the step.
-        supports, couplings, inelastic: Terms that may give way.
-        equation: The equation of the step.
-        scheme: Has general advice.
-        parameter: Words for the time.
-    """
+    """A simulation whose latest step has failed, as far as a diagnosis asks it."""
 
     scene: Scene
     grid: Grid
@@ -99,27 +90,19 @@ def no_equilibrium(
 ) -> ConvergenceError:
     """Describe why even the smallest step, to ``end``, failed; all processes call it together."""
     q1 = simulation.supports.in_plane(newton.iterate())
-    dt, forces, named = (
-        end - simulation.t,
-        _forces_by_kind(simulation, newton, q1),
-        simulation.parameter,
-    )
+    dt, named = end - simulation.t, simulation.parameter
+    forces = _forces_by_kind(simulation, newton, q1)
     sizes = ", ".join(f"{kind} {size:.1e} N" for kind, size in forces.items())
     where = f"at {named.at(simulation.t, '.9g')}"
     if dt != 0:
         where = f"after {named.at(simulation.t, '.9g')}, even with {named.over(dt)}"
     why = singularity(simulation, q1)
     said = f"{failure} ({sizes})" if sizes else str(failure)
+    advice = advice or simulation.scheme.advice
     return ConvergenceError(
-        f"no equilibrium {where}: {why}{'; ' if why else ''}{said}. "
-        f"{advice or simulation.scheme.advice}",
-        time=simulation.t,
-        dt=dt,
-        solution=solution,
-        residuals=failure.residuals,
-        forces=forces,
-        reason=failure.reason,
-    )
+        f"no equilibrium {where}: {why}{'; ' if why else ''}{said}. {advice}", time=simulation.t,
+        dt=dt, solution=solution, residuals=failure.residuals, forces=forces, reason=failure.reason,
+    )  # fmt: skip
 
 
 def open_ledger(solution: Solution, share: Share, newton: Solver) -> str:
@@ -148,12 +131,9 @@ def _forces_by_kind(simulation: Failed, newton: Solver, q1: Array) -> dict[str, 
 def singularity(simulation: Failed, q: Array) -> str:
     """Describe why the tangent of a failed step is singular, or nearly so; else empty.
 
-    All processes call it together.  Where the latest tangent says nothing, Newton's method may have
-    been sent far away by a tangent before it.  Then the one where it set out tells.
-
-    Args:
-        simulation: Holds the latest tangent, and the state before the step.
-        q: The latest iterate at the local degrees of freedom, in the axes of the plane.
+    All processes call it together.  Where the latest tangent, at ``q`` in the axes of the plane,
+    says nothing, Newton's method may have been sent far away by a tangent before it.  Then the one
+    where it set out tells.
     """
     if said := _singularity_at(simulation, q):
         return said
@@ -259,10 +239,7 @@ def _describe(simulation: Failed, found: Softest) -> str:
 
 
 def _strains(grid: Grid, q: Array, x: Array) -> Array:
-    """Strains times the lengths of the cells that a small motion ``x`` makes; (num_cells, 3).
-
-    Elongation and shear of the chord in m, bending in rad.
-    """
+    """Strains of a small motion ``x``, times lengths of cells; (num_cells, 3); m, m, rad."""
     first, last = grid.cells[:, 0], grid.cells[:, 1]
     position, motion = grid.points + q[grid.dofs[:, :2]], x[grid.dofs]
     d = position[last] - position[first]

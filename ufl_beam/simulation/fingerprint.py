@@ -24,9 +24,6 @@ class Description:
     and functions of their module that they use.  What offers ``state()`` and ``restore(state)``,
     and random generators of NumPy, are not compared but found.
 
-    Args:
-        values: What is described, by name.
-
     Attributes:
         texts: Text by name, such as ``{"scene.beams[0] 'left'.section.EI": "2000.0"}``.
         stateful: What has a state, by name.

@@ -1,38 +1,65 @@
 # SPDX-License-Identifier: MIT
-"""The state that a run begins with."""
+"""The grid and the state that a run begins with, and checks before anything is computed."""
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.model_warnings import (
+    warn_of_far_points,
+    warn_of_free_hinges,
+    warn_of_masses,
+    warn_of_origin,
+    warn_of_touching,
+)
 from ufl_beam.discretization.state_io import State
 from ufl_beam.discretization.state_transfer import Transfer, same_unknowns
-from ufl_beam.errors import SceneError, require_kind, warn
+from ufl_beam.errors import SceneError, require_kind, shorten, warn
+from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.connector_laws import HELD
+from ufl_beam.model.constraint_checks import (
+    require_independent,
+    require_inertia,
+    require_masses,
+    require_no_mechanism,
+    require_rates,
+)
 from ufl_beam.model.mesh_options import Mesh
+from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS, Support
+from ufl_beam.simulation.solution import Solution
 
 
-class Start(Protocol):
-    """A solution whose last state a run begins with; see there."""
+def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh) -> Grid:
+    """Make the grid of a scene, once the scheme is known to be able to compute it."""
+    require_kind(scene, Scene, "scene")
+    if not isinstance(scheme, Scheme) or isinstance(scheme, type):
+        raise SceneError(
+            f"scheme = {shorten(scheme)} must be a scheme, such as Static() or Midpoint()"
+        )
+    if has_inertia(scheme):
+        require_masses(scene)
+        require_inertia(scene)
+        warn_of_masses(scene)
+        if scene.initial:
+            warn_of_origin(scene)
+        require_rates(scene, scheme)
+    else:
+        require_no_mechanism(scene)
+    require_independent(scene)
+    warn_of_far_points(scene)
+    warn_of_free_hinges(scene)
+    grid = Grid(scene, mesh)
+    if has_inertia(scheme):
+        warn_of_touching(grid)
+    return grid
 
-    grid: Grid
-    internal: State
 
-    @property
-    def q(self) -> Array:
-        """Configurations of the solution; (n+1, size)."""
-
-    @property
-    def v(self) -> Array:
-        """Velocities; empty in statics."""
-
-
-def mesh_of(start: Start | None, mesh: Mesh | None) -> Mesh:
+def mesh_of(start: Solution | None, mesh: Mesh | None) -> Mesh:
     """The mesh of a call: the one it says, that of the solution it starts with, or that given."""
     if mesh is not None:
         require_kind(mesh, Mesh, "mesh")
@@ -41,25 +68,15 @@ def mesh_of(start: Start | None, mesh: Mesh | None) -> Mesh:
 
 
 class InitialState(NamedTuple):
-    """State that a run begins with, in the numbering of its grid.
-
-    Attributes:
-        q: Configuration at all degrees of freedom.
-        v: Velocities at all degrees of freedom.
-        internal: Internal variables of cells and connectors; empty at the beginning.
-    """
+    """State that a run begins with, in the numbering of its grid; ``internal`` may be empty."""
 
     q: Array
     v: Array
     internal: State
 
 
-def initial_state(grid: Grid, start: Start | None) -> InitialState:
-    """Find the state that a run begins with, before anything is built.
-
-    Raises:
-        SceneError: The solution is of a scene whose state cannot be taken over.
-    """
+def initial_state(grid: Grid, start: Solution | None) -> InitialState:
+    """Find the state that a run begins with, before anything is built."""
     v = _initial_velocity(grid)
     if start is None:
         return InitialState(np.zeros(grid.size), v, {})
@@ -137,7 +154,8 @@ def _require_held(grid: Grid, v: Array) -> None:
     fastest = np.abs(v[nodes] * [1.0, 1.0, size]).max()
     for link, dofs in zip(grid.scene.links, grid.dofs_of_links, strict=True):
         a, b = v[dofs[0:6:2]], v[dofs[1:6:2]]
-        rate = float(np.dot(link.rigidly().a, a) + np.dot(link.rigidly().b, b))
+        by_a, by_b = link.rigidly()
+        rate = float(np.dot(by_a, a) + np.dot(by_b, b))
         if link.law is HELD and abs(rate) > 1e-9 * fastest / (size if link.turns else 1.0):
             raise SceneError(
                 f"Velocity: the parts that {link} joins would move apart at {rate:.3g} m/s "

@@ -13,79 +13,53 @@ LEDGER = ("state", "supplied", "lost")
 """The parts of the ledger, see :class:`~ufl_beam.terms.energy_ledger.Energy`."""
 
 
-class KeptStates:
+class KeptStates(list[Snapshot]):
     """States that were kept; ``v`` is empty in statics, ``connections`` in scenes without any."""
-
-    def __init__(self) -> None:
-        self._states: list[Snapshot] = []
-
-    def keep(self, state: Snapshot) -> None:
-        """Append a state of a run."""
-        self._states.append(state)
-
-    def __len__(self) -> int:
-        return len(self._states)
-
-    def __getitem__(self, n: int) -> Snapshot:
-        return self._states[n]
-
-    def thin(self) -> None:
-        """Forget every other state; the first one stays."""
-        del self._states[1::2]
 
     @property
     def times(self) -> list[float]:
         """Times, or load factors of a path; s."""
-        return [state.t for state in self._states]
+        return [state.t for state in self]
 
     @property
     def q(self) -> list[Array]:
         """Configurations, all degrees of freedom."""
-        return [state.q for state in self._states]
+        return [state.q for state in self]
 
     @property
     def v(self) -> list[Array]:
         """Velocities, all degrees of freedom."""
-        return [state.v for state in self._states if state.v is not None]
+        return [state.v for state in self if state.v is not None]
 
     @property
     def reactions(self) -> list[Array]:
         """Forces of the supports on the scene."""
-        return [state.reactions for state in self._states]
-
-    @property
-    def entries(self) -> list[tuple[dict[str, float], ...]]:
-        """Entries of the ledger; J."""
-        return [state.entries for state in self._states]
+        return [state.reactions for state in self]
 
     @property
     def material(self) -> list[list[tuple[Index, Array]]]:
         """Groups of cells that can yield or break, and rows for their material."""
-        return [state.material for state in self._states]
+        return [state.material for state in self]
 
     @property
     def connections(self) -> list[Array]:
         """Columns of ``Connection`` for all links."""
-        return [state.connections for state in self._states if len(state.connections)]
+        return [state.connections for state in self if len(state.connections)]
 
     def ledger(self) -> list[dict[str, Array]]:
         """Return the parts of the ledger, with arrays by name; each (n+1,); J."""
         parts = []
-        for part in zip(*self.entries, strict=True) if self._states else ((),) * len(LEDGER):
+        for k in range(len(LEDGER)):
+            part = [state.entries[k] for state in self]
             names = dict.fromkeys(name for entries in part for name in entries)
             parts.append({n: np.array([e.get(n, 0.0) for e in part]) for n in names})
         return parts
 
     def arrays(self) -> State:
         """Return all of it, as arrays by name."""
-        arrays = {
-            "times": np.array(self.times),
-            "q": np.array(self.q),
-            "v": np.array(self.v),
-            "reactions": np.array(self.reactions),
-            "connections": np.array(self.connections),
-        }
-        if self._states and self._states[0].material:
+        names = ("times", "q", "v", "reactions", "connections")
+        arrays = {name: np.array(getattr(self, name)) for name in names}
+        if self and self[0].material:
             # Groups are those of laws and processes.
             tables = [np.concatenate([np.c_[group] for group in one]) for one in self.material]
             arrays["material"] = np.array([table[np.argsort(table[:, 0])] for table in tables])
@@ -110,7 +84,7 @@ class KeptStates:
             for name in ("reactions", "connections")
         )
         v = arrays["v"] if len(arrays["v"]) else [None] * n
-        self._states = [
+        self[:] = [
             Snapshot(
                 float(arrays["times"][k]), arrays["q"][k], v[k], reactions[k],
                 tuple({name: float(x[k]) for name, x in part.items()} for part in parts),

@@ -32,11 +32,9 @@ dissipated energy of the discontinuities."""
 
 
 class OpenedHinges(NamedTuple):
-    """Embedded hinges of a beam that opened in a run.
+    """Embedded hinges of a beam that opened in a run, in so many cells.
 
     Attributes:
-        beam: The beam.
-        number: Number of the cells whose hinge opened.
         error: Largest |V| h / (2 limit): difference between the moments in the middle and at the
             ends of such a cell, as a part of the limit.
         place: Middle of the cell with the largest error.
@@ -50,10 +48,6 @@ class OpenedHinges(NamedTuple):
 
 class Opened:
     """Cells that opened in a run.
-
-    Args:
-        grid: The grid of the run.
-        kept: Forces and dissipated energies of cells that may yield or break, at the kept times.
 
     Attributes:
         first: Number of the first kept time after the opening; 0 of cells that were open at the
@@ -93,13 +87,10 @@ class Opened:
         return found
 
     def jumps(self, scheme: Scheme) -> list[tuple[Member, int, float]]:
-        """Beams with cells whose opening is a jump within a step.
+        """Beams with cells that opened in a jump, the worst cell, and how many times too fast.
 
         The resistance falls faster with the opening than the stress of the cell, whose stiffness
         against an opening is θ EI/h, or θ E/h of a fibre.
-
-        Returns:
-            Each beam, the cell in which it is worst, and how many times too fast that is.
         """
         grid = self._grid
         found: list[tuple[Member, int, float]] = []

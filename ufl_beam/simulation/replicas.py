@@ -47,10 +47,6 @@ class Copies:
     scene and another solution.  So all processes compare a weighted sum of all states so far: in
     the background after 1, 2, 4, ... and then every :data:`INTERVAL` steps, and before anything is
     written or given back.
-
-    Args:
-        comm: The processes, each of which computes the whole scene.
-        share: The degrees of freedom of the scene, all of them.
     """
 
     def __init__(self, comm: MPI.Intracomm, share: Share) -> None:
@@ -66,11 +62,7 @@ class Copies:
         _left[:] = [one for one in _left if not one[0].Test()]
 
     def note(self, t: float, q: Array) -> None:
-        """Take the state after a step into the comparison.
-
-        Raises:
-            CopiesDiffer: An earlier comparison failed.
-        """
+        """Take the state after a step into the comparison; raise if an earlier one failed."""
         self._sum += float(self._weights @ q)
         self._size += float(self._weights @ np.abs(q))
         self._times += t
@@ -81,11 +73,7 @@ class Copies:
             self._post()
 
     def settle(self) -> None:
-        """Compare all states so far; all processes call it together.
-
-        Raises:
-            CopiesDiffer: They are not the same; raised on all processes.
-        """
+        """Compare all states so far, together; all processes raise if they are not the same."""
         if self._open and self._compared < self._steps:
             self._complete()
             self._post()

@@ -21,13 +21,8 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import take
 from ufl_beam.output.recorders import Recorder, close_all, recorders_of
 from ufl_beam.parallel import communicator, in_study, say
-from ufl_beam.simulation.checkpoint import (
-    Checkpoint,
-    Keeper,
-    digest_of,
-    kinds_of,
-    require_continuable,
-)
+from ufl_beam.simulation.checkpoint import Checkpoint, Keeper, end_of
+from ufl_beam.simulation.fingerprint import kind_of
 from ufl_beam.simulation.initial_state import mesh_of
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
@@ -107,11 +102,12 @@ def simulate(
         step = None if isinstance(dt, Adaptive) else EqualSteps(t0, t1, dt).dt
         call = {
             "scene": scene, "scheme": scheme, "t[0]": t0, "dt": dt, "every": every, "most": most,
-            "newton": newton or Newton(), "start": _end_of(start), "record": kinds_of(recorders),
-            "t[1]": t1 if step is None else "any", "mesh": mesh_of(start, mesh),
+            "newton": newton or Newton(), "start": end_of(start), "mesh": mesh_of(start, mesh),
+            "record": [*map(kind_of, recorders)], "t[1]": t1 if step is None else "any",
         }  # fmt: skip
         for recorder in recorders:
-            require_continuable(recorder)
+            if type(recorder).state is Recorder.state:
+                recorder.state()  # raises: it does not say how to go on
         keeper = Keeper(checkpoint, call, step, comm)
     with ExitStack() as stack:
         if keeper is not None:
@@ -179,10 +175,7 @@ def simulate(
 
 @contextmanager
 def partial_results(simulation: Simulation) -> Iterator[None]:
-    """Let what is raised in this context carry the solution so far, ``error.solution``.
-
-    Whatever stops a run, an interrupt or a user's function, what was reached is not lost.
-    """
+    """Let whatever stops a run in this context carry the solution so far, ``error.solution``."""
     try:
         yield
     except BaseException as error:
@@ -192,13 +185,6 @@ def partial_results(simulation: Simulation) -> Iterator[None]:
         stopped: Any = error
         stopped.solution = simulation.solution
         raise
-
-
-def _end_of(start: Solution | None) -> str:
-    """A checksum of what a run begins with."""
-    if start is None:
-        return "nothing"
-    return digest_of({"q": start.q[-1:], "v": start.v[-1:], **start.internal})
 
 
 def _require_times(t: tuple[float, float]) -> tuple[float, float]:

@@ -32,9 +32,8 @@ from ufl_beam.parallel import communicator
 from ufl_beam.parameter import Parameter
 from ufl_beam.simulation.assembly import assemble
 from ufl_beam.simulation.diagnosis import no_equilibrium, open_ledger
-from ufl_beam.simulation.initial_state import initial_state, mesh_of
+from ufl_beam.simulation.initial_state import checked_grid, initial_state, mesh_of
 from ufl_beam.simulation.replicas import Copies, sharing
-from ufl_beam.simulation.scene_checks import checked_grid
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_cutting import (
     APPLYING,
@@ -246,7 +245,7 @@ class Simulation(StateView):
         self.ask()
         for one in self._assembly.remembering:
             one.freeze()
-        step = Step(0.0, dt, self.q, self.t, self.t, toward=1.0)
+        step = Step(0.0, dt, self.q, self.t, self.t, fraction=1.0)
         return self.equation.linearise(q, step)
 
     def give_up(self, failure: StepFailed, end: float, advice: str = "") -> NoReturn:

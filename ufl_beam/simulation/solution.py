@@ -30,7 +30,7 @@ from ufl_beam.output.joint_histories import (
 )
 from ufl_beam.output.output_files import require_path
 from ufl_beam.output.snapshot import Snapshot
-from ufl_beam.parallel import ours
+from ufl_beam.parallel import active_comm
 from ufl_beam.parameter import TIME
 from ufl_beam.simulation.cell_results import CellResults, Material
 from ufl_beam.simulation.kept_states import KeptStates
@@ -86,7 +86,7 @@ class Solution:
 
     def keep(self, state: Snapshot) -> None:
         """Append a state of a run."""
-        self._kept.keep(state)
+        self._kept.append(state)
         self.parts, self.iterations = state.parts, state.iterations
 
     def history(self) -> State:
@@ -115,7 +115,7 @@ class Solution:
             OSError: There is no space for it.
         """
         file = require_path(path, "save")
-        on_first(ours(), lambda: write(file, FORMAT, *self._content()))
+        on_first(active_comm(), lambda: write(file, FORMAT, *self._content()))
 
     def _content(self) -> tuple[dict[str, Any], State]:
         """Text and arrays that are saved."""
@@ -134,7 +134,7 @@ class Solution:
 
     def thin(self) -> None:
         """Forget every other kept state; the first one stays."""
-        self._kept.thin()
+        del self._kept[1::2]
 
     # -- motion --------------------------------------------------------------------------------
 

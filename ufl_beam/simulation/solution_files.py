@@ -18,8 +18,7 @@ from ufl_beam.model.connector_laws import Controller, ForceLaw, Guide
 from ufl_beam.model.curves import Curve, nearest, parameter_step
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.archive import above, below, read
-from ufl_beam.output.saved_functions import SavedCurve, SavedFunction
-from ufl_beam.output.saved_scene import from_data, lost, to_data
+from ufl_beam.output.saved_scene import SavedCurve, SavedFunction, from_data, lost, to_data
 from ufl_beam.version import version
 
 T = TypeVar("T")
@@ -58,11 +57,7 @@ class Saved(Protocol):
 
 
 def made_of_file(file: Path, make: Callable[[dict[str, Any], State], T]) -> T:
-    """Read a file and make a solution of it.
-
-    Raises:
-        SceneError: It cannot be read, or no solution can be made of it.
-    """
+    """Read a file and make a solution of it; :class:`SceneError` if that cannot be."""
     text, arrays = read(file, FORMAT)
     try:
         return make(text, arrays)
@@ -102,11 +97,7 @@ def take(solution: Saved, text: dict[str, Any], arrays: State) -> None:
 
 
 def grid_of(text: dict[str, Any]) -> Grid:
-    """Make the grid of a saved solution, with its scene.
-
-    Raises:
-        SceneError: It was numbered otherwise when the solution was saved.
-    """
+    """Make the grid of a saved solution, with its scene."""
     grid = Grid(from_data(text["scene"]), from_data(text["mesh"]))
     if grid.checksum() != text["numbering"]:
         raise SceneError(

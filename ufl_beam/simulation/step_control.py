@@ -53,12 +53,7 @@ class Stepper(Protocol):
 
 
 class Pace(Protocol):
-    """Protocol of step controls.
-
-    Attributes:
-        steps: Steps done.
-        error: Sum of the estimated errors so far; NaN if there are none.
-    """
+    """Protocol of step controls; ``error`` sums the estimated ones, NaN if there are none."""
 
     steps: int
     error: float
@@ -72,11 +67,7 @@ class Pace(Protocol):
         """Part of the way that is done, from 0 to 1."""
 
     def advance(self, simulation: Stepper) -> None:
-        """Take one step.  Errors are those of the simulation.
-
-        Raises:
-            ConvergenceError: It failed.
-        """
+        """Take one step; errors are those of the simulation."""
 
     def state(self) -> dict[str, float]:
         """Numbers from which :meth:`restore` goes on."""
@@ -86,13 +77,7 @@ class Pace(Protocol):
 
 
 class EqualSteps:
-    """Steps of one size, a little shorter than asked for where that does not divide the time.
-
-    Args:
-        t0: Beginning; s.
-        t1: End; s.
-        dt: Longest step; s.
-    """
+    """Steps of one size, a little shorter than asked for where that does not divide the time."""
 
     def __init__(self, t0: float, t1: float, dt: float) -> None:
         self._t0, self._t1 = t0, t1
@@ -178,17 +163,7 @@ class Adaptive:
 
 
 class AdaptiveSteps:
-    """Steps whose error is estimated and limited.
-
-    Args:
-        simulation: What goes through time.
-        t1: End; s.
-        choice: What the user asks for.
-
-    Attributes:
-        rejected: Steps that were solved but too long.
-        error: Sum of the errors so far.
-    """
+    """Steps whose error is estimated and limited; ``rejected`` ones were solved but too long."""
 
     def __init__(self, simulation: Stepper, t1: float, choice: Adaptive) -> None:
         self._t0 = self._t = t0 = simulation.t

@@ -25,13 +25,9 @@ MOST_PARTS = 2**12
 
 
 class Trial(NamedTuple):
-    """A step that was solved but not yet accepted.
+    """A step that was solved but not yet accepted, and the configuration ``q1`` at its end.
 
-    Attributes:
-        step: Its times.
-        q1: Configuration at its end, local degrees of freedom.
-        s: What forces work on, see :meth:`Scheme.nodal_step`; in dynamics the mean velocity of the
-            step times its length.
+    Forces work on ``s``, see :meth:`Scheme.nodal_step`; in dynamics the mean velocity times ``dt``.
     """
 
     step: Step
@@ -46,14 +42,9 @@ def go_in_parts(
     accept: Callable[[Trial], None],
     give_up: Callable[[StepFailed, float], NoReturn],
 ) -> None:
-    """Go from ``t0`` to ``t1`` at once or, where that fails, in parts.
+    """Go from ``t0`` to ``t1`` at once or, where :class:`StepFailed` is raised, in parts.
 
-    Args:
-        t0: Beginning; s.
-        t1: End; s.
-        attempt: Solves a step to a time, or raises :class:`StepFailed`.
-        accept: Goes there.
-        give_up: Ends the run, because even the smallest part, to a time, has failed.
+    ``give_up`` ends the run, because even the smallest part, to a time, has failed.
     """
     done, part = 0, MOST_PARTS
     while done < MOST_PARTS:
@@ -103,14 +94,7 @@ def begins_loaded(scene: Scene, scheme: Scheme, t: float) -> bool:
 
 
 def require_small_turn(share: Share, change: Array, dt: float, whole: float) -> None:
-    """Raise :class:`StepFailed` if a node turns far in a part of the application.
-
-    Args:
-        share: The degrees of freedom of this process.
-        change: That of the configuration in the part.
-        dt: Length of the part, of which shorter ones may help; s.
-        whole: Length of the whole application; s.
-    """
+    """Raise if a node turns far in a part, ``dt`` long, of the application of loads, ``whole``."""
     turn = share.largest(np.abs(change)[share.rotations()].max(initial=0.0))
     if turn > APPLYING_TURN and SHORT_PART * dt > whole:
         raise StepFailed("a node turns too far while the loads at the beginning are applied")

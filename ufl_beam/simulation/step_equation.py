@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 
@@ -14,24 +13,18 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.solvers.equation import PythonEquation
-from ufl_beam.terms.base import Beams, Cells, Term
+from ufl_beam.terms.base import Beams, Term
 from ufl_beam.terms.links import Links
-from ufl_beam.terms.openings import Course
+from ufl_beam.terms.loads import LoadTerm
+from ufl_beam.terms.openings import SearchFlags
 from ufl_beam.terms.supports import Supports
-
-
-class Load(Term, Protocol):
-    """A load, with its force in the present step."""
-
-    force: Array
+from ufl_beam.terms.tangent_derivatives import Cells
 
 
 class StepEquation(PythonEquation):
     """Sum of the virtual works of all terms, less what supports carry.
 
-    Attributes:
-        others: All terms but those of internal forces.
-        terms: All terms.
+    The ``others`` are all terms but those of internal forces.
     """
 
     def __init__(
@@ -40,13 +33,13 @@ class StepEquation(PythonEquation):
         A: Csr,
         beams: Sequence[Cells],
         couplings: Sequence[Links],
-        loads: Sequence[Load],
+        loads: Sequence[LoadTerm],
         others: Sequence[Term],
         supports: Supports,
-        course: Course,
+        search: SearchFlags,
     ) -> None:
         super().__init__(A, np.zeros(share.size), supports.dofs)
-        self.share, self.supports, self._course = share, supports, course
+        self.share, self.supports, self._search = share, supports, search
         self._beams, self._couplings, self._loads = beams, couplings, loads
         self._inner: list[Beams] = [*beams, *couplings]
         self.others: list[Term] = [*loads, *others]
@@ -109,11 +102,11 @@ class StepEquation(PythonEquation):
             failed = 1.0
         return self.share.largest(failed) == 0.0
 
-    def relieve(self, relief: bool) -> bool:
-        """Begin again with relieved points, or end that; return if it makes a difference."""
-        opened = bool(self.share.largest(float(self._course.opened)))
-        self._course.relieve(relief and opened)
-        if relief:
+    def stiffen(self, stiff: bool) -> bool:
+        """Begin again with stiff points, or end that; return whether it makes a difference."""
+        opened = bool(self.share.largest(float(self._search.opened)))
+        self._search.stiffen(stiff and opened)
+        if stiff:
             for coupling in self._couplings:
                 coupling.again()
         return opened
@@ -136,8 +129,7 @@ class StepEquation(PythonEquation):
     def linearise(self, q: Array, step: Step) -> tuple[Array, Array]:
         """Return all forces but those of inertia in a step to ``q``, and their derivatives.
 
-        Returns:
-            The residual; and the entries of the matrix; in the axes of the plane, nothing held.
+        Both are in the axes of the plane, nothing held; the derivatives as entries of the matrix.
         """
         r = np.zeros(self.share.size)
         self.A.data.fill(0.0)
@@ -149,25 +141,14 @@ class StepEquation(PythonEquation):
         return r, self.A.data.copy()
 
     def tangent_change(self, q: Array, u: Array) -> Array:
-        """Derivative of the tangent of :meth:`linearise` along ``u``; entries of the matrix.
-
-        Args:
-            q: Configuration at the local degrees of freedom, which was linearised about last.
-            u: Direction, forces of connectors included.
-        """
+        """Derivative along ``u`` of the latest tangent of :meth:`linearise`, at ``q``; entries."""
         self.A.data.fill(0.0)
         for one in self._inner:
             one.add_tangent_change(q, u)
         return self.A.data.copy()
 
     def stiffness_works(self, q: Array, X: Array, Y: Array) -> Array:
-        """Works of the tangent of :meth:`linearise` for the motions X, each on its own of Y; J.
-
-        Args:
-            q: See :meth:`tangent_change`.
-            X: Motions, in columns.
-            Y: Virtual motions, in columns.
-        """
+        """Works of the tangent of :meth:`linearise`, each column of X on its own of Y; J."""
         self.A.data.fill(0.0)
         for term in (*self._couplings, *self.others):
             if term.kind != "inertia":
@@ -179,17 +160,7 @@ class StepEquation(PythonEquation):
         return works
 
     def tangent_works(self, q: Array, u: Array, X: Array, Y: Array) -> tuple[Array, Array]:
-        """Works of the tangent for the motions X on Y, and of its derivative along u; J.
-
-        Args:
-            q: See :meth:`tangent_change`.
-            u: See :meth:`tangent_change`.
-            X: Motions, in columns.
-            Y: Virtual motions, in columns.
-
-        Returns:
-            Two symmetric matrices.
-        """
+        """Works of the tangent for motions X on Y, and of its derivative along u; symmetric; J."""
         works = np.zeros((2, X.shape[1], Y.shape[1]))
         for i, j in zip(*np.triu_indices(X.shape[1]), strict=True):
             x, y = (np.ascontiguousarray(one) for one in (X[:, i], Y[:, j]))

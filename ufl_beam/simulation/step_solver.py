@@ -32,11 +32,7 @@ its inertia holds it meanwhile.
 
 
 class StepSolver:
-    """Solves steps of a scene; whoever accepts them keeps its state.
-
-    Attributes:
-        newton: The solver of the equation.
-    """
+    """Solves steps of a scene; whoever accepts them keeps its state."""
 
     def __init__(
         self,
@@ -56,15 +52,9 @@ class StepSolver:
         self._coupled = len(share.grid.multipliers) > 0
 
     def solve(self, step: Step, guess: Array, *, like_last: bool) -> Trial:
-        """Solve a step that the terms have begun.
+        """Solve a step that the terms have begun, from a guess in the axes of the supports.
 
-        Args:
-            step: The step.
-            guess: Configuration at its end, in the axes of the supports.
-            like_last: Whether the tangent of the last step may do for this one.
-
-        Raises:
-            StepFailed: There is no equilibrium, or it is too far away.
+        ``like_last`` lets the tangent of the last step do for this one.
         """
         loads = self._equation.load_forces()
         try:
@@ -82,16 +72,9 @@ class StepSolver:
         return self._trial(step, q1)
 
     def solve_along(self, step: Step, guess: Array, border: Border, *, hold: bool) -> Trial:
-        """Solve a step together with the load factor.
+        """Solve a step, whose times are those of the guess, together with the load factor.
 
-        Args:
-            step: The step; its times are those of the guess.
-            guess: Configuration, in the axes of the supports.
-            border: The equation of the factor.
-            hold: Whether what does not flow stays closed if it can, see openings.py.
-
-        Raises:
-            StepFailed: There is no equilibrium, or it is too far away.
+        With ``hold`` what does not flow stays closed if it can, see openings.py.
         """
         t = border.t
         solve = partial(self.newton.solve_along, loads=self._equation.load_forces(), border=border)

@@ -3,64 +3,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from petsc4py import PETSc
 
-from ufl_beam.arrays import Array
+from ufl_beam.arrays import Index
 from ufl_beam.compiled.c_library import lib
-from ufl_beam.solvers.equation import Border
-from ufl_beam.solvers.snes_callbacks import SnesCallbacks
+from ufl_beam.solvers.equation import Border, SnesCallbacks
 from ufl_beam.solvers.vectors import Vectors
 
 
-class Bordered:
-    """Direct solver of the tangent bordered by one more unknown and equation.
+class BorderedNewton:
+    """SNES of the bordered equation, with full steps, and the preconditioner of its tangent.
 
     By elimination of the border: one factorisation and two solutions, as the tangent alone is
     banded.  Where that is nearly singular, the next iteration makes up for the lost digits.
-
-    Args:
-        factors: An exact preconditioner of the tangent.
-        rate: The derivative by the unknown.
-        correct: See :class:`Border`; of vectors.
     """
-
-    def __init__(
-        self, factors: PETSc.PC, rate: PETSc.Vec, correct: Callable[[PETSc.Vec, PETSc.Vec], None]
-    ) -> None:
-        self._factors, self._rate, self._correct = factors, rate, correct
-        self._z = rate.duplicate()
-
-    def setUp(self, pc: PETSc.PC) -> None:
-        """Factor; PETSc asks for it where the matrix has changed."""
-        self._factors.setOperators(*pc.getOperators())
-        self._factors.setUp()
-        pc.setFailedReason(self._factors.getFailedReason())
-
-    def apply(self, pc: PETSc.PC, b: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Solve the bordered system for a right-hand side."""
-        self._factors.apply(b, y)
-        self._factors.apply(self._rate, self._z)
-        self._correct(y, self._z)
-
-
-class BorderedNewton:
-    """SNES of the bordered equation; its steps are full ones."""
 
     def __init__(
         self,
         callbacks: SnesCallbacks,
         vectors: Vectors,
         factors: PETSc.PC,
-        moves: Array,
+        held: Index,
         snes: PETSc.SNES,
         f: PETSc.Vec,
         matrix: PETSc.Mat,
         border: Border,
     ) -> None:
-        self._callbacks, self._vectors, self._moves = callbacks, vectors, moves
-        self._rate, self._y = vectors.new(), vectors.new()
+        self._callbacks, self._vectors, self._held = callbacks, vectors, held
+        self._factors, self._rate, self._y = factors, vectors.new(), vectors.new()
+        self._z = self._rate.duplicate()
         self.snes, self.border = snes, border
         snes.setFunction(self._function, f)
         snes.setJacobian(self._jacobian, matrix)
@@ -68,7 +39,7 @@ class BorderedNewton:
         ksp = PETSc.KSP().create(f.comm)
         ksp.setType("preonly")
         ksp.getPC().setType("python")
-        ksp.getPC().setPythonContext(Bordered(factors, self._rate, self._correct))
+        ksp.getPC().setPythonContext(self)
         snes.setKSP(ksp)
 
     def _function(self, snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
@@ -85,16 +56,25 @@ class BorderedNewton:
             self.border.tangent(self._vectors.view(x), rate)
         P.stateIncrease()
         self._vectors.add_ghosts(self._rate)
-        rate *= self._moves
+        rate[self._held] = 0.0
         self._rate.stateIncrease()
 
-    def _correct(self, y: PETSc.Vec, z: PETSc.Vec) -> None:
+    def setUp(self, pc: PETSc.PC) -> None:
+        """Factor; PETSc asks for it where the matrix has changed."""
+        self._factors.setOperators(*pc.getOperators())
+        self._factors.setUp()
+        pc.setFailedReason(self._factors.getFailedReason())
+
+    def apply(self, pc: PETSc.PC, b: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Solve the bordered system for a right-hand side."""
+        self._factors.apply(b, y)
+        self._factors.apply(self._rate, self._z)
         y.copy(self._y)
         self._vectors.update_ghosts(self._y)
-        self._vectors.update_ghosts(z)
+        self._vectors.update_ghosts(self._z)
         corrected = self._vectors.view(self._y, writable=True)
         with self._callbacks.noted():
-            self.border.correct(corrected, self._vectors.view(z))
+            self.border.correct(corrected, self._vectors.view(self._z))
         owned = y.array_w
         owned[:] = corrected[: len(owned)]
 

@@ -3,7 +3,7 @@
 
 SNES calls these functions on one process.  What has no loop in C takes part by a call of Python.
 Where several processes share a scene, and where supports are at an angle, SNES calls Python, see
-:mod:`ufl_beam.solvers.snes_callbacks`: the same terms, in the same order.
+:class:`SnesCallbacks`: the same terms, in the same order.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, integers, lib, petsc
-from ufl_beam.solvers.equation import Callbacks, Demand, Equation, InPython
+from ufl_beam.solvers.equation import Demand, Equation, InPython, SnesCallbacks
 from ufl_beam.terms.base import Beams, Term
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.supports import Supports
@@ -26,11 +26,7 @@ from ufl_beam.terms.supports import Supports
 class CEquation:
     """The equation of a step in C, on one process and with no support at an angle.
 
-    Args:
-        python: The same equation, for what C does not do.
-        beams, couplings: Terms whose forces are internal forces.
-        others: The other terms.
-        supports: What holds; none at an angle.
+    The same in ``python`` does what C does not; forces of beams and couplings are internal forces.
     """
 
     def __init__(
@@ -44,7 +40,7 @@ class CEquation:
         self.A, self.force, self.held = A, force, _ = python.A, python.force, python.held
         self.residual, self.complete = python.residual, python.complete
         self.tangent, self.missed = python.tangent, python.missed
-        self.relieve, self.working = python.relieve, python.working
+        self.stiffen, self.working = python.stiffen, python.working
         self.error: BaseException | None = None
         self._in_python: list[InPython | Demand] = []
         self._size, self._entries = len(force), len(A.data)
@@ -93,7 +89,7 @@ class CEquation:
         self.error = self.error or error
 
     def attach(
-        self, snes: PETSc.SNES, callbacks: Callbacks, f: PETSc.Vec, matrix: PETSc.Mat
+        self, snes: PETSc.SNES, callbacks: SnesCallbacks, f: PETSc.Vec, matrix: PETSc.Mat
     ) -> None:
         """Let SNES call the functions in C."""
         function, jacobian, test = map(_in_c, ("snes_function", "snes_jacobian", "snes_test"))

@@ -9,6 +9,7 @@ from typing import Any
 from petsc4py import PETSc
 
 import numpy as np
+import numpy.typing as npt
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, integers, lib
@@ -28,35 +29,28 @@ REASONS = {
 
 
 class Convergence:
-    """Sizes of residuals and motions, and the decision to go on or to stop.
-
-    Attributes:
-        c: Data in C, see :func:`judge` of newton.c.
-        diagonal: Positions of the diagonal in the data of the tangent.
-    """
+    """Sizes of residuals and motions, and the decision to stop; ``c``: ``judge`` of newton.c."""
 
     def __init__(
-        self,
-        share: Share,
-        equation: Equation,
-        x: Array,
-        r: Array,
-        newton: Newton,
-        least: int,
+        self, share: Share, equation: Equation, x: Array, r: Array, newton: Newton, least: int
     ) -> None:
         self._share, self._A, self._parallel = share, equation.A, not share.alone
         self._x, self._r = x, r
-        self._weights = self._force_weights()
+        # Residuals count 1 if forces, 1 over the size of the scene if moments.
+        weights = np.ones(share.size)
+        weights[share.rotations()] = 1 / share.grid.scene.size
+        weights[share.multipliers()] = 0.0
+        self._weights = weights[: share.num_owned].copy()
         self._norm = (len(self._weights), doubles(self._weights))
-        self.moves = np.ones(share.size)
-        self.moves[equation.held] = 0.0
+        self._held, self._moves = equation.held, np.ones(share.size)
+        self.leave_out(np.zeros(share.size, dtype=bool))
         self.diagonal = np.flatnonzero(self._A.rows() == self._A.indices)
         self._at_r, self._at_forces = doubles(self._r), doubles(equation.force)
         self._last_loads: list[Array] = []
         self._loads = 0.0
         self._correction = np.empty(share.size)
         self._alive = [
-            *map(doubles, (share.lengths(), self.moves, np.empty(share.size), self._correction)),
+            *map(doubles, (share.lengths(), self._moves, np.empty(share.size), self._correction)),
             integers(self.diagonal.astype(np.int32)),
         ]
         self.c = c = equation.c
@@ -65,13 +59,6 @@ class Convergence:
         c.weight, c.residual = self._norm[1], self._at_r
         c.lengths, c.moves, c.space, c.change, c.diagonal = self._alive
         c.most, c.least = newton.max_iterations, least
-
-    def _force_weights(self) -> Array:
-        """Weights of residuals: 1 of forces, 1 over the size of the scene of moments."""
-        weights = np.ones(self._share.size)
-        weights[self._share.rotations()] = 1 / self._share.grid.scene.size
-        weights[self._share.multipliers()] = 0.0
-        return weights[: self._share.num_owned].copy()
 
     # -- sizes ---------------------------------------------------------------------------------
 
@@ -100,6 +87,11 @@ class Convergence:
         if self._parallel or list(map(id, loads)) != list(map(id, self._last_loads)):
             self._last_loads = loads
             self._loads = self.c.loads = sum(map(self.size, loads))
+
+    def leave_out(self, idle: npt.NDArray[np.bool_]) -> None:
+        """Expect no round-off where supports hold, and where a stiffness holds idle motions."""
+        self._moves[:] = ~idle
+        self._moves[self._held] = 0.0
 
     def scale(self) -> float:
         """Size of the loads and of the internal forces in the latest residual; N."""

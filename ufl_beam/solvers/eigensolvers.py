@@ -56,13 +56,8 @@ def linear(
 ) -> tuple[Array, Array]:
     """The n eigenvalues of ``A x = λ B x`` nearest to ``shift``; values (n,), vectors (size, n).
 
-    Args:
-        A: Symmetric.
-        B: Symmetric; with no negative eigenvalue if ``definite``.
-        n: How many; a few more may be given.
-        most: How many there are.
-        shift: Where ``A - shift B`` is regular.
-        definite: See ``B``.
+    A and B are symmetric, ``A - shift B`` is regular, and B has no negative eigenvalue if
+    ``definite``. There are ``most`` eigenvalues; a few more than n may be given.
     """
     size, n = A.shape[0], min(n + MORE, most)
     if size <= DENSE:
@@ -101,12 +96,7 @@ def quadratic(
 
 
 def small(A: Array, B: Array) -> tuple[Array, Array]:
-    """Compute all eigenvalues of small ``A x = λ B x``; values (n,), vectors (size, n).
-
-    Args:
-        A: Symmetric; rows and columns may differ in size.
-        B: Symmetric.
-    """
+    """All eigenvalues of small symmetric ``A x = λ B x``, rows of any units; (n,), (size, n)."""
     sizes = np.sqrt(np.abs(A.diagonal()) + np.abs(B.diagonal()))
     scale = 1 / np.where(sizes > 0, sizes, 1.0)
     across = np.outer(scale, scale)

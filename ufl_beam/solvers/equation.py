@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -12,19 +14,7 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import ffi, lib
 from ufl_beam.compiled.csr import Csr
-
-
-class Callbacks(Protocol):
-    """Functions in Python that SNES calls, with the arguments of PETSc."""
-
-    def function(self, snes: Any, x: Any, f: Any) -> None:
-        """Compute the residual at an iterate."""
-
-    def jacobian(self, snes: Any, x: Any, J: Any, P: Any) -> None:
-        """Compute the tangent at an iterate."""
-
-    def test(self, snes: Any, iteration: int, norms: Any) -> int:
-        """Return why to stop, or zero."""
+from ufl_beam.solvers.vectors import Vectors
 
 
 class Equation(Protocol):
@@ -60,22 +50,18 @@ class Equation(Protocol):
         """Fill the matrix with the derivative at ``x``."""
 
     def missed(self, x: Array, r: Array, scale: float, moved: float) -> float:
-        """Return how far the laws of connectors are missed, without dimension.
+        """Return how far the laws of connectors are missed by ``x`` with residual ``r``, relative.
 
-        Args:
-            x: Iterate.
-            r: Its residual.
-            scale: Size of the forces in the scene; N.
-            moved: Largest motion; m.
+        ``scale`` is the size of the forces in the scene (N), ``moved`` the largest motion (m).
         """
 
-    def relieve(self, relief: bool) -> bool:
+    def stiffen(self, stiff: bool) -> bool:
         """Begin again with stiffer tangents, or end that; return whether they differ."""
 
     def working(self, x: Array, y: Array) -> Array:
         """Return what the residual works on in a step ``y`` from ``x``; a new array."""
 
-    def attach(self, snes: Any, callbacks: Callbacks, f: Any, matrix: Any) -> None:
+    def attach(self, snes: Any, callbacks: SnesCallbacks, f: Any, matrix: Any) -> None:
         """Let SNES evaluate the equation, by these callbacks or faster, with the residual in f."""
 
     def drive(self, snes: Any, factors: Any) -> None:
@@ -96,7 +82,7 @@ class PythonEquation(Equation):
         """Keep the first exception."""
         self.error = self.error or error
 
-    def attach(self, snes: Any, callbacks: Callbacks, f: Any, matrix: Any) -> None:
+    def attach(self, snes: Any, callbacks: SnesCallbacks, f: Any, matrix: Any) -> None:
         """Let SNES call Python."""
         snes.setFunction(callbacks.function, f)
         snes.setJacobian(callbacks.jacobian, matrix)
@@ -107,11 +93,7 @@ class PythonEquation(Equation):
 
 
 class Border(Protocol):
-    """Additional unknown on which the residual depends, with its equation.
-
-    Attributes:
-        t: The unknown.
-    """
+    """Additional unknown ``t`` on which the residual depends, with its equation."""
 
     t: float
 
@@ -124,43 +106,83 @@ class Border(Protocol):
     def correct(self, y: Array, z: Array) -> None:
         """Change the unknown by what solves the equation, and ``y`` accordingly.
 
-        Args:
-            y: What Newton's method subtracts from the iterate if the unknown does not change.
-            z: What the inverse of the tangent makes of the rate.
+        Newton's method subtracts ``y`` from the iterate; ``z`` is what the inverse of the tangent
+        makes of the rate.
         """
 
     def met(self) -> bool:
         """Return whether the equation is."""
 
 
+class SnesCallbacks:
+    """Residual and tangent of an equation in vectors of PETSc.
+
+    ``idle`` are entries of the tangent and stiffnesses that hold idle motions, if there are any.
+    """
+
+    def __init__(self, equation: Equation, vectors: Vectors, stop: Callable[[int], int]) -> None:
+        self._equation, self._vectors, self._stop = equation, vectors, stop
+        self.idle: tuple[Index, Array] | None = None
+
+    @contextmanager
+    def noted(self) -> Iterator[None]:
+        """Note exceptions instead of raising them through PETSc: processes must stop together."""
+        try:
+            yield
+        except BaseException as error:
+            self._equation.note(error)
+
+    def function(self, snes: Any, x: Any, f: Any) -> None:
+        """Compute the residual ``f`` at ``x``."""
+        self._vectors.update_ghosts(x)
+        r = self._vectors.view(f, writable=True)
+        with self.noted():
+            self._equation.residual(self._vectors.view(x), r)
+        if self._equation.error is not None:
+            # It may have failed on this process alone; by the sum all give up together.
+            r.fill(np.nan)
+        self._vectors.add_ghosts(f)
+        f.stateIncrease()
+        self._equation.complete(r)
+
+    def jacobian(self, snes: Any, x: Any, J: Any, P: Any) -> None:
+        """Compute the tangent at ``x``, unless the last one is near enough."""
+        if self._equation.c.near:
+            return
+        self._vectors.update_ghosts(x)
+        with self.noted():
+            self._equation.tangent(self._vectors.view(x))
+            if self.idle is not None:
+                entries, stiffnesses = self.idle
+                self._equation.A.data[entries] += stiffnesses
+        P.stateIncrease()
+
+    def test(self, snes: Any, iteration: int, norms: Any) -> int:
+        """Return why to stop after an iteration, or zero."""
+        return self._stop(iteration)
+
+
 # -- parts that C leaves to Python ---------------------------------------------------------------
 
 
+@dataclass
 class InPython:
-    """A part of a residual or tangent that Python computes.
+    """A part of a residual or tangent at its first argument that Python adds to its second."""
 
-    Args:
-        add: Adds to its second argument what the part is at the first.
-        size: Number of unknowns, and of what is added to.
-        failed: Told of exceptions, which cannot pass through C.
-    """
+    add: Callable[[Array, Array], None]
+    size: tuple[int, int]
+    failed: Callable[[BaseException], None]
 
-    def __init__(
-        self,
-        add: Callable[[Array, Array], None],
-        size: tuple[int, int],
-        failed: Callable[[BaseException], None],
-    ) -> None:
-        self._add, self._size, self._failed = add, size, failed
+    def __post_init__(self) -> None:
         self.handle = ffi.new_handle(self)
 
     def __call__(self, q: Any, out: Any) -> None:
         """Add, to arrays that C lends; not a number where that fails."""
-        result = _lent(out, self._size[1])
+        result = _lent(out, self.size[1])
         try:
-            self._add(_lent(q, self._size[0]), result)
+            self.add(_lent(q, self.size[0]), result)
         except BaseException as error:
-            self._failed(error)
+            self.failed(error)
             result.fill(np.nan)
 
 
@@ -170,25 +192,23 @@ def add_in_python(handle: Any, q: Any, out: Any) -> None:
     ffi.from_handle(handle)(q, out)
 
 
+@dataclass
 class Demand:
     """Residual of the constraints of connectors, evaluated by Python."""
 
-    def __init__(
-        self,
-        missed: Callable[[Array, Array, float, float], float],
-        size: int,
-        failed: Callable[[BaseException], None],
-    ) -> None:
-        self._missed, self._size, self._failed = missed, size, failed
-        self._handle = ffi.new_handle(self)
-        self.loop = (lib.missed_in_python, self._handle)
+    missed: Callable[[Array, Array, float, float], float]
+    size: int
+    failed: Callable[[BaseException], None]
+
+    def __post_init__(self) -> None:
+        self.loop = lib.missed_in_python, ffi.new_handle(self)
 
     def __call__(self, q: Any, r: Any, scale: float, moved: float) -> float:
         """Return the residual; not a number where it fails."""
         try:
-            return self._missed(_lent(q, self._size), _lent(r, self._size), scale, moved)
+            return self.missed(_lent(q, self.size), _lent(r, self.size), scale, moved)
         except BaseException as error:
-            self._failed(error)
+            self.failed(error)
             return math.nan
 
 

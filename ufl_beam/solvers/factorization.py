@@ -36,16 +36,10 @@ class Factorisation:
     Rows and columns are exchanged, so zeros on the diagonal do no harm.  Before that they are
     scaled such that the largest entry of each is about one: units do not matter.
 
-    Args:
-        A: The matrix; its structure is symmetric.
-
     Attributes:
         symmetric: Whether the matrix is, up to round-off.
         negative: Number of its negative eigenvalues if it is symmetric; else 1 where its
             determinant is negative, and 0 where it is positive.
-
-    Raises:
-        SingularMatrix: No pivot was found, or an entry is not finite.
     """
 
     def __init__(self, A: csr_array) -> None:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from petsc4py import PETSc
 
@@ -19,6 +20,7 @@ LONGEST, SHORTEST = 1.0, 1e-12
 """Limits of a step, as parts of the full one."""
 
 
+@dataclass
 class SearchingNewton:
     """Newton's method with steps to where the residual does no work on them, for points that flow.
 
@@ -26,42 +28,25 @@ class SearchingNewton:
     one branch to the other and back for ever.  Work is the only product of residuals and steps that
     adds forces and moments, and it is the same in all units.  Forces of connectors are unknowns of
     their own, so the line search of PETSc would add products of forces; here the law of a
-    connector, in the place of its force, does work on the change of its motion.
-
-    It answers like the SNES whose function and Jacobian it uses.
-
-    Args:
-        snes: Computes residuals and tangents.
-        ksp: Solves linear equations.
-        x, f: Vectors of the iterate, and of its residual.
-        y, w: Two more.
-        matrix: The tangent.
-        test: Reason to stop after an iteration, or zero.
-        near: Whether the latest tangent is to be used again.
-        work: Of a residual on a step, from the iterate of the tangent: ``work(step)`` makes a
-            function of no arguments that takes the latest residual; J.
-        most: Largest number of iterations.
+    connector, in the place of its force, does work on the change of its motion. It answers like the
+    SNES whose function and Jacobian it uses.  ``test`` gives the reason to stop after an iteration,
+    ``near`` says to keep the tangent, and ``work(step)`` makes a function that gives the work (J)
+    of the latest residual on a step from the iterate of the tangent.
     """
 
-    def __init__(
-        self,
-        snes: PETSc.SNES,
-        ksp: PETSc.KSP,
-        *,
-        x: PETSc.Vec,
-        f: PETSc.Vec,
-        y: PETSc.Vec,
-        w: PETSc.Vec,
-        matrix: PETSc.Mat,
-        test: Callable[[int], int],
-        near: Callable[[], bool],
-        work: Callable[[PETSc.Vec], Callable[[], float]],
-        most: int,
-    ) -> None:
-        self._snes, self._ksp, self._matrix = snes, ksp, matrix
-        self._x, self._f, self._y, self._w = x, f, y, w
-        self._test, self._near, self._work, self._most = test, near, work, most
-        self._reason = self._iterations = 0
+    snes: PETSc.SNES
+    ksp: PETSc.KSP
+    x: PETSc.Vec
+    f: PETSc.Vec
+    y: PETSc.Vec
+    w: PETSc.Vec
+    matrix: PETSc.Mat
+    test: Callable[[int], int]
+    near: Callable[[], bool]
+    work: Callable[[PETSc.Vec], Callable[[], float]]
+    most: int
+    _reason: int = 0
+    _iterations: int = 0
 
     def getConvergedReason(self) -> int:
         """Why the last solution ended; as of PETSc."""
@@ -77,17 +62,17 @@ class SearchingNewton:
         self._reason = self._solve()
 
     def _solve(self) -> int:
-        self._snes.computeFunction(self._x, self._f)
-        while not (reason := self._test(self._iterations)):
-            if self._iterations == self._most:
+        self.snes.computeFunction(self.x, self.f)
+        while not (reason := self.test(self._iterations)):
+            if self._iterations == self.most:
                 return int(lib.TOO_MANY)
-            if not self._near():
-                self._snes.computeJacobian(self._x, self._matrix)
-                self._ksp.setOperators(self._matrix)
-            self._ksp.solve(self._f, self._y)
-            if self._ksp.getConvergedReason() < 0:
+            if not self.near():
+                self.snes.computeJacobian(self.x, self.matrix)
+                self.ksp.setOperators(self.matrix)
+            self.ksp.solve(self.f, self.y)
+            if self.ksp.getConvergedReason() < 0:
                 return int(lib.SINGULAR)
-            self._search(self._work(self._y))
+            self._search(self.work(self.y))
             self._iterations += 1
         return reason
 
@@ -96,7 +81,8 @@ class SearchingNewton:
         before, part_before, part = work(), 0.0, 1.0
         first, evaluations = before, 0
         while True:
-            self._go(part)
+            self.w.waxpy(-part, self.y, self.x)
+            self.snes.computeFunction(self.w, self.f)
             now = work()
             evaluations += 1
             if evaluations == EVALUATIONS or not abs(now) > PART * abs(first):
@@ -110,9 +96,4 @@ class SearchingNewton:
             if not SHORTEST <= next_part <= LONGEST:
                 break
             before, part_before, part = now, part, next_part
-        self._w.copy(self._x)
-
-    def _go(self, part: float) -> None:
-        """Residual at a part of the step."""
-        self._w.waxpy(-part, self._y, self._x)
-        self._snes.computeFunction(self._w, self._f)
+        self.w.copy(self.x)

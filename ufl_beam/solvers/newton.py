@@ -17,12 +17,11 @@ from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
 from ufl_beam.solvers.bordered import BorderedNewton
 from ufl_beam.solvers.convergence import Convergence
-from ufl_beam.solvers.equation import Border, Equation
-from ufl_beam.solvers.idle_motions import IdleMotions
+from ufl_beam.solvers.equation import Border, Equation, SnesCallbacks
 from ufl_beam.solvers.line_search import SearchingNewton
 from ufl_beam.solvers.newton_options import PREFIX, Newton
-from ufl_beam.solvers.preconditioners import ChainsFirst
-from ufl_beam.solvers.snes_callbacks import SnesCallbacks
+from ufl_beam.solvers.null_vectors import IdleMotions
+from ufl_beam.solvers.static_condensation import ChainsFirst
 from ufl_beam.solvers.vectors import Vectors, unlock
 
 FULL_STEPS = {"snes_linesearch_type": "basic"}
@@ -36,20 +35,10 @@ Those that wander longer find a solution by luck: the last digits of the data wo
 
 
 class Solver:
-    """Finds the configuration in which the residual of an equation vanishes.
-
-    Attributes:
-        iterations: Number of iterations so far.
-        convergence: Sizes of forces and works at the latest iterate.
-    """
+    """Finds the configuration in which the residual of an equation vanishes."""
 
     def __init__(
-        self,
-        share: Share,
-        equation: Equation,
-        newton: Newton,
-        least: int,
-        agreement: Agreement,
+        self, share: Share, equation: Equation, newton: Newton, least: int, agreement: Agreement
     ) -> None:
         self._share, self._equation, self._newton = share, equation, newton
         self._agreement, self._vectors = agreement, Vectors(share)
@@ -117,18 +106,11 @@ class Solver:
         if "snes_linesearch_type" in self._chosen():
             return self._snes
         return SearchingNewton(
-            self._snes,
-            self._ksp,
-            x=self._x,
-            f=self._f,
-            y=self._vectors.new(),
-            w=self._vectors.new(),
-            matrix=self._matrix,
-            test=self.convergence.test,
-            near=lambda: bool(self._equation.c.near),
-            work=self._work_on,
+            self._snes, self._ksp, x=self._x, f=self._f, y=self._vectors.new(),
+            w=self._vectors.new(), matrix=self._matrix, test=self.convergence.test,
+            near=lambda: bool(self._equation.c.near), work=self._work_on,
             most=self._newton.max_iterations,
-        )
+        )  # fmt: skip
 
     def _work_on(self, y: PETSc.Vec) -> Callable[[], float]:
         """Work of the latest residual on a step from the present iterate; J."""
@@ -141,7 +123,7 @@ class Solver:
         """SNES of the equation with a border."""
         if self._bordered is None:
             self._bordered = BorderedNewton(
-                self._callbacks, self._vectors, self._ksp.getPC(), self.convergence.moves,
+                self._callbacks, self._vectors, self._ksp.getPC(), self._equation.held,
                 self._make_snes(), self._f, self._matrix, border,
             )  # fmt: skip
         self._bordered.border = border
@@ -152,13 +134,8 @@ class Solver:
     def solve(self, guess: Array, loads: list[Array], like_last: bool = False) -> Array:
         """Find the configuration from ``guess``; local values, ghosts included; a new array.
 
-        Args:
-            guess: Where to begin.
-            loads: Vectors of the loads, for the scale of convergence; new arrays where they change.
-            like_last: Whether the tangent of the last solution may do for this one.
-
-        Raises:
-            StepFailed: No convergence.
+        The ``loads``, for the scale of convergence, are new arrays where they change; ``like_last``
+        lets the tangent of the last solution do for this one.
         """
         self.convergence.take_loads(loads)
         self._go_to(guess)
@@ -167,20 +144,16 @@ class Solver:
             reason = self._hold_idle(guess)
         if reason == lib.STALLED:
             reason = self._iterate(self._careful, PATIENCE)
-        if reason <= 0 and self._may_go_on() and self._equation.relieve(True):
+        if reason <= 0 and self._may_go_on() and self._equation.stiffen(True):
             self._go_to(guess)
-            reason = self._relieved()
+            reason = self._stiffened()
         if reason <= 0:
             raise self._failure(reason)
         self._vectors.update_ghosts(self._x)
         return self._q.copy()
 
     def solve_along(self, guess: Array, loads: list[Array], border: Border) -> Array:
-        """Find the configuration as :meth:`solve` does, together with the unknown of a border.
-
-        Raises:
-            StepFailed: No convergence.
-        """
+        """Find the configuration as :meth:`solve` does, together with the unknown of a border."""
         self.convergence.take_loads(loads)
         self._go_to(guess)
         reason = self._iterate(self._along(border), 12)
@@ -219,11 +192,12 @@ class Solver:
         self._at_idle = integers(entries), doubles(stiffnesses)
         c = self._equation.c
         c.idle, (c.idle_entry, c.idle_stiffness) = len(entries), self._at_idle
+        self.convergence.leave_out(self._idle.stiffness > 0.0)
 
-    def _relieved(self) -> int:
+    def _stiffened(self) -> int:
         """Iterate with stiffer tangents, which come near but slowly, then with true ones."""
         slow = self._iterate(self._snes, PATIENCE)
-        self._equation.relieve(False)
+        self._equation.stiffen(False)
         if slow != lib.TOO_MANY and slow <= 0:
             return slow
         near = self.iterate()

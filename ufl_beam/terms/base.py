@@ -8,8 +8,6 @@ what several processes add to one degree of freedom is summed by the solver.
 
 from __future__ import annotations
 
-from typing import Protocol
-
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, loop
 from ufl_beam.compiled.csr import Csr, StepProduct
@@ -21,14 +19,15 @@ KINDS = ("beams", "connectors", "loads", "inertia", "damping")
 """Kinds of forces."""
 
 
-class Term(Protocol):
-    """Virtual work of one physical effect."""
+class Term:
+    """Virtual work of one physical effect; a method that a term does not define does nothing."""
 
     kind: str
     """Kind of its forces, one of :data:`KINDS`."""
 
     def loops(self) -> tuple[Loop, Loop | None] | None:
-        """Return C functions with data in the place of both methods, or None without them."""
+        """Return C loops of residual and tangent with data; None where Python evaluates them."""
+        return None
 
     def begin(self, step: Step) -> None:
         """Take note of the step that is to be solved."""
@@ -52,27 +51,18 @@ class Term(Protocol):
         """State what later steps depend on; ``q`` is the configuration of the state."""
 
 
-class Beams(Term, Protocol):
+class Beams(Term):
     """Resultants of cells working on the virtual strains; the residual is an internal force."""
 
     def change(self, q1: Array) -> float:
         """Energy that cells of this process store and dissipate in the step to ``q1``; J."""
+        raise NotImplementedError
 
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """Add the derivative of the tangent at ``q1`` along ``u``; no internal variable changes."""
 
 
-class Cells(Beams, Protocol):
-    """Beams whose tangent is known by its works, too, summed over cells from strains."""
-
-    def tangent_work(self, q1: Array, x: Array, y: Array) -> float:
-        """Return the work of the tangent for the motion x on y; J."""
-
-    def work_of_change(self, q1: Array, u: Array, x: Array, y: Array) -> float:
-        """Return the work of the derivative of the tangent along u, for x on y; J."""
-
-
-class OfForms:
+class OfForms(Term):
     """A term whose forces and their derivative are two forms on cells."""
 
     _force: Kernel
@@ -92,7 +82,7 @@ class OfForms:
         self._tangent.add(q1, self._A.data)
 
 
-class OfMatrix:
+class OfMatrix(Term):
     """A term whose forces are a constant matrix times the step of the nodes."""
 
     _times: StepProduct

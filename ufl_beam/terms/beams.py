@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property, partial
 from typing import NamedTuple
 
 import ufl
@@ -19,7 +18,7 @@ from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, Step
 from ufl_beam.terms.base import OfForms, OfMatrix
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.tangent_derivatives import CellTangent
+from ufl_beam.terms.tangent_derivatives import Cells
 
 
 class _ElasticForms(NamedTuple):
@@ -52,7 +51,7 @@ def _elastic_forms(of: Element, scheme: Scheme) -> _ElasticForms:
     return _ElasticForms(ufl.dot(r, w_e) * dx, stored, losses, first)  # P(12)
 
 
-class ElasticBeams(OfForms):
+class ElasticBeams(OfForms, Cells):
     """Resultants of elastic cells working on the virtual strains, P(12)."""
 
     kind = "beams"
@@ -60,7 +59,7 @@ class ElasticBeams(OfForms):
     def __init__(self, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger) -> None:
         forms = _elastic_forms(fields.element, scheme)
         self._q0, self._q1, self._fields = fields.element.q0, fields.element.q1, fields
-        self._work = forms.work
+        self._work_form = forms.work
         self._force, self._tangent = fields.force_and_tangent(forms.work, self._q1, A)
         self._stored, *self._losses = (
             fields.hot_kernel(form, self._q1) for form in (forms.stored, *forms.losses)
@@ -106,41 +105,13 @@ class ElasticBeams(OfForms):
         self._held = self._stored.value(q)
         self._ledger.state["stored"] += self._held
 
-    def remember(self, memory: Memory, q: Array) -> None:
-        """Save nothing: the stored energy follows from the configuration."""
-
     def change(self, q1: Array) -> float:
         """Energy that cells of this process store in the step to ``q1``; J."""
         return self._stored.value(q1) - self._held
 
-    def add_tangent_change(self, q1: Array, u: Array) -> None:
-        """Add the derivative of the tangent at ``q1`` along ``u``."""
-        self._cell_tangent.add_change(q1, u)
-
-    def tangent_work(self, q1: Array, x: Array, y: Array) -> float:
-        """Return the work of the tangent for the motion x on y; J."""
-        return self._cell_tangent.work(q1, x, y)
-
-    def work_of_change(self, q1: Array, u: Array, x: Array, y: Array) -> float:
-        """Return the work of the derivative of the tangent along u, for x on y; J."""
-        return self._cell_tangent.work_of_change(q1, u, x, y)
-
-    @cached_property
-    def _cell_tangent(self) -> CellTangent:
-        kernel = partial(self._fields.kernel, unknown=self._q1)
-        return CellTangent(self._work, self._q1, kernel, self._A)
-
 
 class Inertia(OfMatrix):
-    """Consistent inertia of the beams and inertia of point masses: a constant matrix, P(18).
-
-    Attributes:
-        v: Velocities at the end of the last accepted step.
-        v_before: Those at its beginning.
-        more: What the scheme keeps besides; empty before the first step.
-        last_dt: Length of the last accepted step; s.
-        scheme: The time scheme.
-    """
+    """Inertia of beams and point masses: a constant matrix, P(18); satisfies :class:`Rates`."""
 
     kind = "inertia"
 

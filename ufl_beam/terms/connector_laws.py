@@ -54,7 +54,7 @@ class _Driven(Working):
     def _note(self, step: Step) -> None:
         t = step.motion_time
         wanted = np.array([value_at(link.law.motion, t, link) for link in self._motors])
-        self._target = self._e0 + step.toward * (wanted - self._e0)
+        self._target = self._e0 + step.fraction * (wanted - self._e0)
 
     def rows(self, e1: Array, λ: Array) -> Rows:
         """The motion is given."""
@@ -79,7 +79,7 @@ class _Pushed(Working):
 
     def _note(self, step: Step) -> None:
         wanted = -np.array([self._wanted(link, step) for link in self._links])
-        self._end = self._reached + step.toward * (wanted - self._reached)
+        self._end = self._reached + step.fraction * (wanted - self._reached)
         self._force = self._reached + step.at * (self._end - self._reached)
 
     def accept(self, e1: Array, work: float) -> None:

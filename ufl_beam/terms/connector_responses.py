@@ -17,32 +17,22 @@ from ufl_beam.arrays import Array
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.connectors import Connector
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.openings import Course, Openable
+from ufl_beam.terms.openings import Openable, SearchFlags
 
 Rows = tuple[Any, Any, Any]
 """α, β, γ of some connectors: arrays or numbers."""
 
 
 class Setting(NamedTuple):
-    """Arguments that all responses are made with.
+    """Arguments that all responses are made with."""
 
-    Attributes:
-        asked: Forces of controllers, and limits of friction, in the present step; N or N m.
-        rates: Rates of relative motions with friction as the step begins; m/s or rad/s.
-        size: Size of the scene; m.
-        scheme: Says what acts in a step.
-        ledger: Takes energies and works.
-        friction_repeats: Whether places that stick may hold what is held already.
-        course: Flags that all points of the scene share.
-    """
-
-    asked: Mapping[Connector, float]
-    rates: Mapping[Connector, float]
-    size: float
+    asked: Mapping[Connector, float]  # forces of controllers, limits of friction; N or N m
+    rates: Mapping[Connector, float]  # of motions with friction as the step begins; m/s or rad/s
+    size: float  # of the scene; m
     scheme: Scheme
     ledger: Ledger
-    friction_repeats: bool
-    course: Course
+    friction_repeats: bool  # True if places that stick may hold what is held already
+    search: SearchFlags  # of all points of the scene
 
 
 class Response:
@@ -51,13 +41,11 @@ class Response:
     By default nothing is stored, yields or is remembered.
     """
 
-    steady = False
-    """True if the rows stay the same during a step."""
+    steady = False  # True if the rows stay the same during a step
+    in_c: Mapping[str, Any] = {}  # data of laws evaluated in C, by names in ``couplings``, loops.h
 
-    in_c: Mapping[str, Any] = {}
-    """Data of laws that C evaluates, by their names in ``couplings`` of loops.h."""
-
-    _links: Sequence[Connector]
+    def __init__(self, links: Sequence[Connector]) -> None:
+        self._links = links
 
     @property
     def openable(self) -> Openable | None:
@@ -77,13 +65,9 @@ class Response:
         raise NotImplementedError
 
     def about_force(self, rows: Array) -> Array:
-        """Factor by which rows about the force are divided, zero for rows about the motion.
+        """Factors by which rows about the force are divided, zero for rows about the motion.
 
-        Args:
-            rows: The latest ones that Python has put; (num_links, 3).
-
-        Returns:
-            Shape (num_links,).
+        ``rows`` are the latest ones that Python has put; (num_links, 3).
         """
         raise NotImplementedError
 
@@ -150,8 +134,9 @@ class Working(Response):
     _sign = 1.0
 
     def __init__(self, law: Any, links: Sequence[Connector], setting: Setting) -> None:
+        super().__init__(links)
         self._laws: list[Any] = [link.law for link in links]
-        self._links, self._setting = links, setting
+        self._setting = setting
         self._entries = getattr(setting.ledger, self._group)
         if self._entry:
             self._entries[self._entry] += 0.0

@@ -21,20 +21,13 @@ from ufl_beam.dolfinx_compat import fem, line_mesh
 from ufl_beam.mechanics.relative_motions import MOTIONS, Numbers, Pair
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.connector_laws import HELD, Law, RigidPlastic, Spring
-from ufl_beam.model.connectors import Connector
 from ufl_beam.terms import connector_laws, rigid_plastic, springs
 from ufl_beam.terms.connector_responses import Setting, respond
 from ufl_beam.terms.links import Links
-from ufl_beam.terms.openings import Openable
 from ufl_beam.terms.tangent_derivatives import TangentChange
 
 LAWS = (connector_laws, rigid_plastic, springs)
 """Modules with the responses of laws, which register them with :func:`respond`."""
-
-
-def _alike(link: Connector) -> tuple[str, object]:
-    """Key that the connectors of one :class:`Couplings` have in common."""
-    return link.motion, _kind(link.law)
 
 
 @singledispatch
@@ -54,23 +47,14 @@ def _(law: RigidPlastic) -> object:
 
 
 class _Forms(NamedTuple):
-    """Forms of connectors with the coefficients that they are written in.
+    """Forms of connectors with the coefficients that they are written in."""
 
-    Attributes:
-        work: Virtual work, and the row ``row[0] e + row[1] λ - row[2]`` of a law.
-        tangent: Its derivative by the configuration.
-        motion: The relative motion e by cell.
-        rate: Its derivative along ``u``.
-        change: Derivative of the tangent along ``u``; rows change with the motion by ``bend``.
-        numbers: Numbers of the relative motion, see :class:`Numbers`.
-    """
-
-    work: ufl.Form
-    tangent: ufl.Form
-    motion: ufl.Form
-    rate: ufl.Form
-    change: ufl.Form
-    numbers: fem.Function
+    work: ufl.Form  # virtual work, and the row ``row[0] e + row[1] λ - row[2]`` of a law
+    tangent: ufl.Form  # its derivative by the configuration
+    motion: ufl.Form  # the relative motion e by cell
+    rate: ufl.Form  # its derivative along ``u``
+    change: ufl.Form  # derivative of the tangent along ``u``; ``bend`` is that of row[0] by e
+    numbers: fem.Function  # see :class:`Numbers`
     row: fem.Function
     q0: fem.Function
     q1: fem.Function
@@ -165,10 +149,6 @@ class Couplings(Links):
         self._rate.add(q, rates)
         return rates
 
-    def again(self) -> None:
-        """Begin the step again: forget what its iterates have tried."""
-        self.response.again()
-
     def put_motions(self, q: Array, v: Array, works: Array) -> None:
         """Put minus the change of the motions where the row is about the force."""
         about_force = self.response.about_force(self._rows)
@@ -228,27 +208,6 @@ class Couplings(Links):
         """Energy that the connectors take in the step to ``q1``; J."""
         return self.response.change(self.motion(q1), float(self._taken(q1).sum()))
 
-    def flows(self) -> bool:
-        """Return whether a connector of this process slips plastically in the latest iterate."""
-        return self.response.flows()
-
-    def shown_motion(self, q: Array) -> Array:
-        """Motions of the accepted state ``q`` as solutions show them; (num_links,); m or rad."""
-        return self.response.motion(self.motion(q))
-
-    def dissipated(self) -> Array:
-        """Energy that each connector has dissipated by yielding and softening; (num_links,); J."""
-        return self.response.dissipated
-
-    def remaining(self) -> Array:
-        """Part of the elastic stiffness that is left in the latest iterate; (num_links,)."""
-        return self.response.remaining()
-
-    @property
-    def openable(self) -> Openable | None:
-        """Connectors that open beyond a limit, if there are."""
-        return self.response.openable
-
     def effort(self, q1: Array) -> float:
         """Sum of the sizes of the works that the connectors take in the step to ``q1``; J."""
         return float(np.abs(self._taken(q1)).sum())
@@ -276,10 +235,6 @@ class Couplings(Links):
     @cached_property
     def _tangent_change(self) -> TangentChange:
         return TangentChange(self._forms.change, self._forms.u, self._kernel, self._A)
-
-    def freeze(self) -> None:
-        """Keep everything elastic from now on: nothing yields or breaks further."""
-        self.response.freeze()
 
     # -- the state -----------------------------------------------------------------------------
 
@@ -314,10 +269,11 @@ def couplings(share: Share, setting: Setting, A: Csr) -> list[Links]:
     """Make the connectors of a process but for guides, those that are alike together."""
     links = share.grid.scene.links
     groups: dict[tuple[str, object], list[int]] = {}
+    keys = [(link.motion, _kind(link.law)) for link in links]
     for i, number in enumerate(share.links):
-        groups.setdefault(_alike(links[number]), []).append(i)
-    for link in {_alike(link): link for link in links}.values():
-        if _alike(link) not in groups and link.motion in MOTIONS:
+        groups.setdefault(keys[number], []).append(i)
+    for key, link in dict(zip(keys, links, strict=True)).items():
+        if key not in groups and link.motion in MOTIONS:
             respond(link.law, (), setting)  # makes the entries of the ledger that others write
     return [
         Couplings(share, np.array(here), setting, A)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Damping forces: what the records of damping.py do to the equation of a step."""
+"""Damping forces: those of the records of damping.py, and those of a scheme that decays."""
 
 from __future__ import annotations
 
+import math
 from functools import singledispatch
 from typing import Protocol
 
@@ -12,10 +13,11 @@ import ufl
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.csr import Csr, StepProduct
 from ufl_beam.discretization.compiled_forms import stated
-from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
+from ufl_beam.discretization.function_spaces import Element, Fields, Strains, mass_matrix
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError
+from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
 from ufl_beam.mechanics.kinematics import strain, virtual_strain
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Rates, Scheme, Step
 from ufl_beam.model.damping import KelvinVoigt, Rayleigh
@@ -31,10 +33,10 @@ class Inertia(Rates, Protocol):
 
 @singledispatch
 def damping_forces(
-    damping: object, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger, inertia: Inertia | None
+    of: object, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger, inertia: Inertia | None
 ) -> list[Term]:
     """Forces of one kind of damping on the cells of a process; none if it has no such cells."""
-    raise TypeError(f"{damping!r} is not a damping")
+    raise TypeError(f"{of!r} is not a damping")
 
 
 @stated
@@ -73,12 +75,6 @@ class KelvinVoigtForces(OfForms):
         """Enter the energy that was damped."""
         self._ledger.lost["damping"] += self._lost.value(q1)
 
-    def add_state(self, q: Array) -> None:
-        """Add nothing: damping stores no energy."""
-
-    def remember(self, memory: Memory, q: Array) -> None:
-        """Save nothing: damping has no internal variables."""
-
 
 @stated
 def _reference_stiffness(of: Element) -> ufl.Form:
@@ -110,47 +106,82 @@ class RayleighForces(OfMatrix):
         """Enter the energy that was damped."""
         self._ledger.lost["damping"] += self._times.square(s) / self._dt
 
-    def add_state(self, q: Array) -> None:
-        """Add nothing: damping stores no energy."""
-
-    def remember(self, memory: Memory, q: Array) -> None:
-        """Save nothing: damping has no internal variables."""
-
 
 @damping_forces.register
-def _rayleigh(
-    damping: Rayleigh,
-    fields: Fields,
-    scheme: Scheme,
-    A: Csr,
-    ledger: Ledger,
-    inertia: Inertia | None,
+def _(
+    of: Rayleigh, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger, inertia: Inertia | None
 ) -> list[Term]:
     if inertia is None:
         raise SceneError("Rayleigh: it damps velocities, and statics has none; use KelvinVoigt")
     ledger.lost["damping"] += 0.0
-    return [RayleighForces(damping, fields, A, ledger, inertia)]
+    return [RayleighForces(of, fields, A, ledger, inertia)]
 
 
 @damping_forces.register
-def _kelvin_voigt(
-    damping: KelvinVoigt,
-    fields: Fields,
-    scheme: Scheme,
-    A: Csr,
-    ledger: Ledger,
-    inertia: Inertia | None,
+def _(
+    of: KelvinVoigt, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger, inertia: Inertia | None
 ) -> list[Term]:
     ledger.lost["damping"] += 0.0
     grid = fields.share.grid
-    beams = grid.scene.beams if damping.beams is None else damping.beams
-    cells = [
-        cell
-        for beam in beams
-        for cell, hinge in zip(grid.cells_of(beam), grid.hinges(beam), strict=True)
-        if hinge is None
-    ]
+    beams = grid.scene.beams if of.beams is None else of.beams
+    pairs = (zip(grid.cells_of(beam), grid.hinges(beam), strict=True) for beam in beams)
+    cells = [cell for of_beam in pairs for cell, hinge in of_beam if hinge is None]
     part = np.flatnonzero(np.isin(fields.share.cells, cells))
     if not len(part):
         return []
-    return [KelvinVoigtForces(damping, Fields(fields.share, part), scheme, A, ledger)]
+    return [KelvinVoigtForces(of, Fields(fields.share, part), scheme, A, ledger)]
+
+
+# -- of schemes ----------------------------------------------------------------------------------
+
+
+@stated
+def _change_forms(of: Element, scheme: DecayingMidpoint) -> tuple[ufl.Form, ufl.Form, fem.Function]:
+    """Virtual work, the energy lost, and the changes of the strains in the step before."""
+    q0, q1, C, dx = of.q0, of.q1, of.stiffness, of.dx(1)
+    before, part = of.at_points(3), of.constant(scheme.part)
+    change = strain(q1, of.axis) - strain(q0, of.axis)
+    r = ufl.as_vector([part * C[i] * (change[i] - before[i]) for i in range(3)])
+    work = ufl.dot(r, scheme.virtual_strain(q0, q1, of.w, of.axis)) * dx
+    return work, ufl.dot(r, change) * dx, before
+
+
+class SecondDifferences(OfForms):
+    """Resultants c C (Δe - r Δe'), see :class:`DecayingMidpoint`."""
+
+    kind = "beams"
+
+    def __init__(self, scheme: DecayingMidpoint, fields: Fields, A: Csr, ledger: Ledger) -> None:
+        work, lost, self._before = _change_forms(fields.element, scheme)
+        self._q0, q1 = fields.element.q0, fields.element.q1
+        self._force, self._tangent = fields.force_and_tangent(work, q1, A)
+        self._lost = fields.hot_kernel(lost, q1)
+        self._strains = Strains(fields)
+        self._cells = fields.share.cells[fields.order]
+        self._q: Array = np.empty(0)
+        self._e: Array = np.zeros(self._strains.shape)
+        self._change: Array = np.zeros(self._strains.shape)
+        self._dt = self._last_dt = math.inf
+        self._A, self._ledger = A, ledger
+        ledger.lost["numerical"] += 0.0
+
+    def begin(self, step: Step) -> None:
+        """Remember the configuration at the beginning, and the changes in the step before."""
+        if step.q0 is not self._q:
+            self._q, self._e = step.q0, self._strains(step.q0)
+        self._dt = step.dt
+        for kernel in (self._force, self._lost):
+            kernel.set(self._q0, step.q0)
+            kernel.put(self._before, min(1.0, step.dt / self._last_dt) * self._change)
+
+    def accept(self, q1: Array, s: Array) -> None:
+        """Enter the energy that was lost, and keep the changes of the strains."""
+        self._ledger.lost["numerical"] += self._lost.value(q1)
+        e1 = self._strains(q1)
+        self._change, self._q, self._e, self._last_dt = e1 - self._e, q1, e1, self._dt
+
+    def remember(self, memory: Memory, q: Array) -> None:
+        """The changes of the strains in the last step, and its length."""
+        self._change = memory.rows("changes of strains", self._cells, self._change)
+        self._last_dt = memory.number("step of strains", self._last_dt)
+        self._q, self._e = q, self._strains(q)

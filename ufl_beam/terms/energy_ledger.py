@@ -24,12 +24,8 @@ NOTHING_HELD = 1e-3
 class Ledger:
     """Energies of one process at one time; terms write into it when a step is accepted.
 
-    Terms make their entries when they are made, so that all processes know the same ones.
-
-    Attributes:
-        state: Energies that depend on the state: kinetic, stored; J.
-        supplied: Work that came in since the beginning, by source; J.
-        lost: Energy that went out since the beginning, by sink; never negative; J.
+    Terms make their entries when they are made, so that all processes know the same ones; see
+    :class:`Energy` for the three parts.
     """
 
     state: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
@@ -89,14 +85,17 @@ class Energy:
     lost: dict[str, Array]
 
     def __post_init__(self) -> None:
-        names = [*self.state, *self.supplied, *self.lost]
+        names = [name for part in self._parts for name in part]
         for part in ("state", "supplied", "lost"):
             object.__setattr__(self, part, Entries(getattr(self, part), names))
 
     def __getitem__(self, name: str) -> Array:
         """Entry ``name``; (n+1,); J.  Entries of effects that the scene lacks do not exist."""
-        parts = (self.state, self.supplied, self.lost)
-        return next((part for part in parts if name in part), self.state)[name]
+        return next((part for part in self._parts if name in part), self.state)[name]
+
+    @property
+    def _parts(self) -> tuple[dict[str, Array], ...]:
+        return self.state, self.supplied, self.lost
 
     @property
     def total(self) -> Array:
@@ -125,8 +124,7 @@ class Energy:
         """Describe how far the ledger is open; empty if it closes as claimed.
 
         Args:
-            claimed: Largest imbalance that the scheme and the solver claim, as a part of the
-                energy that went through.
+            claimed: Largest imbalance claimed, as a part of the energy that went through.
             round_off: Estimate of the energy that the last digits of the unknowns make; J.
         """
         # Squares of the least numbers have lost their digits.
@@ -155,11 +153,7 @@ class Energy:
     def __str__(self) -> str:
         lines = [
             f"  {kind:9s} {name:12s} {values[-1]: .6e} J"
-            for kind, entries in (
-                ("in scene", self.state),
-                ("supplied", self.supplied),
-                ("lost", self.lost),
-            )
+            for kind, entries in zip(("in scene", "supplied", "lost"), self._parts, strict=True)
             for name, values in entries.items()
         ]
         lines.append(f"  imbalance at most {self.worst:.1e} of {self.throughput:.6e} J throughput")

@@ -125,9 +125,6 @@ class Guides(Links):
         """Begin at the points of the last step."""
         self._s = self._s0.copy()
 
-    def loops(self) -> None:
-        """None: guide curves are evaluated in Python."""
-
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the forces, and the distances."""
         distance, _, m, _ = self._frames(q1)
@@ -179,9 +176,6 @@ class Guides(Links):
         self._s0 = self._s.copy()
 
     # -- the state -----------------------------------------------------------------------------
-
-    def add_state(self, q: Array) -> None:
-        """Add nothing: guides store no energy."""
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The points on the curves, their parameters, and the steps of these for tangents."""

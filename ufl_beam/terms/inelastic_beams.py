@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -23,16 +22,12 @@ from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.fibres import Layout
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.material_points import Points, inputs
-from ufl_beam.terms.openings import Course
-from ufl_beam.terms.tangent_derivatives import CellTangent
+from ufl_beam.terms.openings import SearchFlags
+from ufl_beam.terms.tangent_derivatives import Cells
 
 
 def inelastic_cells(grid: Numbering) -> list[tuple[Layout, Index]]:
-    """Layouts of material points, and the cells (numbers of the grid) that have them.
-
-    Raises:
-        SceneError: There are some, and cells have a higher degree than 1.
-    """
+    """Layouts of material points, and the cells (numbers of the grid) that have them."""
     groups: dict[Layout, list[int]] = {}
     layouts: dict[object, Layout | None] = {}
     for beam in grid.scene.beams:
@@ -72,7 +67,7 @@ def _forms(of: Element, scheme: Scheme) -> _Forms:
     return _Forms(ufl.dot(r, w_e) * dx, around, tangent, r, b, D)  # P(34)
 
 
-class InelasticBeams:
+class InelasticBeams(Cells):
     """Resultants of cells with material points, working on the virtual strains.
 
     The points answer the strains of an iterate with resultants r and their derivatives D; around
@@ -83,7 +78,13 @@ class InelasticBeams:
     kind = "beams"
 
     def __init__(
-        self, fields: Fields, layout: Layout, scheme: Scheme, A: Csr, ledger: Ledger, course: Course
+        self,
+        fields: Fields,
+        layout: Layout,
+        scheme: Scheme,
+        A: Csr,
+        ledger: Ledger,
+        search: SearchFlags,
     ) -> None:
         self._layout, self._scheme, self._A, self._ledger = layout, scheme, A, ledger
         self._order = fields.order
@@ -99,12 +100,12 @@ class InelasticBeams:
             fields.share.cell_lengths()[fields.order],
             scheme,
             self._variables.x.array.reshape(cells, n, width),
-            course,
+            search,
         )
 
         forms = _forms(fields.element, scheme)
         self._q0, self._q1 = fields.element.q0, fields.element.q1
-        self._b, self._D, self._fields, self._around = forms.b, forms.D, fields, forms.around
+        self._b, self._D, self._fields, self._work_form = forms.b, forms.D, fields, forms.around
         self._force, self._tangent = (
             fields.hot_kernel(form, self._q1) for form in (forms.work, forms.tangent)
         )
@@ -159,31 +160,13 @@ class InelasticBeams:
         self._respond(q1)
         return self.points.dissipation()
 
-    def add_tangent_change(self, q1: Array, u: Array) -> None:
-        """Add the derivative of the tangent at ``q1`` along ``u``; points go on as they answer."""
-        self._cell_tangent_at(q1).add_change(q1, u)
-
-    def tangent_work(self, q1: Array, x: Array, y: Array) -> float:
-        """Return the work of the tangent for the motion x on y; J."""
-        return self._cell_tangent_at(q1).work(q1, x, y)
-
-    def work_of_change(self, q1: Array, u: Array, x: Array, y: Array) -> float:
-        """Return the work of the derivative of the tangent along u, for x on y; J."""
-        return self._cell_tangent_at(q1).work_of_change(q1, u, x, y)
-
-    def _cell_tangent_at(self, q1: Array) -> CellTangent:
+    def _coefficients(self, q1: Array) -> dict[fem.Function, Array]:
+        """Resultants around ``q1`` and their derivatives; points go on as they answer."""
         strains = self._strains(q1)
         r, D = self.points.respond(strains)
         self._latest.fill(np.nan)
         around = r - np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), strains)
-        self._cell_tangent.put(self._b, around)
-        self._cell_tangent.put(self._D, D)
-        return self._cell_tangent
-
-    @cached_property
-    def _cell_tangent(self) -> CellTangent:
-        kernel = partial(self._fields.kernel, unknown=self._q1)
-        return CellTangent(self._around, self._q1, kernel, self._A)
+        return {self._b: around, self._D: D}
 
     # -- see openings.py -----------------------------------------------------------------------
 

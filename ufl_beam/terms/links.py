@@ -11,20 +11,15 @@ from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Share
 from ufl_beam.model.connectors import Connector
 from ufl_beam.terms.base import Beams
+from ufl_beam.terms.connector_responses import Response
 from ufl_beam.terms.openings import Openable
 
 
 class Links(Beams):
     """Connectors that are alike; each has a force among the unknowns.
 
-    Args:
-        share: The degrees of freedom of this process.
-        here: Which of its connectors.
-        A: Matrix that takes the tangent.
-
     Attributes:
         numbers: Of the connectors in the scene's links.
-        links: The connectors.
         work: That they have taken since the beginning; (num_links,); J.
         rate: Mean rate of the motions in the last step; (num_links,); m/s or rad/s.
     """
@@ -40,6 +35,7 @@ class Links(Beams):
         self._before: Array = np.zeros(len(self.links))
         self.work: Array = np.zeros(len(self.links))
         self.rate: Array = np.zeros(len(self.links))
+        self.response = Response(self.links)
 
     def force(self, q: Array) -> Array:
         """Forces that resist the growth of the motions; (num_links,); N or N m."""
@@ -55,7 +51,7 @@ class Links(Beams):
 
     def shown_motion(self, q: Array) -> Array:
         """Motions of the accepted state ``q`` as solutions show them; (num_links,); m or rad."""
-        return self.motion(q)
+        return self.response.motion(self.motion(q))
 
     def demand(self) -> Loop | None:
         """Return the C function of :meth:`excess` with its data, if there is one."""
@@ -67,6 +63,7 @@ class Links(Beams):
 
     def again(self) -> None:
         """Begin the step again: forget what its iterates have tried."""
+        self.response.again()
 
     def put_motions(self, q: Array, v: Array, works: Array) -> None:
         """Put what laws of forces work on in the step ``v`` from ``q`` in the place of forces."""
@@ -75,11 +72,15 @@ class Links(Beams):
         """Take the forces in ``q`` as those before the next step."""
         self._before[:] = self.force(q)
 
+    def effort(self, q1: Array) -> float:
+        """Sum of the sizes of the works that the connectors take in the step to ``q1``; J."""
+        return 0.0
+
     # -- yielding, which most laws do not know -------------------------------------------------
 
     def flows(self) -> bool:
         """Return whether a connector of this process slips plastically in the latest iterate."""
-        return False
+        return self.response.flows()
 
     def dissipation(self, q1: Array) -> float:
         """Energy that connectors of this process dissipate plastically in the step to ``q1``; J."""
@@ -87,20 +88,17 @@ class Links(Beams):
 
     def dissipated(self) -> Array:
         """Energy that each connector has dissipated by yielding and softening; (num_links,); J."""
-        return np.zeros(len(self.links))
-
-    def effort(self, q1: Array) -> float:
-        """Sum of the sizes of the works that the connectors take in the step to ``q1``; J."""
-        return 0.0
+        return self.response.dissipated
 
     def remaining(self) -> Array:
         """Part of the elastic stiffness that is left in the latest iterate; (num_links,)."""
-        return np.ones(len(self.links))
+        return self.response.remaining()
 
     @property
     def openable(self) -> Openable | None:
         """Connectors that open beyond a limit, if there are."""
-        return None
+        return self.response.openable
 
     def freeze(self) -> None:
         """Keep everything elastic from now on: nothing yields or breaks further."""
+        self.response.freeze()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Terms of the loads: their forces, tangents and works."""
+"""Loads, and centrifugal and Coriolis forces: their tangents and works."""
 
 from __future__ import annotations
 
@@ -9,45 +9,60 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import ufl
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, loop
-from ufl_beam.compiled.csr import Csr
+from ufl_beam.compiled.csr import Csr, Product
+from ufl_beam.discretization.compiled_forms import stated
+from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
+from ufl_beam.mechanics.kinematics import split, turn
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.bodies import carries
-from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad
+from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame
 from ufl_beam.model.time_functions import value_at
+from ufl_beam.terms.base import Term
 from ufl_beam.terms.energy_ledger import Ledger
 
 
-class DeadLoads:
-    """Forces and moments that keep their direction: vectors times functions of time.
-
-    Args:
-        loads: What acts; all but follower loads.
-        share: The degrees of freedom of this process.
-        scheme: Says which forces do the work of a step.
-        ledger: Takes their work.
+class LoadTerm(Term):
+    """Forces that time or the configuration gives.
 
     Attributes:
-        force: The loads in the equation of the step.
+        force: The forces in the latest residual.
     """
 
     kind = "loads"
 
+    def __init__(self, share: Share, scheme: Scheme, ledger: Ledger) -> None:
+        self._acting, self._ledger = scheme.acting, ledger
+        ledger.supplied["loads"] += 0.0
+        self.force: Array = np.zeros(share.size)
+        self._before: Array = self.force
+
+    def carry_on(self, t: float, q: Array) -> Array:
+        """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them."""
+        raise NotImplementedError
+
+    def accept(self, q1: Array, s: Array) -> None:
+        """Enter the work of the loads."""
+        self._ledger.supplied["loads"] += float(self._acting(self._before, self.force) @ s)
+        self._before = self.force
+
+
+class DeadLoads(LoadTerm):
+    """Forces and moments that keep their direction: vectors times functions of time."""
+
     def __init__(self, loads: Sequence[Load], share: Share, scheme: Scheme, ledger: Ledger) -> None:
+        super().__init__(share, scheme, ledger)
         # Loads of one time function are one vector; functions need not be hashable.
         vectors: dict[int, tuple[Load, Array]] = {}
         for load in loads:
             _, vector = vectors.setdefault(id(load.time), (load, np.zeros(share.size)))
             vector += _forces(load, share)
         self._vectors = list(vectors.values())
-        self._acting, self._ledger = scheme.acting, ledger
-        ledger.supplied["loads"] += 0.0
-        self.force: Array = np.zeros(share.size)
-        self._before: Array = self.force
         self._end: Array = self.force
         self._in_c = ffi.new("vector *", {"size": share.size})
         self._factors: list[float] = []
@@ -55,12 +70,12 @@ class DeadLoads:
     def begin(self, step: Step) -> None:
         """The loads of the step; nothing is to do for those that stay."""
         factors = self._factors_at(step.load_time)
-        if factors == self._factors and step.toward == step.at == 1:
+        if factors == self._factors and step.fraction == step.at == 1:
             return
         self.force = self._end = self._times(factors)
         self._factors = factors
-        if step.toward < 1 or step.at < 1:
-            change = step.toward * (self._end - self._before)
+        if step.fraction < 1 or step.at < 1:
+            change = step.fraction * (self._end - self._before)
             self._end = self._before + change
             self.force = self._end if step.at == 1 else self._before + step.at * change
             self._factors = []
@@ -90,17 +105,11 @@ class DeadLoads:
         """Subtract the loads from the residual."""
         r -= self.force
 
-    def add_tangent(self, q1: Array) -> None:
-        """Dead loads do not depend on the configuration."""
-
     def accept(self, q1: Array, s: Array) -> None:
-        """Work of the loads."""
+        """Enter the work of the loads, if there are any."""
         if any(self._factors) or self._before is not self.force:
             self._ledger.supplied["loads"] += float(self._acting(self._before, self.force) @ s)
             self._before = self._end
-
-    def add_state(self, q: Array) -> None:
-        """Loads hold no energy; what a potential would hold is in their work."""
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The forces at the end of the last step."""
@@ -108,25 +117,13 @@ class DeadLoads:
         self._factors = []
 
 
-class FollowerLoads:
-    """Forces that turn with the cross-section they act on.
-
-    Args:
-        loads: What acts.
-        share: The degrees of freedom of this process.
-        scheme: Says where in the step loads act, and which forces do the work of a step.
-        ledger: Takes their work.
-        A: Matrix that takes the tangent.
-
-    Attributes:
-        force: The loads in the latest residual.
-    """
-
-    kind = "loads"
+class FollowerLoads(LoadTerm):
+    """Forces that turn with the cross-section they act on."""
 
     def __init__(
         self, loads: Sequence[FollowerLoad], share: Share, scheme: Scheme, ledger: Ledger, A: Csr
     ) -> None:
+        super().__init__(share, scheme, ledger)
         here = [i for i, load in enumerate(loads) if share.computes(load.place)]
         self._numbers, mine = np.array(here, dtype=np.int64), [loads[i] for i in here]
         dofs = np.array([share.local(share.at(load.place)) for load in mine], dtype=np.int64)
@@ -138,15 +135,11 @@ class FollowerLoads:
         self._A = A
         self._weight = scheme.load_weight
         self._sizes_before: Array = np.zeros_like(self._forces)
-        self._acting, self._ledger = scheme.acting, ledger
-        ledger.supplied["loads"] += 0.0
-        self.force: Array = np.zeros(share.size)
-        self._before: Array = self.force
 
     def begin(self, step: Step) -> None:
         """The size of the loads in the step."""
         before, target = self._sizes_before, self._sizes_at(step.load_time)
-        self._sizes_at_end = before + step.toward * (target - before)
+        self._sizes_at_end = before + step.fraction * (target - before)
         self._sizes = before + step.at * (self._sizes_at_end - before)
         self._ψ0 = step.q0[self._dofs[:, 2]]
 
@@ -175,9 +168,6 @@ class FollowerLoads:
         x, y = self._sizes[:, 0], self._sizes[:, 1]
         return cos * x - sin * y, sin * x + cos * y
 
-    def loops(self) -> None:
-        """None: follower loads are evaluated in Python."""
-
     def add_residual(self, q1: Array, r: Array) -> None:
         """Subtract the loads from the residual."""
         self.force = self._in_plane(q1)
@@ -190,12 +180,9 @@ class FollowerLoads:
         np.add.at(self._A.data, self._entries[1], -self._weight * x)
 
     def accept(self, q1: Array, s: Array) -> None:
-        """Work of the loads."""
-        self._ledger.supplied["loads"] += float(self._acting(self._before, self.force) @ s)
-        self._before, self._sizes_before = self.force, self._sizes_at_end
-
-    def add_state(self, q: Array) -> None:
-        """Loads hold no energy; what a potential would hold is in their work."""
+        """Enter the work of the loads, and take their sizes."""
+        super().accept(q1, s)
+        self._sizes_before = self._sizes_at_end
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The forces in the equation of the last step."""
@@ -248,3 +235,90 @@ def _along_beams(per_beam: npt.NDArray[Any], share: Share) -> Array:
     forces = np.zeros(share.size)
     np.add.at(forces, share.cell_dofs, np.kron(loads, [first, last, *between]))
     return forces
+
+
+# -- rotating frames -----------------------------------------------------------------------------
+
+
+@stated
+def _turned_mass(of: Element) -> ufl.Form:
+    (u, _), (w_u, _) = split(ufl.TrialFunction(of.space)), split(of.w)
+    return of.inertia[0] * ufl.dot(turn(u), w_u) * of.dx_of_mass()
+
+
+def turned_mass_matrix(fields: Fields) -> Csr:
+    """Mass times a quarter turn of velocities, so that 2 Ω of it times them is Coriolis' force."""
+    share, G = fields.share, fields.assembled(_turned_mass(fields.element))
+    scene = share.grid.scene
+    lumps = [(share.at(one.place), one.mass) for one in scene.masses]
+    lumps += [(share.at(one.middle), one.mass) for one in scene.bodies]
+    for dofs, mass in lumps:
+        if share.owns(dofs[:2]).all():
+            u, v = share.local(dofs[:2])
+            G.data[G.positions(np.array([u, v]), np.array([v, u]))] += (-mass, mass)
+    return G
+
+
+class FrameForces(LoadTerm):
+    """Centrifugal and Coriolis forces; the first have a potential, the second do no work.
+
+    Rotary inertia keeps its spin in steady rotation, so no moments come of it.
+    """
+
+    def __init__(
+        self, frame: RotatingFrame, fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr
+    ) -> None:
+        share = fields.share
+        super().__init__(share, scheme, ledger)
+        S, G = mass_matrix(fields), turned_mass_matrix(fields)
+        S.data[np.isin(S.rows(), share.rotations())] = 0.0
+        S.data *= frame.rate**2
+        G.data *= 2 * frame.rate if scheme.dynamic else 0.0
+        self._S, self._G, self._pull, self._turn = S.data, G.data, Product(S), Product(G)
+        self._from_centre = _positions(fields, frame.about)
+        self._A, self._share_of_end, self._grown = A, scheme.load_weight, 0.0
+
+    def begin(self, step: Step) -> None:
+        """Remember the beginning, and how much of the forces acts."""
+        self._q0, self._dt = step.q0, step.dt
+        growth = step.fraction * (1.0 - self._grown)
+        self._growth, self._growth_at_end = self._grown + step.at * growth, self._grown + growth
+
+    def carry_on(self, t: float, q: Array) -> Array:
+        """The forces at ``q``; take that state as one that is in equilibrium with them."""
+        self._grown = 1.0
+        self.force = self._before = self._pull(self._from_centre + q)
+        return self.force
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Subtract centrifugal and Coriolis forces from the residual."""
+        q: Array = self._q0 + self._share_of_end * (q1 - self._q0)
+        self.force = self._growth * self._pull(self._from_centre + q)
+        r -= self.force
+        r += self._turn(q1 - self._q0) / self._dt
+
+    def add_tangent(self, q1: Array) -> None:
+        """Subtract the derivative of the forces from the tangent."""
+        self._A.data -= self._growth * self._share_of_end * self._S
+        self._A.data += self._G / self._dt
+
+    def accept(self, q1: Array, s: Array) -> None:
+        """Enter the work of the centrifugal forces, and take how much of them acts."""
+        super().accept(q1, s)
+        self._grown = self._growth_at_end
+
+    def remember(self, memory: Memory, q: Array) -> None:
+        """The forces in the equation of the last step, and how much of them acts."""
+        self.force = self._before = memory.added("rotating frame", self._before)
+        self._grown = memory.number("growth of the rotating frame", self._grown)
+
+
+def _positions(fields: Fields, about: tuple[float, float]) -> Array:
+    """Vectors from a point to the places of all displacements; (size,); m."""
+    share = fields.share
+    grid, x = share.grid, np.zeros(share.grid.size)
+    centers = np.array([body.center for body in grid.scene.rigid_bodies]).reshape(-1, 2)
+    # Beams last: those joined to the ground share its displacement, not the place of its centre.
+    points = np.concatenate([centers, grid.points]) - about
+    x[np.concatenate([grid.dofs_of_bodies, grid.dofs])[:, :2]] = points
+    return np.asarray(x[share.dofs])

@@ -20,7 +20,7 @@ from ufl_beam.model import law_functions
 from ufl_beam.model.fibres import Layout
 from ufl_beam.model.material_laws import Bulk, Softening
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.openings import NOTHING, RELEASED, SPENT, Course
+from ufl_beam.terms.openings import NOTHING, RELEASED, SPENT, SearchFlags
 
 law_functions.where.register(Condition, ufl.conditional)
 law_functions.below.register(Expr, ufl.lt)
@@ -57,17 +57,8 @@ def point_forms(bulk: type[Bulk], softening: Softening | None, scheme: Scheme) -
 class PointForms:
     """Compiled laws: C functions from the inputs of a point to what the loops need.
 
-    Args:
-        statement: Law of the bulk.
-        softening: Law of the discontinuities, if points can break; its numbers do not matter.
-        scheme: The time scheme.
-
-    Attributes:
-        bulk: Stress of a point that does not open, and its derivative.
-        opening: The same of a point that opens, its growth being known.
-        excess: What the bulk bears more than the discontinuity resists, and its derivative by the
-            growth.
-        end: What the end of the step brings, see ``point_output`` in loops.h.
+    They are the stress of the bulk, that of a point that opens by a known growth, and the excess of
+    the bulk over the discontinuity, each with its derivative; and ``point_output`` of loops.h.
     """
 
     def __init__(self, statement: type[Bulk], softening: Softening | None, scheme: Scheme) -> None:
@@ -119,14 +110,13 @@ class Points:
 
     Args:
         layout: The points of a cell.
-        keys: For each cell two numbers that random limits depend on, besides their seed.
+        keys: See :meth:`Layout.bulk`.
         length: Of the cells; (cells,); m.
         scheme: The time scheme.
         storage: Zeros, for all that is known of the points; (cells, n, number of inputs).
-        course: Shared by all points of a scene.
+        search: Shared by all points of a scene.
 
     Attributes:
-        softens: Whether they can open.
         strains: Of the cells at the latest response; (cells, 3); may be written to.
         r, D: The latest response, see :meth:`respond`.
         points: What the loops over the points take, see loops.h.
@@ -146,9 +136,9 @@ class Points:
         length: Array,
         scheme: Scheme,
         storage: Array,
-        course: Course | None = None,
+        search: SearchFlags | None = None,
     ) -> None:
-        course = course or Course()
+        search = search or SearchFlags()
         self._forms = point_forms(layout.statement, layout.softening, scheme)
         self._layout, self._storage, self._loss = layout, storage, scheme.loss
         self._yields, self.softens = layout.yields, layout.softening is not None
@@ -179,16 +169,16 @@ class Points:
             np.ascontiguousarray(x, dtype=np.float64)
             for x in (layout.strains, layout.weights, layout.rest)
         )
-        self._course, forms = course, self._forms
+        self._search, forms = search, self._forms
         self._alive = [
             *map(doubles, (B, weights, rest, np.ascontiguousarray(length))),
             *map(doubles, (self._e0, self.strains, storage, self.r, self.D, self.kept, self.sums)),
-            integers(course.flags),
+            integers(search.flags),
             doubles(self._over),
         ]
         self.points = c = ffi.new("points *")
         c.B, c.weight, c.rest, c.length = self._alive[:4]
-        c.e0, c.e1, c.w, c.r, c.D, c.kept, c.sum, c.course, c.over = self._alive[4:]
+        c.e0, c.e1, c.w, c.r, c.D, c.kept, c.sum, c.search, c.over = self._alive[4:]
         c.bulk, c.opening, c.excess, c.end = forms.bulk, forms.opening, forms.excess, forms.end
         c.cells, c.of_cell, c.width, c.theta = *storage.shape, scheme.theta
 
@@ -239,11 +229,7 @@ class Points:
         flows[flows == RELEASED] = 0.0
 
     def remaining(self, change: Array) -> Array:
-        """Part of the elastic stiffness that is left in the latest response; (cells,).
-
-        Args:
-            change: Small changes of the strains of the cells; (cells, 3).
-        """
+        """Part of the elastic stiffness that is left for small changes of the strains; (cells,)."""
         layout, stiffness = self._layout, self._at["theta"][0, 0] * self._at["stiffness"]
         by_point = change @ layout.strains.T
         elastic = self._at["theta"][0, 0] * change**2 @ layout.rest

@@ -37,8 +37,8 @@ processes.
 """
 
 
-OPENED, RELIEF, HOLD, OVER = (lib.OPENED, lib.RELIEF, lib.HOLD, lib.OVER)
-"""Entries of :attr:`Course.flags`."""
+OPENED, STIFF, HOLD, OVER = (lib.OPENED, lib.STIFF, lib.HOLD, lib.OVER)
+"""Entries of :attr:`SearchFlags.flags`."""
 
 
 SPENT, NOTHING = 1e-6, 1e-30
@@ -48,17 +48,17 @@ RELEASED = float(lib.RELEASED)
 """Value of "flows" of a point that may open in this step although it did not flow in the last."""
 
 
-class Course:
+class SearchFlags:
     """Flags that all points of a scene share in a step.
 
     Attributes:
         flags: Of the present search for an equilibrium; (4,), int32.  OPENED: a point has opened.
-            RELIEF: points that do not open answer elastically.  HOLD: points that do not flow stay
+            STIFF: points that do not open answer elastically.  HOLD: points that do not flow stay
             closed.  OVER: one of them has borne more than its limit.
     """
 
     def __init__(self) -> None:
-        self.flags: Index = np.zeros(lib.COURSE_FLAGS, dtype=np.int32)
+        self.flags: Index = np.zeros(lib.SEARCH_FLAGS, dtype=np.int32)
         self._first: tuple[Index, Index] = (self.flags.copy(), self.flags.copy())
         self._first[True][HOLD] = 1
 
@@ -71,9 +71,9 @@ class Course:
         """True if a point of this process has opened."""
         return bool(self.flags[OPENED])
 
-    def relieve(self, relief: bool) -> None:
+    def stiffen(self, stiff: bool) -> None:
         """Let points that do not open answer elastically, or no more."""
-        self.flags[RELIEF] = relief
+        self.flags[STIFF] = stiff
 
 
 class Openable(Protocol):
@@ -91,47 +91,40 @@ class Openable(Protocol):
 
 
 class Openings:
-    """Solves a step with what does not flow held closed, then lets open what bears too much.
+    """Solves a step with what does not flow held closed, then lets open what bears too much."""
 
-    Args:
-        course: Flags that all places share.
-        places: Those of this process.
-        comm: Processes that share the scene.
-    """
-
-    def __init__(self, course: Course, places: Sequence[Openable], comm: MPI.Intracomm) -> None:
-        self._course, self._places, self._comm = course, places, comm
+    def __init__(
+        self, search: SearchFlags, places: Sequence[Openable], comm: MPI.Intracomm
+    ) -> None:
+        self._search, self._places, self._comm = search, places, comm
         self._parallel, self._released = comm.size > 1, False
 
     @classmethod
-    def of(cls, course: Course, places: Sequence[Openable], comm: MPI.Intracomm) -> Openings | None:
+    def of(
+        cls, search: SearchFlags, places: Sequence[Openable], comm: MPI.Intracomm
+    ) -> Openings | None:
         """The openings of a scene; none if no process has a place that may open."""
-        one = cls(course, places, comm)
+        one = cls(search, places, comm)
         return one if one._largest(float(bool(places))) else None
 
     def solve(
         self, guess: Array, solve: Callable[[Array], Array], again: Callable[[], None]
     ) -> Array:
-        """Find the equilibrium of a step.
-
-        Args:
-            guess: Configuration where the search begins.
-            solve: Finds an equilibrium from a configuration; raises :class:`StepFailed`.
-            again: Begins the step again.
+        """Find the equilibrium of a step from a guess; ``again`` begins the step again.
 
         Raises:
             StepFailed: There is none, neither with places held closed nor with all of them free.
         """
-        course = self._course
-        course.begin(hold=True)
+        search = self._search
+        search.begin(hold=True)
         try:
             q = solve(guess)
-            return self._open_few(q, solve) if self._parallel or course.flags[OVER] else q
+            return self._open_few(q, solve) if self._parallel or search.flags[OVER] else q
         except StepFailed:
-            if not self._largest(float(course.flags[OVER])):
+            if not self._largest(float(search.flags[OVER])):
                 raise  # nothing would open
         finally:
-            course.begin(hold=False)
+            search.begin(hold=False)
             if self._released:
                 self._released = False
                 for one in self._places:

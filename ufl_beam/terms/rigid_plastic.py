@@ -34,23 +34,14 @@ and motion at t_n, which loops.h names as well; numbers of the scheme and the la
 
 
 class Slip(NamedTuple):
-    """A law of slip over a step, in UFL.
+    """A law of slip over a step, in UFL; J, forces in N or N m."""
 
-    Attributes:
-        force: Force in the direction of the motion that acts in the step; N or N m.
-        dissipated: Energy dissipated in the step; J.
-        lost: Energy lost numerically by backward Euler, over ``2 alpha`` of the scheme; J.
-        stored: Energy stored at the end; J.
-        limit: Force beyond the back force up to which the motion is held after the step; N or N m.
-        back_force: Force about which the limit lies after the step; N or N m.
-    """
-
-    force: Expr
-    dissipated: Expr
-    lost: Expr
-    stored: Expr
-    limit: Expr
-    back_force: Expr
+    force: Expr  # that acts in the step, in the direction of the motion
+    dissipated: Expr  # in the step
+    lost: Expr  # numerically by backward Euler, over ``2 alpha`` of the scheme
+    stored: Expr  # at the end
+    limit: Expr  # force beyond the back force up to which the motion is held after the step
+    back_force: Expr  # force about which the limit lies after the step
 
 
 @singledispatch
@@ -82,23 +73,6 @@ def _(law: Hardening, at: Mapping[str, Expr], scheme: Scheme) -> Slip:
     )
 
 
-@singledispatch
-def numbers_of(law: Any) -> dict[str, float]:
-    """Numbers of a law by their names in :data:`INPUTS`."""
-    raise TypeError(f"{law!r} is no law of a hinge")
-
-
-@numbers_of.register
-def _(law: Softening) -> dict[str, float]:
-    return {"limit": law.limit, "energy": law.energy}
-
-
-@numbers_of.register
-def _(law: Hardening) -> dict[str, float]:
-    eta = float(law.viscosity.coefficient(np.ones(1))[0])
-    return {"limit": law.limit, "H": law.modulus, "B": law.kinematic, "eta": eta}
-
-
 EARLY = 0.01
 """Motion, in rad or as a part of the scene, that counts as much as the limit in deciding whether a
 connector slips in an iterate; solutions do not depend on it."""
@@ -124,12 +98,7 @@ def _slope(link: Connector, size: float) -> float:
 
 
 class SlipForms:
-    """Compiled laws of slip: C functions of :data:`INPUTS`; see :func:`slip_forms`.
-
-    Attributes:
-        force: Force in the step, and its derivative by the slip.
-        end: Numbers that the end of the step brings, see ``slip_output`` in loops.h.
-    """
+    """Compiled laws of slip: force and its derivative by the slip; ``slip_output`` of loops.h."""
 
     def __init__(self, law: Softening | Hardening, scheme: Scheme) -> None:
         self._pointwise = pointwise = Pointwise(INPUTS)
@@ -153,7 +122,7 @@ class RigidPlasticResponse(Response):
     """Rigid-plastic connectors whose laws are of one kind."""
 
     def __init__(self, law: RigidPlastic, links: Sequence[Connector], setting: Setting) -> None:
-        self._links = links
+        super().__init__(links)
         n, ledger = len(links), setting.ledger
         self._ledger, self._scheme = ledger, setting.scheme
         ledger.lost["hinges"] += 0.0
@@ -166,7 +135,7 @@ class RigidPlasticResponse(Response):
         self._storage = np.zeros((n, len(INPUTS)))
         self._at = {name: self._storage[:, i] for i, name in enumerate(INPUTS)}
         for i, link in enumerate(links):
-            for name, value in numbers_of(law_of(link)).items():
+            for name, value in law_of(link).numbers(np.ones(())).items():
                 self._at[name][i] = value
         self._at["θ"][:], self._at["dt"][:] = setting.scheme.theta, 1.0
         self._limit, self._back_force = self._at["limit"].copy(), np.zeros(n)
@@ -184,8 +153,8 @@ class RigidPlasticResponse(Response):
         ]
         c.w, c.limit, c.back_force, c.dissipated, c.rows, c.slope = self._alive[:6]
         c.excess, c.slipped, c.way = self._alive[6:]
-        self._course = integers(setting.course.flags)
-        c.course = self._course
+        self._search = integers(setting.search.flags)
+        c.search = self._search
         self.in_c = {"rigid_plastic": c}
 
     # -- the step ------------------------------------------------------------------------------
@@ -193,7 +162,7 @@ class RigidPlasticResponse(Response):
     def begin(self, e0: Array, step: Step) -> None:
         """Begin a step: connectors that slipped in the last one go on."""
         self._at["dt"][:] = step.dt
-        self._way[:] = self._way_before
+        self.again()
 
     def rows(self, e1: Array, λ: Array) -> Rows:
         """Rows of the latest iterate, which C has set."""
@@ -238,10 +207,6 @@ class RigidPlasticResponse(Response):
     def motion(self, e: Array) -> Array:
         """Motions without the round-off of those that are held."""
         return self._at["start"].copy()
-
-    def change(self, e1: Array, work: float) -> float:
-        """Energy stored and dissipated in the step: the work; J."""
-        return work
 
     def dissipation(self, e1: Array, λ: Array) -> float:
         """Energy dissipated in a step to the motions ``e1``, positive where one would slip; J."""

@@ -23,7 +23,7 @@ class _Sprung(Response):
     """Springs of one law: material points whose strain is the motion."""
 
     def __init__(self, law: Spring, links: Sequence[Connector], setting: Setting) -> None:
-        self._links = links
+        super().__init__(links)
         layout = Layout(
             strains=np.array([[1.0, 0.0, 0.0]]),
             weights=np.ones(1),
@@ -36,7 +36,7 @@ class _Sprung(Response):
         number = len(links)
         keys = [(0, i) for i in range(number)]
         storage = np.zeros((number, 1, len(inputs(layout.statement))))
-        self.points = Points(layout, keys, np.ones(number), setting.scheme, storage, setting.course)
+        self.points = Points(layout, keys, np.ones(number), setting.scheme, storage, setting.search)
         self._ledger = setting.ledger
         expect_entries(layout, setting.scheme, setting.ledger)
         self._strains = np.zeros((number, 3))

@@ -27,18 +27,13 @@ class TurnedAxes:
         self._rows = [slice(A.indptr[d], A.indptr[d + 1]) for d in dofs]
         self._columns = [np.flatnonzero(A.indices == d) for d in dofs]
 
-    def enter(self, x: Array) -> None:
-        """Transform from the axes of the plane to the turned axes, in place."""
-        i, j, c, s = self._i, self._j, self._c, self._s
+    def turn(self, x: Array, way: int) -> None:
+        """Transform to the turned axes (1) or to the axes of the plane (-1), in place."""
+        i, j, c, s = self._i, self._j, self._c, way * self._s
         x[i], x[j] = c * x[i] + s * x[j], c * x[j] - s * x[i]
 
-    def leave(self, x: Array) -> None:
-        """Transform from the turned axes to the axes of the plane, in place."""
-        i, j, c, s = self._i, self._j, self._c, self._s
-        x[i], x[j] = c * x[i] - s * x[j], c * x[j] + s * x[i]
-
-    def enter_matrix(self, data: Array) -> None:
-        """Rows and columns of a matrix to the turned axes, in place."""
+    def turn_matrix(self, data: Array) -> None:
+        """Transform rows and columns of a matrix to the turned axes, in place."""
         c, s = self._c, self._s
         # Both dofs belong to the same cells, so their rows, and their columns, have one sparsity.
         for i, j in (self._rows, self._columns):
@@ -58,14 +53,13 @@ class Supports:
         entries: Entries of the matrix that hold them, and those of them on the diagonal.
         pivots: What stands on the diagonal.
         moving: Local degrees of freedom whose values depend on time.
-        work: Whether there are such anywhere in the scene.
     """
 
     def __init__(self, share: Share, scheme: Scheme, ledger: Ledger, A: Csr) -> None:
         self._turned: list[TurnedAxes] = []
         held: list[int] = []
         self._motions: list[tuple[int, TimeFunction, Support]] = []
-        if GROUND in share.grid.scene.movers:
+        if GROUND in share.grid.scene.rigid_bodies:
             held.extend(share.local(share.at(GROUND.middle)))
         for support in share.grid.scene.supports:
             dofs = share.at(support.place)
@@ -88,6 +82,7 @@ class Supports:
         self.pivots: Array = np.ones(len(self.dofs))
         self._owned = self.dofs < share.num_owned
         self._acting, self._ledger = scheme.acting, ledger
+        # True if values depend on time anywhere in the scene
         self.work = any(support.moving for support in share.grid.scene.supports)
         if self.work:
             ledger.supplied["supports"] += 0.0
@@ -102,34 +97,30 @@ class Supports:
     def enter(self, x: Array) -> None:
         """Transform from the axes of the plane to those of the supports, in place."""
         for axes in self._turned:
-            axes.enter(x)
+            axes.turn(x, 1)
 
     def leave(self, x: Array) -> None:
         """Transform from the axes of the supports to those of the plane, in place."""
         for axes in self._turned:
-            axes.leave(x)
+            axes.turn(x, -1)
 
     def in_axes(self, q: Array) -> Array:
         """``q`` in the axes of the supports; a copy only if an axis is turned."""
-        if not self._turned:
-            return q
-        x = q.copy()
-        self.enter(x)
-        return x
+        if self._turned:
+            self.enter(q := q.copy())
+        return q
 
     def in_plane(self, x: Array) -> Array:
         """``x`` in the axes of the plane; a copy only if an axis is turned."""
-        if not self._turned:
-            return x
-        q = x.copy()
-        self.leave(q)
-        return q
+        if self._turned:
+            self.leave(x := x.copy())
+        return x
 
     def move(self, x: Array, x0: Array, step: Step) -> None:
         """Set in ``x`` what is prescribed for the step that begins at ``x0``."""
         for dof, motion, support in self._motions:
             target = value_at(motion, step.motion_time, support)
-            x[dof] = x0[dof] + step.toward * (target - x0[dof])
+            x[dof] = x0[dof] + step.fraction * (target - x0[dof])
 
     def hold(self, r: Array) -> None:
         """Note the reactions in a residual that is complete, and remove them from it."""
@@ -140,7 +131,7 @@ class Supports:
     def hold_matrix(self, data: Array) -> None:
         """Turn a tangent into the axes of the supports and hold what is held."""
         for axes in self._turned:
-            axes.enter_matrix(data)
+            axes.turn_matrix(data)
         if len(self.dofs):
             # What stands on the diagonal has the right dimension and size for what is held.
             # Where material that flows freely leaves nothing, what stood there before does as well.
@@ -171,7 +162,7 @@ class Supports:
         reactions: Array = np.zeros(len(q))
         reactions[self._held] = self._before if self._motions else self.reactions
         self.reactions[:] = memory.at_dofs("reactions", reactions)[self._held]
-        self._before = self.reactions.copy()
+        self.take()
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The reactions, and what stands for what is held in the tangent."""

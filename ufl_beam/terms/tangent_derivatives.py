@@ -12,22 +12,17 @@ import ufl
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import Kernel, stated
+from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.dolfinx_compat import fem
-
-Compile = Callable[[ufl.Form], Kernel]
+from ufl_beam.terms.base import Beams
 
 
 class TangentChange:
-    """Derivative of a tangent by the configuration, along a direction.
+    """Derivative of a tangent along a direction u, from its bilinear form."""
 
-    Args:
-        change: Bilinear form of the derivative.
-        u: The direction.
-        kernel: Compiles a form.
-        A: Matrix that takes the derivative.
-    """
-
-    def __init__(self, change: ufl.Form, u: fem.Function, kernel: Compile, A: Csr) -> None:
+    def __init__(
+        self, change: ufl.Form, u: fem.Function, kernel: Callable[[ufl.Form], Kernel], A: Csr
+    ) -> None:
         self._u, self._A, self._kernel = u, A, kernel(change)
         self._kernel.place(A)
 
@@ -62,58 +57,60 @@ def _works(work: ufl.Form, q1: fem.Function) -> _Works:
     return _Works(action, change, ufl.derivative(tangent, q1, u), x, y, u)
 
 
-class CellTangent:
-    """Tangent of the beams: its derivative as a matrix, and the works of both on two motions.
+class Cells(Beams):
+    """Beams whose tangent is known by its works on two motions, too.
 
     Works are summed over cells from the strains of the motions.  The entries of a matrix have the
     round-off of axial and shear stiffness, in which the bending of slender cells would be lost.
-
-    Args:
-        work: Virtual work.
-        q1: The configuration that it depends on.
-        kernel: Compiles a form; ``q1`` is the configuration that changes.
-        A: Matrix that takes the derivative.
     """
 
-    def __init__(self, work: ufl.Form, q1: fem.Function, kernel: Compile, A: Csr) -> None:
-        self._forms, self._compile, self._A = _works(work, q1), kernel, A
-        self._values: dict[fem.Function, Array] = {}
+    _work_form: ufl.Form
+    _q1: fem.Function
+    _fields: Fields
+    _A: Csr
+
+    def _coefficients(self, q1: Array) -> dict[fem.Function, Array]:
+        """Values in the cells, at ``q1``, of what the virtual work depends on besides."""
+        return {}
+
+    def _kernel(self, form: ufl.Form) -> Kernel:
+        return self._fields.kernel(form, self._q1)
+
+    @cached_property
+    def _works(self) -> _Works:
+        return _works(self._work_form, self._q1)
 
     @cached_property
     def _matrix(self) -> TangentChange:
-        return TangentChange(self._forms.matrix, self._forms.u, self._compile, self._A)
+        return TangentChange(self._works.matrix, self._works.u, self._kernel, self._A)
 
     @cached_property
     def _of_tangent(self) -> Kernel:
-        return self._compile(self._forms.tangent)
+        return self._kernel(self._works.tangent)
 
     @cached_property
     def _of_change(self) -> Kernel:
-        return self._compile(self._forms.change)
+        return self._kernel(self._works.change)
 
-    def put(self, function: fem.Function, values: Array) -> None:
-        """Give a coefficient values in the cells."""
-        self._values[function] = values
-
-    def add_change(self, q1: Array, u: Array) -> None:
-        """Add the derivative at ``q1`` along ``u`` to the matrix."""
-        for function, values in self._values.items():
+    def add_tangent_change(self, q1: Array, u: Array) -> None:
+        """Add the derivative of the tangent at ``q1`` along ``u``."""
+        for function, values in self._coefficients(q1).items():
             self._matrix.put(function, values)
         self._matrix.add(q1, u)
 
-    def work(self, q1: Array, x: Array, y: Array) -> float:
-        """Work of the tangent at ``q1`` for the motion x on y; J."""
+    def tangent_work(self, q1: Array, x: Array, y: Array) -> float:
+        """Return the work of the tangent for the motion x on y; J."""
         return self._value(self._of_tangent, q1, x, y)
 
     def work_of_change(self, q1: Array, u: Array, x: Array, y: Array) -> float:
-        """Work of the derivative of the tangent at ``q1`` along u, for the motion x on y; J."""
-        self._of_change.set(self._forms.u, u)
+        """Return the work of the derivative of the tangent along u, for x on y; J."""
+        self._of_change.set(self._works.u, u)
         return self._value(self._of_change, q1, x, y)
 
     def _value(self, kernel: Kernel, q1: Array, x: Array, y: Array) -> float:
-        for function, values in self._values.items():
+        for function, values in self._coefficients(q1).items():
             if kernel.uses(function):
                 kernel.put(function, values)
-        kernel.set(self._forms.x, x)
-        kernel.set(self._forms.y, y)
+        kernel.set(self._works.x, x)
+        kernel.set(self._works.y, y)
         return kernel.value(q1)

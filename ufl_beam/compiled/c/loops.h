@@ -101,12 +101,12 @@ enum point_output {
 
 enum { POINT_KEPT = 6, POINT_SUMS = 7 }; /* numbers of a cell, and of all: `kept` and `sum` of points */
 
-/* Flags that all points of a scene share in a step; see Course in material_points.py. */
-enum course { OPENED, RELIEF, HOLD, OVER, COURSE_FLAGS };
+/* Flags that all points of a scene share in a step; see SearchFlags in material_points.py. */
+enum search { OPENED, STIFF, HOLD, OVER, SEARCH_FLAGS };
 
 /* Points in cells, `of_cell` in each, with `width` numbers of each in w; see material_points.py. */
 typedef struct {
-  int32_t *course;
+  int32_t *search;
   kernel *bulk, *opening, *excess, *end;
   int cells, of_cell, width;
   const double *B, *weight, *rest, *length;
@@ -133,7 +133,7 @@ enum slip_output {
 
 /* Rigid-plastic connectors, see rigid_plastic.py. */
 typedef struct {
-  int32_t *course;             /* as that of points */
+  int32_t *search;             /* as that of points */
   kernel *force, *end;         /* force of a slip and its derivative; what the end of a step brings */
   int number, width;
   double *w;                   /* what the kernels know, `width` numbers of each connector */
@@ -265,7 +265,7 @@ typedef struct {
   int held, zeros; /* degrees of freedom and entries that supports hold */
   const int32_t *hold, *zero, *pivot; /* pivot: the entry of each that is held on the diagonal */
   double *reactions, *pivots;
-  int idle; /* motions that the tangent holds, their entries and stiffnesses, see idle_motions.py */
+  int idle; /* motions that the tangent holds, their entries and stiffnesses, see null_vectors.py */
   const int32_t *idle_entry;
   const double *idle_stiffness;
 

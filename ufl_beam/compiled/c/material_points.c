@@ -42,11 +42,11 @@ static double growth(kernel *excess, double *w)
 
 /* Resultants r of cells whose strains grow from e0 to e1, and their derivatives D.
  *
- * `course` notes that a point opens, and may ask for relief: then points that do not open answer
+ * `search` notes that a point opens, and may ask for stiff points: those that do not open answer
  * with their elastic stiffness. Where one opens, those around it unload, which their own tangents
  * do not tell, and Newton's method would close what it just opened, again and again.
  *
- * While `course` asks to hold, closed points stay closed whatever they bear, and `over` is the
+ * While `search` asks to hold, closed points stay closed whatever they bear, and `over` is the
  * largest of |stress| / limit - 1 of those that bear more than their limit, else zero.
  */
 void respond(const points *p)
@@ -66,15 +66,15 @@ void respond(const points *p)
       w[GROWTH] = w[DIRECTION] = 0;
       ask(p->bulk, w, 2, s);
       const int over = fabs(s[0]) > w[TRACTION]; /* P(51) */
-      if (over && p->course[HOLD] && w[FLOWS] == CLOSED && w[TRACTION] > 0) {
+      if (over && p->search[HOLD] && w[FLOWS] == CLOSED && w[TRACTION] > 0) {
         *p->over = fmax(*p->over, fabs(s[0]) / w[TRACTION] - 1);
-        p->course[OVER] = 1;
+        p->search[OVER] = 1;
       } else if (over) {
         w[DIRECTION] = s[0] < 0 ? -1 : 1;
         w[GROWTH] = growth(p->excess, w);
         ask(p->opening, w, 2, s);
-        p->course[OPENED] = 1;
-      } else if (p->course[RELIEF]) {
+        p->search[OPENED] = 1;
+      } else if (p->search[STIFF]) {
         s[1] = p->theta * w[STIFFNESS];
       }
       for (int k = 0; k < 3; ++k) {

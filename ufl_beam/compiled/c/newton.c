@@ -78,12 +78,6 @@ int judge(equation *e, const double *q, int iteration, double residual, double s
   return e->slow == e->patience ? STALLED : ITERATING;
 }
 
-/* Largest motion in the scene, at most its size. */
-static double motion_of(const equation *e, const double *q)
-{
-  return fmin(largest_motion(e->size, e->weight, q), e->scene);
-}
-
 /* Spacing of the numbers around displacements and rotations: the last digits of what they are part
  * of. Strains are computed from them to their own relative precision, as long as rotations are small.
  * The next number has the next pattern of bits. */
@@ -146,7 +140,7 @@ static int verdict(equation *e, const double *q, int iteration)
   if (!isfinite(now)) return DIVERGED;
   const double scale = e->loads + size_of_forces(e, e->inner_force);
   double floor = 0;
-  if (iteration > 1 || e->demands) e->moved = motion_of(e, q);
+  if (iteration > 1 || e->demands) e->moved = fmin(largest_motion(e->size, e->weight, q), e->scene);
   if (iteration > 1 && (now > e->rtol * scale || e->demands)) {
     find_last_digits(e, q, e->space);
     for (int i = 0; i < e->size; ++i) e->space[i] *= e->tangent[e->diagonal[i]];

@@ -22,10 +22,10 @@ static int direction_of_slip(const rigid_plastic *p, int i, double *w, double mo
   double s[2];
   p->excess[i] = 0;
   if (limit == 0) return motion < 0 ? -1 : 1;
-  if (p->course[HOLD] && p->slipped[i] == CLOSED) {
+  if (p->search[HOLD] && p->slipped[i] == CLOSED) {
     if (fabs(tested) > limit) {
       p->excess[i] = fabs(tested) / p->limit[i] - 1;
-      p->course[OVER] = 1;
+      p->search[OVER] = 1;
     }
     return 0;
   }
@@ -37,7 +37,7 @@ static int direction_of_slip(const rigid_plastic *p, int i, double *w, double mo
     ask(p->force, w, 2, s);
     if (!(way * (force + p->slope[i] * motion - s[0]) > 0)) return 0;
   }
-  p->course[OPENED] = 1;
+  p->search[OPENED] = 1;
   return way;
 }
 
@@ -78,8 +78,8 @@ double dissipation_of_rigid_plastic(const rigid_plastic *p, const double *e1, co
   return sum;
 }
 
-/* Take the motions e1 as the new state, those of held connectors as they were; sums get what the step dissipated and lost numerically, and
- * what the connectors store. */
+/* Take the motions e1 as the new state, those of held connectors as they were; sums get what the step
+ * dissipated and lost numerically, and what the connectors store. */
 void commit_rigid_plastic(const rigid_plastic *p, const double *e1, double *sums)
 {
   double *w = p->w, s[SLIP_OUTPUTS];

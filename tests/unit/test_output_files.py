@@ -495,7 +495,7 @@ KILLED = """
 import sys
 from pathlib import Path
 sys.path[:0] = sys.argv[2:]
-from test_outputs import fields, writer_of
+from test_output_files import fields, writer_of
 writer = writer_of(Path(sys.argv[1]))
 k = 0
 while True:

@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
-from test_agreement import MPIRUN, needs_mpirun
+from test_collective_errors import MPIRUN, needs_mpirun
 
 import ufl_beam as ub
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.parallel import ours
+from ufl_beam.parallel import active_comm
 
 COMM = MPI.COMM_WORLD
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
@@ -132,7 +132,7 @@ def test_a_member_has_its_process_for_itself(shared_path):
         # A header, the initial state and five steps
         assert len((shared_path / f"{case['force']}.csv").read_text().splitlines()) == 7
         assert (shared_path / f"{case['force']}.xdmf").exists()
-    assert ours() == COMM
+    assert active_comm() == COMM
     simulation = ub.Simulation(post(), ub.Midpoint())
     assert simulation.comm.size == COMM.size
     simulation.close()
@@ -173,7 +173,7 @@ def test_a_failed_member_is_reported_and_not_fatal(capsys):
         "  failed: {'x': 3}: SceneError: x = 3 is no scene\n"
     )
     assert capsys.readouterr().out == (said if COMM.rank == 0 else "")
-    assert ours() == COMM
+    assert active_comm() == COMM
 
 
 def test_a_simulation_that_fails():
@@ -292,7 +292,7 @@ def test_the_file_is_written_on_the_way(tmp_path):
     kept = ub.Study.load(path)
     assert kept.cases == ({"x": 0}, {"x": 1})  # also what came less than 20 writings ago
     assert (kept["found"] == [0, 1]).all()  # the first member at once
-    assert ours() == COMM
+    assert active_comm() == COMM
 
 
 # -- errors ------------------------------------------------------------------------------------
@@ -331,7 +331,7 @@ def test_calls(member, cases, says):
 def test_what_members_return(returned, says):
     with raises("study: {'x': 0}", *says):
         ub.study(lambda x: returned, numbers(0))
-    assert ours() == COMM
+    assert active_comm() == COMM
 
 
 @pytest.mark.parametrize("other", [{"u": 1.0}, {"v": [1.0, 2]}, {"u": 1.0, "w": 2.0}])

@@ -133,8 +133,8 @@ SECOND = """
 import sys
 from pathlib import Path
 sys.path.insert(0, sys.argv[2])
-import test_locks
-test_locks.run(Path(sys.argv[1]), test_locks.Within(lambda: None))
+import test_file_locks
+test_file_locks.run(Path(sys.argv[1]), test_file_locks.Within(lambda: None))
 """
 
 

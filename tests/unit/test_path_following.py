@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.parallel import ours
+from ufl_beam.parallel import active_comm
 from ufl_beam.plotting.drawing import evenly
 
 EA, WIDTH, HEIGHT = 1e6, 4.0, 1.0  # N, m, m: half a truss
@@ -159,7 +159,7 @@ def test_a_limit_point_has_no_branch():
 def test_recorders_write_paths(tmp_path):
     """Rows of a history are the states of the path, critical points among them."""
     apex, scene = truss()
-    file = tmp_path / "path.csv" if ours().size == 1 else None
+    file = tmp_path / "path.csv" if active_comm().size == 1 else None
     record = [ub.History(file, [apex])] if file else []
     path = ub.follow(scene, ub.ArcLength(0.1), steps=12, record=record)
     assert len(path.factor) == 13
@@ -364,11 +364,11 @@ def test_load_factors_are_not_called_times(tmp_path):
     top, scene = softening_row(1)
     events = ub.Events()
     table = tmp_path / "path.csv"
-    record = [events, ub.History(table, [top])] if ours().size == 1 else [events]
+    record = [events, ub.History(table, [top])] if active_comm().size == 1 else [events]
     path = ub.follow(scene, ub.ArcLength(5e-3, factor=2e4), steps=6, record=record)
     assert "load factor 0 to" in str(path)
     assert "t =" not in str(path)
-    if ours().size == 1:
+    if active_comm().size == 1:
         assert table.read_text().startswith("load factor [-],")
     for figure in (ub.plot_history(path, top), ub.plot_energy(path), ub.plot(path)):
         texts = [a.get_xlabel() + a.get_title(loc="left") for a in figure.axes]

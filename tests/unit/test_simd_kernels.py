@@ -42,7 +42,7 @@ def both(expression, values):
     one, several = np.zeros((2, len(q)))
     kernel.add(q, one)
     in_lanes(kernel)
-    assert kernel.vectorised
+    assert kernel.cells.lanes > 1
     kernel.add(q, several)
     return one, several
 
@@ -102,7 +102,7 @@ def test_expressions(expression, cells):
 def test_what_vectors_cannot_is_computed_cell_by_cell(expression, meant):
     kernel, q = pointwise(expression, np.linspace(-1.0, 2.0, 5))
     in_lanes(kernel)
-    assert not kernel.vectorised
+    assert kernel.cells.lanes == 1
     values = np.zeros(len(q))
     kernel.add(q, values)
     assert np.allclose(values, meant(q), rtol=1e-14)
@@ -135,7 +135,7 @@ def test_wrong_vectors_are_found_once(fresh, monkeypatch, caplog):
     for told in (["WARNING", "INFO"], ["INFO"]):
         kernel, q = pointwise(ufl.sin, np.linspace(0.1, 1.0, 5))
         in_lanes(kernel)
-        assert not kernel.vectorised
+        assert kernel.cells.lanes == 1
         assert [record.levelname for record in caplog.records] == told
         assert "entries are not those of FFCx's kernel" in caplog.text
         values = np.zeros(len(q))
@@ -155,7 +155,7 @@ def test_the_check_is_made_once(fresh, monkeypatch):
     for _ in range(2):
         kernel, _ = pointwise(ufl.cos, np.ones(2))
         in_lanes(kernel)
-        assert kernel.vectorised
+        assert kernel.cells.lanes > 1
         simd_kernels._addresses.clear()
     assert len(calls) == 1
 
@@ -169,7 +169,7 @@ def test_what_is_slower_is_said(fresh, caplog, monkeypatch):
     kernel, _ = pointwise(ufl.sin, np.ones(2))
     monkeypatch.setenv("CC", "no-such-compiler")
     in_lanes(kernel)
-    assert not kernel.vectorised
+    assert kernel.cells.lanes == 1
     assert "which is slower: ufl_beam_lanes cannot be compiled" in caplog.text
 
 
@@ -233,7 +233,7 @@ def test_kernels_of_the_hot_loop(run):
     compared = 0
     for term in simulation.terms:
         for name, kernel in kernels(term).items():
-            if not kernel.vectorised:
+            if kernel.cells.lanes == 1:
                 assert name == "_first"  # once a step is not often
                 continue
             several, one = np.zeros((2, kernel._rows.max() + 1))
