@@ -102,6 +102,7 @@ def test_memory_does_not_grow_with_inelastic_material():
     assert watch.objects[2_000] - watch.objects[500] == 1
 
 
+@unsanitized
 @pytest.mark.serial
 def test_a_simulation_gives_everything_back():
     """200 runs one after the other."""

@@ -89,12 +89,13 @@ class ArcLength(Control):
 
     Example:
         >>> rod = ub.Section.circle(d=0.05, E=210e9, nu=0.3)
-        >>> arch = ub.Beam.polyline([(0, 0), (2, 0.2), (4, 0)], rod)
-        >>> down = ub.PointLoad(arch.at(0.5), force=(0, -1e5), time=lambda t: t)
-        >>> shallow = ub.Scene([arch], [], [ub.Pinned(arch.start), ub.Pinned(arch.end)], [down])
-        >>> path = ub.follow(shallow, ub.ArcLength(0.1), steps=40)  # it snaps through
+        >>> half = ub.Beam((0, 0), (2, 0.2), rod, cells=8)  # of a shallow arch
+        >>> crown = ub.Prescribed(half.end, u=0, psi=0)
+        >>> down = ub.PointLoad(half.end, force=(0, -5e4), time=lambda t: t)
+        >>> arch = ub.Scene([half], supports=[ub.Pinned(half.start), crown], loads=[down])
+        >>> path = ub.follow(arch, ub.ArcLength(0.1), steps=40)  # it snaps through
         >>> print([round(point.factor, 2) for point in path.critical if point.kind == "limit"])
-        [0.56, -0.14]
+        [0.49, -0.1]
     """
 
     step: float
