@@ -18,7 +18,8 @@ from ufl_beam.compiled.simd_kernels import LANES, in_batches
 from ufl_beam.discretization.compiled_forms import Kernel, stated, vectorise
 from ufl_beam.discretization.partition import Share
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
-from ufl_beam.mechanics.kinematics import Axis, split, strain
+from ufl_beam.mechanics.functional import kinetic_energy, resultants
+from ufl_beam.mechanics.kinematics import Axis, strain
 from ufl_beam.model.mesh_options import Mesh
 
 
@@ -186,8 +187,9 @@ class Fields:
 
 @stated
 def _mass(of: Element) -> ufl.Form:
-    (u, ψ), (w_u, w_ψ), ρ = split(ufl.TrialFunction(of.space)), split(of.w), of.inertia
-    return (ρ[0] * ufl.dot(u, w_u) + ρ[1] * ψ * w_ψ) * of.dx_of_mass()  # P(67)
+    v = of.configuration()
+    momentum = ufl.derivative(kinetic_energy(v, of.inertia) * of.dx_of_mass(), v, of.w)
+    return ufl.derivative(momentum, v, ufl.TrialFunction(of.space))  # P(67)
 
 
 def mass_matrix(fields: Fields) -> Csr:
@@ -234,9 +236,8 @@ class Strains:
 
 @stated
 def _section_forces(of: Element) -> ufl.Form:
-    C, e = of.stiffness, strain(of.q1, of.axis)
-    z = ufl.TestFunction(C.function_space)
-    return sum(C[i] * e[i] * z[i] for i in range(3)) / of.axis.h * of.dx(1)  # P(7)
+    r = resultants(strain(of.q1, of.axis), of.stiffness)
+    return ufl.dot(r, ufl.TestFunction(of.stiffness.function_space)) / of.axis.h * of.dx(1)
 
 
 class SectionForces:

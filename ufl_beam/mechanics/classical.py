@@ -13,9 +13,9 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.errors import SceneError, require_number
-from ufl_beam.mechanics import kinematics
+from ufl_beam.mechanics import functional, kinematics
 from ufl_beam.mechanics.kinematics import Axis
-from ufl_beam.mechanics.time_schemes import Constant, Rates, Step, require_between, scaled
+from ufl_beam.mechanics.time_schemes import Constant, Rates, Step, require_between
 from ufl_beam.model.law_functions import Values
 from ufl_beam.model.material_laws import Softening
 
@@ -36,8 +36,8 @@ class _AtEnd:
         return kinematics.virtual_strain(q1, w, axis)
 
     def resultants(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> Expr:
-        """C e at the end of the step; the components are uncoupled."""
-        return scaled(C, e1)
+        """Those of the strains at the end of the step."""
+        return functional.resultants(e1, C)
 
     def losses(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> tuple[Expr, ...]:
         """No numerical losses in the ledger."""

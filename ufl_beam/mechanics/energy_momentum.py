@@ -13,10 +13,10 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import combined, doubles, integers, lib
-from ufl_beam.mechanics import kinematics
+from ufl_beam.mechanics import functional, kinematics
 from ufl_beam.mechanics.classical import Static
 from ufl_beam.mechanics.kinematics import Axis
-from ufl_beam.mechanics.time_schemes import Constant, Rates, Step, require_between, scaled
+from ufl_beam.mechanics.time_schemes import Constant, Rates, Step, require_between
 from ufl_beam.model.law_functions import Values
 from ufl_beam.model.material_laws import Softening
 
@@ -42,16 +42,16 @@ class _OverStep:
 
     def resultants(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> Expr:
         """The mean of both ends, and more of the end the more energy is to go."""
-        mean = scaled(C, (e0 + e1) / 2)  # P(83)
+        mean = functional.resultants((e0 + e1) / 2, C)  # P(83)
         if self.alpha == 0:
             return mean
-        return mean + constant(self.alpha) * scaled(C, e1 - e0)  # P(89)
+        return mean + constant(self.alpha) * functional.resultants(e1 - e0, C)  # P(89)
 
     def losses(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> tuple[Expr, ...]:
         """Return the energy that ``alpha`` dissipates."""
         if self.alpha == 0:
             return ()
-        return (constant(self.alpha) * ufl.dot(scaled(C, e1 - e0), e1 - e0),)  # P(90)
+        return (2 * constant(self.alpha) * functional.elastic_energy(e1 - e0, C),)  # P(90)
 
     def average(self, before: Expr, now: Expr) -> Expr:
         """The mean of both ends, of which increments are products."""

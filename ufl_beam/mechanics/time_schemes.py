@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple, Protocol, TypeGuard, runtime_checkable
 
-import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
@@ -129,11 +128,6 @@ class DynamicScheme(Scheme, Protocol):
 def has_inertia(scheme: Scheme) -> TypeGuard[DynamicScheme]:
     """Return whether the scheme is a dynamic one."""
     return scheme.dynamic
-
-
-def scaled(C: Expr, e: Expr) -> Expr:
-    """Component by component product; shape (3,)."""
-    return ufl.as_vector([C[i] * e[i] for i in range(3)])
 
 
 def require_between(what: str, value: float, low: float, high: float) -> None:

@@ -14,6 +14,7 @@ from ufl_beam.compiled.csr import Csr, StepProduct
 from ufl_beam.discretization.compiled_forms import Kernel, stated
 from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
 from ufl_beam.discretization.state_io import Memory
+from ufl_beam.mechanics.functional import elastic_energy, resultants, virtual_work
 from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, Step
 from ufl_beam.terms.base import OfForms, OfMatrix
@@ -39,16 +40,15 @@ def _elastic_forms(of: Element, scheme: Scheme) -> _ElasticForms:
     e0, e1 = strain(q0, of.axis), strain(q1, of.axis)
     r = scheme.resultants(C, e0, e1, of.constant)
     w_e = scheme.virtual_strain(q0, q1, w, of.axis)
-    stored = sum(C[i] * e1[i] ** 2 / 2 for i in range(3)) * dx  # P(9)
+    stored = elastic_energy(e1, C) * dx
     losses = [d * dx for d in scheme.losses(C, e0, e1, of.constant)]
     first = None
     if not scheme.dynamic:
         dq = ufl.TrialFunction(of.space)
-        before = ufl.as_vector([C[i] * e0[i] for i in range(3)])
-        geometric = ufl.dot(before, ufl.derivative(w_e, q1, dq))
-        material = ufl.dot(ufl.derivative(r, q1, dq), w_e)
+        geometric = virtual_work(resultants(e0, C), ufl.derivative(w_e, q1, dq))
+        material = virtual_work(ufl.derivative(r, q1, dq), w_e)
         first = (geometric + material) * dx
-    return _ElasticForms(ufl.dot(r, w_e) * dx, stored, losses, first)  # P(12)
+    return _ElasticForms(virtual_work(r, w_e) * dx, stored, losses, first)
 
 
 class ElasticBeams(OfForms, Cells):
@@ -169,7 +169,7 @@ class Inertia(OfMatrix):
 
     def add_state(self, q: Array) -> None:
         """Add the kinetic energy to the ledger."""
-        self._ledger.state["kinetic"] += self._times.square(self.v) / 2  # P(18)
+        self._ledger.state["kinetic"] += self._times.square(self.v) / 2
 
     def remember(self, memory: Memory, q: Array) -> None:
         """Save or restore velocities and the last step."""

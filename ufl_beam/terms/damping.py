@@ -18,6 +18,7 @@ from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
+from ufl_beam.mechanics.functional import resultants, virtual_work
 from ufl_beam.mechanics.kinematics import strain, virtual_strain
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Rates, Scheme, Step
 from ufl_beam.model.damping import KelvinVoigt, Rayleigh
@@ -44,9 +45,9 @@ def _forms(of: Element, scheme: Scheme) -> tuple[ufl.Form, ufl.Form, fem.Functio
     """Virtual work, the energy lost, and the time over that of the step."""
     q0, q1, C, dx, rate = of.q0, of.q1, of.stiffness, of.dx(1), of.at_points()
     change = strain(q1, of.axis) - strain(q0, of.axis)
-    r = ufl.as_vector([rate * C[i] * change[i] for i in range(3)])
-    work = ufl.dot(r, scheme.virtual_strain(q0, q1, of.w, of.axis)) * dx
-    return work, ufl.dot(r, change) * dx, rate
+    r = rate * resultants(change, C)
+    work = virtual_work(r, scheme.virtual_strain(q0, q1, of.w, of.axis)) * dx
+    return work, virtual_work(r, change) * dx, rate
 
 
 class KelvinVoigtForces(OfForms):
@@ -79,7 +80,7 @@ class KelvinVoigtForces(OfForms):
 @stated
 def _reference_stiffness(of: Element) -> ufl.Form:
     e, w_e = (virtual_strain(of.q1, w, of.axis) for w in (ufl.TrialFunction(of.space), of.w))
-    return sum(of.stiffness[i] * e[i] * w_e[i] for i in range(3)) * of.dx(1)
+    return virtual_work(resultants(e, of.stiffness), w_e) * of.dx(1)
 
 
 class RayleighForces(OfMatrix):
@@ -141,9 +142,9 @@ def _change_forms(of: Element, scheme: DecayingMidpoint) -> tuple[ufl.Form, ufl.
     q0, q1, C, dx = of.q0, of.q1, of.stiffness, of.dx(1)
     before, part = of.at_points(3), of.constant(scheme.part)
     change = strain(q1, of.axis) - strain(q0, of.axis)
-    r = ufl.as_vector([part * C[i] * (change[i] - before[i]) for i in range(3)])
-    work = ufl.dot(r, scheme.virtual_strain(q0, q1, of.w, of.axis)) * dx
-    return work, ufl.dot(r, change) * dx, before
+    r = part * resultants(change - before, C)
+    work = virtual_work(r, scheme.virtual_strain(q0, q1, of.w, of.axis)) * dx
+    return work, virtual_work(r, change) * dx, before
 
 
 class SecondDifferences(OfForms):

@@ -17,6 +17,7 @@ from ufl_beam.discretization.partition import Numbering
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError
+from ufl_beam.mechanics.functional import virtual_work
 from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.fibres import Layout
@@ -62,9 +63,9 @@ class _Forms(NamedTuple):
 def _forms(of: Element, scheme: Scheme) -> _Forms:
     r, b, D = of.at_points(3), of.at_points(3), of.at_points(3, 3)
     w_e, dx = scheme.virtual_strain(of.q0, of.q1, of.w, of.axis), of.dx(1)
-    around = ufl.dot(b + ufl.dot(D, strain(of.q1, of.axis)), w_e) * dx
+    around = virtual_work(b + ufl.dot(D, strain(of.q1, of.axis)), w_e) * dx
     tangent = ufl.derivative(around, of.q1, ufl.TrialFunction(of.space))
-    return _Forms(ufl.dot(r, w_e) * dx, around, tangent, r, b, D)  # P(34)
+    return _Forms(virtual_work(r, w_e) * dx, around, tangent, r, b, D)  # P(34)
 
 
 class InelasticBeams(Cells):
