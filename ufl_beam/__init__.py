@@ -83,6 +83,7 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.model.sections import Section
 from ufl_beam.model.supports import Clamped, Pinned, Prescribed, Roller, Support
 from ufl_beam.model.time_functions import Table, ramp
+from ufl_beam.model.works import Potential, VirtualWork
 from ufl_beam.output.events import Event, Events
 from ufl_beam.output.extremes import Extent, Extremes
 from ufl_beam.output.fatigue import Fatigue, HotSpot
@@ -118,19 +119,18 @@ __all__ = [
     "Checkpoint", "Clamped", "Connector", "Controller", "ConvergenceError", "CopiesDiffer",
     "Coulomb", "CriticalPoint", "Cycles", "Damper", "Decay", "DecayingMidpoint",
     "DisplacementControl", "DissipationControl", "DuvautLions", "Energy", "Envelope", "Event",
-    "Events", "ExactStatic", "Extent", "Extremes", "Fatigue", "Fibres", "FollowerLoad",
-    "ForceLaw", "GeneralizedAlpha", "Gerber", "Goodman", "Gravity", "Guided", "Hardening",
-    "History", "HotSpot", "Joint", "KelvinVoigt", "LineLoad", "LinearSoftening", "Link",
-    "LoadControl", "Lognormal", "Mesh", "Midpoint", "ModelWarning", "Modes", "Motor", "Newmark",
-    "Newton", "Normal", "Path", "Perzyna", "Pinned", "Place", "PointLoad", "PointMass",
-    "Prescribed", "PrintedMidpoint", "Prismatic", "Rayleigh", "Recorder", "Release", "Revolute",
-    "Rigid", "RigidLink", "RigidPlastic", "Roller", "RotatingFrame", "SNCurve", "Scene",
-    "SceneError", "Section", "Simulation", "Slide", "Softening", "Solution", "Spot", "Spring",
-    "Static", "Stop", "Stretch", "Study", "Support", "Table", "Tradeoff", "TradeoffError",
-    "TruncatedNormal", "Turn", "Velocity", "Weibull", "animate", "buckling", "damping",
-    "damping_ratio", "fit_decay", "follow", "ground", "load", "logarithmic_decrement", "modes",
-    "peaks", "picture", "plot", "plot_cycles", "plot_damage", "plot_dissipation", "plot_energy",
-    "plot_extremes", "plot_hinge", "plot_history", "plot_modes", "plot_moment_curvature",
-    "plot_shapes", "plot_tradeoff", "rainflow", "ramp", "render", "say", "simulate", "study",
-    "tradeoff",
+    "Events", "ExactStatic", "Extent", "Extremes", "Fatigue", "Fibres", "FollowerLoad", "ForceLaw",
+    "GeneralizedAlpha", "Gerber", "Goodman", "Gravity", "Guided", "Hardening", "History", "HotSpot",
+    "Joint", "KelvinVoigt", "LineLoad", "LinearSoftening", "Link", "LoadControl", "Lognormal",
+    "Mesh", "Midpoint", "ModelWarning", "Modes", "Motor", "Newmark", "Newton", "Normal", "Path",
+    "Perzyna", "Pinned", "Place", "PointLoad", "PointMass", "Potential", "Prescribed",
+    "PrintedMidpoint", "Prismatic", "Rayleigh", "Recorder", "Release", "Revolute", "Rigid",
+    "RigidLink", "RigidPlastic", "Roller", "RotatingFrame", "SNCurve", "Scene", "SceneError",
+    "Section", "Simulation", "Slide", "Softening", "Solution", "Spot", "Spring", "Static", "Stop",
+    "Stretch", "Study", "Support", "Table", "Tradeoff", "TradeoffError", "TruncatedNormal", "Turn",
+    "Velocity", "VirtualWork", "Weibull", "animate", "buckling", "damping", "damping_ratio",
+    "fit_decay", "follow", "ground", "load", "logarithmic_decrement", "modes", "peaks", "picture",
+    "plot", "plot_cycles", "plot_damage", "plot_dissipation", "plot_energy", "plot_extremes",
+    "plot_hinge", "plot_history", "plot_modes", "plot_moment_curvature", "plot_shapes",
+    "plot_tradeoff", "rainflow", "ramp", "render", "say", "simulate", "study", "tradeoff",
 ]  # fmt: skip

@@ -26,6 +26,7 @@ from ufl_beam.model.constraint_checks import require_no_mechanism
 from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
+from ufl_beam.model.works import VirtualWork
 from ufl_beam.output.joint_histories import Connection, velocity_of
 from ufl_beam.output.time_series import VTKHDF, XDMF, TimeSeries
 from ufl_beam.parallel import active_comm
@@ -313,8 +314,8 @@ def buckling(
     require_kind(scene, Scene, "buckling: scene")
     require_count(n, "buckling: n")
     require_number(t, "buckling: t")
-    for load in scene.loads:
-        if isinstance(load, FollowerLoad | RotatingFrame):
+    for load in (*scene.loads, *scene.works):
+        if isinstance(load, FollowerLoad | RotatingFrame | VirtualWork):
             raise SceneError(
                 f"buckling: a {type(load).__name__} has a stiffness of its own; use "
                 "modes(..., at=) about states with more and more of it, and see where a frequency "

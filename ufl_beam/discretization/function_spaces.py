@@ -47,6 +47,11 @@ class Element:
             fem.Function(fem.functionspace(self._cell, ("DG", 0, (n,)))) for n in (3, 2)
         )
 
+    @cached_property
+    def anywhere(self) -> Axis:
+        """The axis at the points of any rule; :attr:`axis` may be that in the middle of a cell."""
+        return Axis(self._cell, self.axis.nodes, self._along())
+
     def _along(self) -> fem.Function:
         """Coordinate from 0 to 1 along the cell."""
         function = fem.Function(fem.functionspace(self._cell, ("DG", 1)))
@@ -56,6 +61,10 @@ class Element:
     def configuration(self) -> fem.Function:
         """A new configuration (u_x, u_y, ψ)."""
         return fem.Function(self.space)
+
+    def in_cells(self) -> fem.Function:
+        """A new function with a value in each cell."""
+        return fem.Function(fem.functionspace(self._cell, ("DG", 0)))
 
     def at_points(self, *shape: int) -> fem.Function:
         """A new function with values of a shape in the points of ``dx(1)``."""
@@ -84,6 +93,11 @@ class Element:
 
     def _rule(self, degree: int) -> int:
         return degree + 2 * (self._degree - 1)
+
+
+def element_of(mesh: Mesh) -> Element:
+    """The element of a mesh, one for all meshes alike but for their cells."""
+    return _element(mesh.degree, mesh.lumped)
 
 
 @stated
@@ -118,7 +132,7 @@ class Fields:
         self._require_direction(grid.points[grid.cells[share.cells[self.order]]])
         self.cell_dofs = share.cell_dofs[self.order]
         self._matrix: Csr | None = None
-        self.element = _element(grid.mesh.degree, grid.mesh.lumped)
+        self.element = element_of(grid.mesh)
 
     def kernel(self, form: ufl.Form, unknown: fem.Function) -> Kernel:
         """A form on the cells, compiled; ``unknown`` is the configuration that changes."""

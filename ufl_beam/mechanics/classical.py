@@ -47,6 +47,10 @@ class _AtEnd:
         """The one at the end of the step."""
         return now
 
+    def mean(self, f: Callable[[Expr], Expr], q0: Expr, q1: Expr) -> Expr:
+        """The one at the end of the step."""
+        return f(q1)
+
     def virtual_turn(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
         """The virtual rotation itself."""
         return w

@@ -22,11 +22,12 @@ class Axis:
         t0: Unit tangent of the cell, from its first to its last vertex; shape (2,).
         n0: Unit normal, ``t0`` turned by +90°; shape (2,).
         h: Length of the cell; m.
+        x: The point, in the plane; m.
     """
 
     def __init__(self, mesh: ufl.Mesh, nodes: Iterable[float] = (0.0, 1.0), X: Expr = 0.5) -> None:
         self.nodes, self.X = [float(a) for a in nodes], X
-        J = ufl.Jacobian(mesh)
+        J, self.x = ufl.Jacobian(mesh), ufl.SpatialCoordinate(mesh)
         self.h = ufl.sqrt(J[0, 0] ** 2 + J[1, 0] ** 2)
         self.t0 = ufl.as_vector([J[0, 0] / self.h, J[1, 0] / self.h])
         self.n0 = ufl.as_vector([-self.t0[1], self.t0[0]])

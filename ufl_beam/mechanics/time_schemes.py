@@ -70,6 +70,9 @@ class Scheme(Protocol):
     def average(self, before: Expr, now: Expr) -> Expr:
         """Average of a vector or a distance between frames, as variations take it."""
 
+    def mean(self, f: Callable[[Expr], Expr], q0: Expr, q1: Expr) -> Expr:
+        """Value of a function of the configuration in the step, whose integral has a meaning."""
+
     def virtual_turn(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
         """Variation of a relative rotation whose virtual motion is ``w``."""
 

@@ -66,7 +66,7 @@ def require_inertia(scene: Scene) -> None:
         for component, inertia in enumerate((one.mass, one.mass, one.inertia))
         if inertia
     ]
-    rows = _constraints(scene, _determines, masses)
+    rows = _constraints(scene, _determines, [*masses, *_under_works(scene)])
     free = _null_space(csr_array(rows[:, loose]))
     if free.shape[1] == 0:
         return
@@ -88,6 +88,12 @@ def _without_inertia(scene: Scene) -> list[int]:
     for i, (mass, inertia) in enumerate((*beams, *bodies)):
         loose += [3 * i, 3 * i + 1] * bool(mass == 0.0) + [3 * i + 2] * bool(inertia == 0.0)
     return loose
+
+
+def _under_works(scene: Scene) -> list[tuple[Anchor, int]]:
+    """Components of motion of the beams on which works of the user act: they may hold them."""
+    beams = (beam for work in scene.works for beam in work.on(scene.beams))
+    return [(beam.start, component) for beam in beams for component in range(3)]
 
 
 def _determines(link: Connector) -> bool:
@@ -191,7 +197,7 @@ def require_no_mechanism(scene: Scene) -> None:
     An elastic beam resists every motion but the three rigid ones, so a motion without strain moves
     each beam as a rigid body; it exists if joints and supports leave those motions a null space.
     """
-    free = _null_space(_constraints(scene))
+    free = _null_space(_constraints(scene, also=_under_works(scene)))
     if free.shape[1] == 0:
         return
     moving = _moving(scene, free[:, 0] / np.abs(free[:, 0]).max())

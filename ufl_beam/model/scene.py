@@ -23,6 +23,7 @@ from ufl_beam.model.masses import PointMass, Velocity
 from ufl_beam.model.plastic_hinges import NodeDof, merged, plastic_hinges, shared_by_joints
 from ufl_beam.model.supports import COMPONENTS, Support
 from ufl_beam.model.time_functions import TimeFunction, value_at
+from ufl_beam.model.works import Potential, VirtualWork, Work
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +43,7 @@ class Scene:
         bodies: :class:`Body`.
         connectors: Made by :func:`Turn`, :func:`Stretch`, :func:`Slide`: springs, dampers, stops,
             friction, motors.
+        works: :class:`VirtualWork`, :class:`Potential`: effects along beams that you state in UFL.
 
     Raises:
         SceneError: The parts do not fit together; the message names them.
@@ -60,12 +62,13 @@ class Scene:
     damping: Sequence[Damping] = ()
     bodies: Sequence[Body] = ()
     connectors: Sequence[Connector] = ()
+    works: Sequence[Work] = ()
 
     def __post_init__(self) -> None:
         kinds: dict[str, type | tuple[type, ...]] = {
             "beams": Beam, "joints": Joint, "supports": Support, "loads": Load.__args__,
             "masses": PointMass, "initial": Velocity, "damping": Damping.__args__, "bodies": Body,
-            "connectors": Connector,
+            "connectors": Connector, "works": (VirtualWork, Potential),
         }  # fmt: skip
         for part in kinds:
             records = require_sequence(getattr(self, part), f"Scene: {part}")
@@ -178,6 +181,8 @@ class Scene:
                 yield link, link.law.motion
             if isinstance(link.law, Actuator):
                 yield link, link.law.force
+        for work in self.works:
+            yield from ((work, number) for number in work.numbers.values() if callable(number))
 
     def attachments(self) -> Iterator[tuple[object, Anchor]]:
         """Iterate over all that has a place, and its place."""
@@ -197,6 +202,8 @@ class Scene:
             if isinstance(damping, KelvinVoigt):
                 for beam in damping.beams or ():
                     yield "KelvinVoigt", beam.start
+        for work in self.works:
+            yield from ((work, beam.start) for beam in work.beams or ())
 
     @cached_property
     def attached(self) -> dict[Member, list[float]]:
@@ -209,7 +216,7 @@ class Scene:
 
     def _require_once(self) -> None:
         """Raise if a record is in a list twice, or if two joints are the same."""
-        for part in ("joints", "connectors", "loads", "masses", "initial", "damping"):
+        for part in ("joints", "connectors", "loads", "masses", "initial", "damping", "works"):
             first: dict[int, int] = {}
             for i, record in enumerate(getattr(self, part)):
                 j = first.setdefault(id(record), i)
@@ -218,6 +225,13 @@ class Scene:
                         f"Scene: {clip(str(record))} is there twice, as {part}[{j}] and "
                         f"{part}[{i}]; remove one, or make two of them"
                     )
+        names: dict[str, int] = {}
+        for i, work in enumerate(self.works):
+            if (j := names.setdefault(work.name, i)) != i:
+                raise SceneError(
+                    f"Scene: works[{j}] and works[{i}] are both called {work.name!r}, the name of "
+                    "their entry in the energy ledger; give one of them another name"
+                )
         seen: dict[object, int] = {}
         for i, joint in enumerate(self.joints):
             j = seen.setdefault(joint.sameness, i)

@@ -37,6 +37,7 @@ from ufl_beam.model import (
     sections,
     supports,
     time_functions,
+    works,
 )
 
 Data = Any  # data of JSON
@@ -135,7 +136,7 @@ def name_of(function: Any) -> str:
 MODULES: tuple[ModuleType, ...] = (
     *(beams, bodies, connector_laws, connectors, curves, damping, distributions, fibres),
     *(joints, loads, masses, material_laws, mesh_options, scene, sections),
-    *(supports, time_functions),
+    *(supports, time_functions, works),
 )
 
 # Classes of records, by name

@@ -33,13 +33,12 @@ from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.guide_curves import guides
 from ufl_beam.terms.inelastic_beams import InelasticBeams, inelastic_cells
 from ufl_beam.terms.links import Links
-from ufl_beam.terms.loads import DeadLoads, FollowerLoads, FrameForces
+from ufl_beam.terms.loads import DeadLoads, FollowerLoads, FrameForces, LoadTerm
 from ufl_beam.terms.material_points import expect_entries
 from ufl_beam.terms.openings import Openable, Openings, SearchFlags
 from ufl_beam.terms.supports import Supports
 from ufl_beam.terms.tangent_derivatives import Cells
-
-Loads = list[DeadLoads | FollowerLoads | FrameForces]
+from ufl_beam.terms.works import Works
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,7 @@ class Assembly:
     inelastic: list[InelasticBeams]
     yields: bool
     couplings: list[Links]
-    loads: Loads
+    loads: list[LoadTerm]
     inertia: Inertia | None
     supports: Supports
     openings: Openings | None
@@ -138,8 +137,11 @@ class Assembly:
         return path
 
 
-def assemble(share: Share, scheme: Scheme, v: Array, together: Agreement) -> Assembly:
-    """Make the terms of a scene; supports stop the initial local velocities ``v`` in place."""
+def assemble(share: Share, scheme: Scheme, t0: float, v: Array, together: Agreement) -> Assembly:
+    """Make the terms of a scene that begins at t0 (s).
+
+    Supports stop the initial local velocities ``v`` in place.
+    """
     scene, ledger, fields, search = share.grid.scene, Ledger(), Fields(share), SearchFlags()
     A = fields.matrix()
     setting = (scheme, A, ledger)
@@ -169,6 +171,8 @@ def assemble(share: Share, scheme: Scheme, v: Array, together: Agreement) -> Ass
     openings = Openings.of(search, _openable(inelastic, coupled), share.comm)
 
     loads = _loads(scene, fields, scheme, ledger, A)
+    if scene.works:
+        loads.append(together(Works, fields, scheme, ledger, A, t0))
     inertia = Inertia(fields, scheme, A, ledger, v) if has_inertia(scheme) else None
     others: list[Term] = [*numerical, *([inertia] if inertia else [])]
     for damping in scene.damping:
@@ -183,11 +187,13 @@ def assemble(share: Share, scheme: Scheme, v: Array, together: Agreement) -> Ass
     )  # fmt: skip
 
 
-def _loads(scene: Scene, fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr) -> Loads:
+def _loads(scene: Scene, fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr) -> list[LoadTerm]:
+    if scene.loads:
+        ledger.supplied["loads"] += 0.0
     followers = [load for load in scene.loads if isinstance(load, FollowerLoad)]
     frames = [load for load in scene.loads if isinstance(load, RotatingFrame)]
     dead = [load for load in scene.loads if load not in (*followers, *frames)]
-    loads: Loads = [FrameForces(frame, fields, scheme, ledger, A) for frame in frames]
+    loads: list[LoadTerm] = [FrameForces(frame, fields, scheme, ledger, A) for frame in frames]
     if dead:
         loads.append(DeadLoads(dead, fields.share, scheme, ledger))
     if followers:

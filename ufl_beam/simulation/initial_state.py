@@ -32,6 +32,7 @@ from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS, Support
 from ufl_beam.simulation.solution import Solution
+from ufl_beam.terms.work_forms import require_works
 
 
 def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh) -> Grid:
@@ -50,6 +51,7 @@ def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh) -> Grid:
         require_rates(scene, scheme)
     else:
         require_no_mechanism(scene)
+    require_works(scene, scheme, mesh)
     require_independent(scene)
     warn_of_far_points(scene)
     warn_of_free_hinges(scene)

@@ -109,7 +109,7 @@ class Simulation(StateView):
         self.together = together = Agreement(share.comm)
         self._copies = Copies(comm, share) if comm.size > share.comm.size else None
         q, v, internal = initial_state(grid, start)
-        self._assembly = parts = assemble(share, scheme, v[share.dofs], together)
+        self._assembly = parts = assemble(share, scheme, t0, v[share.dofs], together)
         self.fields, self.ledger, self.asked = parts.fields, parts.ledger, parts.asked
         self.beams, self.inelastic, self.couplings = parts.beams, parts.inelastic, parts.couplings
         self.loads, self.supports, self._has_inelastic = parts.loads, parts.supports, parts.yields

@@ -29,7 +29,7 @@ FORMAT = "solution of ufl_beam, 1"
 NAMED = ("seconds", "time_error", "open_ledger")
 """Attributes that are saved as they are."""
 
-TIME_FUNCTIONS = ("time", "held", "motion", "force")
+TIME_FUNCTIONS = ("time", "held", "motion", "force", "numbers")
 """Fields that are functions of time, but for the forces of controllers and functions."""
 
 

@@ -90,7 +90,7 @@ def begins_loaded(scene: Scene, scheme: Scheme, t: float) -> bool:
     if has_inertia(scheme) or not over_step:
         return False
     frames = any(isinstance(load, RotatingFrame) for load in scene.loads)
-    return frames or any(f(t) != 0 for _, f in scene.time_functions())
+    return frames or bool(scene.works) or any(f(t) != 0 for _, f in scene.time_functions())
 
 
 def require_small_turn(share: Share, change: Array, dt: float, whole: float) -> None:

@@ -143,7 +143,7 @@ class StepEquation(PythonEquation):
     def tangent_change(self, q: Array, u: Array) -> Array:
         """Derivative along ``u`` of the latest tangent of :meth:`linearise`, at ``q``; entries."""
         self.A.data.fill(0.0)
-        for one in self._inner:
+        for one in (*self._inner, *self._loads):
             one.add_tangent_change(q, u)
         return self.A.data.copy()
 
@@ -168,7 +168,7 @@ class StepEquation(PythonEquation):
             works[1, i, j] = sum(one.work_of_change(q, u, x, y) for one in self._beams)
         for k, work in enumerate(works):
             self.A.data.fill(0.0)
-            for one in self._couplings:
+            for one in (*self._couplings, *self._loads):
                 if k == 0:
                     one.add_tangent(q)
                 else:

@@ -38,6 +38,9 @@ class Term:
     def add_tangent(self, q1: Array) -> None:
         """Add the derivative at ``q1`` to the matrix that the term was made with."""
 
+    def add_tangent_change(self, q1: Array, u: Array) -> None:
+        """Add the derivative of the tangent at ``q1`` along ``u``; no internal variable changes."""
+
     def accept(self, q1: Array, s: Array) -> None:
         """Take the end of the step as the new state, and enter what the step supplied or lost.
 
@@ -57,9 +60,6 @@ class Beams(Term):
     def change(self, q1: Array) -> float:
         """Energy that cells of this process store and dissipate in the step to ``q1``; J."""
         raise NotImplementedError
-
-    def add_tangent_change(self, q1: Array, u: Array) -> None:
-        """Add the derivative of the tangent at ``q1`` along ``u``; no internal variable changes."""
 
 
 class OfForms(Term):

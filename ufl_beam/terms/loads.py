@@ -38,7 +38,6 @@ class LoadTerm(Term):
 
     def __init__(self, share: Share, scheme: Scheme, ledger: Ledger) -> None:
         self._acting, self._ledger = scheme.acting, ledger
-        ledger.supplied["loads"] += 0.0
         self.force: Array = np.zeros(share.size)
         self._before: Array = self.force
 

@@ -74,6 +74,13 @@ void extrapolate(int size, const double *x, const double *y, double ratio, doubl
   for (int i = 0; i < size; ++i) out[i] = x[i] + ratio * (x[i] - y[i]);
 }
 
+/* Parts one after the other. */
+void add_calls(void *self, const double *q, double *out)
+{
+  const calls *c = self;
+  for (int i = 0; i < c->number; ++i) c->part[i].add(c->part[i].self, q, out);
+}
+
 /* b -= a */
 void subtract_vector(void *self, const double *q, double *b)
 {

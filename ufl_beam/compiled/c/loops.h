@@ -11,6 +11,13 @@ typedef struct {
   void *self;
 } call;
 
+/* Several of them. */
+typedef struct {
+  int number;
+  const call *part;
+} calls;
+void add_calls(void *self, const double *q, double *out);
+
 /* -- forms and constant matrices --------------------------------------------------------------- */
 
 enum { MOST_ENTRIES = 144 }; /* of the vector or matrix of a cell: 12 unknowns of degree 3 */

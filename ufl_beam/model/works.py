@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: MIT
+"""Virtual works and potentials along beams that a user states in UFL."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass, field
+from typing import Any, ClassVar
+
+from ufl_beam.errors import (
+    SceneError,
+    require_count,
+    require_function,
+    require_number,
+    require_sequence,
+    require_text,
+    shorten,
+)
+from ufl_beam.model.bodies import Member
+from ufl_beam.model.time_functions import TimeFunction, require_time_function
+
+ENTRIES = (
+    *("kinetic", "stored", "hardening", "loads", "supports", "motors", "controllers"),
+    *("numerical", "plastic", "hinges", "damping", "friction", "functions"),
+)
+"""Names that entries of the energy ledger have already."""
+
+
+@dataclass(frozen=True, eq=False)
+class Work:
+    """Base of what acts along beams by a function of a user; the function is a density of energy.
+
+    Attributes:
+        arguments: Names that its parameters may have, besides those of ``numbers``.
+    """
+
+    arguments: ClassVar[tuple[str, ...]]
+
+    name: str
+    density: Callable[..., Any]
+    _: KW_ONLY
+    beams: Sequence[Member] | None = None
+    numbers: Mapping[str, float | TimeFunction] = field(default_factory=dict)
+    degree: int = 2
+
+    def __post_init__(self) -> None:
+        kind = type(self).__name__
+        require_text(self.name, f"{kind}: name")
+        if not self.name or self.name in ENTRIES:
+            raise SceneError(
+                f"{kind}: name = {self.name!r} is an entry of the energy ledger already; give the "
+                "work a name of its own"
+            )
+        require_count(self.degree, f"{self}: degree")
+        if self.beams is not None:
+            object.__setattr__(self, "beams", require_sequence(self.beams, f"{self}: beams"))
+            for i, beam in enumerate(self.beams):
+                if not isinstance(beam, Member):
+                    raise SceneError(f"{self}: beams[{i}] = {shorten(beam)} is not a Beam")
+        self._require_numbers()
+        require_function(self.density, f"{self}: density", ", ".join(self.arguments))
+        asked = self.asked
+        for name in self.numbers:
+            if name not in asked:
+                raise SceneError(f"{self}: numbers[{name!r}] is no parameter of the function")
+
+    def __str__(self) -> str:
+        return f"{type(self).__name__} {self.name!r}"
+
+    def _require_numbers(self) -> None:
+        if not isinstance(self.numbers, Mapping):
+            raise SceneError(
+                f"{self}: numbers = {shorten(self.numbers)} must be numbers by name, as {{'c': 1}}"
+            )
+        object.__setattr__(self, "numbers", dict(self.numbers))
+        for name, value in self.numbers.items():
+            what = f"{self}: numbers[{shorten(name)}]"
+            if name in self.arguments:
+                raise SceneError(f"{what}: the name has a meaning already; take another one")
+            if callable(value):
+                require_time_function(value, what)
+            else:
+                require_number(value, what)
+
+    @property
+    def asked(self) -> tuple[str, ...]:
+        """Names of the parameters of the function, each with a known meaning."""
+        known = (*self.arguments, *self.numbers)
+        try:
+            parameters = inspect.signature(self.density).parameters.values()
+        except (TypeError, ValueError):
+            raise SceneError(
+                f"{self}: the parameters of {shorten(self.density)} have no names; write a "
+                f"function of some of {', '.join(known)}"
+            ) from None
+        named = [p for p in parameters if p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD)]
+        for one in named:
+            if one.name not in known and one.default is one.empty:
+                raise SceneError(
+                    f"{self}: the function has a parameter {one.name!r}, which nobody knows; "
+                    f"there are {', '.join(known)}, and what `numbers` names"
+                )
+        return tuple(one.name for one in named if one.name in known)
+
+    def on(self, beams: Sequence[Member]) -> Sequence[Member]:
+        """Those of the beams of a scene on which it acts."""
+        return beams if self.beams is None else self.beams
+
+
+@dataclass(frozen=True, eq=False)
+class VirtualWork(Work):
+    """Virtual work of a distributed effect, which a user states in UFL.
+
+    The function returns the work per undeformed length that the effect does on a virtual motion, as
+    loads do: a force f along y is ``f * w[1]``.  Its derivative follows by UFL.  It takes, by name,
+    whichever of these it needs:
+
+    * ``q0``, ``q1``: configurations (u_x, u_y, ψ) at both ends of the step; m, m, rad,
+    * ``q``: that at which the time scheme states forces, their mean in :class:`Midpoint`,
+    * ``v``: mean velocity of the step, zero in statics; m/s, m/s, rad/s,
+    * ``w``: virtual motion (w_x, w_y, w_ψ), in which the work is linear; m, m, rad,
+    * ``axis``: undeformed axis, with ``axis.x``, its point (2,), tangent ``axis.t0`` and normal
+      ``axis.n0``, derivative along it ``axis.d(f)``, length of the cell ``axis.h``,
+    * ``t``, ``dt``: time at which it acts, and length of the step; s,
+    * the names in ``numbers``.
+
+    Its work since the beginning is the entry ``name`` among those supplied in the energy ledger.
+    Effects that store energy are a :class:`Potential`.
+
+    Args:
+        name: Entry in the ledger.
+        density: The function; J/m.
+        beams: The beams it acts on; all by default.
+        numbers: Numbers, or functions of time, that the function names; others can be taken
+            without compiling anew.
+        degree: Degree of polynomials that are integrated exactly in cells of degree 1; each degree
+            that cells have more adds two.
+
+    Raises:
+        SceneError: The function is not linear in w, or no scalar of UFL; the name is taken.
+
+    Example:
+        >>> def drag(v, w, c):
+        ...     return -c * (v[0] ** 2 + v[1] ** 2 + 1e-12) ** 0.5 * (v[0] * w[0] + v[1] * w[1])
+        >>> air = ub.VirtualWork("air", drag, numbers={"c": 0.6 * 1.2 * 0.2})  # N s²/m³
+        >>> kick = ub.Velocity((beam,), linear=(0.0, 30.0))  # m/s
+        >>> flying = ub.Scene([beam], initial=[kick], works=[air])
+        >>> run = ub.simulate(flying, ub.Midpoint(), t=(0, 1), dt=0.05)
+        >>> bool(run.energy.worst < 1e-9), bool(run.energy["air"][-1] < 0)  # what the air takes
+        (True, True)
+    """
+
+    arguments = ("q0", "q1", "q", "v", "w", "axis", "t", "dt")
+
+
+@dataclass(frozen=True, eq=False)
+class Potential(Work):
+    """Potential energy of a distributed effect, which a user states in UFL.
+
+    The function returns the energy per undeformed length.  It takes, by name, whichever it needs of
+    ``q``, ``axis``, ``t`` and the names in ``numbers``, see :class:`VirtualWork`.  Forces are its
+    derivative by UFL, in :class:`Midpoint` and its relatives the mean of the derivative over the
+    step: their work is the increment of the energy, to round-off for polynomials of degree 8 and
+    otherwise but for the ninth power of a step.  The energy is the entry ``name`` of the state of
+    the ledger; what a change in time brings is the entry supplied "name in time".
+
+    Args:
+        name: Entry in the ledger.
+        density: The function; J/m.
+        beams: The beams it acts on; all by default.
+        numbers: Numbers, or functions of time, that the function names.
+        degree: As in :class:`VirtualWork`.
+
+    Raises:
+        SceneError: The function does not depend on q, or is no scalar of UFL; the name is taken.
+
+    Example:
+        >>> soil = ub.Potential("soil", lambda q, k: k * q[1] ** 2 / 2, numbers={"k": 1e6})  # N/m²
+        >>> load = ub.PointLoad(beam.at(0.5), force=(0, -1e3))
+        >>> rail = ub.Scene([beam], [], [ub.Roller(beam.start, along=(0, 1))], [load], works=[soil])
+        >>> run = ub.simulate(rail, ub.Static(), t=(0, 1), dt=1.0)
+        >>> print(1e3 * run.displacement(beam.end)[-1, 1].round(6))  # mm; the beam is stiff
+        -0.496
+    """
+
+    arguments = ("q", "axis", "t")

@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: MIT
+"""Forms of virtual works and potentials that a user states, and checks of what was stated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import singledispatch
+from typing import Any, NamedTuple
+
+import ufl
+from ufl.algorithms import expand_derivatives
+from ufl.algorithms.check_arities import ArityMismatch, check_form_arity
+from ufl.core.expr import Expr
+from ufl.domain import extract_domains
+
+from ufl_beam.discretization.compiled_forms import stated
+from ufl_beam.discretization.function_spaces import Element, element_of
+from ufl_beam.dolfinx_compat import fem
+from ufl_beam.errors import SceneError, shorten
+from ufl_beam.mechanics.kinematics import split
+from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.model.mesh_options import Mesh
+from ufl_beam.model.scene import Scene
+from ufl_beam.model.works import Potential, VirtualWork, Work
+
+CLOCK = ("t", "dt", "growth")
+"""Numbers of each step: time, length, and how much of the works acts."""
+
+
+class Statement(NamedTuple):
+    """Forms of a work."""
+
+    residual: ufl.Form  # minus the virtual work
+    tangent: ufl.Form  # its derivative; empty where nothing depends on the configuration
+    numbers: Mapping[str, fem.Function]  # functions that have the numbers, by their names
+    energy: ufl.Form | None = None  # of a potential, at the end of the step
+    lost: ufl.Form | None = None  # what the scheme loses of it in the step
+    varies: bool = False  # True if the energy may change in time while nothing moves
+
+
+@stated
+def _number(of: Element, name: str) -> fem.Function:
+    """The function that has the numbers of a name: forms of different works may be one."""
+    return of.in_cells()
+
+
+@stated
+def statement(work: Work, of: Element, scheme: Scheme) -> Statement:
+    """State a work in a time scheme.
+
+    Raises:
+        SceneError: Its function is wrong.
+    """
+    numbers = {name: _number(of, name) for name in (*CLOCK, *work.numbers)}
+    return _state(work, of, scheme, numbers)
+
+
+@singledispatch
+def _state(
+    work: Work, of: Element, scheme: Scheme, numbers: Mapping[str, fem.Function]
+) -> Statement:
+    raise TypeError(f"{work!r} is no work")
+
+
+@_state.register
+def _(
+    work: VirtualWork, of: Element, scheme: Scheme, numbers: Mapping[str, fem.Function]
+) -> Statement:
+    q0, q1, w = of.q0, of.q1, of.w
+    q, v = q0 + scheme.load_weight * (q1 - q0), (q1 - q0) / numbers["dt"]
+    known = {"q0": q0, "q1": q1, "q": q, "v": v, "w": w, "axis": of.anywhere, **numbers}
+    density, dx = _returned(work, known, of), of.dx(work.degree)
+    try:
+        check_form_arity(expand_derivatives(density * dx), (w,))
+    except ArityMismatch as error:
+        raise SceneError(
+            f"{work}: the function must return what is linear in w, such as f * w[1]: {error}"
+        ) from None
+    residual = -numbers["growth"] * density * dx
+    return Statement(residual, _derivative(residual, of), numbers)
+
+
+@_state.register
+def _(
+    work: Potential, of: Element, scheme: Scheme, numbers: Mapping[str, fem.Function]
+) -> Statement:
+    q0, q1, w, q, dx = of.q0, of.q1, of.w, of.configuration(), of.dx(work.degree)
+    energy = _returned(work, {"q": q, "axis": of.anywhere, **numbers}, of)
+    gradient = expand_derivatives(ufl.derivative(energy, q, w))
+    if expand_derivatives(gradient * dx).empty():
+        raise SceneError(f"{work}: the energy must depend on the configuration q")
+
+    def along(way: Expr, at: Expr) -> Expr:
+        return ufl.replace(gradient, {q: at, w: way})
+
+    s = _variation(of, scheme)
+    force = scheme.mean(lambda at: along(s, at), q0, q1)
+    lost = None
+    if scheme.loss:
+        part, way = of.constant(scheme.loss), q1 - q0
+        force += part * (along(s, q1) - along(s, q0))
+        lost = part * (along(way, q1) - along(way, q0)) * dx
+    stored = ufl.replace(energy, {q: q1}) * dx
+    of_time = [numbers["t"], *(numbers[n] for n, x in work.numbers.items() if callable(x))]
+    varies = any(function in stored.coefficients() for function in of_time)
+    return Statement(force * dx, _derivative(force * dx, of), numbers, stored, lost, varies)
+
+
+def _variation(of: Element, scheme: Scheme) -> Expr:
+    """Variation that is the increment of q, everywhere, if w is the step of the nodes."""
+    axis = of.anywhere
+    (_, ψ0), (_, ψ1), (w_u, w_ψ) = map(split, (of.q0, of.q1, of.w))
+    pairs = zip(axis.at_nodes(ψ1 - ψ0), axis.at_nodes(w_ψ), strict=True)
+    turn, _ = axis.interpolate([scheme.virtual_turn(0.0, turned, w) for turned, w in pairs])
+    return ufl.as_vector([w_u[0], w_u[1], turn])
+
+
+def _derivative(residual: ufl.Form, of: Element) -> ufl.Form:
+    return expand_derivatives(ufl.derivative(residual, of.q1, ufl.TrialFunction(of.space)))
+
+
+def _returned(work: Work, known: Mapping[str, Any], of: Element) -> Expr:
+    """Evaluate the function of a work, or raise :class:`SceneError` naming it."""
+    try:
+        value = work.density(**{name: known[name] for name in work.asked})
+    except SceneError:
+        raise
+    except Exception as error:
+        raise SceneError(f"{work}: the function fails: {shorten(error)}") from error
+    if not isinstance(value, Expr):
+        raise SceneError(
+            f"{work}: the function returned {shorten(value)}; it must return an expression of UFL, "
+            "an energy per length"
+        )
+    if value.ufl_shape or value.ufl_free_indices:
+        raise SceneError(
+            f"{work}: the function returned a tensor of shape {value.ufl_shape}; it must return a "
+            "scalar, such as a product with a component of w"
+        )
+    if any(domain != of.space.mesh.ufl_domain() for domain in extract_domains(value)):
+        raise SceneError(
+            f"{work}: the function uses a mesh of its own; let it use axis.x for the place, and "
+            "`numbers` for what it needs besides"
+        )
+    return value
+
+
+def require_works(scene: Scene, scheme: Scheme, mesh: Mesh) -> None:
+    """Raise :class:`SceneError` if the function of a work is wrong."""
+    for work in scene.works:
+        statement(work, element_of(mesh), scheme)
