@@ -5,6 +5,7 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
+import ufl
 from scipy.sparse import csr_array
 
 import ufl_beam as ub
@@ -35,10 +36,30 @@ def scene(kind):
         masses += [ub.PointMass(c.start, 3.0, 2.0), ub.PointMass(b.end, 1.0)]
     if "moved" in kind:
         supports[0] = ub.Prescribed(a.start, u=lambda t: 0.1 * t, v=0, psi=lambda t: 0.3 * t)
-    return ub.Scene([a, b, c], joints=joints, supports=supports, loads=loads, masses=masses)
+    works = works_of(b) if "works" in kind else []
+    return ub.Scene(
+        [a, b, c], joints=joints, supports=supports, loads=loads, masses=masses, works=works
+    )
 
 
-KINDS = ["plain", "follower", "roller", "masses", "moved", "follower roller masses"]
+def works_of(beam):
+    """A potential and a work that depend on all that there is."""
+
+    def energy(q, axis, t, k):
+        turned = (1 + axis.x[0] ** 2) * ufl.sin(q[2] + t)
+        return k * q[0] ** 2 * q[1] + k * turned + k * axis.d(q[2]) ** 4 * q[1] ** 2
+
+    def work(q0, q1, q, v, w, axis, t, dt, c):
+        force = c * (v[0] ** 2 + v[1] ** 2 + 1) ** 0.5 * (1 + q[2] ** 2 + dt * q0[0] * q1[0])
+        return t * force * (v[0] * w[0] + v[1] * w[1]) + q1[0] * axis.d(q1[1]) * axis.d(w[2])
+
+    return [
+        ub.Potential("potential", energy, numbers={"k": lambda t: 20.0 + t}),
+        ub.VirtualWork("work", work, beams=[beam], numbers={"c": 20.0}),
+    ]
+
+
+KINDS = ["plain", "follower", "roller", "masses", "moved", "works", "follower roller masses"]
 SCHEMES = [
     ub.Static(),
     ub.Midpoint(),

@@ -187,6 +187,9 @@ def _require_driven(scene: Scene, t0: float) -> None:
     for link in scene.links:
         functions += [link.law.motion] if isinstance(link.law, Motor) else []
         functions += [link.law.force] if isinstance(link.law, Actuator) else []
+    for work in scene.works:
+        functions += [number for number in work.numbers.values() if callable(number)]
+        functions += [float] if "t" in work.asked else []
     if not any(f(t0 + Δ) != f(t0) for f in functions for Δ in (1e-3, 1.0, -1e-3, -1.0)):
         raise SceneError(
             "follow: no load and no motion depends on time, which is the load factor here; give "

@@ -88,13 +88,15 @@ class Work:
         """Names of the parameters of the function, each with a known meaning."""
         known = (*self.arguments, *self.numbers)
         try:
-            parameters = inspect.signature(self.density).parameters.values()
+            parameters = [*inspect.signature(self.density).parameters.values()]
         except (TypeError, ValueError):
             raise SceneError(
                 f"{self}: the parameters of {shorten(self.density)} have no names; write a "
                 f"function of some of {', '.join(known)}"
             ) from None
-        named = [p for p in parameters if p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD)]
+        if any(p.kind is p.VAR_KEYWORD for p in parameters):
+            return known
+        named = [p for p in parameters if p.kind is not p.VAR_POSITIONAL]
         for one in named:
             if one.name not in known and one.default is one.empty:
                 raise SceneError(

@@ -120,7 +120,7 @@ class LostFunction:
 
     name: str  # that of the function
 
-    def __call__(self, *arguments: object) -> NoReturn:
+    def __call__(self, *arguments: object, **named: object) -> NoReturn:
         """Raise :class:`SceneError`, as the function is not there."""
         raise SceneError(
             f"the function {self.name} is not in the file of the solution, which has results and "

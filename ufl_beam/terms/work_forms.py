@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import singledispatch
 from typing import Any, NamedTuple
 
@@ -35,7 +35,12 @@ class Statement(NamedTuple):
     numbers: Mapping[str, fem.Function]  # functions that have the numbers, by their names
     energy: ufl.Form | None = None  # of a potential, at the end of the step
     lost: ufl.Form | None = None  # what the scheme loses of it in the step
-    varies: bool = False  # True if the energy may change in time while nothing moves
+
+    def varies(self, work: Work) -> bool:
+        """Return whether the energy of a work may change in time while nothing moves."""
+        known = () if self.energy is None else self.energy.coefficients()
+        of_time = ["t", *(name for name, number in work.numbers.items() if callable(number))]
+        return any(self.numbers[name] in known for name in of_time)
 
 
 @stated
@@ -44,15 +49,36 @@ def _number(of: Element, name: str) -> fem.Function:
     return of.in_cells()
 
 
-@stated
+class _Same:
+    """A function of a user, which need not be hashable, as a part of a key."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self.function = function
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Same) and other.function is self.function
+
+    def __hash__(self) -> int:
+        return id(self.function)
+
+
 def statement(work: Work, of: Element, scheme: Scheme) -> Statement:
-    """State a work in a time scheme.
+    """State a work in a time scheme, once for all beams and numbers.
 
     Raises:
         SceneError: Its function is wrong.
     """
-    numbers = {name: _number(of, name) for name in (*CLOCK, *work.numbers)}
-    return _state(work, of, scheme, numbers)
+    names = tuple(work.numbers)
+    return _statement(type(work), work.name, _Same(work.density), names, work.degree, of, scheme)
+
+
+@stated
+def _statement(
+    kind: type[Work], name: str, density: _Same, names: Sequence[str], degree: int, of: Element,
+    scheme: Scheme,
+) -> Statement:  # fmt: skip
+    work = kind(name, density.function, numbers=dict.fromkeys(names, 1.0), degree=degree)
+    return _state(work, of, scheme, {name: _number(of, name) for name in (*CLOCK, *names)})
 
 
 @singledispatch
@@ -72,9 +98,9 @@ def _(
     density, dx = _returned(work, known, of), of.dx(work.degree)
     try:
         check_form_arity(expand_derivatives(density * dx), (w,))
-    except ArityMismatch as error:
+    except (ArityMismatch, ValueError):  # which UFL's own message may raise
         raise SceneError(
-            f"{work}: the function must return what is linear in w, such as f * w[1]: {error}"
+            f"{work}: the function must return what is linear in w, such as f * w[1]"
         ) from None
     residual = -numbers["growth"] * density * dx
     return Statement(residual, _derivative(residual, of), numbers)
@@ -101,9 +127,7 @@ def _(
         force += part * (along(s, q1) - along(s, q0))
         lost = part * (along(way, q1) - along(way, q0)) * dx
     stored = ufl.replace(energy, {q: q1}) * dx
-    of_time = [numbers["t"], *(numbers[n] for n, x in work.numbers.items() if callable(x))]
-    varies = any(function in stored.coefficients() for function in of_time)
-    return Statement(force * dx, _derivative(force * dx, of), numbers, stored, lost, varies)
+    return Statement(force * dx, _derivative(force * dx, of), numbers, stored, lost)
 
 
 def _variation(of: Element, scheme: Scheme) -> Expr:

@@ -156,13 +156,13 @@ class Storing(Acting):
             self._energy = self._kernel(stated.energy)
             self._lost = [] if stated.lost is None else [self._kernel(stated.lost)]
         self._kernels += [self._energy, *self._lost]
-        self._held = 0.0
+        self._held, self._varies = 0.0, stated.varies(work)
 
     @staticmethod
     def expect(work: Work, stated: Statement, ledger: Ledger) -> None:
         """Make the entries."""
         ledger.state[work.name] += 0.0
-        if stated.varies:
+        if stated.varies(work):
             ledger.supplied[f"{work.name} in time"] += 0.0
         if stated.lost is not None:
             ledger.lost["numerical"] += 0.0
@@ -176,7 +176,7 @@ class Storing(Acting):
         """Enter what the scheme lost, and what a change in time supplied."""
         for lost in self._lost:
             self._ledger.lost["numerical"] += lost.value(q1)
-        if self._stated.varies:
+        if self._varies:
             begin, end = times
             self._put(float(self._acting(np.array(begin), np.array(self._known["t"]))))
             moved = self._energy.value(q1) - self._energy.value(self._q0)

@@ -1,0 +1,444 @@
+# SPDX-License-Identifier: MIT
+"""Virtual works and potentials of a user: ledger, compilation, restart, ranks, refusals."""
+
+import math
+import re
+
+from mpi4py import MPI
+
+import numpy as np
+import pytest
+import ufl
+
+import ufl_beam as ub
+from ufl_beam.discretization.compiled_forms import prepared
+
+SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=0.1)
+EXACT = [ub.Midpoint(), ub.Midpoint(0.1, 0.1), ub.DecayingMidpoint(0.6)]
+
+
+def soil(q, k):
+    return k * (q[0] ** 2 + 2 * q[1] ** 2 + 0.1 * q[2] ** 2) / 2
+
+
+def magnet(q, axis, b):
+    return -b * (1 + axis.x[0]) * ufl.sin(q[2] + 0.3)
+
+
+def air(q, v, w, c):
+    return -c * (v[0] * w[0] + v[1] * w[1]) - 0.1 * v[2] * w[2] + 3 * ufl.cos(q[2]) * w[1]
+
+
+def works(beam=None, b=5.0):
+    return [
+        ub.Potential("soil", soil, numbers={"k": 50.0}),
+        ub.Potential("magnet", magnet, numbers={"b": b}, beams=beam and [beam]),
+        ub.VirtualWork("air", air, numbers={"c": 0.3}),
+    ]
+
+
+def flying(b=5.0, cells=4):
+    """Two beams in flight, with works on both, and a field on the second one."""
+    first = ub.Beam((0, 0), (2, 0.5), SECTION, cells=cells)
+    second = ub.Beam((2, 0.5), (3, 0), SECTION, cells=cells // 2)
+    spin = ub.Velocity((first, second), linear=(1.0, 2.0), angular=3.0)
+    return ub.Scene(
+        [first, second],
+        [ub.Rigid(first.end, second.start)],
+        initial=[spin],
+        loads=[ub.PointLoad(first.start, force=(0, 3))],
+        works=works(second, b),
+    )
+
+
+def run(scene, scheme=None, **more):
+    more = {"t": (0, 2), "dt": 0.05, "progress": False, **more}
+    return ub.simulate(scene, scheme or ub.Midpoint(), **more)
+
+
+# -- ledger ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scheme", EXACT)
+@pytest.mark.parametrize("b", [5.0, lambda t: 5 * math.cos(3 * t)], ids=["steady", "in time"])
+def test_the_ledger_closes(scheme, b):
+    """To 1e-9; sin ψ is integrated over a step of 0.2 rad to 0.2⁹/2e9 of itself."""
+    energy = run(flying(b), scheme).energy
+    assert energy.worst < 1e-9
+    assert np.ptp(energy["soil"]) > 1 < np.ptp(energy["magnet"])
+    assert energy["air"][-1] < -1
+    assert ("magnet in time" in energy.supplied) == callable(b)
+    if callable(b):
+        assert np.ptp(energy["magnet in time"]) > 1
+
+
+@pytest.mark.parametrize("degree", [2, 3])
+def test_the_ledger_closes_on_cells_of_higher_degree(degree):
+    assert run(flying(), mesh=ub.Mesh(degree=degree), t=(0, 0.5)).energy.worst < 1e-9
+
+
+def test_the_ledger_of_schemes_at_the_end_is_of_second_order():
+    """The trapezoidal rule; [estimate] measured orders of two halvings are within 0.1 of 2.
+
+    Air that depends on rates takes their mean in a step, of first order; so there is wind here.
+    """
+    beam = ub.Beam((0, 0), (2, 0.5), SECTION, cells=4)
+    spin = ub.Velocity((beam,), linear=(1.0, 2.0), angular=3.0)
+    wind = ub.VirtualWork("wind", lambda q, w: 3 * ufl.cos(q[2]) * w[1])
+    acting = [*works(b=lambda t: 5 * math.cos(3 * t))[:2], wind]
+    scene = ub.Scene([beam], initial=[spin], works=acting)
+    worst = [run(scene, ub.Newmark(), dt=dt).energy.worst for dt in (0.02, 0.01, 0.005)]
+    assert np.log2(worst[0] / worst[1]) == pytest.approx(2, abs=0.1)
+    assert np.log2(worst[1] / worst[2]) == pytest.approx(2, abs=0.1)
+
+
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.ExactStatic(0.5), ub.ExactStatic()])
+def test_a_quadratic_potential_in_statics(scheme):
+    """A stiff beam on springs sinks by F/(k L); the trapezoidal rule of its work is exact."""
+    stiff = ub.Section(EA=1e9, GA=1e9, EI=1e9)
+    beam = ub.Beam((0, 0), (2, 0), stiff, cells=4)
+    load = ub.PointLoad(beam.at(0.5), force=(0, -3e-3), time=lambda t: t)
+    ground = ub.Potential("soil", soil, numbers={"k": 50.0})
+    solution = run(ub.Scene([beam], loads=[load], works=[ground]), scheme, t=(0, 1), dt=0.25)
+    # 50 N/m² twice, on 2 m.  Bending is k L⁴/EI = 2e-6 of it, less in its effect.
+    assert solution.displacement(beam.end)[-1, 1] == pytest.approx(-3e-3 / 200, rel=1e-6)
+    assert solution.energy.worst < 1e-9
+    state = 200 * (3e-3 / 200) ** 2 / 2
+    assert solution.energy["soil"][-1] == pytest.approx(state, rel=1e-6)
+
+
+def test_dissipation_of_the_scheme_is_that_of_a_spring():
+    """Midpoint(alpha) loses alpha k (Δu)² in a step: as the same potential by springs."""
+    stiff = ub.Section(EA=1e9, GA=1e9, EI=1e9, rhoA=1.0, rhoI=1.0)
+
+    def dropped(*works, connectors=()):
+        beam = ub.Beam((0, 0), (1, 0), stiff, cells=1)
+        up = ub.Velocity((beam,), linear=(0.0, 1.0))
+        places = [c(beam) for c in connectors]
+        scene = ub.Scene([beam], initial=[up], works=works, connectors=places)
+        return run(scene, ub.Midpoint(alpha=0.2), t=(0, 0.5), dt=0.05).energy
+
+    def spring(end):
+        def make(beam):
+            at = getattr(beam, end)
+            return ub.Slide(ub.ground(*at.point), at, ub.Spring(25.0), axis=(0, 1))
+
+        return make
+
+    on_soil = dropped(ub.Potential("soil", lambda q: 25.0 * q[1] ** 2))
+    on_springs = dropped(connectors=[spring("start"), spring("end")])
+    lost = on_springs["numerical"]
+    assert lost[-1] > 0.1
+    np.testing.assert_allclose(on_soil["numerical"], lost, rtol=1e-8)
+
+
+# -- against the package's own loads -----------------------------------------------------------
+
+
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.ExactStatic(), ub.Midpoint()])
+def test_a_dead_work_is_a_line_load(scheme):
+    """Also where steps are cut, and where it is there from the start."""
+    beam = ub.Beam((0, 0), (2, 0), SECTION, cells=4)
+    held = [ub.Clamped(beam.start)]
+    load = ub.LineLoad(beam, force=(-20.0, 30.0), moment=5.0)
+    work = ub.VirtualWork("load", lambda w: -20.0 * w[0] + 30.0 * w[1] + 5.0 * w[2])
+    loaded, worked = (
+        run(ub.Scene([beam], supports=held, **by), scheme, t=(0, 1), dt=0.25)
+        for by in ({"loads": [load]}, {"works": [work]})
+    )
+    np.testing.assert_allclose(worked.q, loaded.q, atol=1e-9 * np.abs(loaded.q).max())
+    np.testing.assert_allclose(
+        worked.reaction(held[0])[1:], loaded.reaction(held[0])[1:], rtol=1e-7, atol=1e-7
+    )
+    np.testing.assert_allclose(worked.energy["load"], loaded.energy["loads"], rtol=1e-7, atol=1e-9)
+
+
+def test_a_path_of_a_work():
+    """The load factor is its time."""
+    beam = ub.Beam((0, 0), (2, 0), SECTION, cells=4)
+    held = [ub.Clamped(beam.start)]
+    load = ub.LineLoad(beam, force=(0.0, 30.0), time=lambda t: t)
+    work = ub.VirtualWork("load", lambda w, t: 30.0 * t * w[1])
+    loaded, worked = (
+        ub.follow(
+            ub.Scene([beam], supports=held, **by), ub.ArcLength(0.1), until=lambda at: at.t > 1.0
+        )
+        for by in ({"loads": [load]}, {"works": [work]})
+    )
+    np.testing.assert_allclose(worked.times, loaded.times, atol=1e-8)
+    np.testing.assert_allclose(worked.q, loaded.q, atol=1e-8)
+
+
+# -- small motions -----------------------------------------------------------------------------
+
+
+FINE = ub.Mesh(refine=2, degree=3)
+"""16 cells of degree 3: of a wave with n halves (n π/16)⁶/40 of the stiffness is missing, 1e-6."""
+
+
+def column(k):
+    section = ub.Section(EA=1e9, GA=1e9, EI=1.0, rhoA=2.0, rhoI=0.0)
+    beam = ub.Beam((0, 0), (math.pi, 0), section, cells=8)
+    held = [ub.Pinned(beam.start), ub.Roller(beam.end)]
+    bed = ub.Potential("bed", lambda q, k: k * q[1] ** 2 / 2, numbers={"k": k})
+    return beam, held, bed
+
+
+def test_frequencies_on_an_elastic_foundation():
+    """ω² = (EI (nπ/L)⁴ + k)/ρA of a pinned beam of length π [closed]."""
+    beam, held, bed = column(7.0)
+    found = ub.modes(ub.Scene([beam], supports=held, works=[bed]), 3, mesh=FINE)
+    np.testing.assert_allclose(found.omega**2, [(n**4 + 7) / 2 for n in (1, 2, 3)], rtol=2e-6)
+
+
+def test_damping_ratio_of_viscous_air():
+    """c/(2 ρA ω) [closed]."""
+    beam, held, bed = column(7.0)
+    drag = ub.VirtualWork("drag", lambda v, w: -0.3 * v[1] * w[1])
+    scene = ub.Scene([beam], supports=held, works=[bed, drag])
+    found = ub.modes(scene, 2, mesh=FINE)
+    np.testing.assert_allclose(found.damping, 0.3 / (4 * found.omega), rtol=2e-6)
+
+
+def test_buckling_on_an_elastic_foundation():
+    """P = EI m² + k/m² for m half waves on a length π: two waves of four [closed]."""
+    beam, held, bed = column(10.0)
+    push = ub.PointLoad(beam.end, force=(-1.0, 0.0))
+    scene = ub.Scene([beam], supports=held, loads=[push], works=[bed])
+    factors = ub.buckling(scene, 2, mesh=FINE).factors
+    np.testing.assert_allclose(factors, [4 + 10 / 4, 9 + 10 / 9], rtol=2e-6)
+
+
+def test_buckling_by_a_field():
+    """A magnet against a field: EI ψ'' + m b sin ψ = 0 buckles at m b = EI (π/2L)² [closed].
+
+    The field grows from that of the state, which is none, to that at the time t.
+    """
+    section = ub.Section(EA=1e9, GA=1e9, EI=1.0)
+    beam = ub.Beam((0, 0), (1, 0), section, cells=4)
+    push = ub.PointLoad(beam.end, force=(-1.0, 0.0))
+
+    def critical(b):
+        field = ub.Potential("field", lambda q, b: b * ufl.cos(q[2]), numbers={"b": b})
+        scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push], works=[field])
+        return ub.buckling(scene, 1, mesh=ub.Mesh(degree=3)).factors[0]
+
+    # The force P that is left beside the field m b: EI ψ'' + (m b + P) sin ψ = 0 for both.
+    for b in (0.0, 1.0, 2.0):
+        assert critical(b) == pytest.approx((math.pi / 2) ** 2 - b, rel=1e-6)
+
+
+def test_buckling_refuses_works_without_potential():
+    beam, held, _ = column(1.0)
+    scene = ub.Scene([beam], supports=held, works=[ub.VirtualWork("air", lambda v, w: v[1] * w[1])])
+    with pytest.raises(ub.SceneError, match="a VirtualWork has a stiffness of its own"):
+        ub.buckling(scene, 1)
+
+
+# -- compilation -------------------------------------------------------------------------------
+
+
+def test_numbers_times_and_steps_compile_nothing():
+    run(flying(), dt=0.1)
+    before = prepared.cache_info().misses
+    first = run(flying(b=7.0), dt=0.1)
+    run(flying(b=lambda t: 7.0 + t), dt=0.03)
+    assert prepared.cache_info().misses == before
+    other = run(flying(), dt=0.1)
+    assert np.abs(first.q[-1] - other.q[-1]).max() > 1e-3
+
+
+def test_a_scene_without_works_has_no_term():
+    beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
+    simulation = ub.Simulation(ub.Scene([beam]), ub.Midpoint())
+    assert not simulation.loads
+    assert "loads" not in simulation.ledger.supplied
+
+
+# -- processes, checkpoints, files -------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scheme", [ub.Midpoint(), ub.Newmark()])
+def test_any_number_of_processes(scheme):
+    """Beams of which some processes have no cell."""
+    scene = flying(cells=6)
+    together, alone = (run(scene, scheme, comm=c) for c in (MPI.COMM_WORLD, MPI.COMM_SELF))
+    assert np.abs(together.q - alone.q).max() < 1e-9
+    for name in ("soil", "magnet", "air"):
+        np.testing.assert_allclose(together.energy[name], alone.energy[name], atol=1e-8)
+
+
+@pytest.mark.parametrize("scheme", [ub.Midpoint(0.1), ub.Newmark(), ub.GeneralizedAlpha()])
+def test_restart(scheme, shared_path):
+    scene, field = flying(lambda t: 5 + t), ("soil", "magnet", "air", "magnet in time")
+    whole = run(scene, scheme)
+    file = ub.Checkpoint(shared_path / "run.checkpoint", every=7)
+    run(scene, scheme, t=(0, 1), dt=0.05, checkpoint=file)
+    resumed = run(scene, scheme, checkpoint=file)
+    assert np.array_equal(resumed.q, whole.q)
+    for name in field:
+        assert np.array_equal(resumed.energy[name], whole.energy[name])
+
+
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.ExactStatic()])
+def test_restart_in_statics(scheme, shared_path):
+    beam = ub.Beam((0, 0), (2, 0), SECTION, cells=4)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], works=works(b=lambda t: 5 + t))
+    whole = run(scene, scheme, dt=0.2)
+    file = ub.Checkpoint(shared_path / "run.checkpoint", every=3)
+    run(scene, scheme, t=(0, 1), dt=0.2, checkpoint=file)
+    resumed = run(scene, scheme, dt=0.2, checkpoint=file)
+    assert np.array_equal(resumed.q, whole.q)
+    assert np.array_equal(resumed.energy["air"], whole.energy["air"])
+
+
+def test_a_continued_run():
+    """It takes the state as one that works have led to: nothing grows a second time."""
+    beam = ub.Beam((0, 0), (2, 0), SECTION, cells=4)
+    work = ub.VirtualWork("load", lambda w, q: 30.0 * (1 + q[1]) * w[1])
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], works=[work])
+    first = run(scene, ub.Static(), t=(0, 1), dt=0.5)
+    second = run(scene, ub.Static(), t=(1, 2), dt=0.5, start=first)
+    np.testing.assert_allclose(second.q, first.q[-1][None].repeat(3, 0), atol=1e-9)
+    np.testing.assert_allclose(second.energy["load"], 0.0, atol=1e-9)
+    assert np.allclose(second.reaction(scene.supports[0]), first.reaction(scene.supports[0])[-1])
+
+
+@pytest.mark.serial
+def test_a_saved_solution_knows_its_works(tmp_path):
+    solution = run(flying(lambda t: 5 + t), t=(0, 0.2))
+    solution.save(tmp_path / "run.solution")
+    loaded = ub.load(tmp_path / "run.solution")
+    assert [work.name for work in loaded.scene.works] == ["soil", "magnet", "air"]
+    assert np.array_equal(loaded.energy["air"], solution.energy["air"])
+    with pytest.raises(ub.SceneError, match="the function soil is not in the file"):
+        run(loaded.scene)
+
+
+# -- what is refused ---------------------------------------------------------------------------
+
+BEAM = ub.Beam((0, 0), (1, 0), SECTION, cells=2, name="girder")
+STRAY = ub.Beam((0, 1), (1, 1), SECTION, cells=2, name="stray")
+
+
+def raises(*parts):
+    return pytest.raises(ub.SceneError, match=".*".join(map(re.escape, parts)))
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: ub.VirtualWork(3, air), ("VirtualWork: name = 3 must be text",)),
+        (lambda: ub.VirtualWork("", air), ("VirtualWork: name = ''",)),
+        (lambda: ub.Potential("kinetic", soil), ("'kinetic' is an entry of the energy ledger",)),
+        (lambda: ub.Potential("a", 3), ("Potential 'a': density = 3 must be a function of q",)),
+        (lambda: ub.Potential("a", min), ("Potential 'a'", "have no names")),
+        (lambda: ub.Potential("a", lambda q, k: q[0]), ("a parameter 'k', which nobody knows",)),
+        (lambda: ub.Potential("a", lambda w: w[0]), ("'w'", "there are q, axis, t")),
+        (
+            lambda: ub.Potential("a", lambda q: q[0], numbers={"k": 1}),
+            ("Potential 'a': numbers['k'] is no parameter",),
+        ),
+        (
+            lambda: ub.Potential("a", lambda q: q[0], numbers={"q": 1}),
+            ("numbers['q']: the name has a meaning",),
+        ),
+        (
+            lambda: ub.Potential("a", soil, numbers={"k": math.nan}),
+            ("Potential 'a': numbers['k'] = nan is not finite",),
+        ),
+        (
+            lambda: ub.Potential("a", soil, numbers={"k": lambda t: None}),
+            ("numbers['k']: the time function returned None",),
+        ),
+        (lambda: ub.Potential("a", soil, numbers=3), ("numbers = 3 must be numbers by name",)),
+        (lambda: ub.Potential("a", lambda q: q[0], beams=3), ("beams = 3 must be a list",)),
+        (lambda: ub.Potential("a", lambda q: q[0], beams=[3]), ("beams[0] = 3 is not a Beam",)),
+        (lambda: ub.Potential("a", lambda q: q[0], degree=0.5), ("degree = 0.5",)),
+        (
+            lambda: ub.Scene([BEAM], works=[ub.Potential("a", lambda q: q[0], beams=[STRAY])]),
+            ("Potential 'a': stray is not in the scene; add it to beams",),
+        ),
+        (
+            lambda: ub.Scene([BEAM], works=[ub.Potential("a", lambda q: q[0]) for _ in "ab"]),
+            ("works[0] and works[1] are both called 'a'",),
+        ),
+        (lambda: ub.Scene([BEAM], works=[soil]), ("works[0]", "is not a VirtualWork or Potential")),
+        (lambda: ub.Scene([BEAM], works=3), ("works = 3 must be a list",)),
+    ],
+)
+def test_bad_works(make, says):
+    with raises(*says):
+        make()
+
+
+def other_mesh():
+    from ufl_beam.discretization.function_spaces import Element
+    from ufl_beam.model.mesh_options import Mesh
+
+    return Element(Mesh()).q1
+
+
+def fail(**_):
+    return {}["nothing"]
+
+
+@pytest.mark.parametrize(
+    ("function", "says"),
+    [
+        (lambda w: None, "VirtualWork 'a': the function returned None"),
+        (lambda w: 3.0, "the function returned 3.0; it must return an expression of UFL"),
+        (lambda w: np.ones(2), "the function returned array"),
+        (lambda w: w, "the function returned a tensor of shape (3,)"),
+        (lambda w: fail(), "VirtualWork 'a': the function fails: KeyError('nothing')"),
+        (lambda q: q[0], "must return what is linear in w"),
+        (lambda w: w[0] ** 2, "must return what is linear in w"),
+        (lambda w: w[0] + 1, "must return what is linear in w"),
+        (lambda w: abs(w[0]), "must return what is linear in w"),
+        (lambda w: w[0] * other_mesh()[0], "the function uses a mesh of its own"),
+    ],
+)
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.Midpoint()])
+def test_bad_functions_of_virtual_works(function, says, scheme, monkeypatch):
+    def no_grid(*_):
+        raise AssertionError("a mesh")
+
+    monkeypatch.setattr("ufl_beam.simulation.initial_state.Grid", no_grid)
+    held = [ub.Clamped(BEAM.start)]
+    scene = ub.Scene([BEAM], supports=held, works=[ub.VirtualWork("a", function)])
+    with raises(says):
+        ub.Simulation(scene, scheme)
+
+
+@pytest.mark.parametrize(
+    ("function", "says"),
+    [
+        (lambda q: None, "Potential 'a': the function returned None"),
+        (lambda t: 2 * t, "the energy must depend on the configuration q"),
+        (lambda q: q, "the function returned a tensor of shape (3,)"),
+        (lambda q: q.nothing, "the function fails: AttributeError"),
+    ],
+)
+def test_bad_functions_of_potentials(function, says):
+    held = [ub.Clamped(BEAM.start)]
+    scene = ub.Scene([BEAM], supports=held, works=[ub.Potential("a", function)])
+    with raises(says):
+        ub.Simulation(scene, ub.Midpoint())
+
+
+def test_a_number_that_fails_later_is_named():
+    work = ub.VirtualWork(
+        "gust", lambda w, c: c * w[1], numbers={"c": lambda t: 1.0 if t < 0.1 else None}
+    )
+    scene = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)], works=[work])
+    with raises("VirtualWork 'gust': the time function returned None at t = "):
+        run(scene, t=(0, 1))
+
+
+def test_a_work_that_is_no_number_ends_the_run():
+    """The square root has no derivative at rest; the message names the beam."""
+    still = ub.VirtualWork("drag", lambda v, w: -ufl.sqrt(v[1] ** 2) * v[1] * w[1])
+    push = ub.PointLoad(BEAM.end, force=(0.0, 1.0))
+    scene = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)], loads=[push], works=[still])
+    with pytest.raises(ub.ConvergenceError, match="girder"):
+        run(scene, t=(0, 1))
