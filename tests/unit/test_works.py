@@ -268,6 +268,11 @@ def test_any_number_of_processes(scheme):
         np.testing.assert_allclose(together.energy[name], alone.energy[name], atol=1e-8)
 
 
+def same_works(resumed, whole):
+    """To the last bit on one process; several add their parts in another order."""
+    np.testing.assert_allclose(resumed, whole, rtol=0, atol=1e-13 * (MPI.COMM_WORLD.size > 1))
+
+
 @pytest.mark.parametrize("scheme", [ub.Midpoint(0.1), ub.Newmark(), ub.GeneralizedAlpha()])
 def test_restart(scheme, shared_path):
     scene, field = flying(lambda t: 5 + t), ("soil", "magnet", "air", "magnet in time")
@@ -277,7 +282,7 @@ def test_restart(scheme, shared_path):
     resumed = run(scene, scheme, checkpoint=file)
     assert np.array_equal(resumed.q, whole.q)
     for name in field:
-        assert np.array_equal(resumed.energy[name], whole.energy[name])
+        same_works(resumed.energy[name], whole.energy[name])
 
 
 @pytest.mark.parametrize("scheme", [ub.Static(), ub.ExactStatic()])
@@ -289,7 +294,7 @@ def test_restart_in_statics(scheme, shared_path):
     run(scene, scheme, t=(0, 1), dt=0.2, checkpoint=file)
     resumed = run(scene, scheme, dt=0.2, checkpoint=file)
     assert np.array_equal(resumed.q, whole.q)
-    assert np.array_equal(resumed.energy["air"], whole.energy["air"])
+    same_works(resumed.energy["air"], whole.energy["air"])
 
 
 def test_a_continued_run():

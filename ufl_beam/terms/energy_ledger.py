@@ -12,6 +12,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.state_io import Memory
+from ufl_beam.model.works import ENTRIES
 
 EXPLAINED = 0.1
 """Part of an imbalance from which on an estimate of round-off explains it."""
@@ -112,7 +113,13 @@ class Energy:
     def throughput(self) -> float:
         """Energy that went through: the most that the scene held, and all work on or by it; J."""
         works = sum(float(np.sum(np.abs(np.diff(work)))) for work in self.supplied.values())
-        return float(np.max(self.total)) + works
+        return float(np.max(self._held)) + works
+
+    @property
+    def _held(self) -> Array:
+        """Energy in the scene; potentials of a user, which have no zero, by their change."""
+        sizes = {n: e if n in ENTRIES else np.abs(e - e[0]) for n, e in self.state.items()}
+        return _sum(sizes)
 
     @property
     def worst(self) -> float:
@@ -133,7 +140,7 @@ class Energy:
         if self.worst <= claimed:
             return ""
         part = round_off / self.throughput
-        held = float(np.max(self.total)) + sum(float(lost[-1]) for lost in self.lost.values())
+        held = float(np.max(self._held)) + sum(float(lost[-1]) for lost in self.lost.values())
         if part >= 1.0 and held <= NOTHING_HELD * self.throughput:
             return ""  # all works are round-off, as where supports turn a scene as a whole
         said = (
