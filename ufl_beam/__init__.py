@@ -55,7 +55,6 @@ from ufl_beam.model.connector_laws import (
     Controller,
     Coulomb,
     Damper,
-    ForceLaw,
     Motor,
     RigidPlastic,
     Spring,
@@ -65,6 +64,7 @@ from ufl_beam.model.connectors import Connector, Slide, Stretch, Turn
 from ufl_beam.model.damping import KelvinVoigt, Rayleigh
 from ufl_beam.model.distributions import Lognormal, Normal, TruncatedNormal, Weibull
 from ufl_beam.model.fibres import Fibres
+from ufl_beam.model.force_laws import ForceLaw
 from ufl_beam.model.joints import (
     Guided,
     Joint,

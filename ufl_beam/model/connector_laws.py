@@ -17,6 +17,7 @@ from ufl_beam.errors import (
     require_returned,
 )
 from ufl_beam.model.curves import Curve
+from ufl_beam.model.force_laws import ForceLaw
 from ufl_beam.model.material_laws import (
     BulkLaw,
     HingeLaw,
@@ -198,30 +199,6 @@ class Stop:
                 f"Stop: the interval from low = {self.low:g} to high = {self.high:g} must contain "
                 "0, the undeformed scene, and have at least one end"
             )
-
-
-@dataclass(frozen=True)
-class ForceLaw:
-    """Force of a connector as a function of its motion and rate.
-
-    Args:
-        force: ``force(motion, rate)``; arrays or numbers; N or N m; a positive one resists growth.
-            It is evaluated in the middle of the step.  Its work is the entry "functions" of the
-            ledger.
-
-    Example:
-        >>> law = ub.ForceLaw(lambda motion, rate: 1e6 * motion + 1e9 * motion**3)
-        >>> spring = ub.Slide(ub.ground(2, 0), beam.end, law, axis=(0, 1))
-        >>> propped = ub.Scene([beam], [], scene.supports, scene.loads, connectors=[spring])
-        >>> run = ub.simulate(propped, ub.Static(), t=(0, 1), dt=0.25)
-        >>> bool(run.connector(spring).force[-1] < 0)  # it is compressed
-        True
-    """
-
-    force: Callable[[float, float], float]
-
-    def __post_init__(self) -> None:
-        require_function(self.force, "ForceLaw: force", "(motion, rate)")
 
 
 @dataclass(frozen=True)

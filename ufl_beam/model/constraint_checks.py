@@ -17,7 +17,6 @@ from ufl_beam.model.bodies import GROUND, Anchor, Body, Member, Node, node
 from ufl_beam.model.connector_laws import (
     Coulomb,
     Damper,
-    ForceLaw,
     Guide,
     Motor,
     RigidPlastic,
@@ -26,6 +25,7 @@ from ufl_beam.model.connector_laws import (
 )
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import Point
+from ufl_beam.model.force_laws import ForceLaw
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.plastic_hinges import NodeDof, shared_by_joints
 from ufl_beam.model.scene import Scene

@@ -16,6 +16,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.model import connector_laws as laws
+from ufl_beam.model.force_laws import ForceLaw
 from ufl_beam.plotting.style import ORANGE, WHITE, with_unit
 
 
@@ -76,7 +77,7 @@ STRAIGHT: dict[type, list[Piece]] = {
         *(*_CYLINDER, *_ARROW),
         Piece([(0.9, 0.0), (0.9, 1.15), (-0.25, 1.15), (-0.25, 0.6)], weight=1.0),
     ],
-    laws.ForceLaw: [
+    ForceLaw: [
         *_BOXED,
         Piece([(-0.55, -0.35), (-0.25, -0.27), (0.25, 0.27), (0.55, 0.35)], inside=True),
     ],
@@ -101,7 +102,7 @@ AROUND: dict[type, Glyph] = {
     laws.Spring: Glyph([Piece([(2.0, CENTRE), (2.0, -2.1), (-2.0, 0.0)])], sweep=4.3 * math.pi),
     **{
         law: Glyph([*STRAIGHT[law], *_SPOKES])  # the straight one, with a spoke at both ends
-        for law in (laws.Damper, laws.Stop, laws.Coulomb, laws.ForceLaw, laws.RigidPlastic)
+        for law in (laws.Damper, laws.Stop, laws.Coulomb, ForceLaw, laws.RigidPlastic)
     },
     laws.Motor: _turning(ORANGE),
     laws.Actuator: _turning(WHITE),

@@ -14,8 +14,9 @@ from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import Anchor, Member
-from ufl_beam.model.connector_laws import Controller, ForceLaw, Guide
+from ufl_beam.model.connector_laws import Controller, Guide
 from ufl_beam.model.curves import Curve, nearest, parameter_step
+from ufl_beam.model.force_laws import ForceLaw
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.archive import above, below, read
 from ufl_beam.output.saved_scene import SavedCurve, SavedFunction, from_data, lost, to_data

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.errors import require_returned
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.model.connector_laws import (
     HELD,
@@ -17,7 +16,6 @@ from ufl_beam.model.connector_laws import (
     Controller,
     Coulomb,
     Damper,
-    ForceLaw,
     Motor,
     Stop,
 )
@@ -126,49 +124,6 @@ class _Damped(Working):
         """The force is viscosity times the mean rate."""
         factor = self._viscosity / self._dt
         return -factor, 1.0, -factor * self._e0
-
-
-@respond.register(ForceLaw)
-class _Asked(Working):
-    """Forces that a function of motion and rate gives."""
-
-    _entry = "functions"
-
-    def _prepare(self) -> None:
-        self._small = 1e-3 * np.where([c.turns for c in self._links], 1.0, self._setting.size)
-
-    def _forces(self, e1: Array) -> Array:
-        middle: Array = self._setting.scheme.average(self._e0, e1)
-        rate = (e1 - self._e0) / self._dt
-        each = zip(self._links, self._laws, middle, rate, strict=True)
-        return np.array([_given(link, law.force, m, r) for link, law, m, r in each])
-
-    def rows(self, e1: Array, λ: Array) -> Rows:
-        """The force around the iterate; its derivative by central differences."""
-        force = self._forces(e1)
-        ε = 6e-6 * np.maximum(np.abs(e1 - self._e0), 1e-3 * np.maximum(np.abs(e1), self._small))
-        slope: Array = (self._forces(e1 + ε) - self._forces(e1 - ε)) / (2 * ε)
-        return -slope, 1.0, force - slope * e1
-
-    def bends(self, e1: Array) -> Array:
-        """Second derivative of a force function, by a fourth-order difference.
-
-        Over a thousandth of the scene, or of a radian, it leaves 1e-10 of round-off, and less of
-        the sixth derivative of a law that bends over a thirtieth of the scene or more.
-        """
-        ε = self._small
-        weights = np.array([-1.0, 16.0, -30.0, 16.0, -1.0])
-        forces = np.array([self._forces(e1 + k * ε) for k in range(-2, 3)])
-        return np.asarray(-(weights @ forces) / (12 * ε**2))
-
-
-def _given(link: Connector, force: Any, motion: Any, rate: Any) -> float:
-    """Evaluate the force of a :class:`ForceLaw`; its owner is named if it is no number."""
-    value = force(motion, rate)
-    if isinstance(value, float):
-        return value
-    at = f"motion = {motion:.6g}, rate = {rate:.6g}"
-    return require_returned(value, f"{link}: the function", at)
 
 
 @respond.register(Coulomb)

@@ -21,12 +21,13 @@ from ufl_beam.dolfinx_compat import fem, line_mesh
 from ufl_beam.mechanics.relative_motions import MOTIONS, Numbers, Pair
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.connector_laws import HELD, Law, RigidPlastic, Spring
-from ufl_beam.terms import connector_laws, rigid_plastic, springs
+from ufl_beam.model.force_laws import ForceLaw
+from ufl_beam.terms import connector_laws, force_laws, rigid_plastic, springs
 from ufl_beam.terms.connector_responses import Setting, respond
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.tangent_derivatives import TangentChange
 
-LAWS = (connector_laws, rigid_plastic, springs)
+LAWS = (connector_laws, force_laws, rigid_plastic, springs)
 """Modules with the responses of laws, which register them with :func:`respond`."""
 
 
@@ -39,6 +40,11 @@ def _kind(law: Law) -> object:
 @_kind.register
 def _(law: Spring) -> object:
     return law
+
+
+@_kind.register
+def _(law: ForceLaw) -> object:
+    return ForceLaw, len(law.state)
 
 
 @_kind.register
