@@ -9,7 +9,6 @@ from __future__ import annotations
 from functools import cached_property
 
 import basix.ufl
-import dolfinx.mesh
 import numpy as np
 import ufl
 
@@ -19,6 +18,7 @@ from ufl_beam.compiled.simd_kernels import LANES, in_batches
 from ufl_beam.discretization.compiled_forms import Kernel, stated, vectorise
 from ufl_beam.discretization.partition import Share
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
+from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.mechanics.functional import kinetic_energy, resultants
 from ufl_beam.mechanics.kinematics import Axis, strain
 from ufl_beam.model.mesh_options import Mesh
@@ -39,7 +39,7 @@ class Element:
         inertia: (rhoA, rhoI); kg/m, kg m.
     """
 
-    def __init__(self, mesh: Mesh, cells: dolfinx.mesh.Mesh | None = None) -> None:
+    def __init__(self, mesh: Mesh, cells: meshes.Mesh | None = None) -> None:
         self._degree, self._lumped = mesh.degree, mesh.lumped
         one_cell = np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0, 1]])
         self._cell = cells or line_mesh(*one_cell)
