@@ -22,8 +22,9 @@ try:
     import dolfinx
     import ffcx
     import ufl
-    from dolfinx import cpp, jit, mesh
+    from dolfinx import cpp, jit
     from dolfinx import fem as fem
+    from dolfinx import mesh as mesh
 except ImportError as error:  # pragma: no cover - depends on the machine
     raise ImportError(
         "ufl_beam needs DOLFINx 0.9 or newer with PETSc, which is not on PyPI "

@@ -18,13 +18,17 @@ from ufl_beam.compiled.simd_kernels import LANES, in_batches
 from ufl_beam.discretization.compiled_forms import Kernel, stated, vectorise
 from ufl_beam.discretization.partition import Share
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
+from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.mechanics.functional import kinetic_energy, resultants
 from ufl_beam.mechanics.kinematics import Axis, strain
 from ufl_beam.model.mesh_options import Mesh
 
 
 class Element:
-    """The finite element of the beams on one cell, and the functions that forms are written in.
+    """The finite element of the beams, and the functions that forms are written in.
+
+    Forms that are compiled once for all scenes are stated on one cell; DOLFINx assembles those that
+    are stated on the cells of a scene.
 
     Attributes:
         axis: Undeformed axis, in UFL.
@@ -35,9 +39,10 @@ class Element:
         inertia: (rhoA, rhoI); kg/m, kg m.
     """
 
-    def __init__(self, mesh: Mesh) -> None:
+    def __init__(self, mesh: Mesh, cells: meshes.Mesh | None = None) -> None:
         self._degree, self._lumped = mesh.degree, mesh.lumped
-        self._cell = line_mesh(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0, 1]]))
+        one_cell = np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0, 1]])
+        self._cell = cells or line_mesh(*one_cell)
         line = basix.ufl.element("Lagrange", "interval", mesh.degree)
         self.axis = Axis(self._cell, mesh.nodes, self._along() if mesh.degree > 1 else 0.5)
         self.space = fem.functionspace(self._cell, basix.ufl.mixed_element([line, line, line]))
@@ -55,7 +60,7 @@ class Element:
     def _along(self) -> fem.Function:
         """Coordinate from 0 to 1 along the cell."""
         function = fem.Function(fem.functionspace(self._cell, ("DG", 1)))
-        function.x.array[:] = 0.0, 1.0
+        function.x.array[function.function_space.dofmap.list] = 0.0, 1.0
         return function
 
     def configuration(self) -> fem.Function:

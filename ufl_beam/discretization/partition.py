@@ -174,6 +174,10 @@ class Share:
         lengths[self.multipliers()] = 0.0
         return lengths
 
+    def numbers(self) -> Index:
+        """Numbers in PETSc's vectors of the local degrees of freedom."""
+        return np.asarray(self._global[self.dofs])
+
     def local(self, dofs: Index) -> Index:
         """Local numbers of those ``dofs`` (numbers of the grid) that this process has."""
         found = self._local[dofs]

@@ -215,6 +215,17 @@ class Elimination:
             self._comm.Allreduce(MPI.IN_PLACE, values)
 
 
+def succeeds(function: Callable[..., None], *vectors: PETSc.Vec) -> bool:
+    """Return False if KLU finds that the matrix is singular; its next factorisation works."""
+    try:
+        function(*vectors)
+    except PETSc.Error as error:
+        if error.ierr != lib.OF_LIBRARY:
+            raise
+        return False
+    return True
+
+
 class ChainsFirst:
     """Direct solver: condensation along the beams, then factorization by ``package`` of the rest.
 
@@ -250,26 +261,16 @@ class ChainsFirst:
     def setUp(self, pc: PETSc.PC) -> None:
         """Factor; PETSc asks for it where the matrix has changed."""
         self._matrix.stateIncrease()
-        self._good = self._elimination.factor() and self._succeeds(self._factors.setUp)
+        self._good = self._elimination.factor() and succeeds(self._factors.setUp)
         self._good = self._good and int(self._factors.getFailedReason()) == GOOD
         pc.setFailedReason(GOOD if self._good else BAD_PIVOT)
-
-    def _succeeds(self, function: Callable[..., None], *vectors: PETSc.Vec) -> bool:
-        """Return False if KLU finds that the matrix is singular; its next factorisation works."""
-        try:
-            function(*vectors)
-        except PETSc.Error as error:
-            if error.ierr != lib.OF_LIBRARY:
-                raise
-            return False
-        return True
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, x: PETSc.Vec) -> None:
         """Solve; zero after a failure, where an error would leave objects of PETSc half done."""
         if self._good:
             self._elimination.reduce(b.array_r)
             self._rhs.stateIncrease()
-            self._good = self._succeeds(self._factors.apply, self._rhs, self._solution)
+            self._good = succeeds(self._factors.apply, self._rhs, self._solution)
         if self._good:
             self._elimination.expand(self._solution.array_r, x.array_w)
         else:

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: MIT
+"""The functional on its page: its Euler equations, and that what runs is made of it."""
+
+import math
+
+from mpi4py import MPI
+
+import numpy as np
+import pytest
+import ufl
+
+import ufl_beam as ub
+from ufl_beam.discretization.dolfinx_forms import DolfinxForm, dofs_of_cells
+from ufl_beam.discretization.function_spaces import Element
+from ufl_beam.dolfinx_compat import fem, line_mesh
+from ufl_beam.mechanics import functional
+from ufl_beam.mechanics.kinematics import strain
+
+EPS = float(np.finfo(float).eps)
+
+POINTS = np.array([[0, 0], [1, 0.5], [1.5, 2], [1, 3.0]])
+MESH = line_mesh(POINTS, np.array([[0, 1], [1, 2], [2, 3]]))
+STIFFNESS = (60.0, 40.0, 30.0)
+
+
+def random_function(space, seed):
+    function = fem.Function(space)
+    function.x.array[:] = np.random.default_rng(seed).uniform(-0.5, 0.5, len(function.x.array))
+    return function
+
+
+@pytest.fixture
+def fields():
+    """Configuration, jumps, free strains and resultants at random, with a bulk that has flowed."""
+    of = Element(ub.Mesh(), MESH)
+    constant = fem.functionspace(MESH, ("DG", 0, (3,)))
+    q, α = random_function(of.space, 1), random_function(fem.functionspace(MESH, ("DG", 0)), 2)
+    D, r, plastic = (random_function(constant, seed) for seed in (3, 4, 5))
+
+    def W(e):
+        return functional.elastic_energy(e - plastic, ufl.as_vector(STIFFNESS))
+
+    return of, q, α, D, r, W
+
+
+def vector(form):
+    return fem.assemble_vector(fem.form(form)).array
+
+
+def scalar(form):
+    return fem.assemble_scalar(fem.form(form))
+
+
+def derivative(density, function, dx):
+    return ufl.derivative(density * dx, function, ufl.TestFunction(function.function_space))
+
+
+def test_variation_by_resultants_ties_strains_to_the_configuration(fields):
+    """P(29), its third equation."""
+    of, q, _, D, r, W = fields
+    dx = of.dx(1)
+    found = vector(derivative(functional.hu_washizu(W, q, D, r, of.axis), r, dx))
+    z = ufl.TestFunction(r.function_space)
+    expected = vector(ufl.dot(strain(q, of.axis) - D, z) * dx)
+    assert np.abs(found - expected).max() <= 8 * EPS * np.abs(expected).max()
+
+
+def test_variation_by_strains_is_the_law(fields):
+    """P(29), its second equation: resultants are the derivative of the free energy."""
+    of, q, _, D, r, W = fields
+    dx = of.dx(1)
+    found = vector(derivative(functional.hu_washizu(W, q, D, r, of.axis), D, dx))
+    e = ufl.variable(D)
+    expected = vector(ufl.dot(ufl.diff(W(e), e) - r, ufl.TestFunction(D.function_space)) * dx)
+    assert np.abs(found - expected).max() <= 8 * EPS * np.abs(expected).max()
+
+
+def test_modified_functional_is_that_of_split_strains(fields):
+    """P(26) with the split P(30) is P(31)."""
+    of, q, α, _, r, W = fields
+    jump = functional.incompatible(α, of.axis)
+    D = functional.enhanced_strain(q, α, of.axis)
+    split, modified = (
+        scalar(one * of.dx(1))
+        for one in (
+            functional.hu_washizu(W, q, D, r, of.axis),
+            functional.modified_functional(W, q, jump, r, of.axis),
+        )
+    )
+    assert math.isclose(split, modified, rel_tol=16 * EPS)
+
+
+def test_jumps_do_no_work_on_constant_resultants(fields):
+    """P(33): what a jump adds to the strain of the bulk, and the jump itself, add up to none."""
+    of, _, α, *_ = fields
+    along_the_bulk = vector(
+        functional.incompatible(α, of.axis)[2] * ufl.TestFunction(α.function_space) * of.dx(1)
+    )
+    assert np.abs(along_the_bulk + α.x.array).max() <= 4 * EPS
+
+
+def test_equilibrium_of_the_hinge(fields):
+    """P(34), its second equation: the moment of the bulk is that of the hinge."""
+    of, q, α, _, _, W = fields
+    energy = 3 * α**2  # J, of a hinge with the moment 6 α
+    found = vector(derivative(functional.potential(W, q, α, energy, of.axis), α, of.dx(1)))
+    e = ufl.variable(functional.enhanced_strain(q, α, of.axis))
+    z = ufl.TestFunction(α.function_space)
+    moment = vector(ufl.diff(W(e), e)[2] / of.axis.h * z * of.dx(1))
+    expected = 6 * α.x.array - moment
+    assert np.abs(found - expected).max() <= 16 * EPS * np.abs(moment).max()
+
+
+# -- what runs -----------------------------------------------------------------------------------
+
+SECTION = ub.Section(EA=6e3, GA=4e3, EI=300.0, rhoA=2.0, rhoI=1.0, hinge=ub.Softening(40.0, 25.0))
+
+
+def pushed(section, turn=0.3):
+    """A cantilever whose end is turned, at equilibrium; every process computes all of it."""
+    beam = ub.Beam((0, 0), (1, 2), section, cells=3)
+    scene = ub.Scene(
+        [beam],
+        supports=[ub.Clamped(beam.start), ub.Prescribed(beam.end, psi=lambda t: turn * t)],
+    )
+    simulation = ub.Simulation(scene, ub.Static(), comm=MPI.COMM_SELF)
+    for t in np.linspace(0.05, 1, 20):
+        simulation.step_to(float(t))
+    return simulation
+
+
+def on_cells(simulation):
+    """The element on the cells of a scene, and its configuration."""
+    fields = simulation.fields
+    of = Element(fields.share.grid.mesh, fields.mesh)
+    of.q1.x.array[dofs_of_cells(of.space)] = simulation.q[fields.cell_dofs]
+    return of
+
+
+def test_forces_are_the_derivative_of_the_potential():
+    """Internal forces of a static step, elastic, are P(34), its first equation."""
+    simulation = pushed(ub.Section(EA=6e3, GA=4e3, EI=300.0))
+    of, share = on_cells(simulation), simulation.share
+    W = functional.elastic_energy(strain(of.q1, of.axis), ufl.as_vector((6e3, 4e3, 300.0)))
+    order = np.arange(len(share.cells))
+    form = DolfinxForm(derivative(W, of.q1, of.dx(1)), of.q1, simulation.fields.cell_dofs, order)
+    expected, found = np.zeros((2, share.size))
+    form.add(simulation.q, expected)
+    for one in simulation.beams:
+        one.add_residual(simulation.q, found)
+    assert np.abs(found - expected).max() <= 1e-13 * np.abs(expected).max()
+
+
+def test_an_open_hinge_is_a_stationary_jump():
+    """The jumps that the return map finds make the potential stationary, P(34) and P(49)."""
+    simulation = pushed(SECTION)
+    of = on_cells(simulation)
+    cells, kept = simulation.inelastic[0].kept()
+    α = fem.Function(fem.functionspace(simulation.fields.mesh, ("DG", 0)))
+    α.x.array[np.argsort(simulation.fields.order)[cells]] = kept[:, 3]
+    assert np.count_nonzero(α.x.array) == 3  # a uniform moment opens all
+    C = ufl.as_vector((6e3, 4e3, 300.0))
+    # The energy that a growing jump dissipates, whose derivative is the traction P(52)
+    broken = 25.0 * (1 - ufl.exp(-40.0 / 25.0 * abs(α)))
+
+    def W(e):
+        return functional.elastic_energy(e, C)
+
+    residual = vector(derivative(functional.potential(W, of.q1, α, broken, of.axis), α, of.dx(1)))
+    moments = np.abs(kept[:, 2])
+    assert (moments < 40.0).all()
+    # The local solution has a relative step of 1e-9, squared, and round-off
+    assert np.abs(residual).max() <= 1e-12 * moments.max()
+
+
+def test_mass_is_the_second_derivative_of_the_kinetic_energy():
+    """P(67): consistent, h/3 and h/6 of the density."""
+    of = Element(ub.Mesh(), MESH)
+    of.inertia.x.array[:] = np.tile([2.0, 0.5], 3)
+    v = random_function(of.space, 7)
+    energy = scalar(functional.kinetic_energy(v, of.inertia) * of.dx_of_mass())
+    lengths = np.hypot(*np.diff(POINTS, axis=0).T)
+    of_cells = v.x.array[dofs_of_cells(of.space)].reshape(3, 3, 2)
+    square = (of_cells**2).sum(axis=2) + of_cells.prod(axis=2)
+    original = MESH.topology.original_cell_index
+    expected = (lengths[original, None] / 3 * square * [2.0, 2.0, 0.5]).sum() / 2
+    assert math.isclose(energy, expected, rel_tol=16 * EPS)

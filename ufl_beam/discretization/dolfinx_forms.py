@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: MIT
+"""Cell forms that DOLFINx assembles, for the reference path."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+import ufl
+
+from ufl_beam.arrays import Array, Index
+from ufl_beam.compiled.csr import Csr
+from ufl_beam.compiled.jit import compiled_form
+from ufl_beam.dolfinx_compat import fem
+
+
+def dofs_of_cells(space: fem.FunctionSpace) -> Index:
+    """Degrees of freedom of the cells of a space; (num_cells, dofs of a cell)."""
+    blocks, size = space.dofmap.list, space.dofmap.bs
+    return np.asarray(blocks[:, :, None] * size + np.arange(size)).reshape(len(blocks), -1)
+
+
+class DolfinxForm:
+    """A form assembled by DOLFINx on the mesh that it is stated on; what :class:`Kernel` does.
+
+    Beams that joints connect share unknowns of the scene, but no vertices of the mesh: values go
+    between both through the degrees of freedom of the cells.
+
+    Args:
+        form: Cell integrals with one quadrature rule.
+        unknown: The configuration that most calls change; it need not appear in the form.
+        cell_dofs: Its degrees of freedom in the scene; shape (num_cells, k).
+        order: Row of ``cell_dofs``, and of all values given and returned, of each cell of the mesh.
+    """
+
+    def __init__(
+        self, form: ufl.Form, unknown: fem.Function, cell_dofs: Index, order: Index
+    ) -> None:
+        self._form, _ = compiled_form(form)
+        self._coefficients, self._unknown, self._order = form.coefficients(), unknown, order
+        self._spaces = [argument.ufl_function_space() for argument in form.arguments()]
+        space = unknown.function_space
+        self._at = np.empty(len(unknown.x.array), dtype=np.int32)
+        self._at[dofs_of_cells(space)] = cell_dofs[order]
+        self._rows: Index = self._at
+        if self._spaces[0:1] != [space][0 : len(self._spaces)]:
+            dofs = dofs_of_cells(self._spaces[0])
+            self._rows = np.empty(dofs.size, dtype=np.int32)
+            self._rows[dofs] = np.arange(dofs.size).reshape(dofs.shape)[order]
+
+    def uses(self, function: fem.Function) -> bool:
+        """Return whether a function appears in the form."""
+        return function in self._coefficients
+
+    def set(self, function: fem.Function, q: Array) -> None:
+        """Give ``function`` the degrees of freedom ``q`` of the scene, if it is in the form."""
+        if self.uses(function):
+            function.x.array[:] = q[self._at]
+
+    def put(self, function: fem.Function, values: Array) -> None:
+        """Give ``function`` other values in the cells; shape (num_cells, dofs per cell)."""
+        dofs = dofs_of_cells(function.function_space)
+        function.x.array[dofs] = np.broadcast_to(values, dofs.shape)[self._order]
+
+    def place(self, A: Csr) -> None:
+        """Let a bilinear form on the degrees of freedom of the cells add to ``A``."""
+        self._A = A
+
+    @cached_property
+    def _entries(self) -> Index:
+        """Where in the entries of the scene's matrix those of DOLFINx belong."""
+        matrix = fem.assemble_matrix(self._form)
+        rows = np.repeat(np.arange(len(self._at)), np.diff(matrix.indptr))
+        return self._A.positions(self._at[rows], self._at[matrix.indices])
+
+    def add(self, q: Array, b: Array) -> None:
+        """Add the form at the unknown ``q`` to a vector, or to the entries of the matrix."""
+        self.set(self._unknown, q)
+        if len(self._spaces) == 1:
+            np.add.at(b.reshape(-1), self._rows, fem.assemble_vector(self._form).array)
+        else:
+            np.add.at(b, self._entries, fem.assemble_matrix(self._form).data)
+
+    def value(self, q: Array) -> float:
+        """Return the value of the functional at the unknown ``q``."""
+        self.set(self._unknown, q)
+        return float(fem.assemble_scalar(self._form))
