@@ -215,11 +215,10 @@ def test_internal_variables_change_with_accepted_steps_only():
 
 
 def hysteretic(x, rate, dt, state):
-    """Bouc and Wen's law with β = γ = 1/2, forward in time."""
-    z = state[0]
-    grows = rate * (1 - (0.5 + 0.5 * math.copysign(1.0, rate * z)) * abs(z)) / 1e-3
-    after = z + dt * grows
-    return 1.0 * (z + after) / 2, [after]
+    """Bouc and Wen's law with β = γ = 1/2, which is soft from 1 mm on."""
+    z, way = state[0], rate * dt / 1e-3
+    after = (z + way) / (1 + abs(way) * (way * z > 0))
+    return (z + after) / 2, [after]
 
 
 def machine():

@@ -3,6 +3,7 @@
 
 import math
 import re
+from pathlib import Path
 
 from mpi4py import MPI
 
@@ -318,6 +319,23 @@ def test_a_saved_solution_knows_its_works(tmp_path):
     assert np.array_equal(loaded.energy["air"], solution.energy["air"])
     with pytest.raises(ub.SceneError, match="the function soil is not in the file"):
         run(loaded.scene)
+
+
+@pytest.mark.serial
+def test_the_blocks_of_the_page_run(capsys):
+    page = (Path(__file__).parents[2] / "docs" / "works.md").read_text(encoding="utf-8")
+    names = {}
+    for block in re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL):
+        exec(block, names)
+    said = [[*map(float, line.split())] for line in capsys.readouterr().out.splitlines()]
+    (work, worst), (sunk,), (field, in_time), (dissipated,) = [row for row in said if row]
+    assert work < 0 < dissipated
+    assert worst < 1e-9
+    # Hetényi's deflection to the error of 32 cells, λ² h²/12 = 1e-3
+    assert sunk == pytest.approx(-1.350e-5, rel=1e-3)
+    assert field < 0 > in_time
+    wired = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)], works=[names["wire"]])
+    assert run(wired, t=(0, 0.1)).energy["current"][-1] > 0
 
 
 # -- what is refused ---------------------------------------------------------------------------

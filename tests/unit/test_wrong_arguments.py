@@ -91,6 +91,12 @@ SHAPE = {
 SOFTENING = {"limit": V(1.0, LIMIT), "energy": V(1.0, POSITIVE)}
 NORMAL = {"mean": V(1.0, POSITIVE), "deviation": V(0.1, POSITIVE), "seed": V(1, SEED)}
 MESH = {"mesh": V(None, optional(OBJECT))}
+OF_WORKS = {
+    "name": V("wind", [*TEXT, "", "kinetic"]),
+    "beams": V(None, optional(LIST)),
+    "numbers": V({"c": 1.0}, [None, 1.0, "ab", {}, {"c": None}, {"c": NAN}, {"w": 1, "q": 1}]),
+    "degree": V(2, COUNT),
+}
 RUN = {"newton": V(None, optional(OBJECT)), **MESH, "comm": V(None, optional(OBJECT))}
 ALONG = {"record": V((), LIST), "start": V(None, optional(OBJECT)), **RUN}
 
@@ -237,7 +243,12 @@ TABLE = {
         force=V(1.0, FROM_ZERO), coefficient=V(1.0, FROM_ZERO), joint=V(JOINT, OBJECT),
     ),
     "RigidPlastic": call(ub.RigidPlastic, law=V(LAW, OBJECT)),
-    "ForceLaw": call(ub.ForceLaw, force=V(lambda e, rate: e, FUNCTION)),
+    "ForceLaw": call(
+        ub.ForceLaw,
+        force=V(lambda e, rate, state: (e, state), FUNCTION),
+        state=V([0.0], [None, 1.0, "ab", [NAN], [1j], ["1"], [[1.0]], [HUGE]]),
+        stored=V(None, optional(FUNCTION)),
+    ),
     "Controller": call(ub.Controller, force=V(lambda simulation: 1.0, FUNCTION)),
     "Motor": call(ub.Motor, motion=V(lambda t: t, [*TIME, None])),
     "Actuator": call(ub.Actuator, force=V(lambda t: t, [*TIME, None])),
@@ -247,6 +258,12 @@ TABLE = {
     "LineLoad": call(ub.LineLoad, beam=V(BEAM, OBJECT), force=V((1, 0), VECTOR), **TIMED),
     "Gravity": call(
         ub.Gravity, acceleration=V((0, -9.81), VECTOR), time=V(lambda t: t, [*TIME, None])
+    ),
+    "VirtualWork": call(
+        ub.VirtualWork, density=V(lambda w, c: c * w[1], [*FUNCTION, lambda x: x]), **OF_WORKS
+    ),
+    "Potential": call(
+        ub.Potential, density=V(lambda q, c: c * q[1], [*FUNCTION, lambda w: w]), **OF_WORKS
     ),
     "RotatingFrame": call(ub.RotatingFrame, rate=V(1.0, NUMBER), about=V((0, 0), VECTOR)),
     "Table": call(
@@ -281,7 +298,7 @@ TABLE = {
             name: V((), LIST)
             for name in (
                 "joints", "supports", "loads", "masses", "initial", "damping", "bodies",
-                "connectors",
+                "connectors", "works",
             )
         },
     ),

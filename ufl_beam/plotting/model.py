@@ -154,6 +154,9 @@ def _(damping: KelvinVoigt) -> str:
 def notes_of(scene: Scene) -> list[str]:
     """Return words on loads of the whole scene, and a legend of the symbols."""
     notes = [_damping_in_words(damping) for damping in scene.damping]
+    for work in scene.works:
+        where = "" if work.beams is None else " on " + ", ".join(b.name for b in work.beams[:4])
+        notes.append(f"{work.name}: acts as its function says{where}")
     laws = {b.section.hinge for b in scene.beams if b.section.hinge and b.section.hinge.opens}
     if laws:
         limits = sorted({with_unit(law.limit, "N m") for law in laws})

@@ -153,11 +153,11 @@ class Asked(Working):
         self._setting.ledger.state["stored"] += self._stored
 
     def state(self) -> Array:
-        """Internal variables."""
+        """Internal variables of the accepted state."""
         return self._state
 
     def restore(self, rows: Array) -> None:
-        """Take over :meth:`state`."""
+        """Take over the internal variables of a :meth:`state`."""
         self._state = rows.copy()
 
 

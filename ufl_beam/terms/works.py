@@ -70,7 +70,7 @@ class Acting:
         raise NotImplementedError
 
     def begin(self, q0: Array, clock: Clock) -> None:
-        """Begin a step."""
+        """Take note of the step that is to be solved."""
         for kernel in self._kernels:
             kernel.set(self._fields.element.q0, q0)
         self._put(clock.t, dt=clock.dt, growth=clock.growth)
@@ -129,7 +129,7 @@ class Working(Acting):
 
     @staticmethod
     def expect(work: Work, stated: Statement, ledger: Ledger) -> None:
-        """Make the entry."""
+        """Make its entry among the works supplied."""
         ledger.supplied[work.name] += 0.0
 
     def take(self, force: Array) -> None:
@@ -137,7 +137,7 @@ class Working(Acting):
         self._before = force
 
     def accept(self, q1: Array, s: Array, force: Array, times: tuple[float, float]) -> None:
-        """Enter the work."""
+        """Enter the work of the step."""
         self._ledger.supplied[self._name] += float(self._acting(self._before, force) @ s)
         self._before = force
 
@@ -160,7 +160,7 @@ class Storing(Acting):
 
     @staticmethod
     def expect(work: Work, stated: Statement, ledger: Ledger) -> None:
-        """Make the entries."""
+        """Make its entries of state, work and loss."""
         ledger.state[work.name] += 0.0
         if stated.varies(work):
             ledger.supplied[f"{work.name} in time"] += 0.0
@@ -168,7 +168,7 @@ class Storing(Acting):
             ledger.lost["numerical"] += 0.0
 
     def begin(self, q0: Array, clock: Clock) -> None:
-        """Begin a step."""
+        """Take note of the step that is to be solved."""
         super().begin(q0, clock)
         self._q0 = q0
 
@@ -185,7 +185,7 @@ class Storing(Acting):
             self._ledger.supplied[f"{self._name} in time"] += gained
 
     def add_state(self, q: Array, t: float) -> None:
-        """Enter the energy."""
+        """Enter the energy of the accepted state."""
         self._put(t)
         self._held = self._energy.value(q)
         self._ledger.state[self._name] += self._held
@@ -266,7 +266,7 @@ class Works(LoadTerm):
             tangent.add(q1, self._A.data)
 
     def accept(self, q1: Array, s: Array) -> None:
-        """Enter the works."""
+        """Enter what the works did in the step."""
         self.force = np.zeros_like(q1)
         for one in self._parts:
             force = one.force(q1)
