@@ -132,6 +132,11 @@ def function(fail):
     connected(ub.ForceLaw(lambda motion, rate: fail() if abs(motion) > 1e-5 else 0.0))
 
 
+def work(fail):
+    lift = ub.VirtualWork("lift", lambda w, c: c * w[1], numbers={"c": late(fail)})
+    run(scene(works=[lift]))
+
+
 def guide(fail):
     def curve(s):
         if abs(s) > 1e-5:
@@ -174,7 +179,7 @@ def path(fail):
 EVERYWHERE = [load, load_in_statics, gravity, controller, recorder, beginning, checkpoint]
 """Cases whose function is called on all processes."""
 
-SOMEWHERE = [follower, prescribed, motor, actuator, function, guide, events, path]
+SOMEWHERE = [follower, prescribed, motor, actuator, function, work, guide, events, path]
 """Cases whose function is called where the object is."""
 
 

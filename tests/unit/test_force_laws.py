@@ -214,6 +214,16 @@ def test_internal_variables_change_with_accepted_steps_only():
     simulation.close()
 
 
+def test_a_law_cannot_change_the_state_that_it_is_given():
+    def force(x, rate, state):
+        state += 1.0
+        return x, state
+
+    _, scene, _ = floating(ub.ForceLaw(force, [0.0]), lambda t: t)
+    with pytest.raises(ValueError, match="read-only"):
+        run(scene)
+
+
 def hysteretic(x, rate, dt, state):
     """Bouc and Wen's law with β = γ = 1/2, which is soft from 1 mm on."""
     z, way = state[0], rate * dt / 1e-3
