@@ -58,7 +58,7 @@ def test_an_infinite_slope_at_zero(n, size, dt):
     np.testing.assert_allclose(found, exact, rtol=0, atol=n * 1e-9 * np.abs(exact).max())
     # No step was cut, but perhaps for the motion of 1e-147 m that n = 9 makes of a last digit.
     assert solution.parts - (len(solution.times) - 1) in ((0,) if n < 9 else (0, 1, 2))
-    assert solution.iterations < 10 * solution.parts
+    assert solution.iterations < 15 * solution.parts
 
 
 @pytest.mark.parametrize("stiffness", [1e-3, 1.0, 1e3, 1e6])
