@@ -24,7 +24,6 @@ from ufl_beam.model.connector_laws import HELD, Law, RigidPlastic, Spring
 from ufl_beam.terms import connector_laws, rigid_plastic, springs
 from ufl_beam.terms.connector_responses import Setting, respond
 from ufl_beam.terms.links import Links
-from ufl_beam.terms.tangent_derivatives import TangentChange
 
 LAWS = (connector_laws, rigid_plastic, springs)
 """Modules with the responses of laws, which register them with :func:`respond`."""
@@ -228,13 +227,20 @@ class Couplings(Links):
         rows = np.zeros_like(self._rows)
         for column, numbers in enumerate(self.response.rows(e, self.force(q1))):
             rows[:, column] = numbers
-        change.put(self._forms.row, rows)
-        change.put(self._forms.bend, self.response.bends(e)[:, None])
-        change.add(q1, u)
+        for function, values in (
+            (self._forms.row, rows),
+            (self._forms.bend, self.response.bends(e)[:, None]),
+        ):
+            if change.uses(function):
+                change.put(function, values)
+        change.set(self._forms.u, u)
+        change.add(q1, self._A.data)
 
     @cached_property
-    def _tangent_change(self) -> TangentChange:
-        return TangentChange(self._forms.change, self._forms.u, self._kernel, self._A)
+    def _tangent_change(self) -> Kernel:
+        change = self._kernel(self._forms.change)
+        change.place(self._A)
+        return change
 
     # -- the state -----------------------------------------------------------------------------
 
