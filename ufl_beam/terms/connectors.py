@@ -92,7 +92,7 @@ class Couplings(Links):
     """
 
     def __init__(self, share: Share, here: Index, setting: Setting, A: Csr) -> None:
-        super().__init__(share, here, A)
+        super().__init__(share, here, setting, A)
         links, n = self.links, len(here)
         self._forms = forms = _forms(links[0].motion, setting.scheme)
         self._numbers = np.array([(*c.arms[0], *c.arms[1], *c.apart, *c.axis) for c in links])
@@ -100,7 +100,6 @@ class Couplings(Links):
             self._kernel, (forms.work, forms.tangent, forms.motion)
         )
         self._tangent.place(A)
-        self.response = respond(links[0].law, links, setting)
         self._length = np.where([c.turns for c in links], 1.0, share.grid.scene.size)
         self._e, self._now = np.zeros((2, n))
         self._rows = np.zeros((n, 3))
@@ -211,10 +210,6 @@ class Couplings(Links):
         """Sum of the sizes of the works that the connectors take in the step to ``q1``; J."""
         return float(np.abs(self._taken(q1)).sum())
 
-    def dissipation(self, q1: Array) -> float:
-        """Energy that connectors of this process dissipate plastically in the step to ``q1``; J."""
-        return self.response.dissipation(self.motion(q1), self.force(q1))
-
     def accept(self, q1: Array, s: Array) -> None:
         """Enter what was supplied or lost."""
         taken: float = lib.commit_couplings(self._in_c, doubles(q1), self._dt)
@@ -255,6 +250,7 @@ class Couplings(Links):
         """Motions, forces and works, and what the laws remember."""
         response = self.response
         rows = np.column_stack([self.work, self.rate, self._before, self._e, response.state()])
+        # Files have the names of these classes.
         rows = memory.rows(type(response).__name__, self.numbers, rows)
         self.work[:], self.rate[:], self._before[:], self._e[:] = rows[:, :4].T
         response.restore(rows[:, 4:])

@@ -184,10 +184,6 @@ class InelasticBeams(Cells):
         """Close again the points that :meth:`release` opened."""
         self.points.hold()
 
-    def freeze(self) -> None:
-        """Keep everything elastic from now on: nothing yields or breaks further."""
-        self.points.freeze()
-
     # -- the state -----------------------------------------------------------------------------
 
     def accept(self, q1: Array, s: Array) -> None:

@@ -13,7 +13,7 @@ from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import Kernel, stated
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.dolfinx_compat import fem
-from ufl_beam.terms.base import Beams
+from ufl_beam.terms.base import InternalForces
 
 
 class _Forms(NamedTuple):
@@ -36,8 +36,8 @@ def _forms(work: ufl.Form, q1: fem.Function) -> _Forms:
     return _Forms(action, change, ufl.derivative(tangent, q1, u), x, y, u)
 
 
-class Cells(Beams):
-    """Beams whose tangent is known by its works on two motions, too.
+class Cells(InternalForces):
+    """Forces in cells whose tangent is known by its works on two motions, too.
 
     Works are summed over cells from the strains of the motions.  The entries of a matrix have the
     round-off of axial and shear stiffness, in which the bending of slender cells would be lost.
