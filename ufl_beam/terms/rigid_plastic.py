@@ -17,7 +17,7 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import doubles, ffi, in_order, integers, lib, names
+from ufl_beam.compiled.c_library import doubles, in_order, lib, names, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.bodies import Place
@@ -143,17 +143,13 @@ class RigidPlasticResponse(Response):
         self._slipped, self._way, self._way_before = np.zeros((3, n), dtype=np.int32)
         self._rows, self._sums, self._stored = np.zeros((n, 3)), np.zeros(3), 0.0
         self._slope = np.array([_slope(link, self._setting.size) for link in self._links])
-        self._c = c = ffi.new("rigid_plastic *")
-        c.force, c.end, c.number, c.width = self._forms.force, self._forms.end, n, len(INPUTS)
-        arrays = (self._storage, self._limit, self._back_force, self._dissipated, self._rows)
-        flags = (self._slipped, self._way, self._setting.search.flags)
-        self._alive = [
-            *map(doubles, (*arrays, self._slope, self._excess)),
-            *map(integers, flags),
-        ]
-        c.w, c.limit, c.back_force, c.dissipated, c.rows, c.slope = self._alive[:6]
-        c.excess, c.slipped, c.way, c.search = self._alive[6:]
-        self.in_c, self.openable = {"rigid_plastic": c}, self
+        self._c = struct(
+            "rigid_plastic", number=n, width=len(INPUTS), w=self._storage, rows=self._rows,
+            force=self._forms.force, end=self._forms.end, search=self._setting.search.flags,
+            limit=self._limit, back_force=self._back_force, dissipated=self._dissipated,
+            slope=self._slope, excess=self._excess, slipped=self._slipped, way=self._way,
+        )  # fmt: skip
+        self.in_c, self.openable = {"rigid_plastic": self._c}, self
 
     # -- the step ------------------------------------------------------------------------------
 
