@@ -11,6 +11,7 @@ import ctypes
 from collections.abc import Mapping
 from functools import partial
 from typing import Any, TypeVar
+from weakref import WeakKeyDictionary
 
 from petsc4py import PETSc
 
@@ -79,6 +80,22 @@ def integers(array: Index) -> Any:
     if array.dtype != _INT32:
         raise TypeError(f"C takes integers of 32 bits, not {array.dtype}")
     return ffi.from_buffer(_INT32_ARRAY, array)
+
+
+_ALIVE: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
+
+
+def struct(kind: str, **fields: Any) -> Any:
+    """Return a pointer to a new struct of loops.h; it keeps the arrays among its fields alive."""
+    in_c = {
+        name: (integers if value.dtype == _INT32 else doubles)(value)
+        if isinstance(value, np.ndarray)
+        else value
+        for name, value in fields.items()
+    }
+    made = ffi.new(f"{kind} *", in_c)
+    _ALIVE[made] = in_c
+    return made
 
 
 def names(enum: str, prefix: str = "") -> tuple[str, ...]:

@@ -196,7 +196,7 @@ def _softest(simulation: Failed, q: Array, x: Array, motions: Array) -> Softest:
         except StepFailed:
             continue  # a guide that ends has no motion there, which the failure of the step says
         links[one.numbers] = np.abs(change)
-        left[one.numbers] = one.remaining()
+        left[one.numbers] = one.response.remaining()
     links /= np.where([link.turns for link in scene.links], 1.0, scene.size)
     strains, left_of_cells = _strains(grid, share.gather(q), x), np.ones(len(grid.cells))
     for inelastic in simulation.inelastic:

@@ -18,7 +18,7 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, integers, lib, petsc
 from ufl_beam.solvers.equation import Demand, Equation, InPython, SnesCallbacks
-from ufl_beam.terms.base import Beams, Term
+from ufl_beam.terms.base import InternalForces, Term
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.supports import Supports
 
@@ -32,7 +32,7 @@ class CEquation:
     def __init__(
         self,
         python: Equation,
-        beams: Sequence[Beams],
+        beams: Sequence[InternalForces],
         couplings: Sequence[Links],
         others: Sequence[Term],
         supports: Supports,

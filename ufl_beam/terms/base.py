@@ -8,6 +8,8 @@ what several processes add to one degree of freedom is summed by the solver.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, loop
 from ufl_beam.compiled.csr import Csr, StepProduct
@@ -19,7 +21,7 @@ KINDS = ("beams", "connectors", "loads", "inertia", "damping")
 """Kinds of forces."""
 
 
-class Term:
+class Term(ABC):
     """Virtual work of one physical effect; a method that a term does not define does nothing."""
 
     kind: str
@@ -32,6 +34,7 @@ class Term:
     def begin(self, step: Step) -> None:
         """Take note of the step that is to be solved."""
 
+    @abstractmethod
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the virtual work at ``q1`` to ``r``."""
 
@@ -51,12 +54,12 @@ class Term:
         """State what later steps depend on; ``q`` is the configuration of the state."""
 
 
-class Beams(Term):
-    """Resultants of cells working on the virtual strains; the residual is an internal force."""
+class InternalForces(Term):
+    """Forces between places of a scene, of cells or connectors; their residual is a force."""
 
+    @abstractmethod
     def change(self, q1: Array) -> float:
-        """Energy that cells of this process store and dissipate in the step to ``q1``; J."""
-        raise NotImplementedError
+        """Energy that is stored and dissipated on this process in the step to ``q1``; J."""
 
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """Add the derivative of the tangent at ``q1`` along ``u``; no internal variable changes."""

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import ufl
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop
+from ufl_beam.compiled.c_library import Loop, doubles, lib, loop, struct
 from ufl_beam.compiled.csr import Csr, StepProduct
 from ufl_beam.discretization.compiled_forms import Kernel, stated
 from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
@@ -65,7 +65,7 @@ class ElasticBeams(OfForms, Cells):
             fields.hot_kernel(form, self._q1) for form in (forms.stored, *forms.losses)
         )
         self._first: Kernel | None = None
-        self._tangents = ffi.new("first_cells *", {"then": self._tangent.cells})
+        self._tangents = struct("first_cells", then=self._tangent.cells)
         if forms.first is not None:
             self._first = fields.kernel(forms.first, self._q1)
             self._first.place(A)

@@ -10,9 +10,10 @@ from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
-from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.curves import REACH, nearest, parameter_step, tangent
+from ufl_beam.terms.connector_responses import Setting
 from ufl_beam.terms.links import Links
 
 
@@ -26,8 +27,8 @@ class Guides(Links):
     The motion of a guide is the distance from its curve, zero when a step is accepted.
     """
 
-    def __init__(self, share: Share, here: Index, scheme: Scheme, A: Csr) -> None:
-        super().__init__(share, here, A)
+    def __init__(self, share: Share, here: Index, setting: Setting, A: Csr) -> None:
+        super().__init__(share, here, setting, A)
         self._laws = [link.law for link in self.links if isinstance(link.law, Guide)]
         self._x, self._y = (self._dofs[:, k].astype(np.int64) for k in (1, 3))
         pairs = [(r, c) for r in (self._x, self._y) for c in (self._x, self._y)]
@@ -35,7 +36,7 @@ class Guides(Links):
         self._across = [A.positions(d, self._forces_at) for d in (self._x, self._y)]
         self._rows = [A.positions(self._forces_at, d) for d in (self._x, self._y)]
         self._points = np.array([link.b.point for link in self.links])
-        self._over_step = np.full(len(self.links), scheme.average(0.0, 1.0) != 1.0)
+        self._over_step = np.full(len(self.links), setting.scheme.average(0.0, 1.0) != 1.0)
         n = len(self.links)
         self._s: Array = np.zeros(n)
         self._s0: Array = np.zeros(n)
@@ -185,8 +186,8 @@ class Guides(Links):
         self._on0 = rows[:, 5:].copy()
 
 
-def guides(share: Share, scheme: Scheme, A: Csr) -> list[Links]:
+def guides(share: Share, setting: Setting, A: Csr) -> list[Links]:
     """Make the guides of a process, all together; empty if it has none."""
     links = share.grid.scene.links
     here = [i for i, number in enumerate(share.links) if isinstance(links[number].law, Guide)]
-    return [Guides(share, np.array(here), scheme, A)] if here else []
+    return [Guides(share, np.array(here), setting, A)] if here else []

@@ -9,7 +9,7 @@ import numpy as np
 import ufl
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop
+from ufl_beam.compiled.c_library import Loop, doubles, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.function_spaces import Element, Fields, Strains
@@ -112,13 +112,12 @@ class InelasticBeams(Cells):
         )
         self._tangent.place(A)
         self._latest: Array = np.full(fields.share.size, np.nan)
-        self._in_c = c = ffi.new("inelastic *")
-        c.points, c.strains = self.points.points, self._strains.kernel.cells
-        c.force, c.tangent = self._force.cells, self._tangent.cells
-        c.at_r = self._force.position(forms.r)
-        c.at_b, c.at_D = map(self._tangent.position, (forms.b, forms.D))
-        self._at_latest = doubles(self._latest)
-        c.size, c.latest = len(self._latest), self._at_latest
+        self._in_c = struct(
+            "inelastic", size=len(self._latest), latest=self._latest, points=self.points.points,
+            strains=self._strains.kernel.cells, force=self._force.cells,
+            tangent=self._tangent.cells, at_r=self._force.position(forms.r),
+            at_b=self._tangent.position(forms.b), at_D=self._tangent.position(forms.D),
+        )  # fmt: skip
         self._q: Array = np.empty(0)
 
     # -- the step ------------------------------------------------------------------------------
@@ -184,10 +183,6 @@ class InelasticBeams(Cells):
     def hold(self) -> None:
         """Close again the points that :meth:`release` opened."""
         self.points.hold()
-
-    def freeze(self) -> None:
-        """Keep everything elastic from now on: nothing yields or breaks further."""
-        self.points.freeze()
 
     # -- the state -----------------------------------------------------------------------------
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 import ufl
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, loop
+from ufl_beam.compiled.c_library import Loop, doubles, loop, struct
 from ufl_beam.compiled.csr import Csr, Product
 from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
@@ -64,7 +64,7 @@ class DeadLoads(LoadTerm):
             vector += _forces(load, share)
         self._vectors = list(vectors.values())
         self._end: Array = self.force
-        self._in_c = ffi.new("vector *", {"size": share.size})
+        self._in_c = struct("vector", size=share.size)
         self._factors: list[float] = []
 
     def begin(self, step: Step) -> None:

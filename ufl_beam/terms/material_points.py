@@ -13,7 +13,7 @@ from ufl.conditional import Condition
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import doubles, ffi, in_order, integers, lib, names
+from ufl_beam.compiled.c_library import doubles, ffi, in_order, lib, names, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model import law_functions
@@ -165,22 +165,18 @@ class Points:
         self.r, self.D = np.zeros((cells, 3)), np.zeros((cells, 9))
         self._e0, self.strains = np.zeros((cells, 3)), np.zeros((cells, 3))
         self._over = np.zeros(1)
-        B, weights, rest = (
+        B, weight, rest, length = (
             np.ascontiguousarray(x, dtype=np.float64)
-            for x in (layout.strains, layout.weights, layout.rest)
+            for x in (layout.strains, layout.weights, layout.rest, length)
         )
-        self._search, forms = search, self._forms
-        self._alive = [
-            *map(doubles, (B, weights, rest, np.ascontiguousarray(length))),
-            *map(doubles, (self._e0, self.strains, storage, self.r, self.D, self.kept, self.sums)),
-            integers(search.flags),
-            doubles(self._over),
-        ]
-        self.points = c = ffi.new("points *")
-        c.B, c.weight, c.rest, c.length = self._alive[:4]
-        c.e0, c.e1, c.w, c.r, c.D, c.kept, c.sum, c.search, c.over = self._alive[4:]
-        c.bulk, c.opening, c.excess, c.end = forms.bulk, forms.opening, forms.excess, forms.end
-        c.cells, c.of_cell, c.width, c.theta = *storage.shape, scheme.theta
+        forms, (_, of_cell, width) = self._forms, storage.shape
+        self.points = struct(
+            "points", cells=cells, of_cell=of_cell, width=width, w=storage, theta=scheme.theta,
+            bulk=forms.bulk, opening=forms.opening, excess=forms.excess, end=forms.end,
+            B=B, weight=weight, rest=rest, length=length, e0=self._e0, e1=self.strains,
+            r=self.r, D=self.D, kept=self.kept, sum=self.sums, over=self._over,
+            search=search.flags,
+        )  # fmt: skip
 
     def __getitem__(self, name: str) -> Array:
         """Return the values of an input at the points, by its name; a view; (cells, n)."""
