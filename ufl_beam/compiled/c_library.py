@@ -11,6 +11,7 @@ import ctypes
 from collections.abc import Mapping
 from functools import partial
 from typing import Any, TypeVar
+from weakref import WeakKeyDictionary
 
 from petsc4py import PETSc
 
@@ -79,6 +80,23 @@ def integers(array: Index) -> Any:
     if array.dtype != _INT32:
         raise TypeError(f"C takes integers of 32 bits, not {array.dtype}")
     return ffi.from_buffer(_INT32_ARRAY, array)
+
+
+_kept: WeakKeyDictionary[Any, dict[str, Any]] = WeakKeyDictionary()
+
+
+def fill(struct: Any, **fields: Any) -> Any:
+    """Set fields of a struct of loops.h, and return it; with it, what they point to stays alive.
+
+    Arrays become pointers to their float64 or int32.
+    """
+    kept = _kept.setdefault(struct, {})
+    for name, value in fields.items():
+        if isinstance(value, np.ndarray):
+            value = doubles(value) if value.dtype == np.float64 else integers(value)
+        kept[name] = value
+        setattr(struct, name, value)
+    return struct
 
 
 def names(enum: str, prefix: str = "") -> tuple[str, ...]:
