@@ -46,13 +46,14 @@ for _name, _field in ffi.typeof("petsc_functions").fields:
     setattr(lib.petsc, _name, ffi.cast(_field.type, _address))
 
 
+def opaque(thing: Any) -> Any:
+    """An object of petsc4py as C has it; other things as they are."""
+    return ffi.cast("void *", thing.handle) if isinstance(thing, PETSc.Object) else thing
+
+
 def petsc(name: str, *arguments: Any) -> None:
     """Call a function of ``petsc_functions`` in loops.h; objects of petsc4py are theirs in C."""
-    in_c = (
-        ffi.cast("void *", argument.handle) if isinstance(argument, PETSc.Object) else argument
-        for argument in arguments
-    )
-    if error := getattr(lib.petsc, name)(*in_c):
+    if error := getattr(lib.petsc, name)(*map(opaque, arguments)):
         text, specific = ffi.new("const char **"), ffi.new("char **")
         lib.petsc.PetscErrorMessage(error, text, specific)
         words = (ffi.string(of[0]).decode() for of in (text, specific) if of[0])

@@ -11,7 +11,7 @@ from petsc4py import PETSc
 
 from ufl_beam.arrays import Array
 from ufl_beam.collective_errors import Agreement
-from ufl_beam.compiled.c_library import ffi, fill, lib, loop, petsc
+from ufl_beam.compiled.c_library import ffi, fill, lib, loop, opaque, petsc
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
@@ -45,7 +45,7 @@ class Solver:
         self._x, self._f = self._vectors.new(), self._vectors.new()
         self._q, r = (self._vectors.view(one, writable=True) for one in (self._x, self._f))
         self.convergence = Convergence(share, equation, self._q, r, newton, least)
-        equation.c.x = ffi.cast("void *", self._x.handle)
+        equation.c.x = opaque(self._x)
         self._callbacks = SnesCallbacks(equation, self._vectors, self.convergence.test)
         self._matrix = self._make_matrix()
         # A connector alone may hold a part whose own stiffness leaves zeros, or nothing but
