@@ -22,8 +22,6 @@ from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.simulation.branch_check import StaticPath
 from ufl_beam.simulation.step_equation import StepEquation
-from ufl_beam.solvers.c_equation import CEquation
-from ufl_beam.solvers.equation import Equation
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.beams import ElasticBeams, Inertia
 from ufl_beam.terms.connector_responses import Setting
@@ -87,13 +85,6 @@ class Assembly:
             for one in self.couplings:
                 if isinstance(one.links[0].law, Coulomb):
                     self.rates.update(zip(one.links, one.rates(q, self.inertia.v), strict=True))
-
-    def compiled(self) -> Equation:
-        """Return the equation in C, or as it is where several processes or axes need Python."""
-        python = self.equation
-        if python.share.comm.size > 1 or self.supports.turned:
-            return python
-        return CEquation(python, self.beams, self.couplings, python.others, self.supports)
 
     def internal_variables(self, q: Array) -> State:
         """Return what a run that starts here takes over: internal variables, reactions, rates."""

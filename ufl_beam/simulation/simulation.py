@@ -136,7 +136,7 @@ class Simulation(StateView):
         self.reactions_known = self._branch is not None
 
         self._steps = StepSolver(
-            scheme, self.equation, parts.compiled(), parts.openings, self._branch, newton, together
+            scheme, self.equation, parts.openings, self._branch, newton, together
         )
         self._solver = self._steps.newton
         self.solution = kind(scene, grid)

@@ -15,7 +15,7 @@ from ufl_beam.model.constraint_checks import no_number
 from ufl_beam.simulation.branch_check import StaticPath
 from ufl_beam.simulation.step_cutting import Trial
 from ufl_beam.simulation.step_equation import StepEquation
-from ufl_beam.solvers.equation import Border, Equation
+from ufl_beam.solvers.equation import Border
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.solvers.newton_options import Newton
 from ufl_beam.terms.openings import Openings
@@ -38,7 +38,6 @@ class StepSolver:
         self,
         scheme: Scheme,
         equation: StepEquation,
-        compiled: Equation,
         openings: Openings | None,
         branch: StaticPath | None,
         newton: Newton,
@@ -47,7 +46,8 @@ class StepSolver:
         self._scheme, self._equation, self._openings = scheme, equation, openings
         self._branch, self._together, share = branch, together, equation.share
         least = LEAST_IN_MOTION if has_inertia(scheme) else LEAST_AT_REST
-        self.newton = Solver(share, compiled, newton, least, together)
+        equation.leave_to_c()
+        self.newton = Solver(share, equation, newton, least, together)
         self._rotations, self._multipliers = share.rotations(), as_slice(share.multipliers())
         self._coupled = len(share.grid.multipliers) > 0
 

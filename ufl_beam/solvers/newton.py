@@ -11,7 +11,7 @@ from petsc4py import PETSc
 
 from ufl_beam.arrays import Array
 from ufl_beam.collective_errors import Agreement
-from ufl_beam.compiled.c_library import doubles, ffi, integers, lib
+from ufl_beam.compiled.c_library import ffi, fill, lib, loop, opaque, petsc
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
@@ -45,7 +45,7 @@ class Solver:
         self._x, self._f = self._vectors.new(), self._vectors.new()
         self._q, r = (self._vectors.view(one, writable=True) for one in (self._x, self._f))
         self.convergence = Convergence(share, equation, self._q, r, newton, least)
-        equation.c.x = ffi.cast("void *", self._x.handle)
+        equation.c.x = opaque(self._x)
         self._callbacks = SnesCallbacks(equation, self._vectors, self.convergence.test)
         self._matrix = self._make_matrix()
         # A connector alone may hold a part whose own stiffness leaves zeros, or nothing but
@@ -59,8 +59,8 @@ class Solver:
         self._ksp.getPC().setPythonContext(self._factors)
         self._bordered: BorderedNewton | None = None
         self._snes = self._make_snes()
-        if not self._chosen():
-            equation.drive(self._snes, self._factors)
+        if equation.in_c and not self._chosen():
+            self._leave_newton_to_c()
         self.iterations = self._done = 0
 
     # -- PETSc ---------------------------------------------------------------------------------
@@ -81,7 +81,15 @@ class Solver:
     def _make_snes(self) -> PETSc.SNES:
         snes = PETSc.SNES().create(self._x.comm)
         snes.setOptionsPrefix(PREFIX)
-        self._equation.attach(snes, self._callbacks, self._f, self._matrix)
+        if self._equation.in_c:
+            petsc("SNESSetFunction", snes, self._f, *loop("snes_function", self._equation.c))
+            matrices = self._matrix, self._matrix
+            petsc("SNESSetJacobian", snes, *matrices, *loop("snes_jacobian", self._equation.c))
+            petsc("SNESSetConvergenceTest", snes, *loop("snes_test", self._equation.c), ffi.NULL)
+        else:
+            snes.setFunction(self._callbacks.function, self._f)
+            snes.setJacobian(self._callbacks.jacobian, self._matrix)
+            snes.setConvergenceTest(self._callbacks.test)
         snes.setTolerances(max_it=self._newton.max_iterations)
         snes.setType("newtonls")
         snes.setKSP(self._ksp)
@@ -99,6 +107,13 @@ class Solver:
             for name, value in before.items():
                 database[name] = value
         return snes
+
+    def _leave_newton_to_c(self) -> None:
+        self._factors.drive(self._equation.c)
+        solve, context = loop("snes_newton", self._equation.c)
+        self._snes.setType("shell")
+        petsc("SNESShellSetContext", self._snes, context)
+        petsc("SNESShellSetSolve", self._snes, solve)
 
     @cached_property
     def _careful(self) -> PETSc.SNES | SearchingNewton:
@@ -189,9 +204,8 @@ class Solver:
     def _put_idle(self) -> None:
         """Add the stiffnesses against idle motions to tangents from now on."""
         entries, stiffnesses = self._callbacks.idle = self._idle.entries
-        self._at_idle = integers(entries), doubles(stiffnesses)
-        c = self._equation.c
-        c.idle, (c.idle_entry, c.idle_stiffness) = len(entries), self._at_idle
+        idle = {"idle_entry": entries, "idle_stiffness": stiffnesses}
+        fill(self._equation.c, idle=len(entries), **idle)
         self.convergence.leave_out(self._idle.stiffness > 0.0)
 
     def _stiffened(self) -> int:
