@@ -17,7 +17,7 @@ from ufl_beam.analysis.linearization import SmallMotions
 from ufl_beam.arrays import Array, Complex, State
 from ufl_beam.collective_errors import on_first
 from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.discretization.function_spaces import Fields, SectionForces
+from ufl_beam.discretization.function_spaces import CompiledFields, SectionForces
 from ufl_beam.discretization.model_warnings import warn_of_masses
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import SceneError, require_count, require_kind, require_number
@@ -117,7 +117,7 @@ class Shapes(ABC):
     def _write(self, recorder: TimeSeries, amplitude: float) -> None:
         recorder.require_writable()
         share = Share(self.grid, MPI.COMM_SELF)
-        forces = SectionForces(Fields(share))
+        forces = SectionForces(CompiledFields(share))
         frames: list[Any] = [
             _Frame(self, share, forces, float(k), self._scaled(k, amplitude).real)
             for k in range(len(self))

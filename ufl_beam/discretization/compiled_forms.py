@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache
 from itertools import accumulate
 from pathlib import Path
-from typing import Any, NamedTuple, ParamSpec, TypeVar, cast
+from typing import Any, NamedTuple, ParamSpec, Protocol, TypeVar, cast
 
 import basix.ufl
 import numpy as np
@@ -93,6 +93,34 @@ def prepared(form: ufl.Form) -> Prepared:
         )
     tabulate = tabulator(compiled)
     return Prepared(compiled, source, tabulate, used, columns, constants, packed, entries)
+
+
+class CellForm(Protocol):
+    """A form on cells of a scene, with values of its coefficients there.
+
+    If its test functions are those of the unknown's space, cells add to their degrees of freedom;
+    else each to entries of its own.
+    """
+
+    cells: Any  # argument of ``add_cells`` of loops.h; None of a form that C does not evaluate
+
+    def uses(self, function: fem.Function) -> bool:
+        """Return whether a function appears in the form."""
+
+    def set(self, function: fem.Function, q: Array) -> None:
+        """Give ``function`` the degrees of freedom ``q``, if it appears in the form."""
+
+    def put(self, function: fem.Function, values: Array) -> None:
+        """Give ``function`` other values in the cells; shape (num_cells, dofs per cell)."""
+
+    def place(self, A: Csr) -> None:
+        """Let a bilinear form on the degrees of freedom of the cells add to ``A``."""
+
+    def add(self, q: Array, b: Array) -> None:
+        """Add the form at the unknown ``q`` to a vector, or to the entries of the matrix."""
+
+    def value(self, q: Array) -> float:
+        """Return the value of the functional at the unknown ``q``."""
 
 
 class Kernel:

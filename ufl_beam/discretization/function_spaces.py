@@ -6,6 +6,7 @@ Forms depend on nothing of a scene: they are stated on one cell, and compiled on
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from functools import cached_property
 
 import basix.ufl
@@ -15,7 +16,7 @@ import ufl
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr, coupling
 from ufl_beam.compiled.simd_kernels import LANES, in_batches
-from ufl_beam.discretization.compiled_forms import Kernel, stated, vectorise
+from ufl_beam.discretization.compiled_forms import CellForm, Kernel, stated, vectorise
 from ufl_beam.discretization.partition import Share
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
 from ufl_beam.dolfinx_compat import mesh as meshes
@@ -97,13 +98,13 @@ def _element(degree: int, lumped: bool) -> Element:
 
 
 @stated
-def _tangent(work: ufl.Form, q1: fem.Function) -> ufl.Form:
+def derivative(work: ufl.Form, q1: fem.Function) -> ufl.Form:
     """Derivative of a virtual work."""
     return ufl.derivative(work, q1, ufl.TrialFunction(q1.function_space))
 
 
-class Fields:
-    """Cells of one process, or some of them: what forms of the element are computed on.
+class Fields(ABC):
+    """Cells of one process, or some of them: what forms of the element are evaluated on.
 
     Attributes:
         cell_dofs: Local degrees of freedom in the order of the cells of the mesh;
@@ -123,37 +124,29 @@ class Fields:
         self._require_direction(grid.points[grid.cells[share.cells[self.order]]])
         self.cell_dofs = share.cell_dofs[self.order]
         self._matrix: Csr | None = None
-        self.element = _element(grid.mesh.degree, grid.mesh.lumped)
+        self.element = self._element()
 
-    def kernel(self, form: ufl.Form, unknown: fem.Function) -> Kernel:
-        """A form on the cells, compiled; ``unknown`` is the configuration that changes."""
-        kernel = Kernel(form, unknown, self.cell_dofs, self._coordinates)
-        of_sections = (
-            (self.element.stiffness, ("EA", "GA", "EI")),
-            (self.element.inertia, ("rhoA", "rhoI")),
-        )
-        for function, names in of_sections:
-            if kernel.uses(function):
-                kernel.put(function, self._of_sections(*names))
-        return kernel
+    def part(self, part: Index) -> Fields:
+        """Some of the cells of the process; ``part`` are positions in ``share.cells``."""
+        return type(self)(self.share, part)
 
-    def hot_kernel(self, form: ufl.Form, unknown: fem.Function) -> Kernel:
-        """Kernel as :meth:`kernel`, with several cells at once, for forms of each iteration."""
-        kernel = self.kernel(form, unknown)
-        vectorise([kernel], self._coordinates_in_lanes)
-        return kernel
+    @abstractmethod
+    def _element(self) -> Element:
+        """The element that forms are stated on."""
 
-    def force_and_tangent(self, work: ufl.Form, q1: fem.Function, A: Csr) -> tuple[Kernel, Kernel]:
+    @abstractmethod
+    def kernel(self, form: ufl.Form, unknown: fem.Function) -> CellForm:
+        """A form on the cells; ``unknown`` is the configuration that changes."""
+
+    @abstractmethod
+    def hot_kernel(self, form: ufl.Form, unknown: fem.Function) -> CellForm:
+        """A form as :meth:`kernel` has it, for evaluation in each iteration."""
+
+    @abstractmethod
+    def force_and_tangent(
+        self, work: ufl.Form, q1: fem.Function, A: Csr
+    ) -> tuple[CellForm, CellForm]:
         """A virtual work, and its derivative by ``q1`` that adds to ``A``."""
-        force, tangent = self.kernel(work, q1), self.kernel(_tangent(work, q1), q1)
-        vectorise([force, tangent], self._coordinates_in_lanes)
-        tangent.share(force)
-        tangent.place(A)
-        return force, tangent
-
-    @cached_property
-    def _coordinates_in_lanes(self) -> Array:
-        return in_batches(self._coordinates, LANES)
 
     def matrix(self) -> Csr:
         """A new matrix on the degrees of freedom of this process."""
@@ -177,9 +170,11 @@ class Fields:
         if not np.array_equal(self._coordinates[:, :, :2], ends):
             raise RuntimeError("this version of DOLFINx turns cells around; please report it")
 
-    def _of_sections(self, *names: str) -> Array:
-        """Numbers of the sections of the cells; (num_cells, len(names))."""
+    def of_sections(self, function: fem.Function) -> Array:
+        """Numbers of the sections of the cells, for a coefficient of the element."""
         grid = self.share.grid
+        inertia = function is self.element.inertia
+        names = ("rhoA", "rhoI") if inertia else ("EA", "GA", "EI")
         of_beam = np.array([[getattr(b.section, n) for n in names] for b in grid.scene.beams])
         of_cells = grid.beam_of_cell[self.share.cells[self.order]]
         return of_beam.reshape(-1, len(names))[of_cells]
@@ -188,6 +183,39 @@ class Fields:
         """A function with so many numbers in each point of the cells."""
         element = basix.ufl.quadrature_element("interval", value_shape=(number,), degree=1)
         return fem.Function(fem.functionspace(self.mesh, element))
+
+
+class CompiledFields(Fields):
+    """Cells on which loops in C evaluate forms that are compiled once for all scenes."""
+
+    def _element(self) -> Element:
+        return _element(self.share.grid.mesh.degree, self.share.grid.mesh.lumped)
+
+    def kernel(self, form: ufl.Form, unknown: fem.Function) -> Kernel:
+        """A form on the cells, compiled."""
+        kernel = Kernel(form, unknown, self.cell_dofs, self._coordinates)
+        for function in (self.element.stiffness, self.element.inertia):
+            if kernel.uses(function):
+                kernel.put(function, self.of_sections(function))
+        return kernel
+
+    def hot_kernel(self, form: ufl.Form, unknown: fem.Function) -> Kernel:
+        """Kernel that computes several cells at once."""
+        kernel = self.kernel(form, unknown)
+        vectorise([kernel], self._coordinates_in_lanes)
+        return kernel
+
+    def force_and_tangent(self, work: ufl.Form, q1: fem.Function, A: Csr) -> tuple[Kernel, Kernel]:
+        """Kernels that share the values of their coefficients."""
+        force, tangent = self.kernel(work, q1), self.kernel(derivative(work, q1), q1)
+        vectorise([force, tangent], self._coordinates_in_lanes)
+        tangent.share(force)
+        tangent.place(A)
+        return force, tangent
+
+    @cached_property
+    def _coordinates_in_lanes(self) -> Array:
+        return in_batches(self._coordinates, LANES)
 
 
 @stated

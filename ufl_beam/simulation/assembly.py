@@ -21,6 +21,7 @@ from ufl_beam.model.constraint_checks import friction_repeats
 from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.simulation.branch_check import StaticPath
+from ufl_beam.simulation.evaluation import Evaluation
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.beams import ElasticBeams, Inertia
@@ -129,9 +130,11 @@ class Assembly:
         return path
 
 
-def assemble(share: Share, scheme: Scheme, v: Array, together: Agreement) -> Assembly:
+def assemble(
+    share: Share, scheme: Scheme, v: Array, by: Evaluation, together: Agreement
+) -> Assembly:
     """Make the terms of a scene; supports stop the initial local velocities ``v`` in place."""
-    scene, ledger, fields, search = share.grid.scene, Ledger(), Fields(share), SearchFlags()
+    scene, ledger, fields, search = share.grid.scene, Ledger(), by.fields(share), SearchFlags()
     A = fields.matrix()
     setting = (scheme, A, ledger)
 
@@ -143,20 +146,33 @@ def assemble(share: Share, scheme: Scheme, v: Array, together: Agreement) -> Ass
         part = np.flatnonzero(np.isin(share.cells, cells))
         if len(part):
             elastic[part] = False
-            inelastic.append(InelasticBeams(Fields(share, part), layout, *setting, search))
+            of = (layout, *setting, search, by.points)
+            inelastic.append(by.inelastic(fields.part(part), *of))
     beams: list[Cells] = [*inelastic]
     numerical: list[Term] = []
     if elastic.any():
         part = np.flatnonzero(elastic)
-        on_part = fields if elastic.all() else Fields(share, part)
+        on_part = fields if elastic.all() else fields.part(part)
         beams.append(ElasticBeams(on_part, *setting))
         if isinstance(scheme, DecayingMidpoint):
             numerical.append(SecondDifferences(scheme, on_part, A, ledger))
 
     asked = {link: 0.0 for link in scene.links if isinstance(link.law, Controller | Coulomb)}
     rates = dict(asked)
-    connectors = Setting(asked, rates, scene.size, scheme, ledger, friction_repeats(scene), search)
-    coupled = together(lambda: [*couplings(share, connectors, A), *guides(share, connectors, A)])
+    connectors = Setting(
+        asked,
+        rates,
+        scene.size,
+        scheme,
+        ledger,
+        friction_repeats(scene),
+        search,
+        by.points,
+        by.slips,
+    )
+    coupled = together(
+        lambda: [*couplings(share, connectors, A, by.couplings), *guides(share, connectors, A)]
+    )
     openings = Openings.of(search, _openable(inelastic, coupled), share.comm)
 
     loads = _loads(scene, fields, scheme, ledger, A)

@@ -14,7 +14,13 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Product
 from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.discretization.function_spaces import Fields, SectionForces, Strains, mass_matrix
+from ufl_beam.discretization.function_spaces import (
+    CompiledFields,
+    Fields,
+    SectionForces,
+    Strains,
+    mass_matrix,
+)
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import Place
@@ -46,7 +52,7 @@ class CellResults:
     @cached_property
     def _fields(self) -> Fields:
         """The whole scene on this process: what is computed afterwards needs no communication."""
-        return Fields(Share(self._grid, MPI.COMM_SELF))
+        return CompiledFields(Share(self._grid, MPI.COMM_SELF))
 
     @cached_property
     def _section_forces(self) -> SectionForces:

@@ -32,6 +32,7 @@ from ufl_beam.parallel import communicator
 from ufl_beam.parameter import Parameter
 from ufl_beam.simulation.assembly import assemble
 from ufl_beam.simulation.diagnosis import no_equilibrium, open_ledger
+from ufl_beam.simulation.evaluation import COMPILED, REFERENCE
 from ufl_beam.simulation.initial_state import checked_grid, initial_state, mesh_of
 from ufl_beam.simulation.replicas import Copies, sharing
 from ufl_beam.simulation.solution import Solution
@@ -109,7 +110,8 @@ class Simulation(StateView):
         self.together = together = Agreement(share.comm)
         self._copies = Copies(comm, share) if comm.size > share.comm.size else None
         q, v, internal = initial_state(grid, start)
-        self._assembly = parts = assemble(share, scheme, v[share.dofs], together)
+        by = REFERENCE if newton.reference else COMPILED
+        self._assembly = parts = assemble(share, scheme, v[share.dofs], by, together)
         self.fields, self.ledger, self.asked = parts.fields, parts.ledger, parts.asked
         self.beams, self.inelastic, self.couplings = parts.beams, parts.inelastic, parts.couplings
         self.loads, self.supports, self._has_inelastic = parts.loads, parts.supports, parts.yields
@@ -136,7 +138,7 @@ class Simulation(StateView):
         self.reactions_known = self._branch is not None
 
         self._steps = StepSolver(
-            scheme, self.equation, parts.openings, self._branch, newton, together
+            scheme, self.equation, parts.openings, self._branch, newton, by, together
         )
         self._solver = self._steps.newton
         self.solution = kind(scene, grid)

@@ -17,6 +17,7 @@ from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
 from ufl_beam.solvers.bordered import BorderedNewton
 from ufl_beam.solvers.convergence import Convergence
+from ufl_beam.solvers.direct_solver import DirectSolver
 from ufl_beam.solvers.equation import Border, Equation, SnesCallbacks
 from ufl_beam.solvers.line_search import SearchingNewton
 from ufl_beam.solvers.newton_options import PREFIX, Newton
@@ -38,7 +39,13 @@ class Solver:
     """Finds the configuration in which the residual of an equation vanishes."""
 
     def __init__(
-        self, share: Share, equation: Equation, newton: Newton, least: int, agreement: Agreement
+        self,
+        share: Share,
+        equation: Equation,
+        factors: ChainsFirst | DirectSolver,
+        newton: Newton,
+        least: int,
+        agreement: Agreement,
     ) -> None:
         self._share, self._equation, self._newton = share, equation, newton
         self._agreement, self._vectors = agreement, Vectors(share)
@@ -48,10 +55,7 @@ class Solver:
         equation.c.x = opaque(self._x)
         self._callbacks = SnesCallbacks(equation, self._vectors, self.convergence.test)
         self._matrix = self._make_matrix()
-        # A connector alone may hold a part whose own stiffness leaves zeros, or nothing but
-        # round-off, on the diagonal; PETSc's factorisation does not exchange rows, KLU's does.
-        connected = len(share.grid.multipliers) > 0
-        self._factors = ChainsFirst(share, equation.A, "klu" if connected else "petsc")
+        self._factors = factors
         self._ksp = PETSc.KSP().create(self._x.comm)
         self._ksp.setOptionsPrefix(PREFIX)
         self._ksp.setType("preonly")

@@ -197,12 +197,15 @@ def succeeds(function: Callable[..., None], *vectors: PETSc.Vec) -> bool:
 
 
 class ChainsFirst:
-    """Direct solver: condensation along the beams, then factorization by ``package`` of the rest.
+    """Direct solver: condensation along the beams, then factorization of the rest.
 
     Every process factors what is left, which is small, instead of waiting for another.
     """
 
-    def __init__(self, share: Share, A: Csr, package: str) -> None:
+    def __init__(self, share: Share, A: Csr) -> None:
+        # A connector alone may hold a part whose own stiffness leaves zeros, or nothing but
+        # round-off, on the diagonal; PETSc's factorisation does not exchange rows, KLU's does.
+        package = "klu" if len(share.grid.multipliers) else "petsc"
         self._elimination, self._good = Elimination(share, A), False
         self._matrix = self._elimination.left.petsc()
         self._factors = PETSc.PC().create(PETSc.COMM_SELF)

@@ -13,7 +13,7 @@ from abc import ABC, abstractmethod
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, loop
 from ufl_beam.compiled.csr import Csr, StepProduct
-from ufl_beam.discretization.compiled_forms import Kernel
+from ufl_beam.discretization.compiled_forms import CellForm
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.time_schemes import Step
 
@@ -68,8 +68,8 @@ class InternalForces(Term):
 class OfForms(Term):
     """A term whose forces and their derivative are two forms on cells."""
 
-    _force: Kernel
-    _tangent: Kernel
+    _force: CellForm
+    _tangent: CellForm
     _A: Csr
 
     def loops(self) -> tuple[Loop, Loop | None]:

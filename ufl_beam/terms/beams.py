@@ -9,9 +9,9 @@ from typing import NamedTuple
 import ufl
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop, doubles, lib, loop, struct
+from ufl_beam.compiled.c_library import Loop, fill, loop, struct
 from ufl_beam.compiled.csr import Csr, StepProduct
-from ufl_beam.discretization.compiled_forms import Kernel, stated
+from ufl_beam.discretization.compiled_forms import CellForm, stated
 from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.functional import elastic_energy, resultants, virtual_work
@@ -64,12 +64,11 @@ class ElasticBeams(OfForms, Cells):
         self._stored, *self._losses = (
             fields.hot_kernel(form, self._q1) for form in (forms.stored, *forms.losses)
         )
-        self._first: Kernel | None = None
-        self._tangents = struct("first_cells", then=self._tangent.cells)
+        self._first: CellForm | None = None
+        self._begins, self._in_c = False, struct("first_cells")
         if forms.first is not None:
             self._first = fields.kernel(forms.first, self._q1)
             self._first.place(A)
-            self._tangents.first = self._first.cells
         self._A, self._ledger = A, ledger
         if self._losses:
             ledger.lost["numerical"] += 0.0
@@ -80,11 +79,13 @@ class ElasticBeams(OfForms, Cells):
             kernel.set(self._q0, step.q0)
         if self._first is not None:
             self._first.set(self._q0, step.q0)
-            self._tangents.begins = 1
+            self._begins = self._in_c.begins = True
 
     def loops(self) -> tuple[Loop, Loop | None]:
         """C loops over the cells, of force and tangent."""
-        return loop("add_cells", self._force.cells), loop("add_first_cells", self._tangents)
+        first = {} if self._first is None else {"first": self._first.cells}
+        fill(self._in_c, then=self._tangent.cells, **first)
+        return loop("add_cells", self._force.cells), loop("add_first_cells", self._in_c)
 
     def add_tangent(self, q1: Array) -> None:
         """Add the stiffness, material and geometric.
@@ -92,11 +93,13 @@ class ElasticBeams(OfForms, Cells):
         Extrapolated displacements strain slender beams by nothing but error; forces from that would
         send the first iteration of a static step astray, so it takes those before the step.
         """
-        lib.add_first_cells(self._tangents, doubles(q1), doubles(self._A.data))
+        first = self._first if self._begins else None
+        (first or self._tangent).add(q1, self._A.data)
+        self._begins = False
 
     def accept(self, q1: Array, s: Array) -> None:
         """Enter the energy that the scheme lost."""
-        self._tangents.begins = 0
+        self._begins = self._in_c.begins = False
         for loss in self._losses:
             self._ledger.lost["numerical"] += loss.value(q1)
 

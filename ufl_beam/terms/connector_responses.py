@@ -8,7 +8,7 @@ held has a row about e, all other laws have one about λ, linear in e around the
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import singledispatch
 from typing import Any, NamedTuple
 
@@ -18,6 +18,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.connectors import Connector
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.material_points import Points
 from ufl_beam.terms.openings import Openable, SearchFlags
 
 Rows = tuple[Any, Any, Any]
@@ -34,6 +35,8 @@ class Setting(NamedTuple):
     ledger: Ledger
     friction_repeats: bool  # True if places that stick may hold what is held already
     search: SearchFlags  # of all points of the scene
+    points: type[Points]  # of springs
+    slips: Callable[[Any, Sequence[Connector], Setting], Response]  # of rigid-plastic connectors
 
 
 class Response(ABC):
@@ -88,6 +91,10 @@ class Response(ABC):
         """
         about_motion = np.array([link.holds for link in self._links]) & (rows[:, 1] != 1.0)
         return np.where(about_motion, 0.0, 1.0)
+
+    def factors(self) -> Array:
+        """Factors that rows about the force were divided by; (num_links,)."""
+        return np.ones(len(self._links))
 
     def motion(self, e: Array) -> Array:
         """Motions of the accepted state as solutions show them; ``e`` are those of the nodes."""

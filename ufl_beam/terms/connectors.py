@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from functools import cached_property
 from typing import NamedTuple
 
@@ -14,10 +15,11 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import Loop, doubles, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.compiled_forms import Kernel, stated
+from ufl_beam.discretization.compiled_forms import CellForm, Kernel, stated
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem, line_mesh
+from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.mechanics.relative_motions import MOTIONS, Numbers, Pair
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.connector_laws import HELD, Law, RigidPlastic, Spring
@@ -53,8 +55,7 @@ class _Forms(NamedTuple):
 
 
 @stated
-def _forms(motion: str, scheme: Scheme) -> _Forms:
-    cell = line_mesh(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0, 1]]))
+def _forms(motion: str, scheme: Scheme, cell: meshes.Mesh) -> _Forms:
     line = basix.ufl.element("Lagrange", "interval", 1)
     point = basix.ufl.element("DG", "interval", 0)
     space = fem.functionspace(cell, basix.ufl.mixed_element([line, line, line, point]))
@@ -76,7 +77,7 @@ def _forms(motion: str, scheme: Scheme) -> _Forms:
     return _Forms(work, tangent, by_cell, rate, change, numbers, row, q0, q1, bend, u)
 
 
-class Couplings(Links):
+class Couplings(Links, ABC):
     """Connectors of one relative motion whose laws are of one kind.
 
     Each is a cell of unit length from one node to the other, with its force as a seventh unknown.
@@ -85,47 +86,43 @@ class Couplings(Links):
     def __init__(self, share: Share, here: Index, setting: Setting, A: Csr) -> None:
         super().__init__(share, here, setting, A)
         links, n = self.links, len(here)
-        self._forms = forms = _forms(links[0].motion, setting.scheme)
+        self._forms = forms = _forms(links[0].motion, setting.scheme, self._cells())
         self._numbers = np.array([(*c.arms[0], *c.arms[1], *c.apart, *c.axis) for c in links])
         self._work, self._tangent, self._value = map(
-            self._kernel, (forms.work, forms.tangent, forms.motion)
+            self._form, (forms.work, forms.tangent, forms.motion)
         )
         self._tangent.place(A)
-        length = np.where([c.turns for c in links], 1.0, setting.size)
-        self._e, self._now = np.zeros((2, n))
-        self._rows = np.zeros((n, 3))
+        self._length = np.where([c.turns for c in links], 1.0, setting.size)
+        self._size = setting.size
+        self._weight_of_before = float(setting.scheme.acting(np.ones(1), np.zeros(1))[0])
+        self._e, self._rows = np.zeros(n), np.zeros((n, 3))
         self._q: Array = np.empty(0)
-        self._in_c = struct(
-            "couplings", number=n, link=np.arange(n, dtype=np.int32), dofs=self._dofs,
-            force=self._forces_at.copy(), length=length, size=setting.size,
-            work=self._work.cells, tangent=self._tangent.cells, motion=self._value.cells,
-            row=self._work.position(forms.row), row_of_tangent=self._tangent.position(forms.row),
-            by_cell=np.zeros(n), e0=self._e, e1=self._now, before=self._before,
-            taken=self.work, rate=self.rate,
-            weight_of_before=setting.scheme.acting(np.ones(1), np.zeros(1))[0],
-            **self.response.in_c,
-        )  # fmt: skip
-        self._asks_python = not self.response.steady and not self.response.in_c
+        self._prepare()
+
+    @abstractmethod
+    def _cells(self) -> meshes.Mesh:
+        """The mesh that forms are stated on."""
+
+    @abstractmethod
+    def _evaluated(self, form: ufl.Form) -> CellForm:
+        """A form on the connectors."""
+
+    @abstractmethod
+    def _prepare(self) -> None:
+        """Prepare the evaluation; called once."""
 
     # -- the step ------------------------------------------------------------------------------
 
-    def motion(self, q: Array) -> Array:
-        """Relative motions at ``q``; (num_links,); m or rad."""
-        lib.find_motions(self._in_c, doubles(q))
-        return self._now.copy()
-
-    def _kernel(self, form: ufl.Form) -> Kernel:
-        """A form on the connectors, compiled."""
-        unit = np.tile([[0.0, 0, 0], [1.0, 0, 0]], (len(self.links), 1, 1))
-        kernel = Kernel(form, self._forms.q1, self._dofs, unit)
-        if kernel.uses(self._forms.numbers):
-            kernel.put(self._forms.numbers, self._numbers)
-        return kernel
+    def _form(self, form: ufl.Form) -> CellForm:
+        evaluated = self._evaluated(form)
+        if evaluated.uses(self._forms.numbers):
+            evaluated.put(self._forms.numbers, self._numbers)
+        return evaluated
 
     @cached_property
-    def _rate(self) -> Kernel:
+    def _rate(self) -> CellForm:
         """The rates of the motions; friction asks for them."""
-        return self._kernel(self._forms.rate)
+        return self._form(self._forms.rate)
 
     def rates(self, q: Array, v: Array) -> Array:
         """Rates of the motions at ``q`` if the velocities are ``v``; (num_links,); m/s or rad/s."""
@@ -159,33 +156,12 @@ class Couplings(Links):
         for kernel in (self._work, self._tangent):
             kernel.put(self._forms.row, self._rows)
 
-    def loops(self) -> tuple[Loop, Loop | None] | None:
-        """C loops of the laws that are steady or of material points."""
-        if self._asks_python:
-            return None
-        return loop("add_couplings_force", self._in_c), loop("add_cells", self._tangent.cells)
-
-    def demand(self) -> Loop:
-        """The loop of :meth:`excess`."""
-        return loop("missed_by_couplings", self._in_c)
-
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Add the forces on the nodes, and the rows of the laws."""
-        if self._asks_python:
-            self._put(*self.response.rows(self.motion(q1), self.force(q1)))
-        lib.add_couplings_force(self._in_c, doubles(q1), doubles(r))
-
     def add_tangent(self, q1: Array) -> None:
         """Add the derivative; the rows are those of the latest residual."""
         self._tangent.add(q1, self._A.data)
 
-    def excess(self, q: Array, r: Array, force: float, moved: float) -> float:
-        """Largest residual of a row: of motions as a part of 1 % of ``moved``, or of ``force``."""
-        missed: float = lib.missed_by_couplings(self._in_c, doubles(q), doubles(r), force, moved)
-        return missed
-
     def _taken(self, q1: Array) -> Array:
-        weight = self._in_c.weight_of_before
+        weight = self._weight_of_before
         force = weight * self._before + (1 - weight) * self.force(q1)
         return np.asarray(force * (self.motion(q1) - self._e))
 
@@ -197,9 +173,13 @@ class Couplings(Links):
         """Sum of the sizes of the works that the connectors take in the step to ``q1``; J."""
         return float(np.abs(self._taken(q1)).sum())
 
+    @abstractmethod
+    def _commit(self, q1: Array) -> float:
+        """Take motions, forces and works as those of the state; what all have taken; J."""
+
     def accept(self, q1: Array, s: Array) -> None:
         """Enter what was supplied or lost."""
-        taken: float = lib.commit_couplings(self._in_c, doubles(q1), self._dt)
+        taken = self._commit(q1)
         self._q = q1
         self.response.accept(self._e, taken)
 
@@ -219,8 +199,8 @@ class Couplings(Links):
         change.add(q1, self._A.data)
 
     @cached_property
-    def _tangent_change(self) -> Kernel:
-        change = self._kernel(self._forms.change)
+    def _tangent_change(self) -> CellForm:
+        change = self._form(self._forms.change)
         change.place(self._A)
         return change
 
@@ -254,7 +234,70 @@ def _split(q: Expr) -> tuple[Pair, Expr]:
     return Pair(at(-1.0), at(1.0)), force
 
 
-def couplings(share: Share, setting: Setting, A: Csr) -> list[Links]:
+@stated
+def _one_cell() -> meshes.Mesh:
+    return line_mesh(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0, 1]]))
+
+
+class CompiledCouplings(Couplings):
+    """Connectors whose forms, and laws of many kinds, are evaluated in C."""
+
+    _work: Kernel
+    _tangent: Kernel
+    _value: Kernel
+
+    def _cells(self) -> meshes.Mesh:
+        return _one_cell()
+
+    def _evaluated(self, form: ufl.Form) -> Kernel:
+        unit = np.tile([[0.0, 0, 0], [1.0, 0, 0]], (len(self.links), 1, 1))
+        return Kernel(form, self._forms.q1, self._dofs, unit)
+
+    def _prepare(self) -> None:
+        n, row = len(self.links), self._forms.row
+        self._now = np.zeros(n)
+        self._in_c = struct(
+            "couplings", number=n, link=np.arange(n, dtype=np.int32), dofs=self._dofs,
+            force=self._forces_at.copy(), length=self._length, size=self._size,
+            work=self._work.cells, tangent=self._tangent.cells, motion=self._value.cells,
+            row=self._work.position(row), row_of_tangent=self._tangent.position(row),
+            by_cell=np.zeros(n), e0=self._e, e1=self._now, before=self._before,
+            taken=self.work, rate=self.rate, weight_of_before=self._weight_of_before,
+            **self.response.in_c,
+        )  # fmt: skip
+        self._asks_python = not self.response.steady and not self.response.in_c
+
+    def motion(self, q: Array) -> Array:
+        """Relative motions at ``q``; (num_links,); m or rad."""
+        lib.find_motions(self._in_c, doubles(q))
+        return self._now.copy()
+
+    def loops(self) -> tuple[Loop, Loop | None] | None:
+        """C loops of the laws that are steady or of material points."""
+        if self._asks_python:
+            return None
+        return loop("add_couplings_force", self._in_c), loop("add_cells", self._tangent.cells)
+
+    def demand(self) -> Loop:
+        """The loop of :meth:`excess`."""
+        return loop("missed_by_couplings", self._in_c)
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Add the forces on the nodes, and the rows of the laws."""
+        if self._asks_python:
+            self._put(*self.response.rows(self.motion(q1), self.force(q1)))
+        lib.add_couplings_force(self._in_c, doubles(q1), doubles(r))
+
+    def excess(self, q: Array, r: Array, force: float, moved: float) -> float:
+        """Largest residual of a row: of motions as a part of 1 % of ``moved``, or of ``force``."""
+        missed: float = lib.missed_by_couplings(self._in_c, doubles(q), doubles(r), force, moved)
+        return missed
+
+    def _commit(self, q1: Array) -> float:
+        return float(lib.commit_couplings(self._in_c, doubles(q1), self._dt))
+
+
+def couplings(share: Share, setting: Setting, A: Csr, kind: type[Couplings]) -> list[Links]:
     """Make the connectors of a process but for guides, those that are alike together."""
     links = share.grid.scene.links
     groups: dict[tuple[str, object], list[int]] = {}
@@ -265,7 +308,7 @@ def couplings(share: Share, setting: Setting, A: Csr) -> list[Links]:
         if key not in groups and link.motion in MOTIONS:
             respond(link.law, (), setting)  # makes the entries of the ledger that others write
     return [
-        Couplings(share, np.array(here), setting, A)
+        kind(share, np.array(here), setting, A)
         for (motion, _), here in groups.items()
         if motion in MOTIONS
     ]

@@ -130,7 +130,7 @@ def _(
     part = np.flatnonzero(np.isin(fields.share.cells, cells))
     if not len(part):
         return []
-    return [KelvinVoigtForces(of, Fields(fields.share, part), scheme, A, ledger)]
+    return [KelvinVoigtForces(of, fields.part(part), scheme, A, ledger)]
 
 
 # -- of schemes ----------------------------------------------------------------------------------

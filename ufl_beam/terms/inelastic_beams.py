@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ import ufl
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import Loop, doubles, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.compiled_forms import stated
+from ufl_beam.discretization.compiled_forms import Kernel, stated
 from ufl_beam.discretization.function_spaces import Element, Fields, Strains
 from ufl_beam.discretization.partition import Numbering
 from ufl_beam.discretization.state_io import Memory
@@ -48,7 +49,7 @@ def inelastic_cells(grid: Numbering) -> list[tuple[Layout, Index]]:
     return [(layout, np.array(cells)) for layout, cells in groups.items()]
 
 
-class _Forms(NamedTuple):
+class InelasticForms(NamedTuple):
     """Virtual work of resultants r; the same of b + D e around an iterate, and its derivative."""
 
     work: ufl.Form
@@ -60,15 +61,15 @@ class _Forms(NamedTuple):
 
 
 @stated
-def _forms(of: Element, scheme: Scheme) -> _Forms:
+def _forms(of: Element, scheme: Scheme) -> InelasticForms:
     r, b, D = of.at_points(3), of.at_points(3), of.at_points(3, 3)
     w_e, dx = scheme.virtual_strain(of.q0, of.q1, of.w, of.axis), of.dx(1)
     around = virtual_work(b + ufl.dot(D, strain(of.q1, of.axis)), w_e) * dx
     tangent = ufl.derivative(around, of.q1, ufl.TrialFunction(of.space))
-    return _Forms(virtual_work(r, w_e) * dx, around, tangent, r, b, D)  # P(34)
+    return InelasticForms(virtual_work(r, w_e) * dx, around, tangent, r, b, D)  # P(34)
 
 
-class InelasticBeams(Cells):
+class InelasticBeams(Cells, ABC):
     """Resultants of cells with material points, working on the virtual strains.
 
     The points answer the strains of an iterate with resultants r and their derivatives D; around
@@ -86,6 +87,7 @@ class InelasticBeams(Cells):
         A: Csr,
         ledger: Ledger,
         search: SearchFlags,
+        points: type[Points],
     ) -> None:
         self._layout, self._scheme, self._A, self._ledger = layout, scheme, A, ledger
         self._order = fields.order
@@ -95,7 +97,7 @@ class InelasticBeams(Cells):
         # Internal variables and numbers of the points: one function in their quadrature space.
         width = len(inputs(layout.statement))
         self._variables = fields.variables(n * width)
-        self.points = Points(
+        self.points = points(
             layout,
             fields.share.grid.keys(self._cells),
             fields.share.cell_lengths()[fields.order],
@@ -111,13 +113,7 @@ class InelasticBeams(Cells):
             fields.hot_kernel(form, self._q1) for form in (forms.work, forms.tangent)
         )
         self._tangent.place(A)
-        self._latest: Array = np.full(fields.share.size, np.nan)
-        self._in_c = struct(
-            "inelastic", size=len(self._latest), latest=self._latest, points=self.points.points,
-            strains=self._strains.kernel.cells, force=self._force.cells,
-            tangent=self._tangent.cells, at_r=self._force.position(forms.r),
-            at_b=self._tangent.position(forms.b), at_D=self._tangent.position(forms.D),
-        )  # fmt: skip
+        self._prepare(forms)
         self._q: Array = np.empty(0)
 
     # -- the step ------------------------------------------------------------------------------
@@ -130,25 +126,23 @@ class InelasticBeams(Cells):
             self._q = step.q0
             self.points.start(self._strains(step.q0))
         self.points.begin(step.dt)
-        self._latest.fill(np.nan)
-        self._in_c.begins = not self._scheme.dynamic
+        self._begin()
 
+    @abstractmethod
+    def _prepare(self, forms: InelasticForms) -> None:
+        """Prepare the evaluation; called once."""
+
+    @abstractmethod
+    def _begin(self) -> None:
+        """Prepare a step."""
+
+    @abstractmethod
     def _respond(self, q1: Array) -> None:
-        """Resultants at ``q1``, and their derivatives."""
-        lib.respond_at(self._in_c, doubles(q1))
+        """Let the points answer the strains at ``q1``."""
 
-    def loops(self) -> tuple[Loop, Loop | None]:
-        """The points, and two forms."""
-        functions = ("add_inelastic_force", "add_inelastic_tangent")
-        return loop(functions[0], self._in_c), loop(functions[1], self._in_c)
-
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Add the internal forces."""
-        lib.add_inelastic_force(self._in_c, doubles(q1), doubles(r))
-
-    def add_tangent(self, q1: Array) -> None:
-        """Add the stiffness, material and geometric; see :class:`ElasticBeams`."""
-        lib.add_inelastic_tangent(self._in_c, doubles(q1), doubles(self._A.data))
+    @abstractmethod
+    def _forget(self) -> None:
+        """Forget the latest response: the points would answer otherwise now."""
 
     def change(self, q1: Array) -> float:
         """Energy that cells of this process store and dissipate in the step to ``q1``; J."""
@@ -164,7 +158,7 @@ class InelasticBeams(Cells):
         """Resultants around ``q1`` and their derivatives; points go on as they answer."""
         strains = self._strains(q1)
         r, D = self.points.respond(strains)
-        self._latest.fill(np.nan)
+        self._forget()
         around = r - np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), strains)
         return {self._b: around, self._D: D}
 
@@ -178,7 +172,7 @@ class InelasticBeams(Cells):
     def release(self, least: float) -> None:
         """Let held points open whose excess is so large."""
         self.points.release(least)
-        self._latest.fill(np.nan)
+        self._forget()
 
     def hold(self) -> None:
         """Close again the points that :meth:`release` opened."""
@@ -225,3 +219,42 @@ class InelasticBeams(Cells):
         _, here, there = np.intersect1d(self._cells, cells, return_indices=True)
         if len(here):
             self.points.restore(here, rows[there])
+
+
+class CompiledInelasticBeams(InelasticBeams):
+    """Cells whose points answer, and whose forms are evaluated, in one loop in C."""
+
+    _force: Kernel
+    _tangent: Kernel
+
+    def _prepare(self, forms: InelasticForms) -> None:
+        self._latest: Array = np.full(self._fields.share.size, np.nan)
+        self._in_c = struct(
+            "inelastic", size=len(self._latest), latest=self._latest, **self.points.in_c,
+            strains=self._strains.kernel.cells, force=self._force.cells,
+            tangent=self._tangent.cells, at_r=self._force.position(forms.r),
+            at_b=self._tangent.position(forms.b), at_D=self._tangent.position(forms.D),
+        )  # fmt: skip
+
+    def _begin(self) -> None:
+        self._forget()
+        self._in_c.begins = not self._scheme.dynamic
+
+    def _forget(self) -> None:
+        self._latest.fill(np.nan)
+
+    def _respond(self, q1: Array) -> None:
+        lib.respond_at(self._in_c, doubles(q1))
+
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """The points, and two forms."""
+        functions = ("add_inelastic_force", "add_inelastic_tangent")
+        return loop(functions[0], self._in_c), loop(functions[1], self._in_c)
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Add the internal forces."""
+        lib.add_inelastic_force(self._in_c, doubles(q1), doubles(r))
+
+    def add_tangent(self, q1: Array) -> None:
+        """Add the stiffness, material and geometric; see :class:`ElasticBeams`."""
+        lib.add_inelastic_tangent(self._in_c, doubles(q1), doubles(self._A.data))

@@ -7,25 +7,24 @@ the law, a function of the slip that grows in the step; see rigid_plastic.c.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
 from functools import singledispatch
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import doubles, in_order, lib, names, struct
-from ufl_beam.discretization.compiled_forms import Pointwise, stated
+from ufl_beam.compiled.c_library import names
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import RigidPlastic
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.material_laws import Hardening, HardeningBulk, Softening
 from ufl_beam.model.plastic_hinges import law_of
-from ufl_beam.terms.connector_responses import Response, Rows, respond
+from ufl_beam.terms.connector_responses import Response, Setting, respond
 from ufl_beam.terms.openings import NOTHING, RELEASED, SPENT
 
 INPUTS = (*names("slip_input", "slip_"), *("θ", "dt", "limit", "energy", "H", "B", "eta"))
@@ -97,33 +96,17 @@ def _slope(link: Connector, size: float) -> float:
     return max(early, least) + (2 * steepest if steepest < np.inf else 0.0)
 
 
-class SlipForms:
-    """Compiled laws of slip: force and its derivative by the slip; ``slip_output`` of loops.h."""
-
-    def __init__(self, law: Softening | Hardening, scheme: Scheme) -> None:
-        self._pointwise = pointwise = Pointwise(INPUTS)
-        at = {**pointwise.at, "slip": ufl.variable(pointwise.at["slip"])}
-        end = slip(law, at, scheme)._asdict()
-        force = end.pop("force")
-        self.force = pointwise.compile(force, ufl.diff(force, at["slip"]))
-        self.end = pointwise.compile(*in_order("slip_output", end, "slip_"))
+@respond.register
+def _(law: RigidPlastic, links: Sequence[Connector], setting: Setting) -> Response:
+    return setting.slips(law, links, setting)
 
 
-_slip_forms = stated(SlipForms)
-
-
-def slip_forms(law: Softening | Hardening, scheme: Scheme) -> SlipForms:
-    """Compiled laws of slip, made once in a process; numbers of ``law`` do not matter."""
-    return _slip_forms(Hardening(1.0) if isinstance(law, Hardening) else law.of(1.0, 1.0), scheme)
-
-
-@respond.register(RigidPlastic)
 class RigidPlasticResponse(Response):
     """Rigid-plastic connectors whose laws are of one kind."""
 
     def _prepare(self, law: RigidPlastic) -> None:
         n, ledger, scheme = len(self._links), self._setting.ledger, self._setting.scheme
-        self._ledger = ledger
+        self._ledger, self._law = ledger, law.law
         ledger.lost["hinges"] += 0.0
         self._hardens = isinstance(law.law, Hardening)
         self._loss = 2 * scheme.loss if self._hardens else 0.0
@@ -131,7 +114,6 @@ class RigidPlasticResponse(Response):
             ledger.state["hardening"] += 0.0
         if self._loss:
             ledger.lost["numerical"] += 0.0
-        self._forms = slip_forms(law.law, scheme)
         self._storage = np.zeros((n, len(INPUTS)))
         self._at = {name: self._storage[:, i] for i, name in enumerate(INPUTS)}
         for i, link in enumerate(self._links):
@@ -141,15 +123,9 @@ class RigidPlasticResponse(Response):
         self._limit = self._at["limit"].copy()
         self._back_force, self._dissipated, self._excess = np.zeros((3, n))
         self._slipped, self._way, self._way_before = np.zeros((3, n), dtype=np.int32)
-        self._rows, self._sums, self._stored = np.zeros((n, 3)), np.zeros(3), 0.0
+        self._rows, self._stored = np.zeros((n, 3)), 0.0
         self._slope = np.array([_slope(link, self._setting.size) for link in self._links])
-        self._c = struct(
-            "rigid_plastic", number=n, width=len(INPUTS), w=self._storage, rows=self._rows,
-            force=self._forms.force, end=self._forms.end, search=self._setting.search.flags,
-            limit=self._limit, back_force=self._back_force, dissipated=self._dissipated,
-            slope=self._slope, excess=self._excess, slipped=self._slipped, way=self._way,
-        )  # fmt: skip
-        self.in_c, self.openable = {"rigid_plastic": self._c}, self
+        self.openable = self
 
     # -- the step ------------------------------------------------------------------------------
 
@@ -162,19 +138,22 @@ class RigidPlasticResponse(Response):
         """Go on from the accepted state."""
         self._way[:] = self._way_before
 
-    def rows(self, e1: Array, λ: Array) -> Rows:
-        """Rows of the latest iterate, which C has set."""
-        return self._rows[:, 0], self._rows[:, 1], self._rows[:, 2]
-
     def about_force(self, rows: Array) -> Array:
         """Factors of the rows of those that slip, see rigid_plastic.c."""
         return np.where(self._way == 0, 0.0, -self._slope)
 
+    def factors(self) -> Array:
+        """Factors of motions beside forces."""
+        return self._slope
+
+    @abstractmethod
+    def _commit(self, e1: Array) -> tuple[float, float, float]:
+        """Take the slips as the new state; what is dissipated, lost numerically and stored; J."""
+
     def accept(self, e1: Array, work: float) -> None:
         """Commit the slips of the step."""
-        lib.commit_rigid_plastic(self._c, doubles(e1), doubles(self._sums))
+        dissipated, lost, self._stored = self._commit(e1)
         self._way_before[:] = self._way * self._slipped
-        dissipated, lost, self._stored = self._sums.tolist()
         self._ledger.lost["hinges"] += dissipated
         if self._loss:
             self._ledger.lost["numerical"] += self._loss * lost
@@ -205,11 +184,9 @@ class RigidPlasticResponse(Response):
         """Motions without the round-off of those that are held."""
         return self._at["start"].copy()
 
+    @abstractmethod
     def dissipation(self, e1: Array, λ: Array) -> float:
         """Energy dissipated in a step to the motions ``e1``, positive where one would slip; J."""
-        arrays = doubles(e1), doubles(np.ascontiguousarray(λ))
-        dissipated: float = lib.dissipation_of_rigid_plastic(self._c, *arrays)
-        return dissipated
 
     def dissipated(self) -> Array:
         """Energy that each has dissipated; (num_links,); J."""

@@ -10,7 +10,7 @@ import ufl
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.compiled_forms import Kernel, stated
+from ufl_beam.discretization.compiled_forms import CellForm, stated
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.terms.base import InternalForces
@@ -53,10 +53,10 @@ class Cells(InternalForces):
         return {}
 
     @cached_property
-    def _derivatives(self) -> tuple[_Forms, dict[str, Kernel]]:
+    def _derivatives(self) -> tuple[_Forms, dict[str, CellForm]]:
         return _forms(self._work_form, self._q1), {}
 
-    def _at(self, q1: Array, name: str, **motions: Array) -> Kernel:
+    def _at(self, q1: Array, name: str, **motions: Array) -> CellForm:
         """The kernel of one of the :class:`_Forms`, compiled when it is first asked for."""
         forms, kernels = self._derivatives
         if name not in kernels:
