@@ -77,6 +77,7 @@ class Points(ABC):
         self._search = search or SearchFlags()
         self._layout, self._storage, self._loss = layout, storage, scheme.loss
         self._yields, self.softens = layout.yields, layout.softening is not None
+        self._releases = self.softens and scheme.theta < 1  # see expect_entries
         self._at = {name: storage[:, :, i] for i, name in enumerate(inputs(layout.statement))}
         self._bulk = bulk = layout.bulk(keys)
         self._at["stiffness"][:] = bulk.C
@@ -207,7 +208,7 @@ class Points(ABC):
             ledger.lost["hinges"] += broken
         if self._loss:
             ledger.lost["numerical"] += 2 * self._loss * lost
-        if released:
+        if self._releases:
             ledger.lost["numerical"] += released
 
     def enter_stored(self, ledger: Ledger) -> None:
