@@ -57,17 +57,9 @@ def differences(compiled, reference):
     """Largest differences of all kinds of results, by name."""
     found = {"times": difference(compiled.times, reference.times)}
     found["motions and forces"] = difference(compiled.q, reference.q)
-    for i, support in enumerate(compiled.scene.supports):
-        both = compiled.reaction(support), reference.reaction(reference.scene.supports[i])
-        found[f"reactions of support {i}"] = difference(*both)
-    for i, beam in enumerate(compiled.scene.beams):
-        other = reference.scene.beams[i]
-        for s in (0.3, 0.8):
-            both = (
-                compiled.section_forces_at(beam.at(s)),
-                reference.section_forces_at(other.at(s)),
-            )
-            found[f"section forces of beam {i} at {s}"] = difference(*both)
+    mine, others = (_forces(solution) for solution in (compiled, reference))
+    for name, part in (("forces", slice(0, 2)), ("moments", slice(2, 3))):
+        found[name] = difference(mine[..., part], others[..., part])
     through = reference.energy.throughput or 1.0
     for kind in ("state", "supplied", "lost"):
         mine, others = getattr(compiled.energy, kind), getattr(reference.energy, kind)
@@ -75,6 +67,13 @@ def differences(compiled, reference):
         for name in mine:
             found[name] = np.abs(mine[name] - others[name]).max() / through
     return found
+
+
+def _forces(solution):
+    """Reactions, and forces and moments in two cells of each beam, at all times."""
+    places = [beam.at(s) for beam in solution.scene.beams for s in (0.3, 0.8)]
+    reactions = [solution.reaction(support) for support in solution.scene.supports]
+    return np.array([*reactions, *(solution.section_forces_at(place) for place in places)])
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -259,6 +259,7 @@ class Simulation(StateView):
             ConvergenceError: With the solution so far.
         """
         self.leave()
+        self.supports.go_back()
         self.end()
         raise no_equilibrium(self, self._solver, self.solution, failure, end, advice) from failure
 

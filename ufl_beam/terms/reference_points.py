@@ -42,6 +42,7 @@ class ReferencePoints(Points):
         """Numbers of the points by name; views."""
         return {name: storage[:, :, i] for i, name in enumerate(self._at)}
 
+    @np.errstate(over="ignore")  # of a viscosity over a short step
     def _flow(self, at: dict[str, Array], strain: Values, growth: Values) -> tuple[Values, Values]:
         """Stress of the bulk at t_n+θ, and the plastic flow of the step."""
         law, θ = self._law(at), self._scheme.theta

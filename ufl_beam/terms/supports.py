@@ -145,7 +145,7 @@ class Supports:
         if self._motions:
             work = self._acting(self._before, self.reactions) * s[self._held]
             self._ledger.supplied["supports"] += float(np.sum(work[self._owned]))
-            self._before = self.reactions.copy()
+        self.take()
 
     def stop(self, v: Array) -> None:
         """Set velocities of what does not move to zero, in place; else they would ring."""
@@ -154,13 +154,17 @@ class Supports:
         self.leave(v)
 
     def take(self) -> None:
-        """Take the latest reactions as those before the next step."""
-        self._before = self.reactions.copy()
+        """Take the latest reactions as those of the accepted state."""
+        self._before[:] = self.reactions
+
+    def go_back(self) -> None:
+        """Return to the reactions of the accepted state: a step has failed."""
+        self.reactions[:] = self._before
 
     def carry_on(self, memory: Memory, q: Array) -> None:
         """Save or restore the reactions."""
         reactions: Array = np.zeros(len(q))
-        reactions[self._held] = self._before if self._motions else self.reactions
+        reactions[self._held] = self._before
         self.reactions[:] = memory.at_dofs("reactions", reactions)[self._held]
         self.take()
 
