@@ -6,9 +6,11 @@ C evaluates in one, DOLFINx, NumPy and PETSc evaluate in the other: forms, retur
 connectors, factorization, Newton's method.
 """
 
+from mpi4py import MPI
+
 import numpy as np
 import pytest
-from any_scene import script
+from any_scene import STEPS, script
 
 import ufl_beam as ub
 from ufl_beam.discretization.dolfinx_forms import DolfinxForm
@@ -80,6 +82,40 @@ def _forces(solution):
 def test_both_paths_agree(seed):
     found = differences(run(seed, reference=False), run(seed, reference=True))
     assert max(found.values()) < SAME, {k: v for k, v in found.items() if not v < SAME}
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_residuals_and_tangents_agree(seed):
+    """Somewhere off equilibrium, so that nothing hides behind a converged solution."""
+    names = {}
+    exec(script(seed), names)
+    found = []
+    for reference in (False, True):
+        simulation = ub.Simulation(
+            names["scene"], names["scheme"], mesh=names["mesh"], comm=MPI.COMM_SELF,
+            newton=ub.Newton(rtol=1e-12, reference=reference),
+        )  # fmt: skip
+        t0, dt = names["times"][0], (names["times"][1] - names["times"][0]) / STEPS
+        simulation.step_to(t0 + dt)
+        x = simulation.supports.in_axes(simulation.q + step(simulation.share))
+        simulation.ask()
+        simulation.equation.begin(
+            names["scheme"].step(t0 + dt, t0 + 2 * dt, t0 + 2 * dt, simulation.q)
+        )
+        r = np.empty(len(x))
+        simulation.equation.residual(x, r)
+        simulation.equation.tangent(x)
+        found.append((r, simulation.equation.A.data.copy()))
+        simulation.close()
+    for compiled, reference in zip(*found, strict=True):
+        # States of both differ by the tolerance of one step.
+        assert difference(compiled, reference) < SAME
+
+
+def step(share):
+    """Motions and forces at random, small enough that no node turns far."""
+    random = np.random.default_rng(5)
+    return 1e-3 * share.grid.scene.size * random.uniform(-1, 1, share.size)
 
 
 def test_the_scenes_have_everything():
