@@ -15,8 +15,9 @@ from any_scene import STEPS, script
 import ufl_beam as ub
 from ufl_beam.discretization.dolfinx_forms import DolfinxForm
 from ufl_beam.solvers.direct_solver import DirectSolver
-from ufl_beam.terms.reference_connectors import ReferenceCouplings, ReferenceSlips
+from ufl_beam.terms.connectors import ReferenceCouplings
 from ufl_beam.terms.reference_points import ReferencePoints
+from ufl_beam.terms.reference_slips import ReferenceSlips
 
 WANDERING = (25, 32, 36, 38)
 """Scenes in whose steps Newton's method wanders, so that round-off decides where a step is cut."""

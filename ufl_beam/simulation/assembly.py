@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -21,24 +22,52 @@ from ufl_beam.model.constraint_checks import friction_repeats
 from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.simulation.branch_check import StaticPath
-from ufl_beam.simulation.evaluation import Evaluation
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.beams import ElasticBeams, Inertia
 from ufl_beam.terms.connector_responses import Setting
-from ufl_beam.terms.connectors import couplings
+from ufl_beam.terms.connectors import Couplings, couplings
 from ufl_beam.terms.damping import SecondDifferences, damping_forces
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.guide_curves import guides
 from ufl_beam.terms.inelastic_beams import InelasticBeams, inelastic_cells
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.loads import DeadLoads, FollowerLoads, FrameForces
-from ufl_beam.terms.material_points import expect_entries
+from ufl_beam.terms.material_points import Points, expect_entries
 from ufl_beam.terms.openings import Openable, Openings, SearchFlags
+from ufl_beam.terms.rigid_plastic import RigidPlasticResponse
 from ufl_beam.terms.supports import Supports
 from ufl_beam.terms.tangent_derivatives import Cells
 
 Loads = list[DeadLoads | FollowerLoads | FrameForces]
+
+
+class Evaluation(Protocol):
+    """Classes that evaluate forms and laws: those of evaluation.py."""
+
+    @property
+    def fields(self) -> type[Fields]:
+        """Forms on cells."""
+
+    @property
+    def points(self) -> type[Points]:
+        """Material points."""
+
+    @property
+    def inelastic(self) -> type[InelasticBeams]:
+        """Cells with material points."""
+
+    @property
+    def couplings(self) -> type[Couplings]:
+        """Connectors."""
+
+    @property
+    def slips(self) -> type[RigidPlasticResponse]:
+        """Plastic hinges of zero length."""
+
+    @property
+    def in_c(self) -> bool:
+        """True if C may call the terms with no Python between them."""
 
 
 @dataclass(frozen=True)
@@ -184,6 +213,8 @@ def assemble(
     if inertia:
         supports.stop(inertia.v)
     equation = StepEquation(share, A, beams, coupled, loads, others, supports, search)
+    if by.in_c:
+        equation.leave_to_c()
     return Assembly(
         fields, ledger, asked, rates, beams, inelastic, bool(groups), coupled, loads, inertia,
         supports, openings, equation,

@@ -137,8 +137,9 @@ class Simulation(StateView):
         self._branch = parts.static_path(scheme, self.q, t0, loaded, together)
         self.reactions_known = self._branch is not None
 
+        factors = by.factors(share, self.equation.A)
         self._steps = StepSolver(
-            scheme, self.equation, parts.openings, self._branch, newton, by, together
+            scheme, self.equation, parts.openings, self._branch, newton, factors, together
         )
         self._solver = self._steps.newton
         self.solution = kind(scene, grid)

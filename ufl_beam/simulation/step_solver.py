@@ -13,12 +13,13 @@ from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.constraint_checks import no_number
 from ufl_beam.simulation.branch_check import StaticPath
-from ufl_beam.simulation.evaluation import Evaluation
 from ufl_beam.simulation.step_cutting import Trial
 from ufl_beam.simulation.step_equation import StepEquation
+from ufl_beam.solvers.direct_solver import DirectSolver
 from ufl_beam.solvers.equation import Border
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.solvers.newton_options import Newton
+from ufl_beam.solvers.static_condensation import ChainsFirst
 from ufl_beam.terms.openings import Openings
 
 LARGEST_TURN = 0.75 * math.pi
@@ -42,15 +43,12 @@ class StepSolver:
         openings: Openings | None,
         branch: StaticPath | None,
         newton: Newton,
-        by: Evaluation,
+        factors: ChainsFirst | DirectSolver,
         together: Agreement,
     ) -> None:
         self._scheme, self._equation, self._openings = scheme, equation, openings
         self._branch, self._together, share = branch, together, equation.share
         least = LEAST_IN_MOTION if has_inertia(scheme) else LEAST_AT_REST
-        if by.in_c:
-            equation.leave_to_c()
-        factors = by.factors(share, equation.A)
         self.newton = Solver(share, equation, factors, newton, least, together)
         self._rotations, self._multipliers = share.rotations(), as_slice(share.multipliers())
         self._coupled = len(share.grid.multipliers) > 0

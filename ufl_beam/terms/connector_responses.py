@@ -18,7 +18,6 @@ from ufl_beam.arrays import Array
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.connectors import Connector
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.material_points import Points
 from ufl_beam.terms.openings import Openable, SearchFlags
 
 Rows = tuple[Any, Any, Any]
@@ -35,7 +34,7 @@ class Setting(NamedTuple):
     ledger: Ledger
     friction_repeats: bool  # True if places that stick may hold what is held already
     search: SearchFlags  # of all points of the scene
-    points: type[Points]  # of springs
+    points: Callable[..., Any]  # class of the material points of springs
     slips: Callable[[Any, Sequence[Connector], Setting], Response]  # of rigid-plastic connectors
 
 

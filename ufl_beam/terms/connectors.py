@@ -5,25 +5,24 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from functools import cached_property
-from typing import NamedTuple
 
-import basix.ufl
 import numpy as np
 import ufl
-from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import Loop, doubles, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import CellForm, Kernel, stated
+from ufl_beam.discretization.dolfinx_forms import DolfinxForm
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
-from ufl_beam.dolfinx_compat import fem, line_mesh
+from ufl_beam.dolfinx_compat import line_mesh
 from ufl_beam.dolfinx_compat import mesh as meshes
-from ufl_beam.mechanics.relative_motions import MOTIONS, Numbers, Pair
-from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.mechanics.relative_motions import MOTIONS
+from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.model.connector_laws import HELD, Law, RigidPlastic, Spring
 from ufl_beam.terms import connector_laws, rigid_plastic, springs
+from ufl_beam.terms.connector_forms import connector_forms
 from ufl_beam.terms.connector_responses import Setting, respond
 from ufl_beam.terms.links import Links
 
@@ -38,45 +37,6 @@ def _kind(law: Law) -> object:
     return type(law), law is HELD, isinstance(law, RigidPlastic) and type(law.law)
 
 
-class _Forms(NamedTuple):
-    """Forms of connectors with the coefficients that they are written in."""
-
-    work: ufl.Form  # virtual work, and the row ``row[0] e + row[1] λ - row[2]`` of a law
-    tangent: ufl.Form  # its derivative by the configuration
-    motion: ufl.Form  # the relative motion e by cell
-    rate: ufl.Form  # its derivative along ``u``
-    change: ufl.Form  # derivative of the tangent along ``u``; ``bend`` is that of row[0] by e
-    numbers: fem.Function  # see :class:`Numbers`
-    row: fem.Function
-    q0: fem.Function
-    q1: fem.Function
-    bend: fem.Function
-    u: fem.Function
-
-
-@stated
-def _forms(motion: str, scheme: Scheme, cell: meshes.Mesh) -> _Forms:
-    line = basix.ufl.element("Lagrange", "interval", 1)
-    point = basix.ufl.element("DG", "interval", 0)
-    space = fem.functionspace(cell, basix.ufl.mixed_element([line, line, line, point]))
-    numbers, row, bend = (
-        fem.Function(fem.functionspace(cell, ("DG", 0, shape))) for shape in ((8,), (3,), ())
-    )
-    q0, q1, u = (fem.Function(space) for _ in range(3))
-    (before, _), (now, λ), (w, w_λ) = map(_split, (q0, q1, ufl.TestFunction(space)))
-    n = Numbers(*(ufl.as_vector([numbers[i], numbers[i + 1]]) for i in (0, 2, 4, 6)))
-    e = MOTIONS[motion].value(now, n)
-    e_w = MOTIONS[motion].variation(before, now, w, n, scheme)
-    dx = ufl.Measure("dx", domain=cell, metadata={"quadrature_degree": 1})
-    dq, z = ufl.TrialFunction(space), ufl.TestFunction(bend.function_space)
-    work = (λ * e_w + w_λ * (row[0] * e + row[1] * λ - row[2])) * dx
-    tangent, by_cell = ufl.derivative(work, q1, dq), e * z * dx
-    of_rows = w_λ * bend * ufl.derivative(e, q1, u) * ufl.derivative(e, q1, dq) * dx
-    change = ufl.derivative(tangent, q1, u) + of_rows
-    rate = ufl.derivative(by_cell, q1, u)
-    return _Forms(work, tangent, by_cell, rate, change, numbers, row, q0, q1, bend, u)
-
-
 class Couplings(Links, ABC):
     """Connectors of one relative motion whose laws are of one kind.
 
@@ -86,7 +46,7 @@ class Couplings(Links, ABC):
     def __init__(self, share: Share, here: Index, setting: Setting, A: Csr) -> None:
         super().__init__(share, here, setting, A)
         links, n = self.links, len(here)
-        self._forms = forms = _forms(links[0].motion, setting.scheme, self._cells())
+        self._forms = forms = connector_forms(links[0].motion, setting.scheme, self._cells())
         self._numbers = np.array([(*c.arms[0], *c.arms[1], *c.apart, *c.axis) for c in links])
         self._work, self._tangent, self._value = map(
             self._form, (forms.work, forms.tangent, forms.motion)
@@ -224,16 +184,6 @@ class Couplings(Links, ABC):
         self._q = q
 
 
-def _split(q: Expr) -> tuple[Pair, Expr]:
-    """Split coefficients into both configurations, values at the ends of a cell, and the force."""
-    *components, force = ufl.split(q)
-
-    def at(end: float) -> Expr:
-        return ufl.as_vector([x + end / 2 * ufl.grad(x)[0] for x in components])
-
-    return Pair(at(-1.0), at(1.0)), force
-
-
 @stated
 def _one_cell() -> meshes.Mesh:
     return line_mesh(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0, 1]]))
@@ -295,6 +245,61 @@ class CompiledCouplings(Couplings):
 
     def _commit(self, q1: Array) -> float:
         return float(lib.commit_couplings(self._in_c, doubles(q1), self._dt))
+
+
+class ReferenceCouplings(Couplings):
+    """The same equations as :class:`CompiledCouplings`, line by line."""
+
+    def _cells(self) -> meshes.Mesh:
+        """Cells of unit length, with no vertices in common."""
+        n = len(self.links)
+        mesh = line_mesh(np.tile([[0.0, 0.0], [1.0, 0.0]], (n, 1)), np.arange(2 * n).reshape(n, 2))
+        self._order = np.asarray(mesh.topology.original_cell_index)
+        return mesh
+
+    def _evaluated(self, form: ufl.Form) -> DolfinxForm:
+        return DolfinxForm(form, self._forms.q1, self._dofs, self._order)
+
+    def _prepare(self) -> None:
+        """Nothing more is needed."""
+
+    def motion(self, q: Array) -> Array:
+        """Relative motions at ``q``; (num_links,); m or rad."""
+        e = np.zeros(len(self.links))
+        self._value.add(q, e)
+        return e
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Add the forces on the nodes, and the rows of the laws."""
+        if not self.response.steady:
+            self._put(*self.response.rows(self.motion(q1), self.force(q1)))
+        self._work.add(q1, r)
+
+    def excess(self, q: Array, r: Array, force: float, moved: float) -> float:
+        """Largest residual of a row: of motions as a part of 1 % of ``moved``, or of ``force``.
+
+        What the last digits of the motions make of a row does not count.
+        """
+        amplitude, unit = moved / self._size, self.response.factors()
+        weight = np.abs(self._rows[:, 1])
+        of_motion = 0.01 * self._length * amplitude
+        of_force = weight * force * self._size / self._length
+        size = np.where(weight * unit < 1 - 1e-12, of_motion, of_force)
+        displaced = np.abs(q[self._dofs[:, :4]]).max(axis=1) / self._size
+        turned = np.abs(q[self._dofs[:, 4:6]]).max(axis=1)
+        far = amplitude + np.maximum(displaced, turned)
+        round_off = 8 * np.abs(self._rows[:, 0]) * self._length * np.spacing(far)
+        left = np.abs(r[self._forces_at]) - round_off
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return float(np.where(left <= 0, 0.0, left / size).max())
+
+    def _commit(self, q1: Array) -> float:
+        e, taken = self.motion(q1), self._taken(q1)
+        self.work += taken
+        self.rate[:] = (e - self._e) / self._dt
+        self._before[:] = self.force(q1)
+        self._e[:] = e
+        return float(taken.sum())
 
 
 def couplings(share: Share, setting: Setting, A: Csr, kind: type[Couplings]) -> list[Links]:

@@ -11,7 +11,7 @@ from ufl_beam.model.connector_laws import Spring
 from ufl_beam.model.fibres import Layout
 from ufl_beam.model.material_laws import Hardening
 from ufl_beam.terms.connector_responses import Response, Rows, respond
-from ufl_beam.terms.material_points import expect_entries, inputs
+from ufl_beam.terms.material_points import Points, expect_entries, inputs
 
 
 @respond.register(Spring)
@@ -32,7 +32,7 @@ class _Sprung(Response):
         keys = [(0, i) for i in range(number)]
         storage = np.zeros((number, 1, len(inputs(layout.statement))))
         of = (layout, keys, np.ones(number), setting.scheme, storage, setting.search)
-        self.points = setting.points(*of)
+        self.points: Points = setting.points(*of)
         expect_entries(layout, setting.scheme, setting.ledger)
         self._strains = np.zeros((number, 3))
         self.in_c = self.points.in_c

@@ -1,77 +1,17 @@
 # SPDX-License-Identifier: MIT
-"""Connectors whose forms DOLFINx assembles, and rigid-plastic laws evaluated by NumPy."""
+"""Rigid-plastic connectors whose law is evaluated by NumPy; rigid_plastic.c has the equation."""
 
 from __future__ import annotations
 
 import numpy as np
-import ufl
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import lib
-from ufl_beam.discretization.dolfinx_forms import DolfinxForm
-from ufl_beam.dolfinx_compat import line_mesh
-from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.model.law_functions import Values
 from ufl_beam.terms.connector_responses import Rows
-from ufl_beam.terms.connectors import Couplings
 from ufl_beam.terms.openings import HOLD, OPENED, OVER
 from ufl_beam.terms.reference_points import derivative
 from ufl_beam.terms.rigid_plastic import RigidPlasticResponse, Slip, slip
-
-
-class ReferenceCouplings(Couplings):
-    """The same equations as :class:`CompiledCouplings`, line by line."""
-
-    def _cells(self) -> meshes.Mesh:
-        """Cells of unit length, with no vertices in common."""
-        n = len(self.links)
-        mesh = line_mesh(np.tile([[0.0, 0.0], [1.0, 0.0]], (n, 1)), np.arange(2 * n).reshape(n, 2))
-        self._order = np.asarray(mesh.topology.original_cell_index)
-        return mesh
-
-    def _evaluated(self, form: ufl.Form) -> DolfinxForm:
-        return DolfinxForm(form, self._forms.q1, self._dofs, self._order)
-
-    def _prepare(self) -> None:
-        """Nothing more is needed."""
-
-    def motion(self, q: Array) -> Array:
-        """Relative motions at ``q``; (num_links,); m or rad."""
-        e = np.zeros(len(self.links))
-        self._value.add(q, e)
-        return e
-
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Add the forces on the nodes, and the rows of the laws."""
-        if not self.response.steady:
-            self._put(*self.response.rows(self.motion(q1), self.force(q1)))
-        self._work.add(q1, r)
-
-    def excess(self, q: Array, r: Array, force: float, moved: float) -> float:
-        """Largest residual of a row: of motions as a part of 1 % of ``moved``, or of ``force``.
-
-        What the last digits of the motions make of a row does not count.
-        """
-        amplitude, unit = moved / self._size, self.response.factors()
-        weight = np.abs(self._rows[:, 1])
-        of_motion = 0.01 * self._length * amplitude
-        of_force = weight * force * self._size / self._length
-        size = np.where(weight * unit < 1 - 1e-12, of_motion, of_force)
-        displaced = np.abs(q[self._dofs[:, :4]]).max(axis=1) / self._size
-        turned = np.abs(q[self._dofs[:, 4:6]]).max(axis=1)
-        far = amplitude + np.maximum(displaced, turned)
-        round_off = 8 * np.abs(self._rows[:, 0]) * self._length * np.spacing(far)
-        left = np.abs(r[self._forces_at]) - round_off
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return float(np.where(left <= 0, 0.0, left / size).max())
-
-    def _commit(self, q1: Array) -> float:
-        e, taken = self.motion(q1), self._taken(q1)
-        self.work += taken
-        self.rate[:] = (e - self._e) / self._dt
-        self._before[:] = self.force(q1)
-        self._e[:] = e
-        return float(taken.sum())
 
 
 class ReferenceSlips(RigidPlasticResponse):
