@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, integers, lib, loop
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, integers, lib, loop
 
 
 class Csr:
@@ -82,9 +82,8 @@ class Product:
 
     def __init__(self, A: Csr) -> None:
         self._entries = np.flatnonzero(A.data).astype(np.int32)
-        self._columns = A.indices[self._entries]
-        self._data = A.data[self._entries]
         indptr = np.searchsorted(self._entries, A.indptr).astype(np.int32)
+        self._columns, self._data = A.indices[self._entries], A.data[self._entries]
         pointers = (integers(indptr), integers(self._columns), doubles(self._data))
         self._arrays = (A.size, *pointers)
 
@@ -108,14 +107,13 @@ class StepProduct(Product):
 
     def __init__(self, A: Csr, rotations: Index, tangent: Csr) -> None:
         super().__init__(A)
+        self._structure, self._tangent = tangent, doubles(tangent.data)
         size, indptr, indices, data = self._arrays
-        entry, self._tangent = integers(self._entries), doubles(tangent.data)
-        self._structure = tangent
-        self._alive = (integers(rotations), entry, doubles(np.empty(size)))
-        self.product = ffi.new("step_product *")
-        c = self.product
-        c.size, c.indptr, c.indices, c.data = size, indptr, indices, data
-        c.rotations, (c.rotation, c.entry, c.space) = len(rotations), self._alive
+        self.product = fill(
+            ffi.new("step_product *"),
+            size=size, indptr=indptr, indices=indices, data=data, entry=self._entries,
+            rotations=len(rotations), rotation=rotations, space=np.empty(size),
+        )  # fmt: skip
 
     def matrix(self) -> Csr:
         """Return the matrix, a new one."""

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -120,27 +119,13 @@ class Solver:
         """Newton's method with a line search."""
         if "snes_linesearch_type" in self._chosen():
             return self._snes
-        return SearchingNewton(
-            self._snes, self._ksp, x=self._x, f=self._f, y=self._vectors.new(),
-            w=self._vectors.new(), matrix=self._matrix, test=self.convergence.test,
-            near=lambda: bool(self._equation.c.near), work=self._work_on,
-            most=self._newton.max_iterations,
-        )  # fmt: skip
-
-    def _work_on(self, y: PETSc.Vec) -> Callable[[], float]:
-        """Work of the latest residual on a step from the present iterate; J."""
-        for vector in (self._x, y):
-            self._vectors.update_ghosts(vector)
-        step = self._equation.working(self._q, self._vectors.view(y))
-        return lambda: self.convergence.work(step)
+        return SearchingNewton(self._snes, self._vectors, self._equation, self.convergence)
 
     def _along(self, border: Border) -> PETSc.SNES:
         """SNES of the equation with a border."""
         if self._bordered is None:
-            self._bordered = BorderedNewton(
-                self._callbacks, self._vectors, self._ksp.getPC(), self._equation.held,
-                self._make_snes(), self._f, self._matrix, border,
-            )  # fmt: skip
+            factors = self._ksp.getPC()
+            self._bordered = BorderedNewton(self._make_snes(), self._callbacks, factors, border)
         self._bordered.border = border
         return self._bordered.snes
 
