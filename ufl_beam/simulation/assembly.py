@@ -136,7 +136,7 @@ def assemble(share: Share, scheme: Scheme, v: Array, together: Agreement) -> Ass
     setting = (scheme, A, ledger)
 
     # Each kind makes its entries of the ledger: their order is that of the columns of tables.
-    groups = inelastic_cells(share.grid)
+    groups = inelastic_cells(share)
     inelastic, elastic = [], np.ones(len(share.cells), dtype=bool)
     for layout, cells in groups:
         expect_entries(layout, scheme, ledger)

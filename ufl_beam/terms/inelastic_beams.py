@@ -13,7 +13,7 @@ from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.function_spaces import Element, Fields, Strains
-from ufl_beam.discretization.partition import Numbering
+from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError
@@ -26,8 +26,9 @@ from ufl_beam.terms.openings import SearchFlags
 from ufl_beam.terms.tangent_derivatives import Cells
 
 
-def inelastic_cells(grid: Numbering) -> list[tuple[Layout, Index]]:
+def inelastic_cells(share: Share) -> list[tuple[Layout, Index]]:
     """Layouts of material points, and the cells (numbers of the grid) that have them."""
+    grid = share.grid
     groups: dict[Layout, list[int]] = {}
     layouts: dict[object, Layout | None] = {}
     for beam in grid.scene.beams:
