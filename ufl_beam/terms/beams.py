@@ -162,14 +162,14 @@ class Inertia(OfMatrix):
         v, *more = self.scheme.rates(self._dt, s, self)
         if self.scheme.slips:
             change = v - self.v
-            momentum = self._times(change)
+            momentum = self._times.A(change)
             lost = self.scheme.slip(self._dt, change, self) @ momentum
             self._ledger.lost["numerical"] += float(lost)
         self.v_before, self.v, self.more, self.last_dt = self.v, v, tuple(more), self._dt
 
     def add_state(self, q: Array) -> None:
         """Add the kinetic energy to the ledger."""
-        self._ledger.state["kinetic"] += self._times.square(self.v) / 2  # P(18)
+        self._ledger.state["kinetic"] += self._times.A.square(self.v) / 2  # P(18)
 
     def remember(self, memory: Memory, q: Array) -> None:
         """Save or restore velocities and the last step."""

@@ -104,7 +104,7 @@ class RayleighForces(OfMatrix):
 
     def accept(self, q1: Array, s: Array) -> None:
         """Enter the energy that was damped."""
-        self._ledger.lost["damping"] += self._times.square(s) / self._dt
+        self._ledger.lost["damping"] += self._times.A.square(s) / self._dt
 
 
 @damping_forces.register
