@@ -19,6 +19,7 @@ from ufl_beam.discretization.compiled_forms import Kernel, stated, vectorise
 from ufl_beam.discretization.partition import Share
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
 from ufl_beam.mechanics.kinematics import Axis, split, strain
+from ufl_beam.model.bodies import Body
 from ufl_beam.model.mesh_options import Mesh
 
 
@@ -38,19 +39,15 @@ class Element:
         self._degree, self._lumped = mesh.degree, mesh.lumped
         self._cell = line_mesh(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0, 1]]))
         line = basix.ufl.element("Lagrange", "interval", mesh.degree)
-        self.axis = Axis(self._cell, mesh.nodes, self._along() if mesh.degree > 1 else 0.5)
+        along = fem.Function(fem.functionspace(self._cell, ("DG", 1)))
+        along.x.array[:] = 0.0, 1.0
+        self.axis = Axis(self._cell, mesh.nodes, along if mesh.degree > 1 else 0.5)
         self.space = fem.functionspace(self._cell, basix.ufl.mixed_element([line, line, line]))
         self.q0, self.q1 = self.configuration(), self.configuration()
         self.w = ufl.TestFunction(self.space)
         self.stiffness, self.inertia = (
             fem.Function(fem.functionspace(self._cell, ("DG", 0, (n,)))) for n in (3, 2)
         )
-
-    def _along(self) -> fem.Function:
-        """Coordinate from 0 to 1 along the cell."""
-        function = fem.Function(fem.functionspace(self._cell, ("DG", 1)))
-        function.x.array[:] = 0.0, 1.0
-        return function
 
     def configuration(self) -> fem.Function:
         """A new configuration (u_x, u_y, ψ)."""
@@ -114,7 +111,11 @@ class Fields:
         self.mesh = line_mesh(grid.points[vertices], cells.reshape(-1, 2))
         self.order: Index = part[np.asarray(self.mesh.topology.original_cell_index)]
         self._coordinates = cell_coordinates(self.mesh)
-        self._require_direction(grid.points[grid.cells[share.cells[self.order]]])
+        # The order of the vertices of a cell orients the beam.
+        if not np.array_equal(
+            self._coordinates[:, :, :2], grid.points[grid.cells[share.cells[self.order]]]
+        ):
+            raise RuntimeError("this version of DOLFINx turns cells around; please report it")
         self.cell_dofs = share.cell_dofs[self.order]
         self._matrix: Csr | None = None
         self.element = _element(grid.mesh.degree, grid.mesh.lumped)
@@ -122,13 +123,13 @@ class Fields:
     def kernel(self, form: ufl.Form, unknown: fem.Function) -> Kernel:
         """A form on the cells, compiled; ``unknown`` is the configuration that changes."""
         kernel = Kernel(form, unknown, self.cell_dofs, self._coordinates)
-        of_sections = (
-            (self.element.stiffness, ("EA", "GA", "EI")),
-            (self.element.inertia, ("rhoA", "rhoI")),
-        )
-        for function, names in of_sections:
+        grid, element = self.share.grid, self.element
+        stiffness, inertia = ("EA", "GA", "EI"), ("rhoA", "rhoI")
+        for function, names in ((element.stiffness, stiffness), (element.inertia, inertia)):
             if kernel.uses(function):
-                kernel.put(function, self._of_sections(*names))
+                of_beam = [[getattr(b.section, n) for n in names] for b in grid.scene.beams]
+                beams = grid.beam_of_cell[self.share.cells[self.order]]
+                kernel.put(function, np.array(of_beam).reshape(-1, len(names))[beams])
         return kernel
 
     def hot_kernel(self, form: ufl.Form, unknown: fem.Function) -> Kernel:
@@ -166,18 +167,6 @@ class Fields:
         kernel.add(np.zeros(self.share.size), matrix.data)
         return matrix
 
-    def _require_direction(self, ends: Array) -> None:
-        """The mesh must keep the order of the vertices of a cell, which orients the beam."""
-        if not np.array_equal(self._coordinates[:, :, :2], ends):
-            raise RuntimeError("this version of DOLFINx turns cells around; please report it")
-
-    def _of_sections(self, *names: str) -> Array:
-        """Numbers of the sections of the cells; (num_cells, len(names))."""
-        grid = self.share.grid
-        of_beam = np.array([[getattr(b.section, n) for n in names] for b in grid.scene.beams])
-        of_cells = grid.beam_of_cell[self.share.cells[self.order]]
-        return of_beam.reshape(-1, len(names))[of_cells]
-
     def variables(self, number: int) -> fem.Function:
         """A function with so many numbers in each point of the cells."""
         element = basix.ufl.quadrature_element("interval", value_shape=(number,), degree=1)
@@ -194,12 +183,11 @@ def mass_matrix(fields: Fields) -> Csr:
     """Mass of the beams, the point masses and the bodies."""
     share, M = fields.share, fields.assembled(_mass(fields.element))
     scene = share.grid.scene
-    lumps = [(share.at(one.place), one.mass, one.inertia) for one in scene.masses]
-    lumps += [(share.at(one.middle), one.mass, one.inertia) for one in scene.bodies]
-    for dofs, mass, inertia in lumps:
+    for one in (*scene.masses, *scene.bodies):
+        dofs = share.at(one.middle if isinstance(one, Body) else one.place)
         mine = share.owns(dofs)
         here = share.local(dofs[mine])
-        M.data[M.positions(here, here)] += np.array([mass, mass, inertia])[mine]
+        M.data[M.positions(here, here)] += np.array([one.mass, one.mass, one.inertia])[mine]
     return M
 
 
