@@ -147,20 +147,13 @@ class Solver:
         if reason <= 0 and self._may_go_on() and self._equation.stiffen(True):
             self._go_to(guess)
             reason = self._stiffened()
-        if reason <= 0:
-            raise self._failure(reason)
-        self._vectors.update_ghosts(self._x)
-        return self._q.copy()
+        return self._solution(reason)
 
     def solve_along(self, guess: Array, loads: list[Array], border: Border) -> Array:
         """Find the configuration as :meth:`solve` does, together with the unknown of a border."""
         self.convergence.take_loads(loads)
         self._go_to(guess)
-        reason = self._iterate(self._along(border), 12)
-        if reason <= 0:
-            raise self._failure(reason)
-        self._vectors.update_ghosts(self._x)
-        return self._q.copy()
+        return self._solution(self._iterate(self._along(border), 12))
 
     @cached_property
     def _idle(self) -> IdleMotions:
@@ -177,10 +170,8 @@ class Solver:
             self._go_to(guess)
             return self._iterate(self._snes, 2)
 
-        reason, convergence = int(lib.SINGULAR), self.convergence
-        while reason == lib.SINGULAR and self._idle.find(
-            convergence.residuals(), convergence.scale()
-        ):
+        reason, now = int(lib.SINGULAR), self.convergence
+        while reason == lib.SINGULAR and self._idle.find(now.residuals(), now.scale()):
             reason = again()
         if reason <= 0 and self._idle.forget():
             reason = again()
@@ -237,10 +228,13 @@ class Solver:
         self._agreement.settle(None if isinstance(error, StepFailed) else error)
         return True
 
-    def _failure(self, reason: int) -> StepFailed:
-        """Describe the failure; raise what a function of the user has raised on any process."""
-        self._agreement.settle(self._equation.error)
-        return self.convergence.failure(reason, self._done)
+    def _solution(self, reason: int) -> Array:
+        """Return the latest iterate; raise the failure, or what a function of the user raised."""
+        if reason <= 0:
+            self._agreement.settle(self._equation.error)
+            raise self.convergence.failure(reason, self._done)
+        self._vectors.update_ghosts(self._x)
+        return self.iterate()
 
     # -- what is known of it -------------------------------------------------------------------
 
