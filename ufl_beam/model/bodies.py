@@ -21,6 +21,7 @@ from ufl_beam.errors import (
     shorten,
 )
 from ufl_beam.model.curves import Curve, Point, tangent_within
+from ufl_beam.model.records import NotNegative, Record, Vector
 
 TOGETHER = 1e-9
 """Part of a cell below which two places of a beam are one."""
@@ -127,7 +128,7 @@ class Place:
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class Body(Record):
     """Rigid body; joints, connectors and loads may act at any of its points.
 
     Args:
@@ -146,17 +147,18 @@ class Body:
         Revolute(beam.end (2, 0), rotor (2, 0))
     """
 
-    center: Point
+    center: Vector
     _: KW_ONLY
-    mass: float = 0.0
-    inertia: float = 0.0
+    mass: NotNegative = 0.0
+    inertia: NotNegative = 0.0
     name: str = "body"
 
     def __post_init__(self) -> None:
         require_text(self.name, "Body: name")
-        object.__setattr__(self, "center", require_vector(self.center, f"{self.name}: center"))
-        require_number(self.mass, f"{self.name}: mass", at_least=0.0)
-        require_number(self.inertia, f"{self.name}: inertia", at_least=0.0)
+        super().__post_init__()
+
+    def _label(self) -> str:
+        return self.name
 
     def at(self, x: float, y: float) -> Spot:
         """The point of the body that is at (x, y) in the undeformed scene; m."""
@@ -246,6 +248,12 @@ def require_anchor(anchor: object, owner: str) -> None:
             f"{owner}: {shorten(anchor)} is not a place; use beam.start, .end or .at(s), "
             "body.at(x, y) or ground(x, y)"
         )
+
+
+def require_beam(value: object, what: str) -> None:
+    """Raise :class:`SceneError` naming ``what`` unless ``value`` is a beam."""
+    if not isinstance(value, Member):
+        raise SceneError(f"{what} = {shorten(value)} is not a Beam")
 
 
 def require_node(place: object, owner: str) -> None:

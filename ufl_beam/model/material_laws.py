@@ -325,13 +325,13 @@ HingeLaw = Softening | Hardening
 """Laws of a plastic hinge of zero length, which has no elasticity of its own."""
 
 
-def require_hinge_law(law: object, owner: str) -> None:
-    """Raise :class:`SceneError` naming ``owner`` unless a rigid-plastic hinge can follow a law."""
-    require_kind(law, HingeLaw.__args__, owner)
+def require_hinge_law(law: object, what: str) -> None:
+    """Raise :class:`SceneError` naming ``what`` unless a rigid-plastic hinge can follow a law."""
+    require_kind(law, HingeLaw.__args__, what)
     if isinstance(law, Hardening):
-        _require_from_zero_to_infinity(law.limit, f"{owner}: limit")
+        _require_from_zero_to_infinity(law.limit, f"{what}: limit")
         if isinstance(law.viscosity, DuvautLions):
             raise SceneError(
-                f"{owner}: DuvautLions relaxes an elastic stress, and a hinge of zero length is "
+                f"{what}: DuvautLions relaxes an elastic stress, and a hinge of zero length is "
                 "rigid before it flows; use Perzyna(eta)"
             )
