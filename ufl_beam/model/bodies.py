@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from itertools import pairwise
 from typing import Any
@@ -217,6 +217,33 @@ Anchor = Place | Spot
 
 Node = Place | Body
 """Places of beams and bodies: they have a displacement and a rotation."""
+
+NodeDof = tuple[Node, int]
+"""A component of motion of a node: 0, 1 displacement, 2 rotation."""
+
+
+class Representatives(dict[NodeDof, NodeDof]):
+    """Of components of motion that are equal, the one that stands for all; others are their own."""
+
+    def __missing__(self, dof: NodeDof) -> NodeDof:
+        return dof
+
+
+def merged(groups: Iterable[Sequence[NodeDof]]) -> Representatives:
+    """Find the representatives of components of motion from groups of equal ones."""
+    parent = Representatives()
+
+    def root(dof: NodeDof) -> NodeDof:
+        while dof in parent:
+            dof = parent[dof]
+        return dof
+
+    for group in groups:
+        for other in group[1:]:
+            a, b = root(group[0]), root(other)
+            if a != b:
+                parent[b] = a
+    return Representatives((dof, root(dof)) for dof in parent)
 
 
 def node(anchor: Anchor) -> Node:

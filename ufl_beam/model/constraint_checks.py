@@ -13,7 +13,7 @@ from scipy.sparse.linalg import eigsh
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError
-from ufl_beam.model.bodies import GROUND, Anchor, Body, Member, Node, node
+from ufl_beam.model.bodies import GROUND, Anchor, Body, Member, Node, NodeDof, node
 from ufl_beam.model.connector_laws import (
     Coulomb,
     Damper,
@@ -27,7 +27,6 @@ from ufl_beam.model.connector_laws import (
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import Point
 from ufl_beam.model.loads import RotatingFrame
-from ufl_beam.model.plastic_hinges import NodeDof, shared_by_joints
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 from ufl_beam.model.time_functions import value_at
@@ -39,12 +38,11 @@ DENSE = 90
 def require_masses(scene: Scene) -> None:
     """Raise :class:`SceneError` if a body that may move has no mass, unless a beam carries it."""
     same, moved = scene.representatives, _fixed(scene)
-    for alike in shared_by_joints(scene.joints):
-        moved |= {same.get(dof, dof) for dof in alike if not isinstance(dof[0], Body)}
+    for alike in scene.shared_by_joints:
+        moved |= {same[dof] for dof in alike if not isinstance(dof[0], Body)}
     for body in scene.bodies:
         for name, components in (("mass", (0, 1)), ("inertia", (2,))):
-            dofs = [(body, component) for component in components]
-            free = any(same.get(dof, dof) not in moved for dof in dofs)
+            free = any(same[body, component] not in moved for component in components)
             if free and getattr(body, name) == 0.0:
                 raise SceneError(
                     f"{body.name}: {name} = 0, but dynamics needs it to be positive; use RigidLink "
@@ -102,9 +100,8 @@ def no_number(scene: Scene, times: Iterable[float]) -> str:
 def _fixed(scene: Scene) -> set[NodeDof]:
     """Return the components of motion that the ground and supports give."""
     same = scene.representatives
-    fixed: set[NodeDof] = {(GROUND, component) for component in range(3)}
-    fixed |= {(node(s.place), c) for s in scene.supports if not s.angle for c in s.held}
-    return {same.get(dof, dof) for dof in fixed}
+    by_supports = {same[node(s.place), c] for s in scene.supports if not s.angle for c in s.held}
+    return {same[GROUND, component] for component in range(3)} | by_supports
 
 
 HOLDING = (Motor, Guide)
@@ -160,7 +157,7 @@ def _dependences(scene: Scene, laws: tuple[type, ...]) -> tuple[list[object], Ar
     for number, (_, row) in enumerate(rows):
         for of, factors in row:
             for component, factor in enumerate(factors):
-                dof = same.get((of, component), (of, component))
+                dof = same[of, component]
                 if factor and dof not in fixed:
                     entries.append((columns.setdefault(dof, len(columns)), number, factor))
     gradients = _sparse(entries, (max(len(columns), 1), len(rows)))
@@ -223,7 +220,7 @@ def _constraints(
     unit = np.eye(3)
     rows: list[Row] = [
         [(first, -unit[component]), (other, unit[component])]
-        for (first, component), *others in shared_by_joints(scene.joints)
+        for (first, component), *others in scene.shared_by_joints
         for other, _ in others
     ]
     rows += (row for _, row in (*_of_connectors(scene, acts), *_of_supports(scene.supports)))

@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass, field
 
 from ufl_beam.errors import SceneError, require_kind, require_switch, require_text
-from ufl_beam.model.bodies import Anchor, Place, carries, ground, require_anchor
+from ufl_beam.model.bodies import Anchor, NodeDof, Place, carries, ground, node, require_anchor
 from ufl_beam.model.connector_laws import HELD, Bearing, Guide
 from ufl_beam.model.connectors import Connector, _axis, _require_apart
 from ufl_beam.model.curves import Curve, Point, point_of
@@ -60,10 +60,10 @@ class Joint(Bearing):
         held = [(link.motion, link.axis, id(link.law)) for link in self.holders]
         return self.kind, frozenset(self.places), tuple(held)
 
-    @property
-    def carriers(self) -> tuple[Anchor, ...]:
-        """The anchors whose displacement is that of their node."""
-        return tuple(place for place in self.places if carries(place))
+    def equal(self, component: int) -> list[NodeDof]:
+        """Components of motion that are equal; of displacements those that the nodes carry."""
+        alike = [place for place in self.places if component == 2 or carries(place)]
+        return [(node(place), component) for place in alike]
 
 
 def _joined(
