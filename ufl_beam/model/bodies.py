@@ -268,13 +268,14 @@ def carries(anchor: Anchor) -> bool:
     return math.hypot(*arm(anchor)) == 0.0
 
 
-def require_anchor(anchor: object, owner: str) -> None:
-    """Raise :class:`SceneError` naming ``owner`` unless something can be attached there."""
-    if not isinstance(anchor, Place | Spot):
-        raise SceneError(
-            f"{owner}: {shorten(anchor)} is not a place; use beam.start, .end or .at(s), "
-            "body.at(x, y) or ground(x, y)"
-        )
+def require_anchors(owner: str, *anchors: object) -> None:
+    """Raise :class:`SceneError` naming ``owner`` unless all are places to attach something to."""
+    for anchor in anchors:
+        if not isinstance(anchor, Place | Spot):
+            raise SceneError(
+                f"{owner}: {shorten(anchor)} is not a place; use beam.start, .end or .at(s), "
+                "body.at(x, y) or ground(x, y)"
+            )
 
 
 def require_beam(value: object, what: str) -> None:
@@ -285,7 +286,7 @@ def require_beam(value: object, what: str) -> None:
 
 def require_node(place: object, owner: str) -> None:
     """Raise :class:`SceneError` naming ``owner`` unless the motion of a place is that of a node."""
-    require_anchor(place, owner)
+    require_anchors(owner, place)
     if isinstance(place, Spot) and place.body is GROUND:
         raise SceneError(f"{owner}: {place} does not move")
     if not carries(place):  # type: ignore[arg-type]

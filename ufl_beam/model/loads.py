@@ -7,7 +7,7 @@ from abc import ABC
 from dataclasses import dataclass
 
 from ufl_beam.errors import SceneError
-from ufl_beam.model.bodies import Anchor, Member, carries, require_anchor, require_beam
+from ufl_beam.model.bodies import Anchor, Member, carries, require_anchors, require_beam
 from ufl_beam.model.records import Number, Record, Vector
 from ufl_beam.model.time_functions import Timed, TimeFunction, steady
 
@@ -22,7 +22,7 @@ class LoadAtPlace(Record, ABC):
     time: Timed = steady
 
     def __post_init__(self) -> None:
-        require_anchor(self.place, type(self).__name__)
+        require_anchors(type(self).__name__, self.place)
         super().__post_init__()
 
     def __str__(self) -> str:

@@ -66,15 +66,15 @@ class Table:
 
     def __post_init__(self) -> None:
         for name in ("times", "values"):
-            object.__setattr__(self, name, require_sequence(getattr(self, name), f"Table: {name}"))
+            numbers = require_sequence(getattr(self, name), f"Table: {name}")
+            object.__setattr__(self, name, numbers)
+            for i, number in enumerate(numbers):
+                require_number(number, f"Table: {name}[{i}]")
         if len(self.times) != len(self.values) or len(self.times) < 1:
             raise SceneError(
                 f"Table: {len(self.times)} times and {len(self.values)} values; "
                 "give as many of each"
             )
-        for kind, numbers in (("times", self.times), ("values", self.values)):
-            for i, number in enumerate(numbers):
-                require_number(number, f"Table: {kind}[{i}]")
         for i, (before, after) in enumerate(pairwise(self.times)):
             if after <= before:
                 raise SceneError(
