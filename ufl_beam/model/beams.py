@@ -17,7 +17,6 @@ from ufl_beam.errors import (
     require_sequence,
     require_text,
     require_vector,
-    shorten,
     warn,
 )
 from ufl_beam.model.bodies import TOGETHER, Member, Place
@@ -71,8 +70,7 @@ class Beam(Member):
         a, b = (require_vector(x, f"{self.name}: end") for x in (self.a, self.b))
         object.__setattr__(self, "a", a)
         object.__setattr__(self, "b", b)
-        if not isinstance(self.section, Section):
-            raise SceneError(f"{self.name}: section = {shorten(self.section)} is not a Section")
+        require_kind(self.section, Section, f"{self.name}: section")
         object.__setattr__(self, "cells", require_count(self.cells, f"{self.name}: cells"))
         require_memory(self.cells, f"{self.name}: cells = {self.cells}")
         if self.curve is None:

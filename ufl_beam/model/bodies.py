@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from itertools import pairwise
@@ -27,7 +28,7 @@ TOGETHER = 1e-9
 """Part of a cell below which two places of a beam are one."""
 
 
-class Member:
+class Member(ABC):
     """Base of :class:`Beam`: an axis with places on it; its attributes are those of a beam."""
 
     a: Point

@@ -11,7 +11,7 @@ from typing import Annotated
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.errors import SceneError, require_array, require_count
+from ufl_beam.errors import SceneError, require_array, require_count, require_kind
 from ufl_beam.model.law_functions import Values
 from ufl_beam.model.material_laws import Bulk, BulkLaw, Softening, require_bulk_law
 from ufl_beam.model.records import Instance, Record
@@ -126,9 +126,12 @@ class PlacedFibres:
 
     @classmethod
     def layers(
-        cls, fibres: Fibres, E: float, h: float, below: Below, edges: Sequence[float] = ()
-    ) -> PlacedFibres:
-        """Layers of equal thickness over the depth ``h``, cut at ``edges`` too; m."""
+        cls, fibres: Fibres | None, E: float, h: float, below: Below, edges: Sequence[float] = ()
+    ) -> PlacedFibres | None:
+        """Layers of equal thickness, if any, over the depth ``h``, cut at ``edges`` too; m."""
+        if fibres is None:
+            return None
+        require_kind(fibres, Fibres, "Section: fibres")
         if fibres.number < 2:
             raise SceneError("Fibres: number = 1 has no bending stiffness; use 2 or more")
         cuts = np.union1d(np.linspace(-h / 2, h / 2, fibres.number + 1), np.array(edges))

@@ -15,7 +15,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_kind, require_number
-from ufl_beam.model.fibres import Below, Fibres, Layout, PlacedFibres
+from ufl_beam.model.fibres import Fibres, Layout, PlacedFibres
 from ufl_beam.model.material_laws import BulkLaw, Hardening, Softening, require_bulk_law
 from ufl_beam.model.records import Instance, NotNegative, Positive, Record
 
@@ -167,7 +167,7 @@ class Section(Record):
     ) -> Section:  # fmt: skip
         """Rectangle of width ``b`` and depth ``h`` (in the plane of motion); m."""
         _positive("rectangle", b=b, h=h)
-        placed = _place(fibres, E, h, lambda y: _below_in_rectangle(y, b, h))
+        placed = PlacedFibres.layers(fibres, E, h, lambda y: _below_in_rectangle(y, b, h))
         return cls.of_shape(
             A=b * h, I=b * h**3 / 12, E=E, nu=nu, rho=rho,
             shear_factor=shear_factor, depth=h, fibres=placed, **laws,
@@ -180,7 +180,7 @@ class Section(Record):
     ) -> Section:  # fmt: skip
         """Solid circle of diameter ``d``; m."""
         _positive("circle", d=d)
-        placed = _place(fibres, E, d, lambda y: _below_in_circle(y, d))
+        placed = PlacedFibres.layers(fibres, E, d, lambda y: _below_in_circle(y, d))
         return cls.of_shape(
             A=math.pi * d**2 / 4, I=math.pi * d**4 / 64, E=E, nu=nu, rho=rho,
             shear_factor=shear_factor, depth=d, fibres=placed, **laws,
@@ -199,7 +199,7 @@ class Section(Record):
             )
         inner = d - 2 * t
         edges = (-inner / 2, inner / 2)
-        placed = _place(
+        placed = PlacedFibres.layers(
             fibres, E, d, lambda y: _below_in_circle(y, d) - _below_in_circle(y, inner), edges
         )
         return cls.of_shape(
@@ -224,7 +224,7 @@ class Section(Record):
             )
         web = h - 2 * tf
         A = 2 * b * tf + tw * web
-        placed = _place(
+        placed = PlacedFibres.layers(
             fibres, E, h,
             lambda y: _below_in_rectangle(y, b, h) - _below_in_rectangle(y, b - tw, web),
             edges=(-web / 2, web / 2),
@@ -248,16 +248,6 @@ def _below_in_circle(y: Array, d: float) -> Array:
     half_chord = np.sqrt(r**2 - y**2)
     area = y * half_chord + (r**2 * np.arcsin(y / r) if r else 0.0)
     return np.array([area, -2 / 3 * half_chord**3])
-
-
-def _place(
-    fibres: Fibres | None, E: float, h: float, below: Below, edges: Sequence[float] = ()
-) -> PlacedFibres | None:
-    if fibres is None:
-        return None
-    require_kind(fibres, Fibres, "Section: fibres")
-    require_number(E, "Section: E", positive=True)
-    return PlacedFibres.layers(fibres, E, h, below, edges)
 
 
 def _positive(shape: str, **sizes: float) -> None:

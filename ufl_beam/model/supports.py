@@ -14,6 +14,8 @@ from ufl_beam.model.time_functions import Constant, TimeFunction, require_time_f
 
 COMPONENTS = ("u", "v", "psi")
 
+Motion = float | TimeFunction
+
 
 @dataclass(frozen=True, eq=False)
 class Support(Bearing):
@@ -103,11 +105,7 @@ def Roller(place: Anchor, *, along: Point = (1.0, 0.0)) -> Support:
 
 
 def Prescribed(
-    place: Anchor,
-    *,
-    u: float | TimeFunction | None = None,
-    v: float | TimeFunction | None = None,
-    psi: float | TimeFunction | None = None,
+    place: Anchor, *, u: Motion | None = None, v: Motion | None = None, psi: Motion | None = None
 ) -> Support:
     """Prescribed motion of a place by numbers or functions of time; m, m, rad.
 
@@ -120,14 +118,11 @@ def Prescribed(
         >>> np.allclose(run.position(beam.end)[-1], (0, 2))
         True
     """
-    held = {
-        component: value if callable(value) else _constant(value, place, component)
-        for component, value in enumerate((u, v, psi))
-        if value is not None
-    }
+    held: dict[int, TimeFunction] = {}
+    for component, value in enumerate((u, v, psi)):
+        if callable(value):
+            held[component] = value
+        elif value is not None:
+            number = require_number(value, f"Prescribed at {place}: {COMPONENTS[component]}")
+            held[component] = Constant(number) if number else still
     return Support("Prescribed", place, held)
-
-
-def _constant(value: float, place: Anchor, component: int) -> TimeFunction:
-    require_number(value, f"Prescribed at {place}: {COMPONENTS[component]}")
-    return still if value == 0 else Constant(float(value))
