@@ -14,7 +14,7 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.errors import SceneError, require_kind, shorten
 from ufl_beam.model.bodies import Member, Place
-from ufl_beam.model.material_laws import Softening
+from ufl_beam.model.material_laws import AnySoftening
 from ufl_beam.model.mesh_options import Mesh
 
 
@@ -167,7 +167,7 @@ class BeamMesh:
         beam: Member = self.beams[number]
         return beam.at((s[i] + s[i + 1]) / 2)
 
-    def hinges(self, beam: Member) -> list[Softening | None]:
+    def hinges(self, beam: Member) -> list[AnySoftening | None]:
         """Law of the hinge that may open in the middle of each cell of a beam."""
         return [beam.section.hinge] * len(self.cells_of(beam))
 

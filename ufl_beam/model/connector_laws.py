@@ -13,9 +13,9 @@ from typing import Annotated, Any, Protocol
 from ufl_beam.errors import SceneError, require_function, require_number, require_returned
 from ufl_beam.model.curves import Curve
 from ufl_beam.model.material_laws import (
+    AnySoftening,
     BulkLaw,
     HingeLaw,
-    Softening,
     require_bulk_law,
     require_hinge_law,
 )
@@ -120,7 +120,7 @@ class Spring(Record):
 
     stiffness: Positive
     law: Annotated[BulkLaw | None, require_bulk_law] = None
-    softening: Instance[Softening | None] = None
+    softening: Instance[AnySoftening | None] = None
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_array, require_count, require_kind
 from ufl_beam.model.law_functions import Values
-from ufl_beam.model.material_laws import Bulk, BulkLaw, Softening, require_bulk_law
+from ufl_beam.model.material_laws import AnySoftening, Bulk, BulkLaw, require_bulk_law
 from ufl_beam.model.records import Instance, Record
 
 Below = Callable[[Array], Array]
@@ -32,7 +32,7 @@ class Layout:
     stiffness: Values  # elastic; (n,)
     laws: tuple[tuple[BulkLaw, int], ...]  # with the number of points in a row that follow them
     rest: Values  # stiffness (axial, shear, bending) of what has no points; (3,)
-    softening: Softening | None  # law of the discontinuities, if points can break
+    softening: AnySoftening | None  # law of the discontinuities, if points can break
     breaking: slice  # the points that can
     hinges: bool = False  # True if the discontinuity is one hinge, a jump of rotation
 
@@ -93,7 +93,7 @@ class Fibres(Record):
     law: Annotated[BulkLaw, require_bulk_law]
     _: KW_ONLY
     number: Annotated[int, require_count] = 20
-    softening: Instance[Softening | None] = None
+    softening: Instance[AnySoftening | None] = None
 
 
 @dataclass(frozen=True, eq=False)

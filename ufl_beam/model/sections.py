@@ -16,7 +16,7 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_kind, require_number
 from ufl_beam.model.fibres import Fibres, Layout, PlacedFibres
-from ufl_beam.model.material_laws import BulkLaw, Hardening, Softening, require_bulk_law
+from ufl_beam.model.material_laws import AnySoftening, BulkLaw, Hardening, require_bulk_law
 from ufl_beam.model.records import Instance, NotNegative, Positive, Record
 
 ResultantLaw = Annotated[BulkLaw | None, require_bulk_law]
@@ -65,7 +65,7 @@ class Section(Record):
     axial: ResultantLaw = None
     shear: ResultantLaw = None
     bending: ResultantLaw = None
-    hinge: Instance[Softening | None] = None
+    hinge: Instance[AnySoftening | None] = None
     fibres: Instance[PlacedFibres | None] = None
     massless_by_default: bool = field(init=False, repr=False)
 
@@ -82,7 +82,7 @@ class Section(Record):
                 f"Section: a law {laws[0]} beside fibres; the fibres bear N and M, shear is elastic"
             )
 
-    def layout(self, hinge: Softening | None) -> Layout | None:
+    def layout(self, hinge: AnySoftening | None) -> Layout | None:
         """Material points of a cell with a hinge of this law; none if the cell is elastic."""
         if self.fibres is not None:
             return self.fibres.layout(self.GA)
