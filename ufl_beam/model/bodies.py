@@ -25,7 +25,7 @@ from ufl_beam.model.curves import Curve, Point, tangent_within
 from ufl_beam.model.records import NotNegative, Record, Vector
 
 TOGETHER = 1e-9
-"""Part of a cell below which two places of a beam are one."""
+"""Distance below which two places of a beam are one, as a part of a cell."""
 
 
 class Member(ABC):

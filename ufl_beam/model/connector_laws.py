@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Laws of connectors: what force belongs to a relative motion, or what motion is given."""
+"""Laws of connectors: the force of a relative motion, or a prescribed motion."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Bearing:
 
 
 class Running(Protocol):
-    """A simulation between two steps, as far as laws of connectors ask it."""
+    """Simulation between two steps, as laws of connectors see it."""
 
     t: float
     """Time; s."""

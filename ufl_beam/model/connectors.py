@@ -24,7 +24,7 @@ class Connector:
 
     Attributes:
         kind: Name for messages.
-        motion: Which relative motion; a name of ``relative.MOTIONS``.
+        motion: Which relative motion; a name in ``relative_motions.MOTIONS``.
         a, b: The anchors.
         law: Law of its force.
         axis: Unit vector, for motions along one.

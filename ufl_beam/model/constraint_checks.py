@@ -105,7 +105,7 @@ def _fixed(scene: Scene) -> set[NodeDof]:
 
 
 HOLDING = (Motor, Guide)
-"""Laws of connectors that give the motion."""
+"""Laws of connectors that prescribe the motion."""
 
 RESISTING = (*HOLDING, Spring, ForceLaw, RigidPlastic)
 """Laws of connectors that resist every motion; others bear nothing, or what they are told."""
@@ -141,10 +141,10 @@ def friction_repeats(scene: Scene) -> bool:
 
 
 def _dependences(scene: Scene, laws: tuple[type, ...]) -> tuple[list[object], Array]:
-    """Owners of the constraints by connectors of some laws and supports in turned axes.
+    """Find dependent constraints of connectors with some laws and of supports in turned axes.
 
-    The second result has the combinations of them that demand nothing of what moves freely, in
-    columns.
+    Returns the owner of each constraint and, in columns, the combinations of constraints that
+    vanish for all that can move.
     """
     same, fixed = scene.representatives, _fixed(scene)
     holders: dict[object, object] = {h: joint for joint in scene.joints for h in joint.holders}
@@ -191,7 +191,7 @@ def _center(part: Member | Body) -> Point:
 
 
 def _of_connectors(scene: Scene, acts: Callable[[Connector], bool]) -> Iterator[tuple[object, Row]]:
-    """Connectors that ``act``, and the rows that they make."""
+    """Connectors that ``acts`` selects, and the row of each."""
     for link in filter(acts, scene.links):
         unit = np.array([1.0, 1.0, 1.0 if link.turns else 1 / scene.size])
         ends = zip((link.a, link.b), link.rigidly(), strict=True)
@@ -212,10 +212,10 @@ def _constraints(
     acts: Callable[[Connector], bool] = lambda link: isinstance(link.law, RESISTING),
     also: Iterable[tuple[Anchor, int]] = (),
 ) -> csr_array:
-    """Rows that joints, supports and connectors make of (u, v, size ψ) of all parts.
+    """Matrix of constraints on the rigid motions (u, v, size ψ) of all parts; (n, 3 parts).
 
-    A connector makes a row if it ``acts``, and so do the components of motion that are there
-    ``also``.  The shape is (constraints, 3 parts).
+    Its rows are those of joints, supports, connectors that ``acts`` selects, and components of
+    motion in ``also``.
     """
     unit = np.eye(3)
     rows: list[Row] = [
@@ -274,7 +274,7 @@ def _moving(scene: Scene, mode: Array) -> list[str]:
 
 
 class Rated(Protocol):
-    """A time scheme, as far as scenes may ask too much of its rates."""
+    """Time scheme, by the properties that a scene may need."""
 
     has_mean_velocity: bool
     rings: bool

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Viscous damping of the elastic motion: what users may ask for beside plastic dissipation."""
+"""Viscous damping of the elastic motion, beside plastic dissipation."""
 
 from __future__ import annotations
 

@@ -22,9 +22,9 @@ Below = Callable[[Array], Array]
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """Material points of a cross-section: what strains them, and what their stresses add up to.
+    """Material points of a cross-section, with their strains, weights and laws.
 
-    The resultants are the sum of weight times stress times the strains per strain of the section.
+    The resultants of the section are the sums of weight times stress times ``strains``.
     """
 
     strains: Values  # of each point per strain (Σ, Γ, K) of the section; (n, 3)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Laws of a material point in one dimension: what yields, hardens, flows and breaks.
+"""Laws of a material point in one dimension: yielding, hardening, viscous flow, softening.
 
 A point is a resultant of a cross-section (strain 1 or curvature 1/m against N or N m) or a fibre
 (strain against Pa).  The laws are plain functions of arrays, and of UFL expressions as well: UFL
@@ -77,7 +77,7 @@ class DuvautLions:
 
 @dataclass(frozen=True, eq=False)
 class Bulk(ABC):
-    """Statement of a law of the bulk at many points, for arrays and for symbols.
+    """Law of the bulk at many points, stated for arrays and for symbols.
 
     The internal variables of a point are its plastic strain and the sum of the sizes of its
     increments.  A law has further numbers as fields; those of :attr:`numbers` are the inputs of

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Cross-sections: what a beam is made of, in resultants or in fibres.
+"""Cross-sections of beams, described by resultants or by fibres.
 
 Units are SI: N, N m², kg/m, kg m.
 """

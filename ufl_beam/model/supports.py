@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Supports: what is held or moved in a given way at a place."""
+"""Supports: components of motion of a place that are held or prescribed."""
 
 from __future__ import annotations
 
