@@ -280,5 +280,11 @@ Law = (
     | RigidPlastic
 )  # fmt: skip
 
+HOLDING = (Motor, Guide)
+"""Laws that prescribe the motion."""
+
+RESISTING = (*HOLDING, Spring, ForceLaw, RigidPlastic)
+"""Laws that resist every motion; others bear nothing, or what they are told."""
+
 HELD = Motor(Constant(0.0))
 """The law of what a joint holds."""

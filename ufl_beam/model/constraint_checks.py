@@ -14,16 +14,7 @@ from scipy.sparse.linalg import eigsh
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import GROUND, Anchor, Body, Member, Node, NodeDof, node
-from ufl_beam.model.connector_laws import (
-    Coulomb,
-    Damper,
-    ForceLaw,
-    Guide,
-    Motor,
-    RigidPlastic,
-    Spring,
-    Stop,
-)
+from ufl_beam.model.connector_laws import HOLDING, RESISTING, Coulomb, Damper, Stop
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import Point
 from ufl_beam.model.loads import RotatingFrame
@@ -103,12 +94,6 @@ def _fixed(scene: Scene) -> set[NodeDof]:
     by_supports = {same[node(s.place), c] for s in scene.supports if not s.angle for c in s.held}
     return {same[GROUND, component] for component in range(3)} | by_supports
 
-
-HOLDING = (Motor, Guide)
-"""Laws of connectors that prescribe the motion."""
-
-RESISTING = (*HOLDING, Spring, ForceLaw, RigidPlastic)
-"""Laws of connectors that resist every motion; others bear nothing, or what they are told."""
 
 Row = list[tuple[Node, Array]]
 """A linear constraint of nodes, with the factors of (u, v, size ψ) of each."""
@@ -289,7 +274,7 @@ def require_rates(scene: Scene, scheme: Rated) -> None:
                 f"{name}: {owner} needs the mean velocity of a step, and forces act at its end "
                 "here; use Midpoint() or DecayingMidpoint()"
             )
-    given = [str(c) for c in scene.links if isinstance(c.law, Motor | Guide)]
+    given = [str(c) for c in scene.links if isinstance(c.law, HOLDING)]
     given += [f"the support of {s.place}" for s in scene.supports if s.moving]
     if given and scheme.rings:
         raise SceneError(

@@ -242,20 +242,14 @@ class Scene:
     def _require_pressing(self, connector: Connector, pressing: Bearing) -> None:
         """Raise unless the force of what presses on friction can be known."""
         if pressing not in (*self.joints, *self.supports):
-            raise SceneError(
-                f"{connector}: {pressing}, which presses on its friction, is not in the scene; add "
-                "it to joints or supports"
-            )
-        if isinstance(pressing, Support) and not pressing.held.keys() & {0, 1}:
-            raise SceneError(
-                f"{connector}: {pressing}, which presses on its friction, holds no displacement "
-                "and bears no force; name another support or joint"
-            )
-        if isinstance(pressing, Joint) and all(holder.turns for holder in pressing.holders):
-            raise SceneError(
-                f"{connector}: {pressing}, which presses on its friction, shares unknowns, so that "
-                "its force is not known; make it with measured=True"
-            )
+            why = "is not in the scene; add it to joints or supports"
+        elif isinstance(pressing, Support) and not pressing.held.keys() & {0, 1}:
+            why = "holds no displacement and bears no force; name another support or joint"
+        elif isinstance(pressing, Joint) and all(holder.turns for holder in pressing.holders):
+            why = "shares unknowns, so that its force is not known; make it with measured=True"
+        else:
+            return
+        raise SceneError(f"{connector}: {pressing}, which presses on its friction, {why}")
 
     @property
     def shared_by_joints(self) -> list[list[NodeDof]]:

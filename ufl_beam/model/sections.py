@@ -88,10 +88,10 @@ class Section(Record):
             return self.fibres.layout(self.GA)
         stiffness = np.array([self.EA, self.GA, self.EI])
         laws = [self.axial, self.shear, self.bending]
-        if hinge is not None and not hinge.opens:
+        if hinge is not None and hinge.opens:
+            laws[2] = self.bending or Hardening(limit=math.inf)
+        else:
             hinge = None
-        if hinge is not None and self.bending is None:
-            laws[2] = Hardening(limit=math.inf)
         here = np.array([law is not None for law in laws])
         if not here.any():
             return None
@@ -124,8 +124,7 @@ class Section(Record):
             fibres: Fibres; their sums are then EA and EI.
             laws: ``axial``, ``shear``, ``bending`` and ``hinge`` of :class:`Section`.
         """
-        for name, value in (("A", A), ("I", I), ("E", E), ("shear_factor", shear_factor)):
-            require_number(value, f"Section: {name}", positive=True)
+        _require_positive("Section", A=A, I=I, E=E, shear_factor=shear_factor)
         require_number(depth, "Section: depth", at_least=0.0)
         if rho is not None:
             require_number(rho, "Section: rho", at_least=0.0)
@@ -166,7 +165,7 @@ class Section(Record):
         shear_factor: float = 5 / 6, fibres: Fibres | None = None, **laws: Any,
     ) -> Section:  # fmt: skip
         """Rectangle of width ``b`` and depth ``h`` (in the plane of motion); m."""
-        _positive("rectangle", b=b, h=h)
+        _require_positive("Section.rectangle", b=b, h=h)
         placed = PlacedFibres.layers(fibres, E, h, lambda y: _below_in_rectangle(y, b, h))
         return cls.of_shape(
             A=b * h, I=b * h**3 / 12, E=E, nu=nu, rho=rho,
@@ -179,7 +178,7 @@ class Section(Record):
         shear_factor: float = 9 / 10, fibres: Fibres | None = None, **laws: Any,
     ) -> Section:  # fmt: skip
         """Solid circle of diameter ``d``; m."""
-        _positive("circle", d=d)
+        _require_positive("Section.circle", d=d)
         placed = PlacedFibres.layers(fibres, E, d, lambda y: _below_in_circle(y, d))
         return cls.of_shape(
             A=math.pi * d**2 / 4, I=math.pi * d**4 / 64, E=E, nu=nu, rho=rho,
@@ -192,7 +191,7 @@ class Section(Record):
         shear_factor: float = 1 / 2, fibres: Fibres | None = None, **laws: Any,
     ) -> Section:  # fmt: skip
         """Circular tube of outer diameter ``d`` and wall thickness ``t``; m."""
-        _positive("tube", d=d, t=t)
+        _require_positive("Section.tube", d=d, t=t)
         if 2 * t > d:
             raise SceneError(
                 f"Section.tube: wall t = {t} m is thicker than the radius of d = {d} m"
@@ -216,7 +215,7 @@ class Section(Record):
 
         Bends about its strong axis; the web between the mid-planes of the flanges carries shear.
         """
-        _positive("i_shape", h=h, b=b, tw=tw, tf=tf)
+        _require_positive("Section.i_shape", h=h, b=b, tw=tw, tf=tf)
         if 2 * tf >= h or tw > b:
             raise SceneError(
                 f"Section.i_shape: web and flanges do not fit: h = {h}, b = {b}, tw = {tw}, "
@@ -250,6 +249,6 @@ def _below_in_circle(y: Array, d: float) -> Array:
     return np.array([area, -2 / 3 * half_chord**3])
 
 
-def _positive(shape: str, **sizes: float) -> None:
-    for name, value in sizes.items():
-        require_number(value, f"Section.{shape}: {name}", positive=True)
+def _require_positive(owner: str, **numbers: float) -> None:
+    for name, value in numbers.items():
+        require_number(value, f"{owner}: {name}", positive=True)

@@ -97,10 +97,8 @@ def Roller(place: Anchor, *, along: Point = (1.0, 0.0)) -> Support:
     x, y = require_vector(along, f"Roller at {place}: along")
     if x == y == 0.0:
         raise SceneError(f"Roller at {place}: along = (0, 0) is no direction")
-    if y == 0.0:
-        return Support("Roller", place, {1: still})
-    if x == 0.0:
-        return Support("Roller", place, {0: still})
+    if x == 0.0 or y == 0.0:
+        return Support("Roller", place, {1 if y == 0.0 else 0: still})
     return Support("Roller", place, {1: still}, math.atan2(y, x))
 
 
