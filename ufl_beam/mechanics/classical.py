@@ -17,7 +17,7 @@ from ufl_beam.mechanics import kinematics
 from ufl_beam.mechanics.kinematics import Axis
 from ufl_beam.mechanics.time_schemes import Constant, Rates, Step, require_between, scaled
 from ufl_beam.model.law_functions import Values
-from ufl_beam.model.material_laws import Softening
+from ufl_beam.model.material_laws import SofteningLaw
 
 
 class _AtEnd:
@@ -27,7 +27,7 @@ class _AtEnd:
     theta = 1.0
     loss = 0.0
 
-    def resistance(self, softening: Softening, opening: Array, growth: Values) -> Values:
+    def resistance(self, softening: SofteningLaw, opening: Array, growth: Values) -> Values:
         """The traction at the end of the step."""
         return softening.traction(opening + growth)
 

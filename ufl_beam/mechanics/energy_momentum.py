@@ -18,7 +18,7 @@ from ufl_beam.mechanics.classical import Static
 from ufl_beam.mechanics.kinematics import Axis
 from ufl_beam.mechanics.time_schemes import Constant, Rates, Step, require_between, scaled
 from ufl_beam.model.law_functions import Values
-from ufl_beam.model.material_laws import Softening
+from ufl_beam.model.material_laws import SofteningLaw
 
 
 class _OverStep:
@@ -36,7 +36,7 @@ class _OverStep:
         """Return the energy that ``alpha`` dissipates."""
         return self.alpha
 
-    def resistance(self, softening: Softening, opening: Array, growth: Values) -> Values:
+    def resistance(self, softening: SofteningLaw, opening: Array, growth: Values) -> Values:
         """The mean traction, so that the work of the step is what the opening dissipates."""
         return softening.mean_traction(opening, growth)
 

@@ -19,7 +19,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.mechanics.kinematics import Axis
 from ufl_beam.model.law_functions import Values
-from ufl_beam.model.material_laws import Softening
+from ufl_beam.model.material_laws import SofteningLaw
 
 Constant = Callable[[float], Expr]
 """Makes a number of the scheme a constant of the form, so that changing it compiles nothing."""
@@ -56,7 +56,7 @@ class Scheme(Protocol):
     def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
         """The step from ``t0`` to ``t1``, perhaps a part of one that goes on to ``end``."""
 
-    def resistance(self, softening: Softening, opening: Array, growth: Values) -> Values:
+    def resistance(self, softening: SofteningLaw, opening: Array, growth: Values) -> Values:
         """Traction of a discontinuity whose opening grows in the step."""
 
     def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:

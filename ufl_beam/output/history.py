@@ -14,7 +14,7 @@ import numpy as np
 from ufl_beam.arrays import State
 from ufl_beam.collective_errors import on_first
 from ufl_beam.errors import SceneError, require_count, require_kind, require_sequence
-from ufl_beam.model.bodies import Anchor, require_anchor
+from ufl_beam.model.bodies import Anchor, require_anchors
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
@@ -69,7 +69,7 @@ class History(Recorder):
         self._places = require_sequence(places, f"History {path}: places")
         self._connectors = require_sequence(connectors, f"History {path}: connectors")
         for i, place in enumerate(self._places):
-            require_anchor(place, f"History {path}: places[{i}]")
+            require_anchors(f"History {path}: places[{i}]", place)
         for i, one in enumerate(self._connectors):
             require_kind(one, (Connector, Joint), f"History {path}: connectors[{i}]")
         self._files: list[OutputFile] = []

@@ -18,7 +18,7 @@ from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model import law_functions
 from ufl_beam.model.fibres import Layout
-from ufl_beam.model.material_laws import Bulk, Softening
+from ufl_beam.model.material_laws import Bulk, SofteningLaw
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.openings import NOTHING, RELEASED, SPENT, SearchFlags
 
@@ -49,7 +49,7 @@ def expect_entries(layout: Layout, scheme: Scheme, ledger: Ledger) -> None:
         ledger.lost["numerical"] += 0.0
 
 
-def point_forms(bulk: type[Bulk], softening: Softening | None, scheme: Scheme) -> PointForms:
+def point_forms(bulk: type[Bulk], softening: SofteningLaw | None, scheme: Scheme) -> PointForms:
     """Compiled laws of points, made once in a process; numbers of ``softening`` do not matter."""
     return _point_forms(bulk, softening and softening.of(1.0, 1.0), scheme)
 
@@ -61,7 +61,9 @@ class PointForms:
     the bulk over the discontinuity, each with its derivative; and ``point_output`` of loops.h.
     """
 
-    def __init__(self, statement: type[Bulk], softening: Softening | None, scheme: Scheme) -> None:
+    def __init__(
+        self, statement: type[Bulk], softening: SofteningLaw | None, scheme: Scheme
+    ) -> None:
         self._pointwise = pointwise = Pointwise(inputs(statement))
         at = pointwise.at
         strain, a = ufl.variable(at["strain"]), ufl.variable(at["growth"])

@@ -23,7 +23,7 @@ from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import RigidPlastic
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.material_laws import Hardening, HardeningBulk, Softening
+from ufl_beam.model.material_laws import Hardening, HardeningBulk, SofteningLaw
 from ufl_beam.model.plastic_hinges import law_of
 from ufl_beam.terms.connector_responses import Response, Rows, Setting, respond
 from ufl_beam.terms.openings import NOTHING, RELEASED, SPENT, Openable
@@ -51,7 +51,7 @@ def slip(law: Any, at: Mapping[str, Expr], scheme: Scheme) -> Slip:
 
 
 @slip.register
-def _(law: Softening, at: Mapping[str, Expr], scheme: Scheme) -> Slip:
+def _(law: SofteningLaw, at: Mapping[str, Expr], scheme: Scheme) -> Slip:
     a, ξ, none = at["slip"], at["slipped"], 0 * at["slip"]
     law = law.of(at["limit"], at["energy"])
     force = at["direction"] * scheme.resistance(law, ξ, a)
@@ -100,7 +100,7 @@ def _slope(link: Connector, size: float) -> float:
 class SlipForms:
     """Compiled laws of slip: force and its derivative by the slip; ``slip_output`` of loops.h."""
 
-    def __init__(self, law: Softening | Hardening, scheme: Scheme) -> None:
+    def __init__(self, law: SofteningLaw | Hardening, scheme: Scheme) -> None:
         self._pointwise = pointwise = Pointwise(INPUTS)
         at = {**pointwise.at, "slip": ufl.variable(pointwise.at["slip"])}
         end = slip(law, at, scheme)._asdict()
@@ -112,7 +112,7 @@ class SlipForms:
 _slip_forms = stated(SlipForms)
 
 
-def slip_forms(law: Softening | Hardening, scheme: Scheme) -> SlipForms:
+def slip_forms(law: SofteningLaw | Hardening, scheme: Scheme) -> SlipForms:
     """Compiled laws of slip, made once in a process; numbers of ``law`` do not matter."""
     return _slip_forms(Hardening(1.0) if isinstance(law, Hardening) else law.of(1.0, 1.0), scheme)
 
