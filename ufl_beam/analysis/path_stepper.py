@@ -9,15 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ufl_beam.analysis.critical_points import Branch, CriticalPoint, Direction, Stiffness
-from ufl_beam.analysis.path_corrector import Control, GivenLoadFactor, PathCorrector
+from ufl_beam.analysis.path_corrector import Control, PathCorrector, Plane
 from ufl_beam.errors import StepFailed
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.step_cutting import Trial
-
-ADVICE = (
-    "Try a shorter step or another control: ArcLength goes through limit points of loads and of "
-    "displacements, DissipationControl through softening that snaps back"
-)
 
 SMALLEST_STEP_PART = 2.0**-12  # a step is cut down to this part of it
 TARGET_ITERATIONS = 12  # steps of more are followed by shorter ones, of fewer by longer ones
@@ -61,39 +56,40 @@ class PathStepper:
         if branch is not None:
             corrector.direction = Direction(branch.mode[corrector.share.dofs], 0.0)
             return
-        try:
-            if fresh:
-                still = Direction(np.zeros(corrector.share.size), 0.0)
-                simulation.accept(corrector.attempt(still, 0.0, GivenLoadFactor(corrector.t)))
-            corrector.begin()
-            way = corrector.direction_of(corrector.stiffness_at(simulation.q))
-        except StepFailed as failure:
-            simulation.give_up(failure, self._tried(), ADVICE)
-        corrector.direction = way if self._control.begins_along(corrector, way) > 0 else -way
+        if fresh:
+            none = np.zeros(corrector.share.size)
+            still, factor = Direction(none, 0.0), Direction(none, 1.0)
+            given = Plane(corrector, factor, 1.0, corrector.start + -factor)
+            simulation.accept(corrector.attempt(still, given))
+        corrector.begin()
+        way = corrector.direction_of(corrector.stiffness_at(simulation.q))
+        corrector.direction = way if self._control.sense(corrector, way) > 0 else -way
 
-    def _tried(self) -> float:
-        """The load factor at which the latest attempt began."""
+    @property
+    def tried(self) -> float:
+        """Load factor at which the latest attempt began."""
         return self._corrector.simulation.t + self._corrector.sought.t
 
     def advance(self) -> None:
-        """Take a step, a shorter one where it fails, only up to a critical point in it."""
+        """Take a step, a shorter one where it fails, only up to a critical point in it.
+
+        Raises:
+            StepFailed: Even the shortest one fails.
+        """
         simulation = self._corrector.simulation
         while True:
             iterations = simulation.iterations
             try:
                 found = self._seek(self._part)
                 break
-            except StepFailed as failure:
+            except StepFailed:
                 self._part /= 2
                 if self._part < SMALLEST_STEP_PART:
-                    simulation.give_up(failure, self._tried(), ADVICE)
+                    raise
         count = simulation.iterations - iterations
         part, longer = self._part, min(2.0, TARGET_ITERATIONS / max(count, 1))
         self._part = min(1.0, part * longer)
-        try:
-            self._accept(found, part)
-        except StepFailed as failure:
-            simulation.give_up(failure, self._tried(), ADVICE)
+        self._accept(found, part)
 
     def _accept(self, found: Candidate, part: float) -> None:
         """Go to the end of a step, or to a critical point before it."""
@@ -110,13 +106,14 @@ class PathStepper:
             self._take(self._seek(part))
             return
         self._landed = found.passed(before)
-        limit = self._turns(found, before, after)
+        # The load factor has turned in the state that was found, as at a kink, or its slope
+        # vanishes.  It and the eigenvalue need not change their signs in the same last digit.
+        limit = self._turned(found) or _vanishes(self._slope, found, before, after)
         if self._landed and not corrector.dissipates and corrector.dissipation(found.trial.q1) > 0:
             self._pass_kink(found, reached - 2 * LOCATION_TOLERANCE * part, part, limit)
             return
         # What yields or opens may change signs without an eigenvalue of zero.
-        λ, *ends = (abs(one.stiffness.softest(self._weights)[0]) for one in (found, before, after))
-        soft = limit or λ < SINGULAR_RATIO * max(ends)
+        soft = limit or _vanishes(self._softness, found, before, after)
         way = corrector.direction
         self._take(found)
         if self._landed and soft:
@@ -149,15 +146,15 @@ class PathStepper:
         gone = Direction(trial.q1 - simulation.q, trial.step.t1 - simulation.t)
         if part > UNCHECKED_PART:
             self._require_near(gone)
-        if self._control.continues_along(corrector, gone, way) < 0:
+        if self._control.sense(corrector, way, gone) < 0:
             way = -way
         return Candidate(trial, stiffness, way)
 
     def _require_near(self, gone: Direction) -> None:
         """Raise if a step has left the direction in which it was sought."""
-        corrector, factor = self._corrector, self._corrector.factor
-        size, sought = (corrector.length(way, factor) for way in (gone, corrector.sought))
-        aligned = corrector.product(gone, corrector.sought, factor) >= LEAST_COSINE * size * sought
+        corrector = self._corrector
+        size, sought = (corrector.length(way) for way in (gone, corrector.sought))
+        aligned = corrector.product(gone, corrector.sought) >= LEAST_COSINE * size * sought
         if not aligned or size > LARGEST_LENGTH_RATIO * sought:
             raise StepFailed("the path turns too sharply, or the step leaps to another branch")
 
@@ -167,7 +164,7 @@ class PathStepper:
         By false position with halved weights (Illinois).  Where a step in between fails, the
         last state before, for shorter steps from there.
         """
-        measure = self._measure(after)
+        measure = self._slope if self._turned(after) else self._softness
         low, high, here, there = 0.0, part, measure(before), -measure(after)
         last = failed = 0
         for _ in range(MOST_LOCATION_STEPS):
@@ -197,11 +194,13 @@ class PathStepper:
             last = side
         return self._seek(high), high
 
-    def _measure(self, after: Candidate) -> Callable[[Candidate], float]:
-        """Size of what vanishes at the critical point before ``after``."""
-        if after.way.t * self._corrector.direction.t < 0:
-            return self._slope
-        return lambda found: abs(found.stiffness.softest(self._weights)[0])
+    def _turned(self, found: Candidate) -> bool:
+        """Return whether the load factor goes the other way than before the step."""
+        return found.way.t * self._corrector.direction.t < 0
+
+    def _softness(self, found: Candidate) -> float:
+        """Size of the eigenvalue nearest to zero; N m."""
+        return abs(found.stiffness.softest(self._weights)[0])
 
     def _slope(self, found: Candidate) -> float:
         """Change of the load factor along the path over that of the configuration.
@@ -210,17 +209,6 @@ class PathStepper:
         that the load f does work on it.  At a bifurcation it does none on the critical direction.
         """
         return abs(found.way.t) / self._corrector.size(found.way)
-
-    def _turns(self, found: Candidate, before: Candidate, after: Candidate) -> bool:
-        """Return whether the load factor turns in a state that was located between two others.
-
-        Either it has turned there, as at a kink, or its slope vanishes.  The load factor and the
-        eigenvalue need not change their signs in the same last digit.
-        """
-        if found.way.t * self._corrector.direction.t < 0:
-            return True
-        slope, *ends = (self._slope(one) for one in (found, before, after))
-        return slope < SINGULAR_RATIO * max(ends)
 
     def _note(self, found: Candidate, before: Direction, n: int, limit: bool) -> None:
         """Remember the state as a critical point, the n-th of the path; ``found`` is beyond it."""
@@ -234,9 +222,17 @@ class PathStepper:
             simulation.supports.leave(mode)
             # What the path goes along the mode is lost in a singular stiffness.
             strayed = Direction(way.q - before.q, 0.0)
-            along = corrector.product(strayed, Direction(mode, 0.0), 1.0)
+            along = corrector.product(strayed, Direction(mode, 0.0))
             corrector.direction = Direction(way.q - along * mode, way.t)
         kind = "limit" if limit else "bifurcation"
         state = simulation.snapshot()
         mode = corrector.share.gather(mode)
         self.critical.append(CriticalPoint(kind, simulation.t, n, state, mode))
+
+
+def _vanishes(
+    measure: Callable[[Candidate], float], found: Candidate, before: Candidate, after: Candidate
+) -> bool:
+    """Return whether a measure is nearly zero in a state that was located between two others."""
+    size, *ends = map(measure, (found, before, after))
+    return size < SINGULAR_RATIO * max(ends)
