@@ -129,13 +129,10 @@ class Stiffness:
 
     def __init__(self, share: Share, A: Csr, held: Index, rate: Array) -> None:
         grid = share.grid
-        here = (share.dofs[A.rows()], share.dofs[A.indices], A.data, share.dofs, rate)
-        parts = share.comm.allgather(here) if not share.alone else [here]
-        rows, columns, data, dofs, rates = (np.concatenate(x) for x in zip(*parts, strict=True))
-        of_all = share.dofs[held]
-        if not share.alone:
-            of_all = np.concatenate(share.comm.allgather(of_all))
-        free = np.setdiff1d(np.arange(grid.size), of_all)
+        entries = share.dofs[A.rows()], share.dofs[A.indices], A.data
+        parts = share.comm.allgather((*entries, share.dofs, rate, share.dofs[held]))
+        rows, columns, data, dofs, rates, fixed = map(np.concatenate, zip(*parts, strict=True))
+        free = np.setdiff1d(np.arange(grid.size), fixed)
         shape = (grid.size, grid.size)
         self._K = csr_array(coo_array((data, (rows, columns)), shape=shape))[free][:, free]
         forces = np.bincount(dofs, weights=rates, minlength=grid.size)[free]

@@ -90,7 +90,6 @@ def study(
         outputs.append(("study", (path, path.with_name(f"{path.name}.part"))))
     todo: dict[str, Case] = {}
     records: dict[str, tuple[Outcome, float]] = {}
-    result: Study | None = None
 
     def prepare() -> None:
         if not callable(member):
@@ -119,7 +118,6 @@ def study(
             Study.of(name, {key: records[key] for key in order}).save(path)
 
     def gather() -> None:
-        nonlocal result
         missing = {key: case for key, case in todo.items() if key not in records}
         next_save, quiet, done = 0.0, None if progress else True, len(todo) - len(missing)
         bar = tqdm(total=len(todo), initial=done, unit="member", disable=quiet)
@@ -135,11 +133,6 @@ def study(
                         next_save = time.perf_counter() + 20 * (time.perf_counter() - begin)
         finally:
             save()
-        result = Study.of(name, {key: records[key] for key in todo})
-        if len(result.failed) == len(todo):
-            raise RuntimeError(f"study: all {len(todo)} members failed, {result.failed[0]}")
-        if result.failed:
-            say(result)
 
     on_first(comm, prepare)
     release = take(outputs)
@@ -150,9 +143,11 @@ def study(
         on_first(comm, gather)
     finally:
         release()
-    if comm.size > 1:
-        result = comm.bcast(result)
-    assert result is not None
+    result = Study.of(name, comm.bcast({key: records.get(key) for key in todo}))
+    if len(result.failed) == len(result):
+        raise RuntimeError(f"study: all {len(result)} members failed, {result.failed[0]}")
+    if result.failed and comm.rank == 0:
+        say(result)
     return result
 
 

@@ -81,9 +81,7 @@ class ArcLength(Control):
         _require_step(self.step, "ArcLength")
         require_number(self.factor, "ArcLength: factor", positive=True)
 
-    def sense(
-        self, corrector: PathCorrector, way: Direction, gone: Direction | None = None
-    ) -> float:
+    def sense(self, corrector: PathCorrector, way: Direction, gone: Direction | None) -> float:
         """First that of the step; then that of flow and openings, else by turns below π/2."""
         if gone is None:
             return self.step * way.t
@@ -126,9 +124,7 @@ class _QuantityControl(Control):
     def _quantity(self) -> str:
         """The quantity in words."""
 
-    def sense(
-        self, corrector: PathCorrector, way: Direction, gone: Direction | None = None
-    ) -> float:
+    def sense(self, corrector: PathCorrector, way: Direction, gone: Direction | None) -> float:
         """Positive if the quantity changes along ``way`` as ``step`` says."""
         return self.step * corrector.along(self._normal(corrector), way)
 
@@ -273,9 +269,7 @@ class DissipationControl(Control):
         """Factor of the arc length."""
         return self.otherwise.factor
 
-    def sense(
-        self, corrector: PathCorrector, way: Direction, gone: Direction | None = None
-    ) -> float:
+    def sense(self, corrector: PathCorrector, way: Direction, gone: Direction | None) -> float:
         """That of the arc length."""
         return self.otherwise.sense(corrector, way, gone)
 

@@ -118,7 +118,7 @@ class PathCorrector:
         return self._until(energy, gone, way)
 
     def kink(self, length: float) -> tuple[Direction, Direction] | None:
-        """Find the state in which dissipation begins within a length; the direction beyond it."""
+        """Find the step to where dissipation begins within a length, and the direction beyond."""
         way, q = self.direction, self.simulation.q
         self.begin()
         if self.dissipates or not self.dissipation(q + length * way.q) > 0:
@@ -134,7 +134,7 @@ class PathCorrector:
         return -way if self.dissipation_side(q, way) < 0 else way
 
     def _until(self, energy: float, gone: Direction, way: Direction) -> Direction:
-        """Return the step so far, and as much more along a direction as dissipates so much (J)."""
+        """Extend the step so far along a direction until it dissipates an energy; J."""
 
         def enough(length: float) -> bool:
             return self.dissipation(self.simulation.q + gone.q + length * way.q) >= energy
@@ -226,8 +226,8 @@ class PathCorrector:
         Closed openings that do not flow are held closed if they can be, see openings.py, unless
         ``hold`` is false, as in a direction in which they open.
         """
-        simulation = self.simulation
         self._constraint, self.sought = constraint, predicted
+        simulation = self.simulation
         self.t = simulation.t + predicted.t
         step, guess = self.step_at(self.t), simulation.q + predicted.q
         simulation.supports.enter(guess)
@@ -243,12 +243,9 @@ class PathCorrector:
     def stiffness_at(self, q: Array) -> Stiffness:
         """Return the tangent stiffness at a state."""
         supports = self.simulation.supports
-        x = supports.in_axes(q)
-        # The first tangent of a step is that of the forces before it, and may not yet be taken.
-        together = self.simulation.together
-        together(self.tangent, x, np.zeros(self.share.size))
-        rate = np.zeros(self.share.size)
-        together(self.tangent, x, rate)
+        for _ in range(2):  # the first tangent of a step is that of the forces before it
+            rate = np.zeros(self.share.size)
+            self.simulation.together(self.tangent, supports.in_axes(q), rate)
         return Stiffness(self.share, self._A, supports.dofs, rate)
 
     def direction_of(self, stiffness: Stiffness) -> Direction:
@@ -266,7 +263,7 @@ class PathCorrector:
 
 
 def bisect(reached: Callable[[float], bool], low: float, high: float, halvings: int) -> float:
-    """Return where something is reached, the upper end of an interval that is halved so often."""
+    """Find by bisection where something is reached: at the upper end of what is left."""
     for _ in range(halvings):
         middle = (low + high) / 2
         low, high = (low, middle) if reached(middle) else (middle, high)
@@ -285,13 +282,8 @@ class Control(ABC):
         """Raise :class:`SceneError` if the control does not fit the scene."""
 
     @abstractmethod
-    def sense(
-        self, corrector: PathCorrector, way: Direction, gone: Direction | None = None
-    ) -> float:
-        """Positive if a path goes on along ``way``, negative if against it.
-
-        It came by ``gone`` in the step; if that is None, it begins.
-        """
+    def sense(self, corrector: PathCorrector, way: Direction, gone: Direction | None) -> float:
+        """Positive if a path that came by ``gone``, or begins (None), goes on along ``way``."""
 
     @abstractmethod
     def solve_step(self, corrector: PathCorrector, part: float) -> Trial:

@@ -27,7 +27,7 @@ SINGULAR_RATIO = 1e-3  # part of its size at the ends of a step below which what
 
 
 class Candidate(NamedTuple):
-    """End of a step that may be accepted, with the stiffness and the path's direction there."""
+    """End of a step that may be accepted, with the stiffness and the direction of the path."""
 
     trial: Trial
     stiffness: Stiffness
@@ -43,7 +43,8 @@ class PathStepper:
     """Stepper of a path: it sets lengths of steps and locates critical points."""
 
     def __init__(self, simulation: Simulation, control: Control) -> None:
-        self._corrector, self._control = PathCorrector(simulation, control.factor), control
+        self._simulation, self._control = simulation, control
+        self._corrector = PathCorrector(simulation, control.factor)
         self.critical: list[CriticalPoint] = []
         self._weights = simulation.share.gather(self._corrector.weights)
         self._part = 1.0
@@ -52,7 +53,7 @@ class PathStepper:
 
     def begin(self, branch: Branch | None, *, fresh: bool) -> None:
         """Find the direction in which the path begins; if fresh, its first equilibrium too."""
-        corrector, simulation = self._corrector, self._corrector.simulation
+        corrector, simulation = self._corrector, self._simulation
         if branch is not None:
             corrector.direction = Direction(branch.mode[corrector.share.dofs], 0.0)
             return
@@ -63,12 +64,12 @@ class PathStepper:
             simulation.accept(corrector.attempt(still, given))
         corrector.begin()
         way = corrector.direction_of(corrector.stiffness_at(simulation.q))
-        corrector.direction = way if self._control.sense(corrector, way) > 0 else -way
+        corrector.direction = way if self._control.sense(corrector, way, None) > 0 else -way
 
     @property
     def tried(self) -> float:
         """Load factor at which the latest attempt began."""
-        return self._corrector.simulation.t + self._corrector.sought.t
+        return self._simulation.t + self._corrector.sought.t
 
     def advance(self) -> None:
         """Take a step, a shorter one where it fails, only up to a critical point in it.
@@ -76,9 +77,8 @@ class PathStepper:
         Raises:
             StepFailed: Even the shortest one fails.
         """
-        simulation = self._corrector.simulation
         while True:
-            iterations = simulation.iterations
+            iterations = self._simulation.iterations
             try:
                 found = self._seek(self._part)
                 break
@@ -86,9 +86,8 @@ class PathStepper:
                 self._part /= 2
                 if self._part < SMALLEST_STEP_PART:
                     raise
-        count = simulation.iterations - iterations
-        part, longer = self._part, min(2.0, TARGET_ITERATIONS / max(count, 1))
-        self._part = min(1.0, part * longer)
+        count, part = self._simulation.iterations - iterations, self._part
+        self._part = min(1.0, part * min(2.0, TARGET_ITERATIONS / max(count, 1)))
         self._accept(found, part)
 
     def _accept(self, found: Candidate, part: float) -> None:
@@ -117,28 +116,28 @@ class PathStepper:
         way = corrector.direction
         self._take(found)
         if self._landed and soft:
-            self._note(found, way, len(corrector.simulation.solution.times), limit)
+            self._note(found, way, len(self._simulation.solution), limit)
 
     def _pass_kink(self, after: Candidate, last: float, part: float, limit: bool) -> None:
         """Go to the last state in which nothing dissipates, if the load factor turns there."""
-        corrector, before = self._corrector, self._corrector.direction
-        if limit:
-            if last > 0:
-                self._take(self._seek(last))
-            self._note(after, before, len(corrector.simulation.solution.times) - (last <= 0), limit)
-        if not limit or last <= 0:
-            self._take(self._seek(part))
+        before, n = self._corrector.direction, len(self._simulation.solution)
+        if limit and last > 0:
+            self._take(self._seek(last))
+            self._note(after, before, n, limit)
+            self._before = after
             return
-        self._before = after
+        if limit:
+            self._note(after, before, n - 1, limit)
+        self._take(self._seek(part))
 
     def _take(self, found: Candidate) -> None:
         corrector = self._corrector
         corrector.dissipates = corrector.dissipation(found.trial.q1) > 0.0
-        corrector.simulation.accept(found.trial)
+        self._simulation.accept(found.trial)
         corrector.direction, self._before = found.way, found
 
     def _seek(self, part: float) -> Candidate:
-        corrector, simulation = self._corrector, self._corrector.simulation
+        corrector, simulation = self._corrector, self._simulation
         trial = self._control.solve_step(corrector, part)
         corrector.t = trial.step.t1
         stiffness = corrector.stiffness_at(trial.q1)
@@ -212,7 +211,7 @@ class PathStepper:
 
     def _note(self, found: Candidate, before: Direction, n: int, limit: bool) -> None:
         """Remember the state as a critical point, the n-th of the path; ``found`` is beyond it."""
-        corrector, simulation, way = self._corrector, self._corrector.simulation, found.way
+        corrector, simulation, way = self._corrector, self._simulation, found.way
         if limit:
             # At a limit point the path goes along the mode.
             mode = np.asarray(way.q / corrector.size(way), dtype=np.float64)

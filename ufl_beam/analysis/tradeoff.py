@@ -16,7 +16,7 @@ import numpy as np
 
 from ufl_beam.analysis.refinement_runs import Quantity, RefinementRuns
 from ufl_beam.analysis.richardson import Cost, Cross, Level, size
-from ufl_beam.analysis.targets import Choice, Prediction, Target, target_of
+from ufl_beam.analysis.targets import BUDGET_AIM, Choice, Prediction, Target, target_of
 from ufl_beam.analysis.tradeoff_result import Dials, Refinement, Run, Tradeoff
 from ufl_beam.errors import (
     SceneError,
@@ -187,7 +187,7 @@ class _Search:
     def find(self, others: Sequence[_Found]) -> _Found | None:
         """Find the setting, none if ``others`` are better; TradeoffError if no setting serves."""
         base: Level = (0, 0)
-        doubts: list[str] = []
+        target, doubts = self._target, list[str]()
         tried: list[_Found] = []
         while True:
             prediction, doubt, moved = self._predict(base)
@@ -197,30 +197,32 @@ class _Search:
                     raise self._refusal("self-convergence is not seen" + "".join(doubts))
                 base = moved
                 continue
-            choice = self._target.choose(prediction)
-            if any(self._target.hopeless(choice, one.choice) for one in others):
+            choice = target.choose(prediction.choices())
+            aim = target.objective(choice)
+            if any(aim > 2 * target.objective(one.choice) for one in others):
                 return None
             i, j = prediction.finest
             cells_more = max(0, math.ceil(math.log2(choice.refine) - i))
             more = cells_more, max(0, math.ceil(choice.level - j))
-            if choice.further and more == (0, 0):
+            serves = target.serves(choice)
+            if not serves and more == (0, 0) and choice.seconds <= BUDGET_AIM * target.bounds[0]:
                 more = prediction.bottleneck(choice)
             if more != (0, 0):
                 base = base[0] + more[0], base[1] + more[1]
                 continue
-            if not choice.serves:
+            if not serves:
                 raise self._refusal(
                     f"no setting serves; the nearest takes {choice.seconds:.3g} s and has errors "
-                    f"of {choice.ratio:.2g} {self._target.measure}; steps and cells as they are "
+                    f"of {choice.ratio:.2g} {target.measure}; steps and cells as they are "
                     "given are the coarsest, and the last digits of a quantity are not known"
                 )
             found = self._attempt(choice, prediction)
             again = any(one.run is found.run for one in tried)
             tried.append(found)
-            if self._target.accepts(found.run.seconds, found.ratio):
+            if target.accepts(found.run.seconds, found.ratio):
                 return found
             if again or len(tried) == MOST_TRIALS:
-                return min(self._all(prediction), key=lambda one: one.rank(self._target))
+                return min(self._all(prediction), key=lambda one: one.rank(target))
             self._slower.append(found.run.seconds * self._mean / choice.seconds)
             if found.ratio > choice.ratio:
                 more = prediction.bottleneck(choice)
@@ -276,8 +278,7 @@ class _Search:
         found = []
         for run in self._runs.of(self._family):
             _, refine, level, _ = run.refinement
-            ratio = prediction.ratio(refine, level)
-            choice = Choice(refine, level, run.seconds, ratio, True, False)
+            choice = Choice(refine, level, run.seconds, prediction.ratio(refine, level))
             found.append(_Found(run, choice, prediction))
         return found
 
