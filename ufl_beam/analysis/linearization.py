@@ -133,7 +133,7 @@ class SmallMotions:
         zero = self._unresisted(x, works)
         first = np.abs(values[~zero]).min(initial=highest)
         if zero.any():
-            # Beside what is nearly infinite, inverses of the others had few digits.
+            # Inverses that are nearly infinite left few digits to the others.
             values, x = solve(shift=-first / 2)
             works = self._works(x)
             zero = self._unresisted(x, works)
@@ -161,9 +161,9 @@ class SmallMotions:
 
         Nothing resists the motions ``free``, in columns; ``lowest`` is the first frequency; rad/s.
         """
-        # Zero is a double exponent, of drifts, and no solver finds it well.  Where velocities make
-        # of them but a force like inertia, they are excluded as by constraints, and known: drifts
-        # orthogonal to the rest.
+        # Drifts have the double exponent zero, which no solver finds well.  Those on which
+        # velocities cause only forces like inertia, C N = M N Λ, are known: constraints exclude
+        # them from the rest.
         N = free @ np.linalg.inv(np.linalg.cholesky(free.T @ (self.M @ free))).T
         Λ = N.T @ (C @ N)
         _, sizes, rows = np.linalg.svd(C @ N - self.M @ N @ Λ, full_matrices=False)
@@ -205,7 +205,7 @@ class SmallMotions:
         )
         factors, x = eigensolvers.linear(self.K, -change, n, most=self.K.shape[0], definite=False)
         x = x[:, np.abs(factors) < 1e9 * np.abs(factors).min(initial=np.inf)]
-        # Among the shapes that were found, by works whose round-off is that of strains.
+        # Once more, for combinations of these shapes: the round-off of works is that of strains.
         works = self._simulation.equation.tangent_works(self.q, u, right @ x, left.T @ x)
         factors, mix = eigensolvers.small(works[0], -works[1])
         return self._nearest(n, factors, (x @ mix).astype(complex))

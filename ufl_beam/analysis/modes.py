@@ -14,7 +14,7 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.analysis.linearization import SmallMotions
-from ufl_beam.arrays import Array, Complex, State
+from ufl_beam.arrays import Array, Complex
 from ufl_beam.collective_errors import on_first
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import Fields, SectionForces
@@ -91,10 +91,10 @@ class Shapes(ABC):
         require_count(count, "motion: count")
         times = np.arange(count + 1) / count
         swing = np.outer(np.exp(2j * math.pi * times), self._scaled(k, amplitude)).real
-        states: State = {"q": self.q + swing, "v": np.empty(0), "every": np.array([1])}
-        empty = {"reactions": np.empty(0), "connections": np.empty(0)}
+        history = {"times": times, "q": self.q + swing, "every": np.array([1])}
+        none = dict.fromkeys(("v", "reactions", "connections"), np.empty(0))
         solution = Solution(self.scene, self.grid)
-        solution.resume({"times": times, **states, **empty})
+        solution.resume(history | none)
         return solution
 
     def write(self, path: str | Path, *, amplitude: float = AMPLITUDE) -> None:

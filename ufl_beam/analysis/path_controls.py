@@ -18,7 +18,7 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.simulation.step_cutting import Trial
 
-LEAST_REST = 1e-3  # part of a step of arc length that is gone at least beyond a kink
+LEAST_REST = 1e-3  # least part of a step of arc length that is left beyond a kink
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class ArcLength(Control):
         require_number(self.factor, "ArcLength: factor", positive=True)
 
     def sense(self, corrector: PathCorrector, way: Direction, gone: Direction | None) -> float:
-        """First that of the step; then that of flow and openings, else by turns below π/2."""
+        """First the sign of the step, later that of flow and openings, else by turns below π/2."""
         if gone is None:
             return self.step * way.t
         side = corrector.dissipation_side(corrector.simulation.q + gone.q, way)

@@ -26,7 +26,7 @@ from ufl_beam.mechanics.classical import Static
 from ufl_beam.model.connector_laws import Controller
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.archive import below
+from ufl_beam.output.archive import above, below
 from ufl_beam.output.output_files import take
 from ufl_beam.output.recorders import Recorder, close_all, recorders_of
 from ufl_beam.parallel import communicator
@@ -69,8 +69,7 @@ class Path(Solution):
         text["critical"] = [{"kind": c.kind, "factor": c.factor, "n": c.n} for c in self.critical]
         for k, point in enumerate(self.critical):
             arrays[f"critical/{k}/mode"] = point.mode
-            for name, values in arrays_of(point.state).items():
-                arrays[f"critical/{k}/state/{name}"] = values
+            arrays |= above(f"critical/{k}/state/", arrays_of(point.state))
         return text, arrays
 
     def _take(self, text: dict[str, Any], arrays: State) -> None:

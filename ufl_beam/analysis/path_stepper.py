@@ -21,9 +21,9 @@ LOCATION_TOLERANCE = 1e-7  # critical points are located to this part of a step
 MOST_LOCATION_STEPS = 60  # steps in which a critical point is sought
 LEAST_COSINE = 0.5  # cosine of the angle by which a step may leave the direction of its predictor
 LARGEST_LENGTH_RATIO = 10.0  # ratio by which a step may be longer than its predictor
-UNCHECKED_PART = 2.0**-6  # part of a step up to which that is not asked: a law may have a kink
+UNCHECKED_PART = 2.0**-6  # shorter parts of a step may leave it: a law may have a kink
 SAME_POINT_PART = 1e-3  # within this part of a step a critical point is the one just reached
-SINGULAR_RATIO = 1e-3  # part of its size at the ends of a step below which what vanishes is zero
+SINGULAR_RATIO = 1e-3  # what is below this part of its size at the ends of a step vanishes
 
 
 class Candidate(NamedTuple):

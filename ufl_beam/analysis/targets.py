@@ -16,8 +16,8 @@ from ufl_beam.errors import SceneError, require_number
 STEPS_PER_LEVEL = 16  # choices of steps from one level of refinement to the next
 EXTRAPOLATED_LEVELS = 2  # levels beyond those that were run which a choice may ask for
 BUDGET_AIM, BUDGET_SLACK = 0.9, 0.2  # part that is aimed at; part that a run may fall short by
-LARGEST_ERROR = 0.3  # errors of this part of a quantity are none to recommend
-NEARLY_BEST = 2.0  # if nothing serves, the cheapest with so many times the least error is next
+LARGEST_ERROR = 0.3  # settings of larger errors, as parts of a quantity, are not recommended
+NEARLY_BEST = 2.0  # if nothing serves, the cheapest up to so many times the least error is next
 NEGLIGIBLE = 0.1  # changes up to this part of a tolerance need not converge
 
 
@@ -145,7 +145,7 @@ class Budget:
         return min(fast, key=self.objective, default=fastest)
 
     def serves(self, choice: Choice) -> bool:
-        """Return whether a choice is fast enough, and its error none to be ashamed of."""
+        """Return whether a choice is fast enough, and accurate enough to be recommended."""
         return choice.seconds <= BUDGET_AIM * self.seconds and choice.ratio <= LARGEST_ERROR
 
     def objective(self, choice: Choice) -> float:
