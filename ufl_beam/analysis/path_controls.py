@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, field
 
 import numpy as np
@@ -275,19 +276,15 @@ class DissipationControl(Control):
 
     def solve_step(self, corrector: PathCorrector, part: float) -> Trial:
         """Solve at the next dissipated energy, unless a step of arc length dissipates nothing."""
-        if not corrector.dissipates:
-            try:
-                trial = self.otherwise.solve_step(corrector, part)
-            except StepFailed:
+        if corrector.dissipates:
+            with suppress(StepFailed):
                 return self._dissipate(corrector, part)
+            return self.otherwise.solve_step(corrector, part)
+        with suppress(StepFailed):
+            trial = self.otherwise.solve_step(corrector, part)
             if corrector.dissipation(trial.q1) == 0.0:
                 return trial
-        try:
-            return self._dissipate(corrector, part)
-        except StepFailed:
-            if not corrector.dissipates:
-                raise
-        return self.otherwise.solve_step(corrector, part)
+        return self._dissipate(corrector, part)
 
     def _dissipate(self, corrector: PathCorrector, part: float) -> Trial:
         energy = self.step * part
