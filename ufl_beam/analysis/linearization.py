@@ -129,14 +129,12 @@ class SmallMotions:
         matrix = (K + K.T) / 2 if symmetric else K
         solve = partial(eigensolvers.linear, matrix, M, n, most=self.most, definite=symmetric)
         values, x = solve(shift=-SHIFT * low)
-        works = self._works(x)
-        zero = self._unresisted(x, works)
+        works, zero = self._works(x)
         first = np.abs(values[~zero]).min(initial=highest)
         if zero.any():
             # Inverses that are nearly infinite left few digits to the others.
             values, x = solve(shift=-first / 2)
-            works = self._works(x)
-            zero = self._unresisted(x, works)
+            works, zero = self._works(x)
         if abs(C).max() <= nothing * τ and symmetric:
             values = works / np.sum(x * (M @ x), axis=0)
             values[zero] = 0.0
@@ -146,15 +144,12 @@ class SmallMotions:
         finite = (np.abs(s) ** 2 <= 1e3 * highest) & (s.imag >= 0)
         return self._nearest(n, s[finite], motions[:, finite])
 
-    def _works(self, x: Array) -> Array:
-        """Compute works of the stiffness on motions, in columns, to the digits of strains; J."""
+    def _works(self, x: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
+        """Works (J) of the stiffness on motions, in columns, and which may be but round-off."""
         right, left = self._with_laws()
-        return self._simulation.equation.stiffness_works(self.q, right @ x, left.T @ x)
-
-    def _unresisted(self, x: Array, works: Array) -> npt.NDArray[np.bool_]:
-        """Return which motions no stiffness resists, up to round-off; (n,)."""
+        works = self._simulation.equation.stiffness_works(self.q, right @ x, left.T @ x)
         sizes = np.sum(np.abs(x) * (abs(self.K) @ np.abs(x)), axis=0)
-        return np.asarray(np.abs(works) <= ZERO * sizes)
+        return works, np.asarray(np.abs(works) <= ZERO * sizes)
 
     def _damped(self, C: csr_array, free: Array, n: int, lowest: float) -> tuple[Complex, Complex]:
         """Compute at least n exponents and motions with velocity-dependent forces C.

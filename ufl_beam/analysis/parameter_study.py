@@ -143,7 +143,7 @@ def study(
         on_first(comm, gather)
     finally:
         release()
-    result = Study.of(name, comm.bcast({key: records.get(key) for key in todo}))
+    result = Study.of(name, comm.bcast({key: records[key] for key in todo}))
     if len(result.failed) == len(result):
         raise RuntimeError(f"study: all {len(result)} members failed, {result.failed[0]}")
     if result.failed and comm.rank == 0:

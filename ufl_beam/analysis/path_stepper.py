@@ -60,6 +60,7 @@ class PathStepper:
         if fresh:
             none = np.zeros(corrector.share.size)
             still, factor = Direction(none, 0.0), Direction(none, 1.0)
+            # The load factor is given: it ends where it is, 1 beyond one that is smaller by 1.
             given = Plane(corrector, factor, 1.0, corrector.start + -factor)
             simulation.accept(corrector.attempt(still, given))
         corrector.begin()
