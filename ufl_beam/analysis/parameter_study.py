@@ -104,11 +104,12 @@ def study(
         require_apart(outputs, "study")
         if path is not None and path.exists():
             old = Study.load(path)
-            if old.member != name and not anew:
-                raise SceneError(f"study {path} is one of {old.member}, not of {name}")
-            for key, (outcome, seconds) in old.records().items() if not anew else ():
-                if key not in todo or not isinstance(outcome, str):
-                    records[key] = outcome, seconds
+            if not anew:
+                if old.member != name:
+                    raise SceneError(f"study {path} is one of {old.member}, not of {name}")
+                for key, (outcome, seconds) in old.records().items():
+                    if key not in todo or not isinstance(outcome, str):
+                        records[key] = outcome, seconds
         save()  # that it cannot be written is better known now
 
     def save() -> None:
