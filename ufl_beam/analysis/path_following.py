@@ -15,13 +15,18 @@ from ufl_beam.analysis.critical_points import Branch, CriticalPoint
 from ufl_beam.analysis.path_corrector import Control
 from ufl_beam.analysis.path_stepper import PathStepper
 from ufl_beam.arrays import Array, State
-from ufl_beam.errors import SceneError, require_count, require_function, require_kind
+from ufl_beam.errors import (
+    SceneError,
+    StepFailed,
+    require_count,
+    require_function,
+    require_kind,
+)
 from ufl_beam.mechanics.classical import Static
-from ufl_beam.model.connector_laws import Actuator, Controller, Motor
+from ufl_beam.model.connector_laws import Controller
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
-from ufl_beam.model.time_functions import TimeFunction
-from ufl_beam.output.archive import below
+from ufl_beam.output.archive import above, below
 from ufl_beam.output.output_files import take
 from ufl_beam.output.recorders import Recorder, close_all, recorders_of
 from ufl_beam.parallel import communicator
@@ -32,6 +37,11 @@ from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.solution_files import arrays_of
 from ufl_beam.simulation.solution_files import take as take_solution
 from ufl_beam.solvers.newton_options import Newton
+
+ADVICE = (
+    "Try a shorter step or another control: ArcLength goes through limit points of loads and of "
+    "displacements, DissipationControl through softening that snaps back"
+)
 
 
 class Path(Solution):
@@ -59,8 +69,7 @@ class Path(Solution):
         text["critical"] = [{"kind": c.kind, "factor": c.factor, "n": c.n} for c in self.critical]
         for k, point in enumerate(self.critical):
             arrays[f"critical/{k}/mode"] = point.mode
-            for name, values in arrays_of(point.state).items():
-                arrays[f"critical/{k}/state/{name}"] = values
+            arrays |= above(f"critical/{k}/state/", arrays_of(point.state))
         return text, arrays
 
     def _take(self, text: dict[str, Any], arrays: State) -> None:
@@ -158,14 +167,17 @@ def follow(
 
     try:
         with partial_results(simulation):
-            stepper.begin(branch, fresh=state is None)
-            for recorder in recorders:
-                simulation.together(recorder.open, simulation)
-            simulation.keep()
-            for _ in range(steps):
-                stepper.advance()
-                if simulation.share.largest(simulation.together(after_step)):
-                    break
+            try:
+                stepper.begin(branch, fresh=state is None)
+                for recorder in recorders:
+                    simulation.together(recorder.open, simulation)
+                simulation.keep()
+                for _ in range(steps):
+                    stepper.advance()
+                    if simulation.share.largest(simulation.together(after_step)):
+                        break
+            except StepFailed as failure:
+                simulation.give_up(failure, stepper.tried, ADVICE)
             simulation.end()
     finally:
         release()
@@ -182,12 +194,8 @@ def _require_driven(scene: Scene, t0: float) -> None:
     for link in scene.links:
         if isinstance(link.law, Controller):
             raise SceneError(f"{link}: a controller acts in time, and a path has none")
-    functions: list[TimeFunction] = [load.time for load in scene.loads]
-    functions += [motion for support in scene.supports for motion in support.moving.values()]
-    for link in scene.links:
-        functions += [link.law.motion] if isinstance(link.law, Motor) else []
-        functions += [link.law.force] if isinstance(link.law, Actuator) else []
-    if not any(f(t0 + Δ) != f(t0) for f in functions for Δ in (1e-3, 1.0, -1e-3, -1.0)):
+    times = (t0 + 1e-3, t0 + 1.0, t0 - 1e-3, t0 - 1.0)
+    if not any(f(t) != f(t0) for _, f in scene.time_functions() for t in times):
         raise SceneError(
             "follow: no load and no motion depends on time, which is the load factor here; give "
             "the one that is to grow time=lambda t: t"
