@@ -13,7 +13,7 @@ from ufl_beam.arrays import Array, State
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import SceneError, require_kind, require_number, require_sequence
 from ufl_beam.model.bodies import Place
-from ufl_beam.output.rainflow import Cycles, RainflowCounter, SNCurve, library
+from ufl_beam.output.rainflow import Cycles, RainflowCounter, SNCurve
 from ufl_beam.output.recorders import RecordedState, Recorder
 
 BLOCK = 1000  # steps that are collected before their cycles are counted
@@ -81,7 +81,6 @@ class Fatigue(Recorder):
 
     Raises:
         SceneError: A spot or the curve is none, or the resolution is not positive.
-        ImportError: The package `rainflow`, which counts, is missing.
 
     Example:
         >>> spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
@@ -102,7 +101,6 @@ class Fatigue(Recorder):
             require_kind(spot, HotSpot, f"Fatigue: spots[{i}]")
         require_kind(curve, SNCurve, "Fatigue: curve")
         require_number(resolution, "Fatigue: resolution", at_least=0.0)
-        library()
         self.curve = curve
         self._resolution = resolution or curve.range / 100
         self._counters: dict[HotSpot, RainflowCounter] = {}
