@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -191,7 +191,7 @@ def rainflow(series: npt.ArrayLike) -> Cycles:
         [1. 3.] [1.5 1.5] [1. 1.]
     """
     counter = RainflowCounter(1.0)
-    counter.count(require_row(series, "rainflow: series").tolist())
+    counter.count(require_row(series, "rainflow: series"))
     return counter.cycles()
 
 
@@ -210,12 +210,12 @@ class RainflowCounter:
 
     def add(self, series: Array) -> None:
         """Count the next piece; (n,)."""
-        self.count(np.rint(series / self._resolution).tolist())
+        self.count(np.rint(series / self._resolution))
 
-    def count(self, values: Iterable[float]) -> None:
+    def count(self, values: Array) -> None:
         """Count the next values, multiples of the resolution, by the method of ASTM E1049."""
         points = self._waiting
-        for value in values:
+        for value in map(float, values):
             if points and value == points[-1]:
                 continue
             if len(points) > 1 and (value > points[-1]) == (points[-1] > points[-2]):
@@ -247,9 +247,10 @@ class RainflowCounter:
     def resume(self, counted: Array, waiting: Array) -> None:
         """Go on after a :meth:`state`."""
         self._counts.clear()
-        self._counts.update(((low, high), count) for low, high, count in counted.tolist())
+        for low, high, count in (map(float, row) for row in counted):
+            self._counts[low, high] = count
         self._waiting = []
-        self.count(waiting.tolist())
+        self.count(waiting)
 
 
 def _ends(a: float, b: float) -> tuple[float, float]:
