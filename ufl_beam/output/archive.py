@@ -10,7 +10,7 @@ from typing import Any
 
 from ufl_beam.arrays import State
 from ufl_beam.errors import SceneError
-from ufl_beam.output.output_files import replace_file, require_writable
+from ufl_beam.output.output_files import failure, put_in_place, require_writable
 
 
 def above(prefix: str, content: Mapping[str, Any]) -> dict[str, Any]:
@@ -31,7 +31,10 @@ def write(path: Path, format: str, text: Mapping[str, Any], arrays: State) -> No
     """
     require_writable(path)
     encoded = json.dumps({**text, "arrays": [*arrays]})
-    replace_file(path, image_of(format, {"text": encoded, **arrays}))
+    try:
+        put_in_place(path, image_of(format, {"text": encoded, **arrays}))
+    except OSError as error:
+        raise failure(error, path) from None
 
 
 def image_of(format: str, content: Mapping[str, Any]) -> bytes:

@@ -16,7 +16,8 @@ from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import Coulomb, Stop
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.plastic_hinges import law_of
-from ufl_beam.output.recorders import RecordedState, Recorder
+from ufl_beam.output.recorders import Recorder
+from ufl_beam.output.state_view import StateView
 from ufl_beam.parameter import TIME, Parameter
 
 Flags = npt.NDArray[np.bool_]
@@ -80,12 +81,12 @@ class Events(Recorder):
         self.found: list[Event] = []
         self._rows: list[Row] = []
 
-    def open(self, simulation: RecordedState) -> None:
+    def open(self, simulation: StateView) -> None:
         """Take note of the initial state."""
         self.found, self._rows = [], []
         self._watch(simulation)
 
-    def _watch(self, simulation: RecordedState) -> None:
+    def _watch(self, simulation: StateView) -> None:
         """Find the events that a scene may have, and those before the run."""
         grid = simulation.grid
         in_cells = [law for beam in simulation.scene.beams for law in grid.hinges(beam)]
@@ -98,7 +99,7 @@ class Events(Recorder):
         self._links = [i for i, link in enumerate(links) if type(link.law) in BETWEEN]
         self._flags = self._look(simulation)
 
-    def _look(self, simulation: RecordedState) -> tuple[Flags, list[bool]]:
+    def _look(self, simulation: StateView) -> tuple[Flags, list[bool]]:
         """Return the events of each cell and hinge, and the state of each connector."""
         in_cells = np.zeros((len(self._enough), len(IN_CELLS)), dtype=bool)
         for cells, rows in simulation.material():
@@ -118,7 +119,7 @@ class Events(Recorder):
         limits = [(1 - 1e-9) * simulation.asked.get(link, 0.0) for link in links]
         return in_cells, [bool(goes_on) for goes_on in forces > limits]
 
-    def write(self, simulation: RecordedState) -> None:
+    def write(self, simulation: StateView) -> None:
         """Note the changes of a step."""
         flags = self._look(simulation)
         (cells, goes_on), (cells_before, went_on) = flags, self._flags
@@ -134,7 +135,7 @@ class Events(Recorder):
         if events:
             on_first(simulation.comm, lambda: [self._tell(event) for event in events])
 
-    def _add(self, simulation: RecordedState, rows: list[Row]) -> list[Event]:
+    def _add(self, simulation: StateView, rows: list[Row]) -> list[Event]:
         links, grid = simulation.scene.links, simulation.grid
         named = simulation.parameter
         events = [
@@ -149,7 +150,7 @@ class Events(Recorder):
         """Return the events so far: time, number of the cell or connector, and kind."""
         return {"events": np.array([(t, n, KINDS.index(what)) for t, n, what in self._rows])}
 
-    def resume(self, simulation: RecordedState, state: State) -> None:
+    def resume(self, simulation: StateView, state: State) -> None:
         """Go on after the events of a :meth:`state`."""
         self.found, self._rows = [], []
         self._add(simulation, [(float(t), int(n), KINDS[int(k)]) for t, n, k in state["events"]])

@@ -14,7 +14,8 @@ from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import SceneError, require_kind, require_number, require_sequence
 from ufl_beam.model.bodies import Place
 from ufl_beam.output.rainflow import Cycles, RainflowCounter, SNCurve
-from ufl_beam.output.recorders import RecordedState, Recorder
+from ufl_beam.output.recorders import Recorder
+from ufl_beam.output.state_view import StateView
 
 BLOCK = 1000  # steps that are collected before their cycles are counted
 
@@ -105,7 +106,7 @@ class Fatigue(Recorder):
         self._resolution = resolution or curve.range / 100
         self._counters: dict[HotSpot, RainflowCounter] = {}
 
-    def open(self, simulation: RecordedState) -> None:
+    def open(self, simulation: StateView) -> None:
         """Begin to count, with the initial state."""
         self._prepare(simulation.grid)
         self._begin = simulation.t
@@ -118,7 +119,7 @@ class Fatigue(Recorder):
         self._counters = {spot: RainflowCounter(self._resolution) for spot in self.spots}
         self._block, self._filled = np.empty((len(self.spots), 3, BLOCK)), 0
 
-    def write(self, simulation: RecordedState) -> None:
+    def write(self, simulation: StateView) -> None:
         """Note the section forces, and count now and then."""
         self._block[..., self._filled] = simulation.section_forces()[self._cells]
         self._filled += 1
@@ -148,7 +149,7 @@ class Fatigue(Recorder):
             state[f"counted {i}"], state[f"waiting {i}"] = counter.state()
         return state
 
-    def resume(self, simulation: RecordedState, state: State) -> None:
+    def resume(self, simulation: StateView, state: State) -> None:
         """Go on after a :meth:`state`."""
         self._prepare(simulation.grid)
         self._begin, self._end = map(float, state["duration"])

@@ -120,6 +120,16 @@ class OutputFile:
         if self._regular:
             os.ftruncate(self._file, length)
 
+    def allocate(self, length: int) -> None:
+        """Let the disk be full now rather than when a library writes up to a length."""
+        missing = length - self.size
+        if missing > 0 and hasattr(os, "posix_fallocate"):
+            try:
+                os.posix_fallocate(self._file, self.size, missing)
+            except OSError as error:
+                if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL):  # no such thing there
+                    raise failure(error, self.path) from None
+
     def rename(self, path: Path) -> None:
         """Move the file, in the place of another one if that exists."""
         os.replace(self.path, path)
@@ -127,8 +137,13 @@ class OutputFile:
 
     def sync(self) -> None:
         """Bring everything to the disk; :class:`FileNotFoundError` if the file was removed."""
-        if not is_at(self._file, self.path):
-            raise removed(self.path)
+        if not self._is_there():
+            raise FileNotFoundError(
+                errno.ENOENT,
+                f"output {self.path} was removed or replaced during the run, so that no checkpoint "
+                "can count on it; the checkpoint before is kept, and the solution so far is in the "
+                "error",
+            )
         try:
             os.fsync(self._file)
         except OSError as error:
@@ -137,24 +152,26 @@ class OutputFile:
 
     def close(self) -> None:
         """Close the file; warn if it is not where it was."""
-        file, self._file = self._file, -1
-        if file >= 0:
-            there = is_at(file, self.path)
-            os.close(file)
-            if not there:
-                warn_of_removal(self.path)
+        there = self._is_there()
+        os.close(self._file)
+        if not there:
+            warnings.warn(
+                f"output {self.path} was removed or replaced during the run; what was written to "
+                "it is lost",
+                RuntimeWarning,
+                stacklevel=2,
+            )
 
-
-def replace_file(path: Path, data: bytes) -> None:
-    """Write a whole file; the one before stays until the new one is on the disk."""
-    try:
-        put_in_place(path, data)
-    except OSError as error:
-        raise failure(error, path) from None
+    def _is_there(self) -> bool:
+        """Return whether the path still leads to the file."""
+        try:
+            return os.path.samestat(os.fstat(self._file), os.stat(self.path))
+        except OSError:
+            return False
 
 
 def put_in_place(path: Path, data: bytes) -> None:
-    """Do as :func:`replace_file`, with the error of the system."""
+    """Write a whole file; the one before stays until the new one is on the disk."""
     part = path.parent / f"{path.name}.part"
     try:
         with part.open("wb") as file:
@@ -170,32 +187,6 @@ def put_in_place(path: Path, data: bytes) -> None:
         os.fsync(folder)
     finally:
         os.close(folder)
-
-
-def is_at(file: int, path: Path) -> bool:
-    """Return whether a path leads to an open file."""
-    try:
-        return os.path.samestat(os.fstat(file), os.stat(path))
-    except OSError:
-        return False
-
-
-def removed(path: Path) -> FileNotFoundError:
-    """Return the error of an output that is gone when a checkpoint is due."""
-    return FileNotFoundError(
-        errno.ENOENT,
-        f"output {path} was removed or replaced during the run, so that no checkpoint can count "
-        "on it; the checkpoint before is kept, and the solution so far is in the error",
-    )
-
-
-def warn_of_removal(path: Path) -> None:
-    """Warn that an output is not where it was."""
-    warnings.warn(
-        f"output {path} was removed or replaced during the run; what was written to it is lost",
-        RuntimeWarning,
-        stacklevel=2,
-    )
 
 
 def failure(error: OSError, path: Path) -> OSError:

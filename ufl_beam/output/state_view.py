@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from functools import cached_property
 
 from mpi4py import MPI
@@ -32,7 +33,7 @@ NO_REACTIONS = np.zeros((0, 3))
 NO_CONNECTIONS = np.zeros((0, len(Connection._fields)))
 
 
-class StateView:
+class StateView(ABC):
     """The state of a scene in words of the scene; all processes call its methods together."""
 
     scene: Scene
@@ -54,14 +55,14 @@ class StateView:
     _has_inelastic: bool
 
     @property
+    @abstractmethod
     def parameter(self) -> Parameter:
         """Time, or the load factor of a path."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def iterations(self) -> int:
         """Newton iterations so far."""
-        raise NotImplementedError
 
     def gather(self) -> Snapshot:
         """Gather the state of all processes."""
@@ -111,10 +112,6 @@ class StateView:
             {name: sum(one[g][name] for one in everyone) for name in group}
             for g, group in enumerate(groups)
         )
-
-    def ledger_names(self) -> list[str]:
-        """Names of the entries of the ledger."""
-        return [*self.ledger.state, *self.ledger.supplied, *self.ledger.lost]
 
     def connections(self) -> Array:
         """Columns of :class:`Connection` for all links of the scene; (num_links, 5)."""
