@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Index
+from ufl_beam.arrays import Array, Index, Snapshot
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import Fields, SectionForces
 from ufl_beam.discretization.partition import Share
@@ -21,7 +21,6 @@ from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 from ufl_beam.output.joint_histories import Connection, links_of, motion_of, velocity_of
-from ufl_beam.output.snapshot import Snapshot
 from ufl_beam.parameter import Parameter
 from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.energy_ledger import Ledger
