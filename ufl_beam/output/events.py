@@ -97,10 +97,10 @@ class Events(Recorder):
         self._breaks = np.isfinite(energies)
         links = simulation.scene.links
         self._links = [i for i, link in enumerate(links) if type(link.law) in BETWEEN]
-        self._flags = self._look(simulation)
+        self._in_cells, self._on = self._look(simulation)
 
-    def _look(self, simulation: StateView) -> tuple[Flags, list[bool]]:
-        """Return the events of each cell and hinge, and the state of each connector."""
+    def _look(self, simulation: StateView) -> tuple[Flags, Flags]:
+        """Return the events of each cell and hinge, (n, 3), and which connectors touch or slide."""
         in_cells = np.zeros((len(self._enough), len(IN_CELLS)), dtype=bool)
         for cells, rows in simulation.material():
             plastic, broken = rows[:, 4], rows[:, 5]
@@ -112,25 +112,22 @@ class Events(Recorder):
             happened = ((lost > 0) & ~breaks, (lost > 0) & breaks, lost >= self._enough[hinges])
             in_cells[hinges] = np.column_stack(happened)
         if not self._links:
-            return in_cells, []
+            return in_cells, np.zeros(0, dtype=bool)
         forces = np.abs(simulation.connections()[self._links, 1])
         # Forces above which they touch, or slide; the limit of friction is known to some digits
         links = (simulation.scene.links[link] for link in self._links)
         limits = [(1 - 1e-9) * simulation.asked.get(link, 0.0) for link in links]
-        return in_cells, [bool(goes_on) for goes_on in forces > limits]
+        return in_cells, np.asarray(forces > limits)
 
     def write(self, simulation: StateView) -> None:
         """Note the changes of a step."""
-        flags = self._look(simulation)
-        (cells, goes_on), (cells_before, went_on) = flags, self._flags
-        self._flags = flags
-        new: list[Row] = []
-        for cell, n in np.argwhere(cells & ~cells_before):
-            new.append((simulation.t, int(cell), IN_CELLS[n]))
-        for link, now, before in zip(self._links, goes_on, went_on, strict=True):
-            if now != before:
-                begins, ends = BETWEEN[type(simulation.scene.links[link].law)]
-                new.append((simulation.t, link, begins if now else ends))
+        (in_cells, on), t = self._look(simulation), simulation.t
+        changes = np.argwhere(in_cells & ~self._in_cells)
+        new = [(t, int(cell), IN_CELLS[n]) for cell, n in changes]
+        for k in np.flatnonzero(on != self._on):
+            begins, ends = BETWEEN[type(simulation.scene.links[self._links[k]].law)]
+            new.append((t, self._links[k], begins if on[k] else ends))
+        self._in_cells, self._on = in_cells, on
         events = self._add(simulation, new)
         if events:
             on_first(simulation.comm, lambda: [self._tell(event) for event in events])

@@ -162,8 +162,9 @@ def to_data(value: Any, sampling: Sampling = lost) -> Data:
         if isinstance(value, Mapping):
             pairs = [[describe(x, owner, field) for x in pair] for pair in value.items()]
             return {"mapping": pairs}
-        for name in (name for name, known in KNOWN.items() if value is known):
-            return {"known": name}
+        for name, known in KNOWN.items():
+            if value is known:
+                return {"known": name}
         if id(value) not in numbers:
             record = value
             if RECORDS.get(type(value).__name__) is not type(value):
