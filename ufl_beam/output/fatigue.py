@@ -117,28 +117,27 @@ class Fatigue(Recorder):
         self._cells = np.array([grid.cell(spot.place) for spot in self.spots], dtype=np.int64)
         self._arms = [_arm(grid, spot.place) for spot in self.spots]
         self._counters = {spot: RainflowCounter(self._resolution) for spot in self.spots}
-        self._block, self._filled = np.empty((len(self.spots), 3, BLOCK)), 0
+        self._block: list[Array] = []
 
     def write(self, simulation: StateView) -> None:
         """Note the section forces, and count now and then."""
-        self._block[..., self._filled] = simulation.section_forces()[self._cells]
-        self._filled += 1
+        self._block.append(simulation.section_forces()[self._cells])
         self._end = simulation.t
-        if self._filled == BLOCK:
+        if len(self._block) == BLOCK:
             self._count()
 
     def _count(self) -> None:
-        filled, self._filled = self._filled, 0
-        for spot, arm, forces in zip(self.spots, self._arms, list(self._block), strict=True):
-            N, V, M = (forces[i, :filled] for i in range(3))
-            stress = np.asarray(spot.stress(N, V, M - arm * V), dtype=np.float64)
+        forces, self._block = np.stack(self._block, axis=-1), []
+        for k, spot in enumerate(self.spots):
+            N, V, M = (forces[k, i] for i in range(3))
+            stress = np.asarray(spot.stress(N, V, M - self._arms[k] * V), dtype=np.float64)
             if stress.shape != N.shape or not np.isfinite(stress).all():
                 raise SceneError(f"HotSpot {spot}: stress(N, V, M) must be a finite number each")
             self._counters[spot].add(stress)
 
     def close(self) -> None:
         """Count the steps that are left."""
-        if self._counters and self._filled:
+        if self._counters and self._block:
             self._count()
 
     def state(self) -> State:

@@ -84,11 +84,10 @@ class History(Recorder):
         """Write the header and the initial state."""
         self._prepare(simulation)
         row = self._row(simulation)
-        self._every, self._steps, self._rows = self._first_every, 0, 0
+        self._every, self._steps = self._first_every, 0
         on_first(simulation.comm, lambda: self._begin(self._path, self._header + row))
 
     def _prepare(self, simulation: StateView) -> None:
-        """Note the objects that are followed, and the header."""
         self._comm = simulation.comm
         self._links = {
             link: name
@@ -116,16 +115,12 @@ class History(Recorder):
     def write(self, simulation: StateView) -> None:
         """Write the row of the state, every so many steps."""
         self._steps += 1
-        if self._steps % self._every:
-            return
-        if self._rows == self._most:
+        if self._steps == (self._most + 1) * self._every:
             on_first(simulation.comm, self._thin)
-            self._rows, self._every = self._rows // 2, 2 * self._every
-            if self._steps % self._every:
-                return
-        row = self._row(simulation)
-        self._rows += 1
-        on_first(simulation.comm, lambda: self._append(row))
+            self._every *= 2
+        if self._steps % self._every == 0:
+            row = self._row(simulation)
+            on_first(simulation.comm, lambda: self._append(row))
 
     def _thin(self) -> None:
         """Leave out every other row; at no time is there less than one whole file."""
@@ -145,8 +140,8 @@ class History(Recorder):
     def state(self) -> State:
         """Return the length of the file, and the whole of it where rows may go again."""
         on_first(self._comm, self._sync)
-        counts = np.array([self._every, self._steps, self._rows, 0], dtype=float)
-        content = b""
+        rows = self._steps // self._every
+        counts, content = np.array([self._every, self._steps, rows, 0], dtype=float), b""
         for file in self._files:
             counts[3] = self._length
             if self._most < sys.maxsize:
@@ -160,7 +155,7 @@ class History(Recorder):
     def resume(self, simulation: StateView, state: State) -> None:
         """Cut off what was written after the state, and append."""
         self._prepare(simulation)
-        self._every, self._steps, self._rows, length = map(int, state["counts"])
+        self._every, self._steps, _, length = map(int, state["counts"])
         on_first(simulation.comm, lambda: self._take_back(state["content"].tobytes(), length))
 
     def _take_back(self, content: bytes, length: int) -> None:
