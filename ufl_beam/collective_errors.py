@@ -69,7 +69,8 @@ class Agreement:
         if error is None:
             request.Wait()
         elif not _completed(request):
-            abort(comm, error)
+            traceback.print_exception(error)
+            abort(comm)
         urgency, rank = divmod(int(first[0]), comm.size)
         if urgency == 2:
             return
@@ -124,10 +125,8 @@ def _completed(*requests: MPI.Request) -> bool:
     return True
 
 
-def abort(comm: MPI.Intracomm, error: BaseException | None = None) -> None:
-    """Print an exception and end all processes."""
-    if error is not None:
-        traceback.print_exception(type(error), error, error.__traceback__)
+def abort(comm: MPI.Intracomm) -> None:
+    """End all processes, and say why."""
     print(  # noqa: T201
         f"ufl_beam: process {comm.rank} of {comm.size} failed; the others have not failed within "
         f"{GRACE:g} s and may wait for it, so all are ended",

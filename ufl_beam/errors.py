@@ -260,7 +260,8 @@ def require_memory(cells: int, what: str) -> None:
 
     Each process has the numbering of the whole scene.
     """
-    needed, there = cells * BYTES_PER_CELL, _physical_memory()
+    needed = cells * BYTES_PER_CELL
+    there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     if needed > there:
         raise SceneError(
             f"{what} would take {needed / 1e9:.3g} GB of memory; this machine has "
@@ -271,14 +272,6 @@ def require_memory(cells: int, what: str) -> None:
             f"{what} has more degrees of freedom than the 32-bit indices of PETSc can number. "
             "Take fewer cells"
         )
-
-
-def _physical_memory() -> float:
-    """Return the memory of the machine in bytes; infinity where the system does not tell."""
-    try:
-        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    except (AttributeError, OSError, ValueError):
-        return math.inf
 
 
 def require_vector(value: Any, what: str) -> tuple[float, float]:

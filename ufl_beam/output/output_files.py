@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from ufl_beam.errors import SceneError, shorten
+from ufl_beam.file_locks import is_at
 
 Output = tuple[str, tuple[Path, ...]]  # name of a writer in messages, and the files that it writes
 _in_use: list[Output] = []  # outputs of the runs that go on in this process, the outer ones first
@@ -137,7 +138,7 @@ class OutputFile:
 
     def sync(self) -> None:
         """Bring everything to the disk; :class:`FileNotFoundError` if the file was removed."""
-        if not self._is_there():
+        if not is_at(self._file, self.path):
             raise FileNotFoundError(
                 errno.ENOENT,
                 f"output {self.path} was removed or replaced during the run, so that no checkpoint "
@@ -152,7 +153,7 @@ class OutputFile:
 
     def close(self) -> None:
         """Close the file; warn if it is not where it was."""
-        there = self._is_there()
+        there = is_at(self._file, self.path)
         os.close(self._file)
         if not there:
             warnings.warn(
@@ -161,13 +162,6 @@ class OutputFile:
                 RuntimeWarning,
                 stacklevel=2,
             )
-
-    def _is_there(self) -> bool:
-        """Return whether the path still leads to the file."""
-        try:
-            return os.path.samestat(os.fstat(self._file), os.stat(self.path))
-        except OSError:
-            return False
 
 
 def put_in_place(path: Path, data: bytes) -> None:
