@@ -39,7 +39,7 @@ class Agreement:
 
     def __init__(self, comm: MPI.Intracomm) -> None:
         self._comm = duplicate(comm) if comm.size > 1 else None
-        self.raised: BaseException | None = None  # the latest one, by all processes together
+        self.raised: BaseException | None = None  # the latest that all processes raised together
 
     def __call__(self, function: Callable[..., T], *arguments: Any) -> T:
         """Call a function on all processes."""
@@ -56,7 +56,7 @@ class Agreement:
     def settle(self, error: BaseException | None) -> None:
         """Raise on all processes if one of them has an exception; all call it together.
 
-        A failed step, after which the run may go on, comes after any other exception.
+        A failed step, after which the run may go on, gives way to any other exception.
         """
         comm = self._comm
         if comm is None:

@@ -146,8 +146,7 @@ class TradeoffError(RuntimeError):
 def warn(message: str) -> None:
     """Issue a :class:`ModelWarning` that points at the line of the user's script."""
     level, frame = 1, sys._getframe()
-    # Not of this package, nor methods that ``dataclass`` writes.
-    library = (PACKAGE, "<string>")
+    library = (PACKAGE, "<string>")  # <string>: methods that ``dataclass`` writes
     while frame.f_back is not None and frame.f_code.co_filename.startswith(library):
         level, frame = level + 1, frame.f_back
     warnings.warn(message, ModelWarning, stacklevel=level)
@@ -172,7 +171,7 @@ def as_float(value: object) -> float:
     scalar: Any = value
     if getattr(scalar, "ndim", None) == 0:
         scalar = scalar.item()
-    if isinstance(scalar, str | bytes | bytearray) or hasattr(scalar, "__len__"):
+    if hasattr(scalar, "__len__"):
         raise TypeError("not a number")
     return float(scalar)
 

@@ -40,7 +40,7 @@ class Lock:
         self._file: IO[str] | None = None
 
     def take(self) -> str:
-        """Take the lock; return who has it, empty if it was free.
+        """Take the lock, or return who has it; an empty text if it was free.
 
         A file system that knows no locks locks nothing.
 

@@ -72,7 +72,7 @@ def _identities(path: Path) -> list[object]:
 
 
 def take(outputs: Iterable[Output]) -> Callable[[], None]:
-    """Keep runs within this one from writing its files, until the function returned is called."""
+    """Reserve the files of a run against runs within it; return the function that frees them."""
     taken = list(outputs)
     _in_use.extend(taken)
 
@@ -184,7 +184,7 @@ def put_in_place(path: Path, data: bytes) -> None:
 
 
 def failure(error: OSError, path: Path) -> OSError:
-    """Return an error in writing in words: file, reason, free space, kept content."""
+    """Describe an error of writing: the file, the reason, free space, and that content is kept."""
     space = ""
     if error.errno == errno.ENOSPC and path.is_file():
         space = f" ({shutil.disk_usage(path.parent).free / 1e6:.3g} MB are free)"

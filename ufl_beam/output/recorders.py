@@ -22,8 +22,8 @@ class Recorder(ABC):
 
     Example:
         >>> class Speed(ub.Recorder):
-        ...     largest = 0.0
-        ...     require_writable = open = close = lambda self, *simulation: None
+        ...     def open(self, simulation):
+        ...         self.largest = 0.0
         ...     def write(self, simulation):
         ...         self.largest = max(self.largest, abs(simulation.velocity(beam.end)[1]))
         >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=Speed())

@@ -143,7 +143,7 @@ def lost(owner: Any, field: str, function: Any) -> LostFunction:
 
 
 def to_data(value: Any, sampling: Sampling = lost) -> Data:
-    """Describe a scene, or another record, with a sampling of the functions of a user."""
+    """Describe a scene or another record as data; ``sampling`` replaces functions of a user."""
     records: list[Data] = []
     # By identity; the objects are kept, so that none gets the identity of another.
     numbers: dict[int, tuple[int, Any]] = {}

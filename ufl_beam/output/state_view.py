@@ -33,7 +33,7 @@ NO_CONNECTIONS = np.zeros((0, len(Connection._fields)))
 
 
 class StateView(ABC):
-    """The state of a scene in words of the scene; all processes call its methods together."""
+    """State at the present time, by objects of the scene; all processes call methods together."""
 
     scene: Scene
     comm: MPI.Intracomm  # all processes of the run

@@ -2,9 +2,9 @@
 """Time series of lines as VTKHDF: one HDF5 file, mesh written once, fields appended step by step.
 
 The layout is "UnstructuredGrid" of version 2.0 with "Steps", see the documentation of VTK's file
-formats; VTK 9.3, PyVista and ParaView 5.13 read it.  All data sets are made at the beginning, since
-a kill damages an HDF5 file more easily when one is made than when one grows.  HDF5 itself is not to
-meet a full disk, after which it dies: the space that a step may need is allocated before.
+formats; VTK 9.3, PyVista and ParaView 5.13 read it.  All data sets are made at the beginning: a
+process that is killed while one is made damages the file more easily than while one grows.  HDF5
+crashes when a disk is full, so the space that a step may need is allocated before.
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ class VtkhdfWriter:
         dataset.write(there, space, np.ascontiguousarray(values))
 
     def _cut(self) -> None:
-        """Cut off what is behind the last step; times first, of too many of which VTK 9.3 dies."""
+        """Cut off what is behind the last step; times first, of too many VTK 9.3 crashes."""
         self._times.set_extent((self.steps,))
         self._file.flush()
         self._attributes.modify("NSteps", np.int64(self.steps))
