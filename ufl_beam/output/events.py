@@ -23,8 +23,8 @@ from ufl_beam.parameter import TIME, Parameter
 Flags = npt.NDArray[np.bool_]
 
 IN_CELLS = ("yields", "opens", "is free")  # once in a cell; hinges and cracks open and end
-BETWEEN = {Stop: ("touches", "lets go"), Coulomb: ("slides", "sticks")}  # with their ends
-KINDS = (*IN_CELLS, *(kind for pair in BETWEEN.values() for kind in pair))  # all events
+OF_CONNECTORS = {Stop: ("touches", "lets go"), Coulomb: ("slides", "sticks")}  # with their ends
+KINDS = (*IN_CELLS, *(kind for pair in OF_CONNECTORS.values() for kind in pair))  # all events
 Row = tuple[float, int, str]  # time, number of the cell or connector, what
 BROKEN_PART = 0.999  # part of the energy of a hinge after which it is called a joint
 
@@ -96,7 +96,7 @@ class Events(Recorder):
         self._enough = np.where(breaking, BROKEN_PART * energies, np.inf)
         self._breaks = np.isfinite(energies)
         links = simulation.scene.links
-        self._links = [i for i, link in enumerate(links) if type(link.law) in BETWEEN]
+        self._links = [i for i, link in enumerate(links) if type(link.law) in OF_CONNECTORS]
         self._in_cells, self._on = self._look(simulation)
 
     def _look(self, simulation: StateView) -> tuple[Flags, Flags]:
@@ -125,7 +125,7 @@ class Events(Recorder):
         changes = np.argwhere(in_cells & ~self._in_cells)
         new = [(t, int(cell), IN_CELLS[n]) for cell, n in changes]
         for k in np.flatnonzero(on != self._on):
-            begins, ends = BETWEEN[type(simulation.scene.links[self._links[k]].law)]
+            begins, ends = OF_CONNECTORS[type(simulation.scene.links[self._links[k]].law)]
             new.append((t, self._links[k], begins if on[k] else ends))
         self._in_cells, self._on = in_cells, on
         events = self._add(simulation, new)

@@ -115,7 +115,7 @@ class Fatigue(Recorder):
 
     def _prepare(self, grid: Grid) -> None:
         self._cells = np.array([grid.cell(spot.place) for spot in self.spots], dtype=np.int64)
-        self._arms = [_arm(grid, spot.place) for spot in self.spots]
+        self._offsets = [_offset(grid, spot.place) for spot in self.spots]
         self._counters = {spot: RainflowCounter(self._resolution) for spot in self.spots}
         self._block: list[Array] = []
 
@@ -130,7 +130,7 @@ class Fatigue(Recorder):
         forces, self._block = np.stack(self._block, axis=-1), []
         for k, spot in enumerate(self.spots):
             N, V, M = (forces[k, i] for i in range(3))
-            stress = np.asarray(spot.stress(N, V, M - self._arms[k] * V), dtype=np.float64)
+            stress = np.asarray(spot.stress(N, V, M - self._offsets[k] * V), dtype=np.float64)
             if stress.shape != N.shape or not np.isfinite(stress).all():
                 raise SceneError(f"HotSpot {spot}: stress(N, V, M) must be a finite number each")
             self._counters[spot].add(stress)
@@ -191,7 +191,7 @@ class Fatigue(Recorder):
         return "\n".join(lines)
 
 
-def _arm(grid: Grid, place: Place) -> float:
+def _offset(grid: Grid, place: Place) -> float:
     """Distance of a place from the middle of its cell, positive towards the end; m."""
     nodes, weights = grid.weights(place)
     start, end = grid.points[nodes[:2]]

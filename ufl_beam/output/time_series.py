@@ -46,6 +46,7 @@ class LineData:
         self._ends = slice(len(grid.points), None)
         self._arms = np.reshape([arm(anchor) for anchor in ends], (-1, 2))
         links = simulation.scene.links
+        # Lines, and the links whose forces act along them
         self._pulls = {k: links.index(rod.along) for k, rod in enumerate(rods) if rod.along}
         self._pieces_of_cell, self._num_rods = grid.mesh.degree, len(rods)
 
