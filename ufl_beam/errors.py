@@ -244,7 +244,7 @@ def require_text(value: Any, what: str) -> None:
 
 def require_switch(value: Any, what: str) -> None:
     """Raise :class:`SceneError` naming ``what`` unless ``value`` is True or False."""
-    if type(value).__name__ not in ("bool", "bool_"):
+    if not isinstance(value, bool | np.bool_):
         raise SceneError(f"{what} = {shorten(value)} must be True or False")
 
 
