@@ -16,7 +16,7 @@ from ufl_beam.errors import SceneError
 from ufl_beam.model.constraint_checks import require_independent
 from ufl_beam.model.damping import Damping, KelvinVoigt, Rayleigh
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.line_data import spots_of
+from ufl_beam.output.scene_lines import spots_of
 from ufl_beam.plotting.diagrams import plot_state
 from ufl_beam.plotting.labels import Placed, leader_of, place
 from ufl_beam.plotting.load_symbols import CAPTIONS, NAMES, badge

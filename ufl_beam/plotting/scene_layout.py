@@ -18,7 +18,7 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import Curve, nearest, parameter_step, tangent
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.joint_histories import motion_of, turned
-from ufl_beam.output.line_data import spots_of
+from ufl_beam.output.scene_lines import spots_of
 from ufl_beam.simulation.solution import Solution
 
 Range = tuple[float, float]  # of a slider along its rail from its place, m; or guide parameter

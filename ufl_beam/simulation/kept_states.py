@@ -5,9 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Index
+from ufl_beam.arrays import Array, Index, Snapshot
 from ufl_beam.discretization.state_io import State
-from ufl_beam.output.snapshot import Snapshot
 
 LEDGER = ("state", "supplied", "lost")
 """The parts of the ledger, see :class:`~ufl_beam.terms.energy_ledger.Energy`."""

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from ufl_beam.arrays import Array
+from ufl_beam.arrays import Array, Snapshot
 from ufl_beam.collective_errors import on_first
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError
-from ufl_beam.model.bodies import Anchor, Member, Place, Spot
+from ufl_beam.model.bodies import Anchor, Member, Place
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
@@ -26,10 +26,10 @@ from ufl_beam.output.joint_histories import (
     links_of,
     motion_of,
     of_joint,
+    position_of,
     velocity_of,
 )
 from ufl_beam.output.output_files import require_path
-from ufl_beam.output.snapshot import Snapshot
 from ufl_beam.parallel import active_comm
 from ufl_beam.parameter import TIME
 from ufl_beam.simulation.cell_results import CellResults, Material
@@ -180,10 +180,7 @@ class Solution:
 
     def position(self, place: Anchor) -> Array:
         """Coordinates of a place; (n+1, 2); m."""
-        if isinstance(place, Spot):
-            return np.asarray(place.point + self.displacement(place)[:, :2])
-        nodes, weights = self.grid.weights(place)
-        return np.asarray(weights @ self.grid.points[nodes] + self.displacement(place)[:, :2])
+        return position_of(self.grid, place, self._kept.q)
 
     # -- joints --------------------------------------------------------------------------------
 
@@ -203,7 +200,7 @@ class Solution:
             SceneError: It is not in the scene.
         """
         connections = np.array(self._kept.connections or np.zeros((0, 0, 5)))
-        return of_joint(self, joint, connections[..., 1])
+        return of_joint(self.grid, joint, self._kept.q, connections[..., 1])
 
     def shape(self, beam: Member, n: int = -1) -> Array:
         """Coordinates of the vertices of a beam at the n-th kept time; (num_vertices, 2); m."""
