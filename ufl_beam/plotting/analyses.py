@@ -16,7 +16,7 @@ from ufl_beam.errors import SceneError
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import Fatigue, HotSpot
 from ufl_beam.plotting import drawing, style
-from ufl_beam.plotting.diagrams import draw_diagrams, finish
+from ufl_beam.plotting.diagrams import draw_frame
 from ufl_beam.plotting.style import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY, picture
 from ufl_beam.simulation.solution import Solution
 
@@ -47,11 +47,7 @@ def plot_modes(shapes: Shapes, which: Sequence[int] = (), *, amplitude: float = 
         raise SceneError("plot_modes: there is no shape")
     swings = [shapes.motion(k, amplitude=amplitude, count=2) for k in chosen]
     stages = [drawing.plane_stage(swing, [0, 1], 1.0) for swing in swings]
-    ends = [(drawing.moved_points(s, 0, 1.0), drawing.moved_points(s, 1, 1.0)) for s in swings]
-    bodies = [stage.pose(n).points() for stage in stages for n in (0, 1)]
-    box = np.concatenate(
-        [shapes.grid.points, *bodies, *(points for pair in ends for points in pair)]
-    )
+    box = np.concatenate([stage.points() for stage in stages])
     low, high = box.min(axis=0), box.max(axis=0)
     # Room for the symbols of supports.
     room = 0.08 * np.hypot(*(high - low))
@@ -62,13 +58,12 @@ def plot_modes(shapes: Shapes, which: Sequence[int] = (), *, amplitude: float = 
         grid = np.ravel(figure.subplots(rows, columns, squeeze=False))
         for axes in grid:
             axes.set_axis_off()
-        for k, swing, stage, (there, back), axes in zip(
-            chosen, swings, stages, ends, grid, strict=False
-        ):
+        for k, swing, stage, axes in zip(chosen, swings, stages, grid, strict=False):
+            there, back = stage.pose(0), stage.pose(1)
             drawing.draw_undeformed(axes, swing, stage)
-            drawing.draw_axes(axes, swing, back, color=SKY, linewidth=1.6, zorder=2)
-            drawing.draw_axes(axes, swing, there, color=BLUE, linewidth=2.6, zorder=4)
-            drawing.draw_symbols(axes, stage.pose(0))
+            drawing.draw_axes(axes, swing, back.nodes, color=SKY, linewidth=1.6, zorder=2)
+            drawing.draw_axes(axes, swing, there.nodes, color=BLUE, linewidth=2.6, zorder=4)
+            drawing.draw_symbols(axes, there)
             axes.set_title(f"{k}: {shapes.titles[k]}", loc="left")
             axes.set(aspect="equal", xlim=(low[0] - room, high[0] + room))
             axes.set_ylim(low[1] - room, high[1] + room)
@@ -138,25 +133,17 @@ def plot_extremes(solution: Solution, extremes: Extremes, what: str = "M") -> Fi
         >>> ub.plot_extremes(run, extremes, "M").savefig("extremes.png")
     """
     style.require_choice(what, style.RESULTANTS, "plot_extremes: what")
-    index, points = list(style.RESULTANTS).index(what), solution.grid.points
-    reached = [extremes.section_forces(beam) for beam in solution.scene.beams]
-    # Constant in each cell
+    index = list(style.RESULTANTS).index(what)
+    reached = [(beam, extremes.section_forces(beam)) for beam in solution.scene.beams]
     diagrams = [
-        [np.repeat(values[:, index, None], 2, axis=1) for values in one]
-        for one in ([e.high for e in reached], [e.low for e in reached])
+        (beam, np.repeat(values[:, index, None], 2, axis=1))  # constant in each cell
+        for beam, found in reached
+        for values in (found.high, found.low)
     ]
-    stage = drawing.plane_stage(solution, [0], 1.0)
-    pose = stage.pose(0)
-    with picture(drawing.plane_size(points, pose.points())) as figure:
-        until = solution.parameter.at(solution.times[-1])
-        axes = style.plane_axes(
-            figure, f"extremes of the {style.RESULTANTS[what][0]} {what} until {until}"
-        )
-        found = draw_diagrams(axes, solution, what, diagrams, points)
-        drawing.draw_axes(axes, solution, points, color=INK, linewidth=2.6, zorder=4)
-        drawing.draw_symbols(axes, pose)
-        finish(figure, axes, found)
-    return figure
+    until = solution.parameter.at(solution.times[-1])
+    title = f"extremes of the {style.RESULTANTS[what][0]} {what} until {until}"
+    pose = drawing.plane_stage(solution, [], 1.0).undeformed
+    return draw_frame(solution, pose, title, what, diagrams)
 
 
 def plot_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:

@@ -108,13 +108,12 @@ def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Fig
     """
     from matplotlib.collections import LineCollection
 
-    points, grid = drawing.moved_points(solution, n, magnify), solution.grid
-    density = _dissipated_per_length(solution, n)
+    grid = solution.grid
     stage = drawing.plane_stage(solution, [n], magnify)
-    pose = stage.pose(n)
+    pose, density = stage.pose(n), _dissipated_per_length(solution, n)
     # Corners of a box that is in no direction less than a third of the other: the broad lines of a
     # slender frame would else be cut at the edge.
-    everything = np.concatenate([grid.points, points, pose.points()])
+    everything = stage.points()
     low, high = everything.min(axis=0), everything.max(axis=0)
     more = np.maximum(0.0, (high - low).max() / 3 - (high - low)) / 2
     room = np.array([low - more, high + more])
@@ -126,14 +125,14 @@ def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Fig
         axes = style.plane_axes(figure, f"damage at {time}{style.magnified(magnify)}")
         axes.update_datalim(room)
         drawing.draw_undeformed(axes, solution, stage)
-        drawing.draw_axes(axes, solution, points, color=INK, linewidth=2.0, zorder=2)
+        drawing.draw_axes(axes, solution, pose.nodes, color=INK, linewidth=2.0, zorder=2)
         drawing.draw_symbols(axes, pose)
         yielded = density > 0.0
         if yielded.any():
             unit, prefix = style.decimal_prefix(float(density.max()))
             colors = style.scale("YlOrRd", 0.2, 1.0, 0.0, float(density.max()) / unit)
             zones = LineCollection(
-                list(points[grid.cells[yielded]]),
+                list(pose.nodes[grid.cells[yielded]]),
                 colors=colors.to_rgba(density[yielded] / unit),
                 linewidths=11.0, capstyle="butt", zorder=3,
             )  # fmt: skip
@@ -142,7 +141,7 @@ def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Fig
             cracks = any(p is not None and p.fibres.softening is not None for p in placed)
             title = "dissipated by plastic strains" + (" and cracks" if cracks else "")
             style.draw_bar(figure, axes, colors, f"{title} ({prefix}J/m)")
-        _draw_hinges(figure, axes, solution, n, points)
+        _draw_hinges(figure, axes, solution, n, pose.nodes)
         drawing.make_room(figure, axes)
     return figure
 

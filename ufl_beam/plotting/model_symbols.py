@@ -20,7 +20,7 @@ from ufl_beam.plotting import load_symbols, symbols
 from ufl_beam.plotting.connector_glyphs import law_in_words
 from ufl_beam.plotting.labels import Label, Spot
 from ufl_beam.plotting.load_symbols import CAPTIONS, NAMES, Sizes, along_axis, around, left_of
-from ufl_beam.plotting.scene_layout import Model, Pose
+from ufl_beam.plotting.scene_layout import Pose, Stage
 from ufl_beam.plotting.style import GREY, INK, ORANGE, WHITE, Stroke, with_unit
 from ufl_beam.plotting.symbols import Footing
 
@@ -85,7 +85,7 @@ def draw(subject: Subject, scale: float) -> Drawing:
     unit = SYMBOL * scale * min(max(typical / SHORT_BEAM, SMALLEST), 1.0)
     few = len(scene.supports) + len(scene.loads) <= MOST_LABELS / 2
     outside = max(unit, 0.7 * SYMBOL * scale) if few else unit
-    pose = Model(scene, unit).undeformed
+    pose = Stage(scene, 1.0, unit).undeformed
     sizes = Sizes(outside, 1 / scale, subject.axes, subject.ways, subject.largest, {})
     drawing = Drawing()
     _draw_beams(drawing, subject, unit, scale)

@@ -19,7 +19,7 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.parallel import active_comm
-from ufl_beam.plotting.drawing import evenly, moved_points, open_hinges
+from ufl_beam.plotting.drawing import evenly, open_hinges
 from ufl_beam.plotting.solids import Look, Solids
 from ufl_beam.plotting.style import magnified
 from ufl_beam.simulation.solution import Solution
@@ -66,7 +66,7 @@ def render(
 
     look = Look(solution, color, thickness, magnify, size)
     path = _require_suffix(path, (".png",))
-    moved_points(solution, n, magnify)
+    look.stage([n]).pose(n)
     if active_comm().rank == 0:
         with _film(look, [n]) as frames:
             for frame in frames:
@@ -142,12 +142,11 @@ def _frames(pyvista: Any, plotter: Any, look: Look, shown: list[int]) -> Iterato
     plotter.enable_anti_aliasing("msaa")
     for n in shown:
         plotter.suppress_rendering = True
-        points = moved_points(look.solution, n, look.magnify)
         pose = stage.pose(n)
         if beams:
-            solids.add_beams(n, points, largest)
+            solids.add_beams(n, pose.nodes, largest)
         solids.add_strokes(pose)
-        solids.add_fittings(pose, open_hinges(look.solution, n, points))
+        solids.add_fittings(pose, open_hinges(look.solution, n, pose.nodes))
         time = look.solution.parameter.at(look.solution.times[n], ".3f")
         solids.add_text(f"{time}{magnified(look.magnify)}", (0.02, 0.93))
         plotter.reset_camera_clipping_range()

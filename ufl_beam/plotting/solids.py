@@ -14,7 +14,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import require_number
 from ufl_beam.model.bodies import Anchor, Member, Place
 from ufl_beam.plotting import style, symbols
-from ufl_beam.plotting.drawing import OpenHinge, moved_points
+from ufl_beam.plotting.drawing import OpenHinge
 from ufl_beam.plotting.scene_layout import Pose, Stage
 from ufl_beam.plotting.symbols import FILLED, Pin
 from ufl_beam.simulation.solution import Solution
@@ -97,10 +97,7 @@ class Look:
 
     def bounds(self, shown: list[int]) -> Array:
         """Compute lower and upper corner of the box around these states; (2, 3); m."""
-        margin, stage = 2.2 * self.symbol, self.stage(shown)
-        shapes = [moved_points(self.solution, n, self.magnify) for n in set(shown)]
-        poses = [stage.undeformed, *(stage.pose(n) for n in set(shown))]
-        xy = np.concatenate([self.solution.grid.points, *shapes, *(p.points() for p in poses)])
+        margin, xy = 2.2 * self.symbol, self.stage(shown).points()
         half = max(self.widest, *map(self.depth, self.solution.scene.beams), 0.0) / 2
         low, high = xy.min(axis=0) - margin, xy.max(axis=0) + margin
         return np.array([[*low, -half], [*high, half]])
