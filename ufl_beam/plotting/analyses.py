@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ufl_beam.analysis.modes import Shapes
-from ufl_beam.analysis.tradeoff_result import Tradeoff
+from ufl_beam.analysis.tradeoff_result import Run, Tradeoff
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError
 from ufl_beam.output.extremes import Extremes
@@ -48,10 +48,10 @@ def plot_modes(shapes: Shapes, which: Sequence[int] = (), *, amplitude: float = 
     swings = [shapes.motion(k, amplitude=amplitude, count=2) for k in chosen]
     stages = [drawing.plane_stage(swing, [0, 1], 1.0) for swing in swings]
     box = np.concatenate([stage.points() for stage in stages])
-    low, high = box.min(axis=0), box.max(axis=0)
-    # Room for the symbols of supports.
-    room = 0.08 * np.hypot(*(high - low))
-    width, height = high - low + 2 * room
+    # Room for the symbols of supports
+    room = 0.08 * np.hypot(*np.ptp(box, axis=0))
+    corners = np.array([box.min(axis=0) - room, box.max(axis=0) + room])
+    width, height = np.ptp(corners, axis=0)
     columns = min(len(chosen), 3 if height < 0.8 * width else 4)
     rows = -(-len(chosen) // columns)
     with picture((4.0 * columns, rows * (4.0 * height / width + 0.5))) as figure:
@@ -65,8 +65,7 @@ def plot_modes(shapes: Shapes, which: Sequence[int] = (), *, amplitude: float = 
             drawing.draw_axes(axes, swing, there.nodes, color=BLUE, linewidth=2.6, zorder=4)
             drawing.draw_symbols(axes, there)
             axes.set_title(f"{k}: {shapes.titles[k]}", loc="left")
-            axes.set(aspect="equal", xlim=(low[0] - room, high[0] + room))
-            axes.set_ylim(low[1] - room, high[1] + room)
+            axes.set(aspect="equal", xlim=corners[:, 0], ylim=corners[:, 1])
     return figure
 
 
@@ -84,6 +83,10 @@ def plot_tradeoff(tradeoff: Tradeoff) -> Figure:
         >>> found = ub.tradeoff(scene, tip, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance=0.01)
         >>> ub.plot_tradeoff(found).savefig("tradeoff.png")
     """
+
+    def error(run: Run) -> float:
+        return max(tradeoff.ratio(run), LEAST_ERROR)
+
     with picture((9.0, 6.0)) as figure:
         axes = figure.subplots()
         looks = cycle(product("os^", (BLUE, RED, GREEN, ORANGE, PINK, SKY)))
@@ -91,19 +94,16 @@ def plot_tradeoff(tradeoff: Tradeoff) -> Figure:
             marker, color = look
             runs = [run for run in tradeoff.runs if run.refinement.family == family]
             axes.scatter(
-                [run.seconds for run in runs],
-                [max(tradeoff.ratio(run), LEAST_ERROR) for run in runs],
+                [run.seconds for run in runs], [error(run) for run in runs],
                 s=[30 + 12 * np.log2(run.cells) for run in runs],
                 marker=marker, color=color, alpha=0.75, lw=0, label=f"from {name}", zorder=3,
             )  # fmt: skip
-        front = tradeoff.front
-        seconds, errors = [r.seconds for r in front], [tradeoff.ratio(r) for r in front]
-        axes.plot(seconds, np.maximum(errors, LEAST_ERROR), color=INK, lw=1.2, zorder=2)
-        best = (tradeoff.best.seconds, max(tradeoff.ratio(tradeoff.best), LEAST_ERROR))
-        axes.plot(*best, "o", ms=18, mfc="none", mec=INK, mew=1.8, zorder=4)
+        front, best = tradeoff.front, tradeoff.best
+        axes.plot([r.seconds for r in front], [*map(error, front)], color=INK, lw=1.2, zorder=2)
+        axes.plot(best.seconds, error(best), "o", ms=18, mfc="none", mec=INK, mew=1.8, zorder=4)
         axes.set(xscale="log", yscale="log", xlabel="wall time of a run (s)")
         axes.set_ylabel(f"error ({tradeoff.target.measure})")
-        axes.set_title(f"recommended: {tradeoff.best.dials}", loc="left", fontsize=11)
+        axes.set_title(f"recommended: {best.dials}", loc="left", fontsize=11)
         time, ratio = tradeoff.target.bounds
         for draw, bound in ((axes.axvline, time), (axes.axhline, ratio)):
             if np.isfinite(bound):
@@ -176,22 +176,22 @@ def plot_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:
     with picture((13.0, 5.0)) as figure:
         matrix, spectrum, damage = figure.subplots(1, 3, sharey=True, width_ratios=(1.25, 1, 0.8))
         _draw_matrix(figure, matrix, edges, ranges, means, cycles.count)
-        matrix.set(xlabel="mean stress (MPa)", ylabel="stress range (MPa)", title="cycles")
+        matrix.set(xlabel="mean stress (MPa)", ylabel="stress range (MPa)")
         more = np.cumsum(cycles.count[::-1])[::-1]
         spectrum.plot(more, ranges, color=BLUE, drawstyle="steps-post", label="reached")
         some = np.linspace(edges[1] / 10, 1.1 * edges[-1], 1000)
         spectrum.plot(curve.endurance(1e6 * some), some, color=INK, lw=1.4, ls="--", label="borne")
-        spectrum.set(xscale="log", xlabel="number of cycles", title="spectrum and S-N curve")
+        spectrum.set(xscale="log", xlabel="number of cycles")
         spectrum.legend(loc="lower left")
         total = done.sum()
         parts, _ = np.histogram(ranges, edges, weights=done / (total or 1.0))
         damage.barh(edges[:-1], 100 * parts, np.diff(edges), align="edge", color=RED, alpha=0.6)
-        damage.set(xlabel="part of the damage (%)", title=f"damage {total:.3g}")
-        for axes in (matrix, spectrum, damage):
-            axes.set_title(axes.get_title(), loc="left")
-            axes.set_title("")
+        damage.set(xlabel="part of the damage (%)")
+        matrix.set_ylim(0.0, 1.1 * edges[-1])
+        titles = "cycles", "spectrum and S-N curve", f"damage {total:.3g}"
+        for axes, title in zip((matrix, spectrum, damage), titles, strict=True):
+            axes.set_title(title, loc="left")
             axes.tick_params(labelsize=12, color="#888888")
-            axes.set_ylim(0.0, 1.1 * edges[-1])
     return figure
 
 

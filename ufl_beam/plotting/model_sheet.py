@@ -98,7 +98,7 @@ class Sheet:
         self.strokes[group] += strokes
 
     def write(self, text: str, color: str, rank: int, spots: Spots) -> None:
-        """Add a label."""
+        """Add a label with the places where it may stand."""
         self.labels.append(Label(text, color, rank, spots))
 
     def everything(self) -> Iterator[Stroke]:
