@@ -88,10 +88,13 @@ def _best(
     covered = areas_covered(low, high, boxes)
     cost = DISTANCE_COST * gaps + RANK_COST * np.tile(np.arange(len(label.spots)), number)
     cost += LINE_COST * lengths_inside(low, high, near) + LABEL_COST * covered
-    cost += CROSSING_COST * leads * (crossings(ends, sides) + 0.1 * crossings(ends, near))
     if frame is not None:
         beyond = np.maximum(frame[:2] - low, 0.0) + np.maximum(high - frame[2:], 0.0)
         cost += OUTSIDE_COST * beyond.sum(axis=1)
+    # Those that would be worse than the best one without a leader are not looked at.
+    some = np.flatnonzero(leads & (cost < cost[~leads].min(initial=np.inf)))
+    crossed = crossings(ends[some], sides) + 0.1 * crossings(ends[some], near)
+    cost[some] += CROSSING_COST * crossed
     best = int(np.argmin(cost))
     overlap = float(covered[best] / np.prod(high[best] - low[best]))
     return Placed(label, centers[best], half, spots[best], overlap)

@@ -112,11 +112,8 @@ def plot_energy(solution: Solution) -> Figure:
     """
     energy, precision = solution.energy, float(np.finfo(np.float64).eps)
     along = solution.progress
-    entries = [
-        (name, values, line)
-        for group, line in ((energy.state, "-"), (energy.supplied, "--"), (energy.lost, ":"))
-        for name, values in group.items()
-    ]
+    groups = (energy.state, "-"), (energy.supplied, "--"), (energy.lost, ":")
+    entries = [(name, values, line) for group, line in groups for name, values in group.items()]
     with style.picture((8.0, 6.0)) as figure:
         ledger, check = map(
             style.time_axes, figure.subplots(2, 1, sharex=True, height_ratios=(2.4, 1))

@@ -31,7 +31,7 @@ Meshes = defaultdict[str, list[Any]]  # meshes of PyVista, by colours
 
 @dataclass(frozen=True)
 class Solids:
-    """Solution as solid bodies, in the way that the arguments of :func:`render` say."""
+    """Solid bodies of a solution, as the arguments of :func:`render` ask for them, checked."""
 
     solution: Solution
     color: str
@@ -78,13 +78,12 @@ class Solids:
 
     def values(self, n: int) -> Array:
         """Values of the colours in all cells or, of rotations, at all vertices of beams."""
-        grid, beams = self.solution.grid, self.solution.scene.beams
+        solution, grid = self.solution, self.solution.grid
         if self.color == "rotation":
-            found = [self.solution.q[n][grid.dofs[grid.vertices_of(beam), 2]] for beam in beams]
-        else:
-            index = list(RESULTANTS).index(self.color)
-            found = [self.solution.section_forces(beam, n)[:, index] for beam in beams]
-        return np.concatenate(found) if found else np.empty(0)
+            return np.asarray(solution.q[n][grid.dofs[: grid.first_vertices[-1], 2]])
+        index = list(RESULTANTS).index(self.color)
+        forces = [solution.section_forces(beam, n)[:, index] for beam in solution.scene.beams]
+        return np.concatenate([np.empty(0), *forces])
 
     def beams(self, n: int, pose: Pose, factor: float) -> Any:
         """Make a hexahedron for each cell of the beams, with values that are the colours."""
@@ -121,7 +120,7 @@ class Solids:
         return _polyline([np.insert(axis, 2, 0.0, axis=1) for axis in axes])
 
     def others(self, n: int, pose: Pose) -> Meshes:
-        """Make all but the beams."""
+        """Make bodies, joints, connectors, masses and supports."""
         found: Meshes = defaultdict(list)
         self._add_strokes(found, pose)
         self._add_fittings(found, n, pose)
