@@ -111,7 +111,11 @@ def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Fig
     grid = solution.grid
     stage = drawing.plane_stage(solution, [n], magnify)
     pose, density = stage.pose(n), _dissipated_per_length(solution, n)
-    with style.picture(drawing.plane_size(stage.points())) as figure:
+    points = stage.points()
+    (width, height), (length, rise) = drawing.plane_size(points), np.ptp(points, axis=0)
+    # Upright frames need less; the bar and the legend have their own widths.
+    across = height * length / max(rise, 1e-12)
+    with style.picture((min(width, max(6.0, across + 3.0)), height)) as figure:
         time = solution.parameter.at(solution.times[n])
         axes = style.plane_axes(figure, f"damage at {time}{style.magnified(magnify)}")
         axes.set_adjustable("datalim")  # room for the broad lines of a slender frame
