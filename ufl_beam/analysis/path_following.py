@@ -21,7 +21,7 @@ from ufl_beam.model.connector_laws import Actuator, Controller, Motor
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.time_functions import TimeFunction
-from ufl_beam.output.archive import below
+from ufl_beam.output.archive import above, below
 from ufl_beam.output.output_files import take
 from ufl_beam.output.recorders import Recorder, close_all, recorders_of
 from ufl_beam.parallel import communicator
@@ -29,8 +29,6 @@ from ufl_beam.parameter import FACTOR
 from ufl_beam.simulation.run import partial_results
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.solution_files import arrays_of
-from ufl_beam.simulation.solution_files import take as take_solution
 from ufl_beam.solvers.newton_options import Newton
 
 
@@ -59,8 +57,7 @@ class Path(Solution):
         text["critical"] = [{"kind": c.kind, "factor": c.factor, "n": c.n} for c in self.critical]
         for k, point in enumerate(self.critical):
             arrays[f"critical/{k}/mode"] = point.mode
-            for name, values in arrays_of(point.state).items():
-                arrays[f"critical/{k}/state/{name}"] = values
+            arrays |= above(f"critical/{k}/state/", point.state._arrays())
         return text, arrays
 
     def _take(self, text: dict[str, Any], arrays: State) -> None:
@@ -68,7 +65,7 @@ class Path(Solution):
         critical = []
         for k, one in enumerate(text["critical"]):
             state, prefix = Solution(self.scene, self.grid), f"critical/{k}/state/"
-            take_solution(state, text, below(prefix, arrays))
+            state._take(text, below(prefix, arrays))
             critical.append(CriticalPoint(**one, state=state, mode=arrays[f"critical/{k}/mode"]))
         self.critical = critical
 

@@ -12,7 +12,7 @@ from ufl_beam.analysis.critical_points import Branch, CriticalPoint, Direction, 
 from ufl_beam.analysis.path_corrector import Control, GivenLoadFactor, PathCorrector
 from ufl_beam.errors import StepFailed
 from ufl_beam.simulation.simulation import Simulation
-from ufl_beam.simulation.step_cutting import Trial
+from ufl_beam.simulation.step_solver import Trial
 
 ADVICE = (
     "Try a shorter step or another control: ArcLength goes through limit points of loads and of "

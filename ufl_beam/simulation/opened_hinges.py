@@ -13,22 +13,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Index
+from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import ModelWarning
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.bodies import Member, Place
 from ufl_beam.model.fibres import Layout
+from ufl_beam.output.snapshot import Snapshot
 
 LARGE = 0.05
 """Part of its limit from which a run warns that the place of an embedded hinge shifts it."""
 
 TINY = 1e-6
 """Opening, as a part of energy / limit, over which the first slope of a resistance is taken."""
-
-Kept = Sequence[Sequence[tuple[Index, Array]]]
-"""At each kept time: groups of cells, and rows that begin with N, V, M; the sixth entry is the
-dissipated energy of the discontinuities."""
 
 
 class OpenedHinges(NamedTuple):
@@ -56,19 +53,18 @@ class Opened:
             (num_cells,); N.
     """
 
-    def __init__(self, grid: Grid, kept: Kept) -> None:
+    def __init__(self, grid: Grid, kept: Sequence[Snapshot]) -> None:
         self._grid = grid
-        self.first = np.full(len(grid.cells), -1)
-        self.shear, before = np.zeros((2, len(grid.cells)))
-        if not any((rows[:, 5] > 0).any() for _, rows in kept[-1]):
+        self.first, self.shear = np.full(len(grid.cells), -1), np.zeros(len(grid.cells))
+        open_now = kept[-1].material[:, 6] > 0
+        if not open_now.any():
             return
-        for n, groups in enumerate(kept):
-            for cells, rows in groups:
-                V, new = np.abs(rows[:, 1]), (rows[:, 5] > 0) & (self.first[cells] < 0)
-                self.first[cells[new]] = n
-                # After an opening in a jump V is that of vibrations.
-                self.shear[cells[new]] = (before[cells] if n > 1 else V)[new]
-                before[cells] = V
+        cells = kept[-1].material[open_now, 0].astype(np.int64)
+        dissipated, V = (np.array([s.material[open_now, k] for s in kept]) for k in (6, 2))
+        self.first[cells] = first = (dissipated > 0).argmax(axis=0)
+        # After an opening in a jump V is that of vibrations.
+        n = np.where(first > 1, first - 1, first)
+        self.shear[cells] = np.abs(V[n, np.arange(len(cells))])
 
     def hinges(self) -> list[OpenedHinges]:
         """Embedded hinges, laws of sections, that opened in the run; beam by beam."""

@@ -18,6 +18,7 @@ from ufl_beam.errors import SceneError, require_count, require_kind, require_num
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
+from ufl_beam.output.archive import above, below
 from ufl_beam.output.output_files import take
 from ufl_beam.output.recorders import Recorder, close_all, recorders_of
 from ufl_beam.parallel import communicator, in_study, say
@@ -27,7 +28,7 @@ from ufl_beam.simulation.initial_state import mesh_of
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_control import Adaptive, AdaptiveSteps, EqualSteps, Pace
-from ufl_beam.simulation.step_cutting import MOST_PARTS
+from ufl_beam.simulation.step_solver import MOST_PARTS
 from ufl_beam.solvers.newton_options import Newton
 
 BAR = "{percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
@@ -108,7 +109,7 @@ def simulate(
         for recorder in recorders:
             if type(recorder).state is Recorder.state:
                 recorder.state()  # raises: it does not say how to go on
-        keeper = Keeper(checkpoint, call, step, comm)
+        keeper = Keeper(checkpoint, call, step, t1, comm)
     with ExitStack() as stack:
         if keeper is not None:
             stack.callback(keeper.close)
@@ -129,10 +130,25 @@ def simulate(
         )
 
         def go_on(keeper: Keeper) -> None:
-            states = keeper.resume(simulation, pace, t1)
-            solution.time_error = pace.error
-            for recorder, state in zip(recorders, states, strict=False):
-                recorder.resume(simulation, state)
+            found = keeper.found
+            simulation.resume(below("state/", found))
+            solution.resume(below("history/", found))
+            solution.parts, solution.iterations = simulation.parts, simulation.iterations
+            pace.restore(found["pace"])
+            solution.seconds, solution.time_error = found["seconds"], pace.error
+            keeper.resume(pace.steps)
+            for i, recorder in enumerate(recorders):
+                recorder.resume(simulation, below(f"recorder {i}/", found))
+
+        def write(keeper: Keeper) -> None:
+            content = {
+                "seconds": time.perf_counter() - begin, "pace": pace.state(),
+                "stateful": simulation.together(keeper.states),
+                **above("state/", simulation.state()),
+            }  # fmt: skip
+            for i, recorder in enumerate(recorders):
+                content |= above(f"recorder {i}/", recorder.state())
+            keeper.write(content, solution, pace.steps)
 
         def after_step() -> None:
             solution.time_error = pace.error
@@ -145,8 +161,8 @@ def simulate(
                     solution.every *= 2
             for recorder in recorders:
                 recorder.write(simulation)
-            if keeper is not None:
-                keeper.note(simulation, pace, recorders)
+            if keeper is not None and (keeper.due(pace.steps) or pace.finished):
+                write(keeper)
 
         stack.callback(close_all, recorders)
         stack.callback(take(outputs))

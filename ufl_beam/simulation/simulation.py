@@ -35,15 +35,15 @@ from ufl_beam.simulation.diagnosis import no_equilibrium, open_ledger
 from ufl_beam.simulation.initial_state import checked_grid, initial_state, mesh_of
 from ufl_beam.simulation.replicas import Copies, sharing
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.step_cutting import (
+from ufl_beam.simulation.step_solver import (
     APPLYING,
     FIRST,
+    StepSolver,
     Trial,
     begins_loaded,
     go_in_parts,
     require_small_turn,
 )
-from ufl_beam.simulation.step_solver import StepSolver
 from ufl_beam.solvers.equation import Border
 from ufl_beam.solvers.newton_options import Newton
 
@@ -256,7 +256,10 @@ class Simulation(StateView):
         """
         self.leave()
         self.end()
-        raise no_equilibrium(self, self._solver, self.solution, failure, end, advice) from failure
+        raise no_equilibrium(
+            self.equation, self._solver, self.solution, failure, self.q, (self.t, end),
+            advice or self.scheme.advice,
+        ) from failure  # fmt: skip
 
     def settle(self) -> None:
         """Compare the states so far where each process computes a copy of the scene.

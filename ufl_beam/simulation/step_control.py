@@ -7,73 +7,19 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NoReturn, Protocol
 
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.collective_errors import Agreement
-from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed, require_number, require_sequence
-from ufl_beam.model.scene import Scene
-from ufl_beam.simulation.step_cutting import Trial
-from ufl_beam.terms.beams import Inertia
-from ufl_beam.terms.supports import Supports
+from ufl_beam.simulation.simulation import Simulation
+from ufl_beam.simulation.step_solver import Trial
 
 GROWTH = 1.5
 """A step is at most so many times as long as the one before it, whose error it may repeat."""
 
 SAMPLES = (0.01, 0.5, 0.99)
 """Parts of a step at which loads are asked for."""
-
-
-class Stepper(Protocol):
-    """A simulation, as far as step controls know it; see there."""
-
-    scene: Scene
-    share: Share
-    t: float
-    q: Array
-    last_dt: float
-    inertia: Inertia
-    supports: Supports
-    together: Agreement
-
-    def step_to(self, t1: float) -> None:
-        """Go to a time, in parts where that fails."""
-
-    def attempt(self, t1: float) -> Trial:
-        """Solve the next step."""
-
-    def accept(self, trial: Trial) -> None:
-        """Go where the latest attempt went."""
-
-    def give_up(self, failure: StepFailed, end: float) -> NoReturn:
-        """End the run where it is."""
-
-
-class Pace(Protocol):
-    """Protocol of step controls; ``error`` sums the estimated ones, NaN if there are none."""
-
-    steps: int
-    error: float
-
-    @property
-    def finished(self) -> bool:
-        """True if the end is reached."""
-
-    @property
-    def progress(self) -> float:
-        """Part of the way that is done, from 0 to 1."""
-
-    def advance(self, simulation: Stepper) -> None:
-        """Take one step; errors are those of the simulation."""
-
-    def state(self) -> dict[str, float]:
-        """Numbers from which :meth:`restore` goes on."""
-
-    def restore(self, state: dict[str, float]) -> None:
-        """Go on from a :meth:`state`."""
 
 
 class EqualSteps:
@@ -101,7 +47,7 @@ class EqualSteps:
         """Part of the steps that are done."""
         return self.steps / self._all
 
-    def advance(self, simulation: Stepper) -> None:
+    def advance(self, simulation: Simulation) -> None:
         """Take one step, in parts if it fails."""
         n = self.steps + 1
         simulation.step_to(self._t0 + (self._t1 - self._t0) * n / self._all)
@@ -165,7 +111,7 @@ class Adaptive:
 class AdaptiveSteps:
     """Steps whose error is estimated and limited; ``rejected`` ones were solved but too long."""
 
-    def __init__(self, simulation: Stepper, t1: float, choice: Adaptive) -> None:
+    def __init__(self, simulation: Simulation, t1: float, choice: Adaptive) -> None:
         self._t0 = self._t = t0 = simulation.t
         self._t1 = t1
         self._tolerance = choice.tolerance
@@ -201,7 +147,7 @@ class AdaptiveSteps:
         """Part of the time that is over."""
         return (self._t - self._t0) / (self._t1 - self._t0)
 
-    def advance(self, simulation: Stepper) -> None:
+    def advance(self, simulation: Simulation) -> None:
         """Take one step that is accurate, after rejected ones."""
         stop = next(t for t in self._stops if t > self._t)
         while True:
@@ -229,7 +175,7 @@ class AdaptiveSteps:
         # The acceleration may jump at a stop, so what was before tells nothing about what comes.
         self._fresh = self._t == stop
 
-    def _attempt(self, simulation: Stepper, stop: float) -> tuple[Trial, float]:
+    def _attempt(self, simulation: Simulation, stop: float) -> tuple[Trial, float]:
         """Solve the next step; also its error."""
         left = stop - self._t
         # Two equal steps to a stop in the place of a long and a tiny one
@@ -252,7 +198,7 @@ class AdaptiveSteps:
         missed = simulation.share.largest(simulation.together(self._missed, dt))
         return trial, max(error, missed)
 
-    def _size(self, simulation: Stepper, trial: Trial, error: Array) -> float:
+    def _size(self, simulation: Simulation, trial: Trial, error: Array) -> float:
         """Largest error of a position over the size of the scene, or of a rotation."""
         error[self._turns] += (trial.q1 - simulation.q - trial.s)[self._turns]
         supports = simulation.supports
@@ -288,3 +234,7 @@ class AdaptiveSteps:
         self._largest = [state[f"largest {i}"] for i in range(len(self._largest))]
 
     _STATE = ("steps", "rejected", "error", "_t", "_dt", "_fresh")
+
+
+Pace = EqualSteps | AdaptiveSteps
+"""Steps of a run; ``error`` sums the estimated ones, NaN if there are none."""
