@@ -20,6 +20,7 @@ from ufl_beam.solvers.newton import Solver
 from ufl_beam.solvers.null_vectors import SINGULAR, free_matrix, null_vector
 from ufl_beam.terms.base import KINDS
 from ufl_beam.terms.inelastic_beams import InelasticBeams
+from ufl_beam.terms.links import Links
 
 SHARE = 0.1
 """Part of the largest motion from which on a motion or a deformation is named."""
@@ -164,7 +165,7 @@ def _deformations(
     share, scene = equation.share, grid.scene
     here, ε = x[share.dofs], 1e-6
     links, left = np.zeros(len(scene.links)), np.ones(len(scene.links))
-    for one in equation.couplings:
+    for one in (term for term in equation.terms if isinstance(term, Links)):
         try:
             change = (one.motion(q + ε * here) - one.motion(q - ε * here)) / (2 * ε)
         except StepFailed:
@@ -173,10 +174,9 @@ def _deformations(
         left[one.numbers] = one.remaining()
     links /= np.where([link.turns for link in scene.links], 1.0, scene.size)
     strains, left_of_cells = _strains(grid, share.gather(q), x), np.ones(len(grid.cells))
-    for beams in equation.beams:
-        if isinstance(beams, InelasticBeams):
-            cells, _ = beams.kept()
-            left_of_cells[cells] = beams.points.remaining(strains[cells])
+    for beams in (term for term in equation.terms if isinstance(term, InelasticBeams)):
+        cells, _ = beams.kept()
+        left_of_cells[cells] = beams.points.remaining(strains[cells])
     if share.comm.size > 1:
         share.comm.Allreduce(MPI.IN_PLACE, links)
         share.comm.Allreduce(MPI.IN_PLACE, left, op=MPI.MIN)

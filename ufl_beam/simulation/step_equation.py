@@ -40,7 +40,7 @@ class StepEquation(PythonEquation):
     ) -> None:
         super().__init__(A, np.zeros(share.size), supports.dofs)
         self.share, self.supports, self._search = share, supports, search
-        self.beams, self.couplings, self._loads = beams, couplings, loads
+        self._beams, self._couplings, self._loads = beams, couplings, loads
         self._inner: list[Beams] = [*beams, *couplings]
         self.others: list[Term] = [*loads, *others]
         self.terms: list[Term] = [*self._inner, *self.others]
@@ -107,20 +107,20 @@ class StepEquation(PythonEquation):
         opened = bool(self.share.largest(float(self._search.opened)))
         self._search.stiffen(stiff and opened)
         if stiff:
-            for coupling in self.couplings:
+            for coupling in self._couplings:
                 coupling.again()
         return opened
 
     def missed(self, x: Array, r: Array, scale: float, moved: float) -> float:
         """Return the largest residual of the laws of connectors, without dimension."""
         q1 = self.supports.in_plane(x)
-        here = max((c.excess(q1, r, scale, moved) for c in self.couplings), default=0.0)
+        here = max((c.excess(q1, r, scale, moved) for c in self._couplings), default=0.0)
         return self.share.largest(here) if self.share.grid.scene.links else 0.0
 
     def working(self, x: Array, y: Array) -> Array:
         """Return the conjugates of residuals in the step ``y`` from ``x``."""
         q, v, works = self.supports.in_plane(x), self.supports.in_plane(y), y.copy()
-        for coupling in self.couplings:
+        for coupling in self._couplings:
             coupling.put_motions(q, v, works)
         return works
 
@@ -150,12 +150,12 @@ class StepEquation(PythonEquation):
     def stiffness_works(self, q: Array, X: Array, Y: Array) -> Array:
         """Works of the tangent of :meth:`linearise`, each column of X on its own of Y; J."""
         self.A.data.fill(0.0)
-        for term in (*self.couplings, *self.others):
+        for term in (*self._couplings, *self.others):
             if term.kind != "inertia":
                 term.add_tangent(q)
         times, works = Product(self.A), np.zeros(X.shape[1])
         for i, (x, y) in enumerate(zip(*map(np.ascontiguousarray, (X.T, Y.T)), strict=True)):
-            of_beams = sum(one.tangent_work(q, x, y) for one in self.beams)
+            of_beams = sum(one.tangent_work(q, x, y) for one in self._beams)
             works[i] = of_beams + times(x) @ y
         return works
 
@@ -164,11 +164,11 @@ class StepEquation(PythonEquation):
         works = np.zeros((2, X.shape[1], Y.shape[1]))
         for i, j in zip(*np.triu_indices(X.shape[1]), strict=True):
             x, y = (np.ascontiguousarray(one) for one in (X[:, i], Y[:, j]))
-            works[0, i, j] = sum(one.tangent_work(q, x, y) for one in self.beams)
-            works[1, i, j] = sum(one.work_of_change(q, u, x, y) for one in self.beams)
+            works[0, i, j] = sum(one.tangent_work(q, x, y) for one in self._beams)
+            works[1, i, j] = sum(one.work_of_change(q, u, x, y) for one in self._beams)
         for k, work in enumerate(works):
             self.A.data.fill(0.0)
-            for one in self.couplings:
+            for one in self._couplings:
                 if k == 0:
                     one.add_tangent(q)
                 else:
