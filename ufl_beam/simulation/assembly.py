@@ -77,12 +77,11 @@ class Assembly:
 
     def ask(self, simulation: Running, q: Array) -> None:
         """Ask controllers and friction for forces and limits; note the rates of what may slip."""
-        new = {
-            link: law.ask(simulation, link)
-            for link, law in ((link, link.law) for link in self.asked)
-            if isinstance(law, Controller | Coulomb)
-        }
-        self.asked.update(new)
+        forces = {
+            link: link.law.ask(simulation, link)
+            for link in self.asked if isinstance(link.law, Controller | Coulomb)
+        }  # fmt: skip
+        self.asked.update(forces)
         if self.inertia is not None:
             for one in self.couplings:
                 if isinstance(one.links[0].law, Coulomb):

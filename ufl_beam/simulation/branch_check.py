@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Sequence
 
@@ -62,17 +61,11 @@ class StaticPath:
     def require(self, q1: Array, s: Array, force: Array, least_work: float) -> None:
         """Raise :class:`StepFailed` unless the step ``s`` of the nodes to ``q1`` was followed.
 
-        ``force`` are the internal forces in it; round-off makes the work ``least_work``; J.
+        The internal forces, ``force`` in the step, must account for what it stores and dissipates.
+        Otherwise Newton's method may have found another branch of equilibria: beyond a limit load,
+        or where softening lets go more than it dissipates.  Round-off does the work ``least_work``
+        (J).
         """
-        self._require_near(s)
-        if math.isfinite(self._scheme.slack):
-            self._require_explained(q1, s, force, least_work)
-
-    def accept(self, force: Array) -> None:
-        """Take the internal forces of a step as those before the next."""
-        self.force = force.copy()
-
-    def _require_near(self, s: Array) -> None:
         size = self._share.grid.scene.size
         moves = np.abs(s) / size
         moves[self._rotations] *= size
@@ -82,13 +75,6 @@ class StaticPath:
                 f"a node moves by {far:.1e} times the size of the scene, or turns by so many "
                 "radians, in the step: what yields and what has opened leave a mechanism"
             )
-
-    def _require_explained(self, q1: Array, s: Array, force: Array, least_work: float) -> None:
-        """The forces on the way must account for what the step stores and dissipates.
-
-        Otherwise Newton's method may have found another branch of equilibria than the one followed:
-        beyond a limit load, or where softening lets go more than it dissipates.
-        """
         total = self._share.total
         work = total(float(self._scheme.acting(self.force, force) @ s))
         in_beams = total(sum(one.change(q1) for one in self._beams))
@@ -104,3 +90,7 @@ class StaticPath:
                 f"{work:.3e} J of work: it leaps to another branch of equilibria, or is too long "
                 "to tell"
             )
+
+    def accept(self, force: Array) -> None:
+        """Take the internal forces of a step as those before the next."""
+        self.force = force.copy()
