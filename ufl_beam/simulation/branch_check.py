@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Sequence
 
@@ -75,6 +76,8 @@ class StaticPath:
                 f"a node moves by {far:.1e} times the size of the scene, or turns by so many "
                 "radians, in the step: what yields and what has opened leave a mechanism"
             )
+        if math.isinf(self._scheme.slack):
+            return
         total = self._share.total
         work = total(float(self._scheme.acting(self.force, force) @ s))
         in_beams = total(sum(one.change(q1) for one in self._beams))

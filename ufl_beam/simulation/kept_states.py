@@ -51,12 +51,12 @@ class KeptStates(list[Snapshot]):
 
     @property
     def q(self) -> list[Array]:
-        """Configurations."""
+        """Configurations, all degrees of freedom."""
         return [state.q for state in self]
 
     @property
     def v(self) -> list[Array]:
-        """Velocities; empty in statics."""
+        """Velocities, as :attr:`q`; empty in statics."""
         return [state.v for state in self if state.v is not None]
 
     def ledger(self) -> list[dict[str, Array]]:

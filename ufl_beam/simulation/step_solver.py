@@ -101,11 +101,11 @@ class StepSolver:
         ``like_last`` lets the tangent of the last step do for this one.
         """
         loads = self._equation.load_forces()
+        solve = partial(self.newton.solve, loads=loads, like_last=like_last)
         try:
             if self._openings is None:
-                q1 = self.newton.solve(guess, loads, like_last)
+                q1 = solve(guess)
             else:
-                solve = partial(self.newton.solve, loads=loads, like_last=like_last)
                 q1 = self._openings.solve(guess, solve, partial(self._equation.begin, step))
         except StepFailed:
             try:
