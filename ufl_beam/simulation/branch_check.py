@@ -67,9 +67,8 @@ class StaticPath:
         or where softening lets go more than it dissipates.  Round-off does the work ``least_work``
         (J).
         """
-        size = self._share.grid.scene.size
-        moves = np.abs(s) / size
-        moves[self._rotations] *= size
+        moves = np.abs(s) / self._share.grid.scene.size
+        moves[self._rotations] = np.abs(s[self._rotations])
         far = self._share.largest(moves.max(initial=0.0))
         if not far <= FAR:
             raise StepFailed(

@@ -74,8 +74,8 @@ def initial_state(grid: Grid, start: Solution | None) -> tuple[Array, Array, Sta
     if same_unknowns(start.grid, grid):
         return q0, v if v0 is None else v0, start.internal
     transfer = Transfer(start.grid, grid)
-    velocity = v if v0 is None else transfer.velocity(v0)
-    return transfer.state(q0), velocity, transfer.internal(start.internal)
+    q = transfer.state(q0)
+    return q, v if v0 is None else transfer.velocity(v0), transfer.internal(start.internal)
 
 
 def _initial_velocity(grid: Grid) -> Array:
