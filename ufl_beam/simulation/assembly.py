@@ -44,30 +44,20 @@ Loads = list[DeadLoads | FollowerLoads | FrameForces]
 
 @dataclass(frozen=True)
 class Assembly:
-    """Terms of a scene and what they share.
+    """Terms of a scene and what they share."""
 
-    Attributes:
-        fields: Function spaces on the cells of this process.
-        asked: Forces of controllers, and limits of friction, in the step; N or N m.
-        rates: Rates of the motions with friction as the step begins; m/s or rad/s.
-        beams: Beams of the cells of this process; the inelastic ones, with material points, first.
-        yields: Whether any process has such cells.
-        couplings: Connectors, those alike together.
-        openings: Search for what opens; None if nothing can.
-    """
-
-    fields: Fields
+    fields: Fields  # on the cells of this process
     ledger: Ledger
-    asked: dict[Connector, float]
-    rates: dict[Connector, float]
-    beams: list[Cells]
-    inelastic: list[InelasticBeams]
-    yields: bool
-    couplings: list[Links]
+    asked: dict[Connector, float]  # forces of controllers, limits of friction in the step; N or N m
+    rates: dict[Connector, float]  # of motions with friction as the step begins; m/s or rad/s
+    beams: list[Cells]  # those with material points first
+    inelastic: list[InelasticBeams]  # those with material points
+    yields: bool  # True if any process has such cells
+    couplings: list[Links]  # connectors, those alike together
     loads: Loads
     inertia: Inertia | None
     supports: Supports
-    openings: Openings | None
+    openings: Openings | None  # search for what opens; None if nothing can
     equation: StepEquation
 
     @property
@@ -165,7 +155,9 @@ def assemble(share: Share, scheme: Scheme, v: Array, together: Agreement) -> Ass
     rates = dict(asked)
     connectors = Setting(asked, rates, scene.size, scheme, ledger, friction_repeats(scene), search)
     coupled = together(lambda: [*couplings(share, connectors, A), *guides(share, scheme, A)])
-    openings = Openings.of(search, _openable(inelastic, coupled), share.comm)
+    openable: list[Openable] = [one for one in inelastic if one.points.softens]
+    openable += [one.openable for one in coupled if one.openable is not None]
+    openings = Openings.of(search, openable, share.comm)
 
     loads = _loads(scene, fields, scheme, ledger, A)
     inertia = Inertia(fields, scheme, A, ledger, v) if has_inertia(scheme) else None
@@ -192,9 +184,3 @@ def _loads(scene: Scene, fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr)
     if followers:
         loads.append(FollowerLoads(followers, fields.share, scheme, ledger, A))
     return loads
-
-
-def _openable(inelastic: list[InelasticBeams], coupled: list[Links]) -> list[Openable]:
-    """Return the places of this process that may open: hinges, cracks, softening springs."""
-    cells: list[Openable] = [one for one in inelastic if one.points.softens]
-    return [*cells, *(one.openable for one in coupled if one.openable is not None)]

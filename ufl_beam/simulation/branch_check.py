@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The path of static equilibria: whether a step followed it, or leapt somewhere else."""
+"""Check that a static step followed the path of equilibria, and did not leap to another one."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.links import Links
 
 FAR = 1e3
-"""Sizes of the scene, or radians, by which nothing moves in a static step but a mechanism."""
+"""Largest motion of a node in a static step that is no mechanism; sizes of the scene or radians."""
 
 KINK = 1e-6
-"""Part of the energy that went through at which a static step may pass a kink of a law."""
+"""Work that a kink of a law may leave unexplained, as a part of the energy that went through."""
 
 
 class StaticPath:

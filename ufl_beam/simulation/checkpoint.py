@@ -83,15 +83,8 @@ class Checkpoint:
 class Keeper:
     """The checkpoint of one run; its file is locked until :meth:`close`.
 
-    Args:
-        choice: What the user asks for.
-        call: What the run is, by name.
-        step: Size of its steps if they are equal; then the run may have another end; s.
-        t1: Its end; s.
-        comm: Processes of the run.
-
-    Attributes:
-        found: Content of the file that was there; empty if there was none.
+    The ``call`` is what the run is, by name.  If its steps are equal, ``step`` long (s), it may go
+    on to another end ``t1`` (s).  What the file had is in ``found``, until :meth:`resume`.
     """
 
     def __init__(

@@ -23,14 +23,14 @@ from ufl_beam.terms.inelastic_beams import InelasticBeams
 from ufl_beam.terms.links import Links
 
 SHARE = 0.1
-"""Part of the largest motion from which on a motion or a deformation is named."""
+"""Least motion or deformation that is named, as a part of the largest motion."""
 
 SOFT = 1e-3
-"""Part of its elastic stiffness up to which a connector or a cell gives way."""
+"""Largest stiffness of a connector or a cell that gives way, as a part of its elastic one."""
 
 NEAR = 1e-3
-"""Motion from the state before a step, of the size of the scene or a radian, that tells what yields
-as the step begins."""
+"""Motion from the beginning of a step, in sizes of the scene or radians, after which the tangent
+tells what yields as the step begins."""
 
 ROOM = 10.0
 """Largest imbalance of an exact ledger over the tolerance of the solver."""

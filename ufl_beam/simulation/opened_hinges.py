@@ -21,25 +21,23 @@ from ufl_beam.model.fibres import Layout
 from ufl_beam.output.snapshot import Snapshot
 
 LARGE = 0.05
-"""Part of its limit from which a run warns that the place of an embedded hinge shifts it."""
+"""Shift of a limit by the place of its hinge from which a run warns, as a part of the limit."""
 
 TINY = 1e-6
 """Opening, as a part of energy / limit, over which the first slope of a resistance is taken."""
 
 
 class OpenedHinges(NamedTuple):
-    """Embedded hinges of a beam that opened in a run, in so many cells.
+    """Embedded hinges of a beam that opened in a run.
 
-    Attributes:
-        error: Largest |V| h / (2 limit): difference between the moments in the middle and at the
-            ends of such a cell, as a part of the limit.
-        place: Middle of the cell with the largest error.
+    The error is the largest |V| h / (2 limit): the difference between the moments in the middle and
+    at the ends of such a cell, as a part of the limit.
     """
 
     beam: Member
-    number: int
+    number: int  # of cells
     error: float
-    place: Place
+    place: Place  # middle of the cell with the largest error
 
 
 class Opened:

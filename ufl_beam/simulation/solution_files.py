@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Content of the file of a solution: text, arrays, and the scene with the functions it used."""
+"""Text in the file of a solution: the scene, with its functions as far as they were used."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from ufl_beam.version import version
 T = TypeVar("T")
 
 FORMAT = "solution of ufl_beam, 1"
-"""To be counted up whenever files of before mean something else."""
+"""The number grows whenever the meaning of files changes."""
 
 NAMED = ("seconds", "time_error", "open_ledger")
 """Attributes that are saved as they are."""

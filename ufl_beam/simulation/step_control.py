@@ -16,7 +16,7 @@ from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.step_solver import Trial
 
 GROWTH = 1.5
-"""A step is at most so many times as long as the one before it, whose error it may repeat."""
+"""Largest ratio of the length of a step to that of the one before it."""
 
 SAMPLES = (0.01, 0.5, 0.99)
 """Parts of a step at which loads are asked for."""

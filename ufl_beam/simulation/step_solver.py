@@ -35,12 +35,11 @@ LARGEST_TURN = 0.75 * math.pi
 """A step that turns a node further is cut; the algorithmic strains end at π."""
 
 LEAST_AT_REST, LEAST_IN_MOTION = 2, 1
-"""Iterations at least in statics and dynamics, unless a residual is far below its tolerance.
+"""Least iterations in statics and in dynamics, unless a residual is far below its tolerance.
 
 A column that nearly buckles magnifies a load that is hardly larger than the tolerance.  In motion
 its inertia holds it meanwhile.
 """
-
 
 MOST_PARTS = 2**12
 """Largest number of parts that a step is cut into."""
@@ -61,7 +60,7 @@ Over a part a moment is in error by a quarter of the square: some 1e-4 of it.
 """
 
 SHORT_PART = 512
-"""So many times shorter parts may turn nodes further: their oscillations do not become smaller."""
+"""Parts shorter by this factor may turn nodes further: shorter ones would turn them as far."""
 
 
 class Trial(NamedTuple):
