@@ -27,7 +27,7 @@ from ufl_beam.simulation.fingerprint import kind_of
 from ufl_beam.simulation.initial_state import mesh_of
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.step_control import Adaptive, AdaptiveSteps, EqualSteps, Pace
+from ufl_beam.simulation.step_control import Adaptive, number_of_steps, steps_of
 from ufl_beam.simulation.step_solver import MOST_PARTS
 from ufl_beam.solvers.newton_options import Newton
 
@@ -100,7 +100,7 @@ def simulate(
     begin = time.perf_counter()
     keeper: Keeper | None = None
     if checkpoint is not None:
-        step = None if isinstance(dt, Adaptive) else EqualSteps(t0, t1, dt).dt
+        step = None if isinstance(dt, Adaptive) else (t1 - t0) / number_of_steps(t1 - t0, dt)
         call = {
             "scene": scene, "scheme": scheme, "t[0]": t0, "dt": dt, "every": every, "most": most,
             "newton": newton or Newton(), "start": end_of(start), "mesh": mesh_of(start, mesh),
@@ -123,11 +123,7 @@ def simulate(
 
         stack.callback(note_time)
         stack.callback(simulation.close)
-        pace: Pace = (
-            AdaptiveSteps(simulation, t1, dt)
-            if isinstance(dt, Adaptive)
-            else EqualSteps(simulation.t, t1, dt)
-        )
+        pace = steps_of(simulation, t1, dt)
 
         def go_on(keeper: Keeper) -> None:
             found = keeper.found
@@ -179,7 +175,7 @@ def simulate(
         quiet = None if progress and comm.rank == 0 and not in_study() else True
         with tqdm(total=1.0, bar_format=BAR, disable=quiet, mininterval=0.5) as bar:
             while not pace.finished:
-                pace.advance(simulation)
+                pace.advance()
                 simulation.together(after_step)
                 bar.update(pace.progress - bar.n)
         simulation.end()
