@@ -155,9 +155,7 @@ def assemble(share: Share, scheme: Scheme, v: Array, together: Agreement) -> Ass
     rates = dict(asked)
     connectors = Setting(asked, rates, scene.size, scheme, ledger, friction_repeats(scene), search)
     coupled = together(lambda: [*couplings(share, connectors, A), *guides(share, scheme, A)])
-    openable: list[Openable] = [one for one in inelastic if one.points.softens]
-    openable += [one.openable for one in coupled if one.openable is not None]
-    openings = Openings.of(search, openable, share.comm)
+    openings = Openings.of(search, _openable(inelastic, coupled), share.comm)
 
     loads = _loads(scene, fields, scheme, ledger, A)
     inertia = Inertia(fields, scheme, A, ledger, v) if has_inertia(scheme) else None
@@ -184,3 +182,9 @@ def _loads(scene: Scene, fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr)
     if followers:
         loads.append(FollowerLoads(followers, fields.share, scheme, ledger, A))
     return loads
+
+
+def _openable(inelastic: list[InelasticBeams], coupled: list[Links]) -> list[Openable]:
+    """Return the places of this process that may open: hinges, cracks, softening springs."""
+    cells: list[Openable] = [one for one in inelastic if one.points.softens]
+    return [*cells, *(one.openable for one in coupled if one.openable is not None)]
