@@ -22,11 +22,10 @@ from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.time_functions import TimeFunction
 from ufl_beam.output.archive import above, below
-from ufl_beam.output.output_files import take
-from ufl_beam.output.recorders import Recorder, close_all, recorders_of
+from ufl_beam.output.recorders import Recorder, recorders_of
 from ufl_beam.parallel import communicator
 from ufl_beam.parameter import FACTOR
-from ufl_beam.simulation.run import partial_results
+from ufl_beam.simulation.run import running
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers.newton_options import Newton
@@ -143,7 +142,6 @@ def follow(
     path = cast(Path, simulation.solution)
     stepper = PathStepper(simulation, control)
     path.critical = stepper.critical
-    release = take(outputs)
 
     def after_step() -> bool:
         if recorders:
@@ -153,22 +151,16 @@ def follow(
             recorder.write(simulation)
         return until is not None and bool(until(simulation))
 
-    try:
-        with partial_results(simulation):
-            stepper.begin(branch, fresh=state is None)
-            for recorder in recorders:
-                simulation.together(recorder.open, simulation)
-            simulation.keep()
-            for _ in range(steps):
-                stepper.advance()
-                if simulation.share.largest(simulation.together(after_step)):
-                    break
-            simulation.end()
-    finally:
-        release()
-        path.seconds = time.perf_counter() - began
-        simulation.close()
-        close_all(recorders)
+    with running(simulation, recorders, outputs, began):
+        stepper.begin(branch, fresh=state is None)
+        for recorder in recorders:
+            simulation.together(recorder.open, simulation)
+        simulation.keep()
+        for _ in range(steps):
+            stepper.advance()
+            if simulation.share.largest(simulation.together(after_step)):
+                break
+        simulation.end()
     if comm.rank == 0:
         path.opened.warn(simulation.scheme, path.times)
     return path

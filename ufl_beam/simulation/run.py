@@ -19,7 +19,7 @@ from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.archive import above, below
-from ufl_beam.output.output_files import take
+from ufl_beam.output.output_files import Output, take
 from ufl_beam.output.recorders import Recorder, close_all, recorders_of
 from ufl_beam.parallel import communicator, in_study, say
 from ufl_beam.simulation.checkpoint import Checkpoint, Keeper, end_of
@@ -117,12 +117,8 @@ def simulate(
             scene, scheme, t0=t0, start=start, newton=newton, mesh=mesh, comm=comm
         )
         solution = simulation.solution
-
-        def note_time() -> None:
-            solution.seconds = time.perf_counter() - begin
-
-        stack.callback(note_time)
-        stack.callback(simulation.close)
+        solution.every = every
+        stack.enter_context(running(simulation, recorders, outputs, begin))
         pace = steps_of(simulation, t1, dt)
 
         def go_on(keeper: Keeper) -> None:
@@ -138,7 +134,7 @@ def simulate(
 
         def write(keeper: Keeper) -> None:
             content = {
-                "seconds": time.perf_counter() - begin, "pace": pace.state(),
+                "seconds": solution.seconds + time.perf_counter() - begin, "pace": pace.state(),
                 "stateful": simulation.together(keeper.states),
                 **above("state/", simulation.state()),
             }  # fmt: skip
@@ -160,14 +156,9 @@ def simulate(
             if keeper is not None and (keeper.due(pace.steps) or pace.finished):
                 write(keeper)
 
-        stack.callback(close_all, recorders)
-        stack.callback(take(outputs))
-        stack.enter_context(partial_results(simulation))
-        solution.every = every
         if keeper is not None and keeper.found:
             simulation.together(go_on, keeper)
             say(f"checkpoint {keeper.path}: the run goes on from t = {simulation.t:.9g} s")
-            begin -= solution.seconds
         else:
             for recorder in recorders:
                 simulation.together(recorder.open, simulation)
@@ -186,17 +177,28 @@ def simulate(
 
 
 @contextmanager
-def partial_results(simulation: Simulation) -> Iterator[None]:
-    """Let whatever stops a run in this context carry the solution so far, ``error.solution``."""
-    try:
-        yield
-    except BaseException as error:
-        simulation.leave()
-        if simulation.share.comm.size == 1 or error is simulation.together.raised:
-            simulation.end()  # else the processes may not all be here
-        stopped: Any = error
-        stopped.solution = simulation.solution
-        raise
+def running(
+    simulation: Simulation, recorders: Sequence[Recorder], outputs: Sequence[Output], begin: float
+) -> Iterator[None]:
+    """Close what a run has opened at its end, and let whatever stops it carry ``error.solution``.
+
+    Meanwhile no other run writes its files; ``begin`` is the value of a clock for its seconds.
+    """
+    with ExitStack() as stack:
+        stack.callback(simulation.close)
+        stack.callback(close_all, recorders)
+        stack.callback(take(outputs))
+        try:
+            yield
+        except BaseException as error:
+            simulation.leave()
+            if simulation.share.comm.size == 1 or error is simulation.together.raised:
+                simulation.end()  # else the processes may not all be here
+            stopped: Any = error
+            stopped.solution = simulation.solution
+            raise
+        finally:
+            simulation.solution.seconds += time.perf_counter() - begin
 
 
 def _require_times(t: tuple[float, float]) -> tuple[float, float]:
