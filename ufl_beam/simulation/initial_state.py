@@ -58,7 +58,7 @@ def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh) -> Grid:
 
 
 def mesh_of(start: Solution | None, mesh: Mesh | None) -> Mesh:
-    """The mesh of a call: the one it says, that of the solution it starts with, or that given."""
+    """Return the mesh that a call names, that of the solution it starts with, or the default."""
     if mesh is not None:
         require_kind(mesh, Mesh, "mesh")
         return mesh

@@ -19,7 +19,7 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import Place
-from ufl_beam.output.archive import below
+from ufl_beam.output.archive import above, below
 from ufl_beam.output.snapshot import Snapshot
 
 LEDGER = ("state", "supplied", "lost")
@@ -76,7 +76,7 @@ class KeptStates(list[Snapshot]):
         arrays = {name: np.array([getattr(state, name) for state in self]) for name in names}
         arrays |= {"times": np.array([state.t for state in self]), "v": np.array(self.v)}
         for kind, entries in zip(LEDGER, self.ledger(), strict=True):
-            arrays |= {f"{kind}: {name}": values for name, values in entries.items()}
+            arrays |= above(f"{kind}: ", entries)
         return arrays
 
     def take(self, arrays: State) -> None:
