@@ -29,7 +29,7 @@ class Snapshot(NamedTuple):
     v: Array | None  # velocities, as q; None in statics
     reactions: Array  # forces of the supports on the scene; (num_supports, 3); N, N, N m
     entries: tuple[dict[str, float], ...]  # the ledger: state, supplied, lost; J
-    material: list[tuple[Index, Array]]  # cells that can yield or break, and rows of their material
+    material: Array  # numbers of the cells that can yield or break, and their material; (m, 7)
     connections: Array  # columns of ``Connection`` for all links; (num_links, 5)
     parts: int = 0  # steps so far, parts of cut steps counted each
     iterations: int = 0  # Newton iterations so far

@@ -27,15 +27,12 @@ from ufl_beam.model.connector_laws import Controller
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.archive import above, below
-from ufl_beam.output.output_files import take
-from ufl_beam.output.recorders import Recorder, close_all, recorders_of
+from ufl_beam.output.recorders import Recorder, recorders_of
 from ufl_beam.parallel import communicator
 from ufl_beam.parameter import FACTOR
-from ufl_beam.simulation.run import partial_results
+from ufl_beam.simulation.run import running
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.solution_files import arrays_of
-from ufl_beam.simulation.solution_files import take as take_solution
 from ufl_beam.solvers.newton_options import Newton
 
 ADVICE = (
@@ -69,7 +66,7 @@ class Path(Solution):
         text["critical"] = [{"kind": c.kind, "factor": c.factor, "n": c.n} for c in self.critical]
         for k, point in enumerate(self.critical):
             arrays[f"critical/{k}/mode"] = point.mode
-            arrays |= above(f"critical/{k}/state/", arrays_of(point.state))
+            arrays |= above(f"critical/{k}/state/", point.state._arrays())
         return text, arrays
 
     def _take(self, text: dict[str, Any], arrays: State) -> None:
@@ -77,7 +74,7 @@ class Path(Solution):
         critical = []
         for k, one in enumerate(text["critical"]):
             state, prefix = Solution(self.scene, self.grid), f"critical/{k}/state/"
-            take_solution(state, text, below(prefix, arrays))
+            state._take(text, below(prefix, arrays))
             critical.append(CriticalPoint(**one, state=state, mode=arrays[f"critical/{k}/mode"]))
         self.critical = critical
 
@@ -155,7 +152,6 @@ def follow(
     path = cast(Path, simulation.solution)
     stepper = PathStepper(simulation, control)
     path.critical = stepper.critical
-    release = take(outputs)
 
     def after_step() -> bool:
         if recorders:
@@ -165,25 +161,19 @@ def follow(
             recorder.write(simulation)
         return until is not None and bool(until(simulation))
 
-    try:
-        with partial_results(simulation):
-            try:
-                stepper.begin(branch, fresh=state is None)
-                for recorder in recorders:
-                    simulation.together(recorder.open, simulation)
-                simulation.keep()
-                for _ in range(steps):
-                    stepper.advance()
-                    if simulation.share.largest(simulation.together(after_step)):
-                        break
-            except StepFailed as failure:
-                simulation.give_up(failure, stepper.tried, ADVICE)
-            simulation.end()
-    finally:
-        release()
-        path.seconds = time.perf_counter() - began
-        simulation.close()
-        close_all(recorders)
+    with running(simulation, recorders, outputs, began):
+        try:
+            stepper.begin(branch, fresh=state is None)
+            for recorder in recorders:
+                simulation.together(recorder.open, simulation)
+            simulation.keep()
+            for _ in range(steps):
+                stepper.advance()
+                if simulation.share.largest(simulation.together(after_step)):
+                    break
+        except StepFailed as failure:
+            simulation.give_up(failure, stepper.tried, ADVICE)
+        simulation.end()
     if comm.rank == 0:
         path.opened.warn(simulation.scheme, path.times)
     return path

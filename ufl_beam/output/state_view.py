@@ -30,6 +30,7 @@ from ufl_beam.terms.supports import Supports
 
 NO_REACTIONS = np.zeros((0, 3))
 NO_CONNECTIONS = np.zeros((0, len(Connection._fields)))
+NO_MATERIAL = np.zeros((0, 7))
 
 
 class StateView(ABC):
@@ -67,9 +68,11 @@ class StateView(ABC):
         """Gather the state of all processes."""
         v = [self.share.gather(v) for v in self.velocities()]
         connections = self.connections() if self.scene.links else NO_CONNECTIONS
+        groups = np.concatenate([NO_MATERIAL, *(np.c_[group] for group in self.material())])
+        material = groups[np.argsort(groups[:, 0])]
         return Snapshot(
             self.t, self.share.gather(self.q), v[0] if v else None, self.reactions(),
-            self.entries(), self.material(), connections, self.parts, self.iterations,
+            self.entries(), material, connections, self.parts, self.iterations,
         )  # fmt: skip
 
     def velocities(self) -> list[Array]:

@@ -42,30 +42,20 @@ Loads = list[DeadLoads | FollowerLoads | FrameForces]
 
 @dataclass(frozen=True)
 class Assembly:
-    """Terms of a scene and what they share.
+    """Terms of a scene and what they share."""
 
-    Attributes:
-        fields: Function spaces on the cells of this process.
-        asked: Forces of controllers, and limits of friction, in the step; N or N m.
-        rates: Rates of the motions with friction as the step begins; m/s or rad/s.
-        beams: Beams of the cells of this process; the inelastic ones, with material points, first.
-        yields: Whether any process has such cells.
-        couplings: Connectors, those alike together.
-        openings: Search for what opens; None if nothing can.
-    """
-
-    fields: Fields
+    fields: Fields  # on the cells of this process
     ledger: Ledger
-    asked: dict[Connector, float]
-    rates: dict[Connector, float]
-    beams: list[Cells]
-    inelastic: list[InelasticBeams]
-    yields: bool
-    couplings: list[Links]
+    asked: dict[Connector, float]  # forces of controllers, limits of friction in the step; N or N m
+    rates: dict[Connector, float]  # of motions with friction as the step begins; m/s or rad/s
+    beams: list[Cells]  # those with material points first
+    inelastic: list[InelasticBeams]  # those with material points
+    yields: bool  # True if any process has such cells
+    couplings: list[Links]  # connectors, those alike together
     loads: Loads
     inertia: Inertia | None
     supports: Supports
-    openings: Openings | None
+    openings: Openings | None  # search for what opens; None if nothing can
     equation: StepEquation
 
     @property
@@ -75,12 +65,11 @@ class Assembly:
 
     def ask(self, simulation: Running, q: Array) -> None:
         """Ask controllers and friction for forces and limits; note the rates of what may slip."""
-        new = {
-            link: law.ask(simulation, link)
-            for link, law in ((link, link.law) for link in self.asked)
-            if isinstance(law, Controller | Coulomb)
-        }
-        self.asked.update(new)
+        forces = {
+            link: link.law.ask(simulation, link)
+            for link in self.asked if isinstance(link.law, Controller | Coulomb)
+        }  # fmt: skip
+        self.asked.update(forces)
         if self.inertia is not None:
             for one in self.couplings:
                 if isinstance(one.links[0].law, Coulomb):
