@@ -16,8 +16,8 @@ from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, Step
-from ufl_beam.terms.base import OfForms, OfMatrix
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.forms_and_matrices import OfForms, OfMatrix
 from ufl_beam.terms.tangent_derivatives import Cells
 
 
@@ -54,30 +54,23 @@ def _elastic_forms(of: Element, scheme: Scheme) -> _ElasticForms:
 class ElasticBeams(OfForms, Cells):
     """Resultants of elastic cells working on the virtual strains, P(12)."""
 
-    kind = "beams"
+    kind, _entry = "beams", "numerical"
 
     def __init__(self, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger) -> None:
         forms = _elastic_forms(fields.element, scheme)
-        self._q0, self._q1, self._fields = fields.element.q0, fields.element.q1, fields
-        self._work_form = forms.work
-        self._force, self._tangent = fields.force_and_tangent(forms.work, self._q1, A)
-        self._stored, *self._losses = (
-            fields.hot_kernel(form, self._q1) for form in (forms.stored, *forms.losses)
-        )
+        super().__init__(forms.work, forms.losses, fields, A, ledger)
+        self._fields, self._work_form = fields, forms.work
+        self._stored = fields.hot_kernel(forms.stored, self._q1)
         self._first: Kernel | None = None
         self._tangents = struct("first_cells", then=self._tangent.cells)
         if forms.first is not None:
             self._first = fields.kernel(forms.first, self._q1)
             self._first.place(A)
             self._tangents.first = self._first.cells
-        self._A, self._ledger = A, ledger
-        if self._losses:
-            ledger.lost["numerical"] += 0.0
 
     def begin(self, step: Step) -> None:
         """Remember the configuration at the beginning."""
-        for kernel in (self._force, *self._losses):
-            kernel.set(self._q0, step.q0)
+        super().begin(step)
         if self._first is not None:
             self._first.set(self._q0, step.q0)
             self._tangents.begins = 1
@@ -97,8 +90,7 @@ class ElasticBeams(OfForms, Cells):
     def accept(self, q1: Array, s: Array) -> None:
         """Enter the energy that the scheme lost."""
         self._tangents.begins = 0
-        for loss in self._losses:
-            self._ledger.lost["numerical"] += loss.value(q1)
+        super().accept(q1, s)
 
     def add_state(self, q: Array) -> None:
         """Add the stored energy to the ledger."""
