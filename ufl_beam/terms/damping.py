@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import singledispatch
 from typing import Protocol
 
 import numpy as np
@@ -32,14 +31,6 @@ class Inertia(Rates, Protocol):
     """Velocities of a scene in motion, and its scheme."""
 
     scheme: DynamicScheme
-
-
-@singledispatch
-def damping_forces(
-    of: object, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger, inertia: Inertia | None
-) -> list[Term]:
-    """Forces of one kind of damping on the cells of a process; none if it has no such cells."""
-    raise TypeError(f"{of!r} is not a damping")
 
 
 def _work_and_loss(
@@ -111,21 +102,16 @@ class RayleighForces(OfMatrix):
         self._ledger.lost["damping"] += self._times.square(s) / self._dt
 
 
-@damping_forces.register
-def _(
-    of: Rayleigh, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger, inertia: Inertia | None
-) -> list[Term]:
-    if inertia is None:
-        raise SceneError("Rayleigh: it damps velocities, and statics has none; use KelvinVoigt")
+def damping_forces(
+    of: Rayleigh | KelvinVoigt, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger,
+    inertia: Inertia | None,
+) -> list[Term]:  # fmt: skip
+    """Forces of one kind of damping on the cells of a process; none if it has no such cells."""
     ledger.lost["damping"] += 0.0
-    return [RayleighForces(of, fields, A, ledger, inertia)]
-
-
-@damping_forces.register
-def _(
-    of: KelvinVoigt, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger, inertia: Inertia | None
-) -> list[Term]:
-    ledger.lost["damping"] += 0.0
+    if isinstance(of, Rayleigh):
+        if inertia is None:
+            raise SceneError("Rayleigh: it damps velocities, and statics has none; use KelvinVoigt")
+        return [RayleighForces(of, fields, A, ledger, inertia)]
     grid = fields.share.grid
     beams = grid.scene.beams if of.beams is None else of.beams
     pairs = (zip(grid.cells_of(beam), grid.hinges(beam), strict=True) for beam in beams)
