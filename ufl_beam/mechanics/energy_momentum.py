@@ -14,7 +14,7 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import combined, doubles, integers, lib
 from ufl_beam.mechanics import kinematics
-from ufl_beam.mechanics.classical import Static
+from ufl_beam.mechanics.classical import InParts, PlainStep
 from ufl_beam.mechanics.kinematics import Axis
 from ufl_beam.mechanics.time_schemes import Constant, Rates, Step, require_between, scaled
 from ufl_beam.model.law_functions import Values
@@ -99,7 +99,7 @@ class ExactStep(_OverStep):
 
 
 @dataclass(frozen=True)
-class ExactStatic(ExactStep):
+class ExactStatic(InParts, ExactStep):
     """Static equilibrium with an exact ledger: works are exact increments of energy.
 
     :class:`Static` is in equilibrium at the ends of steps and counts works by the trapezoidal rule;
@@ -127,9 +127,7 @@ class ExactStatic(ExactStep):
 
     theta: float = 1.0
 
-    dynamic = False
     slack = math.inf
-    advice = Static.advice
 
     def __post_init__(self) -> None:
         require_between("ExactStatic: theta", self.theta, 0.5, 1.0)
@@ -143,19 +141,6 @@ class ExactStatic(ExactStep):
     def load_weight(self) -> float:
         """Follower loads turn with the rotation where the resultants are in equilibrium."""
         return self.theta
-
-    def way_to_rest(self, dt: float) -> float:
-        """No way to rest: everything is at rest."""
-        return 0.0
-
-    def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
-        """Loads act where the resultants are, on the straight way to those at the end of the step.
-
-        Parts of a step go in proportion, as those of :class:`Static`; so loads and motions that are
-        there at once can be reached in parts.
-        """
-        fraction = (t1 - t0) / (end - t0)
-        return Step(t0, t1, q0, load_time=end, motion_time=end, fraction=fraction, at=self.theta)
 
 
 class Midway:
@@ -261,7 +246,7 @@ class Midpoint(ExactStep, _Velocities):
 
 
 @dataclass(frozen=True)
-class PrintedMidpoint(_OverStep, _Velocities):
+class PrintedMidpoint(_OverStep, _Velocities, PlainStep):
     """The midpoint rule as the paper prints it, for comparison; :class:`Midpoint` is better.
 
     The variation of the strains is that in the middle of the step, which differs from their
@@ -282,22 +267,9 @@ class PrintedMidpoint(_OverStep, _Velocities):
 
     alpha = beta = 0.0
 
-    def half_tangents(self, rotations: Index) -> Index:
-        """No rotations: the printed scheme takes Δψ itself."""
-        return rotations[:0]
-
     def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
         """The variation in the middle of the step."""
         return kinematics.virtual_strain((q0 + q1) / 2, w, axis)
-
-    def virtual_turn(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
-        """The virtual rotation itself."""
-        return w
-
-    def nodal_step(self, q0: Array, q1: Array, rotations: Index) -> tuple[Array, float]:
-        """The increments themselves, and the largest turn."""
-        s: Array = q1 - q0
-        return s, float(np.abs(s[rotations]).max(initial=0.0))
 
     def error_weights(self) -> tuple[float, float]:
         """Weights of the error of the trapezoidal rule."""
