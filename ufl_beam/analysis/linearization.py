@@ -39,9 +39,6 @@ class _Standstill(Static):
     rings = False
     kept: tuple[str, ...] = ()
 
-    def half_tangents(self, rotations: Index) -> Index:
-        return rotations[:0]
-
     def inertia(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
         return 1 / dt**2, 0.0, rates.v
 

@@ -86,8 +86,8 @@ class InelasticBeams(Cells):
         ledger: Ledger,
         search: SearchFlags,
     ) -> None:
-        self._layout, self._scheme, self._A, self._ledger = layout, scheme, A, ledger
-        self._order = fields.order
+        self._A, self._ledger = A, ledger
+        self._hinges, self._static = layout.hinges, not scheme.dynamic
         self._cells = fields.share.cells[fields.order]
         self._strains = Strains(fields)
         cells, n = len(fields.order), len(layout.weights)
@@ -130,7 +130,7 @@ class InelasticBeams(Cells):
             self.points.start(self._strains(step.q0))
         self.points.begin(step.dt)
         self._latest.fill(np.nan)
-        self._in_c.begins = not self._scheme.dynamic
+        self._in_c.begins = self._static
 
     def _respond(self, q1: Array) -> None:
         """Resultants at ``q1``, and their derivatives."""
@@ -138,8 +138,8 @@ class InelasticBeams(Cells):
 
     def loops(self) -> tuple[Loop, Loop | None]:
         """The points, and two forms."""
-        functions = ("add_inelastic_force", "add_inelastic_tangent")
-        return loop(functions[0], self._in_c), loop(functions[1], self._in_c)
+        forces, tangent = "add_inelastic_force", "add_inelastic_tangent"
+        return loop(forces, self._in_c), loop(tangent, self._in_c)
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the internal forces."""
@@ -211,7 +211,7 @@ class InelasticBeams(Cells):
     def kept(self) -> tuple[Index, Array]:
         """Cells (numbers of the grid), and :attr:`Points.kept` of them; (num_cells, 6)."""
         rows = self.points.kept.copy()
-        if not self._layout.hinges:
+        if not self._hinges:
             rows[:, 3] = 0.0
         return self._cells, rows
 

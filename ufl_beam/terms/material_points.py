@@ -49,16 +49,12 @@ def expect_entries(layout: Layout, scheme: Scheme, ledger: Ledger) -> None:
         ledger.lost["numerical"] += 0.0
 
 
-def point_forms(bulk: type[Bulk], softening: Softening | None, scheme: Scheme) -> PointForms:
-    """Compiled laws of points, made once in a process; numbers of ``softening`` do not matter."""
-    return _point_forms(bulk, softening and softening.of(1.0, 1.0), scheme)
-
-
 class PointForms:
     """Compiled laws: C functions from the inputs of a point to what the loops need.
 
     They are the stress of the bulk, that of a point that opens by a known growth, and the excess of
     the bulk over the discontinuity, each with its derivative; and ``point_output`` of loops.h.
+    The numbers of ``softening`` do not matter: they are inputs.
     """
 
     def __init__(self, statement: type[Bulk], softening: Softening | None, scheme: Scheme) -> None:
@@ -139,7 +135,8 @@ class Points:
         search: SearchFlags | None = None,
     ) -> None:
         search = search or SearchFlags()
-        self._forms = point_forms(layout.statement, layout.softening, scheme)
+        kind = layout.softening and layout.softening.of(1.0, 1.0)
+        self._forms = forms = _point_forms(layout.statement, kind, scheme)
         self._layout, self._storage, self._loss = layout, storage, scheme.loss
         self._yields, self.softens = layout.yields, layout.softening is not None
         self._at = {name: storage[:, :, i] for i, name in enumerate(inputs(layout.statement))}
@@ -149,8 +146,7 @@ class Points:
             self._at[name][:] = getattr(bulk, name)
         self._at["length"][:] = length[:, None]
         self._at["theta"][:] = scheme.theta
-        self._steps = self._at["dt"]
-        self._steps[:] = self._dt = 1.0
+        self._at["dt"][:] = self._dt = 1.0
         self._at["softening energy"][:] = 1.0
         self._at["traction"][:] = np.inf
         if layout.softening is not None:
@@ -169,7 +165,7 @@ class Points:
             np.ascontiguousarray(x, dtype=np.float64)
             for x in (layout.strains, layout.weights, layout.rest, length)
         )
-        forms, (_, of_cell, width) = self._forms, storage.shape
+        _, of_cell, width = storage.shape
         self.points = struct(
             "points", cells=cells, of_cell=of_cell, width=width, w=storage, theta=scheme.theta,
             bulk=forms.bulk, opening=forms.opening, excess=forms.excess, end=forms.end,
@@ -199,7 +195,7 @@ class Points:
     def begin(self, dt: float) -> None:
         """Begin a step of this length; s."""
         if dt != self._dt:
-            self._steps[:] = self._dt = dt
+            self["dt"][:] = self._dt = dt
 
     def respond(self, strains: Array) -> tuple[Array, Array]:
         """(N, V, M) that act in a step to these strains, and derivatives; (cells, 3), (cells, 9).
@@ -226,9 +222,9 @@ class Points:
 
     def remaining(self, change: Array) -> Array:
         """Part of the elastic stiffness that is left for small changes of the strains; (cells,)."""
-        layout, stiffness = self._layout, self._at["theta"][0, 0] * self._at["stiffness"]
-        by_point = change @ layout.strains.T
-        elastic = self._at["theta"][0, 0] * change**2 @ layout.rest
+        layout, theta = self._layout, self["theta"][0, 0]
+        stiffness, by_point = theta * self["stiffness"], change @ layout.strains.T
+        elastic = theta * change**2 @ layout.rest
         elastic += (stiffness * by_point**2) @ layout.weights
         now = np.einsum("ci,cij,cj->c", change, self.D.reshape(-1, 3, 3), change)
         return np.asarray(np.divide(now, elastic, out=np.ones(len(now)), where=elastic > 0))
@@ -252,14 +248,10 @@ class Points:
 
     def _sums_to_come(self) -> Array:
         """Return :attr:`sums` as :meth:`accept` would leave them."""
-        copy = ffi.new("points *", self.points[0])
-        sums = np.empty_like(self.sums)
-        state = (self._e0, self._storage, self.kept)
-        copy.e0, copy.w, copy.kept, copy.sum = alive = [doubles(x.copy()) for x in state] + [
-            doubles(sums)
-        ]
+        copy, sums = ffi.new("points *", self.points[0]), np.empty_like(self.sums)
+        state = [doubles(x.copy()) for x in (self._e0, self._storage, self.kept)]
+        (copy.e0, copy.w, copy.kept), copy.sum = state, doubles(sums)
         lib.commit(copy)
-        del alive
         return sums
 
     def freeze(self) -> None:

@@ -59,12 +59,11 @@ class SearchFlags:
 
     def __init__(self) -> None:
         self.flags: Index = np.zeros(lib.SEARCH_FLAGS, dtype=np.int32)
-        self._first: tuple[Index, Index] = (self.flags.copy(), self.flags.copy())
-        self._first[True][HOLD] = 1
 
     def begin(self, hold: bool) -> None:
         """Begin a search for an equilibrium."""
-        self.flags[:] = self._first[hold]
+        self.flags.fill(0)
+        self.flags[HOLD] = hold
 
     @property
     def opened(self) -> bool:

@@ -98,7 +98,10 @@ def _slope(link: Connector, size: float) -> float:
 
 
 class SlipForms:
-    """Compiled laws of slip: force and its derivative by the slip; ``slip_output`` of loops.h."""
+    """Compiled laws of slip: force and its derivative by the slip; ``slip_output`` of loops.h.
+
+    The numbers of ``law`` do not matter: they are inputs.
+    """
 
     def __init__(self, law: Softening | Hardening, scheme: Scheme) -> None:
         self._pointwise = pointwise = Pointwise(INPUTS)
@@ -110,11 +113,6 @@ class SlipForms:
 
 
 _slip_forms = stated(SlipForms)
-
-
-def slip_forms(law: Softening | Hardening, scheme: Scheme) -> SlipForms:
-    """Compiled laws of slip, made once in a process; numbers of ``law`` do not matter."""
-    return _slip_forms(Hardening(1.0) if isinstance(law, Hardening) else law.of(1.0, 1.0), scheme)
 
 
 @respond.register(RigidPlastic)
@@ -131,7 +129,8 @@ class RigidPlasticResponse(Response):
             ledger.state["hardening"] += 0.0
         if self._loss:
             ledger.lost["numerical"] += 0.0
-        self._forms = slip_forms(law.law, scheme)
+        kind = Hardening(1.0) if isinstance(law.law, Hardening) else law.law.of(1.0, 1.0)
+        self._forms = _slip_forms(kind, scheme)
         self._storage = np.zeros((n, len(INPUTS)))
         self._at = {name: self._storage[:, i] for i, name in enumerate(INPUTS)}
         for i, link in enumerate(self._links):
