@@ -166,7 +166,8 @@ def assemble(share: Share, scheme: Scheme, v: Array, together: Agreement) -> Ass
     rates = dict(asked)
     connectors = Setting(asked, rates, scene.size, scheme, ledger, friction_repeats(scene), search)
     coupled = together(lambda: [*couplings(share, connectors, A), *guides(share, connectors, A)])
-    openings = Openings.of(search, _openable(inelastic, coupled), share.comm)
+    places = _openable(inelastic, coupled)
+    openings = Openings(search, places, share) if share.largest(float(bool(places))) else None
 
     loads = _loads(scene, fields, scheme, ledger, A)
     inertia = Inertia(fields, scheme, A, ledger, v) if has_inertia(scheme) else None
