@@ -78,14 +78,9 @@ class InelasticBeams(Cells):
     kind = "beams"
 
     def __init__(
-        self,
-        fields: Fields,
-        layout: Layout,
-        scheme: Scheme,
-        A: Csr,
-        ledger: Ledger,
+        self, fields: Fields, layout: Layout, scheme: Scheme, A: Csr, ledger: Ledger,
         search: SearchFlags,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._A, self._ledger = A, ledger
         self._hinges, self._static = layout.hinges, not scheme.dynamic
         self._cells = fields.share.cells[fields.order]

@@ -53,10 +53,11 @@ class Supports:
         entries: Entries of the matrix that hold them, and those of them on the diagonal.
         pivots: What stands on the diagonal.
         moving: Local degrees of freedom whose values depend on time.
+        turned: Axes of supports at an angle to those of the plane.
     """
 
     def __init__(self, share: Share, scheme: Scheme, ledger: Ledger, A: Csr) -> None:
-        self._turned: list[TurnedAxes] = []
+        self.turned: list[TurnedAxes] = []
         held: list[int] = []
         self._motions: list[tuple[int, TimeFunction, Support]] = []
         if GROUND in share.grid.scene.rigid_bodies:
@@ -64,21 +65,18 @@ class Supports:
         for support in share.grid.scene.supports:
             dofs = share.at(support.place)
             if support.angle and len(share.local(dofs[:2])):
-                self._turned.append(TurnedAxes(share.local(dofs[:2]), support.angle, A))
+                self.turned.append(TurnedAxes(share.local(dofs[:2]), support.angle, A))
             for component, motion in support.held.items():
-                held.extend(share.local(dofs[[component]]))
+                here = share.local(dofs[[component]])
+                held.extend(here)
                 if component in support.moving:
-                    self._motions.extend(
-                        (d, motion, support) for d in share.local(dofs[[component]])
-                    )
+                    self._motions.extend((dof, motion, support) for dof in here)
         self.dofs = np.array(sorted(held), dtype=np.int64)
         self.moving = np.array([dof for dof, *_ in self._motions], dtype=np.int64)
         self._held = as_slice(self.dofs)
         rows, columns = A.rows(), A.indices
         zero = np.isin(rows, self.dofs) | np.isin(columns, self.dofs)
-        self._zero = np.flatnonzero(zero)
-        self._diagonal = np.flatnonzero(zero & (rows == columns))
-        self.entries = self._zero, self._diagonal
+        self.entries = np.flatnonzero(zero), np.flatnonzero(zero & (rows == columns))
         self.pivots: Array = np.ones(len(self.dofs))
         self._owned = self.dofs < share.num_owned
         self._acting, self._ledger = scheme.acting, ledger
@@ -89,30 +87,25 @@ class Supports:
         self.reactions: Array = np.zeros(len(self.dofs))
         self._before: Array = self.reactions.copy()
 
-    @property
-    def turned(self) -> bool:
-        """True if some supports are at an angle to the axes of the plane."""
-        return bool(self._turned)
-
     def enter(self, x: Array) -> None:
         """Transform from the axes of the plane to those of the supports, in place."""
-        for axes in self._turned:
+        for axes in self.turned:
             axes.turn(x, 1)
 
     def leave(self, x: Array) -> None:
         """Transform from the axes of the supports to those of the plane, in place."""
-        for axes in self._turned:
+        for axes in self.turned:
             axes.turn(x, -1)
 
     def in_axes(self, q: Array) -> Array:
         """``q`` in the axes of the supports; a copy only if an axis is turned."""
-        if self._turned:
+        if self.turned:
             self.enter(q := q.copy())
         return q
 
     def in_plane(self, x: Array) -> Array:
         """``x`` in the axes of the plane; a copy only if an axis is turned."""
-        if self._turned:
+        if self.turned:
             self.leave(x := x.copy())
         return x
 
@@ -130,15 +123,16 @@ class Supports:
 
     def hold_matrix(self, data: Array) -> None:
         """Turn a tangent into the axes of the supports and hold what is held."""
-        for axes in self._turned:
+        for axes in self.turned:
             axes.turn_matrix(data)
         if len(self.dofs):
             # What stands on the diagonal has the right dimension and size for what is held.
             # Where material that flows freely leaves nothing, what stood there before does as well.
-            diagonal = data[self._diagonal]
+            zero, pivots = self.entries
+            diagonal = data[pivots]
             np.copyto(self.pivots, diagonal, where=diagonal != 0.0)
-            data[self._zero] = 0.0
-            data[self._diagonal] = self.pivots
+            data[zero] = 0.0
+            data[pivots] = self.pivots
 
     def accept(self, s: Array) -> None:
         """Work of the supports that move; ``s`` in their axes."""
