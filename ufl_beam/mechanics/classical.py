@@ -69,7 +69,7 @@ class _AtEnd(PlainStep):
 
     load_weight = 1.0
     theta = 1.0
-    loss = 0.0
+    alpha = 0.0
 
     def resistance(self, softening: Softening, opening: Array, growth: Values) -> Values:
         """The traction at the end of the step."""

@@ -31,11 +31,6 @@ class _OverStep:
         """The resultants of P(89) are those at this part of the step."""
         return 0.5 + self.alpha
 
-    @property
-    def loss(self) -> float:
-        """Return the energy that ``alpha`` dissipates."""
-        return self.alpha
-
     def resistance(self, softening: Softening, opening: Array, growth: Values) -> Values:
         """The mean traction, so that the work of the step is what the opening dissipates."""
         return softening.mean_traction(opening, growth)
@@ -169,6 +164,7 @@ class Midway:
 class _Velocities(Midway):
     """Velocities of which ``beta`` takes energy."""
 
+    alpha: float
     beta: float
 
     @property
@@ -199,6 +195,10 @@ class _Velocities(Midway):
     def slip(self, dt: float, change: Array, rates: Rates) -> Array:
         """Difference of velocities in proportion to the change; its loss is D_K of the paper."""
         return self.beta * change  # P(88)
+
+    def error_weights(self) -> tuple[float, float]:
+        """The trapezoidal rule's, and what both kinds of dissipation delay."""
+        return self.beta, 1 / 12 + self.alpha
 
 
 @dataclass(frozen=True)
@@ -240,10 +240,6 @@ class Midpoint(ExactStep, _Velocities):
         for name in ("alpha", "beta"):
             require_between(f"Midpoint: {name}", getattr(self, name), 0.0, 0.5)
 
-    def error_weights(self) -> tuple[float, float]:
-        """The trapezoidal rule's, and what both kinds of dissipation delay."""
-        return self.beta, 1 / 12 + self.alpha
-
 
 @dataclass(frozen=True)
 class PrintedMidpoint(_OverStep, _Velocities, PlainStep):
@@ -270,7 +266,3 @@ class PrintedMidpoint(_OverStep, _Velocities, PlainStep):
     def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
         """The variation in the middle of the step."""
         return kinematics.virtual_strain((q0 + q1) / 2, w, axis)
-
-    def error_weights(self) -> tuple[float, float]:
-        """Weights of the error of the trapezoidal rule."""
-        return 0.0, 1 / 12

@@ -51,7 +51,7 @@ class Scheme(Protocol):
     load_weight: float  # part of the step at whose rotation follower loads act
     theta: float  # part of the step at which laws of inelastic material are stated
     slack: float  # part of what a step stores and dissipates that its forces may not account for
-    loss: float  # part of twice the energy of a change of strain that is lost numerically
+    alpha: float  # part of twice the energy of a change of strain that is lost numerically
 
     def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
         """The step from ``t0`` to ``t1``, perhaps a part of one that goes on to ``end``."""

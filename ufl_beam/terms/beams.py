@@ -15,7 +15,7 @@ from ufl_beam.discretization.compiled_forms import Kernel, stated
 from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.kinematics import strain
-from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, Step
+from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, Step, has_inertia
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.forms_and_matrices import OfForms, OfMatrix
 from ufl_beam.terms.tangent_derivatives import Cells
@@ -42,7 +42,7 @@ def _elastic_forms(of: Element, scheme: Scheme) -> _ElasticForms:
     stored = sum(C[i] * e1[i] ** 2 / 2 for i in range(3)) * dx  # P(9)
     losses = [d * dx for d in scheme.losses(C, e0, e1, of.constant)]
     first = None
-    if not scheme.dynamic:
+    if not has_inertia(scheme):
         dq = ufl.TrialFunction(of.space)
         before = ufl.as_vector([C[i] * e0[i] for i in range(3)])
         geometric = ufl.dot(before, ufl.derivative(w_e, q1, dq))

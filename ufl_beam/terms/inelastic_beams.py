@@ -18,7 +18,7 @@ from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.kinematics import strain
-from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.fibres import Layout
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.material_points import Points, inputs
@@ -82,7 +82,7 @@ class InelasticBeams(Cells):
         search: SearchFlags,
     ) -> None:  # fmt: skip
         self._A, self._ledger = A, ledger
-        self._hinges, self._static = layout.hinges, not scheme.dynamic
+        self._hinges, self._static = layout.hinges, not has_inertia(scheme)
         self._cells = fields.share.cells[fields.order]
         self._strains = Strains(fields)
         cells, n = len(fields.order), len(layout.weights)

@@ -20,7 +20,7 @@ from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.kinematics import split, turn
-from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.bodies import carries
 from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame
 from ufl_beam.model.time_functions import value_at
@@ -284,7 +284,7 @@ class FrameForces(LoadTerm):
         S, G = mass_matrix(fields), turned_mass_matrix(fields)
         S.data[np.isin(S.rows(), share.rotations())] = 0.0
         S.data *= frame.rate**2
-        G.data *= 2 * frame.rate if scheme.dynamic else 0.0
+        G.data *= 2 * frame.rate if has_inertia(scheme) else 0.0
         self._S, self._G, self._pull, self._turn = S.data, G.data, Product(S), Product(G)
         self._from_centre = _positions(fields, frame.about)
         self._A, self._share_of_end, self._grown = A, scheme.load_weight, 0.0

@@ -44,7 +44,7 @@ def expect_entries(layout: Layout, scheme: Scheme, ledger: Ledger) -> None:
         ledger.lost["plastic"] += 0.0
     if layout.softening is not None:
         ledger.lost["hinges"] += 0.0
-    if scheme.loss or (layout.softening is not None and scheme.theta < 1):
+    if scheme.alpha or (layout.softening is not None and scheme.theta < 1):
         # In the middle of a step no stress is left in what has broken, but perhaps at its ends.
         ledger.lost["numerical"] += 0.0
 
@@ -137,7 +137,7 @@ class Points:
         search = search or SearchFlags()
         kind = layout.softening and layout.softening.of(1.0, 1.0)
         self._forms = forms = _point_forms(layout.statement, kind, scheme)
-        self._layout, self._storage, self._loss = layout, storage, scheme.loss
+        self._layout, self._storage, self._alpha = layout, storage, scheme.alpha
         self._yields, self.softens = layout.yields, layout.softening is not None
         self._at = {name: storage[:, :, i] for i, name in enumerate(inputs(layout.statement))}
         self._bulk = bulk = layout.bulk(keys)
@@ -275,8 +275,8 @@ class Points:
             ledger.lost["plastic"] += plastic
         if self.softens:
             ledger.lost["hinges"] += broken
-        if self._loss:
-            ledger.lost["numerical"] += 2 * self._loss * lost
+        if self._alpha:
+            ledger.lost["numerical"] += 2 * self._alpha * lost
         if released:
             ledger.lost["numerical"] += released
 

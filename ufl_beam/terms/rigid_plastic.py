@@ -124,7 +124,7 @@ class RigidPlasticResponse(Response):
         self._ledger = ledger
         ledger.lost["hinges"] += 0.0
         self._hardens = isinstance(law.law, Hardening)
-        self._loss = 2 * scheme.loss if self._hardens else 0.0
+        self._loss = 2 * scheme.alpha if self._hardens else 0.0
         if self._hardens:
             ledger.state["hardening"] += 0.0
         if self._loss:
