@@ -83,10 +83,6 @@ class _AtEnd(PlainStep):
         """C e at the end of the step; the components are uncoupled."""
         return scaled(C, e1)
 
-    def losses(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> tuple[Expr, ...]:
-        """No numerical losses in the ledger."""
-        return ()
-
     def average(self, before: Expr, now: Expr) -> Expr:
         """The one at the end of the step."""
         return now

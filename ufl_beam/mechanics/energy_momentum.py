@@ -42,12 +42,6 @@ class _OverStep:
             return mean
         return mean + constant(self.alpha) * scaled(C, e1 - e0)  # P(89)
 
-    def losses(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> tuple[Expr, ...]:
-        """Return the energy that ``alpha`` dissipates."""
-        if self.alpha == 0:
-            return ()
-        return (constant(self.alpha) * ufl.dot(scaled(C, e1 - e0), e1 - e0),)  # P(90)
-
     def average(self, before: Expr, now: Expr) -> Expr:
         """The mean of both ends, of which increments are products."""
         return (before + now) / 2

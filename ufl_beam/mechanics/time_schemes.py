@@ -65,9 +65,6 @@ class Scheme(Protocol):
     def resultants(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> Expr:
         """(N, V, M) that act during the step, from stiffness and strains at both ends."""
 
-    def losses(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> tuple[Expr, ...]:
-        """Energies per length that the resultants lose numerically in the step; often none."""
-
     def average(self, before: Expr, now: Expr) -> Expr:
         """Average of a vector or a distance between frames, as variations take it."""
 

@@ -15,7 +15,7 @@ from ufl_beam.discretization.compiled_forms import Kernel, stated
 from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.kinematics import strain
-from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, Step, has_inertia
+from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, Step, has_inertia, scaled
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.forms_and_matrices import OfForms, OfMatrix
 from ufl_beam.terms.tangent_derivatives import Cells
@@ -40,12 +40,11 @@ def _elastic_forms(of: Element, scheme: Scheme) -> _ElasticForms:
     r = scheme.resultants(C, e0, e1, of.constant)
     w_e = scheme.virtual_strain(q0, q1, w, of.axis)
     stored = sum(C[i] * e1[i] ** 2 / 2 for i in range(3)) * dx  # P(9)
-    losses = [d * dx for d in scheme.losses(C, e0, e1, of.constant)]
-    first = None
+    lost = of.constant(scheme.alpha) * ufl.dot(scaled(C, e1 - e0), e1 - e0) * dx  # P(90)
+    losses, first = [lost] if scheme.alpha else [], None
     if not has_inertia(scheme):
         dq = ufl.TrialFunction(of.space)
-        before = ufl.as_vector([C[i] * e0[i] for i in range(3)])
-        geometric = ufl.dot(before, ufl.derivative(w_e, q1, dq))
+        geometric = ufl.dot(scaled(C, e0), ufl.derivative(w_e, q1, dq))
         material = ufl.dot(ufl.derivative(r, q1, dq), w_e)
         first = (geometric + material) * dx
     return _ElasticForms(ufl.dot(r, w_e) * dx, stored, losses, first)  # P(12)
