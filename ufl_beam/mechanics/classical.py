@@ -65,30 +65,28 @@ class InParts:
 
 
 class _AtEnd(PlainStep):
-    """Base of schemes whose forces act at the end of the step."""
+    """Base of schemes whose forces, strains and their variations are those at the end of the step.
+
+    Their works are counted by the trapezoidal rule.
+    """
 
     load_weight = 1.0
     theta = 1.0
     alpha = 0.0
 
     def resistance(self, softening: Softening, opening: Array, growth: Values) -> Values:
-        """The traction at the end of the step."""
         return softening.traction(opening + growth)
 
     def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
-        """The variation at the end of the step."""
         return kinematics.virtual_strain(q1, w, axis)
 
     def resultants(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> Expr:
-        """C e at the end of the step; the components are uncoupled."""
         return scaled(C, e1)
 
     def average(self, before: Expr, now: Expr) -> Expr:
-        """The one at the end of the step."""
         return now
 
     def secant(self, force: Callable[[Array], Array], e0: Array, e1: Array) -> tuple[Array, Array]:
-        """The force at the end of the step."""
         f = force(e1)
         return f, np.where(f != 0, 1.0, 0.0)
 

@@ -310,13 +310,10 @@ class Points:
     def refresh(self, strains: Array) -> None:
         """Make forces and stored energies those of a state that no step has led to."""
         layout, bulk, length = self._layout, self._bulk, self["length"][:, :1]
+        p, volume = self["plastic"], layout.weights * length
         e = strains @ layout.strains.T - self["jump"] / self["length"]
-        volume = layout.weights * length
-        self.kept[:, :3] = (
-            layout.rest * strains
-            + (layout.weights * bulk.stress(e, self["plastic"])) @ layout.strains
-        )
-        self.sums[3] = np.sum(volume * bulk.elastic_energy(e - self["plastic"])) + np.sum(
-            strains**2 @ layout.rest / 2 * length[:, 0]
-        )
-        self.sums[4] = np.sum(volume * bulk.hardening_energy(self["plastic"], self["accumulated"]))
+        of_points = (layout.weights * bulk.stress(e, p)) @ layout.strains
+        self.kept[:, :3] = layout.rest * strains + of_points
+        of_rest = strains**2 @ layout.rest / 2 * length[:, 0]
+        self.sums[3] = np.sum(volume * bulk.elastic_energy(e - p)) + np.sum(of_rest)
+        self.sums[4] = np.sum(volume * bulk.hardening_energy(p, self["accumulated"]))
