@@ -53,7 +53,7 @@ class Term(ABC):
 
 
 class InternalForces(Term):
-    """Forces between places of a scene, of cells or connectors; their residual is a force."""
+    """Forces inside a scene: those of its cells and connectors."""
 
     @abstractmethod
     def change(self, q1: Array) -> float:
