@@ -180,7 +180,7 @@ def test_turned_axes_only_at_inclined_rollers():
                 ub.Scene([beam], supports=[ub.Roller(beam.end, along=along)]),
                 ub.Midpoint(),
                 comm=MPI.COMM_SELF,
-            ).supports.turned
+            ).supports._turned
         )
         for along in ((1, 0), (0, 1), (1, 1))
     ]

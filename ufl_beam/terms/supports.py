@@ -53,11 +53,10 @@ class Supports:
         entries: Entries of the matrix that hold them, and those of them on the diagonal.
         pivots: What stands on the diagonal.
         moving: Local degrees of freedom whose values depend on time.
-        turned: Axes of supports at an angle to those of the plane.
     """
 
     def __init__(self, share: Share, scheme: Scheme, ledger: Ledger, A: Csr) -> None:
-        self.turned: list[TurnedAxes] = []
+        self._turned: list[TurnedAxes] = []
         held: list[int] = []
         self._motions: list[tuple[int, TimeFunction, Support]] = []
         if GROUND in share.grid.scene.rigid_bodies:
@@ -65,7 +64,7 @@ class Supports:
         for support in share.grid.scene.supports:
             dofs = share.at(support.place)
             if support.angle and len(share.local(dofs[:2])):
-                self.turned.append(TurnedAxes(share.local(dofs[:2]), support.angle, A))
+                self._turned.append(TurnedAxes(share.local(dofs[:2]), support.angle, A))
             for component, motion in support.held.items():
                 here = share.local(dofs[[component]])
                 held.extend(here)
@@ -87,25 +86,30 @@ class Supports:
         self.reactions: Array = np.zeros(len(self.dofs))
         self._before: Array = self.reactions.copy()
 
+    @property
+    def turned(self) -> bool:
+        """True if some supports are at an angle to the axes of the plane."""
+        return bool(self._turned)
+
     def enter(self, x: Array) -> None:
         """Transform from the axes of the plane to those of the supports, in place."""
-        for axes in self.turned:
+        for axes in self._turned:
             axes.turn(x, 1)
 
     def leave(self, x: Array) -> None:
         """Transform from the axes of the supports to those of the plane, in place."""
-        for axes in self.turned:
+        for axes in self._turned:
             axes.turn(x, -1)
 
     def in_axes(self, q: Array) -> Array:
         """``q`` in the axes of the supports; a copy only if an axis is turned."""
-        if self.turned:
+        if self._turned:
             self.enter(q := q.copy())
         return q
 
     def in_plane(self, x: Array) -> Array:
         """``x`` in the axes of the plane; a copy only if an axis is turned."""
-        if self.turned:
+        if self._turned:
             self.leave(x := x.copy())
         return x
 
@@ -123,7 +127,7 @@ class Supports:
 
     def hold_matrix(self, data: Array) -> None:
         """Turn a tangent into the axes of the supports and hold what is held."""
-        for axes in self.turned:
+        for axes in self._turned:
             axes.turn_matrix(data)
         if len(self.dofs):
             # What stands on the diagonal has the right dimension and size for what is held.
