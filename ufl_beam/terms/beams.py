@@ -11,7 +11,7 @@ import ufl
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, doubles, lib, loop, struct
 from ufl_beam.compiled.csr import Csr, StepProduct
-from ufl_beam.discretization.compiled_forms import Kernel, stated
+from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.kinematics import strain
@@ -60,19 +60,19 @@ class ElasticBeams(OfForms, Cells):
         super().__init__(forms.work, forms.losses, fields, A, ledger)
         self._fields, self._work_form = fields, forms.work
         self._stored = fields.hot_kernel(forms.stored, self._q1)
-        self._first: Kernel | None = None
         self._tangents = struct("first_cells", then=self._tangent.cells)
+        self._static = forms.first is not None
         if forms.first is not None:
             self._first = fields.kernel(forms.first, self._q1)
             self._first.place(A)
             self._tangents.first = self._first.cells
+            self._of_step.append(self._first)
 
     def begin(self, step: Step) -> None:
         """Remember the configuration at the beginning."""
-        super().begin(step)
-        if self._first is not None:
-            self._first.set(self._q0, step.q0)
-            self._tangents.begins = 1
+        for kernel in self._of_step:
+            kernel.set(self._q0, step.q0)
+        self._tangents.begins = self._static
 
     def loops(self) -> tuple[Loop, Loop | None]:
         """C loops over the cells, of force and tangent."""
@@ -89,7 +89,8 @@ class ElasticBeams(OfForms, Cells):
     def accept(self, q1: Array, s: Array) -> None:
         """Enter the energy that the scheme lost."""
         self._tangents.begins = 0
-        super().accept(q1, s)
+        if self._losses:
+            super().accept(q1, s)
 
     def add_state(self, q: Array) -> None:
         """Add the stored energy to the ledger."""

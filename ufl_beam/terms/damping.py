@@ -67,7 +67,7 @@ class KelvinVoigtForces(OfForms):
         super().begin(step)
         if step.dt != self._dt:
             self._dt = step.dt
-            for kernel in (self._force, *self._losses):
+            for kernel in self._of_step:
                 kernel.put(self._rate, np.array([self._time / step.dt]))
 
 
@@ -152,7 +152,7 @@ class SecondDifferences(OfForms):
             self._q, self._e = step.q0, self._strains(step.q0)
         self._dt = step.dt
         super().begin(step)
-        for kernel in (self._force, *self._losses):
+        for kernel in self._of_step:
             kernel.put(self._before, min(1.0, step.dt / self._last_dt) * self._change)
 
     def accept(self, q1: Array, s: Array) -> None:

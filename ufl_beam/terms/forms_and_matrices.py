@@ -27,13 +27,14 @@ class OfForms(Term):
         self._q0, self._q1 = fields.element.q0, fields.element.q1
         self._force, self._tangent = fields.force_and_tangent(work, self._q1, A)
         self._losses = [fields.hot_kernel(form, self._q1) for form in losses]
+        self._of_step = [self._force, *self._losses]
         self._A, self._ledger = A, ledger
         if losses:
             ledger.lost[self._entry] += 0.0
 
     def begin(self, step: Step) -> None:
         """Remember the configuration at the beginning."""
-        for kernel in (self._force, *self._losses):
+        for kernel in self._of_step:
             kernel.set(self._q0, step.q0)
 
     def loops(self) -> tuple[Loop, Loop | None]:

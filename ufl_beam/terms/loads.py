@@ -116,7 +116,7 @@ class DeadLoads(LoadTerm):
     def accept(self, q1: Array, s: Array) -> None:
         """Enter the work of the loads, if there are any."""
         if any(self._factors) or self._before is not self.force:
-            super().accept(q1, s)
+            self._ledger.supplied["loads"] += float(self._acting(self._before, self.force) @ s)
             self._before = self._end
 
     def remember(self, memory: Memory, q: Array) -> None:
