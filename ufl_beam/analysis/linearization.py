@@ -42,9 +42,6 @@ class _Standstill(Static):
     rings = False
     kept: tuple[str, ...] = ()
 
-    def half_tangents(self, rotations: Index) -> Index:
-        return rotations[:0]
-
     def velocity(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
         return 1 / dt, 0.0, rates.v
 

@@ -151,7 +151,7 @@ class PathCorrector:
     def dissipation_side(self, q: Array, way: Direction) -> float:
         """Positive where more dissipates in a direction from ``q``, negative where against it."""
         now, size = self.dissipation(q), self.size(way)
-        flows = self.share.total(float(any(one.flows() for one in self.simulation.couplings)))
+        flows = self.share.total(float(any(c.response.flows() for c in self.simulation.couplings)))
         for doubled in range(MOST_DOUBLINGS if (now > 0 or flows) and size > 0 else 0):
             δ = 1e-9 * 2**doubled / size
             more = self.dissipation(q + δ * way.q) - self.dissipation(q - δ * way.q)
@@ -278,7 +278,7 @@ class Control(ABC):
     def factor(self) -> float:
         """Change of the load factor that counts as much as a unit of displacement."""
 
-    def require(self, scene: Scene) -> None:  # noqa: B027 - most controls fit all scenes
+    def require(self, scene: Scene) -> None:
         """Raise :class:`SceneError` if the control does not fit the scene."""
 
     @abstractmethod

@@ -100,6 +100,11 @@ def fill(struct: Any, **fields: Any) -> Any:
     return struct
 
 
+def struct(kind: str, **fields: Any) -> Any:
+    """Return a pointer to a new struct of loops.h, see :func:`fill`."""
+    return fill(ffi.new(f"{kind} *"), **fields)
+
+
 def names(enum: str, prefix: str = "") -> tuple[str, ...]:
     """Return the names in an enum of loops.h, in order, without the last, which counts them."""
     elements = ffi.typeof(f"enum {enum}").elements

@@ -51,7 +51,7 @@ class Scheme(Protocol):
     load_weight: float  # part of the step at whose rotation follower loads act
     theta: float  # part of the step at which laws of inelastic material are stated
     slack: float  # part of what a step stores and dissipates that its forces may not account for
-    loss: float  # part of twice the energy of a change of strain that is lost numerically
+    alpha: float  # part of twice the energy of a change of strain that is lost numerically
 
     def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
         """The step from ``t0`` to ``t1``, perhaps a part of one that goes on to ``end``."""
@@ -64,9 +64,6 @@ class Scheme(Protocol):
 
     def resultants(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> Expr:
         """(N, V, M) that act during the step, from stiffness and strains at both ends."""
-
-    def losses(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> tuple[Expr, ...]:
-        """Energies per length that the resultants lose numerically in the step; often none."""
 
     def average(self, before: Expr, now: Expr) -> Expr:
         """Average of a vector or a distance between frames, as variations take it."""

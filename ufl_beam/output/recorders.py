@@ -47,7 +47,7 @@ class Recorder(ABC):
     def write(self, simulation: StateView) -> None:
         """Record the state after a step."""
 
-    def close(self) -> None:  # noqa: B027 - not all have something to close
+    def close(self) -> None:
         """End the record; also called when the run fails."""
 
     def state(self) -> State:

@@ -120,7 +120,8 @@ class StateView(ABC):
         here = np.zeros((len(self.scene.links), len(Connection._fields)))
         q = self.q
         for one in self.couplings:
-            columns = one.shown_motion(q), one.force(q), one.work, one.rate, one.dissipated()
+            motion, dissipated = one.response.motion(one.motion(q)), one.response.dissipated()
+            columns = motion, one.force(q), one.work, one.rate, dissipated
             here[one.numbers] = np.column_stack(columns)
         if not self.share.alone:
             self.share.comm.Allreduce(MPI.IN_PLACE, here)

@@ -145,8 +145,9 @@ def assemble(share: Share, scheme: Scheme, v: Array, together: Agreement) -> Ass
     asked = {link: 0.0 for link in scene.links if isinstance(link.law, Controller | Coulomb)}
     rates = dict(asked)
     connectors = Setting(asked, rates, scene.size, scheme, ledger, friction_repeats(scene), search)
-    coupled = together(lambda: [*couplings(share, connectors, A), *guides(share, scheme, A)])
-    openings = Openings.of(search, _openable(inelastic, coupled), share.comm)
+    coupled = together(lambda: [*couplings(share, connectors, A), *guides(share, connectors, A)])
+    places = _openable(inelastic, coupled)
+    openings = Openings(search, places, share) if share.largest(float(bool(places))) else None
 
     loads = _loads(scene, fields, scheme, ledger, A)
     inertia = Inertia(fields, scheme, A, ledger, v) if has_inertia(scheme) else None
@@ -178,4 +179,5 @@ def _loads(scene: Scene, fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr)
 def _openable(inelastic: list[InelasticBeams], coupled: list[Links]) -> list[Openable]:
     """Return the places of this process that may open: hinges, cracks, softening springs."""
     cells: list[Openable] = [one for one in inelastic if one.points.softens]
-    return [*cells, *(one.openable for one in coupled if one.openable is not None)]
+    laws = (one.response.openable for one in coupled)
+    return [*cells, *(law for law in laws if law is not None)]

@@ -14,7 +14,7 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme
-from ufl_beam.terms.base import Beams
+from ufl_beam.terms.base import InternalForces
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.links import Links
 
@@ -36,7 +36,7 @@ class StaticPath:
         self,
         share: Share,
         scheme: Scheme,
-        beams: Sequence[Beams],
+        beams: Sequence[InternalForces],
         couplings: Sequence[Links],
         ledger: Ledger,
         q: Array,

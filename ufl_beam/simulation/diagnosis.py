@@ -171,7 +171,7 @@ def _deformations(
         except StepFailed:
             continue  # a guide that ends has no motion there, which the failure of the step says
         links[one.numbers] = np.abs(change)
-        left[one.numbers] = one.remaining()
+        left[one.numbers] = one.response.remaining()
     links /= np.where([link.turns for link in scene.links], 1.0, scene.size)
     strains, left_of_cells = _strains(grid, share.gather(q), x), np.ones(len(grid.cells))
     for beams in (term for term in equation.terms if isinstance(term, InelasticBeams)):

@@ -235,8 +235,10 @@ class Simulation(StateView):
         Nothing yields or opens any further, now and later: no step may follow.
         """
         self.ask()
-        for one in self._assembly.remembering:
-            one.freeze()
+        for cells in self.inelastic:
+            cells.points.freeze()
+        for coupling in self.couplings:
+            coupling.response.freeze()
         step = Step(0.0, dt, self.q, self.t, self.t, fraction=1.0)
         return self.equation.linearise(q, step)
 

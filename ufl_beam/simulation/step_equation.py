@@ -14,7 +14,7 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.solvers.equation import Equation
-from ufl_beam.terms.base import Beams, Term
+from ufl_beam.terms.base import InternalForces, Term
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.loads import LoadTerm
 from ufl_beam.terms.openings import SearchFlags
@@ -42,7 +42,7 @@ class StepEquation(Equation):
         super().__init__(A, np.zeros(share.size), supports.dofs)
         self.share, self.supports, self._search = share, supports, search
         self._beams, self._couplings, self._loads = beams, couplings, loads
-        self._inner: list[Beams] = [*beams, *couplings]
+        self._inner: list[InternalForces] = [*beams, *couplings]
         self.others: list[Term] = [*loads, *others]
         self.terms: list[Term] = [*self._inner, *self.others]
 

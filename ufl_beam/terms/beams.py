@@ -9,15 +9,15 @@ from typing import NamedTuple
 import ufl
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop
+from ufl_beam.compiled.c_library import Loop, doubles, lib, loop, struct
 from ufl_beam.compiled.csr import Csr, StepProduct
-from ufl_beam.discretization.compiled_forms import Kernel, stated
+from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.kinematics import strain
-from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, Step
-from ufl_beam.terms.base import OfForms, OfMatrix
+from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, Step, has_inertia, scaled
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.forms_and_matrices import OfForms, OfMatrix
 from ufl_beam.terms.tangent_derivatives import Cells
 
 
@@ -40,12 +40,11 @@ def _elastic_forms(of: Element, scheme: Scheme) -> _ElasticForms:
     r = scheme.resultants(C, e0, e1, of.constant)
     w_e = scheme.virtual_strain(q0, q1, w, of.axis)
     stored = sum(C[i] * e1[i] ** 2 / 2 for i in range(3)) * dx  # P(9)
-    losses = [d * dx for d in scheme.losses(C, e0, e1, of.constant)]
-    first = None
-    if not scheme.dynamic:
+    lost = of.constant(scheme.alpha) * ufl.dot(scaled(C, e1 - e0), e1 - e0) * dx  # P(90)
+    losses, first = [lost] if scheme.alpha else [], None
+    if not has_inertia(scheme):
         dq = ufl.TrialFunction(of.space)
-        before = ufl.as_vector([C[i] * e0[i] for i in range(3)])
-        geometric = ufl.dot(before, ufl.derivative(w_e, q1, dq))
+        geometric = ufl.dot(scaled(C, e0), ufl.derivative(w_e, q1, dq))
         material = ufl.dot(ufl.derivative(r, q1, dq), w_e)
         first = (geometric + material) * dx
     return _ElasticForms(ufl.dot(r, w_e) * dx, stored, losses, first)  # P(12)
@@ -54,33 +53,26 @@ def _elastic_forms(of: Element, scheme: Scheme) -> _ElasticForms:
 class ElasticBeams(OfForms, Cells):
     """Resultants of elastic cells working on the virtual strains, P(12)."""
 
-    kind = "beams"
+    kind, _entry = "beams", "numerical"
 
     def __init__(self, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger) -> None:
         forms = _elastic_forms(fields.element, scheme)
-        self._q0, self._q1, self._fields = fields.element.q0, fields.element.q1, fields
-        self._work_form = forms.work
-        self._force, self._tangent = fields.force_and_tangent(forms.work, self._q1, A)
-        self._stored, *self._losses = (
-            fields.hot_kernel(form, self._q1) for form in (forms.stored, *forms.losses)
-        )
-        self._first: Kernel | None = None
-        self._tangents = ffi.new("first_cells *", {"then": self._tangent.cells})
+        super().__init__(forms.work, forms.losses, fields, A, ledger)
+        self._fields, self._work_form = fields, forms.work
+        self._stored = fields.hot_kernel(forms.stored, self._q1)
+        self._tangents = struct("first_cells", then=self._tangent.cells)
+        self._static = forms.first is not None
         if forms.first is not None:
             self._first = fields.kernel(forms.first, self._q1)
             self._first.place(A)
             self._tangents.first = self._first.cells
-        self._A, self._ledger = A, ledger
-        if self._losses:
-            ledger.lost["numerical"] += 0.0
+            self._of_step.append(self._first)
 
     def begin(self, step: Step) -> None:
         """Remember the configuration at the beginning."""
-        for kernel in (self._force, *self._losses):
+        for kernel in self._of_step:
             kernel.set(self._q0, step.q0)
-        if self._first is not None:
-            self._first.set(self._q0, step.q0)
-            self._tangents.begins = 1
+        self._tangents.begins = self._static
 
     def loops(self) -> tuple[Loop, Loop | None]:
         """C loops over the cells, of force and tangent."""
@@ -97,8 +89,8 @@ class ElasticBeams(OfForms, Cells):
     def accept(self, q1: Array, s: Array) -> None:
         """Enter the energy that the scheme lost."""
         self._tangents.begins = 0
-        for loss in self._losses:
-            self._ledger.lost["numerical"] += loss.value(q1)
+        if self._losses:
+            super().accept(q1, s)
 
     def add_state(self, q: Array) -> None:
         """Add the stored energy to the ledger."""

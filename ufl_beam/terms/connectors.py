@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property, singledispatch
+from functools import cached_property
 from typing import NamedTuple
 
 import basix.ufl
@@ -12,7 +12,7 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, integers, lib, loop
+from ufl_beam.compiled.c_library import Loop, doubles, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import Kernel, stated
 from ufl_beam.discretization.partition import Share
@@ -24,26 +24,16 @@ from ufl_beam.model.connector_laws import HELD, Law, RigidPlastic, Spring
 from ufl_beam.terms import connector_laws, rigid_plastic, springs
 from ufl_beam.terms.connector_responses import Setting, respond
 from ufl_beam.terms.links import Links
-from ufl_beam.terms.tangent_derivatives import TangentChange
 
 LAWS = (connector_laws, rigid_plastic, springs)
 """Modules with the responses of laws, which register them with :func:`respond`."""
 
 
-@singledispatch
 def _kind(law: Law) -> object:
     """Key of a law: connectors with the same one are computed together."""
-    return type(law), law is HELD
-
-
-@_kind.register
-def _(law: Spring) -> object:
-    return law
-
-
-@_kind.register
-def _(law: RigidPlastic) -> object:
-    return RigidPlastic, type(law.law)
+    if isinstance(law, Spring):
+        return law
+    return type(law), law is HELD, isinstance(law, RigidPlastic) and type(law.law)
 
 
 class _Forms(NamedTuple):
@@ -93,7 +83,7 @@ class Couplings(Links):
     """
 
     def __init__(self, share: Share, here: Index, setting: Setting, A: Csr) -> None:
-        super().__init__(share, here, A)
+        super().__init__(share, here, setting, A)
         links, n = self.links, len(here)
         self._forms = forms = _forms(links[0].motion, setting.scheme)
         self._numbers = np.array([(*c.arms[0], *c.arms[1], *c.apart, *c.axis) for c in links])
@@ -101,25 +91,20 @@ class Couplings(Links):
             self._kernel, (forms.work, forms.tangent, forms.motion)
         )
         self._tangent.place(A)
-        self.response = respond(links[0].law, links, setting)
-        self._length = np.where([c.turns for c in links], 1.0, share.grid.scene.size)
+        length = np.where([c.turns for c in links], 1.0, setting.size)
         self._e, self._now = np.zeros((2, n))
         self._rows = np.zeros((n, 3))
         self._q: Array = np.empty(0)
-        self._in_c = c = ffi.new("couplings *")
-        c.work, c.tangent, c.motion = self._work.cells, self._tangent.cells, self._value.cells
-        self._alive = [
-            *(integers(x.astype(np.int32)) for x in (np.arange(n), self._forces_at, self._dofs)),
-            *map(doubles, (np.zeros(n), self._now, self._e, self._before, self.work, self.rate)),
-            doubles(self._length),
-        ]
-        c.link, c.force, c.dofs = self._alive[:3]
-        c.by_cell, c.e1, c.e0, c.before, c.taken, c.rate, c.length = self._alive[3:]
-        c.number, c.size = n, share.grid.scene.size
-        c.row, c.row_of_tangent = (one.position(forms.row) for one in (self._work, self._tangent))
-        c.weight_of_before = setting.scheme.acting(np.ones(1), np.zeros(1))[0]
-        for name, data in self.response.in_c.items():
-            setattr(c, name, data)
+        self._in_c = struct(
+            "couplings", number=n, link=np.arange(n, dtype=np.int32), dofs=self._dofs,
+            force=self._forces_at.copy(), length=length, size=setting.size,
+            work=self._work.cells, tangent=self._tangent.cells, motion=self._value.cells,
+            row=self._work.position(forms.row), row_of_tangent=self._tangent.position(forms.row),
+            by_cell=np.zeros(n), e0=self._e, e1=self._now, before=self._before,
+            taken=self.work, rate=self.rate,
+            weight_of_before=setting.scheme.acting(np.ones(1), np.zeros(1))[0],
+            **self.response.in_c,
+        )  # fmt: skip
         self._asks_python = not self.response.steady and not self.response.in_c
 
     # -- the step ------------------------------------------------------------------------------
@@ -212,10 +197,6 @@ class Couplings(Links):
         """Sum of the sizes of the works that the connectors take in the step to ``q1``; J."""
         return float(np.abs(self._taken(q1)).sum())
 
-    def dissipation(self, q1: Array) -> float:
-        """Energy that connectors of this process dissipate plastically in the step to ``q1``; J."""
-        return self.response.dissipation(self.motion(q1), self.force(q1))
-
     def accept(self, q1: Array, s: Array) -> None:
         """Enter what was supplied or lost."""
         taken: float = lib.commit_couplings(self._in_c, doubles(q1), self._dt)
@@ -225,16 +206,19 @@ class Couplings(Links):
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """Add the derivative of the tangent at ``q1`` along ``u``."""
         change, e = self._tangent_change, self.motion(q1)
-        rows = np.zeros_like(self._rows)
-        for column, numbers in enumerate(self.response.rows(e, self.force(q1))):
-            rows[:, column] = numbers
-        change.put(self._forms.row, rows)
-        change.put(self._forms.bend, self.response.bends(e)[:, None])
-        change.add(q1, u)
+        self._put(*self.response.rows(e, self.force(q1)))
+        bends = self.response.bends(e)[:, None]
+        for function, values in ((self._forms.row, self._rows), (self._forms.bend, bends)):
+            if change.uses(function):
+                change.put(function, values)
+        change.set(self._forms.u, u)
+        change.add(q1, self._A.data)
 
     @cached_property
-    def _tangent_change(self) -> TangentChange:
-        return TangentChange(self._forms.change, self._forms.u, self._kernel, self._A)
+    def _tangent_change(self) -> Kernel:
+        change = self._kernel(self._forms.change)
+        change.place(self._A)
+        return change
 
     # -- the state -----------------------------------------------------------------------------
 
@@ -249,6 +233,7 @@ class Couplings(Links):
         """Motions, forces and works, and what the laws remember."""
         response = self.response
         rows = np.column_stack([self.work, self.rate, self._before, self._e, response.state()])
+        # Files have the names of these classes.
         rows = memory.rows(type(response).__name__, self.numbers, rows)
         self.work[:], self.rate[:], self._before[:], self._e[:] = rows[:, :4].T
         response.restore(rows[:, 4:])

@@ -9,7 +9,7 @@ import numpy as np
 import ufl
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop
+from ufl_beam.compiled.c_library import Loop, doubles, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.function_spaces import Element, Fields, Strains
@@ -18,7 +18,7 @@ from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.kinematics import strain
-from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.fibres import Layout
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.material_points import Points, inputs
@@ -79,16 +79,11 @@ class InelasticBeams(Cells):
     kind = "beams"
 
     def __init__(
-        self,
-        fields: Fields,
-        layout: Layout,
-        scheme: Scheme,
-        A: Csr,
-        ledger: Ledger,
+        self, fields: Fields, layout: Layout, scheme: Scheme, A: Csr, ledger: Ledger,
         search: SearchFlags,
-    ) -> None:
-        self._layout, self._scheme, self._A, self._ledger = layout, scheme, A, ledger
-        self._order = fields.order
+    ) -> None:  # fmt: skip
+        self._A, self._ledger = A, ledger
+        self._hinges, self._static = layout.hinges, not has_inertia(scheme)
         self._cells = fields.share.cells[fields.order]
         self._strains = Strains(fields)
         cells, n = len(fields.order), len(layout.weights)
@@ -112,13 +107,12 @@ class InelasticBeams(Cells):
         )
         self._tangent.place(A)
         self._latest: Array = np.full(fields.share.size, np.nan)
-        self._in_c = c = ffi.new("inelastic *")
-        c.points, c.strains = self.points.points, self._strains.kernel.cells
-        c.force, c.tangent = self._force.cells, self._tangent.cells
-        c.at_r = self._force.position(forms.r)
-        c.at_b, c.at_D = map(self._tangent.position, (forms.b, forms.D))
-        self._at_latest = doubles(self._latest)
-        c.size, c.latest = len(self._latest), self._at_latest
+        self._in_c = struct(
+            "inelastic", size=len(self._latest), latest=self._latest, points=self.points.points,
+            strains=self._strains.kernel.cells, force=self._force.cells,
+            tangent=self._tangent.cells, at_r=self._force.position(forms.r),
+            at_b=self._tangent.position(forms.b), at_D=self._tangent.position(forms.D),
+        )  # fmt: skip
         self._q: Array = np.empty(0)
 
     # -- the step ------------------------------------------------------------------------------
@@ -132,7 +126,7 @@ class InelasticBeams(Cells):
             self.points.start(self._strains(step.q0))
         self.points.begin(step.dt)
         self._latest.fill(np.nan)
-        self._in_c.begins = not self._scheme.dynamic
+        self._in_c.begins = self._static
 
     def _respond(self, q1: Array) -> None:
         """Resultants at ``q1``, and their derivatives."""
@@ -140,8 +134,8 @@ class InelasticBeams(Cells):
 
     def loops(self) -> tuple[Loop, Loop | None]:
         """The points, and two forms."""
-        functions = ("add_inelastic_force", "add_inelastic_tangent")
-        return loop(functions[0], self._in_c), loop(functions[1], self._in_c)
+        forces, tangent = "add_inelastic_force", "add_inelastic_tangent"
+        return loop(forces, self._in_c), loop(tangent, self._in_c)
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the internal forces."""
@@ -185,10 +179,6 @@ class InelasticBeams(Cells):
         """Close again the points that :meth:`release` opened."""
         self.points.hold()
 
-    def freeze(self) -> None:
-        """Keep everything elastic from now on: nothing yields or breaks further."""
-        self.points.freeze()
-
     # -- the state -----------------------------------------------------------------------------
 
     def accept(self, q1: Array, s: Array) -> None:
@@ -217,7 +207,7 @@ class InelasticBeams(Cells):
     def kept(self) -> tuple[Index, Array]:
         """Cells (numbers of the grid), and :attr:`Points.kept` of them; (num_cells, 6)."""
         rows = self.points.kept.copy()
-        if not self._layout.hinges:
+        if not self._hinges:
             rows[:, 3] = 0.0
         return self._cells, rows
 

@@ -13,7 +13,7 @@ from ufl.conditional import Condition
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import doubles, ffi, in_order, integers, lib, names
+from ufl_beam.compiled.c_library import doubles, ffi, in_order, lib, names, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model import law_functions
@@ -44,14 +44,9 @@ def expect_entries(layout: Layout, scheme: Scheme, ledger: Ledger) -> None:
         ledger.lost["plastic"] += 0.0
     if layout.softening is not None:
         ledger.lost["hinges"] += 0.0
-    if scheme.loss or (layout.softening is not None and scheme.theta < 1):
+    if scheme.alpha or (layout.softening is not None and scheme.theta < 1):
         # In the middle of a step no stress is left in what has broken, but perhaps at its ends.
         ledger.lost["numerical"] += 0.0
-
-
-def point_forms(bulk: type[Bulk], softening: SofteningLaw | None, scheme: Scheme) -> PointForms:
-    """Compiled laws of points, made once in a process; numbers of ``softening`` do not matter."""
-    return _point_forms(bulk, softening and softening.of(1.0, 1.0), scheme)
 
 
 class PointForms:
@@ -59,6 +54,7 @@ class PointForms:
 
     They are the stress of the bulk, that of a point that opens by a known growth, and the excess of
     the bulk over the discontinuity, each with its derivative; and ``point_output`` of loops.h.
+    The numbers of ``softening`` do not matter: they are inputs.
     """
 
     def __init__(
@@ -141,8 +137,9 @@ class Points:
         search: SearchFlags | None = None,
     ) -> None:
         search = search or SearchFlags()
-        self._forms = point_forms(layout.statement, layout.softening, scheme)
-        self._layout, self._storage, self._loss = layout, storage, scheme.loss
+        kind = layout.softening and layout.softening.of(1.0, 1.0)
+        self._forms = forms = _point_forms(layout.statement, kind, scheme)
+        self._layout, self._storage, self._alpha = layout, storage, scheme.alpha
         self._yields, self.softens = layout.yields, layout.softening is not None
         self._at = {name: storage[:, :, i] for i, name in enumerate(inputs(layout.statement))}
         self._bulk = bulk = layout.bulk(keys)
@@ -151,8 +148,7 @@ class Points:
             self._at[name][:] = getattr(bulk, name)
         self._at["length"][:] = length[:, None]
         self._at["theta"][:] = scheme.theta
-        self._steps = self._at["dt"]
-        self._steps[:] = self._dt = 1.0
+        self._at["dt"][:] = self._dt = 1.0
         self._at["softening energy"][:] = 1.0
         self._at["traction"][:] = np.inf
         if layout.softening is not None:
@@ -167,22 +163,18 @@ class Points:
         self.r, self.D = np.zeros((cells, 3)), np.zeros((cells, 9))
         self._e0, self.strains = np.zeros((cells, 3)), np.zeros((cells, 3))
         self._over = np.zeros(1)
-        B, weights, rest = (
+        B, weight, rest, length = (
             np.ascontiguousarray(x, dtype=np.float64)
-            for x in (layout.strains, layout.weights, layout.rest)
+            for x in (layout.strains, layout.weights, layout.rest, length)
         )
-        self._search, forms = search, self._forms
-        self._alive = [
-            *map(doubles, (B, weights, rest, np.ascontiguousarray(length))),
-            *map(doubles, (self._e0, self.strains, storage, self.r, self.D, self.kept, self.sums)),
-            integers(search.flags),
-            doubles(self._over),
-        ]
-        self.points = c = ffi.new("points *")
-        c.B, c.weight, c.rest, c.length = self._alive[:4]
-        c.e0, c.e1, c.w, c.r, c.D, c.kept, c.sum, c.search, c.over = self._alive[4:]
-        c.bulk, c.opening, c.excess, c.end = forms.bulk, forms.opening, forms.excess, forms.end
-        c.cells, c.of_cell, c.width, c.theta = *storage.shape, scheme.theta
+        _, of_cell, width = storage.shape
+        self.points = struct(
+            "points", cells=cells, of_cell=of_cell, width=width, w=storage, theta=scheme.theta,
+            bulk=forms.bulk, opening=forms.opening, excess=forms.excess, end=forms.end,
+            B=B, weight=weight, rest=rest, length=length, e0=self._e0, e1=self.strains,
+            r=self.r, D=self.D, kept=self.kept, sum=self.sums, over=self._over,
+            search=search.flags,
+        )  # fmt: skip
 
     def __getitem__(self, name: str) -> Array:
         """Return the values of an input at the points, by its name; a view; (cells, n)."""
@@ -205,7 +197,7 @@ class Points:
     def begin(self, dt: float) -> None:
         """Begin a step of this length; s."""
         if dt != self._dt:
-            self._steps[:] = self._dt = dt
+            self["dt"][:] = self._dt = dt
 
     def respond(self, strains: Array) -> tuple[Array, Array]:
         """(N, V, M) that act in a step to these strains, and derivatives; (cells, 3), (cells, 9).
@@ -232,9 +224,9 @@ class Points:
 
     def remaining(self, change: Array) -> Array:
         """Part of the elastic stiffness that is left for small changes of the strains; (cells,)."""
-        layout, stiffness = self._layout, self._at["theta"][0, 0] * self._at["stiffness"]
-        by_point = change @ layout.strains.T
-        elastic = self._at["theta"][0, 0] * change**2 @ layout.rest
+        layout, theta = self._layout, self["theta"][0, 0]
+        stiffness, by_point = theta * self["stiffness"], change @ layout.strains.T
+        elastic = theta * change**2 @ layout.rest
         elastic += (stiffness * by_point**2) @ layout.weights
         now = np.einsum("ci,cij,cj->c", change, self.D.reshape(-1, 3, 3), change)
         return np.asarray(np.divide(now, elastic, out=np.ones(len(now)), where=elastic > 0))
@@ -258,14 +250,10 @@ class Points:
 
     def _sums_to_come(self) -> Array:
         """Return :attr:`sums` as :meth:`accept` would leave them."""
-        copy = ffi.new("points *", self.points[0])
-        sums = np.empty_like(self.sums)
-        state = (self._e0, self._storage, self.kept)
-        copy.e0, copy.w, copy.kept, copy.sum = alive = [doubles(x.copy()) for x in state] + [
-            doubles(sums)
-        ]
+        copy, sums = ffi.new("points *", self.points[0]), np.empty_like(self.sums)
+        state = [doubles(x.copy()) for x in (self._e0, self._storage, self.kept)]
+        (copy.e0, copy.w, copy.kept), copy.sum = state, doubles(sums)
         lib.commit(copy)
-        del alive
         return sums
 
     def freeze(self) -> None:
@@ -289,8 +277,8 @@ class Points:
             ledger.lost["plastic"] += plastic
         if self.softens:
             ledger.lost["hinges"] += broken
-        if self._loss:
-            ledger.lost["numerical"] += 2 * self._loss * lost
+        if self._alpha:
+            ledger.lost["numerical"] += 2 * self._alpha * lost
         if released:
             ledger.lost["numerical"] += released
 
@@ -324,13 +312,10 @@ class Points:
     def refresh(self, strains: Array) -> None:
         """Make forces and stored energies those of a state that no step has led to."""
         layout, bulk, length = self._layout, self._bulk, self["length"][:, :1]
+        p, volume = self["plastic"], layout.weights * length
         e = strains @ layout.strains.T - self["jump"] / self["length"]
-        volume = layout.weights * length
-        self.kept[:, :3] = (
-            layout.rest * strains
-            + (layout.weights * bulk.stress(e, self["plastic"])) @ layout.strains
-        )
-        self.sums[3] = np.sum(volume * bulk.elastic_energy(e - self["plastic"])) + np.sum(
-            strains**2 @ layout.rest / 2 * length[:, 0]
-        )
-        self.sums[4] = np.sum(volume * bulk.hardening_energy(self["plastic"], self["accumulated"]))
+        of_points = (layout.weights * bulk.stress(e, p)) @ layout.strains
+        self.kept[:, :3] = layout.rest * strains + of_points
+        of_rest = strains**2 @ layout.rest / 2 * length[:, 0]
+        self.sums[3] = np.sum(volume * bulk.elastic_energy(e - p)) + np.sum(of_rest)
+        self.sums[4] = np.sum(volume * bulk.hardening_energy(p, self["accumulated"]))
