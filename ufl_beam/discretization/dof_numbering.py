@@ -20,7 +20,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.errors import SceneError, require_kind, shorten
 from ufl_beam.model.bodies import Anchor, Body, Member, Node, Place, node
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.material_laws import Softening
+from ufl_beam.model.material_laws import AnySoftening
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.plastic_hinges import place_of
 from ufl_beam.model.scene import Scene
@@ -177,7 +177,7 @@ class Grid:
         ends = self.points[self.cells[cells]]
         return np.asarray(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
 
-    def hinges(self, beam: Member) -> list[Softening | None]:
+    def hinges(self, beam: Member) -> list[AnySoftening | None]:
         """Law of the hinge that may open in the middle of each cell of a beam."""
         return [beam.section.hinge] * len(self.cells_of(beam))
 

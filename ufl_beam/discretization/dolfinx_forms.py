@@ -9,6 +9,7 @@ import numpy as np
 import ufl
 
 from ufl_beam.arrays import Array, Index
+from ufl_beam.compiled.c_library import ffi
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.jit import compiled_form
 from ufl_beam.discretization.function_spaces import Element, Fields, derivative
@@ -34,7 +35,7 @@ class DolfinxForm:
         order: Row of ``cell_dofs``, and of all values given and returned, of each cell of the mesh.
     """
 
-    cells = None
+    cells = ffi.NULL
 
     def __init__(
         self, form: ufl.Form, unknown: fem.Function, cell_dofs: Index, order: Index

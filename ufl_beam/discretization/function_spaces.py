@@ -22,6 +22,7 @@ from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
 from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.mechanics.functional import kinetic_energy, resultants
 from ufl_beam.mechanics.kinematics import Axis, strain
+from ufl_beam.model.bodies import Body
 from ufl_beam.model.mesh_options import Mesh
 
 
@@ -45,19 +46,15 @@ class Element:
         one_cell = np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0, 1]])
         self._cell = cells or line_mesh(*one_cell)
         line = basix.ufl.element("Lagrange", "interval", mesh.degree)
-        self.axis = Axis(self._cell, mesh.nodes, self._along() if mesh.degree > 1 else 0.5)
+        along = fem.Function(fem.functionspace(self._cell, ("DG", 1)))
+        along.x.array[along.function_space.dofmap.list] = 0.0, 1.0
+        self.axis = Axis(self._cell, mesh.nodes, along if mesh.degree > 1 else 0.5)
         self.space = fem.functionspace(self._cell, basix.ufl.mixed_element([line, line, line]))
         self.q0, self.q1 = self.configuration(), self.configuration()
         self.w = ufl.TestFunction(self.space)
         self.stiffness, self.inertia = (
             fem.Function(fem.functionspace(self._cell, ("DG", 0, (n,)))) for n in (3, 2)
         )
-
-    def _along(self) -> fem.Function:
-        """Coordinate from 0 to 1 along the cell."""
-        function = fem.Function(fem.functionspace(self._cell, ("DG", 1)))
-        function.x.array[function.function_space.dofmap.list] = 0.0, 1.0
-        return function
 
     def configuration(self) -> fem.Function:
         """A new configuration (u_x, u_y, ψ)."""
@@ -121,7 +118,11 @@ class Fields(ABC):
         self.mesh = line_mesh(grid.points[vertices], cells.reshape(-1, 2))
         self.order: Index = part[np.asarray(self.mesh.topology.original_cell_index)]
         self._coordinates = cell_coordinates(self.mesh)
-        self._require_direction(grid.points[grid.cells[share.cells[self.order]]])
+        # The order of the vertices of a cell orients the beam.
+        if not np.array_equal(
+            self._coordinates[:, :, :2], grid.points[grid.cells[share.cells[self.order]]]
+        ):
+            raise RuntimeError("this version of DOLFINx turns cells around; please report it")
         self.cell_dofs = share.cell_dofs[self.order]
         self._matrix: Csr | None = None
         self.element = self._element()
@@ -165,19 +166,13 @@ class Fields(ABC):
         kernel.add(np.zeros(self.share.size), matrix.data)
         return matrix
 
-    def _require_direction(self, ends: Array) -> None:
-        """The mesh must keep the order of the vertices of a cell, which orients the beam."""
-        if not np.array_equal(self._coordinates[:, :, :2], ends):
-            raise RuntimeError("this version of DOLFINx turns cells around; please report it")
-
     def of_sections(self, function: fem.Function) -> Array:
         """Numbers of the sections of the cells, for a coefficient of the element."""
         grid = self.share.grid
-        inertia = function is self.element.inertia
-        names = ("rhoA", "rhoI") if inertia else ("EA", "GA", "EI")
-        of_beam = np.array([[getattr(b.section, n) for n in names] for b in grid.scene.beams])
-        of_cells = grid.beam_of_cell[self.share.cells[self.order]]
-        return of_beam.reshape(-1, len(names))[of_cells]
+        names = ("rhoA", "rhoI") if function is self.element.inertia else ("EA", "GA", "EI")
+        of_beam = [[getattr(beam.section, name) for name in names] for beam in grid.scene.beams]
+        beams = grid.beam_of_cell[self.share.cells[self.order]]
+        return np.array(of_beam).reshape(-1, len(names))[beams]
 
     def variables(self, number: int) -> fem.Function:
         """A function with so many numbers in each point of the cells."""
@@ -229,12 +224,11 @@ def mass_matrix(fields: Fields) -> Csr:
     """Mass of the beams, the point masses and the bodies."""
     share, M = fields.share, fields.assembled(_mass(fields.element))
     scene = share.grid.scene
-    lumps = [(share.at(one.place), one.mass, one.inertia) for one in scene.masses]
-    lumps += [(share.at(one.middle), one.mass, one.inertia) for one in scene.bodies]
-    for dofs, mass, inertia in lumps:
+    for one in (*scene.masses, *scene.bodies):
+        dofs = share.at(one.middle if isinstance(one, Body) else one.place)
         mine = share.owns(dofs)
         here = share.local(dofs[mine])
-        M.data[M.positions(here, here)] += np.array([mass, mass, inertia])[mine]
+        M.data[M.positions(here, here)] += np.array([one.mass, one.mass, one.inertia])[mine]
     return M
 
 

@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from functools import cached_property
 
 from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Index
+from ufl_beam.arrays import Array, Index, Snapshot
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import Fields, SectionForces
 from ufl_beam.discretization.partition import Share
@@ -20,7 +21,6 @@ from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 from ufl_beam.output.joint_histories import Connection, links_of, motion_of, velocity_of
-from ufl_beam.output.snapshot import Snapshot
 from ufl_beam.parameter import Parameter
 from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.energy_ledger import Ledger
@@ -30,10 +30,11 @@ from ufl_beam.terms.supports import Supports
 
 NO_REACTIONS = np.zeros((0, 3))
 NO_CONNECTIONS = np.zeros((0, len(Connection._fields)))
+NO_MATERIAL = np.zeros((0, 7))
 
 
-class StateView:
-    """The state of a scene in words of the scene; all processes call its methods together."""
+class StateView(ABC):
+    """State at the present time, by objects of the scene; all processes call methods together."""
 
     scene: Scene
     comm: MPI.Intracomm  # all processes of the run
@@ -54,22 +55,24 @@ class StateView:
     _has_inelastic: bool
 
     @property
+    @abstractmethod
     def parameter(self) -> Parameter:
         """Time, or the load factor of a path."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def iterations(self) -> int:
         """Newton iterations so far."""
-        raise NotImplementedError
 
     def gather(self) -> Snapshot:
         """Gather the state of all processes."""
         v = [self.share.gather(v) for v in self.velocities()]
         connections = self.connections() if self.scene.links else NO_CONNECTIONS
+        groups = np.concatenate([NO_MATERIAL, *(np.c_[group] for group in self.material())])
+        material = groups[np.argsort(groups[:, 0])]
         return Snapshot(
             self.t, self.share.gather(self.q), v[0] if v else None, self.reactions(),
-            self.entries(), self.material(), connections, self.parts, self.iterations,
+            self.entries(), material, connections, self.parts, self.iterations,
         )  # fmt: skip
 
     def velocities(self) -> list[Array]:
@@ -111,10 +114,6 @@ class StateView:
             {name: sum(one[g][name] for one in everyone) for name in group}
             for g, group in enumerate(groups)
         )
-
-    def ledger_names(self) -> list[str]:
-        """Names of the entries of the ledger."""
-        return [*self.ledger.state, *self.ledger.supplied, *self.ledger.lost]
 
     def connections(self) -> Array:
         """Columns of :class:`Connection` for all links of the scene; (num_links, 5)."""

@@ -72,30 +72,20 @@ class Evaluation(Protocol):
 
 @dataclass(frozen=True)
 class Assembly:
-    """Terms of a scene and what they share.
+    """Terms of a scene and what they share."""
 
-    Attributes:
-        fields: Function spaces on the cells of this process.
-        asked: Forces of controllers, and limits of friction, in the step; N or N m.
-        rates: Rates of the motions with friction as the step begins; m/s or rad/s.
-        beams: Beams of the cells of this process; the inelastic ones, with material points, first.
-        yields: Whether any process has such cells.
-        couplings: Connectors, those alike together.
-        openings: Search for what opens; None if nothing can.
-    """
-
-    fields: Fields
+    fields: Fields  # on the cells of this process
     ledger: Ledger
-    asked: dict[Connector, float]
-    rates: dict[Connector, float]
-    beams: list[Cells]
-    inelastic: list[InelasticBeams]
-    yields: bool
-    couplings: list[Links]
+    asked: dict[Connector, float]  # forces of controllers, limits of friction in the step; N or N m
+    rates: dict[Connector, float]  # of motions with friction as the step begins; m/s or rad/s
+    beams: list[Cells]  # those with material points first
+    inelastic: list[InelasticBeams]  # those with material points
+    yields: bool  # True if any process has such cells
+    couplings: list[Links]  # connectors, those alike together
     loads: Loads
     inertia: Inertia | None
     supports: Supports
-    openings: Openings | None
+    openings: Openings | None  # search for what opens; None if nothing can
     equation: StepEquation
 
     @property
@@ -105,12 +95,11 @@ class Assembly:
 
     def ask(self, simulation: Running, q: Array) -> None:
         """Ask controllers and friction for forces and limits; note the rates of what may slip."""
-        new = {
-            link: law.ask(simulation, link)
-            for link, law in ((link, link.law) for link in self.asked)
-            if isinstance(law, Controller | Coulomb)
-        }
-        self.asked.update(new)
+        forces = {
+            link: link.law.ask(simulation, link)
+            for link in self.asked if isinstance(link.law, Controller | Coulomb)
+        }  # fmt: skip
+        self.asked.update(forces)
         if self.inertia is not None:
             for one in self.couplings:
                 if isinstance(one.links[0].law, Coulomb):
@@ -168,7 +157,7 @@ def assemble(
     setting = (scheme, A, ledger)
 
     # Each kind makes its entries of the ledger: their order is that of the columns of tables.
-    groups = inelastic_cells(share.grid)
+    groups = inelastic_cells(share)
     inelastic, elastic = [], np.ones(len(share.cells), dtype=bool)
     for layout, cells in groups:
         expect_entries(layout, scheme, ledger)
@@ -189,20 +178,13 @@ def assemble(
     asked = {link: 0.0 for link in scene.links if isinstance(link.law, Controller | Coulomb)}
     rates = dict(asked)
     connectors = Setting(
-        asked,
-        rates,
-        scene.size,
-        scheme,
-        ledger,
-        friction_repeats(scene),
-        search,
-        by.points,
+        asked, rates, scene.size, scheme, ledger, friction_repeats(scene), search, by.points,
         by.slips,
-    )
-    coupled = together(
-        lambda: [*couplings(share, connectors, A, by.couplings), *guides(share, connectors, A)]
-    )
-    openings = Openings.of(search, _openable(inelastic, coupled), share.comm)
+    )  # fmt: skip
+    of_links = share, connectors, A
+    coupled = together(lambda: [*couplings(*of_links, by.couplings), *guides(*of_links)])
+    places = _openable(inelastic, coupled)
+    openings = Openings(search, places, share) if share.largest(float(bool(places))) else None
 
     loads = _loads(scene, fields, scheme, ledger, A)
     inertia = Inertia(fields, scheme, A, ledger, v) if has_inertia(scheme) else None

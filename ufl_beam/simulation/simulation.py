@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from functools import partial
 from typing import NoReturn
 
@@ -16,14 +15,7 @@ from ufl_beam.compiled.c_library import extrapolated
 from ufl_beam.discretization.model_warnings import warn_of_jumps
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory, Restoring, Saving, State
-from ufl_beam.errors import (
-    ModelWarning,
-    SceneError,
-    StepFailed,
-    require_kind,
-    require_number,
-    shorten,
-)
+from ufl_beam.errors import SceneError, StepFailed, require_kind, require_number, shorten, warn
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
@@ -36,15 +28,15 @@ from ufl_beam.simulation.evaluation import COMPILED, REFERENCE
 from ufl_beam.simulation.initial_state import checked_grid, initial_state, mesh_of
 from ufl_beam.simulation.replicas import Copies, sharing
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.step_cutting import (
+from ufl_beam.simulation.step_solver import (
     APPLYING,
     FIRST,
+    StepSolver,
     Trial,
     begins_loaded,
     go_in_parts,
     require_small_turn,
 )
-from ufl_beam.simulation.step_solver import StepSolver
 from ufl_beam.solvers.equation import Border
 from ufl_beam.solvers.newton_options import Newton
 
@@ -262,7 +254,10 @@ class Simulation(StateView):
         self.leave()
         self.supports.go_back()
         self.end()
-        raise no_equilibrium(self, self._solver, self.solution, failure, end, advice) from failure
+        raise no_equilibrium(
+            self.equation, self._solver, self.solution, failure, self.q, (self.t, end),
+            advice or self.scheme.advice,
+        ) from failure  # fmt: skip
 
     def settle(self) -> None:
         """Compare the states so far where each process computes a copy of the scene.
@@ -347,7 +342,7 @@ class Simulation(StateView):
         if getattr(self.scheme, "exact_ledger", False) and len(self.solution) > 1:
             self.solution.open_ledger = open_ledger(self.solution, self.share, self._solver)
         if self.solution.open_ledger and self.comm.rank == 0:
-            warnings.warn(self.solution.open_ledger, ModelWarning, stacklevel=3)
+            warn(self.solution.open_ledger)
 
     def close(self) -> None:
         """Give back what PETSc holds."""

@@ -108,7 +108,7 @@ class Convergence:
             return int(lib.DIVERGED)
         scale = self.scale()
         self._find_motion(self._x)
-        floor = 8 * self._round_off() if iteration > 1 else 0.0
+        floor = 8 * self.size(self._round_off(self._x)) if iteration > 1 else 0.0
         return int(lib.judge(self.c, doubles(self._x), iteration, residual, scale, floor))
 
     def failure(self, reason: int, iterations: int) -> StepFailed:
@@ -128,31 +128,28 @@ class Convergence:
 
     # -- round-off -----------------------------------------------------------------------------
 
-    def _round_off(self) -> float:
-        """Residual that the last digit of displacements, strains and rotations makes; N.
+    def _round_off(self, x: Array) -> Array:
+        """Residual that the last digit of displacements, strains and rotations at ``x`` makes; N.
 
         Stiff or finely divided beams cannot be solved any better, however small the forces are.
         """
-        return self.size(self._A.data[self.diagonal] * self._last_digits(self._x))
+        digits = np.empty(self._share.size)
+        lib.find_last_digits(self.c, doubles(x), doubles(digits))
+        return np.asarray(self._A.data[self.diagonal] * digits)
 
     def _find_motion(self, x: Array) -> None:
         """Note the largest motion in any process, at most the size of the scene."""
         largest = lib.largest_motion(*self._norm, doubles(x))
         self.c.moved = min(self._share.largest(largest), self.c.scene)
 
-    def _last_digits(self, x: Array) -> Array:
-        digits = np.empty(self._share.size)
-        lib.find_last_digits(self.c, doubles(x), doubles(digits))
-        return digits
-
     def least_work(self, s: Array) -> float:
         """Work in a step ``s`` of what the last digit of displacements makes; less is none; J."""
         self._find_motion(self._x)
-        works = self._A.data[self.diagonal] * self._last_digits(self._x) * np.abs(s)
+        works = self._round_off(self._x) * np.abs(s)
         return self._share.total(float(works[self._owned].sum()))
 
     def random_work(self, x: Array, s: Array) -> float:
         """Work in a step ``s`` of the last digits at ``x``, were they independent; J."""
         self._find_motion(x)
-        works = self._A.data[self.diagonal] * self._last_digits(x) * s
+        works = self._round_off(x) * s
         return math.sqrt(self._share.total(float(np.sum(works[self._owned] ** 2))))

@@ -152,7 +152,7 @@ class SnesCallbacks:
     """
 
     def __init__(self, equation: Equation, vectors: Vectors, stop: Callable[[int], int]) -> None:
-        self._equation, self._vectors, self._stop = equation, vectors, stop
+        self.equation, self.vectors, self._stop = equation, vectors, stop
         self.idle: tuple[Index, Array] | None = None
 
     @contextmanager
@@ -161,31 +161,31 @@ class SnesCallbacks:
         try:
             yield
         except BaseException as error:
-            self._equation.note(error)
+            self.equation.note(error)
 
     def function(self, snes: Any, x: Any, f: Any) -> None:
         """Compute the residual ``f`` at ``x``."""
-        self._vectors.update_ghosts(x)
-        r = self._vectors.view(f, writable=True)
+        self.vectors.update_ghosts(x)
+        r = self.vectors.view(f, writable=True)
         with self.noted():
-            self._equation.residual(self._vectors.view(x), r)
-        if self._equation.error is not None:
+            self.equation.residual(self.vectors.view(x), r)
+        if self.equation.error is not None:
             # It may have failed on this process alone; by the sum all give up together.
             r.fill(np.nan)
-        self._vectors.add_ghosts(f)
+        self.vectors.add_ghosts(f)
         f.stateIncrease()
-        self._equation.complete(r)
+        self.equation.complete(r)
 
     def jacobian(self, snes: Any, x: Any, J: Any, P: Any) -> None:
         """Compute the tangent at ``x``, unless the last one is near enough."""
-        if self._equation.c.near:
+        if self.equation.c.near:
             return
-        self._vectors.update_ghosts(x)
+        self.vectors.update_ghosts(x)
         with self.noted():
-            self._equation.tangent(self._vectors.view(x))
+            self.equation.tangent(self.vectors.view(x))
             if self.idle is not None:
                 entries, stiffnesses = self.idle
-                self._equation.A.data[entries] += stiffnesses
+                self.equation.A.data[entries] += stiffnesses
         P.stateIncrease()
 
     def test(self, snes: Any, iteration: int, norms: Any) -> int:

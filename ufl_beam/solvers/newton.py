@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -124,27 +123,13 @@ class Solver:
         """Newton's method with a line search."""
         if "snes_linesearch_type" in self._chosen():
             return self._snes
-        return SearchingNewton(
-            self._snes, self._ksp, x=self._x, f=self._f, y=self._vectors.new(),
-            w=self._vectors.new(), matrix=self._matrix, test=self.convergence.test,
-            near=lambda: bool(self._equation.c.near), work=self._work_on,
-            most=self._newton.max_iterations,
-        )  # fmt: skip
-
-    def _work_on(self, y: PETSc.Vec) -> Callable[[], float]:
-        """Work of the latest residual on a step from the present iterate; J."""
-        for vector in (self._x, y):
-            self._vectors.update_ghosts(vector)
-        step = self._equation.working(self._q, self._vectors.view(y))
-        return lambda: self.convergence.work(step)
+        return SearchingNewton(self._snes, self._vectors, self._equation, self.convergence)
 
     def _along(self, border: Border) -> PETSc.SNES:
         """SNES of the equation with a border."""
         if self._bordered is None:
-            self._bordered = BorderedNewton(
-                self._callbacks, self._vectors, self._ksp.getPC(), self._equation.held,
-                self._make_snes(), self._f, self._matrix, border,
-            )  # fmt: skip
+            factors = self._ksp.getPC()
+            self._bordered = BorderedNewton(self._make_snes(), self._callbacks, factors, border)
         self._bordered.border = border
         return self._bordered.snes
 
@@ -166,20 +151,13 @@ class Solver:
         if reason <= 0 and self._may_go_on() and self._equation.stiffen(True):
             self._go_to(guess)
             reason = self._stiffened()
-        if reason <= 0:
-            raise self._failure(reason)
-        self._vectors.update_ghosts(self._x)
-        return self._q.copy()
+        return self._solution(reason)
 
     def solve_along(self, guess: Array, loads: list[Array], border: Border) -> Array:
         """Find the configuration as :meth:`solve` does, together with the unknown of a border."""
         self.convergence.take_loads(loads)
         self._go_to(guess)
-        reason = self._iterate(self._along(border), 12)
-        if reason <= 0:
-            raise self._failure(reason)
-        self._vectors.update_ghosts(self._x)
-        return self._q.copy()
+        return self._solution(self._iterate(self._along(border), 12))
 
     @cached_property
     def _idle(self) -> IdleMotions:
@@ -196,10 +174,8 @@ class Solver:
             self._go_to(guess)
             return self._iterate(self._snes, 2)
 
-        reason, convergence = int(lib.SINGULAR), self.convergence
-        while reason == lib.SINGULAR and self._idle.find(
-            convergence.residuals(), convergence.scale()
-        ):
+        reason, now = int(lib.SINGULAR), self.convergence
+        while reason == lib.SINGULAR and self._idle.find(now.residuals(), now.scale()):
             reason = again()
         if reason <= 0 and self._idle.forget():
             reason = again()
@@ -256,10 +232,13 @@ class Solver:
         self._agreement.settle(None if isinstance(error, StepFailed) else error)
         return True
 
-    def _failure(self, reason: int) -> StepFailed:
-        """Describe the failure; raise what a function of the user has raised on any process."""
-        self._agreement.settle(self._equation.error)
-        return self.convergence.failure(reason, self._done)
+    def _solution(self, reason: int) -> Array:
+        """Return the latest iterate; raise the failure, or what a function of the user raised."""
+        if reason <= 0:
+            self._agreement.settle(self._equation.error)
+            raise self.convergence.failure(reason, self._done)
+        self._vectors.update_ghosts(self._x)
+        return self.iterate()
 
     # -- what is known of it -------------------------------------------------------------------
 

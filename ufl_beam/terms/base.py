@@ -11,9 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop, loop
-from ufl_beam.compiled.csr import Csr, StepProduct
-from ufl_beam.discretization.compiled_forms import CellForm
+from ufl_beam.compiled.c_library import Loop
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.time_schemes import Step
 
@@ -55,7 +53,7 @@ class Term(ABC):
 
 
 class InternalForces(Term):
-    """Forces between places of a scene, of cells or connectors; their residual is a force."""
+    """Forces inside a scene: those of its cells and connectors."""
 
     @abstractmethod
     def change(self, q1: Array) -> float:
@@ -63,41 +61,3 @@ class InternalForces(Term):
 
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """Add the derivative of the tangent at ``q1`` along ``u``; no internal variable changes."""
-
-
-class OfForms(Term):
-    """A term whose forces and their derivative are two forms on cells."""
-
-    _force: CellForm
-    _tangent: CellForm
-    _A: Csr
-
-    def loops(self) -> tuple[Loop, Loop | None]:
-        """C loops over the cells, of force and tangent."""
-        return loop("add_cells", self._force.cells), loop("add_cells", self._tangent.cells)
-
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Add the forces to the residual."""
-        self._force.add(q1, r)
-
-    def add_tangent(self, q1: Array) -> None:
-        """Add the derivative of the forces to the tangent."""
-        self._tangent.add(q1, self._A.data)
-
-
-class OfMatrix(Term):
-    """A term whose forces are a constant matrix times the step of the nodes."""
-
-    _times: StepProduct
-
-    def loops(self) -> tuple[Loop, Loop | None]:
-        """The product, and its derivative."""
-        return self._times.loops()
-
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Add the forces to the residual."""
-        self._times.add_force(q1, r)
-
-    def add_tangent(self, q1: Array) -> None:
-        """Add the derivative of the forces to the tangent."""
-        self._times.add_tangent(q1)

@@ -19,7 +19,7 @@ from ufl_beam.compiled.c_library import doubles, ffi, in_order, lib, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model import law_functions
-from ufl_beam.model.material_laws import Bulk, Softening
+from ufl_beam.model.material_laws import Bulk, SofteningLaw
 from ufl_beam.terms.material_points import Points, inputs
 
 law_functions.where.register(Condition, ufl.conditional)
@@ -27,19 +27,17 @@ law_functions.below.register(Expr, ufl.lt)
 law_functions.exp.register(Expr, ufl.exp)
 
 
-def point_forms(bulk: type[Bulk], softening: Softening | None, scheme: Scheme) -> PointForms:
-    """Compiled laws of points, made once in a process; numbers of ``softening`` do not matter."""
-    return _point_forms(bulk, softening and softening.of(1.0, 1.0), scheme)
-
-
 class PointForms:
     """Compiled laws: C functions from the inputs of a point to what the loops need.
 
     They are the stress of the bulk, that of a point that opens by a known growth, and the excess of
     the bulk over the discontinuity, each with its derivative; and ``point_output`` of loops.h.
+    The numbers of ``softening`` do not matter: they are inputs.
     """
 
-    def __init__(self, statement: type[Bulk], softening: Softening | None, scheme: Scheme) -> None:
+    def __init__(
+        self, statement: type[Bulk], softening: SofteningLaw | None, scheme: Scheme
+    ) -> None:
         self._pointwise = pointwise = Pointwise(inputs(statement))
         at = pointwise.at
         strain, a = ufl.variable(at["strain"]), ufl.variable(at["growth"])
@@ -49,7 +47,7 @@ class PointForms:
 
         # The incompatible mode: a jump relaxes the strain of the bulk by jump over length.
         relieved = at["jump"] / length
-        e = (1 - θ) * at["before"] + θ * strain - (relieved + θ * s * a / length)
+        e = (1 - θ) * at["before"] + θ * strain - (relieved + θ * s * a / length)  # P(30)
         dp = bulk.flow(e, p, ξ, θ, dt)
         σ = bulk.stress(e, p + θ * dp)
         self.bulk = pointwise.compile(σ, ufl.diff(σ, strain))
@@ -92,7 +90,8 @@ class CompiledPoints(Points):
 
     def _prepare(self, scheme: Scheme, length: Array) -> None:
         layout = self._layout
-        self._forms = forms = point_forms(layout.statement, layout.softening, scheme)
+        kind = layout.softening and layout.softening.of(1.0, 1.0)
+        self._forms = forms = _point_forms(layout.statement, kind, scheme)
         self._over = np.zeros(1)
         arrays = {"B": layout.strains, "weight": layout.weights, "rest": layout.rest}
         arrays = {k: np.ascontiguousarray(x, np.float64) for k, x in arrays.items()}

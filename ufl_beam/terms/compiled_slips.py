@@ -11,7 +11,7 @@ from ufl_beam.compiled.c_library import doubles, in_order, lib, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.connector_laws import RigidPlastic
-from ufl_beam.model.material_laws import Hardening, Softening
+from ufl_beam.model.material_laws import Hardening, SofteningLaw
 from ufl_beam.terms.connector_responses import Rows
 from ufl_beam.terms.rigid_plastic import INPUTS, RigidPlasticResponse, slip
 
@@ -19,7 +19,7 @@ from ufl_beam.terms.rigid_plastic import INPUTS, RigidPlasticResponse, slip
 class SlipForms:
     """Compiled laws of slip: force and its derivative by the slip; ``slip_output`` of loops.h."""
 
-    def __init__(self, law: Softening | Hardening, scheme: Scheme) -> None:
+    def __init__(self, law: SofteningLaw | Hardening, scheme: Scheme) -> None:
         self._pointwise = pointwise = Pointwise(INPUTS)
         at = {**pointwise.at, "slip": ufl.variable(pointwise.at["slip"])}
         end = slip(law, at, scheme)._asdict()
@@ -31,17 +31,13 @@ class SlipForms:
 _slip_forms = stated(SlipForms)
 
 
-def slip_forms(law: Softening | Hardening, scheme: Scheme) -> SlipForms:
-    """Compiled laws of slip, made once in a process; numbers of ``law`` do not matter."""
-    return _slip_forms(Hardening(1.0) if isinstance(law, Hardening) else law.of(1.0, 1.0), scheme)
-
-
 class CompiledSlips(RigidPlasticResponse):
     """Rigid-plastic connectors that C evaluates."""
 
     def _prepare(self, law: RigidPlastic) -> None:
         super()._prepare(law)
-        self._forms, self._sums = slip_forms(law.law, self._setting.scheme), np.zeros(3)
+        kind = Hardening(1.0) if isinstance(law.law, Hardening) else law.law.of(1.0, 1.0)
+        self._forms, self._sums = _slip_forms(kind, self._setting.scheme), np.zeros(3)
         self._c = struct(
             "rigid_plastic", number=len(self._rows), width=len(INPUTS), w=self._storage,
             force=self._forms.force, end=self._forms.end, search=self._setting.search.flags,

@@ -146,13 +146,9 @@ class Couplings(Links, ABC):
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """Add the derivative of the tangent at ``q1`` along ``u``."""
         change, e = self._tangent_change, self.motion(q1)
-        rows = np.zeros_like(self._rows)
-        for column, numbers in enumerate(self.response.rows(e, self.force(q1))):
-            rows[:, column] = numbers
-        for function, values in (
-            (self._forms.row, rows),
-            (self._forms.bend, self.response.bends(e)[:, None]),
-        ):
+        self._put(*self.response.rows(e, self.force(q1)))
+        bends = self.response.bends(e)[:, None]
+        for function, values in ((self._forms.row, self._rows), (self._forms.bend, bends)):
             if change.uses(function):
                 change.put(function, values)
         change.set(self._forms.u, u)

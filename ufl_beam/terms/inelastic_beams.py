@@ -14,13 +14,13 @@ from ufl_beam.compiled.c_library import Loop, doubles, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import Kernel, stated
 from ufl_beam.discretization.function_spaces import Element, Fields, Strains
-from ufl_beam.discretization.partition import Numbering
+from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.functional import virtual_work
 from ufl_beam.mechanics.kinematics import strain
-from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.fibres import Layout
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.material_points import Points, inputs
@@ -28,8 +28,9 @@ from ufl_beam.terms.openings import SearchFlags
 from ufl_beam.terms.tangent_derivatives import Cells
 
 
-def inelastic_cells(grid: Numbering) -> list[tuple[Layout, Index]]:
+def inelastic_cells(share: Share) -> list[tuple[Layout, Index]]:
     """Layouts of material points, and the cells (numbers of the grid) that have them."""
+    grid = share.grid
     groups: dict[Layout, list[int]] = {}
     layouts: dict[object, Layout | None] = {}
     for beam in grid.scene.beams:
@@ -80,17 +81,11 @@ class InelasticBeams(Cells, ABC):
     kind = "beams"
 
     def __init__(
-        self,
-        fields: Fields,
-        layout: Layout,
-        scheme: Scheme,
-        A: Csr,
-        ledger: Ledger,
-        search: SearchFlags,
-        points: type[Points],
-    ) -> None:
-        self._layout, self._scheme, self._A, self._ledger = layout, scheme, A, ledger
-        self._order = fields.order
+        self, fields: Fields, layout: Layout, scheme: Scheme, A: Csr, ledger: Ledger,
+        search: SearchFlags, points: type[Points],
+    ) -> None:  # fmt: skip
+        self._A, self._ledger = A, ledger
+        self._hinges, self._static = layout.hinges, not has_inertia(scheme)
         self._cells = fields.share.cells[fields.order]
         self._strains = Strains(fields)
         cells, n = len(fields.order), len(layout.weights)
@@ -113,8 +108,8 @@ class InelasticBeams(Cells, ABC):
             fields.hot_kernel(form, self._q1) for form in (forms.work, forms.tangent)
         )
         self._tangent.place(A)
-        self._prepare(forms)
         self._q: Array = np.empty(0)
+        self._prepare(forms)
 
     # -- the step ------------------------------------------------------------------------------
 
@@ -206,7 +201,7 @@ class InelasticBeams(Cells, ABC):
     def kept(self) -> tuple[Index, Array]:
         """Cells (numbers of the grid), and :attr:`Points.kept` of them; (num_cells, 6)."""
         rows = self.points.kept.copy()
-        if not self._layout.hinges:
+        if not self._hinges:
             rows[:, 3] = 0.0
         return self._cells, rows
 
@@ -238,7 +233,7 @@ class CompiledInelasticBeams(InelasticBeams):
 
     def _begin(self) -> None:
         self._forget()
-        self._in_c.begins = not self._scheme.dynamic
+        self._in_c.begins = self._static
 
     def _forget(self) -> None:
         self._latest.fill(np.nan)
@@ -272,7 +267,7 @@ class ReferenceInelasticBeams(InelasticBeams):
         self.jump = fem.Function(fem.functionspace(self._fields.mesh, ("DG", 0)))
 
     def _begin(self) -> None:
-        self._first = not self._scheme.dynamic
+        self._first = self._static
 
     def _respond(self, q1: Array) -> None:
         points = self.points

@@ -37,7 +37,7 @@ def expect_entries(layout: Layout, scheme: Scheme, ledger: Ledger) -> None:
         ledger.lost["plastic"] += 0.0
     if layout.softening is not None:
         ledger.lost["hinges"] += 0.0
-    if scheme.loss or (layout.softening is not None and scheme.theta < 1):
+    if scheme.alpha or (layout.softening is not None and scheme.theta < 1):
         # In the middle of a step no stress is left in what has broken, but perhaps at its ends.
         ledger.lost["numerical"] += 0.0
 
@@ -75,7 +75,7 @@ class Points(ABC):
         search: SearchFlags | None = None,
     ) -> None:
         self._search = search or SearchFlags()
-        self._layout, self._storage, self._loss = layout, storage, scheme.loss
+        self._layout, self._storage, self._alpha = layout, storage, scheme.alpha
         self._yields, self.softens = layout.yields, layout.softening is not None
         self._releases = self.softens and scheme.theta < 1  # see expect_entries
         self._at = {name: storage[:, :, i] for i, name in enumerate(inputs(layout.statement))}
@@ -85,8 +85,7 @@ class Points(ABC):
             self._at[name][:] = getattr(bulk, name)
         self._at["length"][:] = length[:, None]
         self._at["theta"][:] = scheme.theta
-        self._steps = self._at["dt"]
-        self._steps[:] = self._dt = 1.0
+        self._at["dt"][:] = self._dt = 1.0
         self._at["softening energy"][:] = 1.0
         self._at["traction"][:] = np.inf
         if layout.softening is not None:
@@ -132,7 +131,7 @@ class Points(ABC):
     def begin(self, dt: float) -> None:
         """Begin a step of this length; s."""
         if dt != self._dt:
-            self._steps[:] = self._dt = dt
+            self["dt"][:] = self._dt = dt
 
     @abstractmethod
     def respond(self, strains: Array) -> tuple[Array, Array]:
@@ -157,9 +156,9 @@ class Points(ABC):
 
     def remaining(self, change: Array) -> Array:
         """Part of the elastic stiffness that is left for small changes of the strains; (cells,)."""
-        layout, stiffness = self._layout, self._at["theta"][0, 0] * self._at["stiffness"]
-        by_point = change @ layout.strains.T
-        elastic = self._at["theta"][0, 0] * change**2 @ layout.rest
+        layout, theta = self._layout, self["theta"][0, 0]
+        stiffness, by_point = theta * self["stiffness"], change @ layout.strains.T
+        elastic = theta * change**2 @ layout.rest
         elastic += (stiffness * by_point**2) @ layout.weights
         now = np.einsum("ci,cij,cj->c", change, self.D.reshape(-1, 3, 3), change)
         return np.asarray(np.divide(now, elastic, out=np.ones(len(now)), where=elastic > 0))
@@ -206,8 +205,8 @@ class Points(ABC):
             ledger.lost["plastic"] += plastic
         if self.softens:
             ledger.lost["hinges"] += broken
-        if self._loss:
-            ledger.lost["numerical"] += 2 * self._loss * lost
+        if self._alpha:
+            ledger.lost["numerical"] += 2 * self._alpha * lost
         if self._releases:
             ledger.lost["numerical"] += released
 
@@ -241,13 +240,10 @@ class Points(ABC):
     def refresh(self, strains: Array) -> None:
         """Make forces and stored energies those of a state that no step has led to."""
         layout, bulk, length = self._layout, self._bulk, self["length"][:, :1]
+        p, volume = self["plastic"], layout.weights * length
         e = strains @ layout.strains.T - self["jump"] / self["length"]
-        volume = layout.weights * length
-        self.kept[:, :3] = (
-            layout.rest * strains
-            + (layout.weights * bulk.stress(e, self["plastic"])) @ layout.strains
-        )
-        self.sums[3] = np.sum(volume * bulk.elastic_energy(e - self["plastic"])) + np.sum(
-            strains**2 @ layout.rest / 2 * length[:, 0]
-        )
-        self.sums[4] = np.sum(volume * bulk.hardening_energy(self["plastic"], self["accumulated"]))
+        of_points = (layout.weights * bulk.stress(e, p)) @ layout.strains
+        self.kept[:, :3] = layout.rest * strains + of_points
+        of_rest = strains**2 @ layout.rest / 2 * length[:, 0]
+        self.sums[3] = np.sum(volume * bulk.elastic_energy(e - p)) + np.sum(of_rest)
+        self.sums[4] = np.sum(volume * bulk.hardening_energy(p, self["accumulated"]))

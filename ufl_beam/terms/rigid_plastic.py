@@ -22,7 +22,7 @@ from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import RigidPlastic
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.material_laws import Hardening, HardeningBulk, Softening
+from ufl_beam.model.material_laws import Hardening, HardeningBulk, SofteningLaw
 from ufl_beam.model.plastic_hinges import law_of
 from ufl_beam.terms.connector_responses import Response, Setting, respond
 from ufl_beam.terms.openings import NOTHING, RELEASED, SPENT
@@ -50,7 +50,7 @@ def slip(law: Any, at: Mapping[str, Expr], scheme: Scheme) -> Slip:
 
 
 @slip.register
-def _(law: Softening, at: Mapping[str, Expr], scheme: Scheme) -> Slip:
+def _(law: SofteningLaw, at: Mapping[str, Expr], scheme: Scheme) -> Slip:
     a, ξ, none = at["slip"], at["slipped"], 0 * at["slip"]
     law = law.of(at["limit"], at["energy"])
     force = at["direction"] * scheme.resistance(law, ξ, a)
@@ -109,7 +109,7 @@ class RigidPlasticResponse(Response):
         self._ledger, self._law = ledger, law.law
         ledger.lost["hinges"] += 0.0
         self._hardens = isinstance(law.law, Hardening)
-        self._loss = 2 * scheme.loss if self._hardens else 0.0
+        self._loss = 2 * scheme.alpha if self._hardens else 0.0
         if self._hardens:
             ledger.state["hardening"] += 0.0
         if self._loss:

@@ -66,19 +66,16 @@ class Supports:
             if support.angle and len(share.local(dofs[:2])):
                 self._turned.append(TurnedAxes(share.local(dofs[:2]), support.angle, A))
             for component, motion in support.held.items():
-                held.extend(share.local(dofs[[component]]))
+                here = share.local(dofs[[component]])
+                held.extend(here)
                 if component in support.moving:
-                    self._motions.extend(
-                        (d, motion, support) for d in share.local(dofs[[component]])
-                    )
+                    self._motions.extend((dof, motion, support) for dof in here)
         self.dofs = np.array(sorted(held), dtype=np.int64)
         self.moving = np.array([dof for dof, *_ in self._motions], dtype=np.int64)
         self._held = as_slice(self.dofs)
         rows, columns = A.rows(), A.indices
         zero = np.isin(rows, self.dofs) | np.isin(columns, self.dofs)
-        self._zero = np.flatnonzero(zero)
-        self._diagonal = np.flatnonzero(zero & (rows == columns))
-        self.entries = self._zero, self._diagonal
+        self.entries = np.flatnonzero(zero), np.flatnonzero(zero & (rows == columns))
         self.pivots: Array = np.ones(len(self.dofs))
         self._owned = self.dofs < share.num_owned
         self._acting, self._ledger = scheme.acting, ledger
@@ -135,10 +132,11 @@ class Supports:
         if len(self.dofs):
             # What stands on the diagonal has the right dimension and size for what is held.
             # Where material that flows freely leaves nothing, what stood there before does as well.
-            diagonal = data[self._diagonal]
+            zero, pivots = self.entries
+            diagonal = data[pivots]
             np.copyto(self.pivots, diagonal, where=diagonal != 0.0)
-            data[self._zero] = 0.0
-            data[self._diagonal] = self.pivots
+            data[zero] = 0.0
+            data[pivots] = self.pivots
 
     def accept(self, s: Array) -> None:
         """Work of the supports that move; ``s`` in their axes."""
