@@ -47,23 +47,23 @@ class Evaluation(Protocol):
 
     @property
     def fields(self) -> type[Fields]:
-        """Forms on cells."""
+        """Class of the cells that forms are evaluated on."""
 
     @property
     def points(self) -> type[Points]:
-        """Material points."""
+        """Class of the material points of springs and cells."""
 
     @property
     def inelastic(self) -> type[InelasticBeams]:
-        """Cells with material points."""
+        """Class of the cells with material points."""
 
     @property
     def couplings(self) -> type[Couplings]:
-        """Connectors."""
+        """Class of the connectors but for guides."""
 
     @property
     def slips(self) -> type[RigidPlasticResponse]:
-        """Plastic hinges of zero length."""
+        """Class of the plastic hinges of zero length."""
 
     @property
     def in_c(self) -> bool:

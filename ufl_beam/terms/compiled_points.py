@@ -47,7 +47,7 @@ class PointForms:
 
         # The incompatible mode: a jump relaxes the strain of the bulk by jump over length.
         relieved = at["jump"] / length
-        e = (1 - θ) * at["before"] + θ * strain - (relieved + θ * s * a / length)  # P(30)
+        e = (1 - θ) * at["before"] + θ * strain - (relieved + θ * s * a / length)
         dp = bulk.flow(e, p, ξ, θ, dt)
         σ = bulk.stress(e, p + θ * dp)
         self.bulk = pointwise.compile(σ, ufl.diff(σ, strain))
