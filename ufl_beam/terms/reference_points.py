@@ -77,7 +77,7 @@ class ReferencePoints(Points):
         at["growth"][:] = at["direction"][:] = 0.0
         none = np.zeros_like(strain)
         stress, slope = derivative(lambda ε: self._flow(at, ε, none)[0], strain)
-        over = np.abs(stress) > at["traction"]
+        over = np.abs(stress) > at["traction"]  # P(51)
         held = over & (flags[HOLD] == 1) & (at["flows"] == lib.CLOSED) & (at["traction"] > 0)
         self._excess = float(np.max(np.abs(stress[held]) / at["traction"][held] - 1, initial=0.0))
         opens = over & ~held
