@@ -188,7 +188,7 @@ class StateView(ABC):
         return SectionForces(self.fields)
 
     def material(self) -> list[tuple[Index, Array]]:
-        """Cells that can yield or break, and :attr:`Points.kept`; arrays that later steps change."""
+        """Cells that can yield or break, and :attr:`Points.kept`; later steps change them."""
         here = [inelastic.kept() for inelastic in self.inelastic]
         if not self._has_inelastic or self.share.alone:
             return here
