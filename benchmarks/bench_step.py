@@ -73,7 +73,7 @@ def parts(simulation):
         "of it beams ": microseconds(lambda: simulation.beams[0].add_tangent(x)),
         "factor": microseconds(lambda: lib.factor_tangent(equation, failed)),
         "solve": microseconds(lambda: lib.solve_tangent(equation)),
-        "sizes of forces": microseconds(lambda: lib.size_of_forces(equation, at_r)),
+        "sizes of forces": microseconds(lambda: lib.norm(len(r), equation.weight, at_r)),
     }
 
 

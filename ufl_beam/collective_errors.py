@@ -39,7 +39,7 @@ class Agreement:
 
     def __init__(self, comm: MPI.Intracomm) -> None:
         self._comm = duplicate(comm) if comm.size > 1 else None
-        self.raised: BaseException | None = None  # the latest one, by all processes together
+        self.raised: BaseException | None = None  # the latest that all processes raised together
 
     def __call__(self, function: Callable[..., T], *arguments: Any) -> T:
         """Call a function on all processes."""
@@ -56,7 +56,7 @@ class Agreement:
     def settle(self, error: BaseException | None) -> None:
         """Raise on all processes if one of them has an exception; all call it together.
 
-        A failed step, after which the run may go on, comes after any other exception.
+        A failed step, after which the run may go on, gives way to any other exception.
         """
         comm = self._comm
         if comm is None:
@@ -69,7 +69,8 @@ class Agreement:
         if error is None:
             request.Wait()
         elif not _completed(request):
-            abort(comm, error)
+            traceback.print_exception(error)
+            abort(comm)
         urgency, rank = divmod(int(first[0]), comm.size)
         if urgency == 2:
             return
@@ -124,10 +125,8 @@ def _completed(*requests: MPI.Request) -> bool:
     return True
 
 
-def abort(comm: MPI.Intracomm, error: BaseException | None = None) -> None:
-    """Print an exception and end all processes."""
-    if error is not None:
-        traceback.print_exception(type(error), error, error.__traceback__)
+def abort(comm: MPI.Intracomm) -> None:
+    """End all processes, and say why."""
     print(  # noqa: T201
         f"ufl_beam: process {comm.rank} of {comm.size} failed; the others have not failed within "
         f"{GRACE:g} s and may wait for it, so all are ended",

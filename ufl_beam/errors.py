@@ -146,8 +146,7 @@ class TradeoffError(RuntimeError):
 def warn(message: str) -> None:
     """Issue a :class:`ModelWarning` that points at the line of the user's script."""
     level, frame = 1, sys._getframe()
-    # Not of this package, nor methods that ``dataclass`` writes.
-    library = (PACKAGE, "<string>")
+    library = (PACKAGE, "<string>")  # <string>: methods that ``dataclass`` writes
     while frame.f_back is not None and frame.f_code.co_filename.startswith(library):
         level, frame = level + 1, frame.f_back
     warnings.warn(message, ModelWarning, stacklevel=level)
@@ -172,7 +171,7 @@ def as_float(value: object) -> float:
     scalar: Any = value
     if getattr(scalar, "ndim", None) == 0:
         scalar = scalar.item()
-    if isinstance(scalar, str | bytes | bytearray) or hasattr(scalar, "__len__"):
+    if hasattr(scalar, "__len__"):
         raise TypeError("not a number")
     return float(scalar)
 
@@ -245,7 +244,7 @@ def require_text(value: Any, what: str) -> None:
 
 def require_switch(value: Any, what: str) -> None:
     """Raise :class:`SceneError` naming ``what`` unless ``value`` is True or False."""
-    if type(value).__name__ not in ("bool", "bool_"):
+    if not isinstance(value, bool | np.bool_):
         raise SceneError(f"{what} = {shorten(value)} must be True or False")
 
 
@@ -260,7 +259,8 @@ def require_memory(cells: int, what: str) -> None:
 
     Each process has the numbering of the whole scene.
     """
-    needed, there = cells * BYTES_PER_CELL, _physical_memory()
+    needed = cells * BYTES_PER_CELL
+    there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     if needed > there:
         raise SceneError(
             f"{what} would take {needed / 1e9:.3g} GB of memory; this machine has "
@@ -271,14 +271,6 @@ def require_memory(cells: int, what: str) -> None:
             f"{what} has more degrees of freedom than the 32-bit indices of PETSc can number. "
             "Take fewer cells"
         )
-
-
-def _physical_memory() -> float:
-    """Return the memory of the machine in bytes; infinity where the system does not tell."""
-    try:
-        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    except (AttributeError, OSError, ValueError):
-        return math.inf
 
 
 def require_vector(value: Any, what: str) -> tuple[float, float]:

@@ -12,6 +12,14 @@ from pathlib import Path
 from typing import IO
 
 
+def is_at(file: int, path: Path) -> bool:
+    """Return whether a path leads to an open file."""
+    try:
+        return os.path.samestat(os.fstat(file), os.stat(path))
+    except OSError:
+        return False
+
+
 @contextmanager
 def locked(path: Path) -> Iterator[None]:
     """Wait until no other process is in a context with this path; the file stays.
@@ -32,7 +40,7 @@ class Lock:
         self._file: IO[str] | None = None
 
     def take(self) -> str:
-        """Take the lock; return who has it, empty if it was free.
+        """Take the lock, or return who has it; an empty text if it was free.
 
         A file system that knows no locks locks nothing.
 
@@ -51,7 +59,7 @@ class Lock:
             except OSError:
                 file.close()
                 return ""
-            if self._is_still(file):
+            if is_at(file.fileno(), self.path):
                 break
             file.close()  # its owner has ended in between, and removed it
         file.truncate(0)
@@ -59,13 +67,6 @@ class Lock:
         file.flush()
         self._file = file
         return ""
-
-    def _is_still(self, file: IO[str]) -> bool:
-        """Return whether the path leads to an open file."""
-        try:
-            return os.path.samestat(os.fstat(file.fileno()), self.path.stat())
-        except FileNotFoundError:
-            return False
 
     def release(self) -> None:
         """Give the lock back, if it was taken, and remove its file."""

@@ -10,7 +10,8 @@ from random_machines import script
 import ufl_beam as ub
 from ufl_beam.plotting.load_symbols import badge
 from ufl_beam.plotting.model import notes_of
-from ufl_beam.plotting.model_symbols import Subject, draw
+from ufl_beam.plotting.model_sheet import Subject
+from ufl_beam.plotting.model_symbols import draw
 
 PARTS = ("joints", "supports", "loads", "masses", "initial", "damping", "connectors")
 
@@ -23,11 +24,11 @@ def machine(seed):
 
 def amount(scene):
     """Number of strokes, labels and words of a picture; and whether all numbers are finite."""
-    drawing = draw(Subject.of(scene), scene.size / 300.0)
-    strokes = list(drawing.everything())
+    sheet = draw(Subject(scene), scene.size / 300.0)
+    strokes = list(sheet.everything())
     assert all(np.isfinite(stroke.points).all() for stroke in strokes)
     badges = [load for load in scene.loads if badge(load) is not None]
-    return len(strokes) + len(drawing.labels) + len(badges) + len(notes_of(scene))
+    return len(strokes) + len(sheet.labels) + len(badges) + len(notes_of(scene))
 
 
 @pytest.mark.parametrize("seed", range(25))

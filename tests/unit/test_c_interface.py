@@ -3,6 +3,7 @@
 
 import runpy
 import subprocess
+import weakref
 
 from petsc4py import PETSc
 
@@ -166,6 +167,20 @@ def test_kernels_of_another_type_are_refused():
         RuntimeError, match=r"DOLFINx .* FFCx .* C type void.*int\); ufl_beam calls"
     ):
         c_library.kernel(pointer, of)
+
+
+# -- structs -------------------------------------------------------------------------------------
+
+
+def test_arrays_live_as_long_as_the_struct_that_points_to_them():
+    values = np.array([1.0, 2.0])
+    alive = weakref.ref(values)
+    struct = c_library.fill(ffi.new("vector *"), size=2, values=values)
+    del values
+    assert list(struct.values[0 : struct.size]) == [1.0, 2.0]
+    assert alive() is not None
+    del struct
+    assert alive() is None
 
 
 # -- sizes and types -----------------------------------------------------------------------------

@@ -3,7 +3,6 @@
 
 import csv
 import math
-import sys
 
 import numpy as np
 import pytest
@@ -17,11 +16,6 @@ from ufl_beam.output.rainflow import RainflowCounter
 STEEL = {"E": 210e9, "nu": 0.3, "rho": 7850.0}
 SECTION = ub.Section.rectangle(b=0.1, h=0.2, **STEEL)
 CURVE = ub.SNCurve.eurocode(71e6)
-
-
-@pytest.fixture(scope="module")
-def library():
-    return pytest.importorskip("rainflow", reason="counting cycles needs the package rainflow")
 
 
 def by_range(found):
@@ -38,7 +32,7 @@ ASTM = [-2.0, 1.0, -3.0, 5.0, -1.0, 3.0, -4.0, 4.0, -2.0]
 """The example of ASTM E1049-85, figure 6."""
 
 
-def test_the_example_of_astm_e1049(library):
+def test_the_example_of_astm_e1049():
     found = ub.rainflow(ASTM)
     assert by_range(found) == {3.0: 0.5, 4.0: 1.5, 6.0: 0.5, 8.0: 1.0, 9.0: 0.5}
     (whole,) = np.flatnonzero(found.count == 1.0)
@@ -54,7 +48,9 @@ whole_numbers = st.lists(st.integers(-8, 8), min_size=1, max_size=80)
 
 @settings(max_examples=300, deadline=None)
 @given(series=whole_numbers, pieces=st.lists(st.integers(1, 12), min_size=1, max_size=80))
-def test_pieces_are_counted_as_the_whole(library, series, pieces):
+def test_pieces_are_counted_as_the_whole(series, pieces):
+    """And as the package rainflow counts."""
+    library = pytest.importorskip("rainflow")
     # The library alone counts no cycle in series of two points
     expected = dict(library.count_cycles([*series, series[-1], series[-1]]))
     expected.pop(0, None)
@@ -69,7 +65,7 @@ def test_pieces_are_counted_as_the_whole(library, series, pieces):
     assert by_range(ub.rainflow(series)) == expected
 
 
-def test_what_waits_does_not_grow(library):
+def test_what_waits_does_not_grow():
     """Cycles of one size are all halves, and none of them waits."""
     counter = RainflowCounter(1.0)
     for _ in range(50):
@@ -78,7 +74,7 @@ def test_what_waits_does_not_grow(library):
     assert by_range(counter.cycles()) == {6.0: (2 * 50 * 100 - 1) / 2}
 
 
-def test_means_survive_the_pieces(library):
+def test_means_survive_the_pieces():
     rng = np.random.default_rng(1)
     series = np.cumsum(rng.integers(-9, 10, 3000)).astype(float)
     counter = RainflowCounter(1.0)
@@ -90,7 +86,7 @@ def test_means_survive_the_pieces(library):
 
 
 @pytest.mark.parametrize("series", [[], [3.0], [3.0, 3.0, 3.0]])
-def test_what_never_turns_has_no_cycles(library, series):
+def test_what_never_turns_has_no_cycles(series):
     found = ub.rainflow(series)
     assert len(found.range) == 0
     assert found.damage(CURVE) == found.equivalent(CURVE) == 0.0
@@ -106,14 +102,6 @@ def test_what_never_turns_has_no_cycles(library, series):
 def test_what_is_no_series(series, says):
     with pytest.raises(ub.SceneError, match=says):
         ub.rainflow(series)
-
-
-def test_a_missing_library_is_named(monkeypatch):
-    monkeypatch.setitem(sys.modules, "rainflow", None)
-    spot = ub.HotSpot.fibre(ub.Beam((0, 0), (1, 0), SECTION).start, y=0.1, E=210e9)
-    for call in (lambda: ub.rainflow(ASTM), lambda: ub.Fatigue(spot, CURVE)):
-        with pytest.raises(ImportError, match="pip install rainflow"):
-            call()
 
 
 # -- curves ------------------------------------------------------------------------------------
@@ -161,7 +149,7 @@ def to_and_fro(beam):
     return ub.PointLoad(beam.end, force=(8e3, -2e3), time=lambda t: math.sin(40 * t) * (1 + t))
 
 
-def test_stress_is_in_balance_with_the_load(library):
+def test_stress_is_in_balance_with_the_load():
     """To the right at the top: tension on the left of the way up, largest at the clamp."""
     F, axial = 1e3, -500.0
     beam, scene = mast(lambda b: ub.PointLoad(b.end, force=(F, axial), time=ub.ramp(1.0)))
@@ -186,7 +174,7 @@ def test_stress_is_in_balance_with_the_load(library):
     assert "mast.start (0, 0): 0.5 cycles" in str(fatigue)
 
 
-def test_a_run_is_counted_as_its_solution(library, monkeypatch):
+def test_a_run_is_counted_as_its_solution(monkeypatch):
     monkeypatch.setattr(fatigue, "BLOCK", 7)  # a part of 41 rows
     beam, scene = mast(to_and_fro)
     spot = ub.HotSpot.fibre(beam.at(0.375), y=-0.1, E=210e9)  # in the middle of a cell
@@ -231,7 +219,7 @@ def test_extremes_are_those_of_all_steps():
     assert np.array_equal(found.time_low, solution.times[motion.argmin(axis=0)])
 
 
-def test_what_a_run_that_fails_has_counted_is_kept(library):
+def test_what_a_run_that_fails_has_counted_is_kept():
     def force(t):
         if t > 0.2:
             raise RuntimeError("enough")
@@ -247,7 +235,7 @@ def test_what_a_run_that_fails_has_counted_is_kept(library):
     assert extremes.displacement(beam).high[-1, 0] > 0
 
 
-def test_counts_and_extremes_go_on_from_a_checkpoint(library, shared_path):
+def test_counts_and_extremes_go_on_from_a_checkpoint(shared_path):
     beam, scene = mast(to_and_fro)
     spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
 
@@ -360,7 +348,7 @@ def test_bad_input(make, message):
         make()
 
 
-def test_bad_input_of_a_run(library):
+def test_bad_input_of_a_run():
     beam, scene = mast(to_and_fro)
     run = {"t": (0, 1), "dt": 0.1}
     with pytest.raises(ub.SceneError, match="simulate: most = 0 must be a whole number"):
@@ -379,7 +367,7 @@ def test_bad_input_of_a_run(library):
 # -- pictures ----------------------------------------------------------------------------------
 
 
-def test_pictures(library):
+def test_pictures():
     beam, scene = mast(to_and_fro)
     spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
     recorder, extremes = ub.Fatigue(spot, CURVE), ub.Extremes()

@@ -53,8 +53,11 @@ BAD = {
     "no stop": (lambda: ub.Stop(1.0), "have at least one end"),
     "friction": (lambda: ub.Coulomb(), "Coulomb: force and coefficient are both zero"),
     "friction of what": (lambda: ub.Coulomb(coefficient=0.1), "give coefficient and joint"),
-    "motor": (lambda: ub.Motor(1.0), "Motor: time = 1.0 must be a function of t"),
-    "actuator": (lambda: ub.Actuator(lambda t: math.nan), "Actuator: the time function is nan"),
+    "motor": (lambda: ub.Motor(1.0), "Motor: motion = 1.0 must be a function of t"),
+    "actuator": (
+        lambda: ub.Actuator(lambda t: math.nan),
+        "Actuator: force: the time function is nan",
+    ),
     "controller": (lambda: ub.Controller(1.0), "Controller: force = 1.0 must be a function"),
     "function": (lambda: ub.ForceLaw(1.0), "ForceLaw: force = 1.0 must be a function"),
     "release": (lambda: ub.Release(PLACE, body(1.0).middle, free="X"), "letters of 'NVM'"),

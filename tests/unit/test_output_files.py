@@ -323,8 +323,8 @@ def fields(n):
 
 def writer_of(path, complete=None):
     if path.suffix == ".xdmf":
-        return XdmfWriter(path, POINTS, CELLS, {"part": np.zeros(2)}, complete)
-    return VtkhdfWriter(path, POINTS, CELLS, {"part": np.zeros(2)}, fields(0), complete)
+        return XdmfWriter(path, POINTS, CELLS, np.zeros(2), complete)
+    return VtkhdfWriter(path, POINTS, CELLS, np.zeros(2), fields(0), complete)
 
 
 def write(writer, steps):

@@ -121,7 +121,9 @@ def test_without_the_text_of_the_kernel(tmp_path):
 def fresh(tmp_path, monkeypatch):
     """Nothing is compiled or known yet."""
     monkeypatch.setattr(code_cache, "_place", lambda: tmp_path)
-    monkeypatch.setattr(simd_kernels, "_addresses", {})
+    simd_kernels.in_lanes.cache_clear()
+    yield
+    simd_kernels.in_lanes.cache_clear()
 
 
 @pytest.mark.serial
@@ -142,7 +144,7 @@ def test_wrong_vectors_are_found_once(fresh, monkeypatch, caplog):
         kernel.add(q, values)
         assert np.allclose(values, np.sin(q), rtol=1e-14)
         caplog.clear()
-        simd_kernels._addresses.clear()
+        simd_kernels.in_lanes.cache_clear()
 
 
 @pytest.mark.serial
@@ -156,7 +158,7 @@ def test_the_check_is_made_once(fresh, monkeypatch):
         kernel, _ = pointwise(ufl.cos, np.ones(2))
         in_lanes(kernel)
         assert kernel.cells.lanes > 1
-        simd_kernels._addresses.clear()
+        simd_kernels.in_lanes.cache_clear()
     assert len(calls) == 1
 
 

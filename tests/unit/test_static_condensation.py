@@ -46,8 +46,8 @@ def system(cell_dofs, seed=0, more=(), held=()):
 def solve(elimination, b):
     """The solution, by elimination and a dense solution of what is left; and what is left."""
     assert elimination.factor()
-    arrays = elimination.data, elimination.indices, elimination.indptr
-    left = csr_array(arrays, shape=[elimination.size] * 2).toarray()
+    A = elimination.left
+    left = csr_array((A.data, A.indices, A.indptr), shape=[A.size] * 2).toarray()
     x = np.empty(len(b))
     elimination.reduce(b)
     elimination.expand(np.linalg.solve(left, elimination.f), x)
@@ -78,7 +78,7 @@ def test_solutions_are_those_of_the_whole(name, seed):
     cell_dofs, left = CHAINS[name]
     share, A, dense = system(cell_dofs, seed)
     elimination = Elimination(share, A)
-    assert elimination.size == 3 * left
+    assert elimination.left.size == 3 * left
     for b in np.random.default_rng(seed).uniform(-1, 1, (2, share.size)):
         # Random blocks need pivots between them, too, which elimination does not look for: some
         # digits of sixteen are lost, here four at most.
@@ -98,7 +98,7 @@ def test_held_degrees_of_freedom():
     held = [0, 1, 2, 9, 16, 21, 22, 23]
     share, A, dense = system(cells_of([0, 1, 2, 3], [3, 4, 5, 6, 7, 8, 9]), held=held)
     elimination, b = Elimination(share, A), np.arange(1.0, share.size + 1)
-    assert elimination.size == 3  # both ends have one neighbour
+    assert elimination.left.size == 3  # both ends have one neighbour
     assert np.allclose(solve(elimination, b), np.linalg.solve(dense, b), rtol=1e-10, atol=1e-10)
 
 
@@ -109,7 +109,7 @@ def test_what_couples_to_more_is_left(pair):
     share, A, dense = system(cell_dofs, more=[pair])
     elimination, b = Elimination(share, A), np.ones(share.size)
     left = {60: 4, 30: 6, 17: 3}[pair[1]]  # vertex and unknown, two vertices, one end as ever
-    assert elimination.size == left
+    assert elimination.left.size == left
     assert np.allclose(solve(elimination, b), np.linalg.solve(dense, b), rtol=1e-10, atol=1e-10)
 
 

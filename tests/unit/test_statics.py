@@ -190,3 +190,19 @@ def test_the_order_of_the_work_of_inelastic_laws():
     for scheme, least, most in ((ub.ExactStatic(), 0.8, 1.2), (ub.ExactStatic(0.5), 1.5, 4.0)):
         errors = [abs(work(scheme, steps) - exact) for steps in (16, 32)]
         assert least < np.log2(errors[0] / errors[1]) < most
+
+
+def test_reactions_where_a_run_ends():
+    """Those of the last state that was accepted, not of the step that failed."""
+    softening = ub.Softening(limit=2.0, energy=0.05)  # above the snap-back of an imposed force
+    _, scene = cantilever(
+        lambda b: ub.PointLoad(b.end, force=(0, -4.0), time=ub.ramp(1.0)), hinge=softening
+    )
+    with pytest.raises(ub.ConvergenceError) as ended:
+        run(scene, ub.Static(), dt=0.3)
+    solution = ended.value.solution
+    t = solution.times[-1]
+    assert 0.3 < t < 1.0
+    force = solution.reaction(scene.supports[0])[-1]
+    # Forces are met to 1e-10 of themselves.
+    assert force[:2] == pytest.approx([0.0, 4.0 * t], abs=1e-8)

@@ -76,10 +76,12 @@ SCHEMES = [
 class Probe:
     """Residual and tangent of a step between random states, without what supports hold."""
 
-    def __init__(self, scene, scheme, turn, seed=0, mesh=None):
+    def __init__(self, scene, scheme, turn, seed=0, mesh=None, newton=None):
         random = np.random.default_rng(seed)
         # Every process computes the whole scene.
-        self.simulation = simulation = ub.Simulation(scene, scheme, mesh=mesh, comm=MPI.COMM_SELF)
+        self.simulation = simulation = ub.Simulation(
+            scene, scheme, mesh=mesh, newton=newton, comm=MPI.COMM_SELF
+        )
         size = simulation.share.size
         simulation.q = random.uniform(-0.5, 0.5, size)
         if scheme.dynamic:
@@ -147,6 +149,14 @@ def test_tangent(kind, scheme):
     # and less of the largest entry at these states
     scale = np.abs(tangent).max()
     assert np.abs(tangent - probe.differences(1e-5)).max() < 1e-7 * scale
+
+
+@pytest.mark.parametrize("scheme", SCHEMES[:4], ids=str)
+def test_tangent_of_the_reference_path(scheme):
+    newton = ub.Newton(reference=True)
+    probe = Probe(scene("follower roller masses"), scheme, turn=1.5, newton=newton)
+    tangent = probe.tangent()
+    assert np.abs(tangent - probe.differences(1e-5)).max() < 1e-7 * np.abs(tangent).max()  # ditto
 
 
 @pytest.mark.parametrize("mesh", [ub.Mesh(degree=2), ub.Mesh(degree=3, lumped=True)], ids=str)
@@ -254,6 +264,15 @@ def test_tangent_of_inelastic_scenes(kind, scheme):
         # As above; and none of these states lies within 1e-5 of a corner of its laws
         scale = np.abs(tangent).max()
         assert np.abs(tangent - probe.differences(1e-5)).max() < 1e-6 * scale
+
+
+@pytest.mark.parametrize("kind", LAWS)
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.Midpoint(0.1, 0.1)], ids=str)
+def test_tangent_of_inelastic_scenes_by_the_reference_path(kind, scheme):
+    newton = ub.Newton(reference=True)
+    probe = Probe(inelastic_scene(kind), scheme, turn=1.0, newton=newton)
+    tangent = probe.tangent()
+    assert np.abs(tangent - probe.differences(1e-5)).max() < 1e-6 * np.abs(tangent).max()  # ditto
 
 
 @pytest.mark.parametrize("kind", LAWS)

@@ -259,6 +259,18 @@ def test_a_scene_without_works_has_no_term():
 # -- processes, checkpoints, files -------------------------------------------------------------
 
 
+@pytest.mark.parametrize("scheme", [ub.Midpoint(0.1), ub.Newmark()])
+def test_the_reference_path(scheme):
+    """DOLFINx assembles the same forms."""
+    by_dolfinx, compiled = (
+        run(flying(lambda t: 5 + t), scheme, t=(0, 0.5), newton=ub.Newton(reference=by))
+        for by in (True, False)
+    )
+    np.testing.assert_allclose(by_dolfinx.q, compiled.q, atol=1e-9)
+    for name in ("soil", "magnet", "air", "magnet in time"):
+        np.testing.assert_allclose(by_dolfinx.energy[name], compiled.energy[name], atol=1e-9)
+
+
 @pytest.mark.parametrize("scheme", [ub.Midpoint(), ub.Newmark()])
 def test_any_number_of_processes(scheme):
     """Beams of which some processes have no cell."""
@@ -384,7 +396,7 @@ def raises(*parts):
         ),
         (
             lambda: ub.Scene([BEAM], works=[ub.Potential("a", lambda q: q[0]) for _ in "ab"]),
-            ("works[0] and works[1] are both called 'a'",),
+            ("a work is called 'a' twice, as works[0] and works[1]",),
         ),
         (lambda: ub.Scene([BEAM], works=[soil]), ("works[0]", "is not a VirtualWork or Potential")),
         (lambda: ub.Scene([BEAM], works=3), ("works = 3 must be a list",)),

@@ -21,7 +21,6 @@ STEPS = int(os.environ.get("UFL_BEAM_STEPS", "100000"))
 
 def test_damage_of_cycles_of_one_size():
     """Twenty slow cycles of a force at the end of a cantilever: Miner's sum in closed form."""
-    pytest.importorskip("rainflow", reason="counting cycles needs the package rainflow")
     section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3)
     beam = ub.Beam((0, 0), (2, 0), section, cells=2)
     F, W, n = 20e3, 0.1 * 0.2**2 / 6, 20
@@ -61,7 +60,6 @@ def softening_portal():
 @pytest.mark.serial
 def test_very_many_steps(tmp_path):
     """Constant memory, bounded files, a ledger that closes."""
-    pytest.importorskip("rainflow", reason="counting cycles needs the package rainflow")
     scene = softening_portal()
     left, roof, _ = scene.beams
     spots = [ub.HotSpot.fibre(place, y=0.1, E=210e9) for place in (left.start, roof.start)]

@@ -119,23 +119,22 @@ def metric(share: Share) -> Array:
 class Stiffness:
     """Tangent stiffness of the whole scene, factored by every process; StepFailed if singular.
 
-    Of this process are its part A of the tangent, the local degrees of freedom that supports hold,
-    and its part of the residual's derivative by the load factor, ``rate``.  ``negative`` is the
-    number of negative eigenvalues when the forces of connectors are eliminated and constraints
-    fulfilled; where it is not symmetric, with follower loads, 1 if its determinant is negative,
-    else 0.  ``flow`` is the change of the configuration for a unit of the load factor;
-    (grid.size,), zero where supports hold.
+    Each process gives its part A of the tangent, the local degrees of freedom ``held`` by supports,
+    and its part ``rate`` of the derivative of the residual by the load factor.
+
+    Attributes:
+        negative: Number of negative eigenvalues, the forces of connectors eliminated; where it is
+            not symmetric, as with follower loads, 1 if its determinant is negative, else 0.
+        flow: Change of the configuration for a unit of the load factor, zero where supports hold;
+            (grid.size,).
     """
 
     def __init__(self, share: Share, A: Csr, held: Index, rate: Array) -> None:
         grid = share.grid
-        here = (share.dofs[A.rows()], share.dofs[A.indices], A.data, share.dofs, rate)
-        parts = share.comm.allgather(here) if not share.alone else [here]
-        rows, columns, data, dofs, rates = (np.concatenate(x) for x in zip(*parts, strict=True))
-        of_all = share.dofs[held]
-        if not share.alone:
-            of_all = np.concatenate(share.comm.allgather(of_all))
-        free = np.setdiff1d(np.arange(grid.size), of_all)
+        entries = share.dofs[A.rows()], share.dofs[A.indices], A.data
+        parts = share.comm.allgather((*entries, share.dofs, rate, share.dofs[held]))
+        rows, columns, data, dofs, rates, fixed = map(np.concatenate, zip(*parts, strict=True))
+        free = np.setdiff1d(np.arange(grid.size), fixed)
         shape = (grid.size, grid.size)
         self._K = csr_array(coo_array((data, (rows, columns)), shape=shape))[free][:, free]
         forces = np.bincount(dofs, weights=rates, minlength=grid.size)[free]
@@ -197,7 +196,7 @@ class Stiffness:
         return values
 
     def softest(self, weights: Array) -> tuple[float, Array]:
-        """Find the eigenvalue nearest to zero, N m, and its mode of size 1 in a :func:`metric`."""
+        """Find the eigenvalue nearest to zero, N m, and its mode, of length 1 in a metric."""
         w = weights[self._free]
         mode = np.random.default_rng(0).normal(size=len(w)) / np.sqrt(np.maximum(w, w.max()))
         λ = np.inf

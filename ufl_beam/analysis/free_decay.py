@@ -246,8 +246,8 @@ def fit_decay(t: npt.ArrayLike, amplitudes: npt.ArrayLike) -> Decay:
     mean, each = logarithmic_decrement(A)
     s = t - t[0]
     line = scipy.stats.linregress(s, A)
-    values, errors = (line.intercept, -line.slope), (line.intercept_stderr, line.stderr)
-    linear = _envelope(values, errors, A - line.intercept - line.slope * s)
+    errors = line.intercept_stderr, line.stderr
+    linear = _envelope((line.intercept, -line.slope), errors, A - line.intercept - line.slope * s)
     # Without units; first guess: the line through the logarithms, each weighted by its amplitude
     τ, a, units = s / s[-1], A / np.max(A), np.array([np.max(A), 1 / s[-1]])
     slope, logarithm = np.polyfit(τ, np.log(a), 1, w=a)

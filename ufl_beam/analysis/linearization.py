@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 import warnings
 from functools import partial
+from typing import TypeVar
 
 from mpi4py import MPI
 
@@ -26,12 +27,14 @@ from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers import eigensolvers
 from ufl_beam.solvers.eigensolvers import ROUND_OFF, SHIFT, ZERO
 
+V = TypeVar("V", Array, Complex)
+
 COUPLING_TOLERANCE = 1e-9  # couplings below this part of the largest damping do not count
 AT_REST = 1e300  # length of a step in which all rates vanish; s
 
 
 class _Standstill(Static):
-    """Scheme of small motions: all terms, inertia included, are taken at the present state."""
+    """Scheme of small motions: all terms are taken at the present state, and no step is made."""
 
     dynamic = True
     slips = False
@@ -39,23 +42,8 @@ class _Standstill(Static):
     rings = False
     kept: tuple[str, ...] = ()
 
-    def half_tangents(self, rotations: Index) -> Index:
-        return rotations[:0]
-
-    def inertia(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
-        return 1 / dt**2, 0.0, rates.v
-
     def velocity(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
         return 1 / dt, 0.0, rates.v
-
-    def rates(self, dt: float, s: Array, rates: Rates) -> tuple[Array, ...]:
-        return (np.asarray(s / dt),)
-
-    def slip(self, dt: float, change: Array, rates: Rates) -> Array:
-        return 0 * change
-
-    def error_weights(self) -> tuple[float, float]:
-        return 0.5, 0.0
 
 
 class SmallMotions:
@@ -125,8 +113,8 @@ class SmallMotions:
 
     # -- frequencies ---------------------------------------------------------------------------
 
-    def exponents(self, n: int) -> tuple[Complex, Complex]:
-        """Compute at least n exponents, if there are so many, and motions; (m,), (unknowns, m)."""
+    def exponents(self, n: int) -> tuple[Complex, Array | Complex]:
+        """Compute the n exponents nearest to zero, or all, and their shapes; (n,), (size, n)."""
         K, M = self.K, self.M
         heavy = (M.diagonal() > 0) & (K.diagonal() != 0)
         squares = np.abs(K.diagonal()[heavy]) / M.diagonal()[heavy]
@@ -138,14 +126,12 @@ class SmallMotions:
         matrix = (K + K.T) / 2 if symmetric else K
         solve = partial(eigensolvers.linear, matrix, M, n, most=self.most, definite=symmetric)
         values, x = solve(shift=-SHIFT * low)
-        works = self._works(x)
-        zero = self._unresisted(x, works)
+        works, zero = self._works(x)
         first = np.abs(values[~zero]).min(initial=highest)
         if zero.any():
-            # Beside what is nearly infinite, inverses of the others had few digits.
+            # Inverses that are nearly infinite left few digits to the others.
             values, x = solve(shift=-first / 2)
-            works = self._works(x)
-            zero = self._unresisted(x, works)
+            works, zero = self._works(x)
         if abs(C).max() <= nothing * τ and symmetric:
             values = works / np.sum(x * (M @ x), axis=0)
             values[zero] = 0.0
@@ -153,26 +139,23 @@ class SmallMotions:
         else:
             s, motions = self._damped(C, x[:, zero], n, first**0.5)
         finite = (np.abs(s) ** 2 <= 1e3 * highest) & (s.imag >= 0)
-        return s[finite], motions[:, finite]
+        return self._nearest(n, s[finite], motions[:, finite])
 
-    def _works(self, x: Array) -> Array:
-        """Compute works of the stiffness on motions, in columns, to the digits of strains; J."""
+    def _works(self, x: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
+        """Works (J) of the stiffness on motions, in columns, and which may be but round-off."""
         right, left = self._with_laws()
-        return self._simulation.equation.stiffness_works(self.q, right @ x, left.T @ x)
-
-    def _unresisted(self, x: Array, works: Array) -> npt.NDArray[np.bool_]:
-        """Return which motions no stiffness resists, up to round-off; (n,)."""
+        works = self._simulation.equation.stiffness_works(self.q, right @ x, left.T @ x)
         sizes = np.sum(np.abs(x) * (abs(self.K) @ np.abs(x)), axis=0)
-        return np.asarray(np.abs(works) <= ZERO * sizes)
+        return works, np.asarray(np.abs(works) <= ZERO * sizes)
 
     def _damped(self, C: csr_array, free: Array, n: int, lowest: float) -> tuple[Complex, Complex]:
         """Compute at least n exponents and motions with velocity-dependent forces C.
 
         Nothing resists the motions ``free``, in columns; ``lowest`` is the first frequency; rad/s.
         """
-        # Zero is a double exponent, of drifts, and no solver finds it well.  Where velocities make
-        # of them but a force like inertia, they are excluded as by constraints, and known: drifts
-        # orthogonal to the rest.
+        # Drifts have the double exponent zero, which no solver finds well.  Those on which
+        # velocities cause only forces like inertia, C N = M N Λ, are known: constraints exclude
+        # them from the rest.
         N = free @ np.linalg.inv(np.linalg.cholesky(free.T @ (self.M @ free))).T
         Λ = N.T @ (C @ N)
         _, sizes, rows = np.linalg.svd(C @ N - self.M @ N @ Λ, full_matrices=False)
@@ -205,8 +188,8 @@ class SmallMotions:
 
     # -- buckling ------------------------------------------------------------------------------
 
-    def buckling(self, n: int) -> tuple[Array, Complex]:
-        """Compute at least n buckling factors, if there are so many, and their modes."""
+    def buckling(self, n: int) -> tuple[Array, Array | Complex]:
+        """Compute the n buckling factors nearest to zero, or all, and their shapes."""
         u = self._path()
         right, left = self._with_laws()
         change = csr_array(
@@ -214,10 +197,10 @@ class SmallMotions:
         )
         factors, x = eigensolvers.linear(self.K, -change, n, most=self.K.shape[0], definite=False)
         x = x[:, np.abs(factors) < 1e9 * np.abs(factors).min(initial=np.inf)]
-        # Among the shapes that were found, by works whose round-off is that of strains.
+        # Once more, for combinations of these shapes: the round-off of works is that of strains.
         works = self._simulation.equation.tangent_works(self.q, u, right @ x, left.T @ x)
         factors, mix = eigensolvers.small(works[0], -works[1])
-        return factors, (x @ mix).astype(complex)
+        return self._nearest(n, factors, (x @ mix).astype(complex))
 
     def _with_laws(self) -> tuple[csr_array, csr_array]:
         """Motions with the forces of laws that they bring, in columns; virtual ones, in rows.
@@ -254,9 +237,10 @@ class SmallMotions:
 
     # -- shapes --------------------------------------------------------------------------------
 
-    def shapes(self, x: Complex) -> Array | Complex:
-        """Return motions of all degrees of freedom, the largest displacement one; (size, n)."""
-        shapes = self._Z @ x
+    def _nearest(self, n: int, values: V, x: Complex) -> tuple[V, Array | Complex]:
+        """The n eigenvalues nearest to zero, with motions whose largest displacement is one."""
+        order = np.argsort(np.abs(values), kind="stable")[:n]
+        shapes = self._Z @ x[:, order]
         turns = self._simulation.share.rotations()
         sizes = np.abs(shapes)
         sizes[self.grid.multipliers] = 0.0
@@ -268,4 +252,4 @@ class SmallMotions:
         largest = shapes[sizes.argmax(axis=0), np.arange(shapes.shape[1])]
         shapes = shapes / largest
         real = np.abs(shapes.imag).max(initial=0.0) <= 1e-8
-        return np.asarray(shapes.real if real else shapes)
+        return values[order], np.asarray(shapes.real if real else shapes)

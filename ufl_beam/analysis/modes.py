@@ -14,10 +14,10 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.analysis.linearization import SmallMotions
-from ufl_beam.arrays import Array, Complex, State
+from ufl_beam.arrays import Array, Complex
 from ufl_beam.collective_errors import on_first
 from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.discretization.function_spaces import Fields, SectionForces
+from ufl_beam.discretization.function_spaces import CompiledFields, SectionForces
 from ufl_beam.discretization.model_warnings import warn_of_masses
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import SceneError, require_count, require_kind, require_number
@@ -92,10 +92,10 @@ class Shapes(ABC):
         require_count(count, "motion: count")
         times = np.arange(count + 1) / count
         swing = np.outer(np.exp(2j * math.pi * times), self._scaled(k, amplitude)).real
-        states: State = {"q": self.q + swing, "v": np.empty(0), "every": np.array([1])}
-        empty = {"reactions": np.empty(0), "connections": np.empty(0)}
+        history = {"times": times, "q": self.q + swing, "every": np.array([1])}
+        none = dict.fromkeys(("v", "reactions", "connections"), np.empty(0))
         solution = Solution(self.scene, self.grid)
-        solution.resume({"times": times, **states, **empty})
+        solution.resume(history | none)
         return solution
 
     def write(self, path: str | Path, *, amplitude: float = AMPLITUDE) -> None:
@@ -118,7 +118,7 @@ class Shapes(ABC):
     def _write(self, recorder: TimeSeries, amplitude: float) -> None:
         recorder.require_writable()
         share = Share(self.grid, MPI.COMM_SELF)
-        forces = SectionForces(Fields(share))
+        forces = SectionForces(CompiledFields(share))
         frames: list[Any] = [
             _Frame(self, share, forces, float(k), self._scaled(k, amplitude).real)
             for k in range(len(self))
@@ -268,7 +268,7 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
         [ 41.5 250.6 646.8]
     """
     require_kind(scene, Scene, "modes: scene")
-    require_count(n, "modes: n")
+    n = require_count(n, "modes: n")
     if at is None:
         # Loads that the state does not balance have no part in its stiffness.
         scene = replace(scene, loads=())
@@ -278,9 +278,8 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
     if not small.M.data.any():
         raise SceneError("modes: nothing that can move has mass; give sections rho or rhoA")
     warn_of_masses(scene)
-    exponents, x = small.exponents(int(n))
-    order = np.argsort(np.abs(exponents), kind="stable")[: int(n)]
-    return Modes(small.scene, small.grid, small.q, small.shapes(x[:, order]), exponents[order])
+    exponents, shapes = small.exponents(n)
+    return Modes(scene, small.grid, small.q, shapes, exponents)
 
 
 def buckling(
@@ -312,7 +311,7 @@ def buckling(
         1.00
     """
     require_kind(scene, Scene, "buckling: scene")
-    require_count(n, "buckling: n")
+    n = require_count(n, "buckling: n")
     require_number(t, "buckling: t")
     for load in (*scene.loads, *scene.works):
         if isinstance(load, FollowerLoad | RotatingFrame | VirtualWork):
@@ -326,9 +325,8 @@ def buckling(
     else:
         _require_of(at, scene, mesh, "buckling")
     small = SmallMotions(scene, at, t, mesh)
-    factors, x = small.buckling(int(n))
-    order = np.argsort(np.abs(factors), kind="stable")[: int(n)]
-    return Buckling(small.scene, small.grid, small.q, small.shapes(x[:, order]), factors[order])
+    factors, shapes = small.buckling(n)
+    return Buckling(scene, small.grid, small.q, shapes, factors)
 
 
 def _require_of(at: Solution, scene: Scene, mesh: Mesh | None, what: str) -> None:

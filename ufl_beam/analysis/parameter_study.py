@@ -54,7 +54,7 @@ def study(
             and shapes for each case.  Files that it writes need names of their own.
         cases: Its arguments: ``[{"seed": seed, "mass": m} for m in (1, 2) for seed in range(50)]``;
             numbers, texts and lists of them, no two alike.
-        path: HDF5 file of the results, written on the way, which takes a twentieth of the time.
+        path: HDF5 file of the results, written on the way in at most a twentieth of the time.
             Cases that the file has are not computed again, unless they failed; what it has of
             other cases stays.
         anew: Compute all cases again and discard the results in the file, after a change of the
@@ -90,7 +90,6 @@ def study(
         outputs.append(("study", (path, path.with_name(f"{path.name}.part"))))
     todo: dict[str, Case] = {}
     records: dict[str, tuple[Outcome, float]] = {}
-    result: Study | None = None
 
     def prepare() -> None:
         if not callable(member):
@@ -105,11 +104,12 @@ def study(
         require_apart(outputs, "study")
         if path is not None and path.exists():
             old = Study.load(path)
-            if old.member != name and not anew:
-                raise SceneError(f"study {path} is one of {old.member}, not of {name}")
-            for key, (outcome, seconds) in old.records().items() if not anew else ():
-                if key not in todo or not isinstance(outcome, str):
-                    records[key] = outcome, seconds
+            if not anew:
+                if old.member != name:
+                    raise SceneError(f"study {path} is one of {old.member}, not of {name}")
+                for key, (outcome, seconds) in old.records().items():
+                    if key not in todo or not isinstance(outcome, str):
+                        records[key] = outcome, seconds
         save()  # that it cannot be written is better known now
 
     def save() -> None:
@@ -119,7 +119,6 @@ def study(
             Study.of(name, {key: records[key] for key in order}).save(path)
 
     def gather() -> None:
-        nonlocal result
         missing = {key: case for key, case in todo.items() if key not in records}
         next_save, quiet, done = 0.0, None if progress else True, len(todo) - len(missing)
         bar = tqdm(total=len(todo), initial=done, unit="member", disable=quiet)
@@ -135,11 +134,6 @@ def study(
                         next_save = time.perf_counter() + 20 * (time.perf_counter() - begin)
         finally:
             save()
-        result = Study.of(name, {key: records[key] for key in todo})
-        if len(result.failed) == len(todo):
-            raise RuntimeError(f"study: all {len(todo)} members failed, {result.failed[0]}")
-        if result.failed:
-            say(result)
 
     on_first(comm, prepare)
     release = take(outputs)
@@ -150,9 +144,11 @@ def study(
         on_first(comm, gather)
     finally:
         release()
-    if comm.size > 1:
-        result = comm.bcast(result)
-    assert result is not None
+    result = Study.of(name, comm.bcast({key: records[key] for key in todo}))
+    if len(result.failed) == len(result):
+        raise RuntimeError(f"study: all {len(result)} members failed, {result.failed[0]}")
+    if result.failed and comm.rank == 0:
+        say(result)
     return result
 
 

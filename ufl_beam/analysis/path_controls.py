@@ -5,45 +5,21 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, field
 
 import numpy as np
 
 from ufl_beam.analysis.critical_points import Direction
-from ufl_beam.analysis.path_corrector import Control, PathCorrector
+from ufl_beam.analysis.path_corrector import Control, PathCorrector, Plane
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, StepFailed, require_kind, require_number
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
-from ufl_beam.simulation.step_cutting import Trial
+from ufl_beam.simulation.step_solver import Trial
 
-LEAST_REST = 1e-3  # part of a step of arc length that is gone at least beyond a kink
-
-
-class Plane:
-    """Linear constraint: a step goes a distance ``reach`` along a normal, from ``gone`` on."""
-
-    def __init__(
-        self,
-        corrector: PathCorrector,
-        normal: Direction,
-        reach: float,
-        gone: Direction | None = None,
-    ) -> None:
-        self._total, self._normal, self._reach = corrector.share.total, normal, reach
-        self._start = Direction(corrector.simulation.q, corrector.simulation.t)
-        if gone is not None:
-            self._start = self._start + gone
-
-    def residual(self, q: Array, t: float) -> float:
-        """Missing part of the reach."""
-        return self.derivative(q, Direction(q - self._start.q, t - self._start.t)) - 1.0
-
-    def derivative(self, q: Array, way: Direction) -> float:
-        """Derivative of the equation along a direction; it is the same at any state."""
-        along = self._total(float(self._normal.q @ way.q)) + self._normal.t * way.t
-        return along / self._reach
+LEAST_REST = 1e-3  # least part of a step of arc length that is left beyond a kink
 
 
 @dataclass(frozen=True)
@@ -106,31 +82,29 @@ class ArcLength(Control):
         _require_step(self.step, "ArcLength")
         require_number(self.factor, "ArcLength: factor", positive=True)
 
-    def begins_along(self, corrector: PathCorrector, way: Direction) -> float:
-        """Positive if the load factor changes with the sign of the step."""
-        return self.step * way.t
-
-    def continues_along(self, corrector: PathCorrector, gone: Direction, way: Direction) -> float:
-        """Positive if flow and openings go on along ``way``, else if it turns by less than π/2."""
+    def sense(self, corrector: PathCorrector, way: Direction, gone: Direction | None) -> float:
+        """First the sign of the step, later that of flow and openings, else by turns below π/2."""
+        if gone is None:
+            return self.step * way.t
         side = corrector.dissipation_side(corrector.simulation.q + gone.q, way)
-        return side or corrector.product(gone, way, self.factor)
+        return side or corrector.product(gone, way)
 
     def solve_step(self, corrector: PathCorrector, part: float) -> Trial:
         """Solve on the plane across the direction of the path."""
         reach, way = abs(self.step) * part, corrector.direction
-        size = corrector.length(way, self.factor)
+        size = corrector.length(way)
         unit = way / size
         try:
-            plane = Plane(corrector, self._across(corrector, unit), reach)
-            return corrector.attempt(unit, reach, plane)
+            plane = Plane(corrector, self._across(corrector, unit), reach, corrector.start)
+            return corrector.attempt(reach * unit, plane)
         except StepFailed:
             if (kink := corrector.kink(reach / size)) is None:
                 raise
         gone, way = kink
-        unit = way / corrector.length(way, self.factor)
-        rest = max(reach - corrector.length(gone, self.factor), LEAST_REST * reach)
-        plane = Plane(corrector, self._across(corrector, unit), rest, gone)
-        return corrector.attempt(gone + rest * unit, 1.0, plane, hold=False)
+        unit = way / corrector.length(way)
+        rest = max(reach - corrector.length(gone), LEAST_REST * reach)
+        plane = Plane(corrector, self._across(corrector, unit), rest, corrector.start + gone)
+        return corrector.attempt(gone + rest * unit, plane, hold=False)
 
     def _across(self, corrector: PathCorrector, unit: Direction) -> Direction:
         """Normal of the plane across a direction."""
@@ -151,45 +125,36 @@ class _QuantityControl(Control):
     def _quantity(self) -> str:
         """The quantity in words."""
 
-    def _along(self, corrector: PathCorrector, way: Direction) -> float:
-        """Derivative of the quantity along a direction."""
-        normal = self._normal(corrector)
-        return corrector.share.total(float(normal.q @ way.q)) + normal.t * way.t
-
-    def begins_along(self, corrector: PathCorrector, way: Direction) -> float:
-        """Sense in which the quantity changes as ``step`` says."""
-        return self.step * self._along(corrector, way)
-
-    def continues_along(self, corrector: PathCorrector, gone: Direction, way: Direction) -> float:
-        """Sense in which the quantity changes as ``step`` says."""
-        return self.begins_along(corrector, way)
+    def sense(self, corrector: PathCorrector, way: Direction, gone: Direction | None) -> float:
+        """Positive if the quantity changes along ``way`` as ``step`` says."""
+        return self.step * corrector.along(self._normal(corrector), way)
 
     def solve_step(self, corrector: PathCorrector, part: float) -> Trial:
         """Solve at the next value of the quantity."""
-        reach, what = self.step * part, self._quantity
+        reach, what, normal = self.step * part, self._quantity, self._normal(corrector)
 
         def length(rest: float, way: Direction) -> float:
             """Return the length of the step along a direction."""
-            speed = self._along(corrector, way)
+            speed = corrector.along(normal, way)
             if not speed * reach > 0:
                 raise StepFailed(
                     f"{what} turns back, where this control cannot follow; take ArcLength"
                 )
             return rest / speed
 
-        way, plane = corrector.direction, Plane(corrector, self._normal(corrector), reach)
-        size = length(reach, way)
+        plane = Plane(corrector, normal, reach, corrector.start)
+        size = length(reach, corrector.direction)
         try:
-            return corrector.attempt(way, size, plane)
+            return corrector.attempt(size * corrector.direction, plane)
         except StepFailed as failure:
             if (kink := corrector.kink(size)) is None:
-                more = (
-                    f"{failure}; perhaps {what} turns back here, where this control cannot follow"
-                )
-                raise failure.saying(f"{more}: take ArcLength") from None
+                raise failure.saying(
+                    f"{failure}; perhaps {what} turns back here, where this control cannot "
+                    "follow: take ArcLength"
+                ) from None
         gone, way = kink
-        rest = length(reach - self._along(corrector, gone), way)
-        return corrector.attempt(gone + rest * way, 1.0, plane, hold=False)
+        rest = length(reach - corrector.along(normal, gone), way)
+        return corrector.attempt(gone + rest * way, plane, hold=False)
 
 
 @dataclass(frozen=True)
@@ -305,31 +270,23 @@ class DissipationControl(Control):
         """Factor of the arc length."""
         return self.otherwise.factor
 
-    def begins_along(self, corrector: PathCorrector, way: Direction) -> float:
-        """Positive if the arc length begins along ``way``."""
-        return self.otherwise.begins_along(corrector, way)
-
-    def continues_along(self, corrector: PathCorrector, gone: Direction, way: Direction) -> float:
-        """Positive if the arc length goes on along ``way``."""
-        return self.otherwise.continues_along(corrector, gone, way)
+    def sense(self, corrector: PathCorrector, way: Direction, gone: Direction | None) -> float:
+        """That of the arc length."""
+        return self.otherwise.sense(corrector, way, gone)
 
     def solve_step(self, corrector: PathCorrector, part: float) -> Trial:
         """Solve at the next dissipated energy, unless a step of arc length dissipates nothing."""
-        if not corrector.dissipates:
-            try:
-                trial = self.otherwise.solve_step(corrector, part)
-            except StepFailed:
+        if corrector.dissipates:
+            with suppress(StepFailed):
                 return self._dissipate(corrector, part)
+            return self.otherwise.solve_step(corrector, part)
+        with suppress(StepFailed):
+            trial = self.otherwise.solve_step(corrector, part)
             if corrector.dissipation(trial.q1) == 0.0:
                 return trial
-        try:
-            return self._dissipate(corrector, part)
-        except StepFailed:
-            if not corrector.dissipates:
-                raise
-        return self.otherwise.solve_step(corrector, part)
+        return self._dissipate(corrector, part)
 
     def _dissipate(self, corrector: PathCorrector, part: float) -> Trial:
         energy = self.step * part
-        way, constraint = corrector.predict_dissipation(energy), DissipatedEnergy(corrector, energy)
-        return corrector.attempt(way, 1.0, constraint, hold=False)
+        predicted = corrector.predict_dissipation(energy)
+        return corrector.attempt(predicted, DissipatedEnergy(corrector, energy), hold=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -17,12 +17,11 @@ from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.model.scene import Scene
 from ufl_beam.simulation.simulation import Simulation
-from ufl_beam.simulation.step_cutting import Trial
+from ufl_beam.simulation.step_solver import Trial
 from ufl_beam.terms.base import Term
 
 MOST_DOUBLINGS = 30  # doublings of a step until something dissipates in it
 ONSET_PART = 1e-6  # part of the dissipated energy of a step at which its onset is looked at
-MOST_BISECTIONS = 40  # of the step in which the onset of dissipation is sought
 CONTROL_TOLERANCE = 1e-9  # part of a step by which its end may miss the equation of the control
 
 
@@ -37,22 +36,25 @@ class Constraint(Protocol):
 
 
 @dataclass(frozen=True)
-class GivenLoadFactor:
-    """Constraint that the load factor is t."""
+class Plane:
+    """Linear constraint: a step ends at a distance ``reach`` along a normal from ``start``."""
 
-    t: float
+    corrector: PathCorrector
+    normal: Direction
+    reach: float
+    start: Direction
 
     def residual(self, q: Array, t: float) -> float:
-        """Residual of the equation: missing change of the load factor."""
-        return t - self.t
+        """Missing part of the reach."""
+        return self.derivative(q, Direction(q - self.start.q, t - self.start.t)) - 1.0
 
     def derivative(self, q: Array, way: Direction) -> float:
-        """Derivative of the load factor along a direction."""
-        return way.t
+        """Derivative of the equation along a direction; it is the same at any state."""
+        return self.corrector.along(self.normal, way) / self.reach
 
 
 class PathCorrector:
-    """Corrector of path following: equilibrium augmented by the equation of the control.
+    """Newton corrector of a path: equilibrium together with the equation of the control.
 
     A change ``factor`` of the load factor counts as much as a unit of displacement.
     """
@@ -67,25 +69,34 @@ class PathCorrector:
         self.direction: Direction = Direction(np.zeros(self.share.size), 0.0)
         self.sought = self.direction
 
+    @property
+    def start(self) -> Direction:
+        """State and load factor at the beginning of the step."""
+        return Direction(self.simulation.q, self.simulation.t)
+
     # -- measures ------------------------------------------------------------------------------
 
-    def product(self, a: Direction, b: Direction, factor: float) -> float:
+    def product(self, a: Direction, b: Direction) -> float:
         """Return the inner product of two directions; dimensionless."""
-        return self.share.total(float((self.weights * a.q) @ b.q)) + a.t * b.t / factor**2
+        return self.share.total(float((self.weights * a.q) @ b.q)) + a.t * b.t / self.factor**2
 
-    def length(self, way: Direction, factor: float) -> float:
+    def along(self, normal: Direction, way: Direction) -> float:
+        """Return the derivative along ``way`` of a linear quantity with the gradient ``normal``."""
+        return self.share.total(float(normal.q @ way.q)) + normal.t * way.t
+
+    def length(self, way: Direction) -> float:
         """Return the length of a direction, however small; dimensionless."""
-        along = abs(way.t) / factor
+        along = abs(way.t) / self.factor
         largest = max(self.share.largest(float(np.abs(way.q).max(initial=0.0))), along)
         if largest == 0.0 or not math.isfinite(largest):
             return largest
         # Squares of what is below 1e-154 would be nothing.
         unit = way / largest
-        return largest * math.sqrt(self.product(unit, unit, factor))
+        return largest * math.sqrt(self.product(unit, unit))
 
     def size(self, way: Direction) -> float:
         """Return the length of a direction's part in the configuration; dimensionless."""
-        return self.length(Direction(way.q, 0.0), 1.0)
+        return self.length(Direction(way.q, 0.0))
 
     def dissipation(self, q: Array) -> float:
         """Return the energy that beams and springs dissipate in the step to ``q``; J."""
@@ -107,17 +118,13 @@ class PathCorrector:
         return self._until(energy, gone, way)
 
     def kink(self, length: float) -> tuple[Direction, Direction] | None:
-        """Find the state in which dissipation begins within a length; the direction beyond it."""
+        """Find the step to where dissipation begins within a length, and the direction beyond."""
         way, q = self.direction, self.simulation.q
         self.begin()
         if self.dissipates or not self.dissipation(q + length * way.q) > 0:
             return None
-        low, high = 0.0, length
-        for _ in range(MOST_BISECTIONS):
-            middle = (low + high) / 2
-            begun = self.dissipation(q + middle * way.q) > 0
-            low, high = (low, middle) if begun else (middle, high)
-        gone = high * way
+        begun = bisect(lambda part: self.dissipation(q + part * way.q) > 0, 0.0, length, 40)
+        gone = begun * way
         return gone, self._beyond(gone)
 
     def _beyond(self, gone: Direction) -> Direction:
@@ -127,27 +134,24 @@ class PathCorrector:
         return -way if self.dissipation_side(q, way) < 0 else way
 
     def _until(self, energy: float, gone: Direction, way: Direction) -> Direction:
-        """Return the step so far, and as much more along a direction as dissipates so much (J)."""
+        """Extend the step so far along a direction until it dissipates an energy; J."""
 
-        def dissipated(length: float) -> float:
-            return self.dissipation(self.simulation.q + gone.q + length * way.q)
+        def enough(length: float) -> bool:
+            return self.dissipation(self.simulation.q + gone.q + length * way.q) >= energy
 
-        low, high = 0.0, 1e-6 / self.length(way, self.factor)
+        low, high = 0.0, 1e-6 / self.length(way)
         for _ in range(MOST_DOUBLINGS):
-            if dissipated(high) >= energy:
+            if enough(high):
                 break
             low, high = high, 2 * high
         else:
             raise StepFailed("nothing dissipates in the direction of the path")
-        for _ in range(12):
-            middle = (low + high) / 2
-            low, high = (middle, high) if dissipated(middle) < energy else (low, middle)
-        return gone + high * way
+        return gone + bisect(enough, low, high, 12) * way
 
     def dissipation_side(self, q: Array, way: Direction) -> float:
         """Positive where more dissipates in a direction from ``q``, negative where against it."""
         now, size = self.dissipation(q), self.size(way)
-        flows = self.share.total(float(any(one.flows() for one in self.simulation.couplings)))
+        flows = self.share.total(float(any(c.response.flows() for c in self.simulation.couplings)))
         for doubled in range(MOST_DOUBLINGS if (now > 0 or flows) and size > 0 else 0):
             δ = 1e-9 * 2**doubled / size
             more = self.dissipation(q + δ * way.q) - self.dissipation(q - δ * way.q)
@@ -161,10 +165,17 @@ class PathCorrector:
         """Return an infinitely slow step to a load factor: rates and viscous forces vanish."""
         return Step(-math.inf, t, self.simulation.q, load_time=t, motion_time=t, fraction=1.0)
 
-    @staticmethod
-    def _give(step: Step, terms: Sequence[Term]) -> None:
-        for term in terms:
-            term.begin(step)
+    def _drive(self, t: float) -> None:
+        for term in self._driven:
+            term.begin(self.step_at(t))
+
+    def _driven_forces(self, q: Array, t: float) -> Array:
+        """Forces of all that depends on the load factor, which is t from now on."""
+        self._drive(t)
+        forces = np.zeros(self.share.size)
+        for term in self._driven:
+            term.add_residual(q, forces)
+        return forces
 
     def _moved(self, t: float) -> Array:
         """Return the prescribed motions at the degrees of freedom of supports; zero elsewhere."""
@@ -175,25 +186,17 @@ class PathCorrector:
     def arrive(self, x: Array) -> None:
         """Bring the loads to the load factor of an iterate."""
         self._x = x.copy()
-        self._give(self.step_at(self.t), self._driven)
+        self._drive(self.t)
 
     def tangent(self, x: Array, r: Array) -> None:
         """Fill the matrix, and the derivative by the load factor, exact for linear functions."""
-        simulation = self.simulation
-        q = simulation.supports.in_plane(x)
-        ε = 1e-6 * max(1.0, abs(self.t))
+        simulation, t = self.simulation, self.t
+        q, ε = simulation.supports.in_plane(x), 1e-6 * max(1.0, abs(t))
         for sign in (1, -1):
-            self._give(self.step_at(self.t + sign * ε), self._driven)
-            part = np.zeros(self.share.size)
-            for term in self._driven:
-                term.add_residual(q, part)
-            r += sign / (2 * ε) * part
-        self._give(self.step_at(self.t), self._driven)
-        for term in self._driven:
-            term.add_residual(q, np.zeros(self.share.size))
+            r += sign / (2 * ε) * self._driven_forces(q, t + sign * ε)
+        self._driven_forces(q, t)
         simulation.supports.enter(r)
-        rates = (self._moved(self.t + ε) - self._moved(self.t - ε)) / (2 * ε)
-        self._rates = np.asarray(rates, dtype=np.float64)
+        self._rates = np.asarray((self._moved(t + ε) - self._moved(t - ε)) / (2 * ε), dtype=float)
         self._A = simulation.equation.tangent_at(x, self._rates, r)
 
     def correct(self, y: Array, z: Array) -> None:
@@ -217,19 +220,16 @@ class PathCorrector:
 
     # -- a step --------------------------------------------------------------------------------
 
-    def attempt(
-        self, way: Direction, length: float, constraint: Constraint, *, hold: bool = True
-    ) -> Trial:
-        """Solve for an equilibrium under a constraint, beginning so far along a direction.
+    def attempt(self, predicted: Direction, constraint: Constraint, *, hold: bool = True) -> Trial:
+        """Solve for an equilibrium under a constraint, beginning with a predicted step.
 
         Closed openings that do not flow are held closed if they can be, see openings.py, unless
         ``hold`` is false, as in a direction in which they open.
         """
+        self._constraint, self.sought = constraint, predicted
         simulation = self.simulation
-        self._constraint = constraint
-        self.sought = length * way
-        self.t = simulation.t + self.sought.t
-        step, guess = self.step_at(self.t), simulation.q + self.sought.q
+        self.t = simulation.t + predicted.t
+        step, guess = self.step_at(self.t), simulation.q + predicted.q
         simulation.supports.enter(guess)
         simulation.together(simulation.supports.move, guess, guess, step)
         trial = simulation.attempt_along(step, guess, self, hold=hold)
@@ -238,17 +238,14 @@ class PathCorrector:
     def begin(self) -> None:
         """Let all terms begin a step at the present state and load factor."""
         simulation = self.simulation
-        simulation.together(self._give, self.step_at(simulation.t), simulation.terms)
+        simulation.together(simulation.equation.begin, self.step_at(simulation.t))
 
     def stiffness_at(self, q: Array) -> Stiffness:
         """Return the tangent stiffness at a state."""
         supports = self.simulation.supports
-        x = supports.in_axes(q)
-        # The first tangent of a step is that of the forces before it, and may not yet be taken.
-        together = self.simulation.together
-        together(self.tangent, x, np.zeros(self.share.size))
-        rate = np.zeros(self.share.size)
-        together(self.tangent, x, rate)
+        for _ in range(2):  # the first tangent of a step is that of the forces before it
+            rate = np.zeros(self.share.size)
+            self.simulation.together(self.tangent, supports.in_axes(q), rate)
         return Stiffness(self.share, self._A, supports.dofs, rate)
 
     def direction_of(self, stiffness: Stiffness) -> Direction:
@@ -256,13 +253,21 @@ class PathCorrector:
         q = stiffness.flow[self.share.dofs] + self._rates
         self.simulation.supports.leave(q)
         way = Direction(q, 1.0)
-        size = self.length(way, self.factor)
+        size = self.length(way)
         if not math.isfinite(size) or not self.size(way) > 0:
             raise StepFailed(
                 "nothing moves with the load factor here; let a load or a motion go on to change, "
                 "as with time=lambda t: t"
             )
         return way / size
+
+
+def bisect(reached: Callable[[float], bool], low: float, high: float, halvings: int) -> float:
+    """Find by bisection where something is reached: at the upper end of what is left."""
+    for _ in range(halvings):
+        middle = (low + high) / 2
+        low, high = (low, middle) if reached(middle) else (middle, high)
+    return high
 
 
 class Control(ABC):
@@ -273,16 +278,12 @@ class Control(ABC):
     def factor(self) -> float:
         """Change of the load factor that counts as much as a unit of displacement."""
 
-    def require(self, scene: Scene) -> None:  # noqa: B027 - most controls fit all scenes
+    def require(self, scene: Scene) -> None:
         """Raise :class:`SceneError` if the control does not fit the scene."""
 
     @abstractmethod
-    def begins_along(self, corrector: PathCorrector, way: Direction) -> float:
-        """Positive if ``way`` is the direction in which a path begins."""
-
-    @abstractmethod
-    def continues_along(self, corrector: PathCorrector, gone: Direction, way: Direction) -> float:
-        """Positive if a path that came by ``gone`` in the step goes on along ``way``."""
+    def sense(self, corrector: PathCorrector, way: Direction, gone: Direction | None) -> float:
+        """Positive if a path that came by ``gone``, or begins (None), goes on along ``way``."""
 
     @abstractmethod
     def solve_step(self, corrector: PathCorrector, part: float) -> Trial:

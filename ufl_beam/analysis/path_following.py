@@ -15,23 +15,30 @@ from ufl_beam.analysis.critical_points import Branch, CriticalPoint
 from ufl_beam.analysis.path_corrector import Control
 from ufl_beam.analysis.path_stepper import PathStepper
 from ufl_beam.arrays import Array, State
-from ufl_beam.errors import SceneError, require_count, require_function, require_kind
+from ufl_beam.errors import (
+    SceneError,
+    StepFailed,
+    require_count,
+    require_function,
+    require_kind,
+)
 from ufl_beam.mechanics.classical import Static
-from ufl_beam.model.connector_laws import Actuator, Controller, Motor
+from ufl_beam.model.connector_laws import Controller
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
-from ufl_beam.model.time_functions import TimeFunction
-from ufl_beam.output.archive import below
-from ufl_beam.output.output_files import take
-from ufl_beam.output.recorders import Recorder, close_all, recorders_of
+from ufl_beam.output.archive import above, below
+from ufl_beam.output.recorders import Recorder, recorders_of
 from ufl_beam.parallel import communicator
 from ufl_beam.parameter import FACTOR
-from ufl_beam.simulation.run import partial_results
+from ufl_beam.simulation.run import running
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.solution_files import arrays_of
-from ufl_beam.simulation.solution_files import take as take_solution
 from ufl_beam.solvers.newton_options import Newton
+
+ADVICE = (
+    "Try a shorter step or another control: ArcLength goes through limit points of loads and of "
+    "displacements, DissipationControl through softening that snaps back"
+)
 
 
 class Path(Solution):
@@ -59,8 +66,7 @@ class Path(Solution):
         text["critical"] = [{"kind": c.kind, "factor": c.factor, "n": c.n} for c in self.critical]
         for k, point in enumerate(self.critical):
             arrays[f"critical/{k}/mode"] = point.mode
-            for name, values in arrays_of(point.state).items():
-                arrays[f"critical/{k}/state/{name}"] = values
+            arrays |= above(f"critical/{k}/state/", point.state._arrays())
         return text, arrays
 
     def _take(self, text: dict[str, Any], arrays: State) -> None:
@@ -68,7 +74,7 @@ class Path(Solution):
         critical = []
         for k, one in enumerate(text["critical"]):
             state, prefix = Solution(self.scene, self.grid), f"critical/{k}/state/"
-            take_solution(state, text, below(prefix, arrays))
+            state._take(text, below(prefix, arrays))
             critical.append(CriticalPoint(**one, state=state, mode=arrays[f"critical/{k}/mode"]))
         self.critical = critical
 
@@ -146,7 +152,6 @@ def follow(
     path = cast(Path, simulation.solution)
     stepper = PathStepper(simulation, control)
     path.critical = stepper.critical
-    release = take(outputs)
 
     def after_step() -> bool:
         if recorders:
@@ -156,8 +161,8 @@ def follow(
             recorder.write(simulation)
         return until is not None and bool(until(simulation))
 
-    try:
-        with partial_results(simulation):
+    with running(simulation, recorders, outputs, began):
+        try:
             stepper.begin(branch, fresh=state is None)
             for recorder in recorders:
                 simulation.together(recorder.open, simulation)
@@ -166,12 +171,9 @@ def follow(
                 stepper.advance()
                 if simulation.share.largest(simulation.together(after_step)):
                     break
-            simulation.end()
-    finally:
-        release()
-        path.seconds = time.perf_counter() - began
-        simulation.close()
-        close_all(recorders)
+        except StepFailed as failure:
+            simulation.give_up(failure, stepper.tried, ADVICE)
+        simulation.end()
     if comm.rank == 0:
         path.opened.warn(simulation.scheme, path.times)
     return path
@@ -182,15 +184,9 @@ def _require_driven(scene: Scene, t0: float) -> None:
     for link in scene.links:
         if isinstance(link.law, Controller):
             raise SceneError(f"{link}: a controller acts in time, and a path has none")
-    functions: list[TimeFunction] = [load.time for load in scene.loads]
-    functions += [motion for support in scene.supports for motion in support.moving.values()]
-    for link in scene.links:
-        functions += [link.law.motion] if isinstance(link.law, Motor) else []
-        functions += [link.law.force] if isinstance(link.law, Actuator) else []
-    for work in scene.works:
-        functions += [number for number in work.numbers.values() if callable(number)]
-        functions += [float] if "t" in work.asked else []
-    if not any(f(t0 + Δ) != f(t0) for f in functions for Δ in (1e-3, 1.0, -1e-3, -1.0)):
+    times = (t0 + 1e-3, t0 + 1.0, t0 - 1e-3, t0 - 1.0)
+    driven = any("t" in work.asked for work in scene.works)
+    if not driven and not any(f(t) != f(t0) for _, f in scene.time_functions() for t in times):
         raise SceneError(
             "follow: no load and no motion depends on time, which is the load factor here; give "
             "the one that is to grow time=lambda t: t"

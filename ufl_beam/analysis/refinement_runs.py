@@ -45,7 +45,7 @@ class RefinementRuns:
     _shapes: dict[str, tuple[int, ...]] = field(default_factory=dict, init=False)
 
     def begin(self, family: int) -> None:
-        """Compile and require comparable quantities, on every process."""
+        """Compile, and require quantities of one shape in all runs, on every process."""
         seconds = 0.0
         with alone():
             for level in (0.0, 1.0):

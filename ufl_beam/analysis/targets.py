@@ -4,11 +4,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import NamedTuple, cast
-
-import numpy as np
 
 from ufl_beam.analysis.richardson import Cost, Cross, size
 from ufl_beam.arrays import Array
@@ -17,8 +16,8 @@ from ufl_beam.errors import SceneError, require_number
 STEPS_PER_LEVEL = 16  # choices of steps from one level of refinement to the next
 EXTRAPOLATED_LEVELS = 2  # levels beyond those that were run which a choice may ask for
 BUDGET_AIM, BUDGET_SLACK = 0.9, 0.2  # part that is aimed at; part that a run may fall short by
-LARGEST_ERROR = 0.3  # errors of this part of a quantity are none to recommend
-NEARLY_BEST = 2.0  # if nothing serves, the cheapest with so many times the least error is next
+LARGEST_ERROR = 0.3  # settings of larger errors, as parts of a quantity, are not recommended
+NEARLY_BEST = 2.0  # if nothing serves, the cheapest up to so many times the least error is next
 NEGLIGIBLE = 0.1  # changes up to this part of a tolerance need not converge
 
 
@@ -29,8 +28,6 @@ class Choice(NamedTuple):
     level: float  # steps are about 2**level times as many
     seconds: float  # wall time
     ratio: float  # largest error, as a part of what is allowed, or of the quantity
-    serves: bool  # whether it does what is asked
-    further: bool  # if not, whether one may that is finer than those that were run
 
 
 @dataclass(frozen=True)
@@ -67,14 +64,17 @@ class Prediction:
         """Return the largest of differences of the quantities, in its unit."""
         return max(size(d) / self.units[name] for name, d in differences.items())
 
-    def settings(self) -> tuple[list[tuple[int, float]], Array, Array]:
-        """List all settings that may be chosen, with wall times (s) and ratios."""
+    def choices(self) -> list[Choice]:
+        """List all settings that may be chosen."""
         i, j = self.finest
-        levels = np.arange(STEPS_PER_LEVEL * (j + EXTRAPOLATED_LEVELS) + 1) / STEPS_PER_LEVEL
         refinements = range(1, 2 ** (i + EXTRAPOLATED_LEVELS) + 1)
-        every = [(refine, float(level)) for refine in refinements for level in levels]
-        seconds = [self.cost.seconds(self.steps * 2**j, self.cells * r) for r, j in every]
-        return every, np.array(seconds), np.array([self.ratio(*one) for one in every])
+        levels = range(STEPS_PER_LEVEL * (j + EXTRAPOLATED_LEVELS) + 1)
+        choices = []
+        for refine, k in product(refinements, levels):
+            level = k / STEPS_PER_LEVEL
+            seconds = self.cost.seconds(self.steps * 2**level, self.cells * refine)
+            choices.append(Choice(refine, level, seconds, self.ratio(refine, level)))
+        return choices
 
 
 @dataclass(frozen=True)
@@ -96,17 +96,18 @@ class Tolerance:
         """Return the tolerance of each quantity, in its unit."""
         return {n: self.absolute.get(n, self.relative * scale) for n, scale in scales.items()}
 
-    def choose(self, prediction: Prediction) -> Choice:
+    def choose(self, choices: Sequence[Choice]) -> Choice:
         """Choose the cheapest that is accurate enough, or else nearly as accurate as any."""
-        settings, seconds, ratios = prediction.settings()
-        good = ratios <= max(1.0, NEARLY_BEST * ratios.min())
-        k = int(np.argmin(np.where(good, seconds, np.inf)))
-        serves = bool(ratios[k] <= 1.0)
-        return Choice(*settings[k], float(seconds[k]), float(ratios[k]), serves, not serves)
+        most = max(1.0, NEARLY_BEST * min(one.ratio for one in choices))
+        return min((one for one in choices if one.ratio <= most), key=self.objective)
 
-    def hopeless(self, choice: Choice, best: Choice) -> bool:
-        """Return whether a choice would take much longer."""
-        return choice.seconds > 2 * best.seconds
+    def serves(self, choice: Choice) -> bool:
+        """Return whether a choice is accurate enough."""
+        return choice.ratio <= 1.0
+
+    def objective(self, choice: Choice) -> float:
+        """Return what is to be small: the wall time; s."""
+        return choice.seconds
 
     def accepts(self, seconds: float, ratio: float) -> bool:
         """Return whether it is accurate enough."""
@@ -137,18 +138,19 @@ class Budget:
         """Return the sizes of the quantities."""
         return dict(scales)
 
-    def choose(self, prediction: Prediction) -> Choice:
+    def choose(self, choices: Sequence[Choice]) -> Choice:
         """Choose the most accurate that is fast enough, or the fastest."""
-        settings, seconds, ratios = prediction.settings()
-        fast = seconds <= BUDGET_AIM * self.seconds
-        k = int(np.argmin(np.where(fast, ratios, np.inf) if fast.any() else seconds))
-        good = bool(ratios[k] <= LARGEST_ERROR)
-        numbers = float(seconds[k]), float(ratios[k])
-        return Choice(*settings[k], *numbers, bool(fast[k]) and good, bool(fast[k]) and not good)
+        fast = (one for one in choices if one.seconds <= BUDGET_AIM * self.seconds)
+        fastest = min(choices, key=lambda one: one.seconds)
+        return min(fast, key=self.objective, default=fastest)
 
-    def hopeless(self, choice: Choice, best: Choice) -> bool:
-        """Return whether a choice would be much less accurate."""
-        return choice.ratio > 2 * best.ratio
+    def serves(self, choice: Choice) -> bool:
+        """Return whether a choice is fast enough, and accurate enough to be recommended."""
+        return choice.seconds <= BUDGET_AIM * self.seconds and choice.ratio <= LARGEST_ERROR
+
+    def objective(self, choice: Choice) -> float:
+        """Return what is to be small: the error."""
+        return choice.ratio
 
     def accepts(self, seconds: float, ratio: float) -> bool:
         """Return whether it takes that time, and not much less."""

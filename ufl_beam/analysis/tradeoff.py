@@ -16,7 +16,7 @@ import numpy as np
 
 from ufl_beam.analysis.refinement_runs import Quantity, RefinementRuns
 from ufl_beam.analysis.richardson import Cost, Cross, Level, size
-from ufl_beam.analysis.targets import Choice, Prediction, Target, target_of
+from ufl_beam.analysis.targets import BUDGET_AIM, Choice, Prediction, Target, target_of
 from ufl_beam.analysis.tradeoff_result import Dials, Refinement, Run, Tradeoff
 from ufl_beam.errors import (
     SceneError,
@@ -36,7 +36,7 @@ from ufl_beam.solvers.newton_options import Newton
 
 NEWTON_SHARE = 0.1  # part of the error that another tolerance of Newton's method may change
 MOST_DOUBTS, MOST_TRIALS = 4, 6  # refinements without self-convergence; settings tried
-SHORT_CHOICE = 2.0  # of settings that are tried, runs below are done three times; s
+SHORT_CHOICE = 2.0  # settings that are tried in a shorter time are run three times; s
 ROUNDING = 1e-9  # part of a quantity up to which changes are of rounding or Newton's method
 STEP_ORDER = 2.0  # order of the schemes, at most; that of cells is twice their degree
 
@@ -128,14 +128,9 @@ def tradeoff(
             notes.append(f"{dials}: {error}")
             continue
         try:
-            one = _Search(runs, family, target).find(found)
+            found.append(_Search(runs, family, target).find(found))
         except TradeoffError as error:
             notes.append(f"{dials}: {error}")
-            continue
-        if one is None:
-            notes.append(f"{dials}: given up, others are better")
-        else:
-            found.append(one)
     if len(wrong) == len(families):
         raise wrong[0]
     if not found:
@@ -159,11 +154,16 @@ def tradeoff(
 
 @dataclass(frozen=True)
 class _Found:
-    """Setting that was run, its prediction, and what the runs of its family predict."""
+    """Setting that was run, and what the runs of its family predict."""
 
     run: Run
-    choice: Choice
     prediction: Prediction
+
+    @property
+    def choice(self) -> Choice:
+        """The setting with its wall time and the predicted error."""
+        _, refine, level, _ = self.run.refinement
+        return Choice(refine, level, self.run.seconds, self.prediction.ratio(refine, level))
 
     @property
     def ratio(self) -> float:
@@ -184,50 +184,57 @@ class _Search:
         # Times of settings over the cost that was fitted: machines are noisy
         self._slower: list[float] = []
 
-    def find(self, others: Sequence[_Found]) -> _Found | None:
-        """Find the setting, none if ``others`` are better; TradeoffError if no setting serves."""
+    def find(self, others: Sequence[_Found]) -> _Found:
+        """Find the setting; TradeoffError if none serves, or ``others`` are better."""
+        runs, target = self._runs, self._target
         base: Level = (0, 0)
         doubts: list[str] = []
-        tried: list[_Found] = []
+        tried: list[Run] = []
         while True:
             prediction, doubt, moved = self._predict(base)
             if prediction is None:
                 doubts.append(doubt)
                 if len(doubts) == MOST_DOUBTS:
-                    raise self._refusal("self-convergence is not seen" + "".join(doubts))
+                    raise TradeoffError("self-convergence is not seen" + "".join(doubts))
                 base = moved
                 continue
-            choice = self._target.choose(prediction)
-            if any(self._target.hopeless(choice, one.choice) for one in others):
-                return None
+            choice = target.choose(prediction.choices())
+            aim = target.objective(choice)
+            if any(aim > 2 * target.objective(one.choice) for one in others):
+                raise TradeoffError("given up, others are better")
             i, j = prediction.finest
             cells_more = max(0, math.ceil(math.log2(choice.refine) - i))
             more = cells_more, max(0, math.ceil(choice.level - j))
-            if choice.further and more == (0, 0):
+            serves = target.serves(choice)
+            if not serves and more == (0, 0) and choice.seconds <= BUDGET_AIM * target.bounds[0]:
                 more = prediction.bottleneck(choice)
             if more != (0, 0):
                 base = base[0] + more[0], base[1] + more[1]
                 continue
-            if not choice.serves:
-                raise self._refusal(
+            if not serves:
+                raise TradeoffError(
                     f"no setting serves; the nearest takes {choice.seconds:.3g} s and has errors "
-                    f"of {choice.ratio:.2g} {self._target.measure}; steps and cells as they are "
+                    f"of {choice.ratio:.2g} {target.measure}; steps and cells as they are "
                     "given are the coarsest, and the last digits of a quantity are not known"
                 )
-            found = self._attempt(choice, prediction)
-            again = any(one.run is found.run for one in tried)
-            tried.append(found)
-            if self._target.accepts(found.run.seconds, found.ratio):
+            one = Refinement(self._family, choice.refine, choice.level)
+            runs.run([one], short=SHORT_CHOICE)
+            if one in runs.failed:
+                raise TradeoffError(f"the chosen setting failed: {runs.failed[one]}")
+            found = _Found(runs.runs[one], prediction)
+            if target.accepts(found.run.seconds, found.ratio):
                 return found
-            if again or len(tried) == MOST_TRIALS:
-                return min(self._all(prediction), key=lambda one: one.rank(self._target))
+            if found.run in tried or len(tried) + 1 == MOST_TRIALS:
+                every = (_Found(run, prediction) for run in runs.of(self._family))
+                return min(every, key=lambda one: one.rank(target))
+            tried.append(found.run)
             self._slower.append(found.run.seconds * self._mean / choice.seconds)
             if found.ratio > choice.ratio:
                 more = prediction.bottleneck(choice)
                 base = base[0] + more[0], base[1] + more[1]
 
     def _predict(self, base: Level) -> tuple[Prediction | None, str, Level]:
-        """Return the findings of the runs around a base, or the reason why there are none."""
+        """Return what the runs around a base predict, or why they do not; the next base then."""
         i, j = base
         runs, levels = self._runs, Cross.levels(base)
         wanted = [Refinement(self._family, 2 ** level[0], level[1]) for level in levels]
@@ -252,41 +259,19 @@ class _Search:
             crosses[name] = Cross.of(values, base, orders, floor)
         doubts = [f"\n  {name}{cross}" for name, cross in crosses.items() if not cross.seen]
         if doubts:
-            unseen = [cross for cross in crosses.values() if not cross.seen]
-            cells = any(not (cross.cells.seen and cross.separate) for cross in unseen)
-            steps = any(not (cross.steps.seen and cross.separate) for cross in unseen)
+            cells = any(not (one.cells.seen and one.separate) for one in crosses.values())
+            steps = any(not (one.steps.seen and one.separate) for one in crosses.values())
             where = f"\n  from {runs.dials(wanted[0])} on:"
             return None, where + "".join(doubts), (i + cells, j + steps)
         done = [run for run in runs.of(self._family) if run.refinement.newton == 0]
-        columns = zip(*((run.steps, run.cells, run.seconds) for run in done), strict=True)
-        cost = Cost.of(*map(np.array, columns)).slower(self._mean)
+        measured = np.array([(run.steps, run.cells, run.seconds) for run in done])
+        cost = Cost.of(*measured.T).slower(self._mean)
         cells_now = at[base].cells / wanted[0].refine
         return Prediction(crosses, cost, finest.steps / 2 ** (j + 2), cells_now, units), "", base
-
-    def _attempt(self, choice: Choice, prediction: Prediction) -> _Found:
-        """Run a choice and compare it with the limits."""
-        one = Refinement(self._family, choice.refine, choice.level)
-        self._runs.run([one], short=SHORT_CHOICE)
-        if one in self._runs.failed:
-            raise self._refusal(f"the chosen setting failed: {self._runs.failed[one]}")
-        return _Found(self._runs.runs[one], choice, prediction)
-
-    def _all(self, prediction: Prediction) -> list[_Found]:
-        """Return all runs of the family, as if they had been chosen."""
-        found = []
-        for run in self._runs.of(self._family):
-            _, refine, level, _ = run.refinement
-            ratio = prediction.ratio(refine, level)
-            choice = Choice(refine, level, run.seconds, ratio, True, False)
-            found.append(_Found(run, choice, prediction))
-        return found
 
     @property
     def _mean(self) -> float:
         return geometric_mean(self._slower or [1.0])
-
-    def _refusal(self, message: str) -> TradeoffError:
-        return TradeoffError(message, tuple(self._runs.of(self._family)))
 
 
 def _other_newton(runs: RefinementRuns, best: _Found) -> Run:

@@ -158,10 +158,8 @@ class Tradeoff:
                 *(f"{error:.2g}" for error in self.errors(run).values()), str(run.dials),
             ])  # fmt: skip
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        lines = [
-            "  ".join([*(c.rjust(w) for c, w in zip(row[:-1], widths, strict=False)), row[-1]])
-            for row in rows
-        ]
+        widths[-1] = 0  # dials begin in one column
+        lines = ["  ".join(map(str.rjust, row, widths)) for row in rows]
         lines.append(f"and {len(self.runs) - len(lines) + 1} runs that others beat in both")
         for name, cross in self.crosses.items():
             value = np.array2string(cross.limit, precision=9, threshold=6, edgeitems=2)

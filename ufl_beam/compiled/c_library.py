@@ -11,6 +11,7 @@ import ctypes
 from collections.abc import Mapping
 from functools import partial
 from typing import Any, TypeVar
+from weakref import WeakKeyDictionary
 
 from petsc4py import PETSc
 
@@ -45,13 +46,14 @@ for _name, _field in ffi.typeof("petsc_functions").fields:
     setattr(lib.petsc, _name, ffi.cast(_field.type, _address))
 
 
+def opaque(thing: Any) -> Any:
+    """An object of petsc4py as C has it; other things as they are."""
+    return ffi.cast("void *", thing.handle) if isinstance(thing, PETSc.Object) else thing
+
+
 def petsc(name: str, *arguments: Any) -> None:
     """Call a function of ``petsc_functions`` in loops.h; objects of petsc4py are theirs in C."""
-    in_c = (
-        ffi.cast("void *", argument.handle) if isinstance(argument, PETSc.Object) else argument
-        for argument in arguments
-    )
-    if error := getattr(lib.petsc, name)(*in_c):
+    if error := getattr(lib.petsc, name)(*map(opaque, arguments)):
         text, specific = ffi.new("const char **"), ffi.new("char **")
         lib.petsc.PetscErrorMessage(error, text, specific)
         words = (ffi.string(of[0]).decode() for of in (text, specific) if of[0])
@@ -79,6 +81,28 @@ def integers(array: Index) -> Any:
     if array.dtype != _INT32:
         raise TypeError(f"C takes integers of 32 bits, not {array.dtype}")
     return ffi.from_buffer(_INT32_ARRAY, array)
+
+
+_kept: WeakKeyDictionary[Any, dict[str, Any]] = WeakKeyDictionary()
+
+
+def fill(struct: Any, **fields: Any) -> Any:
+    """Set fields of a struct of loops.h, and return it; with it, what they point to stays alive.
+
+    Arrays become pointers to their float64 or int32.
+    """
+    kept = _kept.setdefault(struct, {})
+    for name, value in fields.items():
+        if isinstance(value, np.ndarray):
+            value = doubles(value) if value.dtype == np.float64 else integers(value)
+        kept[name] = value
+        setattr(struct, name, value)
+    return struct
+
+
+def struct(kind: str, **fields: Any) -> Any:
+    """Return a pointer to a new struct of loops.h, see :func:`fill`."""
+    return fill(ffi.new(f"{kind} *"), **fields)
 
 
 def names(enum: str, prefix: str = "") -> tuple[str, ...]:

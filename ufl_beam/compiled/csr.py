@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, integers, lib, loop
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, integers, lib, loop
 
 
 class Csr:
@@ -81,62 +81,58 @@ class Product:
     """Operator ``x -> A x`` on this process, without the zeros that ``A`` stores."""
 
     def __init__(self, A: Csr) -> None:
-        self._entries = np.flatnonzero(A.data).astype(np.int32)
-        self._columns = A.indices[self._entries]
-        self._data = A.data[self._entries]
-        indptr = np.searchsorted(self._entries, A.indptr).astype(np.int32)
-        pointers = (integers(indptr), integers(self._columns), doubles(self._data))
-        self._arrays = (A.size, *pointers)
+        self.entries = np.flatnonzero(A.data).astype(np.int32)
+        indptr = np.searchsorted(self.entries, A.indptr).astype(np.int32)
+        self.data, columns = A.data[self.entries], A.indices[self.entries]
+        self.arrays = (A.size, integers(indptr), integers(columns), doubles(self.data))
 
     def __call__(self, x: Array) -> Array:
         """Return the product, a new array."""
         y = np.zeros(len(x))
-        lib.add_product(*self._arrays, doubles(x), doubles(y))
+        lib.add_product(*self.arrays, doubles(x), doubles(y))
         return y
 
     def square(self, x: Array) -> float:
         """Return ``x A x``."""
-        square: float = lib.quadratic_form(*self._arrays, doubles(x))
+        square: float = lib.quadratic_form(*self.arrays, doubles(x))
         return square
 
 
-class StepProduct(Product):
+class StepProduct:
     """Forces ``A (factor s - back v)``, s being (Δu, 2 tan(Δψ/2)), and their derivative.
 
     ``A`` is constant; the derivative is added to ``tangent``, of the same structure.
     """
 
     def __init__(self, A: Csr, rotations: Index, tangent: Csr) -> None:
-        super().__init__(A)
-        size, indptr, indices, data = self._arrays
-        entry, self._tangent = integers(self._entries), doubles(tangent.data)
-        self._structure = tangent
-        self._alive = (integers(rotations), entry, doubles(np.empty(size)))
-        self.product = ffi.new("step_product *")
-        c = self.product
-        c.size, c.indptr, c.indices, c.data = size, indptr, indices, data
-        c.rotations, (c.rotation, c.entry, c.space) = len(rotations), self._alive
+        self.A, self._tangent = Product(A), tangent
+        size, indptr, indices, data = self.A.arrays
+        self.c = fill(
+            ffi.new("step_product *"),
+            size=size, indptr=indptr, indices=indices, data=data, entry=self.A.entries,
+            rotations=len(rotations), rotation=rotations, space=np.empty(size),
+        )  # fmt: skip
 
     def matrix(self) -> Csr:
         """Return the matrix, a new one."""
-        A = self._structure.zeros_like()
-        A.data[self._entries] = self._data
+        A = self._tangent.zeros_like()
+        A.data[self.A.entries] = self.A.data
         return A
 
     def begin(self, q0: Array, factor: float, back: float, v: Array) -> None:
         """Prepare what stays constant in the step that begins at ``q0``."""
-        c = self.product
+        c = self.c
         c.factor, c.back = factor, back
         self._states = c.v, c.q0 = doubles(v), doubles(q0)
 
     def loops(self) -> tuple[Loop, Loop]:
         """Return the loops of :meth:`add_force` and :meth:`add_tangent`."""
-        return loop("add_step_force", self.product), loop("add_step_tangent", self.product)
+        return loop("add_step_force", self.c), loop("add_step_tangent", self.c)
 
     def add_force(self, q1: Array, r: Array) -> None:
         """Add the forces at ``q1``."""
-        lib.add_step_force(self.product, doubles(q1), doubles(r))
+        lib.add_step_force(self.c, doubles(q1), doubles(r))
 
     def add_tangent(self, q1: Array) -> None:
         """Add their derivative at ``q1``."""
-        lib.add_step_tangent(self.product, doubles(q1), self._tangent)
+        lib.add_step_tangent(self.c, doubles(q1), doubles(self._tangent.data))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import logging
 import math
 import re
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -113,33 +113,24 @@ def require_agreement(module: ModuleType, kernel: int, sizes: tuple[int, int, in
 _CPU = repr(np.show_config(mode="dicts"))
 """Configuration of NumPy, which includes the features of the processor."""
 
-_addresses: dict[tuple[str, int, int, int], int | None] = {}
 
-
+@cache
 def in_lanes(source: Path, kernel: int, sizes: tuple[int, int, int]) -> int | None:
     """Return the address of the SIMD loop of a compiled form, or None; see above for ``sizes``."""
-    key = (source.name, *sizes)
-    if key not in _addresses:
-        try:
-            module = _compiled(source, kernel, sizes)
-            _addresses[key] = int(module.ffi.cast("intptr_t", module.lib.address()))
-        except (Refused, CompilerError) as why:
-            LOGGER.info("%s is computed cell by cell, which is slower: %s", source.stem, why)
-            _addresses[key] = None
-    return _addresses[key]
-
-
-def _compiled(source: Path, kernel: int, sizes: tuple[int, int, int]) -> ModuleType:
-    """Compile or load the module with the loop over the cells."""
     names = ("LANES", "ENTRIES", "WIDTH", "CONSTANTS")
     defined = [f"#define {x} {n}" for x, n in zip(names, (LANES, *sizes), strict=True)]
     head, loop = "\n".join([HEADERS, DECLARATIONS, *defined, text("lanes.h")]), text("lanes.c")
-    return compiled(
-        "ufl_beam_lanes",
-        INTERFACE,
-        lambda: "\n".join([head, in_vectors(written(source)), loop]),
-        # FFCx names what it makes by what is in it; NumPy knows what "native" means.
-        made_of=[source.name, head, loop, Path(__file__).read_text(), _CPU],
-        flags=["-O2", "-march=native", "-fno-math-errno"],
-        check=lambda module: require_agreement(module, kernel, sizes),
-    )
+    try:
+        module = compiled(
+            "ufl_beam_lanes",
+            INTERFACE,
+            lambda: "\n".join([head, in_vectors(written(source)), loop]),
+            # FFCx names what it makes by what is in it; NumPy knows what "native" means.
+            made_of=[source.name, head, loop, Path(__file__).read_text(), _CPU],
+            flags=["-O2", "-march=native", "-fno-math-errno"],
+            check=lambda module: require_agreement(module, kernel, sizes),
+        )
+    except (Refused, CompilerError) as why:
+        LOGGER.info("%s is computed cell by cell, which is slower: %s", source.stem, why)
+        return None
+    return int(module.ffi.cast("intptr_t", module.lib.address()))

@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache
 from itertools import accumulate
 from pathlib import Path
-from typing import Any, NamedTuple, ParamSpec, TypeVar, cast
+from typing import Any, NamedTuple, ParamSpec, Protocol, TypeVar, cast
 
 import basix.ufl
 import numpy as np
@@ -22,7 +22,7 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import doubles, ffi, integers, kernel, lib
+from ufl_beam.compiled.c_library import doubles, ffi, fill, kernel, lib
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.jit import compiled_form
 from ufl_beam.compiled.simd_kernels import LANES, in_batches, in_lanes
@@ -95,6 +95,34 @@ def prepared(form: ufl.Form) -> Prepared:
     return Prepared(compiled, source, tabulate, used, columns, constants, packed, entries)
 
 
+class CellForm(Protocol):
+    """A form on cells of a scene, with values of its coefficients there.
+
+    If its test functions are those of the unknown's space, cells add to their degrees of freedom;
+    else each to entries of its own.
+    """
+
+    cells: Any  # argument of ``add_cells`` of loops.h; None of a form that C does not evaluate
+
+    def uses(self, function: fem.Function) -> bool:
+        """Return whether a function appears in the form."""
+
+    def set(self, function: fem.Function, q: Array) -> None:
+        """Give ``function`` the degrees of freedom ``q``, if it appears in the form."""
+
+    def put(self, function: fem.Function, values: Array) -> None:
+        """Give ``function`` other values in the cells; shape (num_cells, dofs per cell)."""
+
+    def place(self, A: Csr) -> None:
+        """Let a bilinear form on the degrees of freedom of the cells add to ``A``."""
+
+    def add(self, q: Array, b: Array) -> None:
+        """Add the form at the unknown ``q`` to a vector, or to the entries of the matrix."""
+
+    def value(self, q: Array) -> float:
+        """Return the value of the functional at the unknown ``q``."""
+
+
 class Kernel:
     """A compiled cell form together with the packed values of its coefficients.
 
@@ -144,13 +172,14 @@ class Kernel:
 
     def _prepare(self) -> None:
         """Make the data of the loop over the cells."""
-        numbers = (self._packed, self._form.constants, self._coordinates)
-        self._arrays = (*map(integers, (self._dofs, self._rows)), *map(doubles, numbers))
-        self.cells = c = ffi.new("cells *")
-        c.tabulate, c.several, c.lanes = self._form.tabulate, self._in_lanes, self._lanes
-        c.dofs, c.row, c.w, c.constants, c.coordinates = self._arrays
-        (c.number, c.of_cell), c.rows = self._dofs.shape, self._entries
-        c.at, c.unknowns, c.width = self._at, self._unknowns, self._packed.shape[1]
+        number, of_cell = self._dofs.shape
+        self.cells = fill(
+            ffi.new("cells *"),
+            tabulate=self._form.tabulate, several=self._in_lanes, lanes=self._lanes,
+            number=number, of_cell=of_cell, dofs=self._dofs, unknowns=self._unknowns, at=self._at,
+            width=self._packed.shape[1], w=self._packed, constants=self._form.constants,
+            coordinates=self._coordinates, rows=self._entries, row=self._rows,
+        )  # fmt: skip
 
     def uses(self, function: fem.Function) -> bool:
         """Return whether a function appears in the form."""

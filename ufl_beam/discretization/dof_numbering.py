@@ -8,30 +8,40 @@ process.
 
 from __future__ import annotations
 
+import struct
+from bisect import bisect_left
+from collections.abc import Sequence
 from functools import cache, cached_property
 from zlib import crc32
 
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.discretization.beam_mesh import BeamMesh
-from ufl_beam.errors import SceneError, require_kind
+from ufl_beam.errors import SceneError, require_kind, shorten
 from ufl_beam.model.bodies import Anchor, Body, Member, Node, Place, node
 from ufl_beam.model.connectors import Connector
+from ufl_beam.model.material_laws import AnySoftening
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.plastic_hinges import place_of
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
 
 
-class Grid(BeamMesh):
+class Grid:
     """Vertices, cells and degrees of freedom of a scene.
 
-    A node has three degrees of freedom (u, v, ψ); those that joints share are one.  They are
-    numbered along the beams, the shared ones last: eliminating them in this order fills in nothing
-    but the coupling of the joints.
+    Cells of a higher degree have nodes between their vertices, too.  A node has three degrees of
+    freedom (u, v, ψ); those that joints share are one.  They are numbered along the beams, the
+    shared ones last: eliminating them in this order fills in nothing but the coupling of the
+    joints.
 
     Attributes:
+        points: Nodes of all beams: the vertices, beam after beam, those inside of cells, and the
+            second vertex of each plastic hinge; shape (num_nodes, 2); m.
+        cells: Vertices of the cells; shape (num_cells, 2).
+        nodes_of_cells: Both vertices of the cells and the nodes between; (num_cells, degree + 1).
+        beam_of_cell: Number of the beam of each cell; shape (num_cells,).
+        first_vertices: First vertex of each beam, and the number of all; (num_beams + 1,).
         dofs: Degrees of freedom of each node; shape (num_nodes, 3).
         dofs_of_bodies: Degrees of freedom of the rigid bodies; shape (num_bodies, 3).
         multipliers: Degrees of freedom that are the forces of connectors; shape (num_links,).
@@ -41,81 +51,48 @@ class Grid(BeamMesh):
     def __init__(self, scene: Scene, mesh: Mesh | None = None) -> None:
         mesh = Mesh() if mesh is None else mesh
         require_kind(mesh, Mesh, "mesh")
-        self.scene = scene
-        places = [place_of(hinge) for hinge in scene.hinges]
-        super().__init__(scene.beams, scene.attached, places, mesh, scene.size)
+        self.scene, self.mesh, beams = scene, mesh, scene.beams
+        self._number_of_beam: dict[Member, int] = {beam: i for i, beam in enumerate(beams)}
+        self._parameters = [np.array(mesh.vertices(b, scene.attached[b])) for b in beams]
+        counts = np.array([len(p) for p in self._parameters], dtype=np.int64)
+        self.first_vertices = np.concatenate([[0], np.cumsum(counts)])
+        self._first_cells = self.first_vertices - np.arange(len(beams) + 1)
+        vertices = np.array(
+            [b.curve(s) for b, p in zip(beams, self._parameters, strict=True) for s in p],
+            dtype=np.float64,
+        ).reshape(-1, 2)
+        begin = np.setdiff1d(np.arange(len(vertices)), self.first_vertices[1:] - 1)
+        self.cells = np.column_stack([begin, begin + 1])
+        self.beam_of_cell = np.repeat(np.arange(len(beams)), counts - 1)
+        inner, begins, ends = mesh.nodes[1:-1], vertices[begin], vertices[begin + 1]
+        between = begins[:, None] + inner[:, None] * (ends - begins)[:, None]
+        self.points = np.concatenate([vertices, between.reshape(-1, 2)])
+        numbers = len(vertices) + np.arange(between[..., 0].size).reshape(between.shape[:2])
+        self._require_length()
+        self._add_hinges([place_of(hinge) for hinge in scene.hinges])
+        self.nodes_of_cells = np.hstack([self.cells, numbers])
         self._number()
 
-    def agrees(self, other: Grid) -> bool:
-        """Return whether the degrees of freedom are those of another grid."""
-        return (
-            self.scene.beams == other.scene.beams
-            and np.array_equal(self.points, other.points)
-            and np.array_equal(self.dofs, other.dofs)
-        )
+    def _require_length(self) -> None:
+        lengths = self.lengths(np.arange(len(self.cells)))
+        for cell in np.flatnonzero(lengths <= 1e-12 * self.scene.size)[:1]:
+            beam = self.scene.beams[self.beam_of_cell[cell]]
+            x, y = self.points[self.cells[cell, 0]]
+            raise SceneError(f"{beam.name}: zero length of a cell at ({x:g}, {y:g})")
 
-    def checksum(self) -> int:
-        """A number that tells points and numberings apart."""
-        numbers = np.concatenate([self.dofs.ravel(), self.dofs_of_bodies.ravel(), self.multipliers])
-        return crc32(numbers.astype("<i8").tobytes(), crc32(self.points.astype("<f8").tobytes()))
-
-    def nodes_of(self, one: Member | Body) -> tuple[Array, Index]:
-        """Points and degrees of freedom of the nodes of a beam or body; (n, 2), (n, 3); m."""
-        if isinstance(one, Body):
-            return np.array([one.center]), self.node(one.middle).reshape(1, 3)
-        nodes = self._nodes_of(one)
-        return self.points[nodes], self.dofs[nodes]
-
-    def node(self, anchor: Anchor) -> Index:
-        """Degrees of freedom of what an anchor that has a vertex, or a body, moves with; (3,)."""
-        of = node(anchor)
-        if not isinstance(of, Body):
-            return np.asarray(self.dofs[self.vertex(of)])
-        if of not in self.scene.rigid_bodies:
-            raise SceneError(f"{anchor}: {of.name} is not in the scene")
-        return np.asarray(self.dofs_of_bodies[self.scene.rigid_bodies.index(of)])
-
-    @cached_property
-    def rotations(self) -> Index:
-        """Degrees of freedom that are rotations, those that joints share once."""
-        return np.unique(np.r_[self.dofs[:, 2], self.dofs_of_bodies[:, 2]])
-
-    @cached_property
-    def dofs_of_links(self) -> Index:
-        """Degrees of freedom of each connector: u, v, ψ of both nodes, force; (num_links, 7)."""
-        links = self.scene.links
-        nodes = np.array([(self.node(c.a), self.node(c.b)) for c in links]).reshape(-1, 2, 3)
-        both = nodes.transpose(0, 2, 1).reshape(-1, 6)
-        return np.column_stack([both, self.multipliers]).astype(np.int64)
-
-    def place_of(self, number: int) -> Place:
-        """The middle of a cell or, numbered after the cells, the place of a plastic hinge."""
-        if number < len(self.cells):
-            return self.middle(number)
-        return place_of(self.scene.hinges[number - len(self.cells)])
-
-    def hinge_at(self, place: Place) -> Connector | None:
-        """The plastic hinge of zero length at a place, if there is one."""
-        return next((h for h in self.scene.hinges if place in (h.a, h.b)), None)
-
-    def describe(self, dof: int) -> str:
-        """A degree of freedom in words: its component, beam and point."""
-        if dof in self.multipliers:
-            return f"what holds {self.scene.links[dof - self.multipliers[0]]}"
-        if dof not in self.dofs:
-            body, component = np.argwhere(self.dofs_of_bodies == dof)[0]
-            return f"{COMPONENTS[component]} of {self.scene.rigid_bodies[body].name}"
-        node, component = np.argwhere(self.dofs == dof)[0]
-        x, y = self.points[node]
-        beam = next(b for b in self.scene.beams if node in self._nodes_of(b))
-        return f"{COMPONENTS[component]} of {beam.name} at ({x:g}, {y:g})"
-
-    def worst(self, sizes: Array) -> dict[str, float]:
-        """Largest degree of freedom of each beam, body and connector, in words; zeros left out."""
-        dofs_of_beams = [self.nodes_of(beam)[1] for beam in self.scene.beams]
-        groups = [*dofs_of_beams, *self.dofs_of_bodies, *self.multipliers.reshape(-1, 1)]
-        worst = sorted({int(g.flat[np.argmax(sizes[g])]) for g in groups}, key=lambda d: -sizes[d])
-        return {self.describe(dof): float(sizes[dof]) for dof in worst if sizes[dof]}
+    def _add_hinges(self, places: Sequence[Place]) -> None:
+        """Give each plastic hinge a second vertex, which the cell beyond it begins or ends with."""
+        at = np.array([self.vertex(place) for place in places], dtype=np.int64)
+        numbers = range(len(self.points), len(self.points) + len(at))
+        beyond = [Place(place.beam, place.s, beyond=True) for place in places]
+        self._beyond = dict(zip(beyond, numbers, strict=True))
+        self.points = np.concatenate([self.points, self.points[at]])
+        self.cells_at_hinges = np.array([self.cell(place) for place in places], dtype=np.int64)
+        for place, number, cell in zip(places, numbers, self.cells_at_hinges, strict=True):
+            at_end = place.s == 1.0
+            cell_beyond = cell if at_end or place.s == 0.0 else cell + 1
+            self.cells[cell_beyond, int(at_end)] = number
+        self.vertices_at_hinges = at
 
     def _number(self) -> None:
         nodes, rigid_bodies = len(self.points), self.scene.rigid_bodies
@@ -145,3 +122,178 @@ class Grid(BeamMesh):
         # Forces come last: eliminating what they act on first leaves no zero on the diagonal.
         self.multipliers: Index = len(order) + np.arange(len(self.scene.links))
         self.size = len(order) + len(self.multipliers)
+
+    def agrees(self, other: Grid) -> bool:
+        """Return whether the degrees of freedom are those of another grid."""
+        return (
+            self.scene.beams == other.scene.beams
+            and np.array_equal(self.points, other.points)
+            and np.array_equal(self.dofs, other.dofs)
+        )
+
+    def checksum(self) -> int:
+        """A number that tells points and numberings apart."""
+        numbers = np.concatenate([self.dofs.ravel(), self.dofs_of_bodies.ravel(), self.multipliers])
+        return crc32(numbers.astype("<i8").tobytes(), crc32(self.points.astype("<f8").tobytes()))
+
+    # -- beams, vertices, cells ------------------------------------------------------------------
+
+    def _index(self, beam: Member) -> int:
+        """Number of a beam of the scene."""
+        if not isinstance(beam, Member):
+            raise SceneError(f"beam = {shorten(beam)} is not a Beam")
+        if beam not in self._number_of_beam:
+            raise SceneError(f"{beam.name} is not in the scene")
+        return self._number_of_beam[beam]
+
+    def parameters(self, beam: Member) -> Array:
+        """Parameters of the vertices of a beam."""
+        return self._parameters[self._index(beam)]
+
+    def vertices_of(self, beam: Member) -> Index:
+        """Vertices of a beam from start to end."""
+        i = self._index(beam)
+        return np.arange(self.first_vertices[i], self.first_vertices[i + 1])
+
+    def cells_of(self, beam: Member) -> Index:
+        """Cells of a beam from start to end."""
+        i = self._index(beam)
+        return np.arange(self._first_cells[i], self._first_cells[i + 1])
+
+    def nodes_along(self, beam: Member) -> Index:
+        """Vertices of a beam and nodes between them, from start to end."""
+        vertices, inner = self.vertices_of(beam), self.nodes_of_cells[self.cells_of(beam), 2:]
+        return np.append(np.column_stack([vertices[:-1], inner]), vertices[-1])
+
+    @property
+    def pieces(self) -> Index:
+        """Neighbouring nodes, one pair after the other along each cell; (degree num_cells, 2)."""
+        start, end, *between = self.nodes_of_cells.T
+        along = np.column_stack([start, *between, end])
+        return np.stack([along[:, :-1], along[:, 1:]], axis=2).reshape(-1, 2)
+
+    def lengths(self, cells: Index) -> Array:
+        """Lengths of some cells; (len(cells),); m."""
+        ends = self.points[self.cells[cells]]
+        return np.asarray(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
+
+    def hinges(self, beam: Member) -> list[AnySoftening | None]:
+        """Law of the hinge that may open in the middle of each cell of a beam."""
+        return [beam.section.hinge] * len(self.cells_of(beam))
+
+    def keys(self, cells: Index) -> list[tuple[int, int]]:
+        """A number for the ends of the beam, and the number in the beam, of some cells."""
+        beams = self.beam_of_cell[cells]
+        of_beam = [crc32(struct.pack("4d", *beam.a, *beam.b)) for beam in self.scene.beams]
+        in_beam = cells - self._first_cells[beams]
+        return [(of_beam[b], int(c)) for b, c in zip(beams, in_beam, strict=True)]
+
+    # -- places ----------------------------------------------------------------------------------
+
+    def _cell_and_part(self, place: Place) -> tuple[int, float]:
+        """The cell at a place, and the part of it that lies before the place."""
+        require_kind(place, Place, "place")
+        if place.beam not in self._number_of_beam:
+            raise SceneError(f"{place}: {place.beam.name} is not in the scene")
+        i = self._number_of_beam[place.beam]
+        s = self._parameters[i]
+        left = min(max(bisect_left(s, place.s) - 1, 0), len(s) - 2)
+        part = (place.s - s[left]) / (s[left + 1] - s[left])
+        return int(self._first_cells[i]) + left, float(part)
+
+    def cell(self, place: Place) -> int:
+        """The cell at a place; at a vertex the one before it, at the start the first one."""
+        return self._cell_and_part(place)[0]
+
+    def vertex(self, place: Place) -> int:
+        """The vertex at a place that something is attached to."""
+        if place.beyond:
+            return self._beyond[place]
+        cell, part = self._cell_and_part(place)
+        return cell + self._index(place.beam) + round(part)
+
+    def weights(self, place: Place) -> tuple[Index, Array]:
+        """Nodes of the cell at a place, vertices first, and their weights there; (degree + 1,)."""
+        cell, part = self._cell_and_part(place)
+        first, *between, last = self.mesh.weights(part)
+        nodes = self.nodes_of_cells[cell].copy()
+        if part in (0.0, 1.0):  # the side of a hinge that is attached to, not that of the cell
+            nodes[int(part)] = self.vertex(place)
+        return nodes, np.array([first, last, *between])
+
+    def place(self, vertex: int) -> Place:
+        """Place of a vertex."""
+        number = int(np.searchsorted(self.first_vertices, vertex, side="right")) - 1
+        beam: Member = self.scene.beams[number]
+        return beam.at(float(self._parameters[number][vertex - self.first_vertices[number]]))
+
+    def middle(self, cell: int) -> Place:
+        """The place in the middle of a cell."""
+        number = int(self.beam_of_cell[cell])
+        s, i = self._parameters[number], cell - int(self._first_cells[number])
+        beam: Member = self.scene.beams[number]
+        return beam.at((s[i] + s[i + 1]) / 2)
+
+    def place_of(self, number: int) -> Place:
+        """The middle of a cell or, numbered after the cells, the place of a plastic hinge."""
+        if number < len(self.cells):
+            return self.middle(number)
+        return place_of(self.scene.hinges[number - len(self.cells)])
+
+    def hinge_at(self, place: Place) -> Connector | None:
+        """The plastic hinge of zero length at a place, if there is one."""
+        return next((h for h in self.scene.hinges if place in (h.a, h.b)), None)
+
+    # -- degrees of freedom ----------------------------------------------------------------------
+
+    def nodes_of(self, one: Member | Body) -> tuple[Array, Index]:
+        """Points and degrees of freedom of the nodes of a beam or body; (n, 2), (n, 3); m."""
+        if isinstance(one, Body):
+            return np.array([one.center]), self.node(one.middle).reshape(1, 3)
+        nodes = self._nodes_of(one)
+        return self.points[nodes], self.dofs[nodes]
+
+    def _nodes_of(self, beam: Member) -> Index:
+        """Nodes of a beam, both sides of its hinges included."""
+        return np.union1d(self.nodes_of_cells[self.cells_of(beam)], self.vertices_of(beam))
+
+    def node(self, anchor: Anchor) -> Index:
+        """Degrees of freedom of what an anchor that has a vertex, or a body, moves with; (3,)."""
+        of = node(anchor)
+        if not isinstance(of, Body):
+            return np.asarray(self.dofs[self.vertex(of)])
+        if of not in self.scene.rigid_bodies:
+            raise SceneError(f"{anchor}: {of.name} is not in the scene")
+        return np.asarray(self.dofs_of_bodies[self.scene.rigid_bodies.index(of)])
+
+    @cached_property
+    def rotations(self) -> Index:
+        """Degrees of freedom that are rotations, those that joints share once."""
+        return np.unique(np.r_[self.dofs[:, 2], self.dofs_of_bodies[:, 2]])
+
+    @cached_property
+    def dofs_of_links(self) -> Index:
+        """Degrees of freedom of each connector: u, v, ψ of both nodes, force; (num_links, 7)."""
+        links = self.scene.links
+        nodes = np.array([(self.node(c.a), self.node(c.b)) for c in links]).reshape(-1, 2, 3)
+        both = nodes.transpose(0, 2, 1).reshape(-1, 6)
+        return np.column_stack([both, self.multipliers]).astype(np.int64)
+
+    def describe(self, dof: int) -> str:
+        """A degree of freedom in words: its component, beam and point."""
+        if dof in self.multipliers:
+            return f"what holds {self.scene.links[dof - self.multipliers[0]]}"
+        if dof not in self.dofs:
+            body, component = np.argwhere(self.dofs_of_bodies == dof)[0]
+            return f"{COMPONENTS[component]} of {self.scene.rigid_bodies[body].name}"
+        node, component = np.argwhere(self.dofs == dof)[0]
+        x, y = self.points[node]
+        beam = next(b for b in self.scene.beams if node in self._nodes_of(b))
+        return f"{COMPONENTS[component]} of {beam.name} at ({x:g}, {y:g})"
+
+    def worst(self, sizes: Array) -> dict[str, float]:
+        """Largest degree of freedom of each beam, body and connector, in words; zeros left out."""
+        dofs_of_beams = [self.nodes_of(beam)[1] for beam in self.scene.beams]
+        groups = [*dofs_of_beams, *self.dofs_of_bodies, *self.multipliers.reshape(-1, 1)]
+        worst = sorted({int(g.flat[np.argmax(sizes[g])]) for g in groups}, key=lambda d: -sizes[d])
+        return {self.describe(dof): float(sizes[dof]) for dof in worst if sizes[dof]}

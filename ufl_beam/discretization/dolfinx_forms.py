@@ -9,8 +9,10 @@ import numpy as np
 import ufl
 
 from ufl_beam.arrays import Array, Index
+from ufl_beam.compiled.c_library import ffi
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.jit import compiled_form
+from ufl_beam.discretization.function_spaces import Element, Fields, derivative
 from ufl_beam.dolfinx_compat import fem
 
 
@@ -33,6 +35,8 @@ class DolfinxForm:
         order: Row of ``cell_dofs``, and of all values given and returned, of each cell of the mesh.
     """
 
+    cells = ffi.NULL
+
     def __init__(
         self, form: ufl.Form, unknown: fem.Function, cell_dofs: Index, order: Index
     ) -> None:
@@ -43,7 +47,7 @@ class DolfinxForm:
         self._at = np.empty(len(unknown.x.array), dtype=np.int32)
         self._at[dofs_of_cells(space)] = cell_dofs[order]
         self._rows: Index = self._at
-        if self._spaces[0:1] != [space][0 : len(self._spaces)]:
+        if len(self._spaces) == 1 and self._spaces[0] != space:
             dofs = dofs_of_cells(self._spaces[0])
             self._rows = np.empty(dofs.size, dtype=np.int32)
             self._rows[dofs] = np.arange(dofs.size).reshape(dofs.shape)[order]
@@ -85,3 +89,31 @@ class DolfinxForm:
         """Return the value of the functional at the unknown ``q``."""
         self.set(self._unknown, q)
         return float(fem.assemble_scalar(self._form))
+
+
+class DolfinxFields(Fields):
+    """Cells whose forms are stated on their own mesh, and assembled by DOLFINx."""
+
+    def _element(self) -> Element:
+        element = Element(self.share.grid.mesh, self.mesh)
+        self.element = element
+        for function in (element.stiffness, element.inertia):
+            dofs = dofs_of_cells(function.function_space)
+            function.x.array[dofs] = self.of_sections(function)
+        return element
+
+    def kernel(self, form: ufl.Form, unknown: fem.Function) -> DolfinxForm:
+        """A form on the cells, assembled by DOLFINx."""
+        return DolfinxForm(form, unknown, self.cell_dofs, np.arange(len(self.cell_dofs)))
+
+    def hot_kernel(self, form: ufl.Form, unknown: fem.Function) -> DolfinxForm:
+        """The same: nothing is faster."""
+        return self.kernel(form, unknown)
+
+    def force_and_tangent(
+        self, work: ufl.Form, q1: fem.Function, A: Csr
+    ) -> tuple[DolfinxForm, DolfinxForm]:
+        """A virtual work, and its derivative by ``q1`` that adds to ``A``."""
+        force, tangent = self.kernel(work, q1), self.kernel(derivative(work, q1), q1)
+        tangent.place(A)
+        return force, tangent

@@ -6,6 +6,7 @@ Forms depend on nothing of a scene: they are stated on one cell, and compiled on
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from functools import cached_property
 
 import basix.ufl
@@ -15,12 +16,13 @@ import ufl
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr, coupling
 from ufl_beam.compiled.simd_kernels import LANES, in_batches
-from ufl_beam.discretization.compiled_forms import Kernel, stated, vectorise
+from ufl_beam.discretization.compiled_forms import CellForm, Kernel, stated, vectorise
 from ufl_beam.discretization.partition import Share
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
 from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.mechanics.functional import kinetic_energy, resultants
 from ufl_beam.mechanics.kinematics import Axis, strain
+from ufl_beam.model.bodies import Body
 from ufl_beam.model.mesh_options import Mesh
 
 
@@ -31,7 +33,8 @@ class Element:
     are stated on the cells of a scene.
 
     Attributes:
-        axis: Undeformed axis, in UFL.
+        axis: Undeformed axis at the points of ``dx(1)``, in UFL.
+        anywhere: That at the points of any rule.
         space: Configurations (u_x, u_y, ψ).
         q0, q1: Configurations at the beginning and at the end of a step.
         w: Virtual motions.
@@ -44,24 +47,16 @@ class Element:
         one_cell = np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0, 1]])
         self._cell = cells or line_mesh(*one_cell)
         line = basix.ufl.element("Lagrange", "interval", mesh.degree)
-        self.axis = Axis(self._cell, mesh.nodes, self._along() if mesh.degree > 1 else 0.5)
+        along = fem.Function(fem.functionspace(self._cell, ("DG", 1)))
+        along.x.array[along.function_space.dofmap.list] = 0.0, 1.0
+        self.anywhere = Axis(self._cell, mesh.nodes, along)
+        self.axis = self.anywhere if mesh.degree > 1 else Axis(self._cell, mesh.nodes, 0.5)
         self.space = fem.functionspace(self._cell, basix.ufl.mixed_element([line, line, line]))
         self.q0, self.q1 = self.configuration(), self.configuration()
         self.w = ufl.TestFunction(self.space)
         self.stiffness, self.inertia = (
             fem.Function(fem.functionspace(self._cell, ("DG", 0, (n,)))) for n in (3, 2)
         )
-
-    @cached_property
-    def anywhere(self) -> Axis:
-        """The axis at the points of any rule; :attr:`axis` may be that in the middle of a cell."""
-        return Axis(self._cell, self.axis.nodes, self._along())
-
-    def _along(self) -> fem.Function:
-        """Coordinate from 0 to 1 along the cell."""
-        function = fem.Function(fem.functionspace(self._cell, ("DG", 1)))
-        function.x.array[function.function_space.dofmap.list] = 0.0, 1.0
-        return function
 
     def configuration(self) -> fem.Function:
         """A new configuration (u_x, u_y, ψ)."""
@@ -101,7 +96,7 @@ class Element:
 
 
 def element_of(mesh: Mesh) -> Element:
-    """The element of a mesh, one for all meshes alike but for their cells."""
+    """The element of a mesh on one cell, one for all meshes alike but for their cells."""
     return _element(mesh.degree, mesh.lumped)
 
 
@@ -111,13 +106,13 @@ def _element(degree: int, lumped: bool) -> Element:
 
 
 @stated
-def _tangent(work: ufl.Form, q1: fem.Function) -> ufl.Form:
+def derivative(work: ufl.Form, q1: fem.Function) -> ufl.Form:
     """Derivative of a virtual work."""
     return ufl.derivative(work, q1, ufl.TrialFunction(q1.function_space))
 
 
-class Fields:
-    """Cells of one process, or some of them: what forms of the element are computed on.
+class Fields(ABC):
+    """Cells of one process, or some of them: what forms of the element are evaluated on.
 
     Attributes:
         cell_dofs: Local degrees of freedom in the order of the cells of the mesh;
@@ -134,40 +129,36 @@ class Fields:
         self.mesh = line_mesh(grid.points[vertices], cells.reshape(-1, 2))
         self.order: Index = part[np.asarray(self.mesh.topology.original_cell_index)]
         self._coordinates = cell_coordinates(self.mesh)
-        self._require_direction(grid.points[grid.cells[share.cells[self.order]]])
+        # The order of the vertices of a cell orients the beam.
+        if not np.array_equal(
+            self._coordinates[:, :, :2], grid.points[grid.cells[share.cells[self.order]]]
+        ):
+            raise RuntimeError("this version of DOLFINx turns cells around; please report it")
         self.cell_dofs = share.cell_dofs[self.order]
         self._matrix: Csr | None = None
-        self.element = element_of(grid.mesh)
+        self.element = self._element()
 
-    def kernel(self, form: ufl.Form, unknown: fem.Function) -> Kernel:
-        """A form on the cells, compiled; ``unknown`` is the configuration that changes."""
-        kernel = Kernel(form, unknown, self.cell_dofs, self._coordinates)
-        of_sections = (
-            (self.element.stiffness, ("EA", "GA", "EI")),
-            (self.element.inertia, ("rhoA", "rhoI")),
-        )
-        for function, names in of_sections:
-            if kernel.uses(function):
-                kernel.put(function, self._of_sections(*names))
-        return kernel
+    def part(self, part: Index) -> Fields:
+        """Some of the cells of the process; ``part`` are positions in ``share.cells``."""
+        return type(self)(self.share, part)
 
-    def hot_kernel(self, form: ufl.Form, unknown: fem.Function) -> Kernel:
-        """Kernel as :meth:`kernel`, with several cells at once, for forms of each iteration."""
-        kernel = self.kernel(form, unknown)
-        vectorise([kernel], self._coordinates_in_lanes)
-        return kernel
+    @abstractmethod
+    def _element(self) -> Element:
+        """The element that forms are stated on."""
 
-    def force_and_tangent(self, work: ufl.Form, q1: fem.Function, A: Csr) -> tuple[Kernel, Kernel]:
+    @abstractmethod
+    def kernel(self, form: ufl.Form, unknown: fem.Function) -> CellForm:
+        """A form on the cells; ``unknown`` is the configuration that changes."""
+
+    @abstractmethod
+    def hot_kernel(self, form: ufl.Form, unknown: fem.Function) -> CellForm:
+        """A form as :meth:`kernel` has it, for evaluation in each iteration."""
+
+    @abstractmethod
+    def force_and_tangent(
+        self, work: ufl.Form, q1: fem.Function, A: Csr
+    ) -> tuple[CellForm, CellForm]:
         """A virtual work, and its derivative by ``q1`` that adds to ``A``."""
-        force, tangent = self.kernel(work, q1), self.kernel(_tangent(work, q1), q1)
-        vectorise([force, tangent], self._coordinates_in_lanes)
-        tangent.share(force)
-        tangent.place(A)
-        return force, tangent
-
-    @cached_property
-    def _coordinates_in_lanes(self) -> Array:
-        return in_batches(self._coordinates, LANES)
 
     def matrix(self) -> Csr:
         """A new matrix on the degrees of freedom of this process."""
@@ -186,22 +177,51 @@ class Fields:
         kernel.add(np.zeros(self.share.size), matrix.data)
         return matrix
 
-    def _require_direction(self, ends: Array) -> None:
-        """The mesh must keep the order of the vertices of a cell, which orients the beam."""
-        if not np.array_equal(self._coordinates[:, :, :2], ends):
-            raise RuntimeError("this version of DOLFINx turns cells around; please report it")
-
-    def _of_sections(self, *names: str) -> Array:
-        """Numbers of the sections of the cells; (num_cells, len(names))."""
+    def of_sections(self, function: fem.Function) -> Array:
+        """Numbers of the sections of the cells, for a coefficient of the element."""
         grid = self.share.grid
-        of_beam = np.array([[getattr(b.section, n) for n in names] for b in grid.scene.beams])
-        of_cells = grid.beam_of_cell[self.share.cells[self.order]]
-        return of_beam.reshape(-1, len(names))[of_cells]
+        names = ("rhoA", "rhoI") if function is self.element.inertia else ("EA", "GA", "EI")
+        of_beam = [[getattr(beam.section, name) for name in names] for beam in grid.scene.beams]
+        beams = grid.beam_of_cell[self.share.cells[self.order]]
+        return np.array(of_beam).reshape(-1, len(names))[beams]
 
     def variables(self, number: int) -> fem.Function:
         """A function with so many numbers in each point of the cells."""
         element = basix.ufl.quadrature_element("interval", value_shape=(number,), degree=1)
         return fem.Function(fem.functionspace(self.mesh, element))
+
+
+class CompiledFields(Fields):
+    """Cells on which loops in C evaluate forms that are compiled once for all scenes."""
+
+    def _element(self) -> Element:
+        return element_of(self.share.grid.mesh)
+
+    def kernel(self, form: ufl.Form, unknown: fem.Function) -> Kernel:
+        """A form on the cells, compiled."""
+        kernel = Kernel(form, unknown, self.cell_dofs, self._coordinates)
+        for function in (self.element.stiffness, self.element.inertia):
+            if kernel.uses(function):
+                kernel.put(function, self.of_sections(function))
+        return kernel
+
+    def hot_kernel(self, form: ufl.Form, unknown: fem.Function) -> Kernel:
+        """Kernel that computes several cells at once."""
+        kernel = self.kernel(form, unknown)
+        vectorise([kernel], self._coordinates_in_lanes)
+        return kernel
+
+    def force_and_tangent(self, work: ufl.Form, q1: fem.Function, A: Csr) -> tuple[Kernel, Kernel]:
+        """Kernels that share the values of their coefficients."""
+        force, tangent = self.kernel(work, q1), self.kernel(derivative(work, q1), q1)
+        vectorise([force, tangent], self._coordinates_in_lanes)
+        tangent.share(force)
+        tangent.place(A)
+        return force, tangent
+
+    @cached_property
+    def _coordinates_in_lanes(self) -> Array:
+        return in_batches(self._coordinates, LANES)
 
 
 @stated
@@ -215,12 +235,11 @@ def mass_matrix(fields: Fields) -> Csr:
     """Mass of the beams, the point masses and the bodies."""
     share, M = fields.share, fields.assembled(_mass(fields.element))
     scene = share.grid.scene
-    lumps = [(share.at(one.place), one.mass, one.inertia) for one in scene.masses]
-    lumps += [(share.at(one.middle), one.mass, one.inertia) for one in scene.bodies]
-    for dofs, mass, inertia in lumps:
+    for one in (*scene.masses, *scene.bodies):
+        dofs = share.at(one.middle if isinstance(one, Body) else one.place)
         mine = share.owns(dofs)
         here = share.local(dofs[mine])
-        M.data[M.positions(here, here)] += np.array([mass, mass, inertia])[mine]
+        M.data[M.positions(here, here)] += np.array([one.mass, one.mass, one.inertia])[mine]
     return M
 
 

@@ -92,9 +92,8 @@ def _touching(grid: Grid) -> Index:
     counts = np.array([len(one) for one in near])
     end = np.repeat(ends, counts)
     other = np.concatenate([np.asarray(one, dtype=np.int64) for one in near])
-    is_end = np.isin(other, ends)
     # A beam touches itself where both of its ends meet.
-    apart = np.where(beam_of[end] == beam_of[other], is_end & (end < other), True)
+    apart = (beam_of[end] != beam_of[other]) | (np.isin(other, ends) & (end < other))
     gap = np.linalg.norm(points[end] - points[other], axis=1)
     kept = apart & (gap <= np.minimum(reach[end], reach[other]))
     end, other, gap = end[kept], other[kept], gap[kept]
@@ -114,12 +113,11 @@ def _touching(grid: Grid) -> Index:
 def _groups(grid: Grid) -> Index:
     """Number of the group of nodes that joints, connectors and supports join to each node."""
     links = grid.dofs_of_links[:, :2]
-    held = [support for support in grid.scene.supports if {0, 1} <= support.held.keys()]
-    ground = grid.size
-    if GROUND in grid.scene.rigid_bodies:
-        ground = int(grid.node(GROUND.middle)[0])
-    fast = np.array([(grid.node(s.place)[0], ground) for s in held], dtype=np.int64).reshape(-1, 2)
-    rows, columns = np.concatenate([links, fast]).T
+    fixed = [s.place for s in grid.scene.supports if {0, 1} <= s.held.keys()]
+    has_ground = GROUND in grid.scene.rigid_bodies
+    ground = int(grid.node(GROUND.middle)[0]) if has_ground else grid.size
+    to_ground = np.array([(grid.node(place)[0], ground) for place in fixed], dtype=np.int64)
+    rows, columns = np.concatenate([links, to_ground.reshape(-1, 2)]).T
     size = grid.size + 1
     graph = coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(size, size))
     _, group = connected_components(graph, directed=False)
@@ -132,7 +130,8 @@ def warn_of_far_points(scene: Scene) -> None:
     ``body.at(x, y)`` takes coordinates of the undeformed scene; a point that was meant relative to
     the centre is far out.
     """
-    spots = dict.fromkeys(spot for spot in _spots(scene) if not carries(spot))
+    attached = (place for _, place in scene.attachments() if isinstance(place, Spot))
+    spots = dict.fromkeys(s for s in attached if s.body is not GROUND and not carries(s))
     if not spots:
         return
     others = list(_points(scene))
@@ -149,12 +148,6 @@ def warn_of_far_points(scene: Scene) -> None:
                 "is there. body.at(x, y) takes coordinates of the undeformed scene; what is meant "
                 f"relative to the centre is at({cx:g} + {x:g}, {cy:g} + {y:g})"
             )
-
-
-def _spots(scene: Scene) -> Iterator[Spot]:
-    for _, place in scene.attachments():
-        if isinstance(place, Spot) and place.body is not GROUND:
-            yield place
 
 
 def _points(scene: Scene) -> Iterator[tuple[tuple[float, float], object]]:
@@ -207,22 +200,24 @@ def warn_of_jumps(grid: Grid, t: float, q: Array, motions: Array) -> None:
 
     ``motions`` are the relative motions of the connectors there; (num_links,).
     """
-    size = grid.scene.size
-    for support in grid.scene.supports:
-        for component, motion in support.moving.items():
-            here = float(q[grid.node(support.place)[component]])
-            name, unit = COMPONENTS[component], "rad" if component == 2 else "m"
-            _warn_of_jump(f"{support}: {name}", here, value_at(motion, t, support), unit, size, t)
-    for link, here in zip(grid.scene.links, motions, strict=True):
-        if isinstance(link.law, Motor) and link.law is not HELD:
-            target, unit = value_at(link.law.motion, t, link), "rad" if link.turns else "m"
-            _warn_of_jump(f"{link}: its motion", float(here), target, unit, size, t)
-
-
-def _warn_of_jump(what: str, here: float, target: float, unit: str, size: float, t: float) -> None:
-    if abs(target - here) > JUMP * (size if unit == "m" else 1.0):
-        warn(
-            f"{what} jumps from {here:.6g} to {target:.6g} {unit} at the start, t = {t:g} s, which "
-            "in dynamics is a blow. Let it grow in time, as ub.Table and lambda t: ... can, or "
-            "begin with start= from a static run"
+    starts = [
+        (
+            f"{support}: {COMPONENTS[c]}",
+            q[grid.node(support.place)[c]],
+            value_at(f, t, support),
+            c == 2,
         )
+        for support in grid.scene.supports
+        for c, f in support.moving.items()
+    ] + [
+        (f"{link}: its motion", here, value_at(link.law.motion, t, link), link.turns)
+        for link, here in zip(grid.scene.links, motions, strict=True)
+        if isinstance(link.law, Motor) and link.law is not HELD
+    ]
+    for what, here, target, turns in starts:
+        if abs(target - here) > JUMP * (1.0 if turns else grid.scene.size):
+            warn(
+                f"{what} jumps from {here:.6g} to {target:.6g} {'rad' if turns else 'm'} at the "
+                f"start, t = {t:g} s, which in dynamics is a blow. Let it grow in time, as "
+                "ub.Table and lambda t: ... can, or begin with start= from a static run"
+            )

@@ -15,8 +15,8 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.model.bodies import Anchor, Member, Place, Spot
 
 
-class Numbering(Protocol):
-    """Numbering of the degrees of freedom of a scene, see :class:`Grid`."""
+class _Numbering(Protocol):
+    """What a share, and whoever computes on it, asks a :class:`Grid`; documented there."""
 
     scene: Any
     mesh: Any
@@ -32,36 +32,17 @@ class Numbering(Protocol):
     size: int
 
     @property
-    def rotations(self) -> Index:
-        """Degrees of freedom that are rotations."""
-
+    def rotations(self) -> Index: ...
     @property
-    def dofs_of_links(self) -> Index:
-        """Of each connector: both u, both v, both ψ of its nodes, and its force; (num_links, 7)."""
-
-    def node(self, anchor: Anchor) -> Index:
-        """Degrees of freedom of what an anchor moves with; (3,)."""
-
-    def cell(self, place: Place) -> int:
-        """The cell at a place; at a vertex the one before it."""
-
-    def lengths(self, cells: Index) -> Array:
-        """Lengths of some cells; (len(cells),); m."""
-
-    def cells_of(self, beam: Member) -> Index:
-        """Cells of a beam from start to end."""
-
-    def hinges(self, beam: Member) -> list[Any]:
-        """Law of the hinge that may open in the middle of each cell of a beam."""
-
-    def keys(self, cells: Index) -> list[tuple[int, int]]:
-        """Two numbers for each of some cells that tell it from others."""
-
-    def weights(self, place: Place) -> tuple[Index, Array]:
-        """Nodes of the cell at a place, and their weights there."""
-
-    def worst(self, sizes: Array) -> dict[str, float]:
-        """The degree of freedom of each beam, body and connector with the largest size."""
+    def dofs_of_links(self) -> Index: ...
+    def node(self, anchor: Anchor) -> Index: ...
+    def cell(self, place: Place) -> int: ...
+    def lengths(self, cells: Index) -> Array: ...
+    def cells_of(self, beam: Member) -> Index: ...
+    def hinges(self, beam: Member) -> list[Any]: ...
+    def keys(self, cells: Index) -> list[tuple[int, int]]: ...
+    def weights(self, place: Place) -> tuple[Index, Array]: ...
+    def worst(self, sizes: Array) -> dict[str, float]: ...
 
 
 class Share:
@@ -84,7 +65,7 @@ class Share:
             shape (len(links), 7).
     """
 
-    def __init__(self, grid: Numbering, comm: MPI.Intracomm) -> None:
+    def __init__(self, grid: _Numbering, comm: MPI.Intracomm) -> None:
         self.grid = grid
         self.comm, self.alone = comm, comm.size == 1
         num_cells = len(grid.cells)

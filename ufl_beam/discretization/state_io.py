@@ -7,8 +7,8 @@ is; the same statement writes it down and takes it back.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections import defaultdict
-from typing import Protocol
 
 import numpy as np
 
@@ -21,56 +21,58 @@ NOWHERE: Array = np.empty(0)
 of the scene."""
 
 
-class Memory(Protocol):
+class Memory(ABC):
     """Takes what a process remembers and gives back what it is to remember."""
-
-    def number(self, name: str, value: float) -> float:
-        """A number that all processes know."""
-
-    def total(self, name: str, value: float) -> float:
-        """A number whose sum over the processes means something."""
-
-    def at_dofs(self, name: str, values: Array) -> Array:
-        """Values at the local degrees of freedom, alike on all processes that have them."""
-
-    def added(self, name: str, values: Array) -> Array:
-        """Values at the local degrees of freedom whose sums over the processes mean something."""
-
-    def rows(self, name: str, numbers: Index, rows: Array) -> Array:
-        """Rows of numbered things, each on one process only; of any lengths under one name."""
-
-
-class Saving:
-    """A memory that writes down; :meth:`state` is what came together."""
 
     def __init__(self, share: Share) -> None:
         self._share = share
+        self._one = (1, np.zeros(1, dtype=int), int(share.comm.rank == 0))
+        self._dofs = (share.grid.size, share.dofs, share.num_owned)
+
+    def number(self, name: str, value: float) -> float:
+        """A number that all processes know."""
+        return float(self._alike(name, np.array([value]), *self._one)[0])
+
+    def total(self, name: str, value: float) -> float:
+        """A number whose sum over the processes means something."""
+        return float(self._summed(name, np.array([value]), *self._one)[0])
+
+    def at_dofs(self, name: str, values: Array) -> Array:
+        """Values at the local degrees of freedom, alike on all processes that have them."""
+        return self._alike(name, values, *self._dofs)
+
+    def added(self, name: str, values: Array) -> Array:
+        """Values at the local degrees of freedom whose sums over the processes mean something."""
+        return self._summed(name, values, *self._dofs)
+
+    @abstractmethod
+    def rows(self, name: str, numbers: Index, rows: Array) -> Array:
+        """Rows of numbered things, each on one process only; of any lengths under one name."""
+
+    @abstractmethod
+    def _alike(self, name: str, values: Array, size: int, where: Index, owned: int) -> Array:
+        """Values at some places of ``size``, of which the first ``owned`` are of this process."""
+
+    @abstractmethod
+    def _summed(self, name: str, values: Array, size: int, where: Index, owned: int) -> Array:
+        """Addends of values at such places."""
+
+
+class Saving(Memory):
+    """A memory that writes down; :meth:`state` is what came together."""
+
+    def __init__(self, share: Share) -> None:
+        super().__init__(share)
         self._sums: dict[str, tuple[int, Index, Array]] = {}
         self._rows: defaultdict[str, list[Array]] = defaultdict(list)
 
-    def number(self, name: str, value: float) -> float:
-        """Save a number that is the same on all processes."""
-        self._sum(name, 1, np.zeros(int(self._share.comm.rank == 0), dtype=int), np.array([value]))
-        return value
-
-    def total(self, name: str, value: float) -> float:
-        """Save the sum of a number over all processes."""
-        self._sum(name, 1, np.zeros(1, dtype=int), np.array([value]))
-        return value
-
-    def at_dofs(self, name: str, values: Array) -> Array:
-        """Save values at the owned degrees of freedom."""
-        share = self._share
-        self._sum(name, share.grid.size, share.dofs[: share.num_owned], values)
+    def _alike(self, name: str, values: Array, size: int, where: Index, owned: int) -> Array:
+        self._sums[name] = size, where[:owned], values[:owned].copy()
         return values
 
-    def added(self, name: str, values: Array) -> Array:
-        """Save a number that is the same on all processes."""
-        self._sum(name, self._share.grid.size, self._share.dofs, values)
+    def _summed(self, name: str, values: Array, size: int, where: Index, owned: int) -> Array:
+        self._sums[name] = size, where, values.copy()
         return values
-
-    def _sum(self, name: str, size: int, where: Index, values: Array) -> None:
-        self._sums[name] = size, where, values[: len(where)].copy()
 
     def rows(self, name: str, numbers: Index, rows: Array) -> Array:
         """Save numbered rows of a table."""
@@ -95,29 +97,20 @@ class Saving:
         return state
 
 
-class Restoring:
-    """A memory that gives back a state; what that does not have stays as it is."""
+class Restoring(Memory):
+    """A memory that gives back a state; rows that the state does not have stay as they are."""
 
     def __init__(self, share: Share, state: State) -> None:
-        self._share, self._state = share, state
+        super().__init__(share)
+        self._state = state
 
-    def number(self, name: str, value: float) -> float:
-        """Return the number that was saved."""
-        return float(self._state[name][0])
+    def _alike(self, name: str, values: Array, size: int, where: Index, owned: int) -> Array:
+        return np.asarray(self._state[name][where])
 
-    def total(self, name: str, value: float) -> float:
-        """See :class:`Memory`; the first process has all of it."""
-        return self.number(name, value) if self._share.comm.rank == 0 else 0.0
-
-    def at_dofs(self, name: str, values: Array) -> Array:
-        """Return the saved values at the local degrees of freedom."""
-        return np.asarray(self._state[name][self._share.dofs])
-
-    def added(self, name: str, values: Array) -> Array:
-        """See :class:`Memory`; the owner of a degree of freedom has all of it."""
-        values = self.at_dofs(name, values)
-        values[self._share.num_owned :] = 0.0
-        return values
+    def _summed(self, name: str, values: Array, size: int, where: Index, owned: int) -> Array:
+        here = self._state[name][where]
+        here[owned:] = 0.0  # the owner has all of it
+        return np.asarray(here)
 
     def rows(self, name: str, numbers: Index, rows: Array) -> Array:
         """Return the saved rows of these numbers."""

@@ -52,9 +52,8 @@ class Transfer:
                 "in the same order, and the same Mesh"
             )
         if not np.array_equal(old.points, new.points):
-            for beam in new.scene.beams:
-                if not np.array_equal(old.nodes_of(beam)[0], new.nodes_of(beam)[0]):
-                    break
+            nodes = ((b, old.nodes_of(b)[0], new.nodes_of(b)[0]) for b in new.scene.beams)
+            beam = next(b for b, before, now in nodes if not np.array_equal(before, now))
             raise SceneError(
                 f"start: {beam.name} has other vertices than in the solution, because something "
                 "is attached at other places; let these be corners=(s, ...) of the beam in both"

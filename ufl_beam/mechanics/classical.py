@@ -17,52 +17,82 @@ from ufl_beam.mechanics import functional, kinematics
 from ufl_beam.mechanics.kinematics import Axis
 from ufl_beam.mechanics.time_schemes import Constant, Rates, Step, require_between
 from ufl_beam.model.law_functions import Values
-from ufl_beam.model.material_laws import Softening
+from ufl_beam.model.material_laws import SofteningLaw
 
 
-class _AtEnd:
-    """Base of schemes whose forces act at the end of the step."""
-
-    load_weight = 1.0
-    theta = 1.0
-    loss = 0.0
-
-    def resistance(self, softening: Softening, opening: Array, growth: Values) -> Values:
-        """The traction at the end of the step."""
-        return softening.traction(opening + growth)
-
-    def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
-        """The variation at the end of the step."""
-        return kinematics.virtual_strain(q1, w, axis)
-
-    def resultants(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> Expr:
-        """Those of the strains at the end of the step."""
-        return functional.resultants(e1, C)
-
-    def losses(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> tuple[Expr, ...]:
-        """No numerical losses in the ledger."""
-        return ()
-
-    def average(self, before: Expr, now: Expr) -> Expr:
-        """The one at the end of the step."""
-        return now
-
-    def mean(self, f: Callable[[Expr], Expr], q0: Expr, q1: Expr) -> Expr:
-        """The one at the end of the step."""
-        return f(q1)
+class PlainStep:
+    """Base of schemes whose forces work on the increments of displacements and rotations."""
 
     def virtual_turn(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
         """The virtual rotation itself."""
         return w
 
-    def secant(self, force: Callable[[Array], Array], e0: Array, e1: Array) -> tuple[Array, Array]:
-        """The force at the end of the step."""
-        f = force(e1)
-        return f, np.where(f != 0, 1.0, 0.0)
+    def nodal_step(self, q0: Array, q1: Array, rotations: Index) -> tuple[Array, float]:
+        """The increments themselves, and the largest turn."""
+        s: Array = q1 - q0
+        return s, float(np.abs(s[rotations]).max(initial=0.0))
+
+    def half_tangents(self, rotations: Index) -> Index:
+        """No rotations: their steps are the increments."""
+        return rotations[:0]
+
+
+class InParts:
+    """Base of static schemes, in which time is the load parameter."""
+
+    dynamic = False
+    advice = (
+        "Try a smaller dt; beyond a limit load, and where softening snaps back (limit**2/energy of "
+        "a hinge, half of it if softening is linear, above the stiffness that drives it), there is "
+        "no equilibrium nearby: follow the path with ub.follow(scene, ub.ArcLength(...)) or "
+        "ub.DissipationControl(...), prescribe a displacement in the place of the load, or run "
+        "dynamics"
+    )
+    theta: float
+
+    def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
+        """Loads act where the resultants are, on the straight way to those at the end of the step.
+
+        Parts of a step go in proportion; so loads and motions that are there at once can be reached
+        in parts as well as those that grow.
+        """
+        fraction = (t1 - t0) / (end - t0)
+        return Step(t0, t1, q0, load_time=end, motion_time=end, fraction=fraction, at=self.theta)
 
     def way_to_rest(self, dt: float) -> float:
-        """No way to rest: friction sticks at its place."""
+        """No way to rest: everything is at rest."""
         return 0.0
+
+
+class _AtEnd(PlainStep):
+    """Base of schemes whose forces, strains and their variations are those at the end of the step.
+
+    Their works are counted by the trapezoidal rule.
+    """
+
+    load_weight = 1.0
+    theta = 1.0
+    alpha = 0.0
+
+    def mean(self, f: Callable[[Expr], Expr], q0: Expr, q1: Expr) -> Expr:
+        """The one at the end of the step."""
+        return f(q1)
+
+    def resistance(self, softening: SofteningLaw, opening: Array, growth: Values) -> Values:
+        return softening.traction(opening + growth)
+
+    def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
+        return kinematics.virtual_strain(q1, w, axis)
+
+    def resultants(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> Expr:
+        return functional.resultants(e1, C)
+
+    def average(self, before: Expr, now: Expr) -> Expr:
+        return now
+
+    def secant(self, force: Callable[[Array], Array], e0: Array, e1: Array) -> tuple[Array, Array]:
+        f = force(e1)
+        return f, np.where(f != 0, 1.0, 0.0)
 
     def nodal_step(self, q0: Array, q1: Array, rotations: Index) -> tuple[Array, float]:
         """The increments themselves; a step may turn a node as far as it likes."""
@@ -74,7 +104,7 @@ class _AtEnd:
 
 
 @dataclass(frozen=True)
-class Static(_AtEnd):
+class Static(InParts, _AtEnd):
     """Static equilibrium at the end of each step; time is the load parameter.
 
     The ledger counts works by the trapezoidal rule, so its imbalance is of second order in the step
@@ -87,22 +117,7 @@ class Static(_AtEnd):
         [100000. 200000.]
     """
 
-    dynamic = False
-    advice = (
-        "Try a smaller dt; beyond a limit load, and where softening snaps back (limit**2/energy of "
-        "a hinge, half of it if softening is linear, above the stiffness that drives it), there is "
-        "no equilibrium nearby: follow the path with ub.follow(scene, ub.ArcLength(...)) or "
-        "ub.DissipationControl(...), prescribe a displacement in the place of the load, or run "
-        "dynamics"
-    )
     slack = 0.05
-
-    def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
-        """Parts of a step go in proportion to the loads and motions of its end.
-
-        So loads that are there at once can be reached in parts as well as those that grow.
-        """
-        return Step(t0, t1, q0, load_time=end, motion_time=end, fraction=(t1 - t0) / (end - t0))
 
 
 class Weights(NamedTuple):
@@ -141,9 +156,9 @@ class _Accelerated(_AtEnd):
         """Loads and motions are those of the end."""
         return Step(t0, t1, q0, load_time=t1, motion_time=t1, fraction=1.0)
 
-    def half_tangents(self, rotations: Index) -> Index:
-        """No rotations: steps are the increments themselves."""
-        return rotations[:0]
+    def way_to_rest(self, dt: float) -> float:
+        """Unknown: friction needs a mean velocity, and scenes with it are refused."""
+        return 0.0
 
     @property
     def rings(self) -> bool:

@@ -14,11 +14,11 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import combined, doubles, integers, lib
 from ufl_beam.mechanics import functional, kinematics
-from ufl_beam.mechanics.classical import Static
+from ufl_beam.mechanics.classical import InParts, PlainStep
 from ufl_beam.mechanics.kinematics import Axis
 from ufl_beam.mechanics.time_schemes import Constant, Rates, Step, require_between
 from ufl_beam.model.law_functions import Values
-from ufl_beam.model.material_laws import Softening
+from ufl_beam.model.material_laws import SofteningLaw
 
 WAY = 4
 """Points of Gauss's rule over the way of a step; it is exact up to degree 7, and four forces cost
@@ -35,12 +35,7 @@ class _OverStep:
         """The resultants of P(89) are those at this part of the step."""
         return 0.5 + self.alpha
 
-    @property
-    def loss(self) -> float:
-        """Return the energy that ``alpha`` dissipates."""
-        return self.alpha
-
-    def resistance(self, softening: Softening, opening: Array, growth: Values) -> Values:
+    def resistance(self, softening: SofteningLaw, opening: Array, growth: Values) -> Values:
         """The mean traction, so that the work of the step is what the opening dissipates."""
         return softening.mean_traction(opening, growth)
 
@@ -50,12 +45,6 @@ class _OverStep:
         if self.alpha == 0:
             return mean
         return mean + constant(self.alpha) * functional.resultants(e1 - e0, C)  # P(89)
-
-    def losses(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> tuple[Expr, ...]:
-        """Return the energy that ``alpha`` dissipates."""
-        if self.alpha == 0:
-            return ()
-        return (2 * constant(self.alpha) * functional.elastic_energy(e1 - e0, C),)  # P(90)
 
     def average(self, before: Expr, now: Expr) -> Expr:
         """The mean of both ends, of which increments are products."""
@@ -109,7 +98,7 @@ class ExactStep(_OverStep):
 
 
 @dataclass(frozen=True)
-class ExactStatic(ExactStep):
+class ExactStatic(InParts, ExactStep):
     """Static equilibrium with an exact ledger: works are exact increments of energy.
 
     :class:`Static` is in equilibrium at the ends of steps and counts works by the trapezoidal rule;
@@ -137,9 +126,7 @@ class ExactStatic(ExactStep):
 
     theta: float = 1.0
 
-    dynamic = False
     slack = math.inf
-    advice = Static.advice
 
     def __post_init__(self) -> None:
         require_between("ExactStatic: theta", self.theta, 0.5, 1.0)
@@ -153,19 +140,6 @@ class ExactStatic(ExactStep):
     def load_weight(self) -> float:
         """Follower loads turn with the rotation where the resultants are in equilibrium."""
         return self.theta
-
-    def way_to_rest(self, dt: float) -> float:
-        """No way to rest: everything is at rest."""
-        return 0.0
-
-    def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
-        """Loads act where the resultants are, on the straight way to those at the end of the step.
-
-        Parts of a step go in proportion, as those of :class:`Static`; so loads and motions that are
-        there at once can be reached in parts.
-        """
-        fraction = (t1 - t0) / (end - t0)
-        return Step(t0, t1, q0, load_time=end, motion_time=end, fraction=fraction, at=self.theta)
 
 
 class Midway:
@@ -194,6 +168,7 @@ class Midway:
 class _Velocities(Midway):
     """Velocities of which ``beta`` takes energy."""
 
+    alpha: float
     beta: float
 
     @property
@@ -224,6 +199,10 @@ class _Velocities(Midway):
     def slip(self, dt: float, change: Array, rates: Rates) -> Array:
         """Difference of velocities in proportion to the change; its loss is D_K of the paper."""
         return self.beta * change  # P(88)
+
+    def error_weights(self) -> tuple[float, float]:
+        """The trapezoidal rule's, and what both kinds of dissipation delay."""
+        return self.beta, 1 / 12 + self.alpha
 
 
 @dataclass(frozen=True)
@@ -265,13 +244,9 @@ class Midpoint(ExactStep, _Velocities):
         for name in ("alpha", "beta"):
             require_between(f"Midpoint: {name}", getattr(self, name), 0.0, 0.5)
 
-    def error_weights(self) -> tuple[float, float]:
-        """The trapezoidal rule's, and what both kinds of dissipation delay."""
-        return self.beta, 1 / 12 + self.alpha
-
 
 @dataclass(frozen=True)
-class PrintedMidpoint(_OverStep, _Velocities):
+class PrintedMidpoint(_OverStep, _Velocities, PlainStep):
     """The midpoint rule as the paper prints it, for comparison; :class:`Midpoint` is better.
 
     The variation of the strains is that in the middle of the step, which differs from their
@@ -292,23 +267,6 @@ class PrintedMidpoint(_OverStep, _Velocities):
 
     alpha = beta = 0.0
 
-    def half_tangents(self, rotations: Index) -> Index:
-        """No rotations: the printed scheme takes Δψ itself."""
-        return rotations[:0]
-
     def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
         """The variation in the middle of the step."""
         return kinematics.virtual_strain((q0 + q1) / 2, w, axis)
-
-    def virtual_turn(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
-        """The virtual rotation itself."""
-        return w
-
-    def nodal_step(self, q0: Array, q1: Array, rotations: Index) -> tuple[Array, float]:
-        """The increments themselves, and the largest turn."""
-        s: Array = q1 - q0
-        return s, float(np.abs(s[rotations]).max(initial=0.0))
-
-    def error_weights(self) -> tuple[float, float]:
-        """Weights of the error of the trapezoidal rule."""
-        return 0.0, 1 / 12

@@ -18,7 +18,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.mechanics.kinematics import Axis
 from ufl_beam.model.law_functions import Values
-from ufl_beam.model.material_laws import Softening
+from ufl_beam.model.material_laws import SofteningLaw
 
 Constant = Callable[[float], Expr]
 """Makes a number of the scheme a constant of the form, so that changing it compiles nothing."""
@@ -50,12 +50,12 @@ class Scheme(Protocol):
     load_weight: float  # part of the step at whose rotation follower loads act
     theta: float  # part of the step at which laws of inelastic material are stated
     slack: float  # part of what a step stores and dissipates that its forces may not account for
-    loss: float  # part of twice the energy of a change of strain that is lost numerically
+    alpha: float  # part of twice the energy of a change of strain that is lost numerically
 
     def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
         """The step from ``t0`` to ``t1``, perhaps a part of one that goes on to ``end``."""
 
-    def resistance(self, softening: Softening, opening: Array, growth: Values) -> Values:
+    def resistance(self, softening: SofteningLaw, opening: Array, growth: Values) -> Values:
         """Traction of a discontinuity whose opening grows in the step."""
 
     def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
@@ -63,9 +63,6 @@ class Scheme(Protocol):
 
     def resultants(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> Expr:
         """(N, V, M) that act during the step, from stiffness and strains at both ends."""
-
-    def losses(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> tuple[Expr, ...]:
-        """Energies per length that the resultants lose numerically in the step; often none."""
 
     def average(self, before: Expr, now: Expr) -> Expr:
         """Average of a vector or a distance between frames, as variations take it."""

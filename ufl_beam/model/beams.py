@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
-from itertools import pairwise
+from itertools import accumulate, pairwise
 
 from ufl_beam.errors import (
     SceneError,
@@ -17,7 +17,6 @@ from ufl_beam.errors import (
     require_sequence,
     require_text,
     require_vector,
-    shorten,
     warn,
 )
 from ufl_beam.model.bodies import TOGETHER, Member, Place
@@ -71,8 +70,7 @@ class Beam(Member):
         a, b = (require_vector(x, f"{self.name}: end") for x in (self.a, self.b))
         object.__setattr__(self, "a", a)
         object.__setattr__(self, "b", b)
-        if not isinstance(self.section, Section):
-            raise SceneError(f"{self.name}: section = {shorten(self.section)} is not a Section")
+        require_kind(self.section, Section, f"{self.name}: section")
         object.__setattr__(self, "cells", require_count(self.cells, f"{self.name}: cells"))
         require_memory(self.cells, f"{self.name}: cells = {self.cells}")
         if self.curve is None:
@@ -128,22 +126,15 @@ class Beam(Member):
 
     @classmethod
     def arc(
-        cls,
-        center: Point,
-        radius: float,
-        angles: tuple[float, float],
-        section: Section,
-        *,
-        cells: int = 8,
-        name: str = "beam",
-    ) -> Beam:
+        cls, center: Point, radius: float, angles: tuple[float, float], section: Section, *,
+        cells: int = 8, name: str = "beam",
+    ) -> Beam:  # fmt: skip
         """Circular arc from ``angles[0]`` to ``angles[1]`` (rad, counter-clockwise from x)."""
         middle = require_vector(center, f"{name}: center")
         require_number(radius, f"{name}: radius", positive=True)
         first, last = require_vector(angles, f"{name}: angles")
         if first == last:
             raise SceneError(f"{name}: zero length, both angles of the arc are {first:g}")
-
         curve = Arc(middle, float(radius), first, last)
         return cls(curve(0), curve(1), section, cells=cells, name=name, curve=curve)
 
@@ -156,16 +147,14 @@ class Beam(Member):
         xy = [require_vector(p, f"{name}: point {i}") for i, p in enumerate(points)]
         if len(xy) < 2:
             raise SceneError(f"{name}: a polyline needs at least two points, not {len(xy)}")
-        ends = [0.0]
-        for p, q in pairwise(xy):
-            if p == q:
-                raise SceneError(f"{name}: zero length between two points at {p}")
-            ends.append(ends[-1] + math.dist(p, q))
-        at = [end / ends[-1] for end in ends]
-
-        curve = Polyline(tuple(xy), tuple(at))
-        corners = tuple(at[1:-1])
-        return cls(xy[0], xy[-1], section, cells=cells, name=name, curve=curve, corners=corners)
+        lengths = [math.dist(p, q) for p, q in pairwise(xy)]
+        if 0.0 in lengths:
+            where = xy[lengths.index(0.0)]
+            raise SceneError(f"{name}: zero length between two points at {where}")
+        ends = [0.0, *accumulate(lengths)]
+        at = tuple(end / ends[-1] for end in ends)
+        curve = Polyline(tuple(xy), at)
+        return cls(xy[0], xy[-1], section, cells=cells, name=name, curve=curve, corners=at[1:-1])
 
     @classmethod
     def along(cls, curve: Curve, section: Section, *, cells: int = 8, name: str = "beam") -> Beam:

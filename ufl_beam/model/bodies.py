@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from abc import ABC
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from itertools import pairwise
 from typing import Any
@@ -21,12 +22,13 @@ from ufl_beam.errors import (
     shorten,
 )
 from ufl_beam.model.curves import Curve, Point, tangent_within
+from ufl_beam.model.records import NotNegative, Record, Vector
 
 TOGETHER = 1e-9
-"""Part of a cell below which two places of a beam are one."""
+"""Distance below which two places of a beam are one, as a part of a cell."""
 
 
-class Member:
+class Member(ABC):
     """Base of :class:`Beam`: an axis with places on it; its attributes are those of a beam."""
 
     a: Point
@@ -127,7 +129,7 @@ class Place:
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class Body(Record):
     """Rigid body; joints, connectors and loads may act at any of its points.
 
     Args:
@@ -146,17 +148,18 @@ class Body:
         Revolute(beam.end (2, 0), rotor (2, 0))
     """
 
-    center: Point
+    center: Vector
     _: KW_ONLY
-    mass: float = 0.0
-    inertia: float = 0.0
+    mass: NotNegative = 0.0
+    inertia: NotNegative = 0.0
     name: str = "body"
 
     def __post_init__(self) -> None:
         require_text(self.name, "Body: name")
-        object.__setattr__(self, "center", require_vector(self.center, f"{self.name}: center"))
-        require_number(self.mass, f"{self.name}: mass", at_least=0.0)
-        require_number(self.inertia, f"{self.name}: inertia", at_least=0.0)
+        super().__post_init__()
+
+    def _label(self) -> str:
+        return self.name
 
     def at(self, x: float, y: float) -> Spot:
         """The point of the body that is at (x, y) in the undeformed scene; m."""
@@ -216,6 +219,33 @@ Anchor = Place | Spot
 Node = Place | Body
 """Places of beams and bodies: they have a displacement and a rotation."""
 
+NodeDof = tuple[Node, int]
+"""A component of motion of a node: 0, 1 displacement, 2 rotation."""
+
+
+class Representatives(dict[NodeDof, NodeDof]):
+    """Of components of motion that are equal, the one that stands for all; others are their own."""
+
+    def __missing__(self, dof: NodeDof) -> NodeDof:
+        return dof
+
+
+def merged(groups: Iterable[Sequence[NodeDof]]) -> Representatives:
+    """Find the representatives of components of motion from groups of equal ones."""
+    parent = Representatives()
+
+    def root(dof: NodeDof) -> NodeDof:
+        while dof in parent:
+            dof = parent[dof]
+        return dof
+
+    for group in groups:
+        for other in group[1:]:
+            a, b = root(group[0]), root(other)
+            if a != b:
+                parent[b] = a
+    return Representatives((dof, root(dof)) for dof in parent)
+
 
 def node(anchor: Anchor) -> Node:
     """Return the cross-section of a beam, or the body, that an anchor moves with."""
@@ -239,18 +269,25 @@ def carries(anchor: Anchor) -> bool:
     return math.hypot(*arm(anchor)) == 0.0
 
 
-def require_anchor(anchor: object, owner: str) -> None:
-    """Raise :class:`SceneError` naming ``owner`` unless something can be attached there."""
-    if not isinstance(anchor, Place | Spot):
-        raise SceneError(
-            f"{owner}: {shorten(anchor)} is not a place; use beam.start, .end or .at(s), "
-            "body.at(x, y) or ground(x, y)"
-        )
+def require_anchors(owner: str, *anchors: object) -> None:
+    """Raise :class:`SceneError` naming ``owner`` unless all are places to attach something to."""
+    for anchor in anchors:
+        if not isinstance(anchor, Place | Spot):
+            raise SceneError(
+                f"{owner}: {shorten(anchor)} is not a place; use beam.start, .end or .at(s), "
+                "body.at(x, y) or ground(x, y)"
+            )
+
+
+def require_beam(value: object, what: str) -> None:
+    """Raise :class:`SceneError` naming ``what`` unless ``value`` is a beam."""
+    if not isinstance(value, Member):
+        raise SceneError(f"{what} = {shorten(value)} is not a Beam")
 
 
 def require_node(place: object, owner: str) -> None:
     """Raise :class:`SceneError` naming ``owner`` unless the motion of a place is that of a node."""
-    require_anchor(place, owner)
+    require_anchors(owner, place)
     if isinstance(place, Spot) and place.body is GROUND:
         raise SceneError(f"{owner}: {place} does not move")
     if not carries(place):  # type: ignore[arg-type]

@@ -1,35 +1,31 @@
 # SPDX-License-Identifier: MIT
-"""Laws of connectors: what force belongs to a relative motion, or what motion is given."""
+"""Laws of connectors: the force of a relative motion, or a prescribed motion."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass
+from functools import partial
 from numbers import Real
-from typing import Any, Protocol
+from typing import Annotated, Any, Protocol
 
-from ufl_beam.errors import (
-    SceneError,
-    require_function,
-    require_kind,
-    require_number,
-    require_returned,
-)
+from ufl_beam.errors import SceneError, require_function, require_number, require_returned
 from ufl_beam.model.curves import Curve
-from ufl_beam.model.force_laws import ForceLaw
+from ufl_beam.model.force_laws import ForceLaw as ForceLaw
 from ufl_beam.model.material_laws import (
+    AnySoftening,
     BulkLaw,
     HingeLaw,
-    Softening,
     require_bulk_law,
     require_hinge_law,
 )
-from ufl_beam.model.time_functions import Constant, TimeFunction, require_time_function
+from ufl_beam.model.records import Instance, NotNegative, Positive, Record
+from ufl_beam.model.time_functions import Constant, Timed
 
 
 @dataclass(frozen=True)
-class Motor:
+class Motor(Record):
     """Prescribed relative motion of a connector; its force is unknown.
 
     Args:
@@ -43,14 +39,11 @@ class Motor:
         True
     """
 
-    motion: TimeFunction
-
-    def __post_init__(self) -> None:
-        require_time_function(self.motion, "Motor")
+    motion: Timed
 
 
 @dataclass(frozen=True)
-class Actuator:
+class Actuator(Record):
     """Prescribed force or moment of a connector; a positive one makes the motion grow.
 
     Args:
@@ -64,10 +57,7 @@ class Actuator:
         [    0.  -500. -1000.]
     """
 
-    force: TimeFunction
-
-    def __post_init__(self) -> None:
-        require_time_function(self.force, "Actuator")
+    force: Timed
 
 
 class Bearing:
@@ -75,7 +65,7 @@ class Bearing:
 
 
 class Running(Protocol):
-    """A simulation between two steps, as far as laws of connectors ask it."""
+    """Simulation between two steps, as laws of connectors see it."""
 
     t: float
     """Time; s."""
@@ -85,7 +75,7 @@ class Running(Protocol):
 
 
 @dataclass(frozen=True)
-class Controller:
+class Controller(Record):
     """Force by a function of the running simulation, constant during each step.
 
     Args:
@@ -101,10 +91,7 @@ class Controller:
         True
     """
 
-    force: Callable[[Any], float]
-
-    def __post_init__(self) -> None:
-        require_function(self.force, "Controller: force", "the simulation")
+    force: Annotated[Callable[[Any], float], partial(require_function, of="the simulation")]
 
     def ask(self, simulation: Running, link: object) -> float:
         """Evaluate the force of ``link`` in the next step; all processes call it together."""
@@ -113,7 +100,7 @@ class Controller:
 
 
 @dataclass(frozen=True)
-class Spring:
+class Spring(Record):
     """Elastic spring of a connector, which may yield and break.
 
     Args:
@@ -132,20 +119,13 @@ class Spring:
         True
     """
 
-    stiffness: float
-    law: BulkLaw | None = None
-    softening: Softening | None = None
-
-    def __post_init__(self) -> None:
-        require_number(self.stiffness, "Spring: stiffness", positive=True)
-        if self.law is not None:
-            require_bulk_law(self.law, "Spring: law")
-        if self.softening is not None:
-            require_kind(self.softening, Softening, "Spring: softening")
+    stiffness: Positive
+    law: Annotated[BulkLaw | None, require_bulk_law] = None
+    softening: Instance[AnySoftening | None] = None
 
 
 @dataclass(frozen=True)
-class Damper:
+class Damper(Record):
     """Viscous damper: a force in proportion to the rate of the motion.
 
     Args:
@@ -159,14 +139,11 @@ class Damper:
         True
     """
 
-    viscosity: float
-
-    def __post_init__(self) -> None:
-        require_number(self.viscosity, "Damper: viscosity", positive=True)
+    viscosity: Positive
 
 
 @dataclass(frozen=True)
-class Stop:
+class Stop(Record):
     """Elastic stop: a contact force where the motion leaves an interval.
 
     Args:
@@ -184,13 +161,13 @@ class Stop:
         -0.01
     """
 
-    stiffness: float
+    stiffness: Positive
     _: KW_ONLY
     low: float = -math.inf
     high: float = math.inf
 
     def __post_init__(self) -> None:
-        require_number(self.stiffness, "Stop: stiffness", positive=True)
+        super().__post_init__()
         for name, end in (("low", self.low), ("high", self.high)):
             if not isinstance(end, Real) or abs(end) != math.inf:
                 require_number(end, f"Stop: {name}")
@@ -202,7 +179,7 @@ class Stop:
 
 
 @dataclass(frozen=True)
-class Coulomb:
+class Coulomb(Record):
     """Coulomb friction: sticks below a limit of the force, slides at the limit.
 
     The limit is ``force``, plus ``coefficient`` times the force of a joint at the end of the
@@ -226,20 +203,17 @@ class Coulomb:
         0.21
     """
 
-    force: float = 0.0
+    force: NotNegative = 0.0
     _: KW_ONLY
-    coefficient: float = 0.0
-    joint: Bearing | None = None
+    coefficient: NotNegative = 0.0
+    joint: Instance[Bearing | None] = None
 
     def __post_init__(self) -> None:
-        require_number(self.force, "Coulomb: force", at_least=0.0)
-        require_number(self.coefficient, "Coulomb: coefficient", at_least=0.0)
+        super().__post_init__()
         if self.force == self.coefficient == 0.0:
             raise SceneError("Coulomb: force and coefficient are both zero; leave it out")
         if (self.coefficient > 0) != (self.joint is not None):
             raise SceneError("Coulomb: give coefficient and joint together")
-        if self.joint is not None:
-            require_kind(self.joint, Bearing, "Coulomb: joint")
 
     def ask(self, simulation: Running, link: object) -> float:
         """Return the limit of the next step; all processes call it together."""
@@ -249,7 +223,7 @@ class Coulomb:
 
 
 @dataclass(frozen=True)
-class RigidPlastic:
+class RigidPlastic(Record):
     """Rigid-plastic law: no motion below a limit of the force, flow or softening at it.
 
     There is no elastic stiffness: below the limit the motion is held exactly.  Plastic hinges of
@@ -268,26 +242,27 @@ class RigidPlastic:
         >>> arm = ub.Scene([beam], supports=[ub.Pinned(beam.start)], connectors=[hinge])
     """
 
-    law: HingeLaw
-
-    def __post_init__(self) -> None:
-        require_hinge_law(self.law, "RigidPlastic: law")
+    law: Annotated[HingeLaw, require_hinge_law]
 
 
 @dataclass(frozen=True)
-class Guide:
+class Guide(Record):
     """The point stays on a curve of the plane, free along it; see :func:`Guided`."""
 
-    curve: Curve  # ``s -> (x, y)``, smooth, for all s that the motion may reach; m
-
-    def __post_init__(self) -> None:
-        require_function(self.curve, "Guide: curve", "s that returns (x, y)")
+    # ``s -> (x, y)``, smooth, for all s that the motion may reach; m
+    curve: Annotated[Curve, partial(require_function, of="s that returns (x, y)")]
 
 
 Law = (
     Guide | Motor | Actuator | Controller | Spring | Damper | Stop | ForceLaw | Coulomb
     | RigidPlastic
 )  # fmt: skip
+
+HOLDING = (Motor, Guide)
+"""Laws that prescribe the motion."""
+
+RESISTING = (*HOLDING, Spring, ForceLaw, RigidPlastic)
+"""Laws that resist every motion; others bear nothing, or what they are told."""
 
 HELD = Motor(Constant(0.0))
 """The law of what a joint holds."""

@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 
 from ufl_beam.errors import SceneError, require_kind, require_vector
-from ufl_beam.model.bodies import Anchor, arm, require_anchor
+from ufl_beam.model.bodies import Anchor, arm, require_anchors
 from ufl_beam.model.connector_laws import Coulomb, Guide, Law, Motor, RigidPlastic
 from ufl_beam.model.curves import Point
 
@@ -24,7 +24,7 @@ class Connector:
 
     Attributes:
         kind: Name for messages.
-        motion: Which relative motion; a name of ``relative.MOTIONS``.
+        motion: Which relative motion; a name in ``relative_motions.MOTIONS``.
         a, b: The anchors.
         law: Law of its force.
         axis: Unit vector, for motions along one.
@@ -48,8 +48,7 @@ class Connector:
     corner: Point | None = None
 
     def __post_init__(self) -> None:
-        for anchor in (self.a, self.b):
-            require_anchor(anchor, self.kind)
+        require_anchors(self.kind, self.a, self.b)
         require_kind(self.law, Law.__args__, f"{self}: law")
 
     def __str__(self) -> str:
@@ -121,7 +120,7 @@ def Stretch(a: Anchor, b: Anchor, law: Law) -> Connector:
         >>> stayed = ub.Scene([beam], supports=scene.supports, connectors=[rod])
     """
     connector = Connector("Stretch", "stretching", a, b, law)
-    _require_apart(connector)
+    require_apart(connector)
     return connector
 
 
@@ -141,12 +140,12 @@ def Slide(a: Anchor, b: Anchor, law: Law, *, axis: Point | None = None) -> Conne
         >>> spring = ub.Slide(ub.ground(2, 0), beam.end, ub.Spring(1e6), axis=(0, 1))
         >>> propped = ub.Scene([beam], supports=scene.supports, connectors=[spring])
     """
-    return Connector("Slide", "sliding", a, b, law, _axis(a, b, axis, "Slide"))
+    return Connector("Slide", "sliding", a, b, law, unit_axis(a, b, axis, "Slide"))
 
 
-def _axis(a: Anchor, b: Anchor, axis: Point | None, kind: str) -> Point:
-    for anchor in (a, b):
-        require_anchor(anchor, kind)
+def unit_axis(a: Anchor, b: Anchor, axis: Point | None, kind: str) -> Point:
+    """Unit vector along an axis, by default from ``a`` to ``b``."""
+    require_anchors(kind, a, b)
     (ax, ay), (bx, by) = a.point, b.point
     x, y = (bx - ax, by - ay) if axis is None else require_vector(axis, f"{kind}: axis")
     length = math.hypot(x, y)
@@ -158,7 +157,8 @@ def _axis(a: Anchor, b: Anchor, axis: Point | None, kind: str) -> Point:
     return x / length, y / length
 
 
-def _require_apart(connector: Connector) -> None:
+def require_apart(connector: Connector) -> None:
+    """Raise :class:`SceneError` if both ends of a connector are at the same point."""
     if math.hypot(*connector.apart) == 0.0:
         raise SceneError(
             f"{connector}: zero length, both ends are at the same point; join them with Revolute, "

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -13,22 +13,13 @@ from scipy.sparse.linalg import eigsh
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError
-from ufl_beam.model.bodies import GROUND, Anchor, Body, Member, Node, node
-from ufl_beam.model.connector_laws import (
-    Coulomb,
-    Damper,
-    Guide,
-    Motor,
-    RigidPlastic,
-    Spring,
-    Stop,
-)
+from ufl_beam.model.bodies import GROUND, Anchor, Body, Member, Node, NodeDof, node
+from ufl_beam.model.connector_laws import HOLDING, RESISTING, Coulomb, Damper, Stop
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import Point
-from ufl_beam.model.force_laws import ForceLaw
 from ufl_beam.model.loads import RotatingFrame
-from ufl_beam.model.plastic_hinges import NodeDof, shared_by_joints
 from ufl_beam.model.scene import Scene
+from ufl_beam.model.supports import Support
 from ufl_beam.model.time_functions import value_at
 
 DENSE = 90
@@ -38,12 +29,11 @@ DENSE = 90
 def require_masses(scene: Scene) -> None:
     """Raise :class:`SceneError` if a body that may move has no mass, unless a beam carries it."""
     same, moved = scene.representatives, _fixed(scene)
-    for alike in shared_by_joints(scene.joints):
-        moved |= {same.get(dof, dof) for dof in alike if not isinstance(dof[0], Body)}
+    for alike in scene.shared_by_joints:
+        moved |= {same[dof] for dof in alike if not isinstance(dof[0], Body)}
     for body in scene.bodies:
         for name, components in (("mass", (0, 1)), ("inertia", (2,))):
-            dofs = [(body, component) for component in components]
-            free = any(same.get(dof, dof) not in moved for dof in dofs)
+            free = any(same[body, component] not in moved for component in components)
             if free and getattr(body, name) == 0.0:
                 raise SceneError(
                     f"{body.name}: {name} = 0, but dynamics needs it to be positive; use RigidLink "
@@ -57,8 +47,10 @@ def require_inertia(scene: Scene) -> None:
     Its rigid motions must be held, by stiffness, damping or constraints, or have inertia: else the
     equations of motion are singular.
     """
-    loose = _without_inertia(scene)
-    if not loose:
+    inertias = [(s.rhoA, s.rhoA, s.rhoA or s.rhoI) for s in (beam.section for beam in scene.beams)]
+    inertias += [(one.mass, one.mass, one.inertia) for one in scene.bodies]
+    loose = np.flatnonzero(np.array(inertias) == 0.0)  # in the order of (u, v, size ψ) of all parts
+    if not loose.size:
         return
     masses = [
         (one.place, component)
@@ -71,23 +63,13 @@ def require_inertia(scene: Scene) -> None:
     if free.shape[1] == 0:
         return
     mode = np.zeros(rows.shape[1])
-    mode[loose] = free[:, 0] / np.abs(free[:, 0]).max()
+    mode[loose] = free[:, 0]
     parts = "; ".join(_moving(scene, mode)[:4])
     raise SceneError(
         f"dynamics needs mass or something that holds: {parts}, without mass (rhoA or mass = "
         "0), and nothing determines this motion. Give it mass (a section rho or rhoA), or hold or "
         "join it"
     )
-
-
-def _without_inertia(scene: Scene) -> list[int]:
-    """Numbers of the rigid motions (u, v, size ψ) of parts that have no inertia of their own."""
-    beams = [(one.section.rhoA, one.section.rhoA or one.section.rhoI) for one in scene.beams]
-    bodies = [(one.mass, one.inertia) for one in scene.bodies]
-    loose: list[int] = []
-    for i, (mass, inertia) in enumerate((*beams, *bodies)):
-        loose += [3 * i, 3 * i + 1] * bool(mass == 0.0) + [3 * i + 2] * bool(inertia == 0.0)
-    return loose
 
 
 def _under_works(scene: Scene) -> list[tuple[Anchor, int]]:
@@ -115,16 +97,12 @@ def no_number(scene: Scene, times: Iterable[float]) -> str:
 def _fixed(scene: Scene) -> set[NodeDof]:
     """Return the components of motion that the ground and supports give."""
     same = scene.representatives
-    fixed: set[NodeDof] = {(GROUND, component) for component in range(3)}
-    fixed |= {(node(s.place), c) for s in scene.supports if not s.angle for c in s.held}
-    return {same.get(dof, dof) for dof in fixed}
+    by_supports = {same[node(s.place), c] for s in scene.supports if not s.angle for c in s.held}
+    return {same[GROUND, component] for component in range(3)} | by_supports
 
 
-HOLDING = (Motor, Guide)
-"""Laws of connectors that give the motion."""
-
-Demand = tuple[str, list[tuple[NodeDof, float]]]
-"""Who demands, and the factors of what moves in it; rotations times the size of the scene."""
+Row = list[tuple[Node, Array]]
+"""A linear constraint of nodes, with the factors of (u, v, size ψ) of each."""
 
 
 def require_independent(scene: Scene) -> None:
@@ -134,12 +112,11 @@ def require_independent(scene: Scene) -> None:
     """
     if not any(isinstance(link.law, HOLDING) for link in scene.links):
         return
-    demands = _demands(scene, HOLDING)
-    within = _dependences(demands)
+    owners, within = _dependences(scene, HOLDING)
     if within.shape[1] == 0:
         return
     dependent = np.flatnonzero(np.abs(within).max(axis=1) > 1e-6)
-    names = list(dict.fromkeys(demands[i][0] for i in dependent))
+    names = dict.fromkeys(str(owners[i]) for i in dependent)
     raise SceneError(
         f"constraints repeat or contradict each other: {within.shape[1]} of those of "
         f"{'; '.join(names)} can be left out. Remove one, or make it elastic: a Spring, or a Beam "
@@ -151,44 +128,31 @@ def friction_repeats(scene: Scene) -> bool:
     """Return whether places that stick hold what is held already, by joints or by each other."""
     if not any(isinstance(link.law, Coulomb) for link in scene.links):
         return False
-    return _dependences(_demands(scene, (*HOLDING, Coulomb))).shape[1] > 0
+    return _dependences(scene, (*HOLDING, Coulomb))[1].shape[1] > 0
 
 
-def _dependences(demands: list[Demand]) -> Array:
-    """Combinations of demands that demand nothing; (num_demands, k)."""
-    columns = {dof: i for i, dof in enumerate({s: 0 for _, f in demands for s, _ in f})}
-    entries = [
-        (columns[dof], row, factor)
-        for row, (_, factors) in enumerate(demands)
-        for dof, factor in factors
-    ]
-    return _null_space(_sparse(entries, (max(len(columns), 1), len(demands))))
+def _dependences(scene: Scene, laws: tuple[type, ...]) -> tuple[list[object], Array]:
+    """Find dependent constraints of connectors with some laws and of supports in turned axes.
 
-
-def _demands(scene: Scene, laws: tuple[type, ...]) -> list[Demand]:
-    """Return the constraints that connectors of some laws and supports in turned axes make."""
+    Returns the owner of each constraint and, in columns, the combinations of constraints that
+    vanish for all that can move.
+    """
     same, fixed = scene.representatives, _fixed(scene)
-
-    def free(factors: Iterable[tuple[Node, int, float]]) -> list[tuple[NodeDof, float]]:
-        dofs = (((of, c), factor) for of, c, factor in factors if factor)
-        known = ((same.get(dof, dof), factor) for dof, factor in dofs)
-        return [(dof, factor) for dof, factor in known if dof not in fixed]
-
-    demands: list[Demand] = []
-    for link in scene.links:
-        if isinstance(link.law, laws):
-            unit = (1.0, 1.0, 1.0 if link.turns else 1 / scene.size)
-            pairs = zip((link.a, link.b), link.rigidly(), strict=True)
-            factors = [(node(at), c, f[c] * unit[c]) for at, f in pairs for c in range(3)]
-            owner = next((joint for joint in scene.joints if link in joint.holders), link)
-            demands.append((str(owner), free(factors)))
-    for support in scene.supports:
-        if support.angle:
-            of, cos, sin = node(support.place), math.cos(support.angle), math.sin(support.angle)
-            rows = {0: (cos, sin), 1: (-sin, cos)}
-            for c in support.held.keys() & rows.keys():
-                demands.append((str(support), free((of, k, rows[c][k]) for k in range(2))))
-    return demands
+    holders: dict[object, object] = {h: joint for joint in scene.joints for h in joint.holders}
+    rows = [
+        *_of_connectors(scene, lambda link: isinstance(link.law, laws)),
+        *_of_supports(support for support in scene.supports if support.angle),
+    ]
+    columns: dict[NodeDof, int] = {}
+    entries = []
+    for number, (_, row) in enumerate(rows):
+        for of, factors in row:
+            for component, factor in enumerate(factors):
+                dof = same[of, component]
+                if factor and dof not in fixed:
+                    entries.append((columns.setdefault(dof, len(columns)), number, factor))
+    gradients = _sparse(entries, (max(len(columns), 1), len(rows)))
+    return [holders.get(owner, owner) for owner, _ in rows], _null_space(gradients)
 
 
 def require_no_mechanism(scene: Scene) -> None:
@@ -200,7 +164,7 @@ def require_no_mechanism(scene: Scene) -> None:
     free = _null_space(_constraints(scene, also=_under_works(scene)))
     if free.shape[1] == 0:
         return
-    moving = _moving(scene, free[:, 0] / np.abs(free[:, 0]).max())
+    moving = _moving(scene, free[:, 0])
     more = f"; and {len(moving) - 4} more" if len(moving) > 4 else ""
     ways = "way" if free.shape[1] == 1 else "independent ways"
     raise SceneError(
@@ -217,8 +181,21 @@ def _center(part: Member | Body) -> Point:
     return (xa + xb) / 2, (ya + yb) / 2
 
 
-RESISTING = (Motor, Guide, Spring, ForceLaw, RigidPlastic)
-"""Laws of connectors that resist every motion; others bear nothing, or what they are told."""
+def _of_connectors(scene: Scene, acts: Callable[[Connector], bool]) -> Iterator[tuple[object, Row]]:
+    """Connectors that ``acts`` selects, and the row of each."""
+    for link in filter(acts, scene.links):
+        unit = np.array([1.0, 1.0, 1.0 if link.turns else 1 / scene.size])
+        ends = zip((link.a, link.b), link.rigidly(), strict=True)
+        yield link, [(node(end), np.multiply(factors, unit)) for end, factors in ends]
+
+
+def _of_supports(supports: Iterable[Support]) -> Iterator[tuple[object, Row]]:
+    """Supports, and a row for each component that they hold."""
+    for support in supports:
+        cos, sin = math.cos(support.angle), math.sin(support.angle)
+        turned = np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
+        for component in support.held:
+            yield support, [(node(support.place), turned[component])]
 
 
 def _constraints(
@@ -226,57 +203,36 @@ def _constraints(
     acts: Callable[[Connector], bool] = lambda link: isinstance(link.law, RESISTING),
     also: Iterable[tuple[Anchor, int]] = (),
 ) -> csr_array:
-    """Rows that joints, supports and connectors make of (u, v, size ψ) of all parts.
+    """Matrix of constraints on the rigid motions (u, v, size ψ) of all parts; (n, 3 parts).
 
-    A connector makes a row if it ``acts``, and so do the components of motion that are there
-    ``also``.  The shape is (constraints, 3 parts).
+    Its rows are those of joints, supports, connectors that ``acts`` selects, and components of
+    motion in ``also``.
     """
-    number = {part: i for i, part in enumerate(_parts(scene))}
+    unit = np.eye(3)
+    rows: list[Row] = [
+        [(first, -unit[component]), (other, unit[component])]
+        for (first, component), *others in scene.shared_by_joints
+        for other, _ in others
+    ]
+    rows += (row for _, row in (*_of_connectors(scene, acts), *_of_supports(scene.supports)))
+    rows += ([(node(place), unit[component])] for place, component in also)
+    parts: dict[object, int] = {part: i for i, part in enumerate((*scene.beams, *scene.bodies))}
     entries: list[tuple[int, int, float]] = []
-    row = 0
-
-    def add(of: Node, factors: Sequence[float] | Array) -> None:
-        """Factors of (u, v, size ψ) of a node, in the present row."""
-        if of is GROUND:
-            return
-        part = of if isinstance(of, Body) else of.beam
-        (cx, cy), (px, py) = _center(part), of.center if isinstance(of, Body) else of.point
-        x, y = (px - cx) / scene.size, (py - cy) / scene.size
-        motion = np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]])
-        demand = np.asarray(factors) @ motion
-        entries.extend((row, 3 * number[part] + k, float(demand[k])) for k in range(3))
-
-    for (first, component), *others in shared_by_joints(scene.joints):
-        for other, _ in others:
-            add(first, -np.eye(3)[component])
-            add(other, np.eye(3)[component])
-            row += 1
-    for link in scene.links:
-        if acts(link):
-            unit = np.array([1.0, 1.0, 1.0 if link.turns else 1 / scene.size])
-            for anchor, factors in zip((link.a, link.b), link.rigidly(), strict=True):
-                add(node(anchor), factors * unit)
-            row += 1
-    for support in scene.supports:
-        cos, sin = math.cos(support.angle), math.sin(support.angle)
-        turned = np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
-        for component in support.held:
-            add(node(support.place), turned[component])
-            row += 1
-    for place, component in also:
-        add(node(place), np.eye(3)[component])
-        row += 1
-    return _sparse(entries, (max(row, 1), 3 * len(number)))
+    for i, row in enumerate(rows):
+        for of, factors in row:
+            if of is not GROUND:
+                part, (px, py) = (of, of.center) if isinstance(of, Body) else (of.beam, of.point)
+                cx, cy = _center(part)
+                x, y = (px - cx) / scene.size, (py - cy) / scene.size
+                demand = factors @ np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]])
+                entries += ((i, 3 * parts[part] + k, demand[k]) for k in range(3))
+    return _sparse(entries, (max(len(rows), 1), 3 * len(parts)))
 
 
-def _sparse(entries: list[tuple[int, int, float]], shape: tuple[int, int]) -> csr_array:
+def _sparse(entries: Sequence[tuple[int, int, float]], shape: tuple[int, int]) -> csr_array:
     """Matrix of entries (row, column, value); those at one place are added."""
     rows, columns, values = np.array(entries).reshape(-1, 3).T
     return csr_array((values, (rows.astype(int), columns.astype(int))), shape=shape)
-
-
-def _parts(scene: Scene) -> list[Member | Body]:
-    return [*scene.beams, *scene.bodies]
 
 
 def _null_space(constraints: csr_array) -> Array:
@@ -293,26 +249,23 @@ def _null_space(constraints: csr_array) -> Array:
 
 def _moving(scene: Scene, mode: Array) -> list[str]:
     """Describe the motions of the parts that move in a mode."""
-    motions = enumerate(mode.reshape(-1, 3))
-    return [_describe(scene, i, motion) for i, motion in motions if np.abs(motion).max() > 1e-6]
-
-
-def _describe(scene: Scene, number: int, mode: Array) -> str:
-    part, bodies = _parts(scene)[number], number - len(scene.beams)
-    name = f"{part.name} ({f'body {bodies}' if isinstance(part, Body) else f'beam {number}'})"
-    u, v, ψ = mode
-    if abs(ψ) < 1e-6:
-        return f"{name} can shift along ({u:.3g}, {v:.3g})"
-    cx, cy = _center(part)
-    x, y = (
-        scene.size * round(c / scene.size, 9)
-        for c in (cx - v / ψ * scene.size, cy + u / ψ * scene.size)
-    )
-    return f"{name} can turn about ({x:.4g}, {y:.4g})"
+    parts: list[tuple[str, Member | Body]] = [(f"beam {i}", b) for i, b in enumerate(scene.beams)]
+    parts += [(f"body {i}", body) for i, body in enumerate(scene.bodies)]
+    found = []
+    motions = (mode / np.abs(mode).max()).reshape(-1, 3)
+    for (kind, part), (u, v, ψ) in zip(parts, motions, strict=True):
+        if abs(ψ) >= 1e-6:
+            cx, cy = _center(part)
+            center = (cx - v / ψ * scene.size, cy + u / ψ * scene.size)
+            x, y = (scene.size * round(c / scene.size, 9) for c in center)
+            found.append(f"{part.name} ({kind}) can turn about ({x:.4g}, {y:.4g})")
+        elif max(abs(u), abs(v)) > 1e-6:
+            found.append(f"{part.name} ({kind}) can shift along ({u:.3g}, {v:.3g})")
+    return found
 
 
 class Rated(Protocol):
-    """A time scheme, as far as scenes may ask too much of its rates."""
+    """Time scheme, by the properties that a scene may need."""
 
     has_mean_velocity: bool
     rings: bool
@@ -327,7 +280,7 @@ def require_rates(scene: Scene, scheme: Rated) -> None:
                 f"{name}: {owner} needs the mean velocity of a step, and forces act at its end "
                 "here; use Midpoint() or DecayingMidpoint()"
             )
-    given = [str(c) for c in scene.links if isinstance(c.law, Motor | Guide)]
+    given = [str(c) for c in scene.links if isinstance(c.law, HOLDING)]
     given += [f"the support of {s.place}" for s in scene.supports if s.moving]
     if given and scheme.rings:
         raise SceneError(

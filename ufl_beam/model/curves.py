@@ -19,11 +19,11 @@ Point = tuple[float, float]
 Curve = Callable[[float], Sequence[float]]
 
 REACH = 1e-3
-"""Part of a length over which tangents are taken: differences of fourth order err by some 1e-12 of
-a curve as bent as the length is long, and lose three digits of its coordinates."""
+"""Step of the differences that give tangents, as a part of a length.  Their error is some 1e-12 for
+a curve with a radius of that length; round-off costs three digits of the coordinates."""
 
 PROJECTIONS = 50
-"""Iterations in which the nearest point of a curve is sought."""
+"""Largest number of iterations in the search for the nearest point of a curve."""
 
 WEIGHTS = np.array(
     [[-25, 48, -36, 16, -3], [-3, -10, 18, -6, 1], [1, -8, 0, 8, -1],
@@ -112,9 +112,9 @@ def tangent_within(curve: Curve, s: float, low: float, high: float) -> Array:
 
 
 def parameter_step(curve: Curve, s: float, length: float) -> float:
-    """Change of the parameter by which a curve goes on by :data:`REACH` of a length.
+    """Change of the parameter that moves a point along a curve by :data:`REACH` of a length.
 
-    The parameter may have any unit: the search begins at a step that means nothing.
+    The parameter may have any unit, so the search begins at an arbitrary step.
     """
     step = 1e-6
     for _ in range(60):

@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: MIT
-"""Viscous damping of the elastic motion: what users may ask for beside plastic dissipation."""
+"""Viscous damping of the elastic motion, beside plastic dissipation."""
 
 from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass
 
-from ufl_beam.errors import SceneError, require_number, require_sequence, shorten
-from ufl_beam.model.bodies import Member
+from ufl_beam.errors import SceneError, require_sequence
+from ufl_beam.model.bodies import Member, require_beam
+from ufl_beam.model.records import NotNegative, Positive, Record
 
 
 @dataclass(frozen=True)
-class Rayleigh:
+class Rayleigh(Record):
     """Rayleigh damping (a0 M + a1 K) v with the stiffness K of the undeformed scene, P(92).
 
     The damping ratio of a mode of circular frequency ω is a0/(2ω) + a1 ω/2.  It is a property of
@@ -33,18 +34,17 @@ class Rayleigh:
     """
 
     _: KW_ONLY
-    mass: float = 0.0
-    stiffness: float = 0.0
+    mass: NotNegative = 0.0
+    stiffness: NotNegative = 0.0
 
     def __post_init__(self) -> None:
-        require_number(self.mass, "Rayleigh: mass", at_least=0.0)
-        require_number(self.stiffness, "Rayleigh: stiffness", at_least=0.0)
+        super().__post_init__()
         if self.mass == self.stiffness == 0.0:
             raise SceneError("Rayleigh: mass and stiffness are both zero; leave damping out")
 
 
 @dataclass(frozen=True, eq=False)
-class KelvinVoigt:
+class KelvinVoigt(Record):
     """Kelvin-Voigt damping: C times the strain rates, beside the elastic resultants; objective.
 
     Rigid motion is not damped.  The damping ratio of a mode of circular frequency ω in small
@@ -65,16 +65,15 @@ class KelvinVoigt:
         True
     """
 
-    time: float
+    time: Positive
     beams: tuple[Member, ...] | None = None
 
     def __post_init__(self) -> None:
-        require_number(self.time, "KelvinVoigt: time", positive=True)
+        super().__post_init__()
         if self.beams is not None:
             object.__setattr__(self, "beams", require_sequence(self.beams, "KelvinVoigt: beams"))
             for i, beam in enumerate(self.beams):
-                if not isinstance(beam, Member):
-                    raise SceneError(f"KelvinVoigt: beams[{i}] = {shorten(beam)} is not a Beam")
+                require_beam(beam, f"KelvinVoigt: beams[{i}]")
 
 
 Damping = Rayleigh | KelvinVoigt

@@ -10,43 +10,47 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import KW_ONLY, dataclass
 from numbers import Integral
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 import scipy  # its parts are loaded when they are used
 
-from ufl_beam.errors import SceneError, require_number, shorten
+from ufl_beam.errors import SceneError, shorten
+from ufl_beam.model.records import Positive, Record
+
+
+def _require_seed(value: Any, what: str) -> None:
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < 0:
+        raise SceneError(f"{what} = {shorten(value)} must be a whole number, 0 or more")
 
 
 @dataclass(frozen=True)
-class Distribution(ABC):
+class Distribution(Record, ABC):
     """Base of the distributions: a random positive quantity."""
 
     _: KW_ONLY
-    seed: int  # the same seed gives the same scene again
-
-    def __post_init__(self) -> None:
-        name = type(self).__name__
-        if isinstance(self.seed, bool) or not isinstance(self.seed, Integral) or self.seed < 0:
-            raise SceneError(
-                f"{name}: seed = {shorten(self.seed)} must be a whole number, 0 or more"
-            )
-        for parameter in self.__match_args__:
-            require_number(getattr(self, parameter), f"{name}: {parameter}", positive=True)
+    seed: Annotated[int, _require_seed]  # the same seed gives the same scene again
 
     @abstractmethod
-    def law(self) -> Any:
+    def _law(self) -> Any:
         """The distribution of SciPy."""
 
     def draw(self, n: int, key: tuple[int, int]) -> npt.NDArray[np.float64]:
         """``n`` independent values of the stream ``key``; none is negative; shape (n,)."""
         stream = np.random.default_rng(np.random.SeedSequence(int(self.seed), spawn_key=key))
-        return np.asarray(np.maximum(self.law().rvs(n, random_state=stream), 0.0))
+        return np.asarray(np.maximum(self._law().rvs(n, random_state=stream), 0.0))
 
 
 @dataclass(frozen=True)
-class Normal(Distribution):
+class _ByMoments(Distribution):
+    """Base of the distributions that are given by mean and standard deviation."""
+
+    mean: Positive
+    deviation: Positive
+
+
+class Normal(_ByMoments):
     """Normal distribution; negative values become zero, and such fibres yield at once.
 
     Args:
@@ -62,15 +66,11 @@ class Normal(Distribution):
         >>> scattered = ub.Fibres(ub.Hardening(limit), number=16)
     """
 
-    mean: float
-    deviation: float
-
-    def law(self) -> Any:
-        """The distribution of SciPy."""
+    def _law(self) -> Any:
         return scipy.stats.norm(self.mean, self.deviation)
 
 
-class TruncatedNormal(Normal):
+class TruncatedNormal(_ByMoments):
     """Normal distribution of these parameters, truncated to positive values.
 
     Example:
@@ -79,12 +79,11 @@ class TruncatedNormal(Normal):
         True
     """
 
-    def law(self) -> Any:
-        """The distribution of SciPy."""
+    def _law(self) -> Any:
         return scipy.stats.truncnorm(-self.mean / self.deviation, np.inf, self.mean, self.deviation)
 
 
-class Lognormal(Normal):
+class Lognormal(_ByMoments):
     """Lognormal distribution of given mean and standard deviation.
 
     Example:
@@ -92,8 +91,7 @@ class Lognormal(Normal):
         >>> scattered = ub.Fibres(ub.Hardening(limit), number=16)
     """
 
-    def law(self) -> Any:
-        """The distribution of SciPy."""
+    def _law(self) -> Any:
         spread = np.sqrt(np.log1p((self.deviation / self.mean) ** 2))
         return scipy.stats.lognorm(spread, scale=self.mean * np.exp(-(spread**2) / 2))
 
@@ -116,9 +114,8 @@ class Weibull(Distribution):
         >>> scattered = ub.Fibres(ub.Hardening(limit), number=16)
     """
 
-    scale: float
-    shape: float
+    scale: Positive
+    shape: Positive
 
-    def law(self) -> Any:
-        """The distribution of SciPy."""
+    def _law(self) -> Any:
         return scipy.stats.weibull_min(self.shape, scale=self.scale)

@@ -6,20 +6,25 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_array, require_count, require_kind
 from ufl_beam.model.law_functions import Values
-from ufl_beam.model.material_laws import Bulk, BulkLaw, Softening, require_bulk_law
+from ufl_beam.model.material_laws import AnySoftening, Bulk, BulkLaw, require_bulk_law
+from ufl_beam.model.records import Instance, Record
+
+Below = Callable[[Array], Array]
+"""Area of a shape below y, from any line, and its first moment about y = 0; (2, n); m², m³."""
 
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """Material points of a cross-section: what strains them, and what their stresses add up to.
+    """Material points of a cross-section, with their strains, weights and laws.
 
-    The resultants are the sum of weight times stress times the strains per strain of the section.
+    The resultants of the section are the sums of weight times stress times ``strains``.
     """
 
     strains: Values  # of each point per strain (Σ, Γ, K) of the section; (n, 3)
@@ -27,7 +32,7 @@ class Layout:
     stiffness: Values  # elastic; (n,)
     laws: tuple[tuple[BulkLaw, int], ...]  # with the number of points in a row that follow them
     rest: Values  # stiffness (axial, shear, bending) of what has no points; (3,)
-    softening: Softening | None  # law of the discontinuities, if points can break
+    softening: AnySoftening | None  # law of the discontinuities, if points can break
     breaking: slice  # the points that can
     hinges: bool = False  # True if the discontinuity is one hinge, a jump of rotation
 
@@ -66,7 +71,7 @@ class Layout:
 
 
 @dataclass(frozen=True)
-class Fibres:
+class Fibres(Record):
     """Number and material law of the fibres of a section, P(93).
 
     Args:
@@ -85,17 +90,10 @@ class Fibres:
         1.39e+07
     """
 
-    law: BulkLaw
+    law: Annotated[BulkLaw, require_bulk_law]
     _: KW_ONLY
-    number: int = 20
-    softening: Softening | None = None
-
-    def __post_init__(self) -> None:
-        require_bulk_law(self.law, "Fibres: law")
-        require_count(self.number, "Fibres: number")
-        object.__setattr__(self, "number", int(self.number))
-        if self.softening is not None:
-            require_kind(self.softening, Softening, "Fibres: softening")
+    number: Annotated[int, require_count] = 20
+    softening: Instance[AnySoftening | None] = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,24 +126,18 @@ class PlacedFibres:
 
     @classmethod
     def layers(
-        cls,
-        fibres: Fibres,
-        E: float,
-        h: float,
-        area: Callable[[Array], Array],
-        first_moment: Callable[[Array], Array],
-        edges: Sequence[float] = (),
-    ) -> PlacedFibres:
-        """Layers of equal thickness over the depth ``h``, cut at ``edges`` too; m.
-
-        ``area`` is that below y, from any line, ``first_moment`` that of it about y = 0; m², m³.
-        """
+        cls, fibres: Fibres | None, E: float, h: float, below: Below, edges: Sequence[float] = ()
+    ) -> PlacedFibres | None:
+        """Layers of equal thickness, if any, over the depth ``h``, cut at ``edges`` too; m."""
+        if fibres is None:
+            return None
+        require_kind(fibres, Fibres, "Section: fibres")
         if fibres.number < 2:
             raise SceneError("Fibres: number = 1 has no bending stiffness; use 2 or more")
         cuts = np.union1d(np.linspace(-h / 2, h / 2, fibres.number + 1), np.array(edges))
         cuts = cuts[np.insert(np.diff(cuts) > 1e-9 * h, 0, True)]
-        A = np.diff(area(cuts))
-        return cls(fibres, E, np.diff(first_moment(cuts)) / A, A)
+        A, S = np.diff(below(cuts))
+        return cls(fibres, E, S / A, A)
 
     @property
     def EA(self) -> float:

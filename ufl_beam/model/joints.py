@@ -7,9 +7,9 @@ import math
 from dataclasses import dataclass, field
 
 from ufl_beam.errors import SceneError, require_kind, require_switch, require_text
-from ufl_beam.model.bodies import Anchor, Place, carries, ground, require_anchor
+from ufl_beam.model.bodies import Anchor, NodeDof, Place, carries, ground, node, require_anchors
 from ufl_beam.model.connector_laws import HELD, Bearing, Guide
-from ufl_beam.model.connectors import Connector, _axis, _require_apart
+from ufl_beam.model.connectors import Connector, require_apart, unit_axis
 from ufl_beam.model.curves import Curve, Point, point_of
 
 
@@ -47,8 +47,7 @@ class Joint(Bearing):
     def __post_init__(self) -> None:
         if len(self.places) < 2:
             raise SceneError(f"{self.kind}: a joint needs at least two places")
-        for place in self.places:
-            require_anchor(place, self.kind)
+        require_anchors(self.kind, *self.places)
         object.__setattr__(self, "look", self.look or self.kind)
 
     def __str__(self) -> str:
@@ -60,18 +59,17 @@ class Joint(Bearing):
         held = [(link.motion, link.axis, id(link.law)) for link in self.holders]
         return self.kind, frozenset(self.places), tuple(held)
 
-    @property
-    def carriers(self) -> tuple[Anchor, ...]:
-        """The anchors whose displacement is that of their node."""
-        return tuple(place for place in self.places if carries(place))
+    def equal(self, component: int) -> list[NodeDof]:
+        """Components of motion that are equal; of displacements those that the nodes carry."""
+        alike = [place for place in self.places if component == 2 or carries(place)]
+        return [(node(place), component) for place in alike]
 
 
 def _joined(
     kind: str, places: tuple[Anchor, ...], shared: tuple[int, ...], measured: bool = False
 ) -> Joint:
     """A joint at one point: what is measured, and what nodes do not carry, connectors hold."""
-    for place in places:
-        require_anchor(place, kind)
+    require_anchors(kind, *places)
     require_switch(measured, f"{kind}: measured")
     carriers = [place for place in places if carries(place) and not measured]
     first = (carriers or list(places))[:1]
@@ -138,7 +136,7 @@ def Prismatic(
         Prismatic(beam.end (2, 0), slider (2, 0))
     """
     require_switch(turning, "Prismatic: turning")
-    x, y = _axis(rail, slider, axis, "Prismatic")
+    x, y = unit_axis(rail, slider, axis, "Prismatic")
     across = Connector("Prismatic", "sliding", rail, slider, HELD, (-y, x))
     return Joint("Prismatic", (rail, slider), () if turning else (2,), (across,))
 
@@ -153,8 +151,7 @@ def RigidLink(a: Anchor, b: Anchor) -> Joint:
         >>> flange = ub.Beam((0, 0.5), (2, 0.5), section, name="flange")
         >>> built = ub.Scene([beam, flange], [ub.RigidLink(beam.end, flange.end)], scene.supports)
     """
-    for anchor in (a, b):
-        require_anchor(anchor, "RigidLink")
+    require_anchors("RigidLink", a, b)
     if a.point == b.point:
         raise SceneError(f"RigidLink({a}, {b}): zero length; join them with Rigid")
     holders = tuple(
@@ -178,7 +175,7 @@ def Link(a: Anchor, b: Anchor) -> Joint:
         1540.0
     """
     rod = Connector("Link", "stretching", a, b, HELD)
-    _require_apart(rod)
+    require_apart(rod)
     return Joint("Link", (a, b), (), (rod,))
 
 
@@ -197,7 +194,7 @@ def Guided(place: Anchor, curve: Curve) -> Joint:
         >>> rail = ub.Guided(beam.end, lambda s: (2 + s, 0.5 * s**2))
         >>> guided = ub.Scene([beam], [rail], [ub.Roller(beam.start)], [ub.Gravity()])
     """
-    require_anchor(place, "Guided")
+    require_anchors("Guided", place)
     if not carries(place):
         raise SceneError(f"Guided({place}): it must be the centre of the body")
     law = Guide(curve)
@@ -231,7 +228,7 @@ def Release(a: Place, b: Anchor, *, free: str, measured: bool = False) -> Joint:
         Release(beam.end (2, 0), girder.start (2, 0))
     """
     require_kind(a, Place, "Release: a")
-    require_anchor(b, "Release: b")
+    require_anchors("Release: b", b)
     require_text(free, f"Release({a}, {b}): free")
     require_switch(measured, f"Release({a}, {b}): measured")
     if not free or set(free) - set("NVM"):

@@ -3,15 +3,36 @@
 
 from __future__ import annotations
 
+from abc import ABC
 from dataclasses import dataclass
 
-from ufl_beam.errors import SceneError, require_number, require_vector
-from ufl_beam.model.bodies import Anchor, Member, carries, require_anchor
-from ufl_beam.model.time_functions import TimeFunction, require_time_function, steady
+from ufl_beam.errors import SceneError
+from ufl_beam.model.bodies import Anchor, Member, carries, require_anchors, require_beam
+from ufl_beam.model.records import Number, Record, Vector
+from ufl_beam.model.time_functions import Timed, TimeFunction, steady
 
 
 @dataclass(frozen=True, eq=False)
-class PointLoad:
+class LoadAtPlace(Record, ABC):
+    """Base of the loads that act at one place."""
+
+    place: Anchor
+    force: Vector = (0.0, 0.0)
+    moment: Number = 0.0
+    time: Timed = steady
+
+    def __post_init__(self) -> None:
+        require_anchors(type(self).__name__, self.place)
+        super().__post_init__()
+
+    def __str__(self) -> str:
+        return f"{type(self).__name__} at {self.place}"
+
+    _label = __str__
+
+
+@dataclass(frozen=True, eq=False)
+class PointLoad(LoadAtPlace):
     """Dead force and moment at a place: they keep their direction in the plane.
 
     Args:
@@ -28,20 +49,9 @@ class PointLoad:
         [    312. -100000. -174990.]
     """
 
-    place: Anchor
-    force: tuple[float, float] = (0.0, 0.0)
-    moment: float = 0.0
-    time: TimeFunction = steady
-
-    def __post_init__(self) -> None:
-        _check_point_load(self, "PointLoad")
-
-    def __str__(self) -> str:
-        return f"PointLoad at {self.place}"
-
 
 @dataclass(frozen=True, eq=False)
-class FollowerLoad:
+class FollowerLoad(LoadAtPlace):
     """Follower force at a place: it turns with the cross-section and is not conservative.
 
     Args:
@@ -58,32 +68,17 @@ class FollowerLoad:
         True
     """
 
-    place: Anchor
-    force: tuple[float, float] = (0.0, 0.0)
-    moment: float = 0.0
-    time: TimeFunction = steady
-
     def __post_init__(self) -> None:
-        _check_point_load(self, "FollowerLoad")
+        super().__post_init__()
         if not carries(self.place):
             raise SceneError(
-                f"FollowerLoad at {self.place}: not the centre of the body; act on the centre, "
+                f"{self}: not the centre of the body; act on the centre, "
                 "with the moment that this makes"
             )
 
-    def __str__(self) -> str:
-        return f"FollowerLoad at {self.place}"
-
-
-def _check_point_load(load: PointLoad | FollowerLoad, kind: str) -> None:
-    require_anchor(load.place, kind)
-    require_vector(load.force, f"{kind} at {load.place}: force")
-    require_number(load.moment, f"{kind} at {load.place}: moment")
-    require_time_function(load.time, f"{kind} at {load.place}")
-
 
 @dataclass(frozen=True, eq=False)
-class LineLoad:
+class LineLoad(Record):
     """Distributed dead force and moment along a beam, per undeformed length.
 
     Args:
@@ -101,23 +96,22 @@ class LineLoad:
     """
 
     beam: Member
-    force: tuple[float, float] = (0.0, 0.0)
-    moment: float = 0.0
-    time: TimeFunction = steady
+    force: Vector = (0.0, 0.0)
+    moment: Number = 0.0
+    time: Timed = steady
 
     def __post_init__(self) -> None:
-        if not isinstance(self.beam, Member):
-            raise SceneError(f"LineLoad: {self.beam!r} is not a Beam")
-        require_vector(self.force, f"LineLoad on {self.beam.name}: force")
-        require_number(self.moment, f"LineLoad on {self.beam.name}: moment")
-        require_time_function(self.time, f"LineLoad on {self.beam.name}")
+        require_beam(self.beam, "LineLoad: beam")
+        super().__post_init__()
 
     def __str__(self) -> str:
         return f"LineLoad on {self.beam.name}"
 
+    _label = __str__
+
 
 @dataclass(frozen=True, eq=False)
-class Gravity:
+class Gravity(Record):
     """Weight of all beams, bodies and point masses.
 
     Args:
@@ -131,19 +125,15 @@ class Gravity:
         3080.0
     """
 
-    acceleration: tuple[float, float] = (0.0, -9.81)
-    time: TimeFunction = steady
-
-    def __post_init__(self) -> None:
-        require_vector(self.acceleration, "Gravity: acceleration")
-        require_time_function(self.time, "Gravity")
+    acceleration: Vector = (0.0, -9.81)
+    time: Timed = steady
 
     def __str__(self) -> str:
         return "Gravity"
 
 
 @dataclass(frozen=True, eq=False)
-class RotatingFrame:
+class RotatingFrame(Record):
     """Centrifugal and Coriolis forces on all masses, in a frame that turns steadily.
 
     Motions, velocities and all other loads refer to the rotating frame.  A static run gives the
@@ -160,12 +150,8 @@ class RotatingFrame:
         True
     """
 
-    rate: float
-    about: tuple[float, float] = (0.0, 0.0)
-
-    def __post_init__(self) -> None:
-        require_number(self.rate, "RotatingFrame: rate")
-        require_vector(self.about, "RotatingFrame: about")
+    rate: Number
+    about: Vector = (0.0, 0.0)
 
     @property
     def time(self) -> TimeFunction:

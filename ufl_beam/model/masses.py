@@ -4,14 +4,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
-from ufl_beam.errors import SceneError, require_number, require_sequence, require_vector, shorten
+from ufl_beam.errors import SceneError, require_sequence, require_vector, shorten
 from ufl_beam.model.bodies import Anchor, Body, Member, require_node
 from ufl_beam.model.curves import Point
+from ufl_beam.model.records import NotNegative, Number, Record, Vector
 
 
 @dataclass(frozen=True, eq=False)
-class PointMass:
+class PointMass(Record):
     """Point mass, with rotary inertia, fixed to a place.
 
     Args:
@@ -26,17 +28,19 @@ class PointMass:
     """
 
     place: Anchor
-    mass: float
-    inertia: float = 0.0
+    mass: NotNegative
+    inertia: NotNegative = 0.0
 
     def __post_init__(self) -> None:
         require_node(self.place, "PointMass")
-        require_number(self.mass, f"PointMass at {self.place}: mass", at_least=0.0)
-        require_number(self.inertia, f"PointMass at {self.place}: inertia", at_least=0.0)
+        super().__post_init__()
+
+    def _label(self) -> str:
+        return f"PointMass at {self.place}"
 
 
 @dataclass(frozen=True, eq=False)
-class Velocity:
+class Velocity(Record):
     """Initial velocity of beams and bodies that move as one rigid body.
 
     Args:
@@ -52,19 +56,16 @@ class Velocity:
     """
 
     beams: tuple[Member | Body, ...]
-    linear: tuple[float, float] = (0.0, 0.0)
-    angular: float = 0.0
-    about: Point | None = None
+    linear: Vector = (0.0, 0.0)
+    angular: Number = 0.0
+    about: Annotated[Point | None, require_vector] = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "beams", require_sequence(self.beams, "Velocity: beams"))
         for i, beam in enumerate(self.beams):
             if not isinstance(beam, Member | Body):
                 raise SceneError(f"Velocity: beams[{i}] = {shorten(beam)} is not a Beam or Body")
-        require_vector(self.linear, "Velocity: linear")
-        require_number(self.angular, "Velocity: angular")
-        if self.about is not None:
-            require_vector(self.about, "Velocity: about")
+        super().__post_init__()
 
     def at(self, x: float, y: float) -> tuple[float, float, float]:
         """(du/dt, dv/dt, dψ/dt) of the point (x, y); m/s, m/s, rad/s."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Laws of a material point in one dimension: what yields, hardens, flows and breaks.
+"""Laws of a material point in one dimension: yielding, hardening, viscous flow, softening.
 
 A point is a resultant of a cross-section (strain 1 or curvature 1/m against N or N m) or a fibre
 (strain against Pa).  The laws are plain functions of arrays, and of UFL expressions as well: UFL
@@ -77,7 +77,7 @@ class DuvautLions:
 
 @dataclass(frozen=True, eq=False)
 class Bulk(ABC):
-    """Statement of a law of the bulk at many points, for arrays and for symbols.
+    """Law of the bulk at many points, stated for arrays and for symbols.
 
     The internal variables of a point are its plastic strain and the sum of the sizes of its
     increments.  A law has further numbers as fields; those of :attr:`numbers` are the inputs of
@@ -226,22 +226,8 @@ Far below round-off; but numbers that underflow would be forces and stiffnesses 
 
 
 @dataclass(frozen=True)
-class Softening:
-    """Exponential softening of a hinge or crack, down to a perfect joint, P(51)-P(53).
-
-    Args:
-        limit: Traction at which it opens: moment of a hinge, N m; stress of a fibre, Pa.  Zero is a
-            perfect joint, infinity never opens.
-        energy: Fracture energy, dissipated by a complete opening: J; for fibres J/m².
-
-    Raises:
-        SceneError: A negative limit, or an energy that is not positive.
-
-    Example:
-        >>> law = ub.Softening(limit=5e4, energy=1e3)  # N m, J
-        >>> print(law.traction(np.array([0.0, 0.02, 0.04])).round())  # after openings in rad; N m
-        [50000. 18394.  6767.]
-    """
+class SofteningLaw(ABC):
+    """Base of the laws of hinges and cracks that lose their resistance."""
 
     limit: float
     energy: float
@@ -264,12 +250,37 @@ class Softening:
         """Limit and fracture energy; they do not depend on a stiffness ``C``."""
         return {"limit": self.limit, "energy": self.energy}
 
-    def of(self, limit: Values, energy: Values) -> Softening:
+    def of(self, limit: Values, energy: Values) -> SofteningLaw:
         """Return the same law with other numbers, or with symbols."""
         law = object.__new__(type(self))
-        object.__setattr__(law, "limit", limit)
-        object.__setattr__(law, "energy", energy)
+        vars(law).update(limit=limit, energy=energy)
         return law
+
+    @abstractmethod
+    def traction(self, ξ: Values) -> Values:
+        """Resistance after the accumulated opening ξ."""
+
+    @abstractmethod
+    def mean_traction(self, ξ: Values, a: Values) -> Values:
+        """Mean resistance while the opening grows from ξ by a; its product with a is dissipated."""
+
+
+class Softening(SofteningLaw):
+    """Exponential softening of a hinge or crack, down to a perfect joint, P(51)-P(53).
+
+    Args:
+        limit: Traction at which it opens: moment of a hinge, N m; stress of a fibre, Pa.  Zero is a
+            perfect joint, infinity never opens.
+        energy: Fracture energy, dissipated by a complete opening: J; for fibres J/m².
+
+    Raises:
+        SceneError: A negative limit, or an energy that is not positive.
+
+    Example:
+        >>> law = ub.Softening(limit=5e4, energy=1e3)  # N m, J
+        >>> print(law.traction(np.array([0.0, 0.02, 0.04])).round())  # after openings in rad; N m
+        [50000. 18394.  6767.]
+    """
 
     def traction(self, ξ: Values) -> Values:
         """Resistance after the accumulated opening ξ."""
@@ -281,8 +292,7 @@ class Softening:
         return self.traction(ξ) * _mean_of_decay(self.limit / self.energy * a)
 
 
-@dataclass(frozen=True)
-class LinearSoftening(Softening):
+class LinearSoftening(SofteningLaw):
     """Linear softening of a hinge or crack, to zero at the opening 2 energy / limit.
 
     Args and errors are those of :class:`Softening`.
@@ -305,6 +315,9 @@ class LinearSoftening(Softening):
         return where(ends, now**2 / (2 * safe), now - slope * a / 2)
 
 
+AnySoftening = Softening | LinearSoftening
+
+
 def _mean_of_decay(x: Values) -> Values:
     """Mean of exp(-x) from 0 to x, smooth at zero: (1 - exp(-x))/x, its series below 0.1."""
     small = below(x, 0.1)
@@ -321,17 +334,17 @@ def require_bulk_law(law: object, what: str) -> None:
         raise SceneError(f"{what} = {shorten(law)} is not a Hardening")
 
 
-HingeLaw = Softening | Hardening
+HingeLaw = AnySoftening | Hardening
 """Laws of a plastic hinge of zero length, which has no elasticity of its own."""
 
 
-def require_hinge_law(law: object, owner: str) -> None:
-    """Raise :class:`SceneError` naming ``owner`` unless a rigid-plastic hinge can follow a law."""
-    require_kind(law, HingeLaw.__args__, owner)
+def require_hinge_law(law: object, what: str) -> None:
+    """Raise :class:`SceneError` naming ``what`` unless a rigid-plastic hinge can follow a law."""
+    require_kind(law, (Softening, Hardening, LinearSoftening), what)
     if isinstance(law, Hardening):
-        _require_from_zero_to_infinity(law.limit, f"{owner}: limit")
+        _require_from_zero_to_infinity(law.limit, f"{what}: limit")
         if isinstance(law.viscosity, DuvautLions):
             raise SceneError(
-                f"{owner}: DuvautLions relaxes an elastic stress, and a hinge of zero length is "
+                f"{what}: DuvautLions relaxes an elastic stress, and a hinge of zero length is "
                 "rigid before it flows; use Perzyna(eta)"
             )

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -46,6 +45,7 @@ class Mesh:
     lumped: bool = False
 
     def __post_init__(self) -> None:
+        require_kind(self.lumped, bool, "Mesh: lumped")
         if not isinstance(self.refine, Rational) or self.refine <= 0:
             raise SceneError(
                 f"Mesh: refine = {shorten(self.refine)} must be a positive whole number or "
@@ -56,7 +56,6 @@ class Mesh:
         if not isinstance(self.degree, Real) or self.degree not in (1, 2, 3):
             raise SceneError(f"Mesh: degree = {shorten(self.degree)} must be 1, 2 or 3")
         object.__setattr__(self, "degree", int(self.degree))
-        require_kind(self.lumped, bool, "Mesh: lumped")
 
     @cached_property
     def nodes(self) -> npt.NDArray[np.float64]:
@@ -95,7 +94,7 @@ class Mesh:
         if self.refine == 1:
             return given
         places = sorted({0.0, 1.0, *beam.corners, *attached})
-        kept = sorted({_nearest(given, s) for s in places})
+        kept = sorted({int(np.abs(np.subtract(given, s)).argmin()) for s in places})
         for first, last in pairwise(kept):
             if (last - first) * self.refine % 1:
                 common = math.gcd(*(b - a for a, b in pairwise(kept)))
@@ -108,12 +107,6 @@ class Mesh:
         number = int((len(given) - 1) * self.refine)
         require_memory(number, f"Mesh: refine = {self.refine} of {beam.name}, {number} cells,")
         return [_between(given, i / Fraction(self.refine)) for i in range(number + 1)]
-
-
-def _nearest(values: Sequence[float], s: float) -> int:
-    """Position of the value that is nearest to ``s``; they ascend."""
-    i = bisect_left(values, s)
-    return min(range(max(i - 1, 0), min(i + 1, len(values))), key=lambda k: abs(values[k] - s))
 
 
 def _between(values: Sequence[float], position: Fraction) -> float:

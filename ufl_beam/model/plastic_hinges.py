@@ -3,63 +3,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Protocol
+from collections.abc import Iterable, Mapping, Sequence
 
 from ufl_beam.errors import SceneError
-from ufl_beam.model.bodies import Anchor, Node, Place, node
+from ufl_beam.model.bodies import Anchor, Node, NodeDof, Place, merged, node
 from ufl_beam.model.connector_laws import RigidPlastic
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.material_laws import HingeLaw
 
-NodeDof = tuple[Node, int]
-"""A component of motion of a node: 0, 1 displacement, 2 rotation."""
-
-
-class Sharing(Protocol):
-    """Joint whose places share components of motion."""
-
-    @property
-    def places(self) -> tuple[Anchor, ...]:
-        """Places that share unknowns."""
-
-    @property
-    def shared(self) -> tuple[int, ...]:
-        """Components: 0, 1 displacement, 2 rotation."""
-
-    @property
-    def carriers(self) -> tuple[Anchor, ...]:
-        """Places that share displacements."""
-
-
-def merged(groups: Iterable[Sequence[NodeDof]]) -> dict[NodeDof, NodeDof]:
-    """Representative of each component of motion that equals others, from groups of equal ones."""
-    parent: dict[NodeDof, NodeDof] = {}
-
-    def root(dof: NodeDof) -> NodeDof:
-        while dof in parent:
-            dof = parent[dof]
-        return dof
-
-    for group in groups:
-        for other in group[1:]:
-            a, b = root(group[0]), root(other)
-            if a != b:
-                parent[b] = a
-    return {dof: root(dof) for dof in parent}
-
-
-def shared_by_joints(joints: Iterable[Sharing]) -> Iterator[list[NodeDof]]:
-    """Groups of components of motion that joints make equal."""
-    for joint in joints:
-        for component in joint.shared:
-            alike = joint.places if component == 2 else joint.carriers
-            yield [(node(place), component) for place in alike]
-
 
 def plastic_hinges(
     may_have: Mapping[Place, HingeLaw],  # laws of the hinges that the beams may have
-    joints: Sequence[Sharing],
+    rigid: Iterable[Sequence[NodeDof]],  # groups of rotations that joints make equal
     bearing: Iterable[Anchor],  # where supports, connectors or masses bear a moment
     loaded: Iterable[Anchor],  # where loads are moments
 ) -> tuple[Connector, ...]:
@@ -72,23 +27,17 @@ def plastic_hinges(
     one never opens.
     """
     laws = {place: law for place, law in may_have.items() if law.opens}
-    same = merged(
-        [(node(place), 2) for place in joint.places] for joint in joints if 2 in joint.shared
-    )
+    same = merged(rigid)
     members: dict[NodeDof, list[Node]] = {}
     for dof in {*same, *same.values()}:
-        members.setdefault(same.get(dof, dof), []).append(dof[0])
+        members.setdefault(same[dof], []).append(dof[0])
 
-    def at(places: Iterable[Anchor]) -> set[NodeDof]:
-        return {same.get(dof, dof) for dof in ((node(place), 2) for place in places)}
-
-    borne, acted = at(bearing), at(loaded)
+    borne, acted = ({same[node(place), 2] for place in places} for places in (bearing, loaded))
 
     def stays(place: Place) -> bool:
         if 0.0 < place.s < 1.0:
             return True
-        dof: NodeDof = (place, 2)
-        dof = same.get(dof, dof)
+        dof = same[place, 2]
         others = [other for other in members.get(dof, ()) if other != place]
         between = len(others) > 0 and (dof in acted or not _outlasts(place, others, laws))
         return dof in borne or between

@@ -4,23 +4,37 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from ufl_beam.errors import SceneError, clip, require_kind, require_sequence
 from ufl_beam.model.beams import Beam
-from ufl_beam.model.bodies import GROUND, Anchor, Body, Member, Place, Spot, carries, ground, node
+from ufl_beam.model.bodies import (
+    GROUND,
+    Anchor,
+    Body,
+    Member,
+    NodeDof,
+    Place,
+    Representatives,
+    Spot,
+    carries,
+    ground,
+    merged,
+    node,
+)
 from ufl_beam.model.connector_laws import Actuator, Bearing, Coulomb, Motor
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import enclosing_diameter
 from ufl_beam.model.damping import Damping, KelvinVoigt
 from ufl_beam.model.joints import Joint
-from ufl_beam.model.loads import FollowerLoad, LineLoad, Load, PointLoad, RotatingFrame
+from ufl_beam.model.loads import LineLoad, Load, LoadAtPlace, PointLoad, RotatingFrame
 from ufl_beam.model.masses import PointMass, Velocity
-from ufl_beam.model.plastic_hinges import NodeDof, merged, plastic_hinges, shared_by_joints
+from ufl_beam.model.plastic_hinges import plastic_hinges
 from ufl_beam.model.supports import COMPONENTS, Support
 from ufl_beam.model.time_functions import TimeFunction, value_at
 from ufl_beam.model.works import Potential, VirtualWork, Work
@@ -70,28 +84,22 @@ class Scene:
             "masses": PointMass, "initial": Velocity, "damping": Damping.__args__, "bodies": Body,
             "connectors": Connector, "works": (VirtualWork, Potential),
         }  # fmt: skip
-        for part in kinds:
+        for part, kind in kinds.items():
             records = require_sequence(getattr(self, part), f"Scene: {part}")
             object.__setattr__(self, part, records)
+            for i, record in enumerate(records):
+                require_kind(record, kind, f"Scene: {part}[{i}]")
         if not self.beams and not self.bodies:
             raise SceneError("Scene: no beams and no bodies")
-        for part, kind in kinds.items():
-            for i, record in enumerate(getattr(self, part)):
-                require_kind(record, kind, f"Scene: {part}[{i}]")
-        known: dict[Beam | Body, str] = {GROUND: "ground"}
-        for part in ("beams", "bodies"):
-            for i, one in enumerate(getattr(self, part)):
-                first = known.setdefault(one, f"{part}[{i}]")
-                if first != f"{part}[{i}]":
-                    raise SceneError(
-                        f"Scene: {one.name} is in the scene twice, as {first} and {part}[{i}]"
-                    )
+        if GROUND in self.bodies:
+            raise SceneError("Scene: the ground is in every scene; leave it out of bodies")
+        self._require_once()
+        known = {GROUND, *self.beams, *self.bodies}
         for owner, place in self.attachments():
             one = place.beam if isinstance(place, Place) else place.body
             if one not in known:
                 part = "beams" if isinstance(one, Beam) else "bodies"
                 raise SceneError(f"{owner}: {one.name} is not in the scene; add it to {part}")
-        self._require_once()
         for joint in self.joints:
             self._require_together(joint)
         for connector in self.links:
@@ -145,14 +153,14 @@ class Scene:
     def hinges(self) -> tuple[Connector, ...]:
         """Plastic hinges of zero length: those of beams, and at ends whose section has a hinge."""
         loaded = [load.place for load in self.moments]
+        rigid = [joint.equal(2) for joint in self.joints if 2 in joint.shared]
         laws = {place: law for beam in self.beams for place, law in beam.hinge_laws.items()}
-        return plastic_hinges(laws, self.joints, self._bearing_moments(), loaded)
+        return plastic_hinges(laws, rigid, self._bearing_moments(), loaded)
 
     @property
-    def moments(self) -> list[PointLoad | FollowerLoad]:
+    def moments(self) -> list[LoadAtPlace]:
         """Loads at places that are moments, or have one."""
-        at_places = (load for load in self.loads if isinstance(load, PointLoad | FollowerLoad))
-        return [load for load in at_places if load.moment]
+        return [load for load in self.loads if isinstance(load, LoadAtPlace) and load.moment]
 
     def _bearing_moments(self) -> Iterator[Anchor]:
         """Places where supports, connectors or masses bear a moment."""
@@ -191,10 +199,10 @@ class Scene:
         yield from ((support, support.place) for support in self.supports)
         yield from (("PointMass", mass.place) for mass in self.masses)
         for load in self.loads:
-            if isinstance(load, PointLoad | FollowerLoad):
-                yield type(load).__name__, load.place
+            if isinstance(load, LoadAtPlace):
+                yield load, load.place
             elif isinstance(load, LineLoad):
-                yield "LineLoad", load.beam.start
+                yield load, load.beam.start
         for velocity in self.initial:
             for one in velocity.beams:
                 yield "Velocity", one.middle if isinstance(one, Body) else one.start
@@ -216,29 +224,20 @@ class Scene:
 
     def _require_once(self) -> None:
         """Raise if a record is in a list twice, or if two joints are the same."""
+        for one, twice in (*_again("beams", self.beams), *_again("bodies", self.bodies)):
+            raise SceneError(f"Scene: {one.name} is in the scene {twice}")
         for part in ("joints", "connectors", "loads", "masses", "initial", "damping", "works"):
-            first: dict[int, int] = {}
-            for i, record in enumerate(getattr(self, part)):
-                j = first.setdefault(id(record), i)
-                if i != j:
-                    raise SceneError(
-                        f"Scene: {clip(str(record))} is there twice, as {part}[{j}] and "
-                        f"{part}[{i}]; remove one, or make two of them"
-                    )
-        names: dict[str, int] = {}
-        for i, work in enumerate(self.works):
-            if (j := names.setdefault(work.name, i)) != i:
+            for record, twice in _again(part, getattr(self, part)):
                 raise SceneError(
-                    f"Scene: works[{j}] and works[{i}] are both called {work.name!r}, the name of "
-                    "their entry in the energy ledger; give one of them another name"
+                    f"Scene: {clip(str(record))} is there {twice}; remove one, or make two of them"
                 )
-        seen: dict[object, int] = {}
-        for i, joint in enumerate(self.joints):
-            j = seen.setdefault(joint.sameness, i)
-            if i != j:
-                raise SceneError(
-                    f"Scene: {joint} is there twice, as joints[{j}] and joints[{i}]; remove one"
-                )
+        for joint, twice in _again("joints", self.joints, key=lambda joint: joint.sameness):
+            raise SceneError(f"Scene: {joint} is there {twice}; remove one")
+        for work, twice in _again("works", self.works, key=lambda work: work.name):
+            raise SceneError(
+                f"Scene: a work is called {work.name!r} {twice}, the name of its entry in the "
+                "energy ledger; give one of them another name"
+            )
 
     def _require_together(self, joint: Joint) -> None:
         here, *others = joint.places
@@ -255,37 +254,34 @@ class Scene:
     def _require_pressing(self, connector: Connector, pressing: Bearing) -> None:
         """Raise unless the force of what presses on friction can be known."""
         if pressing not in (*self.joints, *self.supports):
-            raise SceneError(
-                f"{connector}: {pressing}, which presses on its friction, is not in the scene; add "
-                "it to joints or supports"
-            )
-        if isinstance(pressing, Support) and not pressing.held.keys() & {0, 1}:
-            raise SceneError(
-                f"{connector}: {pressing}, which presses on its friction, holds no displacement "
-                "and bears no force; name another support or joint"
-            )
-        if isinstance(pressing, Joint) and all(holder.turns for holder in pressing.holders):
-            raise SceneError(
-                f"{connector}: {pressing}, which presses on its friction, shares unknowns, so that "
-                "its force is not known; make it with measured=True"
-            )
+            why = "is not in the scene; add it to joints or supports"
+        elif isinstance(pressing, Support) and not pressing.held.keys() & {0, 1}:
+            why = "holds no displacement and bears no force; name another support or joint"
+        elif isinstance(pressing, Joint) and all(holder.turns for holder in pressing.holders):
+            why = "shares unknowns, so that its force is not known; make it with measured=True"
+        else:
+            return
+        raise SceneError(f"{connector}: {pressing}, which presses on its friction, {why}")
+
+    @property
+    def shared_by_joints(self) -> list[list[NodeDof]]:
+        """Groups of components of motion that joints make equal."""
+        return [joint.equal(component) for joint in self.joints for component in joint.shared]
 
     @cached_property
-    def representatives(self) -> dict[NodeDof, NodeDof]:
+    def representatives(self) -> Representatives:
         """Which component of a node stands for it, for all components that joints share."""
         hinges = ([(node(link.a), c), (node(link.b), c)] for link in self.hinges for c in (0, 1))
-        return merged([*shared_by_joints(self.joints), *hinges])
+        return merged([*self.shared_by_joints, *hinges])
 
     def _require_single_supports(self) -> None:
         same = self.representatives
-        fixed: list[NodeDof] = [(GROUND, component) for component in range(3)]
-        holders = {same.get(dof, dof): "the ground" for dof in fixed}
+        holders = {same[GROUND, component]: "the ground" for component in range(3)}
         for support in self.supports:
             # A support in turned axes takes both displacements of its place.
             components = {*support.held, *((0, 1) if support.angle else ())}
             for component in sorted(components):
-                dof: NodeDof = (node(support.place), component)
-                dof = same.get(dof, dof)
+                dof = same[node(support.place), component]
                 if dof in holders:
                     raise SceneError(
                         f"supports in conflict: {holders[dof]} and {support} both hold "
@@ -309,3 +305,13 @@ def _off_center(load: PointLoad) -> tuple[Connector, ...]:
         push("parting", y, (0.0, 1.0)),
         *((push("turning", moment),) if moment else ()),
     )
+
+
+def _again(
+    part: str, records: Sequence[Any], key: Callable[[Any], object] = id
+) -> Iterator[tuple[Any, str]]:
+    """Records that were in a list before, and the words for it."""
+    first: dict[object, int] = {}
+    for i, record in enumerate(records):
+        if (j := first.setdefault(key(record), i)) != i:
+            yield record, f"twice, as {part}[{j}] and {part}[{i}]"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Cross-sections: what a beam is made of, in resultants or in fibres.
+"""Cross-sections of beams, described by resultants or by fibres.
 
 Units are SI: N, N m², kg/m, kg m.
 """
@@ -7,23 +7,23 @@ Units are SI: N, N m², kg/m, kg m.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_kind, require_number
 from ufl_beam.model.fibres import Fibres, Layout, PlacedFibres
-from ufl_beam.model.material_laws import BulkLaw, Hardening, Softening, require_bulk_law
+from ufl_beam.model.material_laws import AnySoftening, BulkLaw, Hardening, require_bulk_law
+from ufl_beam.model.records import Instance, NotNegative, Positive, Record
 
-Integral = Callable[[Array], Array]
-"""Area of a shape below y, or its first moment."""
+ResultantLaw = Annotated[BulkLaw | None, require_bulk_law]
 
 
 @dataclass(frozen=True, eq=False)
-class Section:
+class Section(Record):
     """Stiffness and inertia of a cross-section, P(7) and P(18).
 
     Args:
@@ -55,55 +55,43 @@ class Section:
         1.4e+07 5.67e+06 1.4e+07
     """
 
-    EA: float
-    GA: float
-    EI: float
-    rhoA: float = field(default=None)  # type: ignore[assignment]
-    rhoI: float = 0.0
-    depth: float = 0.0
+    EA: Positive
+    GA: Positive
+    EI: Positive
+    rhoA: NotNegative = field(default=None)  # type: ignore[assignment]
+    rhoI: NotNegative = 0.0
+    depth: NotNegative = 0.0
     _: KW_ONLY
-    axial: BulkLaw | None = None
-    shear: BulkLaw | None = None
-    bending: BulkLaw | None = None
-    hinge: Softening | None = None
-    fibres: PlacedFibres | None = None
+    axial: ResultantLaw = None
+    shear: ResultantLaw = None
+    bending: ResultantLaw = None
+    hinge: Instance[AnySoftening | None] = None
+    fibres: Instance[PlacedFibres | None] = None
     massless_by_default: bool = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         object.__setattr__(self, "massless_by_default", self.rhoA is None)
         if self.rhoA is None:
             object.__setattr__(self, "rhoA", 0.0)
-        for name in ("EA", "GA", "EI"):
-            require_number(getattr(self, name), f"Section: {name}", positive=True)
-        for name in ("rhoA", "rhoI", "depth"):
-            require_number(getattr(self, name), f"Section: {name}", at_least=0.0)
         if self.depth == 0.0:
             object.__setattr__(self, "depth", math.sqrt(12 * self.EI / self.EA))
-        if self.fibres is not None:
-            require_kind(self.fibres, PlacedFibres, "Section: fibres")
-        laws = {name: getattr(self, name) for name in ("axial", "shear", "bending", "hinge")}
-        for name, law in laws.items():
-            if law is not None:
-                if name == "hinge":
-                    require_kind(law, Softening, "Section: hinge")
-                else:
-                    require_bulk_law(law, f"Section: {name}")
-                if self.fibres is not None:
-                    raise SceneError(
-                        f"Section: a law {name} beside fibres; the fibres bear N and M, shear is "
-                        "elastic"
-                    )
+        laws = [n for n in ("axial", "shear", "bending", "hinge") if getattr(self, n) is not None]
+        if laws and self.fibres is not None:
+            raise SceneError(
+                f"Section: a law {laws[0]} beside fibres; the fibres bear N and M, shear is elastic"
+            )
 
-    def layout(self, hinge: Softening | None) -> Layout | None:
+    def layout(self, hinge: AnySoftening | None) -> Layout | None:
         """Material points of a cell with a hinge of this law; none if the cell is elastic."""
         if self.fibres is not None:
             return self.fibres.layout(self.GA)
         stiffness = np.array([self.EA, self.GA, self.EI])
         laws = [self.axial, self.shear, self.bending]
-        if hinge is not None and not hinge.opens:
+        if hinge is not None and hinge.opens:
+            laws[2] = self.bending or Hardening(limit=math.inf)
+        else:
             hinge = None
-        if hinge is not None and self.bending is None:
-            laws[2] = Hardening(limit=math.inf)
         here = np.array([law is not None for law in laws])
         if not here.any():
             return None
@@ -120,18 +108,9 @@ class Section:
 
     @classmethod
     def of_shape(
-        cls,
-        *,
-        A: float,
-        I: float,
-        E: float,
-        nu: float,
-        rho: float | None,
-        shear_factor: float,
-        depth: float,
-        fibres: PlacedFibres | None = None,
-        **laws: Any,
-    ) -> Section:
+        cls, *, A: float, I: float, E: float, nu: float, rho: float | None, shear_factor: float,
+        depth: float, fibres: PlacedFibres | None = None, **laws: Any,
+    ) -> Section:  # fmt: skip
         """Homogeneous isotropic section of a given shape.
 
         Args:
@@ -145,8 +124,7 @@ class Section:
             fibres: Fibres; their sums are then EA and EI.
             laws: ``axial``, ``shear``, ``bending`` and ``hinge`` of :class:`Section`.
         """
-        for name, value in (("A", A), ("I", I), ("E", E), ("shear_factor", shear_factor)):
-            require_number(value, f"Section: {name}", positive=True)
+        _require_positive("Section", A=A, I=I, E=E, shear_factor=shear_factor)
         require_number(depth, "Section: depth", at_least=0.0)
         if rho is not None:
             require_number(rho, "Section: rho", at_least=0.0)
@@ -162,16 +140,9 @@ class Section:
 
     @classmethod
     def of_fibres(
-        cls,
-        y: Sequence[float],
-        A: Sequence[float],
-        *,
-        E: float,
-        nu: float,
-        fibres: Fibres,
-        rho: float | None = None,
-        shear_factor: float = 5 / 6,
-    ) -> Section:
+        cls, y: Sequence[float], A: Sequence[float], *, E: float, nu: float, fibres: Fibres,
+        rho: float | None = None, shear_factor: float = 5 / 6,
+    ) -> Section:  # fmt: skip
         """Fibres of areas ``A`` (m²) at distances ``y`` (m) from any line along the beam.
 
         The axis of the beam runs through their centroid.
@@ -190,20 +161,12 @@ class Section:
 
     @classmethod
     def rectangle(
-        cls,
-        b: float,
-        h: float,
-        *,
-        E: float,
-        nu: float,
-        rho: float | None = None,
-        shear_factor: float = 5 / 6,
-        fibres: Fibres | None = None,
-        **laws: Any,
-    ) -> Section:
+        cls, b: float, h: float, *, E: float, nu: float, rho: float | None = None,
+        shear_factor: float = 5 / 6, fibres: Fibres | None = None, **laws: Any,
+    ) -> Section:  # fmt: skip
         """Rectangle of width ``b`` and depth ``h`` (in the plane of motion); m."""
-        _positive("rectangle", b=b, h=h)
-        placed = _place(fibres, E, h, *_below_in_rectangle(b, h))
+        _require_positive("Section.rectangle", b=b, h=h)
+        placed = PlacedFibres.layers(fibres, E, h, lambda y: _below_in_rectangle(y, b, h))
         return cls.of_shape(
             A=b * h, I=b * h**3 / 12, E=E, nu=nu, rho=rho,
             shear_factor=shear_factor, depth=h, fibres=placed, **laws,
@@ -211,19 +174,12 @@ class Section:
 
     @classmethod
     def circle(
-        cls,
-        d: float,
-        *,
-        E: float,
-        nu: float,
-        rho: float | None = None,
-        shear_factor: float = 9 / 10,
-        fibres: Fibres | None = None,
-        **laws: Any,
-    ) -> Section:
+        cls, d: float, *, E: float, nu: float, rho: float | None = None,
+        shear_factor: float = 9 / 10, fibres: Fibres | None = None, **laws: Any,
+    ) -> Section:  # fmt: skip
         """Solid circle of diameter ``d``; m."""
-        _positive("circle", d=d)
-        placed = _place(fibres, E, d, *_below_in_circle(d))
+        _require_positive("Section.circle", d=d)
+        placed = PlacedFibres.layers(fibres, E, d, lambda y: _below_in_circle(y, d))
         return cls.of_shape(
             A=math.pi * d**2 / 4, I=math.pi * d**4 / 64, E=E, nu=nu, rho=rho,
             shear_factor=shear_factor, depth=d, fibres=placed, **laws,
@@ -231,28 +187,20 @@ class Section:
 
     @classmethod
     def tube(
-        cls,
-        d: float,
-        t: float,
-        *,
-        E: float,
-        nu: float,
-        rho: float | None = None,
-        shear_factor: float = 1 / 2,
-        fibres: Fibres | None = None,
-        **laws: Any,
-    ) -> Section:
+        cls, d: float, t: float, *, E: float, nu: float, rho: float | None = None,
+        shear_factor: float = 1 / 2, fibres: Fibres | None = None, **laws: Any,
+    ) -> Section:  # fmt: skip
         """Circular tube of outer diameter ``d`` and wall thickness ``t``; m."""
-        _positive("tube", d=d, t=t)
+        _require_positive("Section.tube", d=d, t=t)
         if 2 * t > d:
             raise SceneError(
                 f"Section.tube: wall t = {t} m is thicker than the radius of d = {d} m"
             )
         inner = d - 2 * t
-        placed = _place(
-            fibres, E, d, *_less(_below_in_circle(d), _below_in_circle(inner)),
-            edges=(-inner / 2, inner / 2),
-        )  # fmt: skip
+        edges = (-inner / 2, inner / 2)
+        placed = PlacedFibres.layers(
+            fibres, E, d, lambda y: _below_in_circle(y, d) - _below_in_circle(y, inner), edges
+        )
         return cls.of_shape(
             A=math.pi * (d**2 - inner**2) / 4, I=math.pi * (d**4 - inner**4) / 64,
             E=E, nu=nu, rho=rho, shear_factor=shear_factor, depth=d, fibres=placed, **laws,
@@ -260,23 +208,14 @@ class Section:
 
     @classmethod
     def i_shape(
-        cls,
-        h: float,
-        b: float,
-        tw: float,
-        tf: float,
-        *,
-        E: float,
-        nu: float,
-        rho: float | None = None,
-        fibres: Fibres | None = None,
-        **laws: Any,
-    ) -> Section:
+        cls, h: float, b: float, tw: float, tf: float, *, E: float, nu: float,
+        rho: float | None = None, fibres: Fibres | None = None, **laws: Any,
+    ) -> Section:  # fmt: skip
         """Doubly symmetric I of depth ``h``, width ``b``, web ``tw`` and flanges ``tf``; m.
 
         Bends about its strong axis; the web between the mid-planes of the flanges carries shear.
         """
-        _positive("i_shape", h=h, b=b, tw=tw, tf=tf)
+        _require_positive("Section.i_shape", h=h, b=b, tw=tw, tf=tf)
         if 2 * tf >= h or tw > b:
             raise SceneError(
                 f"Section.i_shape: web and flanges do not fit: h = {h}, b = {b}, tw = {tw}, "
@@ -284,8 +223,9 @@ class Section:
             )
         web = h - 2 * tf
         A = 2 * b * tf + tw * web
-        placed = _place(
-            fibres, E, h, *_less(_below_in_rectangle(b, h), _below_in_rectangle(b - tw, web)),
+        placed = PlacedFibres.layers(
+            fibres, E, h,
+            lambda y: _below_in_rectangle(y, b, h) - _below_in_rectangle(y, b - tw, web),
             edges=(-web / 2, web / 2),
         )  # fmt: skip
         return cls.of_shape(
@@ -294,52 +234,21 @@ class Section:
         )  # fmt: skip
 
 
-def _below_in_rectangle(b: float, h: float) -> tuple[Integral, Integral]:
-    """Area below y, and its first moment."""
-
-    def inside(y: Array) -> Array:
-        return np.asarray(np.clip(y, -h / 2, h / 2))
-
-    return lambda y: b * inside(y), lambda y: b * inside(y) ** 2 / 2
+def _below_in_rectangle(y: Array, b: float, h: float) -> Array:
+    """Area below y, and its first moment; (2, n)."""
+    y = np.clip(y, -h / 2, h / 2)
+    return np.array([b * y, b * y**2 / 2])
 
 
-def _below_in_circle(d: float) -> tuple[Integral, Integral]:
-    """Area below y, and its first moment."""
+def _below_in_circle(y: Array, d: float) -> Array:
+    """Area below y, and its first moment; (2, n)."""
     r = d / 2
-
-    def half_chord(y: Array) -> Array:
-        return np.asarray(np.sqrt(np.maximum(r**2 - y**2, 0.0)))
-
-    def area(y: Array) -> Array:
-        y = np.clip(y, -r, r)
-        return np.asarray(y * half_chord(y) + (r**2 * np.arcsin(y / r) if r else 0.0))
-
-    return area, lambda y: -2 / 3 * half_chord(y) ** 3
+    y = np.clip(y, -r, r)
+    half_chord = np.sqrt(r**2 - y**2)
+    area = y * half_chord + (r**2 * np.arcsin(y / r) if r else 0.0)
+    return np.array([area, -2 / 3 * half_chord**3])
 
 
-def _less(
-    outer: tuple[Integral, Integral], inner: tuple[Integral, Integral]
-) -> tuple[Integral, Integral]:
-    """A shape with a hole."""
-    (A, S), (a, s) = outer, inner
-    return lambda y: A(y) - a(y), lambda y: S(y) - s(y)
-
-
-def _place(
-    fibres: Fibres | None,
-    E: float,
-    h: float,
-    area: Integral,
-    first_moment: Integral,
-    edges: Sequence[float] = (),
-) -> PlacedFibres | None:
-    if fibres is None:
-        return None
-    require_kind(fibres, Fibres, "Section: fibres")
-    require_number(E, "Section: E", positive=True)
-    return PlacedFibres.layers(fibres, E, h, area, first_moment, edges)
-
-
-def _positive(shape: str, **sizes: float) -> None:
-    for name, value in sizes.items():
-        require_number(value, f"Section.{shape}: {name}", positive=True)
+def _require_positive(owner: str, **numbers: float) -> None:
+    for name, value in numbers.items():
+        require_number(value, f"{owner}: {name}", positive=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Supports: what is held or moved in a given way at a place."""
+"""Supports: components of motion of a place that are held or prescribed."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from ufl_beam.model.curves import Point
 from ufl_beam.model.time_functions import Constant, TimeFunction, require_time_function
 
 COMPONENTS = ("u", "v", "psi")
+
+Motion = float | TimeFunction
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,19 +97,13 @@ def Roller(place: Anchor, *, along: Point = (1.0, 0.0)) -> Support:
     x, y = require_vector(along, f"Roller at {place}: along")
     if x == y == 0.0:
         raise SceneError(f"Roller at {place}: along = (0, 0) is no direction")
-    if y == 0.0:
-        return Support("Roller", place, {1: still})
-    if x == 0.0:
-        return Support("Roller", place, {0: still})
+    if x == 0.0 or y == 0.0:
+        return Support("Roller", place, {1 if y == 0.0 else 0: still})
     return Support("Roller", place, {1: still}, math.atan2(y, x))
 
 
 def Prescribed(
-    place: Anchor,
-    *,
-    u: float | TimeFunction | None = None,
-    v: float | TimeFunction | None = None,
-    psi: float | TimeFunction | None = None,
+    place: Anchor, *, u: Motion | None = None, v: Motion | None = None, psi: Motion | None = None
 ) -> Support:
     """Prescribed motion of a place by numbers or functions of time; m, m, rad.
 
@@ -120,14 +116,11 @@ def Prescribed(
         >>> np.allclose(run.position(beam.end)[-1], (0, 2))
         True
     """
-    held = {
-        component: value if callable(value) else _constant(value, place, component)
-        for component, value in enumerate((u, v, psi))
-        if value is not None
-    }
+    held: dict[int, TimeFunction] = {}
+    for component, value in enumerate((u, v, psi)):
+        if callable(value):
+            held[component] = value
+        elif value is not None:
+            number = require_number(value, f"Prescribed at {place}: {COMPONENTS[component]}")
+            held[component] = Constant(number) if number else still
     return Support("Prescribed", place, held)
-
-
-def _constant(value: float, place: Anchor, component: int) -> TimeFunction:
-    require_number(value, f"Prescribed at {place}: {COMPONENTS[component]}")
-    return still if value == 0 else Constant(float(value))

@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
 
@@ -65,15 +66,15 @@ class Table:
 
     def __post_init__(self) -> None:
         for name in ("times", "values"):
-            object.__setattr__(self, name, require_sequence(getattr(self, name), f"Table: {name}"))
+            numbers = require_sequence(getattr(self, name), f"Table: {name}")
+            object.__setattr__(self, name, numbers)
+            for i, number in enumerate(numbers):
+                require_number(number, f"Table: {name}[{i}]")
         if len(self.times) != len(self.values) or len(self.times) < 1:
             raise SceneError(
                 f"Table: {len(self.times)} times and {len(self.values)} values; "
                 "give as many of each"
             )
-        for kind, numbers in (("times", self.times), ("values", self.values)):
-            for i, number in enumerate(numbers):
-                require_number(number, f"Table: {kind}[{i}]")
         for i, (before, after) in enumerate(pairwise(self.times)):
             if after <= before:
                 raise SceneError(
@@ -94,9 +95,7 @@ class Table:
 def require_time_function(function: TimeFunction, what: str) -> None:
     """Raise :class:`SceneError` naming ``what`` unless ``function`` gives a number at t = 0."""
     if not callable(function):
-        raise SceneError(
-            f"{what}: time = {shorten(function)} must be a function of t, such as ub.Table"
-        )
+        raise SceneError(f"{what} = {shorten(function)} must be a function of t, such as ub.Table")
     try:
         value = function(0.0)
     except Exception as error:
@@ -104,6 +103,10 @@ def require_time_function(function: TimeFunction, what: str) -> None:
     number = require_returned(value, f"{what}: the time function", "t = 0")
     if not math.isfinite(number):
         raise SceneError(f"{what}: the time function is {number} at t = 0")
+
+
+Timed = Annotated[TimeFunction, require_time_function]
+"""Field of a record with a time function."""
 
 
 def value_at(function: TimeFunction, t: float, owner: object) -> float:

@@ -10,7 +10,7 @@ from typing import Any
 
 from ufl_beam.arrays import State
 from ufl_beam.errors import SceneError
-from ufl_beam.output.output_files import replace_file, require_writable
+from ufl_beam.output.output_files import failure, put_in_place, require_writable
 
 
 def above(prefix: str, content: Mapping[str, Any]) -> dict[str, Any]:
@@ -27,15 +27,18 @@ def below(prefix: str, content: Mapping[str, Any]) -> dict[str, Any]:
 def write(path: Path, format: str, text: Mapping[str, Any], arrays: State) -> None:
     """Write a file; there is always a whole one, the new or the one before.
 
-    The ``format`` is what it is and the number of its version: "solution of ufl_beam, 1".
+    The ``format`` names the content and its version: "solution of ufl_beam, 1".
     """
     require_writable(path)
     encoded = json.dumps({**text, "arrays": [*arrays]})
-    replace_file(path, image_of(format, {"text": encoded, **arrays}))
+    try:
+        put_in_place(path, image_of(format, {"text": encoded, **arrays}))
+    except OSError as error:
+        raise failure(error, path) from None
 
 
 def image_of(format: str, content: Mapping[str, Any]) -> bytes:
-    """Return an HDF5 file, made in memory: HDF5 dies of a full disk."""
+    """Return an HDF5 file, made in memory because HDF5 crashes when a disk is full."""
     import h5py
 
     with h5py.File("archive", "w", driver="core", backing_store=False) as file:

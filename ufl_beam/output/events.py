@@ -16,14 +16,15 @@ from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import Coulomb, Stop
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.plastic_hinges import law_of
-from ufl_beam.output.recorders import RecordedState, Recorder
+from ufl_beam.output.recorders import Recorder
+from ufl_beam.output.state_view import StateView
 from ufl_beam.parameter import TIME, Parameter
 
 Flags = npt.NDArray[np.bool_]
 
 IN_CELLS = ("yields", "opens", "is free")  # once in a cell; hinges and cracks open and end
-BETWEEN = {Stop: ("touches", "lets go"), Coulomb: ("slides", "sticks")}  # with their ends
-KINDS = (*IN_CELLS, *(kind for pair in BETWEEN.values() for kind in pair))  # all events
+OF_CONNECTORS = {Stop: ("touches", "lets go"), Coulomb: ("slides", "sticks")}  # with their ends
+KINDS = (*IN_CELLS, *(kind for pair in OF_CONNECTORS.values() for kind in pair))  # all events
 Row = tuple[float, int, str]  # time, number of the cell or connector, what
 BROKEN_PART = 0.999  # part of the energy of a hinge after which it is called a joint
 
@@ -80,12 +81,12 @@ class Events(Recorder):
         self.found: list[Event] = []
         self._rows: list[Row] = []
 
-    def open(self, simulation: RecordedState) -> None:
+    def open(self, simulation: StateView) -> None:
         """Take note of the initial state."""
         self.found, self._rows = [], []
         self._watch(simulation)
 
-    def _watch(self, simulation: RecordedState) -> None:
+    def _watch(self, simulation: StateView) -> None:
         """Find the events that a scene may have, and those before the run."""
         grid = simulation.grid
         in_cells = [law for beam in simulation.scene.beams for law in grid.hinges(beam)]
@@ -95,11 +96,11 @@ class Events(Recorder):
         self._enough = np.where(breaking, BROKEN_PART * energies, np.inf)
         self._breaks = np.isfinite(energies)
         links = simulation.scene.links
-        self._links = [i for i, link in enumerate(links) if type(link.law) in BETWEEN]
-        self._flags = self._look(simulation)
+        self._links = [i for i, link in enumerate(links) if type(link.law) in OF_CONNECTORS]
+        self._in_cells, self._on = self._look(simulation)
 
-    def _look(self, simulation: RecordedState) -> tuple[Flags, list[bool]]:
-        """Return the events of each cell and hinge, and the state of each connector."""
+    def _look(self, simulation: StateView) -> tuple[Flags, Flags]:
+        """Return the events of each cell and hinge, (n, 3), and which connectors touch or slide."""
         in_cells = np.zeros((len(self._enough), len(IN_CELLS)), dtype=bool)
         for cells, rows in simulation.material():
             plastic, broken = rows[:, 4], rows[:, 5]
@@ -111,30 +112,27 @@ class Events(Recorder):
             happened = ((lost > 0) & ~breaks, (lost > 0) & breaks, lost >= self._enough[hinges])
             in_cells[hinges] = np.column_stack(happened)
         if not self._links:
-            return in_cells, []
+            return in_cells, np.zeros(0, dtype=bool)
         forces = np.abs(simulation.connections()[self._links, 1])
         # Forces above which they touch, or slide; the limit of friction is known to some digits
         links = (simulation.scene.links[link] for link in self._links)
         limits = [(1 - 1e-9) * simulation.asked.get(link, 0.0) for link in links]
-        return in_cells, [bool(goes_on) for goes_on in forces > limits]
+        return in_cells, np.asarray(forces > limits)
 
-    def write(self, simulation: RecordedState) -> None:
+    def write(self, simulation: StateView) -> None:
         """Note the changes of a step."""
-        flags = self._look(simulation)
-        (cells, goes_on), (cells_before, went_on) = flags, self._flags
-        self._flags = flags
-        new: list[Row] = []
-        for cell, n in np.argwhere(cells & ~cells_before):
-            new.append((simulation.t, int(cell), IN_CELLS[n]))
-        for link, now, before in zip(self._links, goes_on, went_on, strict=True):
-            if now != before:
-                begins, ends = BETWEEN[type(simulation.scene.links[link].law)]
-                new.append((simulation.t, link, begins if now else ends))
+        (in_cells, on), t = self._look(simulation), simulation.t
+        changes = np.argwhere(in_cells & ~self._in_cells)
+        new = [(t, int(cell), IN_CELLS[n]) for cell, n in changes]
+        for k in np.flatnonzero(on != self._on):
+            begins, ends = OF_CONNECTORS[type(simulation.scene.links[self._links[k]].law)]
+            new.append((t, self._links[k], begins if on[k] else ends))
+        self._in_cells, self._on = in_cells, on
         events = self._add(simulation, new)
         if events:
             on_first(simulation.comm, lambda: [self._tell(event) for event in events])
 
-    def _add(self, simulation: RecordedState, rows: list[Row]) -> list[Event]:
+    def _add(self, simulation: StateView, rows: list[Row]) -> list[Event]:
         links, grid = simulation.scene.links, simulation.grid
         named = simulation.parameter
         events = [
@@ -149,7 +147,7 @@ class Events(Recorder):
         """Return the events so far: time, number of the cell or connector, and kind."""
         return {"events": np.array([(t, n, KINDS.index(what)) for t, n, what in self._rows])}
 
-    def resume(self, simulation: RecordedState, state: State) -> None:
+    def resume(self, simulation: StateView, state: State) -> None:
         """Go on after the events of a :meth:`state`."""
         self.found, self._rows = [], []
         self._add(simulation, [(float(t), int(n), KINDS[int(k)]) for t, n, k in state["events"]])

@@ -11,7 +11,8 @@ from ufl_beam.arrays import Array, Index, State
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import Body, Member
-from ufl_beam.output.recorders import RecordedState, Recorder
+from ufl_beam.output.recorders import Recorder
+from ufl_beam.output.state_view import StateView
 
 
 class Extent(NamedTuple):
@@ -68,12 +69,12 @@ class Extremes(Recorder):
         [-175000. -125000.  -75000.  -25000.]
     """
 
-    def open(self, simulation: RecordedState) -> None:
+    def open(self, simulation: StateView) -> None:
         """Begin with the initial state."""
         self._grid: Grid = simulation.grid
         self._forces, self._q = (Extent.around(x, simulation.t) for x in _state(simulation))
 
-    def write(self, simulation: RecordedState) -> None:
+    def write(self, simulation: StateView) -> None:
         """Take in the state of a step."""
         for extent, values in zip((self._forces, self._q), _state(simulation), strict=True):
             extent.widen(values, simulation.t)
@@ -83,7 +84,7 @@ class Extremes(Recorder):
         extents = ("forces", self._forces), ("q", self._q)
         return {f"{of} {name}": x for of, extent in extents for name, x in extent._asdict().items()}
 
-    def resume(self, simulation: RecordedState, state: State) -> None:
+    def resume(self, simulation: StateView, state: State) -> None:
         """Go on after a :meth:`state`."""
         self._grid = simulation.grid
         self._forces, self._q = (
@@ -121,6 +122,6 @@ class Extremes(Recorder):
         return self._q.of(dofs)
 
 
-def _state(simulation: RecordedState) -> tuple[Array, Array]:
+def _state(simulation: StateView) -> tuple[Array, Array]:
     """Section forces of all cells, and the configuration, the same on every process."""
     return simulation.section_forces(), simulation.share.gather(simulation.q)

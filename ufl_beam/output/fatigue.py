@@ -13,8 +13,9 @@ from ufl_beam.arrays import Array, State
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import SceneError, require_kind, require_number, require_sequence
 from ufl_beam.model.bodies import Place
-from ufl_beam.output.rainflow import Cycles, RainflowCounter, SNCurve, library
-from ufl_beam.output.recorders import RecordedState, Recorder
+from ufl_beam.output.rainflow import Cycles, RainflowCounter, SNCurve
+from ufl_beam.output.recorders import Recorder
+from ufl_beam.output.state_view import StateView
 
 BLOCK = 1000  # steps that are collected before their cycles are counted
 
@@ -81,7 +82,6 @@ class Fatigue(Recorder):
 
     Raises:
         SceneError: A spot or the curve is none, or the resolution is not positive.
-        ImportError: The package `rainflow`, which counts, is missing.
 
     Example:
         >>> spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
@@ -102,12 +102,11 @@ class Fatigue(Recorder):
             require_kind(spot, HotSpot, f"Fatigue: spots[{i}]")
         require_kind(curve, SNCurve, "Fatigue: curve")
         require_number(resolution, "Fatigue: resolution", at_least=0.0)
-        library()
         self.curve = curve
         self._resolution = resolution or curve.range / 100
         self._counters: dict[HotSpot, RainflowCounter] = {}
 
-    def open(self, simulation: RecordedState) -> None:
+    def open(self, simulation: StateView) -> None:
         """Begin to count, with the initial state."""
         self._prepare(simulation.grid)
         self._begin = simulation.t
@@ -116,30 +115,29 @@ class Fatigue(Recorder):
 
     def _prepare(self, grid: Grid) -> None:
         self._cells = np.array([grid.cell(spot.place) for spot in self.spots], dtype=np.int64)
-        self._arms = [_arm(grid, spot.place) for spot in self.spots]
+        self._offsets = [_offset(grid, spot.place) for spot in self.spots]
         self._counters = {spot: RainflowCounter(self._resolution) for spot in self.spots}
-        self._block, self._filled = np.empty((len(self.spots), 3, BLOCK)), 0
+        self._block: list[Array] = []
 
-    def write(self, simulation: RecordedState) -> None:
+    def write(self, simulation: StateView) -> None:
         """Note the section forces, and count now and then."""
-        self._block[..., self._filled] = simulation.section_forces()[self._cells]
-        self._filled += 1
+        self._block.append(simulation.section_forces()[self._cells])
         self._end = simulation.t
-        if self._filled == BLOCK:
+        if len(self._block) == BLOCK:
             self._count()
 
     def _count(self) -> None:
-        filled, self._filled = self._filled, 0
-        for spot, arm, forces in zip(self.spots, self._arms, list(self._block), strict=True):
-            N, V, M = (forces[i, :filled] for i in range(3))
-            stress = np.asarray(spot.stress(N, V, M - arm * V), dtype=np.float64)
+        forces, self._block = np.stack(self._block, axis=-1), []
+        for k, spot in enumerate(self.spots):
+            N, V, M = (forces[k, i] for i in range(3))
+            stress = np.asarray(spot.stress(N, V, M - self._offsets[k] * V), dtype=np.float64)
             if stress.shape != N.shape or not np.isfinite(stress).all():
                 raise SceneError(f"HotSpot {spot}: stress(N, V, M) must be a finite number each")
             self._counters[spot].add(stress)
 
     def close(self) -> None:
         """Count the steps that are left."""
-        if self._counters and self._filled:
+        if self._counters and self._block:
             self._count()
 
     def state(self) -> State:
@@ -150,7 +148,7 @@ class Fatigue(Recorder):
             state[f"counted {i}"], state[f"waiting {i}"] = counter.state()
         return state
 
-    def resume(self, simulation: RecordedState, state: State) -> None:
+    def resume(self, simulation: StateView, state: State) -> None:
         """Go on after a :meth:`state`."""
         self._prepare(simulation.grid)
         self._begin, self._end = map(float, state["duration"])
@@ -193,7 +191,7 @@ class Fatigue(Recorder):
         return "\n".join(lines)
 
 
-def _arm(grid: Grid, place: Place) -> float:
+def _offset(grid: Grid, place: Place) -> float:
     """Distance of a place from the middle of its cell, positive towards the end; m."""
     nodes, weights = grid.weights(place)
     start, end = grid.points[nodes[:2]]

@@ -14,13 +14,14 @@ import numpy as np
 from ufl_beam.arrays import State
 from ufl_beam.collective_errors import on_first
 from ufl_beam.errors import SceneError, require_count, require_kind, require_sequence
-from ufl_beam.model.bodies import Anchor, require_anchor
+from ufl_beam.model.bodies import Anchor, require_anchors
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.joint_histories import links_of, motion_of
 from ufl_beam.output.output_files import OutputFile, require_path
-from ufl_beam.output.recorders import RecordedState, Recorder
+from ufl_beam.output.recorders import Recorder
+from ufl_beam.output.state_view import StateView
 
 MOTION = (("u", "m"), ("v", "m"), ("psi", "rad"))  # columns of a place, and their units
 CONNECTOR = ("motion", "force", "work")  # columns of a connector
@@ -69,7 +70,7 @@ class History(Recorder):
         self._places = require_sequence(places, f"History {path}: places")
         self._connectors = require_sequence(connectors, f"History {path}: connectors")
         for i, place in enumerate(self._places):
-            require_anchor(place, f"History {path}: places[{i}]")
+            require_anchors(f"History {path}: places[{i}]", place)
         for i, one in enumerate(self._connectors):
             require_kind(one, (Connector, Joint), f"History {path}: connectors[{i}]")
         self._files: list[OutputFile] = []
@@ -79,15 +80,14 @@ class History(Recorder):
         """Path of the file, and if rows may go that of the one that takes its place."""
         return (self._path,) if self._most == sys.maxsize else (self._path, self._part)
 
-    def open(self, simulation: RecordedState) -> None:
+    def open(self, simulation: StateView) -> None:
         """Write the header and the initial state."""
         self._prepare(simulation)
         row = self._row(simulation)
-        self._every, self._steps, self._rows = self._first_every, 0, 0
+        self._every, self._steps = self._first_every, 0
         on_first(simulation.comm, lambda: self._begin(self._path, self._header + row))
 
-    def _prepare(self, simulation: RecordedState) -> None:
-        """Note the objects that are followed, and the header."""
+    def _prepare(self, simulation: StateView) -> None:
         self._comm = simulation.comm
         self._links = {
             link: name
@@ -99,7 +99,7 @@ class History(Recorder):
             turns = simulation.scene.links[link].turns
             units = ("rad", "N m", "J") if turns else ("m", "N", "J")
             names += [f"{c} {name} [{unit}]" for c, unit in zip(CONNECTOR, units, strict=True)]
-        energies = (f"{name} [J]" for name in simulation.ledger_names())
+        energies = (f"{name} [J]" for group in simulation.entries() for name in group)
         self._header = _line([simulation.parameter.column, *names, *energies])
 
     def _begin(self, path: Path, content: bytes) -> None:
@@ -112,19 +112,15 @@ class History(Recorder):
         self._files[0].put(self._length, line)
         self._length += len(line)
 
-    def write(self, simulation: RecordedState) -> None:
+    def write(self, simulation: StateView) -> None:
         """Write the row of the state, every so many steps."""
         self._steps += 1
-        if self._steps % self._every:
-            return
-        if self._rows == self._most:
+        if self._steps == (self._most + 1) * self._every:
             on_first(simulation.comm, self._thin)
-            self._rows, self._every = self._rows // 2, 2 * self._every
-            if self._steps % self._every:
-                return
-        row = self._row(simulation)
-        self._rows += 1
-        on_first(simulation.comm, lambda: self._append(row))
+            self._every *= 2
+        if self._steps % self._every == 0:
+            row = self._row(simulation)
+            on_first(simulation.comm, lambda: self._append(row))
 
     def _thin(self) -> None:
         """Leave out every other row; at no time is there less than one whole file."""
@@ -132,21 +128,20 @@ class History(Recorder):
         self._begin(self._part, self._header + b"".join(rows[::2]))
         self._files[0].rename(self._path)
 
-    def _row(self, simulation: RecordedState) -> bytes:
+    def _row(self, simulation: StateView) -> bytes:
         q = simulation.share.gather(simulation.q)
         motion = [motion_of(simulation.grid, place, [q])[0] for place in self._places]
         links = list(self._links)
         connections = simulation.connections()[links, :3] if links else ()
-        entries = {name: e for group in simulation.entries() for name, e in group.items()}
-        energies = [entries[name] for name in simulation.ledger_names()]
+        energies = [energy for group in simulation.entries() for energy in group.values()]
         numbers = (simulation.t, *np.ravel(motion), *np.ravel(connections), *energies)
         return _line([repr(float(x)) for x in numbers])
 
     def state(self) -> State:
         """Return the length of the file, and the whole of it where rows may go again."""
         on_first(self._comm, self._sync)
-        counts = np.array([self._every, self._steps, self._rows, 0], dtype=float)
-        content = b""
+        rows = self._steps // self._every
+        counts, content = np.array([self._every, self._steps, rows, 0], dtype=float), b""
         for file in self._files:
             counts[3] = self._length
             if self._most < sys.maxsize:
@@ -157,10 +152,10 @@ class History(Recorder):
         for file in self._files:
             file.sync()
 
-    def resume(self, simulation: RecordedState, state: State) -> None:
+    def resume(self, simulation: StateView, state: State) -> None:
         """Cut off what was written after the state, and append."""
         self._prepare(simulation)
-        self._every, self._steps, self._rows, length = map(int, state["counts"])
+        self._every, self._steps, _, length = map(int, state["counts"])
         on_first(simulation.comm, lambda: self._take_back(state["content"].tobytes(), length))
 
     def _take_back(self, content: bytes, length: int) -> None:

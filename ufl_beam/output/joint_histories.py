@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,22 +17,6 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import nearest, parameter_step, tangent
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
-
-
-class Motion(Protocol):
-    """The motion of a scene at some times, such as a :class:`Solution`."""
-
-    scene: Scene
-
-    @property
-    def times(self) -> Array:
-        """Times that were kept; (n+1,); s."""
-
-    def displacement(self, place: Anchor) -> Array:
-        """Return (u, v, ψ) of a place; (n+1, 3); m, m, rad."""
-
-    def position(self, place: Anchor) -> Array:
-        """Return (x, y) of a place; (n+1, 2); m."""
 
 
 class Connection(NamedTuple):
@@ -126,16 +110,23 @@ def _of_node(grid: Grid, place: Anchor, states: Sequence[Array]) -> Array:
     return np.array([weights @ x[dofs] for x in states])
 
 
-def of_joint(solution: Motion, joint: Joint, forces: Array) -> JointHistory:
-    """History of a joint, from the forces of all links of the scene; (n+1, num_links)."""
-    scene = solution.scene
+def position_of(grid: Grid, place: Anchor, states: Sequence[Array]) -> Array:
+    """Coordinates of a place in configurations of the grid; (n, 2); m."""
+    if isinstance(place, Spot):
+        return np.asarray(place.point + motion_of(grid, place, states)[:, :2])
+    nodes, weights = grid.weights(place)
+    return np.asarray(weights @ grid.points[nodes] + motion_of(grid, place, states)[:, :2])
+
+
+def of_joint(grid: Grid, joint: Joint, states: Sequence[Array], forces: Array) -> JointHistory:
+    """History of a joint, from configurations and the forces of all links; (n+1, num_links)."""
     a, b, *_ = joint.places
-    turns = [solution.displacement(place)[:, 2] for place in (a, b)]
+    turns = [motion_of(grid, place, states)[:, 2] for place in (a, b)]
+    between = position_of(grid, b, states) - position_of(grid, a, states)
     apart = np.subtract(b.point, a.point)
-    between = solution.position(b) - solution.position(a)
     motion = np.column_stack([turned(between, -turns[0]) - apart, turns[1] - turns[0]])
-    force, moment = np.zeros((len(solution.times), 2)), np.zeros(len(solution.times))
-    numbers = links_of(scene, joint)
+    force, moment = np.zeros((len(states), 2)), np.zeros(len(states))
+    numbers = links_of(grid.scene, joint)
     if not any({holder.a, holder.b} == {a, b} for holder in joint.holders):
         raise SceneError(
             f"{joint}: {a} and {b} share unknowns, so that the force between them is not known; "
@@ -150,18 +141,18 @@ def of_joint(solution: Motion, joint: Joint, forces: Array) -> JointHistory:
         if holder.turns:
             moment -= λ
         else:
-            force -= λ[:, None] * _direction(solution, holder, turns[0])
+            force -= λ[:, None] * _direction(grid, holder, states, turns[0])
     return JointHistory(motion, force, turned(force, -turns[0]), turned(force, -turns[1]), moment)
 
 
-def _direction(solution: Motion, holder: Connector, turn: Array) -> Array:
+def _direction(grid: Grid, holder: Connector, states: Sequence[Array], turn: Array) -> Array:
     """Unit vectors in the plane along which a motion grows; (n+1, 2)."""
     if holder.stretches:
-        between = solution.position(holder.b) - solution.position(holder.a)
+        between = position_of(grid, holder.b, states) - position_of(grid, holder.a, states)
         return np.asarray(between / np.linalg.norm(between, axis=1)[:, None])
     if isinstance(holder.law, Guide):
-        curve, s, size, normals = holder.law.curve, 0.0, solution.scene.size, []
-        for point in solution.position(holder.b):
+        curve, s, size, normals = holder.law.curve, 0.0, grid.scene.size, []
+        for point in position_of(grid, holder.b, states):
             step = parameter_step(curve, s, size)
             s = nearest(curve, point, s, step, size)
             x, y = tangent(curve, s, step)

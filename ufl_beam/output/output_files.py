@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from ufl_beam.errors import SceneError, shorten
+from ufl_beam.file_locks import is_at
 
 Output = tuple[str, tuple[Path, ...]]  # name of a writer in messages, and the files that it writes
 _in_use: list[Output] = []  # outputs of the runs that go on in this process, the outer ones first
@@ -71,7 +72,7 @@ def _identities(path: Path) -> list[object]:
 
 
 def take(outputs: Iterable[Output]) -> Callable[[], None]:
-    """Keep runs within this one from writing its files, until the function returned is called."""
+    """Reserve the files of a run against runs within it; return the function that frees them."""
     taken = list(outputs)
     _in_use.extend(taken)
 
@@ -120,6 +121,16 @@ class OutputFile:
         if self._regular:
             os.ftruncate(self._file, length)
 
+    def allocate(self, length: int) -> None:
+        """Let the disk be full now rather than when a library writes up to a length."""
+        missing = length - self.size
+        if missing > 0 and hasattr(os, "posix_fallocate"):
+            try:
+                os.posix_fallocate(self._file, self.size, missing)
+            except OSError as error:
+                if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL):  # no such thing there
+                    raise failure(error, self.path) from None
+
     def rename(self, path: Path) -> None:
         """Move the file, in the place of another one if that exists."""
         os.replace(self.path, path)
@@ -128,7 +139,12 @@ class OutputFile:
     def sync(self) -> None:
         """Bring everything to the disk; :class:`FileNotFoundError` if the file was removed."""
         if not is_at(self._file, self.path):
-            raise removed(self.path)
+            raise FileNotFoundError(
+                errno.ENOENT,
+                f"output {self.path} was removed or replaced during the run, so that no checkpoint "
+                "can count on it; the checkpoint before is kept, and the solution so far is in the "
+                "error",
+            )
         try:
             os.fsync(self._file)
         except OSError as error:
@@ -137,24 +153,19 @@ class OutputFile:
 
     def close(self) -> None:
         """Close the file; warn if it is not where it was."""
-        file, self._file = self._file, -1
-        if file >= 0:
-            there = is_at(file, self.path)
-            os.close(file)
-            if not there:
-                warn_of_removal(self.path)
-
-
-def replace_file(path: Path, data: bytes) -> None:
-    """Write a whole file; the one before stays until the new one is on the disk."""
-    try:
-        put_in_place(path, data)
-    except OSError as error:
-        raise failure(error, path) from None
+        there = is_at(self._file, self.path)
+        os.close(self._file)
+        if not there:
+            warnings.warn(
+                f"output {self.path} was removed or replaced during the run; what was written to "
+                "it is lost",
+                RuntimeWarning,
+                stacklevel=2,
+            )
 
 
 def put_in_place(path: Path, data: bytes) -> None:
-    """Do as :func:`replace_file`, with the error of the system."""
+    """Write a whole file; the one before stays until the new one is on the disk."""
     part = path.parent / f"{path.name}.part"
     try:
         with part.open("wb") as file:
@@ -172,34 +183,8 @@ def put_in_place(path: Path, data: bytes) -> None:
         os.close(folder)
 
 
-def is_at(file: int, path: Path) -> bool:
-    """Return whether a path leads to an open file."""
-    try:
-        return os.path.samestat(os.fstat(file), os.stat(path))
-    except OSError:
-        return False
-
-
-def removed(path: Path) -> FileNotFoundError:
-    """Return the error of an output that is gone when a checkpoint is due."""
-    return FileNotFoundError(
-        errno.ENOENT,
-        f"output {path} was removed or replaced during the run, so that no checkpoint can count "
-        "on it; the checkpoint before is kept, and the solution so far is in the error",
-    )
-
-
-def warn_of_removal(path: Path) -> None:
-    """Warn that an output is not where it was."""
-    warnings.warn(
-        f"output {path} was removed or replaced during the run; what was written to it is lost",
-        RuntimeWarning,
-        stacklevel=2,
-    )
-
-
 def failure(error: OSError, path: Path) -> OSError:
-    """Return an error in writing in words: file, reason, free space, kept content."""
+    """Describe an error of writing: the file, the reason, free space, and that content is kept."""
     space = ""
     if error.errno == errno.ENOSPC and path.is_file():
         space = f" ({shutil.disk_usage(path.parent).free / 1e6:.3g} MB are free)"

@@ -5,18 +5,15 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, is_infinite, require_function, require_number, require_row
-
-Ends = tuple[float, float]  # lower and upper end of a cycle
 
 
 @dataclass(frozen=True)
@@ -180,99 +177,67 @@ class Cycles:
 
 
 def rainflow(series: npt.ArrayLike) -> Cycles:
-    """Count the rainflow cycles of a series, ASTM E1049-85; needs the package `rainflow`.
+    """Count the rainflow cycles of a series by ASTM E1049-85.
 
     Args:
         series: Stresses, or whatever goes to and fro; (n,).
 
     Raises:
         SceneError: It is not one row of finite numbers.
-        ImportError: The package is missing.
 
     Example:
         >>> cycles = ub.rainflow([0, 3, 1, 2, 0])
         >>> print(cycles.range, cycles.mean, cycles.count)
         [1. 3.] [1.5 1.5] [1. 1.]
     """
-    values = require_row(series, "rainflow: series")
-    counts: defaultdict[Ends, float] = defaultdict(float)
-    waiting = _count([float(x) for x in values], counts)
-    return _cycles(counts, waiting, 1.0)
-
-
-def _count(series: Sequence[float], counts: defaultdict[Ends, float]) -> list[float]:
-    """Add what a series counts to ``counts``; the turning points that wait for what follows.
-
-    The method of ASTM E1049 reads one point after the other, and all that it remembers is a row of
-    points between which ranges become smaller.  Taken as the beginning of what follows, they count
-    what the series would.
-    """
-    # The library leaves out series of one and of two points.
-    points = [*series, *series[-1:], *series[-1:]]
-    chain = points[:1]
-    for _, _, count, i, j in library()(points):
-        if count == 1.0:
-            counts[_ends(points[i], points[j])] += 1.0
-        else:  # each begins where the one before it ended
-            chain.append(points[j])
-    # Half cycles that grow contain the first point and are done; those that shrink are what the
-    # library finds at the end.
-    halves = list(pairwise(chain))
-    waits = max(range(len(halves)), key=lambda k: (abs(chain[k + 1] - chain[k]), k), default=0)
-    for a, b in halves[:waits]:
-        counts[_ends(a, b)] += 0.5
-    return chain[waits:]
-
-
-def _ends(a: float, b: float) -> Ends:
-    return min(a, b), max(a, b)
-
-
-def library() -> Any:
-    """Import the counting function of the package `rainflow`, which need not be installed."""
-    try:
-        from rainflow import extract_cycles
-    except ImportError as error:
-        raise ImportError(
-            "counting cycles needs the package rainflow: pip install rainflow, "
-            "or ./env with a network"
-        ) from error
-    return extract_cycles
-
-
-def _cycles(counts: Mapping[Ends, float], waiting: Sequence[float], unit: float) -> Cycles:
-    """Return the cycles counted, and half cycles between the remaining turning points."""
-    counts = defaultdict(float, counts)
-    for a, b in pairwise(waiting):
-        counts[_ends(a, b)] += 0.5
-    low, high = np.array(list(counts), dtype=float).reshape(-1, 2).T
-    count = np.array(list(counts.values()), dtype=float)
-    order = np.lexsort((low, high - low))
-    order = order[(high > low)[order]]
-    return Cycles(unit * (high - low)[order], unit / 2 * (low + high)[order], count[order])
+    counter = RainflowCounter(1.0)
+    counter.count(require_row(series, "rainflow: series"))
+    return counter.cycles()
 
 
 class RainflowCounter:
     """Rainflow counter of a series that comes in pieces, in constant memory.
 
-    Values are rounded to multiples of ``resolution`` (Pa): cycles are then counts in classes, and
-    the turning points that wait are no more than the classes.  Else it counts as :func:`rainflow`.
+    Values are rounded to multiples of ``resolution`` (Pa), so that cycles fall into classes, and no
+    more turning points wait than there are classes.
     """
 
     def __init__(self, resolution: float) -> None:
         require_number(resolution, "RainflowCounter: resolution", positive=True)
         self._resolution = resolution
-        self._counts: defaultdict[Ends, float] = defaultdict(float)
-        self._waiting: list[float] = []
+        self._counts: defaultdict[tuple[float, float], float] = defaultdict(float)  # by both ends
+        self._waiting: list[float] = []  # turning points between which ranges become smaller
 
     def add(self, series: Array) -> None:
         """Count the next piece; (n,)."""
-        levels = np.rint(series / self._resolution)
-        self._waiting = _count([*self._waiting, *map(float, levels)], self._counts)
+        self.count(np.rint(series / self._resolution))
+
+    def count(self, values: Array) -> None:
+        """Count the next values, multiples of the resolution, by the method of ASTM E1049."""
+        points = self._waiting
+        for value in map(float, values):
+            if points and value == points[-1]:
+                continue
+            if len(points) > 1 and (value > points[-1]) == (points[-1] > points[-2]):
+                points.pop()  # no turning point: the series goes on beyond it
+            points.append(value)
+            while len(points) > 2 and abs(value - points[-2]) >= abs(points[-2] - points[-3]):
+                if len(points) == 3:  # from the beginning of the series
+                    self._counts[_ends(*points[:2])] += 0.5
+                    del points[0]
+                else:
+                    self._counts[_ends(*points[-3:-1])] += 1.0
+                    del points[-3:-1]
 
     def cycles(self) -> Cycles:
-        """Return all cycles so far."""
-        return _cycles(self._counts, self._waiting, self._resolution)
+        """Return all cycles so far; between the points that wait there are half cycles."""
+        counts = self._counts.copy()
+        for a, b in pairwise(self._waiting):
+            counts[_ends(a, b)] += 0.5
+        low, high = np.array(list(counts), dtype=float).reshape(-1, 2).T
+        order, unit = np.lexsort((low, high - low)), self._resolution
+        count = np.array(list(counts.values()), dtype=float)
+        return Cycles(unit * (high - low)[order], unit / 2 * (low + high)[order], count[order])
 
     def state(self) -> tuple[Array, Array]:
         """Return ends and numbers of cycles, (n, 3), and waiting turning points, in classes."""
@@ -281,6 +246,12 @@ class RainflowCounter:
 
     def resume(self, counted: Array, waiting: Array) -> None:
         """Go on after a :meth:`state`."""
-        rows = (map(float, row) for row in counted)
-        self._counts = defaultdict(float, {(low, high): count for low, high, count in rows})
-        self._waiting = [float(level) for level in waiting]
+        self._counts.clear()
+        for low, high, count in (map(float, row) for row in counted):
+            self._counts[low, high] = count
+        self._waiting = []
+        self.count(waiting)
+
+
+def _ends(a: float, b: float) -> tuple[float, float]:
+    return min(a, b), max(a, b)

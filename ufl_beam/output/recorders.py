@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Recorders of runs: base class, protocol of the recorded state, checks."""
+"""Recorders of runs: base class and checks."""
 
 from __future__ import annotations
 
@@ -7,63 +7,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Protocol
 
 from mpi4py import MPI
 
-from ufl_beam.arrays import Array, Index, State
+from ufl_beam.arrays import State
 from ufl_beam.collective_errors import on_first
-from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import SceneError, require_kind, require_sequence
-from ufl_beam.model.connectors import Connector
-from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import Output, require_apart, require_writable
-from ufl_beam.parameter import Parameter
-
-
-class RecordedState(Protocol):
-    """State of a simulation as recorders read it; all processes call its methods together."""
-
-    scene: Scene
-    comm: MPI.Intracomm
-    grid: Grid
-    share: Share  # degrees of freedom of this process
-    t: float  # s
-    q: Array  # configuration at the local degrees of freedom
-    asked: dict[Connector, float]  # forces of controllers, and limits of friction; N or N m
-
-    @property
-    def parameter(self) -> Parameter:
-        """Words for the time."""
-
-    @property
-    def may_break(self) -> bool:
-        """True if something in the scene yields, softens or has plastic hinges."""
-
-    def velocities(self) -> list[Array]:
-        """Return velocities at the local degrees of freedom; none in statics."""
-
-    def entries(self) -> tuple[dict[str, float], ...]:
-        """Return the ledger over all processes: state, supplied, lost; J."""
-
-    def ledger_names(self) -> list[str]:
-        """Return the names of the entries of the ledger."""
-
-    def connections(self) -> Array:
-        """Return the columns of ``Connection`` for all links of the scene; (num_links, 5)."""
-
-    def hinges(self) -> Array:
-        """Return the columns of ``Connection`` for the plastic hinges; (num_hinges, 5)."""
-
-    def section_forces(self) -> Array:
-        """Return section forces (N, V, M) in all cells; (num_cells, 3); N, N, N m."""
-
-    def material(self) -> list[tuple[Index, Array]]:
-        """Return the cells that can yield or break, and their state."""
-
-    def damage(self) -> tuple[Array, Array]:
-        """Return jump of rotation (rad) and dissipated energy (J) of cells; (num_cells,) each."""
+from ufl_beam.output.state_view import StateView
 
 
 class Recorder(ABC):
@@ -71,8 +22,8 @@ class Recorder(ABC):
 
     Example:
         >>> class Speed(ub.Recorder):
-        ...     largest = 0.0
-        ...     require_writable = open = close = lambda self, *simulation: None
+        ...     def open(self, simulation):
+        ...         self.largest = 0.0
         ...     def write(self, simulation):
         ...         self.largest = max(self.largest, abs(simulation.velocity(beam.end)[1]))
         >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=Speed())
@@ -89,14 +40,14 @@ class Recorder(ABC):
             require_writable(path)
 
     @abstractmethod
-    def open(self, simulation: RecordedState) -> None:
+    def open(self, simulation: StateView) -> None:
         """Begin, with the initial state."""
 
     @abstractmethod
-    def write(self, simulation: RecordedState) -> None:
+    def write(self, simulation: StateView) -> None:
         """Record the state after a step."""
 
-    def close(self) -> None:  # noqa: B027 - not all have something to close
+    def close(self) -> None:
         """End the record; also called when the run fails."""
 
     def state(self) -> State:
@@ -110,7 +61,7 @@ class Recorder(ABC):
             "state() and resume(simulation, state), or run without a checkpoint"
         )
 
-    def resume(self, simulation: RecordedState, state: State) -> None:
+    def resume(self, simulation: StateView, state: State) -> None:
         """Go on from a :meth:`state`, in the place of :meth:`open`; nothing is recorded yet.
 
         Raises:

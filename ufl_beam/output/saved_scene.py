@@ -13,35 +13,21 @@ import warnings
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
-from types import ModuleType
-from typing import Any, NoReturn
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import Any, NoReturn, TypeVar
 
 import numpy as np
 
 from ufl_beam.errors import ModelWarning, SceneError
-from ufl_beam.model import (
-    beams,
-    bodies,
-    connector_laws,
-    connectors,
-    curves,
-    damping,
-    distributions,
-    fibres,
-    joints,
-    loads,
-    masses,
-    material_laws,
-    mesh_options,
-    scene,
-    sections,
-    supports,
-    time_functions,
-    works,
-)
+from ufl_beam.model.bodies import GROUND
+from ufl_beam.model.connector_laws import HELD
+from ufl_beam.model.curves import Point
+from ufl_beam.model.supports import still
+from ufl_beam.model.time_functions import steady
 
+T = TypeVar("T")
 Data = Any  # data of JSON
-
 Sampling = Callable[[Any, str, Any], Any]  # from record, field and function what stands for it
 SAMPLES = 1000  # intervals in which a curve is sampled
 
@@ -57,12 +43,7 @@ class SavedFunction:
     @classmethod
     def of(cls, function: Callable[[float], float], times: Iterable[float]) -> SavedFunction:
         """Sample a function, at 0 as well; where it fails it is not known."""
-        known = {}
-        for t in sorted({0.0, *times}):
-            try:
-                known[t] = float(function(t))
-            except Exception:
-                continue
+        known = _sampled(lambda t: float(function(t)), {0.0, *times})
         return cls(name_of(function), tuple(known), tuple(known.values()))
 
     def __call__(self, t: float) -> float:
@@ -82,7 +63,7 @@ class SavedCurve:
 
     name: str  # that of the function
     s: tuple[float, ...]  # ascending parameters, at least two
-    points: tuple[curves.Point, ...]  # one for each; m
+    points: tuple[Point, ...]  # one for each; m
 
     @classmethod
     def of(
@@ -90,16 +71,15 @@ class SavedCurve:
     ) -> SavedCurve:
         """Sample a curve between two parameters, and at more of them; gaps where it fails."""
         even = (first + (last - first) * k / SAMPLES for k in range(SAMPLES + 1))
-        known = {}
-        for s in sorted({*even, *more}):
-            try:
-                x, y = curve(s)
-                known[s] = float(x), float(y)
-            except Exception:
-                continue
+
+        def point(s: float) -> Point:
+            x, y = curve(s)
+            return float(x), float(y)
+
+        known = _sampled(point, {*even, *more})
         return cls(name_of(curve), tuple(known), tuple(known.values()))
 
-    def __call__(self, s: float) -> curves.Point:
+    def __call__(self, s: float) -> Point:
         """The point at a parameter; exact where it was sampled."""
         n = bisect_left(self.s, s)
         if n < len(self.s) and self.s[n] == s:
@@ -128,32 +108,33 @@ class LostFunction:
         )
 
 
+def _sampled(function: Callable[[float], T], at: Iterable[float]) -> dict[float, T]:
+    """Values of a function in ascending order, without those at which it fails."""
+    known = {}
+    for x in sorted(at):
+        try:
+            known[x] = function(x)
+        except Exception:
+            continue
+    return known
+
+
 def name_of(function: Any) -> str:
     """Return the name of a function, or of the class of a callable object."""
     return str(getattr(function, "__qualname__", type(function).__qualname__))
 
 
-MODULES: tuple[ModuleType, ...] = (
-    *(beams, bodies, connector_laws, connectors, curves, damping, distributions, fibres),
-    *(joints, loads, masses, material_laws, mesh_options, scene, sections),
-    *(supports, time_functions, works),
-)
-
+MODEL = import_module("ufl_beam.model").__path__
 # Classes of records, by name
 RECORDS: dict[str, type] = {
     name: kind
-    for module in MODULES
-    for name, kind in vars(module).items()
+    for module in iter_modules(MODEL, "ufl_beam.model.")
+    for name, kind in vars(import_module(module.name)).items()
     if isinstance(kind, type) and dataclasses.is_dataclass(kind)
 }
 RECORDS |= {kind.__name__: kind for kind in (SavedFunction, SavedCurve, LostFunction)}
 # Objects that all scenes share
-KNOWN: dict[str, Any] = {
-    "GROUND": bodies.GROUND,
-    "HELD": connector_laws.HELD,
-    "steady": time_functions.steady,
-    "still": supports.still,
-}
+KNOWN: dict[str, Any] = {"GROUND": GROUND, "HELD": HELD, "steady": steady, "still": still}
 
 
 def lost(owner: Any, field: str, function: Any) -> LostFunction:
@@ -162,7 +143,7 @@ def lost(owner: Any, field: str, function: Any) -> LostFunction:
 
 
 def to_data(value: Any, sampling: Sampling = lost) -> Data:
-    """Describe a scene, or another record, with a sampling of the functions of a user."""
+    """Describe a scene or another record as data; ``sampling`` replaces functions of a user."""
     records: list[Data] = []
     # By identity; the objects are kept, so that none gets the identity of another.
     numbers: dict[int, tuple[int, Any]] = {}
@@ -181,8 +162,9 @@ def to_data(value: Any, sampling: Sampling = lost) -> Data:
         if isinstance(value, Mapping):
             pairs = [[describe(x, owner, field) for x in pair] for pair in value.items()]
             return {"mapping": pairs}
-        for name in (name for name, known in KNOWN.items() if value is known):
-            return {"known": name}
+        for name, known in KNOWN.items():
+            if value is known:
+                return {"known": name}
         if id(value) not in numbers:
             record = value
             if RECORDS.get(type(value).__name__) is not type(value):

@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from functools import cached_property
 
 from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Index
+from ufl_beam.arrays import Array, Index, Snapshot
+from ufl_beam.compiled.csr import as_slice
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import Fields, SectionForces
 from ufl_beam.discretization.partition import Share
@@ -20,7 +22,6 @@ from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 from ufl_beam.output.joint_histories import Connection, links_of, motion_of, velocity_of
-from ufl_beam.output.snapshot import Snapshot
 from ufl_beam.parameter import Parameter
 from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.energy_ledger import Ledger
@@ -30,10 +31,11 @@ from ufl_beam.terms.supports import Supports
 
 NO_REACTIONS = np.zeros((0, 3))
 NO_CONNECTIONS = np.zeros((0, len(Connection._fields)))
+NO_MATERIAL = np.zeros((0, 7))
 
 
-class StateView:
-    """The state of a scene in words of the scene; all processes call its methods together."""
+class StateView(ABC):
+    """State at the present time, by objects of the scene; all processes call methods together."""
 
     scene: Scene
     comm: MPI.Intracomm  # all processes of the run
@@ -54,23 +56,40 @@ class StateView:
     _has_inelastic: bool
 
     @property
+    @abstractmethod
     def parameter(self) -> Parameter:
         """Time, or the load factor of a path."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def iterations(self) -> int:
         """Newton iterations so far."""
-        raise NotImplementedError
 
     def gather(self) -> Snapshot:
         """Gather the state of all processes."""
         v = [self.share.gather(v) for v in self.velocities()]
         connections = self.connections() if self.scene.links else NO_CONNECTIONS
+        material = self._material_table() if self._has_inelastic else NO_MATERIAL
         return Snapshot(
             self.t, self.share.gather(self.q), v[0] if v else None, self.reactions(),
-            self.entries(), self.material(), connections, self.parts, self.iterations,
+            self.entries(), material, connections, self.parts, self.iterations,
         )  # fmt: skip
+
+    def _material_table(self) -> Array:
+        """Numbers of cells and rows of their material, in the order of the numbers; (m, 7)."""
+        rows = [rows for _, rows in self.material()]
+        empty, order = self._empty_table
+        table = empty.copy()
+        table[:, 1:] = (rows[0] if len(rows) == 1 else np.concatenate(rows))[order]
+        return table
+
+    @cached_property
+    def _empty_table(self) -> tuple[Array, Index | slice]:
+        """The table of :meth:`_material_table` without material, and its order."""
+        cells = np.concatenate([cells for cells, _ in self.material()])
+        table, order = np.zeros((len(cells), 7)), np.argsort(cells)
+        table[:, 0] = cells[order]
+        return table, as_slice(order)
 
     def velocities(self) -> list[Array]:
         """Velocities at the local degrees of freedom; none in statics."""
@@ -112,16 +131,13 @@ class StateView:
             for g, group in enumerate(groups)
         )
 
-    def ledger_names(self) -> list[str]:
-        """Names of the entries of the ledger."""
-        return [*self.ledger.state, *self.ledger.supplied, *self.ledger.lost]
-
     def connections(self) -> Array:
         """Columns of :class:`Connection` for all links of the scene; (num_links, 5)."""
         here = np.zeros((len(self.scene.links), len(Connection._fields)))
         q = self.q
         for one in self.couplings:
-            columns = one.shown_motion(q), one.force(q), one.work, one.rate, one.dissipated()
+            motion, dissipated = one.response.motion(one.motion(q)), one.response.dissipated()
+            columns = motion, one.force(q), one.work, one.rate, dissipated
             here[one.numbers] = np.column_stack(columns)
         if not self.share.alone:
             self.share.comm.Allreduce(MPI.IN_PLACE, here)
@@ -172,7 +188,7 @@ class StateView:
         return SectionForces(self.fields)
 
     def material(self) -> list[tuple[Index, Array]]:
-        """Cells that can yield or break, and :attr:`Points.kept`."""
+        """Cells that can yield or break, and :attr:`Points.kept`; later steps change them."""
         here = [inelastic.kept() for inelastic in self.inelastic]
         if not self._has_inelastic or self.share.alone:
             return here

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Recorders of time series for ParaView and PyVista."""
+"""Time series for ParaView and PyVista: recorders of a scene as one data set of lines."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +12,71 @@ from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.arrays import State
+from ufl_beam.arrays import Array, Index, State
 from ufl_beam.collective_errors import on_first
 from ufl_beam.errors import SceneError, require_count
-from ufl_beam.output.line_data import LineData, LineFields
+from ufl_beam.model.bodies import arm
+from ufl_beam.output.joint_histories import turned
 from ufl_beam.output.output_files import require_path
-from ufl_beam.output.recorders import RecordedState, Recorder
+from ufl_beam.output.recorders import Recorder
+from ufl_beam.output.scene_lines import rods_of
+from ufl_beam.output.state_view import StateView
 from ufl_beam.output.vtkhdf import VtkhdfWriter
 from ufl_beam.output.xdmf import Complete, XdmfWriter, data_path
+
+LineFields = tuple[dict[str, Array], dict[str, Array]]  # at points, (n,) or (n, 3); in cells, (m,)
+
+
+class LineData:
+    """Geometry of beams, bodies and connectors as lines, and the fields of a state on it.
+
+    Beams come first, node after node; behind them each line of a body or connector with two points
+    of its own.  N is the force of a connector that acts along its line; V and M are zero there.
+    """
+
+    def __init__(self, simulation: StateView) -> None:
+        grid, rods = simulation.grid, rods_of(simulation.scene)
+        ends = [anchor for rod in rods for anchor in (rod.a, rod.b)]
+        corners = np.reshape([anchor.point for anchor in ends], (-1, 2))
+        self.points = np.insert(np.concatenate([grid.points, corners]), 2, 0.0, axis=1)
+        lines = len(grid.points) + np.arange(len(ends)).reshape(-1, 2)
+        self.cells: Index = np.concatenate([grid.pieces, lines])
+        self.parts = np.append(np.zeros(len(grid.pieces)), [rod.part for rod in rods])
+        self._nodes = np.concatenate([grid.dofs, *(grid.node(a)[None] for a in ends)])
+        self._ends = slice(len(grid.points), None)
+        self._arms = np.reshape([arm(anchor) for anchor in ends], (-1, 2))
+        links = simulation.scene.links
+        # Lines, and the links whose forces act along them
+        self._pulls = {k: links.index(rod.along) for k, rod in enumerate(rods) if rod.along}
+        self._pieces_of_cell, self._num_rods = grid.mesh.degree, len(rods)
+
+    def fields(self, simulation: StateView) -> LineFields:
+        """Compute the fields of the present state, see :class:`XDMF`; all processes call it."""
+        q = simulation.share.gather(simulation.q)[self._nodes]
+        arms = turned(self._arms, q[self._ends, 2])
+        displacement = np.insert(q[:, :2], 2, 0.0, axis=1)
+        displacement[self._ends, :2] += arms - self._arms
+        at_points = {"displacement": displacement, "rotation": q[:, 2]}
+        for velocities in simulation.velocities():
+            v = simulation.share.gather(velocities)[self._nodes]
+            velocity = np.insert(v[:, :2], 2, 0.0, axis=1)
+            velocity[self._ends, :2] += v[self._ends, 2:] * arms[:, ::-1] * (-1.0, 1.0)
+            at_points |= {"velocity": velocity, "angular velocity": v[:, 2]}
+        return at_points, self._in_cells(simulation)
+
+    def _in_cells(self, simulation: StateView) -> dict[str, Array]:
+        forces = simulation.section_forces()
+        in_cells: dict[str, Array] = {name: forces[:, k] for k, name in enumerate("NVM")}
+        if simulation.may_break:
+            in_cells["jump"], in_cells["dissipated energy"] = simulation.damage()
+        in_lines = {
+            name: np.append(np.repeat(values, self._pieces_of_cell), np.zeros(self._num_rods))
+            for name, values in in_cells.items()
+        }
+        if self._pulls:
+            rods = in_lines["N"][len(self.cells) - self._num_rods :]
+            rods[[*self._pulls]] = simulation.connections()[[*self._pulls.values()], 1]
+        return in_lines
 
 
 class TimeSeries(Recorder):
@@ -35,13 +93,13 @@ class TimeSeries(Recorder):
             raise SceneError(f"{kind} {path}: the name of the file must end in {self.ending}")
         self._writers: list[Any] = []
 
-    def open(self, simulation: RecordedState) -> None:
+    def open(self, simulation: StateView) -> None:
         """Write the mesh and the initial state."""
         self._count = 0
         fields = self._prepare(simulation)
         on_first(simulation.comm, lambda: self._begin(simulation.t, fields))
 
-    def _prepare(self, simulation: RecordedState) -> LineFields:
+    def _prepare(self, simulation: StateView) -> LineFields:
         """Note the mesh; the fields of the present state."""
         self._comm: MPI.Intracomm = simulation.comm
         self._lines = LineData(simulation)
@@ -53,10 +111,10 @@ class TimeSeries(Recorder):
         self._writers[0].write(t, fields)
 
     @abstractmethod
-    def _writer(self, fields: LineFields, complete: list[int] | None = None) -> Any:
+    def _writer(self, fields: LineFields, complete: Sequence[int] | None = None) -> Any:
         """Make the writer of a file, or of one that is complete up to some sizes."""
 
-    def write(self, simulation: RecordedState) -> None:
+    def write(self, simulation: StateView) -> None:
         """Write the state, every so many steps."""
         self._count += 1
         if self._count % self._every == 0:
@@ -69,7 +127,7 @@ class TimeSeries(Recorder):
         sizes = [n for writer in self._writers for n in writer.complete]
         return {"sizes": np.array([self._count, *sizes], dtype=float)}
 
-    def resume(self, simulation: RecordedState, state: State) -> None:
+    def resume(self, simulation: StateView, state: State) -> None:
         """Cut off what was written after the state, and go on."""
         self._count, *sizes = (int(n) for n in state["sizes"])
         fields = self._prepare(simulation)
@@ -135,10 +193,9 @@ class XDMF(TimeSeries):
             )
         super().require_writable()
 
-    def _writer(self, fields: LineFields, complete: list[int] | None = None) -> XdmfWriter:
-        lines = self._lines
-        sizes = None if complete is None else Complete(*complete)
-        return XdmfWriter(self._path, lines.points, lines.cells, {"part": lines.parts}, sizes)
+    def _writer(self, fields: LineFields, complete: Sequence[int] | None = None) -> XdmfWriter:
+        lines, sizes = self._lines, None if complete is None else Complete(*complete)
+        return XdmfWriter(self._path, lines.points, lines.cells, lines.parts, sizes)
 
 
 class VTKHDF(TimeSeries):
@@ -169,7 +226,7 @@ class VTKHDF(TimeSeries):
         """Path of the file."""
         return (self._path,)
 
-    def _writer(self, fields: LineFields, complete: list[int] | None = None) -> VtkhdfWriter:
+    def _writer(self, fields: LineFields, complete: Sequence[int] | None = None) -> VtkhdfWriter:
         lines, steps = self._lines, None if complete is None else complete[0]
-        mesh = lines.points, lines.cells, {"part": lines.parts}
+        mesh = lines.points, lines.cells, lines.parts
         return VtkhdfWriter(self._path, *mesh, fields, steps)

@@ -11,7 +11,7 @@ them.
 from __future__ import annotations
 
 import mmap
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 from xml.sax.saxutils import escape
@@ -46,26 +46,23 @@ class XdmfWriter:
     """Writer of one time series; ``complete`` are its sizes after the last complete step.
 
     Given, it goes on from there, and raises :class:`ValueError` if the files are not those that
-    were written up to there.  ``constant`` are fields in cells that do not change, (m,).
+    were written up to there.
     """
 
     def __init__(
-        self,
-        path: Path,
-        points: Array,
-        cells: Index,
-        constant: Mapping[str, Array],
-        complete: Complete | None = None,
+        self, path: Path, points: Array, cells: Index, parts: Array, complete: Complete | None
     ) -> None:
         self._name, self._mesh_data = escape(data_path(path).name), b""
-        cell_text, point_text = self._mesh_item(cells.astype("<i8")), self._mesh_item(points)
+        items = []
+        for values in (cells.astype("<i8"), points, parts):
+            items.append(_item(values, len(self._mesh_data), self._name))
+            self._mesh_data += values.tobytes()
         self._mesh = (  # named anew in each step, written once
             f'<Topology TopologyType="Polyline" NodesPerElement="2" '
-            f'NumberOfElements="{len(cells)}">{cell_text}</Topology>'
-            f'<Geometry GeometryType="XYZ">{point_text}</Geometry>'
+            f'NumberOfElements="{len(cells)}">{items[0]}</Topology>'
+            f'<Geometry GeometryType="XYZ">{items[1]}</Geometry>'
+            f"{_attribute('part', 'Cell', parts, items[2])}"
         )
-        for name, values in constant.items():
-            self._mesh += _attribute(name, "Cell", values, self._mesh_item(values))
         new = complete is None
         self.complete = complete or Complete(0, len(HEAD), ROOM, len(self._mesh_data))
         self._data, self._xml = OutputFile(data_path(path), new=new), OutputFile(path, new=new)
@@ -77,11 +74,6 @@ class XdmfWriter:
             self._require_same()
             self._cut()
 
-    def _mesh_item(self, values: Array | Index) -> str:
-        text = _item(values, len(self._mesh_data), self._name)
-        self._mesh_data += values.tobytes()
-        return text
-
     def _require_same(self) -> None:
         """Raise unless both files are long enough and begin as these do."""
         if (
@@ -92,7 +84,7 @@ class XdmfWriter:
         ):
             raise ValueError("not the files that were written up to there")
 
-    def write(self, t: float, fields: Sequence[Mapping[str, Array]]) -> None:
+    def write(self, t: float, fields: tuple[Mapping[str, Array], ...]) -> None:
         """Append a step with its fields."""
         if self._writing:  # an interrupt has left a part of a step
             self._cut()

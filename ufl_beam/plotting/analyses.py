@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ufl_beam.analysis.modes import Shapes
-from ufl_beam.analysis.tradeoff_result import Tradeoff
+from ufl_beam.analysis.tradeoff_result import Run, Tradeoff
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import Fatigue, HotSpot
 from ufl_beam.plotting import drawing, style
-from ufl_beam.plotting.diagrams import draw_diagrams, finish
+from ufl_beam.plotting.diagrams import draw_frame
 from ufl_beam.plotting.style import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY, picture
 from ufl_beam.simulation.solution import Solution
 
@@ -47,31 +47,25 @@ def plot_modes(shapes: Shapes, which: Sequence[int] = (), *, amplitude: float = 
         raise SceneError("plot_modes: there is no shape")
     swings = [shapes.motion(k, amplitude=amplitude, count=2) for k in chosen]
     stages = [drawing.plane_stage(swing, [0, 1], 1.0) for swing in swings]
-    ends = [(drawing.moved_points(s, 0, 1.0), drawing.moved_points(s, 1, 1.0)) for s in swings]
-    bodies = [stage.pose(n).points() for stage in stages for n in (0, 1)]
-    box = np.concatenate(
-        [shapes.grid.points, *bodies, *(points for pair in ends for points in pair)]
-    )
-    low, high = box.min(axis=0), box.max(axis=0)
-    # Room for the symbols of supports.
-    room = 0.08 * np.hypot(*(high - low))
-    width, height = high - low + 2 * room
+    box = np.concatenate([stage.points() for stage in stages])
+    # Room for the symbols of supports
+    room = 0.08 * np.hypot(*np.ptp(box, axis=0))
+    corners = np.array([box.min(axis=0) - room, box.max(axis=0) + room])
+    width, height = np.ptp(corners, axis=0)
     columns = min(len(chosen), 3 if height < 0.8 * width else 4)
     rows = -(-len(chosen) // columns)
     with picture((4.0 * columns, rows * (4.0 * height / width + 0.5))) as figure:
         grid = np.ravel(figure.subplots(rows, columns, squeeze=False))
         for axes in grid:
             axes.set_axis_off()
-        for k, swing, stage, (there, back), axes in zip(
-            chosen, swings, stages, ends, grid, strict=False
-        ):
+        for k, swing, stage, axes in zip(chosen, swings, stages, grid, strict=False):
+            there, back = stage.pose(0), stage.pose(1)
             drawing.draw_undeformed(axes, swing, stage)
-            drawing.draw_axes(axes, swing, back, color=SKY, linewidth=1.6, zorder=2)
-            drawing.draw_axes(axes, swing, there, color=BLUE, linewidth=2.6, zorder=4)
-            drawing.draw_symbols(axes, stage.pose(0))
+            drawing.draw_axes(axes, swing, back.nodes, color=SKY, linewidth=1.6, zorder=2)
+            drawing.draw_axes(axes, swing, there.nodes, color=BLUE, linewidth=2.6, zorder=4)
+            drawing.draw_symbols(axes, there)
             axes.set_title(f"{k}: {shapes.titles[k]}", loc="left")
-            axes.set(aspect="equal", xlim=(low[0] - room, high[0] + room))
-            axes.set_ylim(low[1] - room, high[1] + room)
+            axes.set(aspect="equal", xlim=corners[:, 0], ylim=corners[:, 1])
     return figure
 
 
@@ -89,6 +83,10 @@ def plot_tradeoff(tradeoff: Tradeoff) -> Figure:
         >>> found = ub.tradeoff(scene, tip, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance=0.01)
         >>> ub.plot_tradeoff(found).savefig("tradeoff.png")
     """
+
+    def error(run: Run) -> float:
+        return max(tradeoff.ratio(run), LEAST_ERROR)
+
     with picture((9.0, 6.0)) as figure:
         axes = figure.subplots()
         looks = cycle(product("os^", (BLUE, RED, GREEN, ORANGE, PINK, SKY)))
@@ -96,19 +94,16 @@ def plot_tradeoff(tradeoff: Tradeoff) -> Figure:
             marker, color = look
             runs = [run for run in tradeoff.runs if run.refinement.family == family]
             axes.scatter(
-                [run.seconds for run in runs],
-                [max(tradeoff.ratio(run), LEAST_ERROR) for run in runs],
+                [run.seconds for run in runs], [error(run) for run in runs],
                 s=[30 + 12 * np.log2(run.cells) for run in runs],
                 marker=marker, color=color, alpha=0.75, lw=0, label=f"from {name}", zorder=3,
             )  # fmt: skip
-        front = tradeoff.front
-        seconds, errors = [r.seconds for r in front], [tradeoff.ratio(r) for r in front]
-        axes.plot(seconds, np.maximum(errors, LEAST_ERROR), color=INK, lw=1.2, zorder=2)
-        best = (tradeoff.best.seconds, max(tradeoff.ratio(tradeoff.best), LEAST_ERROR))
-        axes.plot(*best, "o", ms=18, mfc="none", mec=INK, mew=1.8, zorder=4)
+        front, best = tradeoff.front, tradeoff.best
+        axes.plot([r.seconds for r in front], [*map(error, front)], color=INK, lw=1.2, zorder=2)
+        axes.plot(best.seconds, error(best), "o", ms=18, mfc="none", mec=INK, mew=1.8, zorder=4)
         axes.set(xscale="log", yscale="log", xlabel="wall time of a run (s)")
         axes.set_ylabel(f"error ({tradeoff.target.measure})")
-        axes.set_title(f"recommended: {tradeoff.best.dials}", loc="left", fontsize=11)
+        axes.set_title(f"recommended: {best.dials}", loc="left", fontsize=11)
         time, ratio = tradeoff.target.bounds
         for draw, bound in ((axes.axvline, time), (axes.axhline, ratio)):
             if np.isfinite(bound):
@@ -138,25 +133,17 @@ def plot_extremes(solution: Solution, extremes: Extremes, what: str = "M") -> Fi
         >>> ub.plot_extremes(run, extremes, "M").savefig("extremes.png")
     """
     style.require_choice(what, style.RESULTANTS, "plot_extremes: what")
-    index, points = list(style.RESULTANTS).index(what), solution.grid.points
-    reached = [extremes.section_forces(beam) for beam in solution.scene.beams]
-    # Constant in each cell
+    index = list(style.RESULTANTS).index(what)
+    reached = [(beam, extremes.section_forces(beam)) for beam in solution.scene.beams]
     diagrams = [
-        [np.repeat(values[:, index, None], 2, axis=1) for values in one]
-        for one in ([e.high for e in reached], [e.low for e in reached])
+        (beam, np.repeat(values[:, index, None], 2, axis=1))  # constant in each cell
+        for beam, found in reached
+        for values in (found.high, found.low)
     ]
-    stage = drawing.plane_stage(solution, [0], 1.0)
-    pose = stage.pose(0)
-    with picture(drawing.plane_size(points, pose.points())) as figure:
-        until = solution.parameter.at(solution.times[-1])
-        axes = style.plane_axes(
-            figure, f"extremes of the {style.RESULTANTS[what][0]} {what} until {until}"
-        )
-        found = draw_diagrams(axes, solution, what, diagrams, points)
-        drawing.draw_axes(axes, solution, points, color=INK, linewidth=2.6, zorder=4)
-        drawing.draw_symbols(axes, pose)
-        finish(figure, axes, found)
-    return figure
+    until = solution.parameter.at(solution.times[-1])
+    title = f"extremes of the {style.RESULTANTS[what][0]} {what} until {until}"
+    pose = drawing.plane_stage(solution, [], 1.0).undeformed
+    return draw_frame(solution, pose, title, what, diagrams)
 
 
 def plot_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:
@@ -189,22 +176,22 @@ def plot_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:
     with picture((13.0, 5.0)) as figure:
         matrix, spectrum, damage = figure.subplots(1, 3, sharey=True, width_ratios=(1.25, 1, 0.8))
         _draw_matrix(figure, matrix, edges, ranges, means, cycles.count)
-        matrix.set(xlabel="mean stress (MPa)", ylabel="stress range (MPa)", title="cycles")
+        matrix.set(xlabel="mean stress (MPa)", ylabel="stress range (MPa)")
         more = np.cumsum(cycles.count[::-1])[::-1]
         spectrum.plot(more, ranges, color=BLUE, drawstyle="steps-post", label="reached")
         some = np.linspace(edges[1] / 10, 1.1 * edges[-1], 1000)
         spectrum.plot(curve.endurance(1e6 * some), some, color=INK, lw=1.4, ls="--", label="borne")
-        spectrum.set(xscale="log", xlabel="number of cycles", title="spectrum and S-N curve")
+        spectrum.set(xscale="log", xlabel="number of cycles")
         spectrum.legend(loc="lower left")
         total = done.sum()
         parts, _ = np.histogram(ranges, edges, weights=done / (total or 1.0))
         damage.barh(edges[:-1], 100 * parts, np.diff(edges), align="edge", color=RED, alpha=0.6)
-        damage.set(xlabel="part of the damage (%)", title=f"damage {total:.3g}")
-        for axes in (matrix, spectrum, damage):
-            axes.set_title(axes.get_title(), loc="left")
-            axes.set_title("")
+        damage.set(xlabel="part of the damage (%)")
+        matrix.set_ylim(0.0, 1.1 * edges[-1])
+        titles = "cycles", "spectrum and S-N curve", f"damage {total:.3g}"
+        for axes, title in zip((matrix, spectrum, damage), titles, strict=True):
+            axes.set_title(title, loc="left")
             axes.tick_params(labelsize=12, color="#888888")
-            axes.set_ylim(0.0, 1.1 * edges[-1])
     return figure
 
 

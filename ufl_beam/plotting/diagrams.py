@@ -5,15 +5,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from itertools import groupby
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.model.bodies import Member
 from ufl_beam.plotting import drawing, style
+from ufl_beam.plotting.geometry import directions, left_of, segments, unit_vectors
 from ufl_beam.plotting.labels import Label, Spot, leader_of, place
+from ufl_beam.plotting.scene_layout import Pose
 from ufl_beam.plotting.style import BLUE, INK, POINTS, RED, RESULTANTS, half_size, with_unit
 from ufl_beam.simulation.solution import Solution
 
@@ -29,24 +30,31 @@ AROUND, LEAST, MOST = (1.0, 1.2), (3.6, 2.6), (9.0, 6.8)
 """Room for words and numbers around the axes; least and largest size of a figure; inch."""
 
 
+Diagram = tuple[Member, Array]  # a beam, and the values at both ends of its cells, (num_cells, 2)
+
+
 def plot_state(solution: Solution, what: str, *, n: int, magnify: float) -> Figure:
     """Draw the frame at a time, with a diagram of a section force; see :func:`plot`."""
     style.require_choice(what, ("shape", *RESULTANTS), "plot: what")
-    points = drawing.moved_points(solution, n, magnify)
-    stage = drawing.plane_stage(solution, [n], magnify)
-    pose = stage.pose(n)
+    pose = drawing.plane_stage(solution, [n], magnify).pose(n)
     name = f"{RESULTANTS[what][0]} {what}" if what in RESULTANTS else "shape"
-    time = solution.parameter.at(solution.times[n])
-    with style.picture(drawing.plane_size(solution.grid.points, points, pose.points())) as figure:
-        axes = style.plane_axes(figure, f"{name} at {time}{style.magnified(magnify)}")
-        drawing.draw_undeformed(axes, solution, stage)
-        extremes: list[Extreme] = []
-        if what in RESULTANTS:
-            values = [_values(solution, beam, what, n) for beam in solution.scene.beams]
-            extremes = draw_diagrams(axes, solution, what, [values], points)
-        drawing.draw_axes(axes, solution, points, color=INK, linewidth=2.6, zorder=4)
+    title = f"{name} at {solution.parameter.at(solution.times[n])}{style.magnified(magnify)}"
+    beams = solution.scene.beams if what in RESULTANTS else ()
+    diagrams = [(beam, _values(solution, beam, what, n)) for beam in beams]
+    return draw_frame(solution, pose, title, what, diagrams)
+
+
+def draw_frame(
+    solution: Solution, pose: Pose, title: str, what: str, diagrams: Sequence[Diagram]
+) -> Figure:
+    """Draw the frame in a pose, with diagrams of a section force and their extreme values."""
+    with style.picture(drawing.plane_size(pose.stage.points())) as figure:
+        axes = style.plane_axes(figure, title)
+        drawing.draw_undeformed(axes, solution, pose.stage)
+        extremes = _draw_diagrams(axes, solution, pose.nodes, what, diagrams) if diagrams else []
+        drawing.draw_axes(axes, solution, pose.nodes, color=INK, linewidth=2.6, zorder=4)
         drawing.draw_symbols(axes, pose)
-        finish(figure, axes, extremes)
+        _finish(figure, axes, extremes)
     return figure
 
 
@@ -83,73 +91,53 @@ class Extreme(NamedTuple):
     outward: Array  # unit vector away from the axis; (2,)
 
 
-def draw_diagrams(
-    axes: Axes, solution: Solution, what: str, diagrams: Sequence[Sequence[Array]], points: Array
+def _draw_diagrams(
+    axes: Axes, solution: Solution, nodes: Array, what: str, diagrams: Sequence[Diagram]
 ) -> list[Extreme]:
-    """Draw diagrams of a section force on the frame, to one scale; return both extreme values.
-
-    Each has the values at both ends of the cells of all beams, (num_cells, 2) each; N, N m; the
-    nodes are at ``points``, (num_nodes, 2); m.
-    """
+    """Draw diagrams of a section force, all to one scale; return both extreme values."""
     index, side = list(RESULTANTS).index(what), -1.0 if what == "M" else 1.0
-    beams = solution.scene.beams
     # A strain of 1e-10 is what rounding and the tolerance of the iteration leave behind.
-    limits = [(b.section.EA, b.section.GA, b.section.EI / b.section.depth)[index] for b in beams]
-    if all(
-        np.all(np.abs(f) <= 1e-10 * limit)
-        for forces in diagrams
-        for f, limit in zip(forces, limits, strict=True)
-    ):
+    limits = [(s.EA, s.GA, s.EI / s.depth)[index] for s in (b.section for b, _ in diagrams)]
+    sizes = [float(np.abs(values).max()) for _, values in diagrams]
+    if all(size <= 1e-10 * limit for size, limit in zip(sizes, limits, strict=True)):
         return []
-    largest = max(float(np.max(np.abs(f))) for forces in diagrams for f in forces)
-    scale = 0.13 * side * math.hypot(*np.ptp(points, axis=0)) / largest
-    every, tips, outward = [], [], []
-    for forces in diagrams:
-        for beam, found in zip(beams, forces, strict=True):
-            values = np.where(np.abs(found) > DRAWN_AS_ZERO * largest, found, 0.0)
-            chain = points[solution.grid.vertices_of(beam)]
-            along = np.diff(chain, axis=0)
-            left = along[:, ::-1] * (-1.0, 1.0) / np.linalg.norm(along, axis=1)[:, None]
-            ends = np.stack([chain[:-1], chain[1:]], axis=1)
-            _draw_areas(axes, ends, values, scale * left)
-            every.append(values.ravel())
-            tips.append((ends + scale * values[..., None] * left[:, None]).reshape(-1, 2))
-            away = side * np.sign(values)[..., None] * left[:, None]
-            outward.append(away.reshape(-1, 2))
-    found, tip, away = (np.concatenate(parts) for parts in (every, tips, outward))
+    largest = max(sizes)
+    scale = 0.13 * side * math.hypot(*np.ptp(nodes, axis=0)) / largest
+    rows = []  # value, point of the diagram, and vector away from the axis, at the ends of cells
+    for beam, found in diagrams:
+        values = np.where(np.abs(found) > DRAWN_AS_ZERO * largest, found, 0.0).ravel()
+        chain = nodes[solution.grid.vertices_of(beam)]
+        axis = np.repeat(chain, 2, axis=0)[1:-1]
+        left = np.repeat(left_of(unit_vectors(np.diff(chain, axis=0))), 2, axis=0)
+        tips = axis + scale * values[:, None] * left
+        _draw_areas(axes, axis, tips, values)
+        rows.append(np.column_stack([values, tips, side * np.sign(values)[:, None] * left]))
+    value, tip, outward = np.split(np.concatenate(rows), [1, 3], axis=1)
     return [
-        Extreme(with_unit(found[k], RESULTANTS[what][1]), color, tip[k], away[k])
-        for k, sign, color in ((np.argmax(found), 1, RED), (np.argmin(found), -1, BLUE))
-        if sign * found[k] > 0
+        Extreme(with_unit(value[k, 0], RESULTANTS[what][1]), color, tip[k], outward[k])
+        for k, sign, color in ((np.argmax(value), 1, RED), (np.argmin(value), -1, BLUE))
+        if sign * value[k, 0] > 0
     ]
 
 
-def _draw_areas(axes: Axes, ends: Array, values: Array, left: Array) -> None:
-    """Draw the diagram of a beam: an area for each part of it with one sign.
-
-    ``left`` is the ordinate of the value one, (num_cells, 2); the axis has ``ends`` of each cell.
-    """
-    # Parts of cells: points of the axis, values there, ordinate of the value one
-    parts: list[tuple[Array, Array, Array]] = []
-    for k in range(len(values)):
-        axis, pair, ordinate = ends[k], values[k], left[k]
-        if pair[0] * pair[1] < 0.0:
-            middle = axis[0] + pair[0] / (pair[0] - pair[1]) * (axis[1] - axis[0])
-            parts.append((np.array([axis[0], middle]), pair * (1.0, 0.0), ordinate))
-            parts.append((np.array([middle, axis[1]]), pair * (0.0, 1.0), ordinate))
-        else:
-            parts.append((axis, pair, ordinate))
-    for sign, run in groupby(parts, lambda part: np.sign(part[1].sum())):
-        if sign != 0.0:
-            cells = list(run)
-            axis = np.concatenate([points for points, _, _ in cells])
-            tips = axis + np.concatenate([np.outer(pair, x) for _, pair, x in cells])
-            outline = np.concatenate([axis[:1], tips, axis[:0:-1]])
+def _draw_areas(axes: Axes, axis: Array, tips: Array, values: Array) -> None:
+    """Draw an area for each part of a beam with values of one sign; two points for each cell."""
+    # A cell in which the sign changes becomes two.
+    first = 2 * np.flatnonzero(values[::2] * values[1::2] < 0.0)
+    part = values[first] / (values[first] - values[first + 1])
+    zeros = np.repeat(axis[first] + part[:, None] * (axis[first + 1] - axis[first]), 2, axis=0)
+    at = np.repeat(first + 1, 2)
+    axis, tips = (np.insert(points, at, zeros, axis=0) for points in (axis, tips))
+    values = np.insert(values, at, 0.0)
+    signs = np.sign(values[::2] + values[1::2])
+    for run in np.split(np.arange(len(values)), 2 * np.flatnonzero(np.diff(signs)) + 2):
+        if (sign := signs[run[0] // 2]) != 0.0:
+            outline = np.concatenate([axis[run[:1]], tips[run], axis[run[:0:-1]]])
             color = RED if sign > 0 else BLUE
             axes.fill(*outline.T, facecolor=(color, 0.28), edgecolor=color, linewidth=1.0, zorder=2)
 
 
-def finish(figure: Figure, axes: Axes, extremes: Sequence[Extreme] = ()) -> None:
+def _finish(figure: Figure, axes: Axes, extremes: Sequence[Extreme]) -> None:
     """Fit the figure to what is drawn, and write the extreme values where they cover nothing."""
     without_texts = axes.dataLim.frozen()
     written: list[Annotation] = []
@@ -182,51 +170,48 @@ def _write(figure: Figure, axes: Axes, extremes: Sequence[Extreme]) -> list[Anno
         return []
     figure.draw_without_rendering()
 
-    def in_points(xy: Array) -> Array:
+    def in_points(xy: Any) -> Array:
         return np.asarray(axes.transData.transform(xy) * POINTS / figure.dpi)
 
-    lines = _segments(axes, in_points)
+    lines = _lines(axes, in_points)
     labels, halves = [], []
-    for text, color, tip, outward in extremes:
+    for number, (text, color, tip, outward) in enumerate(extremes):
         # Straight away from the axis first, then more and more aside
         turns = np.radians((0, 40, -40, 75, -75, 105, -105))
-        ways = math.atan2(outward[1], outward[0]) + turns
+        ways = directions(math.atan2(outward[1], outward[0]) + turns)
         at = in_points(tip)
-        spots = [Spot(at, np.array([math.cos(a), math.sin(a)])) for a in ways]
-        labels.append(Label(text, color, 0, tuple(spots)))
+        labels.append(Label(text, color, number, tuple(Spot(at, way) for way in ways)))
         halves.append(half_size(figure, axes, text, LABEL_SIZE, weight="bold"))
     written = []
     for one in place(labels, halves, lines):
-        tip = next(e.tip for e in extremes if e.text == one.label.text)
-        offset = one.center - one.spot
-        arrow = {"arrowstyle": "-", "color": one.label.color, "linewidth": 0.8}
+        text, color, number, _ = one.label
+        (x, y), (right, up) = extremes[number].tip, one.center - one.spot
+        arrow = {"arrowstyle": "-", "color": color, "linewidth": 0.8}
         written.append(
             axes.annotate(
-                one.label.text, (tip[0], tip[1]), (offset[0], offset[1]),
-                textcoords="offset points", ha="center", va="center", fontsize=LABEL_SIZE,
-                color=one.label.color, weight="bold", zorder=6,
+                text, (x, y), (right, up), textcoords="offset points", ha="center", va="center",
+                fontsize=LABEL_SIZE, color=color, weight="bold", zorder=6,
                 arrowprops=arrow if len(leader_of(one)) else None,
             )
         )  # fmt: skip
     return written
 
 
-def _segments(axes: Axes, in_points: Callable[[Array], Array]) -> Array:
+def _lines(axes: Axes, in_points: Callable[[Any], Array]) -> Array:
     """Lines that texts should not cover, those within areas too; (n, 4); points."""
-    found = []
+    found: list[Array] = [np.empty((0, 4))]
     for line in axes.lines:
-        chain = in_points(np.asarray(line.get_xydata(), dtype=np.float64))
+        chain = in_points(line.get_xydata())
         if len(chain) == 1:  # a symbol
             half = line.get_markersize() / 2
             chain = chain + np.array([[-half, -half], [half, half], [-half, half], [half, -half]])
-        found.append(np.hstack([chain[:-1], chain[1:]]))
+        found.append(segments(chain))
     for patch in axes.patches:
-        outline = in_points(np.asarray(patch.get_path().vertices, dtype=np.float64))
-        found.append(np.hstack([outline[:-1], outline[1:]]))
-        count = len(outline) // 2
+        outline = in_points(patch.get_path().vertices)
+        found.append(segments(outline))
         # Ordinates, from a point of the outline to the one across the axis
         for part in np.linspace(0.0, 1.0, 5):
             between = outline[:-1] + part * np.diff(outline, axis=0)
-            feet = (outline[1:] + part * (outline[:-1] - outline[1:]))[::-1]
-            found.append(np.hstack([between[1:count], feet[1:count]]))
-    return np.concatenate(found) if found else np.empty((0, 4))
+            feet = (outline[1:] - part * np.diff(outline, axis=0))[::-1]
+            found.append(np.hstack([between, feet])[1 : len(outline) // 2])
+    return np.concatenate(found)

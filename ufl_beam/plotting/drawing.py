@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.errors import SceneError, require_number
 from ufl_beam.model.bodies import Member
 from ufl_beam.model.material_laws import HingeLaw
 from ufl_beam.model.plastic_hinges import law_of, place_of
@@ -22,16 +21,6 @@ from ufl_beam.simulation.solution import Solution
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-
-def moved_points(solution: Solution, n: int, magnify: float) -> Array:
-    """Vertices of all beams at the n-th kept time, or SceneError; (num_vertices, 2); m."""
-    kept = len(solution.times)
-    if not -kept <= n < kept:
-        raise SceneError(f"n = {n}: the solution kept {kept} times; give {-kept} to {kept - 1}")
-    require_number(magnify, "magnify", positive=True)
-    grid = solution.grid
-    return np.asarray(grid.points + magnify * solution.q[n][grid.dofs[:, :2]])
 
 
 class OpenHinge(NamedTuple):
@@ -79,19 +68,15 @@ def nearest(kept: Array, times: Sequence[float] | Array) -> list[int]:
     return [int(np.argmin(np.abs(kept - t))) for t in sorted(times)]
 
 
-def plane_size(*shapes: Array) -> tuple[float, float]:
+def plane_size(points: Array) -> tuple[float, float]:
     """Choose the size of a figure: 9 inches wide unless its points stand upright."""
-    width, height = np.ptp(np.concatenate(shapes), axis=0)
+    width, height = np.ptp(points, axis=0)
     return 9.0, float(np.clip(8.0 * height / max(width, 1e-12), 3.2, 6.8))
 
 
 def plane_stage(solution: Solution, shown: Sequence[int], magnify: float) -> Stage:
     """Make a stage whose symbols (m) are as large as those of supports, which are in points."""
-    rough = Stage(solution, magnify, 0.02 * solution.scene.size)
-    shapes = [moved_points(solution, n, magnify) for n in shown]
-    points = np.concatenate(
-        [solution.grid.points, *shapes, *(rough.pose(n).points() for n in shown)]
-    )
+    points = Stage(solution, magnify, 0.02 * solution.scene.size, shown).points()
     width, height = np.ptp(points, axis=0)
     inches = plane_size(points)
     scale = max(1.12 * width / (inches[0] - 0.9), 1.20 * height / (inches[1] - 1.1))
@@ -107,7 +92,7 @@ def draw_axes(axes: Axes, solution: Solution, points: Array, **line: Any) -> Non
 def draw_undeformed(axes: Axes, solution: Solution, stage: Stage) -> None:
     """Draw undeformed beams, bodies and rods in grey."""
     pose = stage.undeformed
-    draw_axes(axes, solution, solution.grid.points, color=GREY, linewidth=1.2, zorder=1)
+    draw_axes(axes, solution, pose.nodes, color=GREY, linewidth=1.2, zorder=1)
     for stroke in (*symbols.bodies(pose), *symbols.rods(pose)):
         axes.plot(*stroke.points.T, color=GREY, linewidth=1.2, zorder=1)
 

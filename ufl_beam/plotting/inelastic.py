@@ -108,32 +108,26 @@ def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Fig
     """
     from matplotlib.collections import LineCollection
 
-    points, grid = drawing.moved_points(solution, n, magnify), solution.grid
-    density = _dissipated_per_length(solution, n)
+    grid = solution.grid
     stage = drawing.plane_stage(solution, [n], magnify)
-    pose = stage.pose(n)
-    # Corners of a box that is in no direction less than a third of the other: the broad lines of a
-    # slender frame would else be cut at the edge.
-    everything = np.concatenate([grid.points, points, pose.points()])
-    low, high = everything.min(axis=0), everything.max(axis=0)
-    more = np.maximum(0.0, (high - low).max() / 3 - (high - low)) / 2
-    room = np.array([low - more, high + more])
-    width, height = drawing.plane_size(room)
+    pose, density = stage.pose(n), _dissipated_per_length(solution, n)
+    points = stage.points()
+    (width, height), (length, rise) = drawing.plane_size(points), np.ptp(points, axis=0)
     # Upright frames need less; the bar and the legend have their own widths.
-    across = height * float(np.divide(*np.ptp(room, axis=0)))
+    across = height * length / max(rise, 1e-12)
     with style.picture((min(width, max(6.0, across + 3.0)), height)) as figure:
         time = solution.parameter.at(solution.times[n])
         axes = style.plane_axes(figure, f"damage at {time}{style.magnified(magnify)}")
-        axes.update_datalim(room)
+        axes.set_adjustable("datalim")  # room for the broad lines of a slender frame
         drawing.draw_undeformed(axes, solution, stage)
-        drawing.draw_axes(axes, solution, points, color=INK, linewidth=2.0, zorder=2)
+        drawing.draw_axes(axes, solution, pose.nodes, color=INK, linewidth=2.0, zorder=2)
         drawing.draw_symbols(axes, pose)
         yielded = density > 0.0
         if yielded.any():
             unit, prefix = style.decimal_prefix(float(density.max()))
             colors = style.scale("YlOrRd", 0.2, 1.0, 0.0, float(density.max()) / unit)
             zones = LineCollection(
-                list(points[grid.cells[yielded]]),
+                list(pose.nodes[grid.cells[yielded]]),
                 colors=colors.to_rgba(density[yielded] / unit),
                 linewidths=11.0, capstyle="butt", zorder=3,
             )  # fmt: skip
@@ -142,7 +136,7 @@ def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Fig
             cracks = any(p is not None and p.fibres.softening is not None for p in placed)
             title = "dissipated by plastic strains" + (" and cracks" if cracks else "")
             style.draw_bar(figure, axes, colors, f"{title} ({prefix}J/m)")
-        _draw_hinges(figure, axes, solution, n, points)
+        _draw_hinges(figure, axes, solution, n, pose.nodes)
         drawing.make_room(figure, axes)
     return figure
 
@@ -179,17 +173,11 @@ def plot_dissipation(solution: Solution) -> Figure:
         axes.plot(t, held, color=BLUE, label="in the scene")
         _prefix(axes.yaxis, np.concatenate([supplied, held]), "energy", "J")
         axes.set_xlabel(solution.parameter.progress)
-        worst, through = _scientific(energy.worst), with_unit(energy.throughput, "J")
+        digits, power = f"{energy.worst:.1e}".split("e")
+        worst, through = rf"${digits}\times10^{{{int(power)}}}$", with_unit(energy.throughput, "J")
         axes.set_title(f"worst imbalance {worst} of {through} throughput", loc="left", color=INK)
         figure.legend(loc="outside upper left", ncols=3)
     return figure
-
-
-def _scientific(value: float) -> str:
-    """A value with two digits and a power of ten: "3.1 × 10⁻¹²"."""
-    digits, power = f"{value:.1e}".split("e")
-    raised = str(int(power)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-    return f"{digits} × 10{raised}" if value else "0"
 
 
 def _dissipated_per_length(solution: Solution, n: int) -> Array:

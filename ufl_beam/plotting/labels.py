@@ -68,44 +68,36 @@ def place(
 def _best(
     label: Label, half: Array, lines: Array, others: list[Placed], frame: Array | None
 ) -> Placed:
-    """The place of a label that costs least."""
+    """The place of a label that costs least, of all spots at all distances."""
     boxes: Array = np.reshape([(*x.center - x.half, *x.center + x.half) for x in others], (-1, 4))
     sides = np.concatenate([boxes, boxes[:, [0, 3, 2, 1]]])  # diagonals, which leaders would cross
     leaders = [leader.ravel() for x in others if len(leader := leader_of(x))]
     lines = np.vstack([lines, *leaders])
-    ends_of_lines = lines[:, :2], lines[:, 2:]
-    at = np.array([spot.at for spot in label.spots])
-    way = np.array([spot.way for spot in label.spots])
-    least = np.array([spot.gap for spot in label.spots])
+    gaps, number = np.repeat(GAPS, len(label.spots)), len(GAPS)
+    spots = np.tile([spot.at + spot.gap * spot.way for spot in label.spots], (number, 1))
+    ways = np.tile([spot.way for spot in label.spots], (number, 1))
     # So far from its spot a box is beyond the line through it, across the way.
-    reach = np.abs(way) @ half
-    spots = at + least[:, None] * way
-    found, lowest = None, np.inf
-    for gap in GAPS:
-        if DISTANCE_COST * gap >= lowest:
-            break
-        centers = spots + way * (gap + reach)[:, None]
-        low, high = centers - half - CLEARANCE, centers + half + CLEARANCE
-        ends = np.hstack([spots, np.clip(spots, centers - half, centers + half)])
-        leads = np.linalg.norm(ends[:, 2:] - ends[:, :2], axis=1) >= LEADER
-        # Segments whose own boxes meet one of these
-        first, last = np.minimum(*ends_of_lines), np.maximum(*ends_of_lines)
-        meets = (first <= high.max(axis=0)) & (last >= low.min(axis=0))
-        near = lines[meets.all(axis=1)]
-        covered = areas_covered(low, high, boxes)
-        cost = DISTANCE_COST * gap + RANK_COST * np.arange(len(at))
-        cost += LINE_COST * lengths_inside(low, high, near) + LABEL_COST * covered
-        cost += CROSSING_COST * leads * (crossings(ends, sides) + 0.1 * crossings(ends, near))
-        if frame is not None:
-            beyond = np.maximum(frame[:2] - low, 0.0) + np.maximum(high - frame[2:], 0.0)
-            cost += OUTSIDE_COST * beyond.sum(axis=1)
-        best = int(np.argmin(cost))
-        if found is None or cost[best] < lowest:
-            overlap = float(covered[best] / np.prod(high[best] - low[best]))
-            found = Placed(label, centers[best], half, spots[best], overlap)
-            lowest = float(cost[best])
-    assert found is not None
-    return found
+    centers = spots + ways * (gaps + np.abs(ways) @ half)[:, None]
+    low, high = centers - half - CLEARANCE, centers + half + CLEARANCE
+    ends = np.hstack([spots, np.clip(spots, centers - half, centers + half)])
+    leads = np.linalg.norm(ends[:, 2:] - ends[:, :2], axis=1) >= LEADER
+    # Segments whose own boxes meet one of these
+    first, last = np.minimum(lines[:, :2], lines[:, 2:]), np.maximum(lines[:, :2], lines[:, 2:])
+    meets = (first <= high.max(axis=0)) & (last >= low.min(axis=0))
+    near = lines[meets.all(axis=1)]
+    covered = areas_covered(low, high, boxes)
+    cost = DISTANCE_COST * gaps + RANK_COST * np.tile(np.arange(len(label.spots)), number)
+    cost += LINE_COST * lengths_inside(low, high, near) + LABEL_COST * covered
+    if frame is not None:
+        beyond = np.maximum(frame[:2] - low, 0.0) + np.maximum(high - frame[2:], 0.0)
+        cost += OUTSIDE_COST * beyond.sum(axis=1)
+    # Those that would be worse than the best one without a leader are not looked at.
+    some = np.flatnonzero(leads & (cost < cost[~leads].min(initial=np.inf)))
+    crossed = crossings(ends[some], sides) + 0.1 * crossings(ends[some], near)
+    cost[some] += CROSSING_COST * crossed
+    best = int(np.argmin(cost))
+    overlap = float(covered[best] / np.prod(high[best] - low[best]))
+    return Placed(label, centers[best], half, spots[best], overlap)
 
 
 def leader_of(placed: Placed) -> Array:
@@ -132,15 +124,12 @@ def crossings(first: Array, second: Array) -> Array:
 def lengths_inside(low: Array, high: Array, lines: Array) -> Array:
     """Measure segments (n, 4) inside each box, given by its corners (num_boxes, 2)."""
     first, way = lines[None, :, :2], (lines[:, 2:] - lines[:, :2])[None]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        enter, leave = (low[:, None] - first) / way, (high[:, None] - first) / way
+    lengths = np.linalg.norm(way[0], axis=1)
     # Along an axis in which a segment does not move, it is inside for ever or never.
-    level = way == 0.0
-    inside = (low[:, None] <= first) & (first <= high[:, None])
-    begin = np.where(level, np.where(inside, -np.inf, np.inf), np.minimum(enter, leave))
-    end = np.where(level, np.where(inside, np.inf, -np.inf), np.maximum(enter, leave))
-    part = np.minimum(end.min(axis=2), 1.0) - np.maximum(begin.max(axis=2), 0.0)
-    return np.asarray(np.maximum(part, 0.0) @ np.linalg.norm(way[0], axis=1))
+    way = np.where(way == 0.0, 1e-99, way)
+    ends = (low[:, None] - first) / way, (high[:, None] - first) / way
+    enter, leave = np.minimum(*ends).max(axis=2), np.maximum(*ends).min(axis=2)
+    return np.asarray(np.maximum(np.minimum(leave, 1.0) - np.maximum(enter, 0.0), 0.0) @ lengths)
 
 
 def areas_covered(low: Array, high: Array, boxes: Array) -> Array:

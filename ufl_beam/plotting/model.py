@@ -3,24 +3,25 @@
 
 from __future__ import annotations
 
-import math
 from collections import defaultdict
 from collections.abc import Callable
-from functools import cache, singledispatch
-from typing import TYPE_CHECKING, Any, NamedTuple
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError
 from ufl_beam.model.constraint_checks import require_independent
-from ufl_beam.model.damping import Damping, KelvinVoigt, Rayleigh
+from ufl_beam.model.damping import Damping, Rayleigh
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.line_data import spots_of
+from ufl_beam.output.scene_lines import spots_of
 from ufl_beam.plotting.diagrams import plot_state
+from ufl_beam.plotting.geometry import segments
 from ufl_beam.plotting.labels import Placed, leader_of, place
-from ufl_beam.plotting.load_symbols import CAPTIONS, NAMES, badge
-from ufl_beam.plotting.model_symbols import MOST_LABELS, TEXT, Drawing, Subject, draw
+from ufl_beam.plotting.load_symbols import badge
+from ufl_beam.plotting.model_sheet import CAPTIONS, MOST_LABELS, NAMES, Sheet, Subject
+from ufl_beam.plotting.model_symbols import TEXT, draw
 from ufl_beam.plotting.style import INK, POINTS, RED, half_size, picture, with_unit
 from ufl_beam.simulation.solution import Solution
 
@@ -28,20 +29,13 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-WIDTH, HEIGHT = (5.5, 9.0), (3.0, 6.8)  # least and largest size of the figure; inch
+LEAST, MOST = (5.5, 3.0), (9.0, 6.8)  # sizes of the figure; inch
 LEFT, RIGHT, BELOW, ABOVE, NOTE = 66.0, 14.0, 46.0, 34.0, 16.0  # room around axes; points
-LABEL_SIZE, TITLE_SIZE = 11.0, 14.0  # sizes of labels and of the title; points
-BADGE = 60.0  # room for the symbol of a load on the whole scene, and between two of them; points
+LABEL_SIZE, TITLE_SIZE, ARROW_SIZE = 11.0, 14.0, 26.0  # of labels, title, arrows above; points
+BADGE = 60.0  # room for the arrow of a load on the whole scene, and between two of them; points
 
 Measure = Callable[[str], Array]  # half of width and height of a text; (2,); points
-
-
-class Plan(NamedTuple):
-    """Size of a picture."""
-
-    scale: float  # length of a point in the scene; m
-    frame: Array  # lower left and upper right corner of the axes, in the scene; (4,); points
-    size: tuple[float, float]  # of the figure; inch
+UNBOUNDED = np.array([-np.inf, -np.inf, np.inf, np.inf])  # frame, before its place is known
 
 
 def plot(
@@ -93,62 +87,36 @@ def plot(
 
 def plot_model(scene: Scene) -> Figure:
     """Draw the undeformed model with all that is in it; see :func:`plot`."""
-    subject = Subject.of(scene)
+    subject, notes = Subject(scene), notes_of(scene)
     skeleton = _skeleton(subject)
-    notes = notes_of(scene)
-    with picture((WIDTH[1], HEIGHT[1])) as figure:
+    with picture(MOST) as figure:
         figure.set_layout_engine("none")
-        width, height = np.ptp(skeleton, axis=0)
-        scale = max(width / 400.0, height / 250.0, scene.size / 500.0)
-        plan = Plan(scale, np.empty(4), (0.0, 0.0))
         probe = figure.add_axes((0.0, 0.0, 1.0, 1.0))
         measure: Measure = cache(lambda text: half_size(figure, probe, text, LABEL_SIZE))
-        least = _width_of_words(subject, notes, measure)
+        words = _width_of_words(subject, notes, measure)
+        width, height = np.ptp(skeleton, axis=0)
+        scale, frame = max(width / 400.0, height / 250.0, scene.size / 500.0), UNBOUNDED
         # What stands around the beams has a size in points: with the second plan it fits.
-        for again in (False, True):
-            drawing = draw(subject, plan.scale)
-            placed = _arrange(drawing, plan.scale, measure, plan.frame if again else None)
-            box = _box(drawing, placed, plan.scale)
-            plan = _plan(skeleton, plan.scale, box, len(notes), least)
-        drawing = draw(subject, plan.scale)
-        placed = _arrange(drawing, plan.scale, measure, plan.frame)
-        axes = _axes(figure, plan, _title(subject), notes)
-        _paint(axes, drawing)
-        _write(axes, placed, plan.scale)
-        _badges(axes, scene, plan, measure)
+        for _ in range(2):
+            sheet = draw(subject, scale)
+            box = _box(sheet, _arrange(sheet, measure, frame))
+            scale, frame = _plan(skeleton, scale, box, len(notes), words)
+        sheet = draw(subject, scale)
+        placed = _arrange(sheet, measure, frame)
+        axes = _axes(figure, scale, frame, _title(subject), notes)
+        _paint(axes, sheet)
+        _write(axes, placed, scale)
+        _write_badges(axes, scene, measure, frame)
         probe.remove()
     return figure
 
 
 def _title(subject: Subject) -> str:
-    beams, bodies = subject.scene.beams, subject.scene.bodies
-    parts = [_counted(len(beams), "beam"), _counted(subject.cells, "cell")] if beams else []
-    parts += [_counted(len(bodies), "body", "bodies")] if bodies else []
-    return "model: " + ", ".join(parts)
-
-
-def _counted(number: int, one: str, many: str = "") -> str:
-    """Write a number and the noun that it counts: "1 body", "20 000 beams"."""
-    return f"{number:,}".replace(",", " ") + " " + (one if number == 1 else many or f"{one}s")
-
-
-@singledispatch
-def _damping_in_words(damping: Damping) -> str:
-    """Describe a kind of damping and its size."""
-    return type(damping).__name__
-
-
-@_damping_in_words.register
-def _(damping: Rayleigh) -> str:
-    parts = (("mass", damping.mass, "1/s"), ("stiffness", damping.stiffness, "s"))
-    return "Rayleigh damping, " + ", ".join(f"{n} {x:.3g} {u}" for n, x, u in parts if x)
-
-
-@_damping_in_words.register
-def _(damping: KelvinVoigt) -> str:
-    where = "" if damping.beams is None else " of " + ", ".join(b.name for b in damping.beams[:4])
-    more = " ..." if len(damping.beams or ()) > 4 else ""
-    return f"Kelvin–Voigt damping, {with_unit(damping.time, 's')}{where}{more}"
+    """Numbers of all kinds of parts: "model: 20 000 beams, 1 body"."""
+    beams, bodies = len(subject.scene.beams), len(subject.scene.bodies)
+    parts = (beams, "beam", "beams"), (subject.cells, "cell", "cells"), (bodies, "body", "bodies")
+    counted = (f"{k:,} {one if k == 1 else many}".replace(",", " ") for k, one, many in parts if k)
+    return "model: " + ", ".join(counted)
 
 
 def notes_of(scene: Scene) -> list[str]:
@@ -164,6 +132,15 @@ def notes_of(scene: Scene) -> list[str]:
     return notes
 
 
+def _damping_in_words(damping: Damping) -> str:
+    if isinstance(damping, Rayleigh):
+        parts = (("mass", damping.mass, "1/s"), ("stiffness", damping.stiffness, "s"))
+        return "Rayleigh damping, " + ", ".join(f"{n} {x:.3g} {u}" for n, x, u in parts if x)
+    where = "" if damping.beams is None else " of " + ", ".join(b.name for b in damping.beams[:4])
+    more = " ..." if len(damping.beams or ()) > 4 else ""
+    return f"Kelvin–Voigt damping, {with_unit(damping.time, 's')}{where}{more}"
+
+
 def _skeleton(subject: Subject) -> Array:
     """Points of the scene without symbols; (n, 2); m."""
     scene = subject.scene
@@ -172,69 +149,68 @@ def _skeleton(subject: Subject) -> Array:
     return np.concatenate(points)
 
 
-def _arrange(drawing: Drawing, scale: float, measure: Measure, frame: Array | None) -> list[Placed]:
+def _arrange(sheet: Sheet, measure: Measure, frame: Array) -> list[Placed]:
     """Labels at their places; those that others would cover are left out."""
-    labels = drawing.labels
+    labels = sheet.labels
     for rank in (NAMES, CAPTIONS):
         if len(labels) > MOST_LABELS:
             labels = [label for label in labels if label.rank < rank]
     in_points = [
-        label._replace(spots=tuple(s._replace(at=np.asarray(s.at / scale)) for s in label.spots))
+        label._replace(
+            spots=tuple(s._replace(at=np.divide(s.at, sheet.scale)) for s in label.spots)
+        )
         for label in labels[:MOST_LABELS]
     ]
-    chains = [np.asarray(stroke.points / scale) for stroke in drawing.everything()]
-    lines = np.concatenate([np.hstack([chain[:-1], chain[1:]]) for chain in chains])
-    placed = place(in_points, [measure(label.text) for label in in_points], lines, frame)
+    lines = np.concatenate([segments(stroke.points) for stroke in sheet.everything()])
+    halves = [measure(label.text) for label in in_points]
+    placed = place(in_points, halves, lines / sheet.scale, frame)
     return [one for one in placed if one.overlap < 0.1]
 
 
-def _box(drawing: Drawing, placed: list[Placed], scale: float) -> Array:
+def _box(sheet: Sheet, placed: list[Placed]) -> Array:
     """Lower left and upper right corner of everything; (4,); points."""
-    points = [stroke.points for stroke in drawing.everything()]
-    points += [scale * (one.center + sign * one.half[None]) for one in placed for sign in (-1, 1)]
-    everything = np.concatenate(points) / scale
+    points = [stroke.points / sheet.scale for stroke in sheet.everything()]
+    points += [one.center + sign * one.half[None] for one in placed for sign in (-1, 1)]
+    everything = np.concatenate(points)
     return np.array([*everything.min(axis=0), *everything.max(axis=0)])
 
 
 def _width_of_words(subject: Subject, notes: list[str], measure: Measure) -> float:
     """Width of the words above the axes; points."""
-    badges = [found[0] for load in subject.scene.loads if (found := badge(load)) is not None]
+    badges = filter(None, map(badge, subject.scene.loads))
     first = TITLE_SIZE / LABEL_SIZE * 2 * measure(_title(subject))[0]
-    first += sum(2 * measure(text)[0] + BADGE for text in badges)
+    first += sum(2 * measure(text)[0] + BADGE for text, *_ in badges)
     return float(max([first, *(2 * measure(note)[0] for note in notes)]))
 
 
-def _plan(skeleton: Array, scale: float, box: Array, notes: int, words: float) -> Plan:
-    """The largest scale at which everything fits, and the frame around it.
+def _plan(
+    skeleton: Array, scale: float, box: Array, notes: int, words: float
+) -> tuple[float, Array]:
+    """The largest scale at which everything fits, and the corners of the axes; points.
 
     The ``box`` around everything and the width of the ``words`` above it are in points.
     """
     low, high = skeleton.min(axis=0), skeleton.max(axis=0)
     # What stands out beyond the skeleton has a size in points.
     below, beyond = low / scale - box[:2] + 8.0, box[2:] - high / scale + 8.0
-    around_axes = np.array([LEFT + RIGHT, BELOW + ABOVE + NOTE * notes])
-    least, most = (
-        np.array(side) * POINTS - around_axes for side in zip(WIDTH, HEIGHT, strict=True)
-    )
+    around_axes = (LEFT + RIGHT, BELOW + ABOVE + NOTE * notes)
+    least, most = (POINTS * np.array(size) - around_axes for size in (LEAST, MOST))
     least[0] = min(max(least[0], words), most[0])
     room = np.maximum(most - below - beyond, 0.3 * most)
-    largest = float(np.max((high - low) / room))
-    scale = largest if largest > 0.0 else scale
+    scale = float(np.max((high - low) / room)) or scale
     frame = np.array([*(low / scale - below), *(high / scale + beyond)])
     more = np.maximum(least - (frame[2:] - frame[:2]), 0.0) / 2
-    frame += np.concatenate([-more, more])
-    width, height = (frame[2:] - frame[:2] + around_axes) / POINTS
-    return Plan(scale, frame, (float(width), float(height)))
+    return scale, frame + np.concatenate([-more, more])
 
 
-def _axes(figure: Figure, plan: Plan, title: str, notes: list[str]) -> Axes:
+def _axes(figure: Figure, scale: float, frame: Array, title: str, notes: list[str]) -> Axes:
     """The axes, and the words above them."""
     from matplotlib.ticker import MaxNLocator
 
-    x0, y0, x1, y1 = plan.frame
-    left, (width, height) = LEFT, (POINTS * side for side in plan.size)
+    x0, y0, x1, y1 = frame
+    left, width, height = LEFT, x1 - x0 + LEFT + RIGHT, y1 - y0 + BELOW + ABOVE + NOTE * len(notes)
     axes = figure.add_axes((0.1, 0.1, 0.8, 0.8))
-    axes.set(xlim=(x0 * plan.scale, x1 * plan.scale), ylim=(y0 * plan.scale, y1 * plan.scale))
+    axes.set(xlim=(x0 * scale, x1 * scale), ylim=(y0 * scale, y1 * scale))
     axes.set(xlabel="x (m)", ylabel="y (m)")
     for line, length, each in ((axes.xaxis, x1 - x0, 60.0), (axes.yaxis, y1 - y0, 32.0)):
         number = min(max(int(length / each), 2), 9)
@@ -257,23 +233,21 @@ def _axes(figure: Figure, plan: Plan, title: str, notes: list[str]) -> Axes:
     return axes
 
 
-def _paint(axes: Axes, drawing: Drawing) -> None:
+def _paint(axes: Axes, sheet: Sheet) -> None:
     """Draw all strokes of a group that look alike as one collection."""
     from matplotlib.collections import LineCollection, PolyCollection
 
-    for group, strokes in drawing.strokes.items():
+    for group, strokes in sheet.strokes.items():
         alike: defaultdict[tuple[str, float, str | None, float], list[Array]] = defaultdict(list)
         for points, color, weight, fill, layer in strokes:
             alike[color, weight, fill, layer].append(points)
         for (color, weight, fill, layer), chains in alike.items():
-            look: dict[str, Any] = {
-                "edgecolors": color, "linewidths": weight, "zorder": layer, "gid": group,
-                "joinstyle": "round", "capstyle": "round",
-            }  # fmt: skip
-            if fill is not None:
-                look["facecolors"] = fill
             kind = LineCollection if fill is None else PolyCollection
-            axes.add_collection(kind(chains, **look), autolim=False)
+            collection = kind(
+                chains, edgecolors=color, facecolors=fill or "none", linewidths=weight,
+                zorder=layer, joinstyle="round", capstyle="round", gid=group,
+            )  # fmt: skip
+            axes.add_collection(collection, autolim=False)
 
 
 def _write(axes: Axes, placed: list[Placed], scale: float) -> None:
@@ -290,25 +264,13 @@ def _write(axes: Axes, placed: list[Placed], scale: float) -> None:
         )  # fmt: skip
 
 
-def _badges(axes: Axes, scene: Scene, plan: Plan, measure: Measure) -> None:
-    """Write the loads of the whole scene right above the axes."""
-    x, y = plan.frame[2:] - plan.frame[:2] + (0.0, 17.0)
-    for load in scene.loads:
-        if (found := badge(load)) is None:
-            continue
-        text, sense = found
-        if not isinstance(sense, tuple):
-            text = ("\u21ba " if sense >= 0 else "\u21bb ") + text
-        axes.annotate(
-            text, (x, y), xycoords="axes points", ha="right", va="center", color=RED,
-            fontsize=LABEL_SIZE, gid="badges", annotation_clip=False,
-        )  # fmt: skip
-        x -= 2 * float(measure(text)[0]) + 0.35 * BADGE
-        if isinstance(sense, tuple) and math.hypot(*sense) > 0.0:
-            way = 12.0 * np.array(sense) / math.hypot(*sense)
-            look = {"color": RED, "arrowstyle": "-|>", "lw": 2.0, "shrinkA": 0, "shrinkB": 0}
+def _write_badges(axes: Axes, scene: Scene, measure: Measure, frame: Array) -> None:
+    """Write the loads on the whole scene right above the axes."""
+    x, y = frame[2:] - frame[:2] + (0.0, 17.0)
+    for text, arrow, angle in filter(None, map(badge, scene.loads)):
+        for words, size, turn in ((text, LABEL_SIZE, 0.0), (arrow, ARROW_SIZE, angle)):
             axes.annotate(
-                "", (x + way[0], y + way[1]), (x - way[0], y - way[1]), xycoords="axes points",
-                annotation_clip=False, gid="badges", arrowprops=look,
+                words, (x, y), xycoords="axes points", ha="right", va="center", color=RED,
+                fontsize=size, rotation=turn, gid="badges", annotation_clip=False,
             )  # fmt: skip
-        x -= 0.65 * BADGE
+            x -= 2 * float(measure(text)[0]) + 6.0 if words is text else BADGE

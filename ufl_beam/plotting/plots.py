@@ -52,18 +52,15 @@ def plot_shapes(
         )
     kept = solution.times
     chosen = drawing.nearest(kept, times) if len(times) else drawing.evenly(solution, int(count))
-    shapes = [drawing.moved_points(solution, n, magnify) for n in chosen]
     stage = drawing.plane_stage(solution, chosen, magnify)
     poses = [stage.pose(n) for n in chosen]
-    everything = (solution.grid.points, *shapes, *(pose.points() for pose in poses))
-    with style.picture(drawing.plane_size(*everything)) as figure:
+    with style.picture(drawing.plane_size(stage.points())) as figure:
         of_time = style.scale("viridis", 0.0, 0.88, kept[chosen].min(), kept[chosen].max())
         axes = style.plane_axes(figure, style.magnified(magnify, ""))
         drawing.draw_undeformed(axes, solution, stage)
-        for n, points, pose in zip(chosen, shapes, poses, strict=True):
-            color = of_time.to_rgba(kept[n])
+        for pose, color in zip(poses, of_time.to_rgba(kept[chosen]), strict=True):
             drawing.draw_strokes(axes, (*symbols.bodies(pose), *symbols.rods(pose)), color)
-            drawing.draw_axes(axes, solution, points, color=color, linewidth=2.2, zorder=3)
+            drawing.draw_axes(axes, solution, pose.nodes, color=color, linewidth=2.2, zorder=3)
             drawing.draw_masses(axes, pose, color)
         drawing.draw_fixings(axes, poses[-1])
         style.draw_bar(figure, axes, of_time, solution.parameter.name)
@@ -115,11 +112,8 @@ def plot_energy(solution: Solution) -> Figure:
     """
     energy, precision = solution.energy, float(np.finfo(np.float64).eps)
     along = solution.progress
-    entries = [
-        (name, values, line)
-        for group, line in ((energy.state, "-"), (energy.supplied, "--"), (energy.lost, ":"))
-        for name, values in group.items()
-    ]
+    groups = (energy.state, "-"), (energy.supplied, "--"), (energy.lost, ":")
+    entries = [(name, values, line) for group, line in groups for name, values in group.items()]
     with style.picture((8.0, 6.0)) as figure:
         ledger, check = map(
             style.time_axes, figure.subplots(2, 1, sharex=True, height_ratios=(2.4, 1))

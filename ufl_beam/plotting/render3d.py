@@ -19,9 +19,9 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.parallel import active_comm
-from ufl_beam.plotting.drawing import evenly, moved_points, open_hinges
-from ufl_beam.plotting.solids import Look, Solids
-from ufl_beam.plotting.style import magnified
+from ufl_beam.plotting.drawing import evenly
+from ufl_beam.plotting.solids import QUANTITIES, Solids
+from ufl_beam.plotting.style import decimal_prefix, magnified
 from ufl_beam.simulation.solution import Solution
 
 # Where the camera looks from, and what is up in the picture; the frame is in the plane of x and y.
@@ -64,11 +64,11 @@ def render(
     """
     from matplotlib.image import imsave
 
-    look = Look(solution, color, thickness, magnify, size)
+    solids = Solids(solution, color, thickness, magnify, size)
     path = _require_suffix(path, (".png",))
-    moved_points(solution, n, magnify)
+    solids.stage([n]).pose(n)
     if active_comm().rank == 0:
-        with _film(look, [n]) as frames:
+        with _film(solids, [n]) as frames:
             for frame in frames:
                 imsave(path, frame)
 
@@ -107,25 +107,25 @@ def animate(
     Example:
         >>> ub.animate(solution, "beam.gif", fps=5, seconds=0.4, size=(320, 192))
     """
-    look = Look(solution, color, thickness, magnify, size)
+    solids = Solids(solution, color, thickness, magnify, size)
     path = _require_suffix(path, (".gif", ".mp4"))
     require_number(fps, "animate: fps", positive=True)
     require_number(seconds, "animate: seconds", positive=True)
     shown = evenly(solution, max(1, round(fps * seconds)))
     if active_comm().rank == 0:
-        with _film(look, shown) as frames, _film_writer(path, fps) as film:
+        with _film(solids, shown) as frames, _film_writer(path, fps) as film:
             for frame in frames:
                 film.append_data(frame)
 
 
 @contextmanager
-def _film(look: Look, shown: list[int]) -> Iterator[Iterator[Any]]:
+def _film(solids: Solids, shown: list[int]) -> Iterator[Iterator[Any]]:
     """The frames of these states, one after the other, as images (height, width, 3)."""
     pyvista = _optional("pyvista", "ufl_beam[view]", "pictures of solid bodies need PyVista")
     with _screen(pyvista):
-        plotter = pyvista.Plotter(off_screen=True, window_size=list(look.size))
+        plotter = pyvista.Plotter(off_screen=True, window_size=list(solids.size))
         try:
-            yield _frames(pyvista, plotter, look, shown)
+            yield _frames(pyvista.merge, plotter, solids, shown)
         finally:
             plotter.close()
             del plotter
@@ -133,23 +133,39 @@ def _film(look: Look, shown: list[int]) -> Iterator[Iterator[Any]]:
             gc.collect()
 
 
-def _frames(pyvista: Any, plotter: Any, look: Look, shown: list[int]) -> Iterator[Any]:
-    beams, stage = look.solution.scene.beams, look.stage(shown)
-    sizes = (float(np.abs(look.values(b, n)).max()) for b in beams for n in set(shown))
-    largest, solids = max(sizes, default=0.0), Solids(pyvista, plotter, look)
-    _set_camera(plotter, look.bounds(shown), look.size)
+def _frames(merge: Any, plotter: Any, solids: Solids, shown: list[int]) -> Iterator[Any]:
+    solution, stage = solids.solution, solids.stage(shown)
+    largest = max(float(np.abs(solids.values(n)).max(initial=0.0)) for n in set(shown))
+    factor, prefix = decimal_prefix(largest)
+    limit, (quantity, unit) = largest / factor or 1.0, QUANTITIES[solids.color]
+    height = solids.size[1]
+    text = {"font_size": height // 40, "color": "black", "viewport": True}
+    bar = {
+        "title": "values", "color": "black", "n_labels": 5, "fmt": "%.3g", "width": 0.48,
+        "height": 0.09, "position_x": 0.46, "position_y": 0.01, "label_font_size": height // 36,
+    }  # fmt: skip
+    _set_camera(plotter, solids.bounds(stage), solids.size)
     plotter.set_background("white")
     plotter.enable_anti_aliasing("msaa")
+    if solution.scene.beams:
+        plotter.add_mesh(solids.axes(), color="#A0A0A0", reset_camera=False)
+        plotter.add_text(f"{quantity} ({prefix}{unit})", position=(0.02, 0.025), **text)
     for n in shown:
         plotter.suppress_rendering = True
-        points = moved_points(look.solution, n, look.magnify)
         pose = stage.pose(n)
-        if beams:
-            solids.add_beams(n, points, largest)
-        solids.add_strokes(pose)
-        solids.add_fittings(pose, open_hinges(look.solution, n, points))
-        time = look.solution.parameter.at(look.solution.times[n], ".3f")
-        solids.add_text(f"{time}{magnified(look.magnify)}", (0.02, 0.93))
+        # Meshes and texts replace those of the same name.
+        if solution.scene.beams:
+            plotter.add_mesh(
+                solids.beams(n, pose, factor), scalars="values", clim=(-limit, limit),
+                cmap="coolwarm", name="beams", scalar_bar_args=bar, reset_camera=False,
+                ambient=0.4, diffuse=0.7,
+            )  # fmt: skip
+            plotter.scalar_bars["values"].SetTitle("")  # VTK would set it over the numbers.
+        for color, meshes in solids.others(n, pose).items():
+            look = {"color": color, "name": color, "ambient": 0.25}
+            plotter.add_mesh(merge(meshes), reset_camera=False, **look)
+        time = f"{solution.parameter.at(solution.times[n], '.3f')}{magnified(solids.magnify)}"
+        plotter.add_text(time, position=(0.02, 0.93), name="time", **text)
         plotter.reset_camera_clipping_range()
         plotter.suppress_rendering = False
         plotter.render()

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,24 +12,60 @@ from functools import cached_property
 import numpy as np
 
 from ufl_beam.arrays import Array
+from ufl_beam.errors import SceneError, require_number
 from ufl_beam.model.bodies import GROUND, Anchor, Body, Spot
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import Curve, nearest, parameter_step, tangent
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.joint_histories import motion_of, turned
-from ufl_beam.output.line_data import spots_of
+from ufl_beam.output.scene_lines import spots_of
+from ufl_beam.plotting.geometry import directions
 from ufl_beam.simulation.solution import Solution
 
 Range = tuple[float, float]  # of a slider along its rail from its place, m; or guide parameter
 
 
-class Setting(ABC):
-    """Scene that is drawn, and the size of its symbols."""
+class Stage:
+    """Scene before any run or in a solution, as pictures show it, and the size of its symbols.
 
-    scene: Scene
-    unit: float  # half the size of a symbol of a support; m
-    magnify: float  # factor on the displacements
+    Displacements are drawn ``magnify`` times as large as they are.  Of a solution, the kept times
+    ``shown`` are in the picture, by default all; rails are long enough for them.
+    """
+
+    def __init__(
+        self,
+        subject: Scene | Solution,
+        magnify: float,
+        unit: float,  # half the size of a symbol of a support; m
+        shown: Sequence[int] | None = None,
+    ) -> None:
+        require_number(magnify, "magnify", positive=True)
+        self.magnify, self.unit = magnify, unit
+        self._solution = subject if isinstance(subject, Solution) else None
+        self.scene = subject.scene if isinstance(subject, Solution) else subject
+        kept = 0 if self._solution is None else len(self._solution.times)
+        self._shown = range(kept) if shown is None else shown
+
+    @property
+    def undeformed(self) -> Pose:
+        """Pose in which everything was made."""
+        nodes = np.empty((0, 2)) if self._solution is None else self._solution.grid.points
+        return Pose(self, lambda anchor: np.zeros(3), nodes)
+
+    def pose(self, n: int) -> Pose:
+        """Return the pose at the n-th kept time of the solution, or raise SceneError."""
+        assert self._solution is not None
+        grid, kept = self._solution.grid, len(self._solution.times)
+        if not -kept <= n < kept:
+            raise SceneError(f"n = {n}: the solution kept {kept} times; give {-kept} to {kept - 1}")
+        q = self._solution.q[n]
+        nodes = grid.points + self.magnify * q[grid.dofs[:, :2]]
+        return Pose(self, lambda anchor: motion_of(grid, anchor, [q])[0], nodes)
+
+    def points(self) -> Array:
+        """Return all points of the undeformed pose and of all that are shown; (n, 2); m."""
+        return np.concatenate([p.points() for p in (self.undeformed, *map(self.pose, self._shown))])
 
     @cached_property
     def travels(self) -> dict[Connector, Range]:
@@ -37,14 +73,21 @@ class Setting(ABC):
         joints = [j for j in self.scene.joints if j.look in ("Prismatic", "Guided")]
         return {holder: self._travel(holder) for holder in (j.holders[0] for j in joints)}
 
-    @abstractmethod
     def _travel(self, holder: Connector) -> Range:
         """Range of what a connector holds on its rail or guide curve."""
-
-    @property
-    def undeformed(self) -> Pose:
-        """Pose in which everything was made."""
-        return Pose(self, lambda anchor: np.zeros(3))
+        solution = self._solution
+        if isinstance(holder.law, Guide):
+            points = np.empty((0, 2)) if solution is None else solution.position(holder.b)
+            return _used(holder.law.curve, points, self._shown, 3.0 * self.unit, self.scene.size)
+        along = holder.axis[1], -holder.axis[0]  # it holds across the rail
+        start = float(np.dot(along, holder.apart))
+        if solution is None:
+            return start, start
+        ahead = turned(along, solution.displacement(holder.a)[:, 2])
+        apart = solution.position(holder.b) - solution.position(holder.a)
+        way = np.sum(apart * ahead, axis=1)[list(self._shown)]
+        reached = start + self.magnify * (np.append(way, start) - start)
+        return float(reached.min()), float(reached.max())
 
     @cached_property
     def spots(self) -> dict[Body, list[Spot]]:
@@ -62,76 +105,30 @@ class Setting(ABC):
     @cached_property
     def offsets(self) -> dict[Connector, float]:
         """Offsets of connectors that share their line, or their pin, with others; in units."""
-        alike: dict[tuple[bool, frozenset[object]], list[Connector | None]] = {}
-        for joint in self.scene.joints:
-            if joint.look in ("Prismatic", "RigidLink", "Link"):
-                alike[False, frozenset(joint.places)] = [None]  # which keeps the middle
+        rods = [j for j in self.scene.joints if j.look in ("Prismatic", "RigidLink", "Link")]
+        middles = {frozenset(joint.places) for joint in rods}  # they keep the middle
+        groups: defaultdict[tuple[bool, frozenset[object]], list[Connector]] = defaultdict(list)
         for c in self.scene.connectors:
-            ends: tuple[object, ...] = (c.b.point,) if c.turns else (c.a, c.b)
-            alike.setdefault((c.turns, frozenset(ends)), []).append(c)
-        offsets = {}
-        for (turns, _), group in alike.items():
+            groups[c.turns, frozenset((c.b.point,) if c.turns else (c.a, c.b))].append(c)
+        offsets: dict[Connector, float] = {}
+        for (turns, ends), group in groups.items():
             for k, connector in enumerate(group):
-                if connector is None:
-                    continue
                 if turns:
                     offsets[connector] = 1.15 * k
-                elif group[0] is None:
-                    offsets[connector] = 1.6 * ((k + 1) // 2) * (-1.0) ** k
+                elif ends in middles:
+                    offsets[connector] = 1.6 * (k // 2 + 1) * (-1.0) ** (k + 1)
                 else:
                     offsets[connector] = 1.6 * (k - (len(group) - 1) / 2)
         return offsets
-
-
-class Model(Setting):
-    """Scene before any run."""
-
-    def __init__(self, scene: Scene, unit: float) -> None:
-        self.scene, self.unit, self.magnify = scene, unit, 1.0
-
-    def _travel(self, holder: Connector) -> Range:
-        """Rail as long as the slider, or some of the guide curve."""
-        if isinstance(holder.law, Guide):
-            more, size = 3.0 * self.unit, self.scene.size
-            return _used(holder.law.curve, np.empty((0, 2)), (), more, size)
-        start = float(np.dot(_along(holder), holder.apart))
-        return start, start
-
-
-class Stage(Setting):
-    """Solution, of which rails must do for the kept times ``shown``; all by default."""
-
-    def __init__(
-        self, solution: Solution, magnify: float, unit: float, shown: Sequence[int] | None = None
-    ) -> None:
-        self.scene, self._solution = solution.scene, solution
-        self.magnify, self.unit = magnify, unit
-        self._shown = range(len(solution.times)) if shown is None else shown
-
-    def pose(self, n: int) -> Pose:
-        """Return the pose at the n-th kept time."""
-        grid, q = self._solution.grid, self._solution.q[n]
-        return Pose(self, lambda anchor: np.asarray(motion_of(grid, anchor, [q])[0]))
-
-    def _travel(self, holder: Connector) -> Range:
-        points = self._solution.position(holder.b)
-        if isinstance(holder.law, Guide):
-            more, size = 3.0 * self.unit, self.scene.size
-            return _used(holder.law.curve, points, self._shown, more, size)
-        along = _along(holder)
-        ahead = turned(along, self._solution.displacement(holder.a)[:, 2])
-        way = np.sum((points - self._solution.position(holder.a)) * ahead, axis=1)
-        start = float(np.dot(along, holder.apart))
-        way = start + self.magnify * (way[list(self._shown)] - start)
-        return min(start, float(way.min())), max(start, float(way.max()))
 
 
 @dataclass(frozen=True, eq=False)
 class Pose:
     """Scene at one time, as it is drawn."""
 
-    stage: Setting  # what is shown
+    stage: Stage
     motion: Callable[[Anchor], Array]  # (u, v, ψ) of an anchor, not magnified; (3,); m, m, rad
+    nodes: Array  # of all beams of a solution; (num_nodes, 2); m
 
     def at(self, anchor: Anchor) -> Array:
         """Return the coordinates of an anchor; (2,); m."""
@@ -146,10 +143,10 @@ class Pose:
         return np.asarray(turned(x, np.array([self.turn(anchor)]))[0])
 
     def points(self) -> Array:
-        """Return points of all bodies, and of all that is attached to the ground; (n, 2); m."""
-        ground = [spot.point for spot in self.stage.spots[GROUND]]
+        """Return nodes of beams, outlines of bodies, and points of the ground; (n, 2); m."""
+        ground = np.reshape([spot.point for spot in self.stage.spots[GROUND]], (-1, 2))
         bodies = [self.of_body(body, outline) for body, outline in self.stage.outlines.items()]
-        return np.concatenate([np.reshape(ground, (-1, 2)), *bodies])
+        return np.concatenate([self.nodes, ground, *bodies])
 
     def of_body(self, body: Body, points: Array) -> Array:
         """Move points of a body of the undeformed scene with it; (n, 2); m."""
@@ -157,11 +154,6 @@ class Pose:
         arms = points - body.center
         moved = turned(arms, np.full(len(arms), ψ)) - arms + (u, v)
         return np.asarray(points + self.stage.magnify * moved)
-
-
-def _along(holder: Connector) -> tuple[float, float]:
-    """Direction of a rail, whose holder holds across it."""
-    return holder.axis[1], -holder.axis[0]
 
 
 def _used(curve: Curve, points: Array, shown: Sequence[int], more: float, size: float) -> Range:
@@ -188,8 +180,7 @@ def _around(points: list[tuple[float, float]], unit: float) -> Array:
     from scipy.spatial import ConvexHull
 
     r = (0.75 if len(set(points)) > 1 else 1.3) * unit
-    angle = np.linspace(0.0, 2 * math.pi, 48, endpoint=False)
-    circle = r * np.column_stack([np.cos(angle), np.sin(angle)])
+    circle = r * directions(np.linspace(0.0, 2 * math.pi, 48, endpoint=False))
     cloud = np.concatenate([np.add(point, circle) for point in points])
     corners = cloud[ConvexHull(cloud).vertices]
     return np.vstack([corners, corners[:1]])

@@ -20,9 +20,17 @@ from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 from ufl_beam.output.joint_histories import turned
-from ufl_beam.plotting.connector_glyphs import AROUND, STRAIGHT, Piece, along, around
+from ufl_beam.plotting.connector_glyphs import AROUND, STRAIGHT, along, around
+from ufl_beam.plotting.geometry import (
+    directions,
+    in_frame,
+    left_of,
+    lengths_along,
+    points_along,
+    unit_vectors,
+)
 from ufl_beam.plotting.scene_layout import Pose
-from ufl_beam.plotting.style import BACK, FRONT, GREY, INK, MIDDLE, ORANGE, UPON, WHITE, Stroke
+from ufl_beam.plotting.style import BACK, FRONT, GREY, INK, ORANGE, WHITE, Stroke
 
 FILLED, EDGE = "#D6E2ED", "#5F7A94"  # colours of bodies
 STEEL, DARK, GROUND_GREY = "#6E6E6E", "#4A4A4A", "#808080"  # of rails, rods and still supports
@@ -63,8 +71,7 @@ def bodies(pose: Pose) -> list[Stroke]:
 
 def centres(pose: Pose) -> Iterator[Stroke]:
     """Draw centres of mass as circles, two quarters dark."""
-    angle = np.linspace(0.0, math.pi / 2, 13)
-    arc = 0.45 * pose.stage.unit * np.column_stack([np.cos(angle), np.sin(angle)])
+    arc = 0.45 * pose.stage.unit * directions(np.linspace(0.0, math.pi / 2, 13))
     quarter = np.vstack([(0.0, 0.0), arc, (0.0, 0.0)])
     for body in pose.stage.scene.bodies:
         at, ψ = pose.at(body.middle), pose.turn(body.middle)
@@ -115,21 +122,19 @@ def connectors(pose: Pose) -> Iterator[Stroke]:
 def _straight(pose: Pose, connector: Connector) -> Iterator[Stroke]:
     a, b = pose.at(connector.a), pose.at(connector.b)
     unit, offset = pose.stage.unit, pose.stage.offsets[connector]
-    length = float(np.linalg.norm(b - a))
-    straight = length > 0.1 * unit
-    x, y = (b - a) / length if straight else pose.turned(connector.axis, connector.a)
-    across = np.array([-y, x])
-    ends = a, b
+    apart = np.linalg.norm(b - a) > 0.1 * unit
+    axis = unit_vectors(b - a) if apart else pose.turned(connector.axis, connector.a)
+    across = unit * left_of(axis)
     if offset:
-        aside = offset * unit * across
-        ends = a + 0.06 * (b - a), b - 0.06 * (b - a)
-        yield Stroke(np.array([a, ends[0], ends[0] + aside]))
-        yield Stroke(np.array([b, ends[1], ends[1] + aside]))
-        ends = ends[0] + aside, ends[1] + aside
+        for end, far in ((a, b), (b, a)):
+            lane = end + 0.06 * (far - end)
+            yield Stroke(np.array([end, lane, lane + offset * across]))
+        inwards = 0.06 * (b - a)
+        a, b = a + inwards + offset * across, b - inwards + offset * across
     # It takes the same part of the way at all times, so it stretches with the motion.
     body = min(0.66, 6.0 * unit / max(math.hypot(*connector.apart), unit))
-    for piece in STRAIGHT[type(connector.law)]:
-        yield _inked(piece, along(piece, *ends, (across, unit), body))
+    for stroke in STRAIGHT[type(connector.law)]:
+        yield along(stroke, a, b, across, body)
 
 
 def _around(pose: Pose, connector: Connector) -> Iterator[Stroke]:
@@ -140,9 +145,8 @@ def _around(pose: Pose, connector: Connector) -> Iterator[Stroke]:
     first -= 0.5
     # Where it turns for many times, the symbol stops winding.
     sweep = glyph.sweep + min(max(sweep, -0.75 * glyph.sweep), 2.0)
-    for piece in glyph.pieces:
-        points = around(piece, pin, radius, (first, first + sweep))
-        yield _inked(piece, points)._replace(layer=FRONT)
+    for stroke in glyph.strokes:
+        yield around(stroke, pin, radius, (first, first + sweep))
     start = pose.at(connector.a)
     if np.linalg.norm(pin - start) > radius and node(connector.a) is not GROUND:
         yield Stroke(np.array([start, pin]), GREY, 1.0)
@@ -185,24 +189,21 @@ def _grounds(scene: Scene) -> dict[Spot, tuple[float, bool]]:
 def _rail(pose: Pose, joint: Joint) -> Iterator[Stroke]:
     """The rail as long as the way, and the block on it."""
     (across,), (base, slider) = joint.holders, joint.places
-    unit = pose.stage.unit
-    x, y = pose.turned(across.axis, base)
-    ahead, left = np.array([y, -x]), np.array([x, y])  # the axis held is across the rail
-    start, block = pose.at(base), pose.at(slider)
+    unit, start, block = pose.stage.unit, pose.at(base), pose.at(slider)
+    ahead = -left_of(pose.turned(across.axis, base))
     s = float((block - start) @ ahead)
     low, high = pose.stage.travels[across]
-    low, high = min(low, s), max(high, s)  # magnified rotations lead elsewhere
-    first = block + (low - 1.8 * unit - s) * ahead
-    last = block + (high + 1.8 * unit - s) * ahead
-    yield Stroke(np.array([first, last]), STEEL, 2.2)
+    # Magnified rotations lead elsewhere.
+    low, high = min(low, s) - 1.8 * unit, max(high, s) + 1.8 * unit
+    rail = block + np.outer((low - s, high - s), ahead)
+    yield Stroke(rail, STEEL, 2.2)
     if node(base) is GROUND:
-        yield from _hatches(np.array([first, last]), unit)
+        yield from _hatches(rail, unit)
     else:
-        foot = min(max(0.0, low - 1.8 * unit), high + 1.8 * unit)
+        foot = min(max(0.0, low), high)
         yield Stroke(np.array([start, block + (foot - s) * ahead]), STEEL, 2.2)
     corners = [(-0.95, 0.55), (0.95, 0.55), (0.95, -0.55), (-0.95, -0.55), (-0.95, 0.55)]
-    outline = block + unit * (np.array(corners) @ np.array([ahead, left]))
-    yield Stroke(outline, INK, 1.8, WHITE)
+    yield Stroke(in_frame(corners, block, unit * ahead), INK, 1.8, WHITE)
 
 
 def _guide(pose: Pose, joint: Joint) -> Iterator[Stroke]:
@@ -219,15 +220,14 @@ def _sleeve(pose: Pose, joint: Joint) -> Iterator[Stroke]:
     """Two bars along what a release leaves free; a box if it leaves both free."""
     if 0 in joint.shared:
         return
-    at, unit, place = pose.at(joint.places[0]), pose.stage.unit, joint.places[0]
-    x, y = pose.turned(joint.holders[0].axis if joint.holders else (0.0, 1.0), place)
-    free, held = np.array([y, -x]), np.array([x, y])
-    for side in (1, -1):
-        bar = at + unit * np.array([0.9 * free, -0.9 * free]) + side * 0.6 * unit * held
-        yield Stroke(bar, INK, 2.4, layer=FRONT)
-        if not joint.holders:
-            across = at + unit * np.array([0.6 * held, -0.6 * held]) + side * 0.9 * unit * free
-            yield Stroke(across, INK, 2.4, layer=FRONT)
+    place = joint.places[0]
+    held = pose.turned(joint.holders[0].axis if joint.holders else (0.0, 1.0), place)
+    bars = [[(-0.9, t), (0.9, t)] for t in (0.6, -0.6)]
+    if not joint.holders:
+        bars += [[(s, -0.6), (s, 0.6)] for s in (0.9, -0.9)]
+    for bar in bars:
+        points = in_frame(bar, pose.at(place), -pose.stage.unit * left_of(held))
+        yield Stroke(points, INK, 2.4, layer=FRONT)
 
 
 def support_direction(support: Support, turned: float) -> float:
@@ -259,17 +259,12 @@ def _towards(spot: Spot, other: Anchor) -> float:
     return _inward(other) if (x, y) == (X, Y) else math.atan2(Y - y, X - x)
 
 
-def _inked(piece: Piece, points: Array) -> Stroke:
-    return Stroke(points, INK, piece.weight, piece.fill, UPON if piece.inside else MIDDLE)
-
-
 def _hatches(line: Array, unit: float) -> Iterator[Stroke]:
     """The mark of the ground along a line, to its right."""
-    steps = np.diff(line, axis=0)
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))])
-    for s in np.arange(0.3 * unit, way[-1], 0.55 * unit):
-        x, y = (np.interp(s, way, column) for column in line.T)
-        k = min(int(np.searchsorted(way, s)), len(steps)) - 1
-        dx, dy = steps[k] / (np.linalg.norm(steps[k]) or 1.0)
-        foot = np.array([x - 0.4 * unit * (dx - dy), y - 0.4 * unit * (dy + dx)])
-        yield Stroke(np.array([[x, y], foot]), STEEL, 1.0)
+    lengths = lengths_along(line)
+    at = np.arange(0.3 * unit, lengths[-1], 0.55 * unit)
+    step = np.minimum(np.searchsorted(lengths, at), len(line) - 1) - 1
+    ahead = unit_vectors(np.diff(line, axis=0)[step])
+    tops = points_along(line, at)
+    for ends in np.stack([tops, tops - 0.4 * unit * (ahead + left_of(ahead))], axis=1):
+        yield Stroke(ends, STEEL, 1.0)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -22,51 +23,68 @@ from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.simulation.branch_check import StaticPath
 from ufl_beam.simulation.step_equation import StepEquation
-from ufl_beam.solvers.c_equation import CEquation
-from ufl_beam.solvers.equation import Equation
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.beams import ElasticBeams, Inertia
 from ufl_beam.terms.connector_responses import Setting
-from ufl_beam.terms.connectors import couplings
+from ufl_beam.terms.connectors import Couplings, couplings
 from ufl_beam.terms.damping import SecondDifferences, damping_forces
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.guide_curves import guides
 from ufl_beam.terms.inelastic_beams import InelasticBeams, inelastic_cells
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.loads import DeadLoads, FollowerLoads, FrameForces, LoadTerm
-from ufl_beam.terms.material_points import expect_entries
+from ufl_beam.terms.material_points import Points, expect_entries
 from ufl_beam.terms.openings import Openable, Openings, SearchFlags
+from ufl_beam.terms.rigid_plastic import RigidPlasticResponse
 from ufl_beam.terms.supports import Supports
 from ufl_beam.terms.tangent_derivatives import Cells
 from ufl_beam.terms.works import Works
 
 
+class Evaluation(Protocol):
+    """Classes that evaluate forms and laws: those of evaluation.py."""
+
+    @property
+    def fields(self) -> type[Fields]:
+        """Class of the cells that forms are evaluated on."""
+
+    @property
+    def points(self) -> type[Points]:
+        """Class of the material points of springs and cells."""
+
+    @property
+    def inelastic(self) -> type[InelasticBeams]:
+        """Class of the cells with material points."""
+
+    @property
+    def couplings(self) -> type[Couplings]:
+        """Class of the connectors but for guides."""
+
+    @property
+    def slips(self) -> type[RigidPlasticResponse]:
+        """Class of the plastic hinges of zero length."""
+
+    @property
+    def in_c(self) -> bool:
+        """True if C may call the terms with no Python between them."""
+
+
 @dataclass(frozen=True)
 class Assembly:
-    """Terms of a scene and what they share.
+    """Terms of a scene and what they share."""
 
-    Attributes:
-        fields: Function spaces on the cells of this process.
-        asked: Forces of controllers, and limits of friction, in the step; N or N m.
-        rates: Rates of the motions with friction as the step begins; m/s or rad/s.
-        beams: Beams of the cells of this process; the inelastic ones, with material points, first.
-        yields: Whether any process has such cells.
-        couplings: Connectors, those alike together.
-        openings: Search for what opens; None if nothing can.
-    """
-
-    fields: Fields
+    fields: Fields  # on the cells of this process
     ledger: Ledger
-    asked: dict[Connector, float]
-    rates: dict[Connector, float]
-    beams: list[Cells]
-    inelastic: list[InelasticBeams]
-    yields: bool
-    couplings: list[Links]
+    asked: dict[Connector, float]  # forces of controllers, limits of friction in the step; N or N m
+    rates: dict[Connector, float]  # of motions with friction as the step begins; m/s or rad/s
+    beams: list[Cells]  # those with material points first
+    inelastic: list[InelasticBeams]  # those with material points
+    yields: bool  # True if any process has such cells
+    couplings: list[Links]  # connectors, those alike together
     loads: list[LoadTerm]
     inertia: Inertia | None
     supports: Supports
-    openings: Openings | None
+    openings: Openings | None  # search for what opens; None if nothing can
     equation: StepEquation
 
     @property
@@ -76,23 +94,15 @@ class Assembly:
 
     def ask(self, simulation: Running, q: Array) -> None:
         """Ask controllers and friction for forces and limits; note the rates of what may slip."""
-        new = {
-            link: law.ask(simulation, link)
-            for link, law in ((link, link.law) for link in self.asked)
-            if isinstance(law, Controller | Coulomb)
-        }
-        self.asked.update(new)
+        forces = {
+            link: link.law.ask(simulation, link)
+            for link in self.asked if isinstance(link.law, Controller | Coulomb)
+        }  # fmt: skip
+        self.asked.update(forces)
         if self.inertia is not None:
             for one in self.couplings:
                 if isinstance(one.links[0].law, Coulomb):
                     self.rates.update(zip(one.links, one.rates(q, self.inertia.v), strict=True))
-
-    def compiled(self) -> Equation:
-        """Return the equation in C, or as it is where several processes or axes need Python."""
-        python = self.equation
-        if python.share.comm.size > 1 or self.supports.turned:
-            return python
-        return CEquation(python, self.beams, self.couplings, python.others, self.supports)
 
     def internal_variables(self, q: Array) -> State:
         """Return what a run that starts here takes over: internal variables, reactions, rates."""
@@ -137,38 +147,46 @@ class Assembly:
         return path
 
 
-def assemble(share: Share, scheme: Scheme, t0: float, v: Array, together: Agreement) -> Assembly:
+def assemble(
+    share: Share, scheme: Scheme, t0: float, v: Array, by: Evaluation, together: Agreement
+) -> Assembly:
     """Make the terms of a scene that begins at t0 (s).
 
     Supports stop the initial local velocities ``v`` in place.
     """
-    scene, ledger, fields, search = share.grid.scene, Ledger(), Fields(share), SearchFlags()
+    scene, ledger, fields, search = share.grid.scene, Ledger(), by.fields(share), SearchFlags()
     A = fields.matrix()
     setting = (scheme, A, ledger)
 
     # Each kind makes its entries of the ledger: their order is that of the columns of tables.
-    groups = inelastic_cells(share.grid)
+    groups = inelastic_cells(share)
     inelastic, elastic = [], np.ones(len(share.cells), dtype=bool)
     for layout, cells in groups:
         expect_entries(layout, scheme, ledger)
         part = np.flatnonzero(np.isin(share.cells, cells))
         if len(part):
             elastic[part] = False
-            inelastic.append(InelasticBeams(Fields(share, part), layout, *setting, search))
+            of = (layout, *setting, search, by.points)
+            inelastic.append(by.inelastic(fields.part(part), *of))
     beams: list[Cells] = [*inelastic]
     numerical: list[Term] = []
     if elastic.any():
         part = np.flatnonzero(elastic)
-        on_part = fields if elastic.all() else Fields(share, part)
+        on_part = fields if elastic.all() else fields.part(part)
         beams.append(ElasticBeams(on_part, *setting))
         if isinstance(scheme, DecayingMidpoint):
             numerical.append(SecondDifferences(scheme, on_part, A, ledger))
 
     asked = {link: 0.0 for link in scene.links if isinstance(link.law, Controller | Coulomb)}
     rates = dict(asked)
-    connectors = Setting(asked, rates, scene.size, scheme, ledger, friction_repeats(scene), search)
-    coupled = together(lambda: [*couplings(share, connectors, A), *guides(share, scheme, A)])
-    openings = Openings.of(search, _openable(inelastic, coupled), share.comm)
+    connectors = Setting(
+        asked, rates, scene.size, scheme, ledger, friction_repeats(scene), search, by.points,
+        by.slips,
+    )  # fmt: skip
+    of_links = share, connectors, A
+    coupled = together(lambda: [*couplings(*of_links, by.couplings), *guides(*of_links)])
+    places = _openable(inelastic, coupled)
+    openings = Openings(search, places, share) if share.largest(float(bool(places))) else None
 
     loads = _loads(scene, fields, scheme, ledger, A)
     if scene.works:
@@ -181,6 +199,8 @@ def assemble(share: Share, scheme: Scheme, t0: float, v: Array, together: Agreem
     if inertia:
         supports.stop(inertia.v)
     equation = StepEquation(share, A, beams, coupled, loads, others, supports, search)
+    if by.in_c:
+        equation.leave_to_c()
     return Assembly(
         fields, ledger, asked, rates, beams, inelastic, bool(groups), coupled, loads, inertia,
         supports, openings, equation,
@@ -204,4 +224,5 @@ def _loads(scene: Scene, fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr)
 def _openable(inelastic: list[InelasticBeams], coupled: list[Links]) -> list[Openable]:
     """Return the places of this process that may open: hinges, cracks, softening springs."""
     cells: list[Openable] = [one for one in inelastic if one.points.softens]
-    return [*cells, *(one.openable for one in coupled if one.openable is not None)]
+    laws = (one.response.openable for one in coupled)
+    return [*cells, *(law for law in laws if law is not None)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The path of static equilibria: whether a step followed it, or leapt somewhere else."""
+"""Check that a static step followed the path of equilibria, and did not leap to another one."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme
-from ufl_beam.terms.base import Beams
+from ufl_beam.terms.base import InternalForces
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.links import Links
 
 FAR = 1e3
-"""Sizes of the scene, or radians, by which nothing moves in a static step but a mechanism."""
+"""Largest motion of a node in a static step that is no mechanism; sizes of the scene or radians."""
 
 KINK = 1e-6
-"""Part of the energy that went through at which a static step may pass a kink of a law."""
+"""Work that a kink of a law may leave unexplained, as a part of the energy that went through."""
 
 
 class StaticPath:
@@ -36,7 +36,7 @@ class StaticPath:
         self,
         share: Share,
         scheme: Scheme,
-        beams: Sequence[Beams],
+        beams: Sequence[InternalForces],
         couplings: Sequence[Links],
         ledger: Ledger,
         q: Array,
@@ -62,33 +62,21 @@ class StaticPath:
     def require(self, q1: Array, s: Array, force: Array, least_work: float) -> None:
         """Raise :class:`StepFailed` unless the step ``s`` of the nodes to ``q1`` was followed.
 
-        ``force`` are the internal forces in it; round-off makes the work ``least_work``; J.
+        The internal forces, ``force`` in the step, must account for what it stores and dissipates.
+        Otherwise Newton's method may have found another branch of equilibria: beyond a limit load,
+        or where softening lets go more than it dissipates.  Round-off does the work ``least_work``
+        (J).
         """
-        self._require_near(s)
-        if math.isfinite(self._scheme.slack):
-            self._require_explained(q1, s, force, least_work)
-
-    def accept(self, force: Array) -> None:
-        """Take the internal forces of a step as those before the next."""
-        self.force = force.copy()
-
-    def _require_near(self, s: Array) -> None:
-        size = self._share.grid.scene.size
-        moves = np.abs(s) / size
-        moves[self._rotations] *= size
+        moves = np.abs(s) / self._share.grid.scene.size
+        moves[self._rotations] = np.abs(s[self._rotations])
         far = self._share.largest(moves.max(initial=0.0))
         if not far <= FAR:
             raise StepFailed(
                 f"a node moves by {far:.1e} times the size of the scene, or turns by so many "
                 "radians, in the step: what yields and what has opened leave a mechanism"
             )
-
-    def _require_explained(self, q1: Array, s: Array, force: Array, least_work: float) -> None:
-        """The forces on the way must account for what the step stores and dissipates.
-
-        Otherwise Newton's method may have found another branch of equilibria than the one followed:
-        beyond a limit load, or where softening lets go more than it dissipates.
-        """
+        if math.isinf(self._scheme.slack):
+            return
         total = self._share.total
         work = total(float(self._scheme.acting(self.force, force) @ s))
         in_beams = total(sum(one.change(q1) for one in self._beams))
@@ -104,3 +92,7 @@ class StaticPath:
                 f"{work:.3e} J of work: it leaps to another branch of equilibria, or is too long "
                 "to tell"
             )
+
+    def accept(self, force: Array) -> None:
+        """Take the internal forces of a step as those before the next."""
+        self.force = force.copy()

@@ -7,27 +7,23 @@ import hashlib
 import os
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import count
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.collective_errors import Agreement, on_first
-from ufl_beam.discretization.state_io import State
+from ufl_beam.collective_errors import on_first
 from ufl_beam.errors import SceneError, require_count, require_number, require_sequence, shorten
 from ufl_beam.file_locks import Lock
-from ufl_beam.output.archive import above, below
+from ufl_beam.output.archive import above
 from ufl_beam.output.output_files import require_path
-from ufl_beam.output.recorders import Recorder
 from ufl_beam.simulation.checkpoint_file import Content, read, write
 from ufl_beam.simulation.fingerprint import CODE, Description, difference, has_state
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.step_control import Pace
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,41 +80,23 @@ class Checkpoint:
         return path, path.parent / f"{path.name}.part"
 
 
-class Running(Protocol):
-    """A simulation, as far as checkpoints know it; see there."""
-
-    t: float
-    parts: int
-    solution: Solution
-    together: Agreement
-
-    @property
-    def iterations(self) -> int:
-        """Newton iterations so far."""
-
-    def state(self) -> State:
-        """Return the state on which later steps depend."""
-
-    def resume(self, state: State) -> None:
-        """Go on from a state."""
-
-
 class Keeper:
     """The checkpoint of one run; its file is locked until :meth:`close`.
 
-    Args:
-        choice: What the user asks for.
-        call: What the run is, by name.
-        step: Size of its steps if they are equal; then the run may have another end.
-        comm: Processes of the run.
+    The ``call`` is what the run is, by name.  If its steps are equal, ``step`` long (s), it may go
+    on to another end ``t1`` (s).  What the file had is in ``found``, until :meth:`resume`.
     """
 
     def __init__(
-        self, choice: Checkpoint, call: Mapping[str, Any], step: float | None, comm: MPI.Intracomm
+        self,
+        choice: Checkpoint,
+        call: Mapping[str, Any],
+        step: float | None,
+        t1: float,
+        comm: MPI.Intracomm,
     ) -> None:
-        self._choice, self._call, self._comm = choice, call, comm
+        self._choice, self._call, self._step, self._t1, self._comm = choice, call, step, t1, comm
         self.path = Path(choice.path)
-        self._step = step
         self._described = Description(call)
         also = {f"also[{i}]": one for i, one in enumerate(choice.also)}
         self._stateful = {**self._described.stateful, **also}
@@ -132,7 +110,6 @@ class Keeper:
         if comm.size > 1:
             self.found = comm.bcast(self.found)
         self._last_time, self._last_step = time.perf_counter(), -1
-        self._begin = self._last_time - self.found.get("seconds", 0.0)
 
     # -- going on ------------------------------------------------------------------------------
 
@@ -159,11 +136,12 @@ class Keeper:
             self._require_same(self.found)
 
     def _require_same(self, found: Content) -> None:
-        now, then = dict(self._described.texts), dict(found["call"])
+        now, then = self._described.texts, found["call"]
         if found["python"] != PYTHON:
-            for texts in (now, then):
-                for name in [n for n in texts if n.endswith(f".{CODE}")]:
-                    del texts[name]
+            now, then = (
+                {name: text for name, text in texts.items() if not name.endswith(f".{CODE}")}
+                for texts in (now, then)
+            )
         differs = difference(now, then)
         step, before = self._step, found["step"]
         if not differs and (step is None) != (before is None):
@@ -177,43 +155,30 @@ class Keeper:
                 f"checkpoint {self.path} is of another run: {differs}. Delete the file to begin "
                 "anew, or name another"
             )
+        t, t1 = float(found["state/t"][0]), self._t1
+        if t > t1 and t - t1 > 1e-9 * (step or 0.0):
+            raise SceneError(
+                f"checkpoint {self.path} is at t = {t:.9g} s, beyond the end t[1] = {t1:.9g} s"
+            )
 
     def close(self) -> None:
         """Let other runs have the file."""
         self._lock.release()
 
-    def resume(self, simulation: Running, pace: Pace, t1: float) -> Iterator[Content]:
-        """Take over what the file has, then give what it has of each recorder."""
-        found = self.found
-        state = below("state/", found)
-        t = float(state["t"][0])
-        if t > t1 and t - t1 > 1e-9 * (self._step or 0.0):
-            raise SceneError(
-                f"checkpoint {self.path} is at t = {t:.9g} s, beyond the end t[1] = {t1:.9g} s"
-            )
-        simulation.resume(state)
-        simulation.solution.resume(below("history/", found))
-        simulation.solution.parts = simulation.parts
-        simulation.solution.iterations = simulation.iterations
-        simulation.solution.seconds = found["seconds"]
-        pace.restore(found["pace"])
-        for one, its_state in zip(self._stateful.values(), found["stateful"].values(), strict=True):
-            _restore(one, its_state)
-        self._last_step = pace.steps
-        self.found = {}
-        return (below(f"recorder {i}/", found) for i in count())
+    def resume(self, steps: int) -> None:
+        """Restore the objects with a state, and forget the file; so many steps are done."""
+        states = self.found["stateful"].values()
+        for one, state in zip(self._stateful.values(), states, strict=True):
+            _restore(one, state)
+        self._last_step, self.found = steps, {}
 
     # -- writing -------------------------------------------------------------------------------
 
-    def note(self, simulation: Running, pace: Pace, recorders: Sequence[Recorder]) -> None:
-        """Write if it is time to; all processes call it together after each step."""
+    def due(self, steps: int) -> bool:
+        """Return whether to write after so many steps; all processes ask after each of them."""
         if self._last_step < 0:  # better now than after an hour
             self._require_told()
             self._last_step = 0
-        if pace.finished or self._due(pace.steps):
-            self.write(simulation, pace, recorders)
-
-    def _due(self, steps: int) -> bool:
         every, minutes = self._choice.every, self._choice.minutes
         due = every is not None and steps - self._last_step >= every
         if minutes is not None:
@@ -221,29 +186,22 @@ class Keeper:
             due = due or bool(self._comm.bcast(over) if self._comm.size > 1 else over)
         return due
 
-    def write(self, simulation: Running, pace: Pace, recorders: Sequence[Recorder]) -> None:
-        """Write; all processes call it together."""
+    def states(self) -> dict[str, Any]:
+        """Return the states of the objects that have one, by name."""
+        return {name: _state(one) for name, one in self._stateful.items()}
+
+    def write(self, content: Content, solution: Solution, steps: int) -> None:
+        """Write what :attr:`found` is to be, and the history; all processes call it together."""
         self._require_told()
-        stateful = self._stateful.items()
-        content: Content = {
-            "python": PYTHON,
-            "call": self._described.texts,
-            "step": self._step,
-            "seconds": time.perf_counter() - self._begin,
-            "pace": pace.state(),
-            "stateful": simulation.together(lambda: {name: _state(one) for name, one in stateful}),
-            **above("state/", simulation.state()),
-        }
-        parts = [recorder.state() for recorder in recorders]
+        mine = {"python": PYTHON, "call": self._described.texts, "step": self._step}
 
         def put() -> None:
-            content.update(above("history/", simulation.solution.history()))
-            for i, part in enumerate(parts):
-                content.update(above(f"recorder {i}/", part))
-            write(self.path, content, f"of t = {simulation.t:.9g} s")
+            history = above("history/", solution.history())
+            at = f"of t = {content['state/t'][0]:.9g} s"
+            write(self.path, {**mine, **content, **history}, at)
 
         on_first(self._comm, put)
-        self._last_time, self._last_step = time.perf_counter(), pace.steps
+        self._last_time, self._last_step = time.perf_counter(), steps
 
     def _require_told(self) -> None:
         """Raise if what functions use changes without their saying so: it would be lost."""

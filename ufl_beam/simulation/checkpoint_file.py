@@ -21,7 +21,7 @@ from ufl_beam.output.archive import image_of
 from ufl_beam.output.output_files import put_in_place
 
 FORMAT = "checkpoint of ufl_beam, 2"
-"""To be counted up whenever files of before mean something else."""
+"""The number grows whenever the meaning of files changes."""
 
 HEADER = 512
 """Bytes before the HDF5 file, the least that readers of HDF5 skip."""

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from mpi4py import MPI
 
@@ -14,9 +14,6 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import ConvergenceError, StepFailed
-from ufl_beam.mechanics.time_schemes import Scheme
-from ufl_beam.model.scene import Scene
-from ufl_beam.parameter import Parameter
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.newton import Solver
@@ -24,17 +21,16 @@ from ufl_beam.solvers.null_vectors import SINGULAR, free_matrix, null_vector
 from ufl_beam.terms.base import KINDS
 from ufl_beam.terms.inelastic_beams import InelasticBeams
 from ufl_beam.terms.links import Links
-from ufl_beam.terms.supports import Supports
 
 SHARE = 0.1
-"""Part of the largest motion from which on a motion or a deformation is named."""
+"""Least motion or deformation that is named, as a part of the largest motion."""
 
 SOFT = 1e-3
-"""Part of its elastic stiffness up to which a connector or a cell gives way."""
+"""Largest stiffness of a connector or a cell that gives way, as a part of its elastic one."""
 
 NEAR = 1e-3
-"""Motion from the state before a step, of the size of the scene or a radian, that tells what yields
-as the step begins."""
+"""Motion from the beginning of a step, in sizes of the scene or radians, after which the tangent
+tells what yields as the step begins."""
 
 ROOM = 10.0
 """Largest imbalance of an exact ledger over the tolerance of the solver."""
@@ -43,65 +39,44 @@ NAMED = 3
 """Largest number of names in a list."""
 
 
-class Failed(Protocol):
-    """A simulation whose latest step has failed, as far as a diagnosis asks it."""
+class Deformed(NamedTuple):
+    """Connectors, or cells, in a motion: sizes of their deformations, and which have given way."""
 
-    scene: Scene
-    grid: Grid
-    share: Share
-    t: float
-    q: Array
-    scheme: Scheme
-    supports: Supports
-    couplings: list[Links]
-    inelastic: list[InelasticBeams]
-    equation: StepEquation
+    sizes: Array
+    yielding: npt.NDArray[np.bool_]
 
     @property
-    def parameter(self) -> Parameter:
-        """Time, or the load factor of a path."""
+    def stiff(self) -> bool:
+        """True if one deforms that has its stiffness."""
+        return bool((self.sizes[~self.yielding] >= SHARE).any())
 
-
-class Softest(NamedTuple):
-    """The motion that meets least resistance.
-
-    Attributes:
-        x: It, at all degrees of freedom; largest where one is a radian or the size of the scene.
-        motions: Sizes of its parts, those of forces zero; (grid.size,).
-        links: Sizes of the motions of connectors; (num_links,).
-        cells: Sizes of the strains of cells, see :func:`_strains`; (num_cells,).
-        yielding: Connectors, and cells, that have lost their stiffness in this motion.
-    """
-
-    x: Array
-    motions: Array
-    links: Array
-    cells: Array
-    yielding: tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]
+    @property
+    def soft(self) -> Index:
+        """Numbers of those that have given way, the largest first."""
+        return _named(np.where(self.yielding, self.sizes, 0.0))
 
 
 def no_equilibrium(
-    simulation: Failed,
+    equation: StepEquation,
     newton: Solver,
     solution: Solution,
     failure: StepFailed,
-    end: float,
+    q0: Array,
+    times: tuple[float, float],
     advice: str,
 ) -> ConvergenceError:
-    """Describe why even the smallest step, to ``end``, failed; all processes call it together."""
-    q1 = simulation.supports.in_plane(newton.iterate())
-    dt, named = end - simulation.t, simulation.parameter
-    forces = _forces_by_kind(simulation, newton, q1)
+    """Describe why even the smallest step, from ``q0``, failed; all processes call it together."""
+    q1, (t, end), named = equation.supports.in_plane(newton.iterate()), times, solution.parameter
+    forces = _forces_by_kind(equation, newton, q1)
     sizes = ", ".join(f"{kind} {size:.1e} N" for kind, size in forces.items())
-    where = f"at {named.at(simulation.t, '.9g')}"
-    if dt != 0:
-        where = f"after {named.at(simulation.t, '.9g')}, even with {named.over(dt)}"
-    why = singularity(simulation, q1)
+    where = f"at {named.at(t, '.9g')}"
+    if end != t:
+        where = f"after {named.at(t, '.9g')}, even with {named.over(end - t)}"
+    why = _singularity(equation, solution.grid, q0, q1)
     said = f"{failure} ({sizes})" if sizes else str(failure)
-    advice = advice or simulation.scheme.advice
     return ConvergenceError(
-        f"no equilibrium {where}: {why}{'; ' if why else ''}{said}. {advice}", time=simulation.t,
-        dt=dt, solution=solution, residuals=failure.residuals, forces=forces, reason=failure.reason,
+        f"no equilibrium {where}: {why}{'; ' if why else ''}{said}. {advice}", time=t, dt=end - t,
+        solution=solution, residuals=failure.residuals, forces=forces, reason=failure.reason,
     )  # fmt: skip
 
 
@@ -116,10 +91,10 @@ def open_ledger(solution: Solution, share: Share, newton: Solver) -> str:
     return energy.opened(claimed, newton.convergence.random_work(np.abs(q).max(axis=0), steps))
 
 
-def _forces_by_kind(simulation: Failed, newton: Solver, q1: Array) -> dict[str, float]:
+def _forces_by_kind(equation: StepEquation, newton: Solver, q1: Array) -> dict[str, float]:
     """Sizes of the forces at the latest iterate; N."""
-    forces = {kind: np.zeros(simulation.share.size) for kind in KINDS}
-    for term in simulation.equation.terms:
+    forces = {kind: np.zeros(equation.share.size) for kind in KINDS}
+    for term in equation.terms:
         try:
             term.add_residual(q1, forces[term.kind])
         except Exception:
@@ -128,40 +103,38 @@ def _forces_by_kind(simulation: Failed, newton: Solver, q1: Array) -> dict[str, 
     return {kind: size for kind, size in sizes.items() if size}
 
 
-def singularity(simulation: Failed, q: Array) -> str:
+def _singularity(equation: StepEquation, grid: Grid, q0: Array, q1: Array) -> str:
     """Describe why the tangent of a failed step is singular, or nearly so; else empty.
 
-    All processes call it together.  Where the latest tangent, at ``q`` in the axes of the plane,
-    says nothing, Newton's method may have been sent far away by a tangent before it.  Then the one
-    where it set out tells.
+    Where the latest tangent, at ``q1``, says nothing, Newton's method may have been sent far away
+    by a tangent before it.  Then one near the beginning ``q0`` of the step tells.
     """
-    if said := _singularity_at(simulation, q):
+    if said := _singularity_at(equation, grid, q1):
         return said
-    share, before = simulation.share, simulation.q
-    way = np.abs(q - before)
+    share, size = equation.share, grid.scene.size
+    way = np.abs(q1 - q0)
     way[share.multipliers()] = 0.0
-    turns = share.rotations()
-    way[turns] *= simulation.scene.size
-    far = share.largest(float(way.max(initial=0.0))) / simulation.scene.size
+    way[share.rotations()] *= size
+    far = share.largest(float(way.max(initial=0.0))) / size
     if not 0 < far < np.inf:
         return ""
-    near = before + min(1.0, NEAR / far) * (q - before)
-    return _singularity_at(simulation, near) if simulation.equation.respond_at(near) else ""
+    near = q0 + min(1.0, NEAR / far) * (q1 - q0)
+    return _singularity_at(equation, grid, near) if equation.respond_at(near) else ""
 
 
-def _singularity_at(simulation: Failed, q: Array) -> str:
+def _singularity_at(equation: StepEquation, grid: Grid, q: Array) -> str:
     """Describe why the latest tangent, which is that at ``q``, is singular; empty if it is not."""
-    K, free = free_matrix(simulation.share, simulation.equation.A, simulation.supports.dofs)
+    scene = grid.scene
+    K, free = free_matrix(equation.share, equation.A, equation.supports.dofs)
     if not len(free) or not np.isfinite(K.data).all():
         return ""
     try:
         size, vector = null_vector(K)
     except (np.linalg.LinAlgError, RuntimeError):
         return ""
-    x = np.zeros(simulation.grid.size)
+    x: Array = np.zeros(grid.size)
     x[free] = vector
-    grid, scene = simulation.grid, simulation.scene
-    motions: Array = np.abs(x)
+    motions = np.abs(x)
     turns = np.zeros(grid.size, dtype=bool)
     turns[grid.rotations] = True
     motions[~turns] /= scene.size
@@ -176,62 +149,55 @@ def _singularity_at(simulation: Failed, q: Array) -> str:
         return said if size <= SINGULAR else ""
     x /= largest
     motions /= largest
-    found = _softest(simulation, q, x, motions)
-    mechanism = not (_deforms(found, 1) | _deforms(found, 0)) and any(
-        part.any() for part in found.yielding
-    )
+    links, cells = _deformations(equation, grid, q, x)
+    said = _describe(grid, motions, links, cells)
     if size <= SINGULAR:
-        return f"the tangent stiffness is singular: {_describe(simulation, found)}"
-    return f"a mechanism has formed: {_describe(simulation, found)}" if mechanism else ""
+        return f"the tangent stiffness is singular: {said}"
+    yields = links.yielding.any() or cells.yielding.any()
+    mechanism = yields and not (links.stiff or cells.stiff)
+    return f"a mechanism has formed: {said}" if mechanism else ""
 
 
-def _softest(simulation: Failed, q: Array, x: Array, motions: Array) -> Softest:
-    """Return the deformations of a motion, and the parts without stiffness in it."""
-    grid, scene, share = simulation.grid, simulation.scene, simulation.share
+def _deformations(
+    equation: StepEquation, grid: Grid, q: Array, x: Array
+) -> tuple[Deformed, Deformed]:
+    """Deformations of the connectors and of the cells in a motion from ``q``, all of them."""
+    share, scene = equation.share, grid.scene
     here, ε = x[share.dofs], 1e-6
     links, left = np.zeros(len(scene.links)), np.ones(len(scene.links))
-    for one in simulation.couplings:
+    for one in (term for term in equation.terms if isinstance(term, Links)):
         try:
             change = (one.motion(q + ε * here) - one.motion(q - ε * here)) / (2 * ε)
         except StepFailed:
             continue  # a guide that ends has no motion there, which the failure of the step says
         links[one.numbers] = np.abs(change)
-        left[one.numbers] = one.remaining()
+        left[one.numbers] = one.response.remaining()
     links /= np.where([link.turns for link in scene.links], 1.0, scene.size)
     strains, left_of_cells = _strains(grid, share.gather(q), x), np.ones(len(grid.cells))
-    for inelastic in simulation.inelastic:
-        cells, _ = inelastic.kept()
-        left_of_cells[cells] = inelastic.points.remaining(strains[cells])
+    for beams in (term for term in equation.terms if isinstance(term, InelasticBeams)):
+        cells, _ = beams.kept()
+        left_of_cells[cells] = beams.points.remaining(strains[cells])
     if share.comm.size > 1:
         share.comm.Allreduce(MPI.IN_PLACE, links)
         share.comm.Allreduce(MPI.IN_PLACE, left, op=MPI.MIN)
         share.comm.Allreduce(MPI.IN_PLACE, left_of_cells, op=MPI.MIN)
     strains[:, :2] /= scene.size
     sizes = np.abs(strains).max(axis=1, initial=0.0)
-    yielding = (left <= SOFT) & (links >= SHARE), (left_of_cells <= SOFT) & (sizes >= SHARE)
-    return Softest(x, motions, links, sizes, yielding)
+    soft, soft_cells = left <= SOFT, left_of_cells <= SOFT
+    return Deformed(links, soft & (links >= SHARE)), Deformed(sizes, soft_cells & (sizes >= SHARE))
 
 
-def _deforms(found: Softest, of: int) -> bool:
-    """Return whether connectors (0) or cells (1) deform that have their stiffness."""
-    sizes = (found.links, found.cells)[of]
-    return bool((sizes[~found.yielding[of]] >= SHARE).any())
-
-
-def _describe(simulation: Failed, found: Softest) -> str:
-    """Words for a motion that meets no force."""
-    grid, scene = simulation.grid, simulation.scene
-    moving = np.where(found.motions >= 1 / 2, found.motions, 0.0)
-    parts = [_component(words) for words in grid.worst(moving)]
-    elastic = np.where(found.yielding[1], 0.0, found.cells)
-    if elastic.max(initial=0.0) >= SHARE:
+def _describe(grid: Grid, motions: Array, links: Deformed, cells: Deformed) -> str:
+    """Words for a motion that meets no force; ``motions`` are the sizes of its parts."""
+    alike = np.round(motions, 6)  # the order of equal ones must not be that of their round-off
+    parts = [_component(words) for words in grid.worst(np.where(alike >= 1 / 2, alike, 0.0))]
+    if cells.stiff:
         return (
             f"the forces no longer resist a motion that is largest in {_list(parts)}, as at a "
             "limit load or a bifurcation"
         )
     said = f"{_list(parts)} {'is' if len(parts) == 1 else 'are'} held by nothing"
-    ways = [str(scene.links[i]) for i in _named(np.where(found.yielding[0], found.links, 0.0))]
-    ways += [_cell(grid, i) for i in _named(np.where(found.yielding[1], found.cells, 0.0))]
+    ways = [str(grid.scene.links[i]) for i in links.soft] + [_cell(grid, i) for i in cells.soft]
     if ways:
         give = "gives way" if len(ways) == 1 else "give way together"
         said += f"; {_list(ways)} {give} at no further force"

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from ufl_beam.arrays import Array
@@ -30,7 +28,7 @@ from ufl_beam.model.constraint_checks import (
 )
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
-from ufl_beam.model.supports import COMPONENTS, Support
+from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.terms.work_forms import require_works
 
@@ -62,38 +60,29 @@ def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh) -> Grid:
 
 
 def mesh_of(start: Solution | None, mesh: Mesh | None) -> Mesh:
-    """The mesh of a call: the one it says, that of the solution it starts with, or that given."""
+    """Return the mesh that a call names, that of the solution it starts with, or the default."""
     if mesh is not None:
         require_kind(mesh, Mesh, "mesh")
         return mesh
     return Mesh() if start is None else start.grid.mesh
 
 
-class InitialState(NamedTuple):
-    """State that a run begins with, in the numbering of its grid; ``internal`` may be empty."""
-
-    q: Array
-    v: Array
-    internal: State
-
-
-def initial_state(grid: Grid, start: Solution | None) -> InitialState:
-    """Find the state that a run begins with, before anything is built."""
+def initial_state(grid: Grid, start: Solution | None) -> tuple[Array, Array, State]:
+    """Return configuration, velocities and internal variables at the beginning of a run."""
     v = _initial_velocity(grid)
     if start is None:
-        return InitialState(np.zeros(grid.size), v, {})
+        return np.zeros(grid.size), v, {}
     q0, v0 = start.q[-1], start.v[-1] if len(start.v) else None
     if same_unknowns(start.grid, grid):
-        return InitialState(q0, v if v0 is None else v0, start.internal)
+        return q0, v if v0 is None else v0, start.internal
     transfer = Transfer(start.grid, grid)
     q = transfer.state(q0)
-    velocity = v if v0 is None else transfer.velocity(v0)
-    return InitialState(q, velocity, transfer.internal(start.internal))
+    return q, v if v0 is None else transfer.velocity(v0), transfer.internal(start.internal)
 
 
 def _initial_velocity(grid: Grid) -> Array:
     """Velocities of :class:`Velocity`; zero elsewhere."""
-    v = np.full(grid.size, np.nan)
+    v: Array = np.full(grid.size, np.nan)
     for velocity in grid.scene.initial:
         for beam in velocity.beams:
             points, dofs = grid.nodes_of(beam)
@@ -108,46 +97,40 @@ def _initial_velocity(grid: Grid) -> Array:
                     "from itself or from a beam that it is joined to"
                 )
             v[dofs] = new
-    known: Array = np.asarray(np.nan_to_num(v))
+    v = np.nan_to_num(v)
     if grid.scene.initial:
-        _require_held(grid, known)
-        _require_free(grid, known)
-    return known
+        _require_held(grid, v)
+        _require_free(grid, v)
+    return v
 
 
 def _require_free(grid: Grid, v: Array) -> None:
     """Refuse velocities that supports take away altogether, and warn of those that lose a part."""
-    held: dict[int, Support] = {}
-    for support in grid.scene.supports:
-        if support.moving:
-            continue
-        dofs = grid.node(support.place)
-        held.update((int(dofs[c]), support) for c in support.held if not support.angle)
-    fastest = np.abs(v).max() * max(grid.scene.size, 1.0)
-    stopped = {dof for dof in held if abs(v[dof]) > 1e-9 * fastest}
-    for velocity in grid.scene.initial:
-        for one in velocity.beams:
-            dofs = np.unique(grid.nodes_of(one)[1])
-            moving = {int(dof) for dof in dofs if abs(v[dof]) > 1e-9 * fastest}
-            lost = moving & stopped
-            if lost and lost == moving:
-                raise SceneError(
-                    f"Velocity: {one.name} does not move, because {held[min(lost)]} holds it; "
-                    "remove the support or the velocity"
-                )
-            if lost:
-                names = ", ".join(COMPONENTS[c] for c in _components(grid, lost))
-                warn(
-                    f"Velocity of {one.name}: {held[min(lost)]} holds {names} there, so that its "
-                    "velocity is zero there from the start while that of the rest is not, a blow. "
-                    "Give a velocity that agrees with the support, about= its place"
-                )
-
-
-def _components(grid: Grid, dofs: set[int]) -> list[int]:
-    """Components (0, 1, 2) of motion that degrees of freedom belong to."""
+    held = {
+        int(grid.node(support.place)[c]): support
+        for support in grid.scene.supports if not support.moving and not support.angle
+        for c in support.held
+    }  # fmt: skip
+    moving = np.abs(v) > 1e-9 * np.abs(v).max() * max(grid.scene.size, 1.0)
     columns = np.vstack([grid.dofs, grid.dofs_of_bodies]).T
-    return [c for c in range(3) if np.isin(columns[c], list(dofs)).any()]
+    for beam in (beam for velocity in grid.scene.initial for beam in velocity.beams):
+        dofs = np.unique(grid.nodes_of(beam)[1])
+        dofs = dofs[moving[dofs]]
+        lost = dofs[np.isin(dofs, [*held])]
+        if not len(lost):
+            continue
+        support = held[int(lost[0])]
+        if len(lost) == len(dofs):
+            raise SceneError(
+                f"Velocity: {beam.name} does not move, because {support} holds it; remove the "
+                "support or the velocity"
+            )
+        names = ", ".join(COMPONENTS[c] for c in range(3) if np.isin(columns[c], lost).any())
+        warn(
+            f"Velocity of {beam.name}: {support} holds {names} there, so that its velocity is zero "
+            "there from the start while that of the rest is not, a blow. Give a velocity that "
+            "agrees with the support, about= its place"
+        )
 
 
 def _require_held(grid: Grid, v: Array) -> None:

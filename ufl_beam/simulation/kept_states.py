@@ -1,25 +1,58 @@
 # SPDX-License-Identifier: MIT
-"""States of a run at the times that were kept."""
+"""States of a run at the kept times, and what follows from them: forces, strains, momenta."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cached_property
+from typing import NamedTuple
+
+from mpi4py import MPI
+
 import numpy as np
 
-from ufl_beam.arrays import Array, Index
+from ufl_beam.arrays import Array, Index, Snapshot
+from ufl_beam.compiled.csr import Product
+from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.function_spaces import (
+    CompiledFields,
+    Fields,
+    SectionForces,
+    Strains,
+    mass_matrix,
+)
+from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import State
-from ufl_beam.output.snapshot import Snapshot
+from ufl_beam.errors import SceneError
+from ufl_beam.model.bodies import Place
+from ufl_beam.output.archive import above, below
 
 LEDGER = ("state", "supplied", "lost")
 """The parts of the ledger, see :class:`~ufl_beam.terms.energy_ledger.Energy`."""
 
 
-class KeptStates(list[Snapshot]):
-    """States that were kept; ``v`` is empty in statics, ``connections`` in scenes without any."""
+class Material(NamedTuple):
+    """State of the material of all cells at one time.
 
-    @property
-    def times(self) -> list[float]:
-        """Times, or load factors of a path; s."""
-        return [state.t for state in self]
+    Attributes:
+        forces: (N, V, M); (num_cells, 3); N, N, N m.
+        jump: Rotation of the hinges; (num_cells,); rad.
+        plastic: Energy dissipated by plastic strains; (num_cells,); J.
+        hinge: Energy dissipated by hinges, or by the cracks of fibres; (num_cells,); J.
+    """
+
+    forces: Array
+    jump: Array
+    plastic: Array
+    hinge: Array
+
+
+class KeptStates(list[Snapshot]):
+    """States that were kept; methods with a number ``n`` give results of all cells in the n-th."""
+
+    def __init__(self, grid: Grid) -> None:
+        super().__init__()
+        self._grid = grid
 
     @property
     def q(self) -> list[Array]:
@@ -28,23 +61,8 @@ class KeptStates(list[Snapshot]):
 
     @property
     def v(self) -> list[Array]:
-        """Velocities, all degrees of freedom."""
+        """Velocities, as :attr:`q`; empty in statics."""
         return [state.v for state in self if state.v is not None]
-
-    @property
-    def reactions(self) -> list[Array]:
-        """Forces of the supports on the scene."""
-        return [state.reactions for state in self]
-
-    @property
-    def material(self) -> list[list[tuple[Index, Array]]]:
-        """Groups of cells that can yield or break, and rows for their material."""
-        return [state.material for state in self]
-
-    @property
-    def connections(self) -> list[Array]:
-        """Columns of ``Connection`` for all links."""
-        return [state.connections for state in self if len(state.connections)]
 
     def ledger(self) -> list[dict[str, Array]]:
         """Return the parts of the ledger, with arrays by name; each (n+1,); J."""
@@ -55,40 +73,106 @@ class KeptStates(list[Snapshot]):
             parts.append({n: np.array([e.get(n, 0.0) for e in part]) for n in names})
         return parts
 
+    # -- files ---------------------------------------------------------------------------------
+
     def arrays(self) -> State:
-        """Return all of it, as arrays by name."""
-        names = ("times", "q", "v", "reactions", "connections")
-        arrays = {name: np.array(getattr(self, name)) for name in names}
-        if self and self[0].material:
-            # Groups are those of laws and processes.
-            tables = [np.concatenate([np.c_[group] for group in one]) for one in self.material]
-            arrays["material"] = np.array([table[np.argsort(table[:, 0])] for table in tables])
+        """Return all states, as arrays by name."""
+        names = ("q", "reactions", "connections", "material")
+        arrays = {name: np.array([getattr(state, name) for state in self]) for name in names}
+        arrays |= {"times": np.array([state.t for state in self]), "v": np.array(self.v)}
         for kind, entries in zip(LEDGER, self.ledger(), strict=True):
-            arrays |= {f"{kind}: {name}": values for name, values in entries.items()}
+            arrays |= above(f"{kind}: ", entries)
         return arrays
 
     def take(self, arrays: State) -> None:
-        """Go on after :meth:`arrays`."""
+        """Go on after :meth:`arrays`; what they lack, or have no rows of, is not in the scene."""
         n = len(arrays["times"])
-        material: list[list[tuple[Index, Array]]] = [[] for _ in range(n)]
-        if "material" in arrays:
-            material = [[(one[:, 0].astype(np.int64), one[:, 1:])] for one in arrays["material"]]
-        parts = [
-            {name.removeprefix(f"{kind}: "): values
-             for name, values in arrays.items() if name.startswith(f"{kind}: ")}
-            for kind in LEDGER
-        ]  # fmt: skip
-        # Shapes that are no run have no velocities and reactions.
-        reactions, connections = (
-            arrays[name] if len(arrays[name]) else np.zeros((n, 0))
-            for name in ("reactions", "connections")
-        )
-        v = arrays["v"] if len(arrays["v"]) else [None] * n
+        nothing: dict[str, Array] = {
+            "reactions": np.zeros((n, 0, 3)), "connections": np.zeros((n, 0, 5)),
+            "material": np.zeros((n, 0, 7)),
+        }  # fmt: skip
+        found = {**nothing, **{name: values for name, values in arrays.items() if len(values)}}
+        ledger = [below(f"{kind}: ", found) for kind in LEDGER]
         self[:] = [
             Snapshot(
-                float(arrays["times"][k]), arrays["q"][k], v[k], reactions[k],
-                tuple({name: float(x[k]) for name, x in part.items()} for part in parts),
-                material[k], connections[k],
+                float(found["times"][k]), found["q"][k], found["v"][k] if "v" in found else None,
+                found["reactions"][k],
+                tuple({name: float(x[k]) for name, x in part.items()} for part in ledger),
+                found["material"][k], found["connections"][k],
             )
             for k in range(n)
         ]  # fmt: skip
+
+    # -- cells ---------------------------------------------------------------------------------
+
+    @cached_property
+    def _fields(self) -> Fields:
+        """The whole scene on this process: what is computed afterwards needs no communication."""
+        return CompiledFields(Share(self._grid, MPI.COMM_SELF))
+
+    @cached_property
+    def _section_forces(self) -> SectionForces:
+        return SectionForces(self._fields)
+
+    @cached_property
+    def _strains(self) -> Strains:
+        return Strains(self._fields)
+
+    def forces(self, n: int) -> Array:
+        """(N, V, M), kept where history decides, else computed from the motion; (num_cells, 3)."""
+        forces = np.empty((len(self._grid.cells), 3))
+        self._section_forces.write(self[n].q, forces)
+        cells, rows = cells_of(self[n])
+        forces[cells] = rows[:, :3]
+        return forces
+
+    def strains(self, n: int) -> Array:
+        """(Σ, Γ, K); (num_cells, 3); 1, 1, 1/m."""
+        strains = np.empty((len(self._grid.cells), 3))
+        strains[self._fields.order] = self._strains.mean(self[n].q)
+        return strains
+
+    def material(self, n: int, cells: Index | int) -> Material:
+        """State of the material of some cells."""
+        inelastic, rows = cells_of(self[n])
+        if not len(inelastic) and not self._grid.scene.hinges:
+            raise SceneError("material: nothing in the scene yields or breaks; it is elastic")
+        everything = np.zeros((len(self._grid.cells), 6))
+        everything[:, :3] = self.forces(n)
+        everything[inelastic, 3:] = rows[:, 3:]
+        chosen = everything[cells].T
+        return Material(chosen[:3].T, *chosen[3:])
+
+    def at(self, place: Place, of: Callable[[int], Array]) -> Array:
+        """Results of the cell at a place at all kept times; (n+1, 3)."""
+        cell = self._grid.cell(place)
+        return np.array([of(n)[cell] for n in range(len(self))])
+
+    def material_at(self, place: Place) -> Material:
+        """State of the material in the cell at a place; arrays begin with (n+1,)."""
+        cell = self._grid.cell(place)
+        kept = [self.material(n, cell) for n in range(len(self))]
+        return Material(*map(np.array, zip(*kept, strict=True)))
+
+    def momentum(self) -> Array:
+        """(p_x, p_y, L) at all kept times, L about the origin; (n+1, 3); N s, N s, N m s."""
+        if not self.v:
+            raise SceneError("momentum: the run was static; there is none")
+        times, grid = Product(mass_matrix(self._fields)), self._grid
+        dofs = np.vstack([grid.dofs, grid.dofs_of_bodies])
+        centers = np.array([body.center for body in grid.scene.rigid_bodies]).reshape(-1, 2)
+        _, first = np.unique(dofs[:, 0], return_index=True)
+        u, v, ψ = dofs[first, 0], dofs[first, 1], np.unique(dofs[:, 2])
+        X, Y = np.vstack([grid.points, centers])[first].T
+
+        def of(q: Array, velocity: Array) -> tuple[float, float, float]:
+            p = times(velocity)
+            turning = (X + q[u]) * p[v] - (Y + q[v]) * p[u]
+            return p[u].sum(), p[v].sum(), turning.sum() + p[ψ].sum()
+
+        return np.array([of(q, v) for q, v in zip(self.q, self.v, strict=True)])
+
+
+def cells_of(state: Snapshot) -> tuple[Index, Array]:
+    """Cells of a state that can yield or break, and rows of their material, N, V, M first."""
+    return state.material[:, 0].astype(np.int64), state.material[:, 1:]

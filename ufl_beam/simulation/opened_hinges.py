@@ -7,43 +7,36 @@ of the cell the moment differs by |V| h/2, so a hinge that belongs there opens a
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Index
+from ufl_beam.arrays import Array, Snapshot
 from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.errors import ModelWarning
+from ufl_beam.errors import warn
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.bodies import Member, Place
 from ufl_beam.model.fibres import Layout
 
 LARGE = 0.05
-"""Part of its limit from which a run warns that the place of an embedded hinge shifts it."""
+"""Shift of a limit by the place of its hinge from which a run warns, as a part of the limit."""
 
 TINY = 1e-6
 """Opening, as a part of energy / limit, over which the first slope of a resistance is taken."""
 
-Kept = Sequence[Sequence[tuple[Index, Array]]]
-"""At each kept time: groups of cells, and rows that begin with N, V, M; the sixth entry is the
-dissipated energy of the discontinuities."""
-
 
 class OpenedHinges(NamedTuple):
-    """Embedded hinges of a beam that opened in a run, in so many cells.
+    """Embedded hinges of a beam that opened in a run.
 
-    Attributes:
-        error: Largest |V| h / (2 limit): difference between the moments in the middle and at the
-            ends of such a cell, as a part of the limit.
-        place: Middle of the cell with the largest error.
+    The error is the largest |V| h / (2 limit): the difference between the moments in the middle and
+    at the ends of such a cell, as a part of the limit.
     """
 
     beam: Member
-    number: int
+    number: int  # of cells
     error: float
-    place: Place
+    place: Place  # middle of the cell with the largest error
 
 
 class Opened:
@@ -56,19 +49,18 @@ class Opened:
             (num_cells,); N.
     """
 
-    def __init__(self, grid: Grid, kept: Kept) -> None:
+    def __init__(self, grid: Grid, kept: Sequence[Snapshot]) -> None:
         self._grid = grid
-        self.first = np.full(len(grid.cells), -1)
-        self.shear, before = np.zeros((2, len(grid.cells)))
-        if not any((rows[:, 5] > 0).any() for _, rows in kept[-1]):
+        self.first, self.shear = np.full(len(grid.cells), -1), np.zeros(len(grid.cells))
+        open_now = kept[-1].material[:, 6] > 0
+        if not open_now.any():
             return
-        for n, groups in enumerate(kept):
-            for cells, rows in groups:
-                V, new = np.abs(rows[:, 1]), (rows[:, 5] > 0) & (self.first[cells] < 0)
-                self.first[cells[new]] = n
-                # After an opening in a jump V is that of vibrations.
-                self.shear[cells[new]] = (before[cells] if n > 1 else V)[new]
-                before[cells] = V
+        cells = kept[-1].material[open_now, 0].astype(np.int64)
+        dissipated, V = (np.array([s.material[open_now, k] for s in kept]) for k in (6, 2))
+        self.first[cells] = first = (dissipated > 0).argmax(axis=0)
+        # After an opening in a jump V is that of vibrations.
+        n = np.where(first > 1, first - 1, first)
+        self.shear[cells] = np.abs(V[n, np.arange(len(cells))])
 
     def hinges(self) -> list[OpenedHinges]:
         """Embedded hinges, laws of sections, that opened in the run; beam by beam."""
@@ -86,24 +78,6 @@ class Opened:
             found.append(OpenedHinges(beam, len(cells), float(errors[worst]), place))
         return found
 
-    def jumps(self, scheme: Scheme) -> list[tuple[Member, int, float]]:
-        """Beams with cells that opened in a jump, the worst cell, and how many times too fast.
-
-        The resistance falls faster with the opening than the stress of the cell, whose stiffness
-        against an opening is θ EI/h, or θ E/h of a fibre.
-        """
-        grid = self._grid
-        found: list[tuple[Member, int, float]] = []
-        for beam in grid.scene.beams:
-            cells, laws = grid.cells_of(beam), grid.hinges(beam)
-            fall = {law: _fall(beam.section.layout(law), scheme) for law in set(laws)}
-            opened = np.where(self.first[cells] > 0, grid.lengths(cells), 0.0)
-            ratios = opened * [fall[law] for law in laws]
-            worst = int(np.argmax(ratios))
-            if ratios[worst] > 1:
-                found.append((beam, int(cells[worst]), float(ratios[worst])))
-        return found
-
     def summary(self) -> str:
         """A line about embedded hinges that opened, if there are any."""
         hinges = self.hinges()
@@ -118,25 +92,39 @@ class Opened:
 
     def warn(self, scheme: Scheme, times: Array) -> None:
         """Issue a :class:`ModelWarning` for each beam where much depends on the mesh."""
-        for beam, cell, ratio in self.jumps(scheme):
-            length = float(self._grid.lengths(np.array([cell]))[0])
-            t = times[self.first[cell]]
-            _warn(
-                f"{beam.name}: what opened in the cell at s = {self._grid.middle(cell).s:.3g} by "
-                f"t = {t:.6g} s did so in a jump: its resistance falls {ratio:.3g} times as fast "
-                f"as its cell of {length:.3g} m can follow. Energy that the cell released and the "
-                "opening did not dissipate went to the rest of the scene. Use cells shorter than "
-                f"{length / ratio:.3g} m, or an energy {ratio:.3g} times as large"
-            )
+        self._warn_of_jumps(scheme, times)
         for beam, number, error, place in self.hinges():
             if error > LARGE:
-                _warn(
+                warn(
                     f"{beam.name}: the hinge of the section opened in {_cells_in_words(number)}, "
                     "in the middle of a cell. At the ends of the cell at "
                     f"s = {place.s:.3g} the moment differs from that in its middle by "
                     f"{_percent(error)} of the limit, so the load at which the hinge opens is "
                     "uncertain by as much. Put a hinge exactly where it belongs, "
                     "Beam(hinges={s: law}), or use shorter cells"
+                )
+
+    def _warn_of_jumps(self, scheme: Scheme, times: Array) -> None:
+        """Warn of resistances that fall faster with the opening than the stress of the cell.
+
+        The stiffness of a cell against an opening is θ EI/h, or θ E/h of a fibre.
+        """
+        grid = self._grid
+        for beam in grid.scene.beams:
+            cells, laws = grid.cells_of(beam), grid.hinges(beam)
+            fall = {law: _fall(beam.section.layout(law), scheme) for law in set(laws)}
+            lengths = grid.lengths(cells)
+            ratios = np.where(self.first[cells] > 0, lengths, 0.0) * [fall[law] for law in laws]
+            worst = int(np.argmax(ratios))
+            ratio, length, t = ratios[worst], lengths[worst], times[self.first[cells[worst]]]
+            if ratio > 1:
+                warn(
+                    f"{beam.name}: what opened in the cell at "
+                    f"s = {grid.middle(int(cells[worst])).s:.3g} by t = {t:.6g} s did so in a "
+                    f"jump: its resistance falls {ratio:.3g} times as fast as its cell of "
+                    f"{length:.3g} m can follow. Energy that the cell released and the opening did "
+                    "not dissipate went to the rest of the scene. Use cells shorter than "
+                    f"{length / ratio:.3g} m, or an energy {ratio:.3g} times as large"
                 )
 
 
@@ -148,11 +136,6 @@ def _cells_in_words(number: int) -> str:
 def _percent(part: float) -> str:
     """A part in words: "12 %", or "more than 100 %" where the limit is next to nothing."""
     return f"{100 * part:.2g} %" if part <= 1 else "more than 100 %"
-
-
-def _warn(message: str) -> None:
-    """Warn at the line that called :func:`simulate` or :func:`follow`."""
-    warnings.warn(message, ModelWarning, stacklevel=4)
 
 
 def _fall(layout: Layout | None, scheme: Scheme) -> float:

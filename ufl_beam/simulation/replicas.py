@@ -82,12 +82,9 @@ class Copies:
     def leave(self) -> None:
         """Tell the others, without waiting for them, that this process does not go on."""
         if self._open:
-            self._open = False
-            if self._pending is not None:
-                _left.append(self._pending)
+            before, self._open = self._pending, False
             self._post(failed=1.0)
-            assert self._pending is not None
-            _left.append(self._pending)
+            _left.extend(one for one in (before, self._pending) if one is not None)
             self._pending = None
 
     def _post(self, failed: float = 0.0) -> None:
@@ -107,17 +104,17 @@ class Copies:
         allowed = TOLERANCE * np.array([size, abs(ends[1]) + abs(ends[4]), 0.0])
         if failed or (apart > allowed).any():
             self._open = False
-            raise CopiesDiffer(self._words(failed))
-
-    def _words(self, failed: float) -> str:
-        who = f"the {self._comm.size} processes, each of which computes this small scene,"
-        what = "go on differently: one of them has failed" if failed else "find different motions"
-        return (
-            f"{who} {what}, seen by process {self._comm.rank} after {self._steps} steps. Something "
-            "in the scene differs between them: random numbers without a seed, a clock, the number "
-            "of the process. Seed random generators, or draw on one process and send to the others "
-            "(MPI.COMM_WORLD.bcast), or pass comm=MPI.COMM_SELF if each is to compute its own scene"
-        )
+            what = "find different motions"
+            if failed:
+                what = "go on differently: one of them has failed"
+            raise CopiesDiffer(
+                f"the {self._comm.size} processes, each of which computes this small scene, "
+                f"{what}, seen by process {self._comm.rank} after {self._steps} steps. Something "
+                "in the scene differs between them: random numbers without a seed, a clock, the "
+                "number of the process. Seed random generators, or draw on one process and send to "
+                "the others (MPI.COMM_WORLD.bcast), or pass comm=MPI.COMM_SELF if each is to "
+                "compute its own scene"
+            )
 
     def _wait(self, request: MPI.Request) -> None:
         end = time.monotonic() + PATIENCE

@@ -18,7 +18,8 @@ from ufl_beam.errors import SceneError, require_count, require_kind, require_num
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.output_files import take
+from ufl_beam.output.archive import above, below
+from ufl_beam.output.output_files import Output, take
 from ufl_beam.output.recorders import Recorder, close_all, recorders_of
 from ufl_beam.parallel import communicator, in_study, say
 from ufl_beam.simulation.checkpoint import Checkpoint, Keeper, end_of
@@ -26,8 +27,8 @@ from ufl_beam.simulation.fingerprint import kind_of
 from ufl_beam.simulation.initial_state import mesh_of
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.step_control import Adaptive, AdaptiveSteps, EqualSteps, Pace
-from ufl_beam.simulation.step_cutting import MOST_PARTS
+from ufl_beam.simulation.step_control import Adaptive, number_of_steps, steps_of
+from ufl_beam.simulation.step_solver import MOST_PARTS
 from ufl_beam.solvers.newton_options import Newton
 
 BAR = "{percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
@@ -99,7 +100,7 @@ def simulate(
     begin = time.perf_counter()
     keeper: Keeper | None = None
     if checkpoint is not None:
-        step = None if isinstance(dt, Adaptive) else EqualSteps(t0, t1, dt).dt
+        step = None if isinstance(dt, Adaptive) else (t1 - t0) / number_of_steps(t1 - t0, dt)
         call = {
             "scene": scene, "scheme": scheme, "t[0]": t0, "dt": dt, "every": every, "most": most,
             "newton": newton or Newton(), "start": end_of(start), "mesh": mesh_of(start, mesh),
@@ -108,7 +109,7 @@ def simulate(
         for recorder in recorders:
             if type(recorder).state is Recorder.state:
                 recorder.state()  # raises: it does not say how to go on
-        keeper = Keeper(checkpoint, call, step, comm)
+        keeper = Keeper(checkpoint, call, step, t1, comm)
     with ExitStack() as stack:
         if keeper is not None:
             stack.callback(keeper.close)
@@ -116,23 +117,30 @@ def simulate(
             scene, scheme, t0=t0, start=start, newton=newton, mesh=mesh, comm=comm
         )
         solution = simulation.solution
-
-        def note_time() -> None:
-            solution.seconds = time.perf_counter() - begin
-
-        stack.callback(note_time)
-        stack.callback(simulation.close)
-        pace: Pace = (
-            AdaptiveSteps(simulation, t1, dt)
-            if isinstance(dt, Adaptive)
-            else EqualSteps(simulation.t, t1, dt)
-        )
+        solution.every = every
+        stack.enter_context(running(simulation, recorders, outputs, begin))
+        pace = steps_of(simulation, t1, dt)
 
         def go_on(keeper: Keeper) -> None:
-            states = keeper.resume(simulation, pace, t1)
-            solution.time_error = pace.error
-            for recorder, state in zip(recorders, states, strict=False):
-                recorder.resume(simulation, state)
+            found = keeper.found
+            simulation.resume(below("state/", found))
+            solution.resume(below("history/", found))
+            solution.parts, solution.iterations = simulation.parts, simulation.iterations
+            pace.restore(found["pace"])
+            solution.seconds, solution.time_error = found["seconds"], pace.error
+            keeper.resume(pace.steps)
+            for i, recorder in enumerate(recorders):
+                recorder.resume(simulation, below(f"recorder {i}/", found))
+
+        def write(keeper: Keeper) -> None:
+            content = {
+                "seconds": solution.seconds + time.perf_counter() - begin, "pace": pace.state(),
+                "stateful": simulation.together(keeper.states),
+                **above("state/", simulation.state()),
+            }  # fmt: skip
+            for i, recorder in enumerate(recorders):
+                content |= above(f"recorder {i}/", recorder.state())
+            keeper.write(content, solution, pace.steps)
 
         def after_step() -> None:
             solution.time_error = pace.error
@@ -145,17 +153,12 @@ def simulate(
                     solution.every *= 2
             for recorder in recorders:
                 recorder.write(simulation)
-            if keeper is not None:
-                keeper.note(simulation, pace, recorders)
+            if keeper is not None and (keeper.due(pace.steps) or pace.finished):
+                write(keeper)
 
-        stack.callback(close_all, recorders)
-        stack.callback(take(outputs))
-        stack.enter_context(partial_results(simulation))
-        solution.every = every
         if keeper is not None and keeper.found:
             simulation.together(go_on, keeper)
             say(f"checkpoint {keeper.path}: the run goes on from t = {simulation.t:.9g} s")
-            begin -= solution.seconds
         else:
             for recorder in recorders:
                 simulation.together(recorder.open, simulation)
@@ -163,7 +166,7 @@ def simulate(
         quiet = None if progress and comm.rank == 0 and not in_study() else True
         with tqdm(total=1.0, bar_format=BAR, disable=quiet, mininterval=0.5) as bar:
             while not pace.finished:
-                pace.advance(simulation)
+                pace.advance()
                 simulation.together(after_step)
                 bar.update(pace.progress - bar.n)
         simulation.end()
@@ -174,17 +177,28 @@ def simulate(
 
 
 @contextmanager
-def partial_results(simulation: Simulation) -> Iterator[None]:
-    """Let whatever stops a run in this context carry the solution so far, ``error.solution``."""
-    try:
-        yield
-    except BaseException as error:
-        simulation.leave()
-        if simulation.share.comm.size == 1 or error is simulation.together.raised:
-            simulation.end()  # else the processes may not all be here
-        stopped: Any = error
-        stopped.solution = simulation.solution
-        raise
+def running(
+    simulation: Simulation, recorders: Sequence[Recorder], outputs: Sequence[Output], begin: float
+) -> Iterator[None]:
+    """Close what a run has opened at its end, and let whatever stops it carry ``error.solution``.
+
+    Meanwhile no other run writes its files; ``begin`` is the value of a clock for its seconds.
+    """
+    with ExitStack() as stack:
+        stack.callback(simulation.close)
+        stack.callback(close_all, recorders)
+        stack.callback(take(outputs))
+        try:
+            yield
+        except BaseException as error:
+            simulation.leave()
+            if simulation.share.comm.size == 1 or error is simulation.together.raised:
+                simulation.end()  # else the processes may not all be here
+            stopped: Any = error
+            stopped.solution = simulation.solution
+            raise
+        finally:
+            simulation.solution.seconds += time.perf_counter() - begin
 
 
 def _require_times(t: tuple[float, float]) -> tuple[float, float]:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from functools import partial
 from typing import NoReturn
 
@@ -16,14 +15,7 @@ from ufl_beam.compiled.c_library import extrapolated
 from ufl_beam.discretization.model_warnings import warn_of_jumps
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory, Restoring, Saving, State
-from ufl_beam.errors import (
-    ModelWarning,
-    SceneError,
-    StepFailed,
-    require_kind,
-    require_number,
-    shorten,
-)
+from ufl_beam.errors import SceneError, StepFailed, require_kind, require_number, shorten, warn
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
@@ -32,18 +24,19 @@ from ufl_beam.parallel import communicator
 from ufl_beam.parameter import Parameter
 from ufl_beam.simulation.assembly import assemble
 from ufl_beam.simulation.diagnosis import no_equilibrium, open_ledger
+from ufl_beam.simulation.evaluation import COMPILED, REFERENCE
 from ufl_beam.simulation.initial_state import checked_grid, initial_state, mesh_of
 from ufl_beam.simulation.replicas import Copies, sharing
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.step_cutting import (
+from ufl_beam.simulation.step_solver import (
     APPLYING,
     FIRST,
+    StepSolver,
     Trial,
     begins_loaded,
     go_in_parts,
     require_small_turn,
 )
-from ufl_beam.simulation.step_solver import StepSolver
 from ufl_beam.solvers.equation import Border
 from ufl_beam.solvers.newton_options import Newton
 
@@ -109,7 +102,8 @@ class Simulation(StateView):
         self.together = together = Agreement(share.comm)
         self._copies = Copies(comm, share) if comm.size > share.comm.size else None
         q, v, internal = initial_state(grid, start)
-        self._assembly = parts = assemble(share, scheme, t0, v[share.dofs], together)
+        by = REFERENCE if newton.reference else COMPILED
+        self._assembly = parts = assemble(share, scheme, t0, v[share.dofs], by, together)
         self.fields, self.ledger, self.asked = parts.fields, parts.ledger, parts.asked
         self.beams, self.inelastic, self.couplings = parts.beams, parts.inelastic, parts.couplings
         self.loads, self.supports, self._has_inelastic = parts.loads, parts.supports, parts.yields
@@ -135,8 +129,9 @@ class Simulation(StateView):
         self._branch = parts.static_path(scheme, self.q, t0, loaded, together)
         self.reactions_known = self._branch is not None
 
+        factors = by.factors(share, self.equation.A)
         self._steps = StepSolver(
-            scheme, self.equation, parts.compiled(), parts.openings, self._branch, newton, together
+            scheme, self.equation, parts.openings, self._branch, newton, factors, together
         )
         self._solver = self._steps.newton
         self.solution = kind(scene, grid)
@@ -243,8 +238,10 @@ class Simulation(StateView):
         Nothing yields or opens any further, now and later: no step may follow.
         """
         self.ask()
-        for one in self._assembly.remembering:
-            one.freeze()
+        for cells in self.inelastic:
+            cells.points.freeze()
+        for coupling in self.couplings:
+            coupling.response.freeze()
         step = Step(0.0, dt, self.q, self.t, self.t, fraction=1.0)
         return self.equation.linearise(q, step)
 
@@ -255,8 +252,12 @@ class Simulation(StateView):
             ConvergenceError: With the solution so far.
         """
         self.leave()
+        self.supports.go_back()
         self.end()
-        raise no_equilibrium(self, self._solver, self.solution, failure, end, advice) from failure
+        raise no_equilibrium(
+            self.equation, self._solver, self.solution, failure, self.q, (self.t, end),
+            advice or self.scheme.advice,
+        ) from failure  # fmt: skip
 
     def settle(self) -> None:
         """Compare the states so far where each process computes a copy of the scene.
@@ -341,7 +342,7 @@ class Simulation(StateView):
         if getattr(self.scheme, "exact_ledger", False) and len(self.solution) > 1:
             self.solution.open_ledger = open_ledger(self.solution, self.share, self._solver)
         if self.solution.open_ledger and self.comm.rank == 0:
-            warnings.warn(self.solution.open_ledger, ModelWarning, stacklevel=3)
+            warn(self.solution.open_ledger)
 
     def close(self) -> None:
         """Give back what PETSc holds."""

@@ -9,40 +9,32 @@ from typing import Any
 
 import numpy as np
 
-from ufl_beam.arrays import Array
+from ufl_beam.arrays import Array, Snapshot
 from ufl_beam.collective_errors import on_first
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError
-from ufl_beam.model.bodies import Anchor, Member, Place, Spot
+from ufl_beam.model.bodies import Anchor, Member, Place
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
-from ufl_beam.output.archive import write
+from ufl_beam.output.archive import above, below, write
 from ufl_beam.output.joint_histories import (
     Connection,
     JointHistory,
     links_of,
     motion_of,
     of_joint,
+    position_of,
     velocity_of,
 )
 from ufl_beam.output.output_files import require_path
-from ufl_beam.output.snapshot import Snapshot
 from ufl_beam.parallel import active_comm
 from ufl_beam.parameter import TIME
-from ufl_beam.simulation.cell_results import CellResults, Material
-from ufl_beam.simulation.kept_states import KeptStates
+from ufl_beam.simulation.kept_states import KeptStates, Material
 from ufl_beam.simulation.opened_hinges import Opened
-from ufl_beam.simulation.solution_files import (
-    FORMAT,
-    arrays_of,
-    grid_of,
-    made_of_file,
-    take,
-    text_of,
-)
+from ufl_beam.simulation.solution_files import FORMAT, NAMED, grid_of, made_of_file, text_of
 from ufl_beam.terms.energy_ledger import Energy
 
 
@@ -81,8 +73,7 @@ class Solution:
         self.time_error, self.seconds = math.nan, 0.0
         self.every, self.open_ledger = 1, ""
         self.internal: State = {}
-        self._kept = KeptStates()
-        self._cells = CellResults(grid, self._kept)
+        self._kept = KeptStates(grid)
 
     def keep(self, state: Snapshot) -> None:
         """Append a state of a run."""
@@ -119,11 +110,20 @@ class Solution:
 
     def _content(self) -> tuple[dict[str, Any], State]:
         """Text and arrays that are saved."""
-        return text_of(self), arrays_of(self)
+        text = {"kind": type(self).__name__, **text_of(self.grid, self.times, self.position)}
+        return {**text, **{name: getattr(self, name) for name in NAMED}}, self._arrays()
+
+    def _arrays(self) -> State:
+        counts = {"counts": np.array([self.parts, self.iterations])}
+        return {**counts, **above("history/", self.history()), **above("internal/", self.internal)}
 
     def _take(self, text: dict[str, Any], arrays: State) -> None:
         """Take over what :meth:`_content` gave."""
-        take(self, text, arrays)
+        self.resume(below("history/", arrays))
+        self.internal = below("internal/", arrays)
+        self.parts, self.iterations = (int(n) for n in arrays["counts"])
+        for name in NAMED:
+            setattr(self, name, text[name])
 
     def __reduce__(self) -> tuple[Any, ...]:
         return restored, self._content()
@@ -141,7 +141,7 @@ class Solution:
     @property
     def times(self) -> Array:
         """Times that were kept, n after the initial one; (n+1,); s."""
-        return np.array(self._kept.times)
+        return np.array([state.t for state in self._kept])
 
     @property
     def progress(self) -> Array:
@@ -180,10 +180,7 @@ class Solution:
 
     def position(self, place: Anchor) -> Array:
         """Coordinates of a place; (n+1, 2); m."""
-        if isinstance(place, Spot):
-            return np.asarray(place.point + self.displacement(place)[:, :2])
-        nodes, weights = self.grid.weights(place)
-        return np.asarray(weights @ self.grid.points[nodes] + self.displacement(place)[:, :2])
+        return position_of(self.grid, place, self._kept.q)
 
     # -- joints --------------------------------------------------------------------------------
 
@@ -194,7 +191,7 @@ class Solution:
             SceneError: It is not in the scene.
         """
         (number,) = links_of(self.scene, connector)
-        return Connection(*np.array(self._kept.connections)[:, number].T)
+        return Connection(*np.array([state.connections[number] for state in self._kept]).T)
 
     def joint(self, joint: Joint) -> JointHistory:
         """Return the relative motion and the forces of the first two places of a joint.
@@ -202,8 +199,8 @@ class Solution:
         Raises:
             SceneError: It is not in the scene.
         """
-        connections = np.array(self._kept.connections or np.zeros((0, 0, 5)))
-        return of_joint(self, joint, connections[..., 1])
+        connections = np.array([state.connections[:, 1] for state in self._kept])
+        return of_joint(self.grid, joint, self._kept.q, connections)
 
     def shape(self, beam: Member, n: int = -1) -> Array:
         """Coordinates of the vertices of a beam at the n-th kept time; (num_vertices, 2); m."""
@@ -224,11 +221,12 @@ class Solution:
         """
         if support not in self.scene.supports:
             raise SceneError(f"reaction: {support} is not in the scene")
-        return np.array(self._kept.reactions)[:, self.scene.supports.index(support)]
+        number = self.scene.supports.index(support)
+        return np.array([state.reactions[number] for state in self._kept])
 
     def section_forces(self, beam: Member, n: int = -1) -> Array:
         """(N, V, M) in the cells of a beam at the n-th kept time; (num_cells, 3); N, N, N m."""
-        return self._cells.forces(n)[self.grid.cells_of(beam)]
+        return self._kept.forces(n)[self.grid.cells_of(beam)]
 
     def section_forces_at(self, place: Place) -> Array:
         """(N, V, M) in the cell at a place; (n+1, 3); N, N, N m.
@@ -238,18 +236,18 @@ class Solution:
         Raises:
             SceneError: The beam of the place is not in the scene.
         """
-        return self._cells.at(place, self._cells.forces)
+        return self._kept.at(place, self._kept.forces)
 
     def strains(self, beam: Member, n: int = -1) -> Array:
         """(Σ, Γ, K) in the cells of a beam at the n-th kept time; (num_cells, 3); 1, 1, 1/m.
 
         The curvature includes the jump of a hinge over the length of its cell.
         """
-        return self._cells.strains(n)[self.grid.cells_of(beam)]
+        return self._kept.strains(n)[self.grid.cells_of(beam)]
 
     def strains_at(self, place: Place) -> Array:
         """(Σ, Γ, K) in the cell at a place, as :meth:`section_forces_at`; (n+1, 3); 1, 1, 1/m."""
-        return self._cells.at(place, self._cells.strains)
+        return self._kept.at(place, self._kept.strains)
 
     def material(self, beam: Member, n: int = -1) -> Material:
         """Forces, jumps and dissipated energies in the cells of a beam at the n-th kept time.
@@ -257,7 +255,7 @@ class Solution:
         Raises:
             SceneError: The scene is elastic.
         """
-        return self._cells.material(n, self.grid.cells_of(beam))
+        return self._kept.material(n, self.grid.cells_of(beam))
 
     def material_at(self, place: Place) -> Material:
         """Material states in the cell at a place at all kept times; arrays begin with (n+1,).
@@ -268,7 +266,7 @@ class Solution:
         Raises:
             SceneError: The scene is elastic, or the beam of the place is not in it.
         """
-        forces, jump, plastic, energy = self._cells.material_at(place)
+        forces, jump, plastic, energy = self._kept.material_at(place)
         hinge = self.grid.hinge_at(place)
         if hinge is not None:
             of_hinge = self.connector(hinge)
@@ -278,7 +276,7 @@ class Solution:
     @property
     def opened(self) -> Opened:
         """The cells whose embedded hinge or cracks opened in the run."""
-        return Opened(self.grid, self._kept.material)
+        return Opened(self.grid, self._kept)
 
     def hinge_place_error(self) -> dict[Member, float]:
         """Largest part of its limit by which the place of an embedded hinge shifts it, by beam.
@@ -303,7 +301,7 @@ class Solution:
         Raises:
             SceneError: The run was static.
         """
-        return self._cells.momentum()
+        return self._kept.momentum()
 
     def __str__(self) -> str:
         scene = self.scene
@@ -311,7 +309,7 @@ class Solution:
             (len(scene.beams), "beam", "beams"), (len(self.grid.cells), "cell", "cells"),
             (len(scene.bodies), "body", "bodies"), (len(scene.links), "link", "links"),
         )  # fmt: skip
-        span = f"{self._kept.times[0]:g} to {self._kept.times[-1]:g}"
+        span = f"{self._kept[0].t:g} to {self._kept[-1].t:g}"
         parts = [f"{n} {one if n == 1 else many}" for n, one, many in counts if n]
         return (
             f"{', '.join(parts)}, {self.grid.size} degrees of freedom\n"

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Content of the file of a solution: text, arrays, and the scene with the functions it used."""
+"""Text in the file of a solution: the scene, with its functions as far as they were used."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -18,43 +18,20 @@ from ufl_beam.model.connector_laws import Controller, Guide
 from ufl_beam.model.curves import Curve, nearest, parameter_step
 from ufl_beam.model.force_laws import ForceLaw
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.archive import above, below, read
+from ufl_beam.output.archive import read
 from ufl_beam.output.saved_scene import SavedCurve, SavedFunction, from_data, lost, to_data
 from ufl_beam.version import version
 
 T = TypeVar("T")
 
 FORMAT = "solution of ufl_beam, 1"
-"""To be counted up whenever files of before mean something else."""
+"""The number grows whenever the meaning of files changes."""
 
 NAMED = ("seconds", "time_error", "open_ledger")
 """Attributes that are saved as they are."""
 
 TIME_FUNCTIONS = ("time", "held", "motion", "force", "numbers")
 """Fields that are functions of time, but for the forces of controllers and functions."""
-
-
-class Saved(Protocol):
-    """A solution, as far as its file has it; the names of :data:`NAMED` are attributes too."""
-
-    scene: Scene
-    grid: Grid
-    parts: int
-    iterations: int
-    internal: State
-
-    @property
-    def times(self) -> Array:
-        """Times that were kept; s."""
-
-    def position(self, place: Anchor) -> Array:
-        """Coordinates of a place at these times; m."""
-
-    def history(self) -> State:
-        """Return all kept states, as arrays by name."""
-
-    def resume(self, history: State) -> None:
-        """Take over a :meth:`history`."""
 
 
 def made_of_file(file: Path, make: Callable[[dict[str, Any], State], T]) -> T:
@@ -68,33 +45,23 @@ def made_of_file(file: Path, make: Callable[[dict[str, Any], State], T]) -> T:
         raise SceneError(f"solution {file}: the file is damaged: {error!r}") from None
 
 
-def text_of(solution: Saved) -> dict[str, Any]:
-    """Return what is saved as text."""
-    functions = UsedFunctions(solution.grid, [*map(float, solution.times)], solution.position)
+def text_of(grid: Grid, times: Array, position: Callable[[Anchor], Array]) -> dict[str, Any]:
+    """Return the text for :func:`grid_of`; ``position`` gives a place at the times; (n+1, 2); m."""
+
+    def record(owner: Any, field: str, function: Any) -> Any:
+        """Return the record for a function that is a field of ``owner``."""
+        if field == "curve" and isinstance(owner, Member):
+            return SavedCurve.of(function, 0.0, 1.0, grid.parameters(owner))
+        if field == "curve":
+            return _used_curve(grid.scene, position, function)
+        if field in TIME_FUNCTIONS and not isinstance(owner, Controller | ForceLaw):
+            return SavedFunction.of(function, map(float, times))
+        return lost(owner, field, function)
+
     return {
-        "kind": type(solution).__name__,
-        "version": version(),
-        "scene": to_data(solution.scene, functions),
-        "mesh": to_data(solution.grid.mesh),
-        "numbering": solution.grid.checksum(),
-        **{name: getattr(solution, name) for name in NAMED},
-    }
-
-
-def arrays_of(solution: Saved) -> State:
-    """Return what is saved as arrays."""
-    counts = {"counts": np.array([solution.parts, solution.iterations])}
-    history = above("history/", solution.history())
-    return {**counts, **history, **above("internal/", solution.internal)}
-
-
-def take(solution: Saved, text: dict[str, Any], arrays: State) -> None:
-    """Take over :func:`text_of` and :func:`arrays_of`."""
-    solution.resume(below("history/", arrays))
-    solution.internal = below("internal/", arrays)
-    solution.parts, solution.iterations = (int(n) for n in arrays["counts"])
-    for name in NAMED:
-        setattr(solution, name, text[name])
+        "version": version(), "scene": to_data(grid.scene, record), "mesh": to_data(grid.mesh),
+        "numbering": grid.checksum(),
+    }  # fmt: skip
 
 
 def grid_of(text: dict[str, Any]) -> Grid:
@@ -108,35 +75,16 @@ def grid_of(text: dict[str, Any]) -> Grid:
     return grid
 
 
-class UsedFunctions:
-    """Replaces functions of a scene by records, see :func:`to_data`."""
-
-    def __init__(
-        self, grid: Grid, times: Sequence[float], position: Callable[[Anchor], Array]
-    ) -> None:
-        self._grid, self._times, self._position = grid, times, position
-
-    def __call__(self, owner: Any, field: str, function: Any) -> Any:
-        """Return the record for a function that is a field of ``owner``."""
-        if field == "curve" and isinstance(owner, Member):
-            return SavedCurve.of(function, 0.0, 1.0, self._grid.parameters(owner))
-        if field == "curve":
-            return self._used_curve(function)
-        if field in TIME_FUNCTIONS and not isinstance(owner, Controller | ForceLaw):
-            return SavedFunction.of(function, self._times)
-        return lost(owner, field, function)
-
-    def _used_curve(self, curve: Curve) -> SavedCurve:
-        """The part of a guide curve that was used, a tenth more, and what tangents need."""
-        used, scene = [0.0], self._grid.scene
-        for link in scene.links:
-            if isinstance(link.law, Guide) and link.law.curve is curve:
-                s = 0.0
-                for point in self._position(link.b):
-                    step = parameter_step(curve, s, scene.size)
-                    s = nearest(curve, point, s, step, scene.size)
-                    used.append(s)
-        first, last = float(np.nanmin(used)), float(np.nanmax(used))
-        steps = (parameter_step(curve, s, scene.size) for s in (first, last))
-        more = 0.1 * (last - first) + 8 * max(steps)
-        return SavedCurve.of(curve, first - more, last + more, (0.0,))
+def _used_curve(scene: Scene, position: Callable[[Anchor], Array], curve: Curve) -> SavedCurve:
+    """The part of a guide curve that was used, a tenth more, and what tangents need."""
+    used = [0.0]
+    for link in scene.links:
+        if isinstance(link.law, Guide) and link.law.curve is curve:
+            s = 0.0
+            for point in position(link.b):
+                s = nearest(curve, point, s, parameter_step(curve, s, scene.size), scene.size)
+                used.append(s)
+    first, last = float(np.nanmin(used)), float(np.nanmax(used))
+    steps = (parameter_step(curve, s, scene.size) for s in (first, last))
+    more = 0.1 * (last - first) + 8 * max(steps)
+    return SavedCurve.of(curve, first - more, last + more, (0.0,))

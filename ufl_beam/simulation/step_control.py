@@ -7,89 +7,33 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NoReturn, Protocol
 
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.collective_errors import Agreement
-from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed, require_number, require_sequence
-from ufl_beam.model.scene import Scene
-from ufl_beam.simulation.step_cutting import Trial
-from ufl_beam.terms.beams import Inertia
-from ufl_beam.terms.supports import Supports
+from ufl_beam.simulation.simulation import Simulation
+from ufl_beam.simulation.step_solver import Trial
 
 GROWTH = 1.5
-"""A step is at most so many times as long as the one before it, whose error it may repeat."""
+"""Largest ratio of the length of a step to that of the one before it."""
 
 SAMPLES = (0.01, 0.5, 0.99)
 """Parts of a step at which loads are asked for."""
 
 
-class Stepper(Protocol):
-    """A simulation, as far as step controls know it; see there."""
-
-    scene: Scene
-    share: Share
-    t: float
-    q: Array
-    last_dt: float
-    inertia: Inertia
-    supports: Supports
-    together: Agreement
-
-    def step_to(self, t1: float) -> None:
-        """Go to a time, in parts where that fails."""
-
-    def attempt(self, t1: float) -> Trial:
-        """Solve the next step."""
-
-    def accept(self, trial: Trial) -> None:
-        """Go where the latest attempt went."""
-
-    def give_up(self, failure: StepFailed, end: float) -> NoReturn:
-        """End the run where it is."""
-
-
-class Pace(Protocol):
-    """Protocol of step controls; ``error`` sums the estimated ones, NaN if there are none."""
-
-    steps: int
-    error: float
-
-    @property
-    def finished(self) -> bool:
-        """True if the end is reached."""
-
-    @property
-    def progress(self) -> float:
-        """Part of the way that is done, from 0 to 1."""
-
-    def advance(self, simulation: Stepper) -> None:
-        """Take one step; errors are those of the simulation."""
-
-    def state(self) -> dict[str, float]:
-        """Numbers from which :meth:`restore` goes on."""
-
-    def restore(self, state: dict[str, float]) -> None:
-        """Go on from a :meth:`state`."""
+def number_of_steps(time: float, dt: float) -> int:
+    """Return the least number of equal steps not longer than ``dt``, but for rounding."""
+    return max(1, math.ceil(time / dt * (1 - 1e-9)))
 
 
 class EqualSteps:
     """Steps of one size, a little shorter than asked for where that does not divide the time."""
 
-    def __init__(self, t0: float, t1: float, dt: float) -> None:
-        self._t0, self._t1 = t0, t1
-        self.error = math.nan
-        # The slack is for the rounding of (t1 - t0) / dt.
-        self._all = max(1, math.ceil((t1 - t0) / dt * (1 - 1e-9)))
-        self.steps = 0
-
-    @property
-    def dt(self) -> float:
-        """Size of the steps; s."""
-        return (self._t1 - self._t0) / self._all
+    def __init__(self, simulation: Simulation, t1: float, dt: float) -> None:
+        self._simulation, self._t0, self._time = simulation, simulation.t, t1 - simulation.t
+        self._all = number_of_steps(self._time, dt)
+        self.steps, self.error = 0, math.nan
 
     @property
     def finished(self) -> bool:
@@ -101,11 +45,10 @@ class EqualSteps:
         """Part of the steps that are done."""
         return self.steps / self._all
 
-    def advance(self, simulation: Stepper) -> None:
+    def advance(self) -> None:
         """Take one step, in parts if it fails."""
-        n = self.steps + 1
-        simulation.step_to(self._t0 + (self._t1 - self._t0) * n / self._all)
-        self.steps = n
+        self._simulation.step_to(self._t0 + self._time * (self.steps + 1) / self._all)
+        self.steps += 1
 
     def state(self) -> dict[str, float]:
         """The number of steps."""
@@ -163,11 +106,11 @@ class Adaptive:
 
 
 class AdaptiveSteps:
-    """Steps whose error is estimated and limited; ``rejected`` ones were solved but too long."""
+    """Steps whose error is estimated and limited."""
 
-    def __init__(self, simulation: Stepper, t1: float, choice: Adaptive) -> None:
-        self._t0 = self._t = t0 = simulation.t
-        self._t1 = t1
+    def __init__(self, simulation: Simulation, t1: float, choice: Adaptive) -> None:
+        self._simulation, self._t0, self._t1 = simulation, simulation.t, t1
+        t0 = simulation.t
         self._tolerance = choice.tolerance
         self._longest = choice.longest or t1 - t0
         last_digit = math.ulp(max(abs(t0), abs(t1)))
@@ -188,30 +131,29 @@ class AdaptiveSteps:
         M = simulation.inertia.M
         bears = np.bincount(M.rows(), weights=np.abs(M.data), minlength=share.size)
         self._massless = np.flatnonzero(bears == 0.0)
-        self.steps = self.rejected = 0
-        self.error = 0.0
+        self.steps, self.error = 0, 0.0
 
     @property
     def finished(self) -> bool:
         """True if the end is reached."""
-        return self._t == self._t1
+        return self._simulation.t == self._t1
 
     @property
     def progress(self) -> float:
         """Part of the time that is over."""
-        return (self._t - self._t0) / (self._t1 - self._t0)
+        return (self._simulation.t - self._t0) / (self._t1 - self._t0)
 
-    def advance(self, simulation: Stepper) -> None:
+    def advance(self) -> None:
         """Take one step that is accurate, after rejected ones."""
-        stop = next(t for t in self._stops if t > self._t)
+        simulation = self._simulation
+        stop = next(t for t in self._stops if t > simulation.t)
         while True:
             try:
-                trial, error = self._attempt(simulation, stop)
+                trial, error = self._attempt(stop)
                 dt = trial.step.dt
                 change = 0.9 * (self._tolerance / max(error, 1e-300)) ** (1 / 3)
                 if error <= self._tolerance:
                     break
-                self.rejected += 1
                 self._dt = dt * max(change, 0.1)
                 failure = StepFailed(
                     f"its error {error:.1e} is above the tolerance {self._tolerance:.1e}; if a "
@@ -220,42 +162,41 @@ class AdaptiveSteps:
             except StepFailed as reason:
                 failure, self._dt = reason, self._dt / 4
             if self._dt < self._shortest:
-                simulation.give_up(failure, self._t + self._dt)
+                simulation.give_up(failure, simulation.t + self._dt)
         simulation.accept(trial)
-        self._t = simulation.t
         self.error += error
         self.steps += 1
         self._dt = min(dt * min(change, GROWTH), self._longest)
         # The acceleration may jump at a stop, so what was before tells nothing about what comes.
-        self._fresh = self._t == stop
+        self._fresh = simulation.t == stop
 
-    def _attempt(self, simulation: Stepper, stop: float) -> tuple[Trial, float]:
+    def _attempt(self, stop: float) -> tuple[Trial, float]:
         """Solve the next step; also its error."""
-        left = stop - self._t
+        simulation, inertia = self._simulation, self._simulation.inertia
+        left = stop - simulation.t
         # Two equal steps to a stop in the place of a long and a tiny one
         dt = left if self._dt >= left else min(self._dt, left / 2)
-        inertia = simulation.inertia
         if self._fresh:
             # Nothing to compare with: half of a step is compared with the whole.
-            whole = simulation.attempt(self._t + dt)
+            whole = simulation.attempt(simulation.t + dt)
             before, between = (inertia.velocities(whole.s) - inertia.v) / dt, -dt / 4
             dt /= 2
         else:
             before = (inertia.v - inertia.v_before) / simulation.last_dt
             between = (dt + simulation.last_dt) / 2
-        trial = simulation.attempt(stop if dt == left else self._t + dt)
+        trial = simulation.attempt(stop if dt == left else simulation.t + dt)
         dt = trial.step.dt
         a = (inertia.velocities(trial.s) - inertia.v) / dt
         jerk = (a - before) / between
         c2, c3 = inertia.scheme.error_weights()
-        error = self._size(simulation, trial, c2 * dt**2 * a + c3 * dt**3 * jerk)
+        error = self._size(trial, c2 * dt**2 * a + c3 * dt**3 * jerk)
         missed = simulation.share.largest(simulation.together(self._missed, dt))
         return trial, max(error, missed)
 
-    def _size(self, simulation: Stepper, trial: Trial, error: Array) -> float:
+    def _size(self, trial: Trial, error: Array) -> float:
         """Largest error of a position over the size of the scene, or of a rotation."""
+        simulation, supports = self._simulation, self._simulation.supports
         error[self._turns] += (trial.q1 - simulation.q - trial.s)[self._turns]
-        supports = simulation.supports
         supports.enter(error)
         error[supports.dofs] = 0.0
         # Rotations without inertia follow the others, at once where a load jumps.
@@ -268,10 +209,10 @@ class AdaptiveSteps:
 
     def _missed(self, dt: float) -> float:
         """Return the error of the midpoint rule for a load, as a part of its largest impulse."""
-        missed = 0.0
+        missed, t = 0.0, self._simulation.t
         for i, function in enumerate(self._functions):
             # Not at the ends, where there may be jumps
-            before, middle, after = (float(function(self._t + part * dt)) for part in SAMPLES)
+            before, middle, after = (float(function(t + part * dt)) for part in SAMPLES)
             self._largest[i] = max(self._largest[i], abs(before), abs(middle), abs(after))
             missed = max(missed, abs(before - 2 * middle + after) / (self._largest[i] or 1.0))
         return missed / 6 * dt / (self._t1 - self._t0)  # Simpson's rule less the midpoint's
@@ -287,4 +228,11 @@ class AdaptiveSteps:
             setattr(self, name, type(getattr(self, name))(state[name]))
         self._largest = [state[f"largest {i}"] for i in range(len(self._largest))]
 
-    _STATE = ("steps", "rejected", "error", "_t", "_dt", "_fresh")
+    _STATE = ("steps", "error", "_dt", "_fresh")
+
+
+def steps_of(simulation: Simulation, t1: float, dt: float | Adaptive) -> EqualSteps | AdaptiveSteps:
+    """Return the steps to ``t1``; ``error`` sums the estimated errors, NaN if there are none."""
+    if isinstance(dt, Adaptive):
+        return AdaptiveSteps(simulation, t1, dt)
+    return EqualSteps(simulation, t1, dt)

@@ -8,12 +8,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from ufl_beam.arrays import Array
+from ufl_beam.compiled.c_library import Loop, ffi, fill
 from ufl_beam.compiled.csr import Csr, Product
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Step
-from ufl_beam.solvers.equation import PythonEquation
-from ufl_beam.terms.base import Beams, Term
+from ufl_beam.solvers.equation import Equation
+from ufl_beam.terms.base import InternalForces, Term
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.loads import LoadTerm
 from ufl_beam.terms.openings import SearchFlags
@@ -21,7 +22,7 @@ from ufl_beam.terms.supports import Supports
 from ufl_beam.terms.tangent_derivatives import Cells
 
 
-class StepEquation(PythonEquation):
+class StepEquation(Equation):
     """Sum of the virtual works of all terms, less what supports carry.
 
     The ``others`` are all terms but those of internal forces.
@@ -41,7 +42,7 @@ class StepEquation(PythonEquation):
         super().__init__(A, np.zeros(share.size), supports.dofs)
         self.share, self.supports, self._search = share, supports, search
         self._beams, self._couplings, self._loads = beams, couplings, loads
-        self._inner: list[Beams] = [*beams, *couplings]
+        self._inner: list[InternalForces] = [*beams, *couplings]
         self.others: list[Term] = [*loads, *others]
         self.terms: list[Term] = [*self._inner, *self.others]
 
@@ -123,6 +124,39 @@ class StepEquation(PythonEquation):
         for coupling in self._couplings:
             coupling.put_motions(q, v, works)
         return works
+
+    # -- in C ----------------------------------------------------------------------------------
+
+    def leave_to_c(self) -> None:
+        """Let SNES call the loops of the terms in C, with no Python between them.
+
+        What has no loop takes part by a call of Python.  Where several processes share a scene, and
+        where supports are at an angle, SNES calls Python: the same terms, in the same order.
+        """
+        if not self.share.alone or self.supports.turned:
+            return
+        supports, entries = self.supports, self.A.data
+        loops = [term.loops() or self._in_python(term) for term in self.terms]
+        stiffnesses = [stiffness for _, stiffness in loops if stiffness is not None]
+        zero, pivot = (x.astype(np.int32) for x in supports.entries)
+        fill(
+            self.c,
+            size=self.share.size, inner=len(self._inner), inner_force=self.force,
+            forces=len(loops), force=ffi.new("call[]", [force for force, _ in loops]),
+            stiffnesses=len(stiffnesses), stiffness=ffi.new("call[]", stiffnesses),
+            entries=len(entries), tangent=entries, zeros=len(zero), zero=zero, pivot=pivot,
+            held=len(supports.dofs), hold=supports.dofs.astype(np.int32),
+            reactions=supports.reactions, pivots=supports.pivots,
+        )  # fmt: skip
+        self.demand([one.demand() or self.demand_in_python(one.excess) for one in self._couplings])
+        self.in_c = True
+
+    def _in_python(self, term: Term) -> tuple[Loop, Loop]:
+        def add_tangent(q1: Array, _: Array) -> None:
+            term.add_tangent(q1)
+
+        residual = self.part_in_python(term.add_residual, self.share.size)
+        return residual, self.part_in_python(add_tangent, len(self.A.data))
 
     # -- derivatives about a state -------------------------------------------------------------
 

@@ -1,34 +1,79 @@
 # SPDX-License-Identifier: MIT
-"""Solution of one step: the equilibrium that is sought, and whether it can be trusted."""
+"""Solution of one step, whether it can be trusted, and the cutting of steps that fail.
+
+In statics, where forces act over the step, a step that turns a node far does not end in
+equilibrium.  So loads that act at once are applied in parts that turn nodes little, and the rest of
+the first step has nothing left to do but to follow them.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import partial
+from typing import NamedTuple, NoReturn
+
+import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.collective_errors import Agreement
 from ufl_beam.compiled.csr import as_slice
+from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.constraint_checks import no_number
+from ufl_beam.model.loads import RotatingFrame
+from ufl_beam.model.scene import Scene
 from ufl_beam.simulation.branch_check import StaticPath
-from ufl_beam.simulation.step_cutting import Trial
 from ufl_beam.simulation.step_equation import StepEquation
-from ufl_beam.solvers.equation import Border, Equation
+from ufl_beam.solvers.direct_solver import DirectSolver
+from ufl_beam.solvers.equation import Border
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.solvers.newton_options import Newton
+from ufl_beam.solvers.static_condensation import ChainsFirst
 from ufl_beam.terms.openings import Openings
 
 LARGEST_TURN = 0.75 * math.pi
 """A step that turns a node further is cut; the algorithmic strains end at π."""
 
 LEAST_AT_REST, LEAST_IN_MOTION = 2, 1
-"""Iterations at least in statics and dynamics, unless a residual is far below its tolerance.
+"""Least iterations in statics and in dynamics, unless a residual is far below its tolerance.
 
 A column that nearly buckles magnifies a load that is hardly larger than the tolerance.  In motion
 its inertia holds it meanwhile.
 """
+
+MOST_PARTS = 2**12
+"""Largest number of parts that a step is cut into."""
+
+FIRST = 1 / 16
+"""Part of the first step after which accelerations are taken for those at the beginning.
+
+Shorter ones are nearer to it, but magnify the velocities of supports that do not begin with theirs.
+"""
+
+APPLYING = 1 / 8
+"""Part of the first step in which loads that are there from the start are applied."""
+
+APPLYING_TURN = 0.02
+"""Largest turn of a node meanwhile in a part; rad.
+
+Over a part a moment is in error by a quarter of the square: some 1e-4 of it.
+"""
+
+SHORT_PART = 512
+"""Parts shorter by this factor may turn nodes further: shorter ones would turn them as far."""
+
+
+class Trial(NamedTuple):
+    """A step that was solved but not yet accepted, and the configuration ``q1`` at its end.
+
+    Forces work on ``s``, see :meth:`Scheme.nodal_step`; in dynamics the mean velocity times ``dt``.
+    """
+
+    step: Step
+    q1: Array
+    s: Array
 
 
 class StepSolver:
@@ -38,16 +83,16 @@ class StepSolver:
         self,
         scheme: Scheme,
         equation: StepEquation,
-        compiled: Equation,
         openings: Openings | None,
         branch: StaticPath | None,
         newton: Newton,
+        factors: ChainsFirst | DirectSolver,
         together: Agreement,
     ) -> None:
         self._scheme, self._equation, self._openings = scheme, equation, openings
         self._branch, self._together, share = branch, together, equation.share
         least = LEAST_IN_MOTION if has_inertia(scheme) else LEAST_AT_REST
-        self.newton = Solver(share, compiled, newton, least, together)
+        self.newton = Solver(share, equation, factors, newton, least, together)
         self._rotations, self._multipliers = share.rotations(), as_slice(share.multipliers())
         self._coupled = len(share.grid.multipliers) > 0
 
@@ -57,11 +102,11 @@ class StepSolver:
         ``like_last`` lets the tangent of the last step do for this one.
         """
         loads = self._equation.load_forces()
+        solve = partial(self.newton.solve, loads=loads, like_last=like_last)
         try:
             if self._openings is None:
-                q1 = self.newton.solve(guess, loads, like_last)
+                q1 = solve(guess)
             else:
-                solve = partial(self.newton.solve, loads=loads, like_last=like_last)
                 q1 = self._openings.solve(guess, solve, partial(self._equation.begin, step))
         except StepFailed:
             try:
@@ -107,3 +152,47 @@ class StepSolver:
         if self._branch is not None:
             self._branch.require(q1, s, self._equation.force, self.newton.convergence.least_work(s))
         return Trial(step, q1, s)
+
+
+def go_in_parts(
+    t0: float,
+    t1: float,
+    attempt: Callable[[float], Trial],
+    accept: Callable[[Trial], None],
+    give_up: Callable[[StepFailed, float], NoReturn],
+) -> None:
+    """Go from ``t0`` to ``t1`` at once or, where :class:`StepFailed` is raised, in parts.
+
+    ``give_up`` ends the run, because even the smallest part, to a time, has failed.
+    """
+    done, part = 0, MOST_PARTS
+    while done < MOST_PARTS:
+        last = done + part == MOST_PARTS
+        end = t1 if last else t0 + (t1 - t0) * (done + part) / MOST_PARTS
+        try:
+            accept(attempt(end))
+        except StepFailed as failure:
+            if part == 1:
+                give_up(failure, end)
+            part //= 2
+            continue
+        done += part
+        # A part grows again where the larger one would begin anyway.
+        if done % (2 * part) == 0 and part < MOST_PARTS:
+            part *= 2
+
+
+def begins_loaded(scene: Scene, scheme: Scheme, t: float) -> bool:
+    """Return whether loads that act at ``t`` are to be applied before the first step."""
+    over_step = scheme.average(0.0, 1.0) != 1.0
+    if has_inertia(scheme) or not over_step:
+        return False
+    frames = any(isinstance(load, RotatingFrame) for load in scene.loads)
+    return frames or bool(scene.works) or any(f(t) != 0 for _, f in scene.time_functions())
+
+
+def require_small_turn(share: Share, change: Array, dt: float, whole: float) -> None:
+    """Raise if a node turns far in a part, ``dt`` long, of the application of loads, ``whole``."""
+    turn = share.largest(np.abs(change)[share.rotations()].max(initial=0.0))
+    if turn > APPLYING_TURN and SHORT_PART * dt > whole:
+        raise StepFailed("a node turns too far while the loads at the beginning are applied")

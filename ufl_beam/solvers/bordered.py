@@ -5,10 +5,8 @@ from __future__ import annotations
 
 from petsc4py import PETSc
 
-from ufl_beam.arrays import Index
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.solvers.equation import Border, SnesCallbacks
-from ufl_beam.solvers.vectors import Vectors
 
 
 class BorderedNewton:
@@ -19,24 +17,15 @@ class BorderedNewton:
     """
 
     def __init__(
-        self,
-        callbacks: SnesCallbacks,
-        vectors: Vectors,
-        factors: PETSc.PC,
-        held: Index,
-        snes: PETSc.SNES,
-        f: PETSc.Vec,
-        matrix: PETSc.Mat,
-        border: Border,
+        self, snes: PETSc.SNES, callbacks: SnesCallbacks, factors: PETSc.PC, border: Border
     ) -> None:
-        self._callbacks, self._vectors, self._held = callbacks, vectors, held
-        self._factors, self._rate, self._y = factors, vectors.new(), vectors.new()
-        self._z = self._rate.duplicate()
-        self.snes, self.border = snes, border
-        snes.setFunction(self._function, f)
-        snes.setJacobian(self._jacobian, matrix)
+        self.snes, self.border, self._callbacks, self._factors = snes, border, callbacks, factors
+        self._vectors, self._held = callbacks.vectors, callbacks.equation.held
+        self._rate, self._y, self._z = (self._vectors.new() for _ in range(3))
+        snes.setFunction(self._function, snes.getFunction()[0])
+        snes.setJacobian(self._jacobian, snes.getJacobian()[0])
         snes.setConvergenceTest(self._test)
-        ksp = PETSc.KSP().create(f.comm)
+        ksp = PETSc.KSP().create(snes.comm)
         ksp.setType("preonly")
         ksp.getPC().setType("python")
         ksp.getPC().setPythonContext(self)

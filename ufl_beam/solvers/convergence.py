@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import doubles, integers, lib
+from ufl_beam.compiled.c_library import doubles, fill, lib
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
 from ufl_beam.solvers.equation import Equation
@@ -34,31 +34,28 @@ class Convergence:
     def __init__(
         self, share: Share, equation: Equation, x: Array, r: Array, newton: Newton, least: int
     ) -> None:
-        self._share, self._A, self._parallel = share, equation.A, not share.alone
-        self._x, self._r = x, r
-        # Residuals count 1 if forces, 1 over the size of the scene if moments.
-        weights = np.ones(share.size)
-        weights[share.rotations()] = 1 / share.grid.scene.size
-        weights[share.multipliers()] = 0.0
-        self._weights = weights[: share.num_owned].copy()
-        self._norm = (len(self._weights), doubles(self._weights))
-        self._held, self._moves = equation.held, np.ones(share.size)
+        self._share, self._A, self._x, self._r = share, equation.A, x, r
+        self._held, self._owned = equation.held, slice(share.num_owned)
+        # Residuals count 1 if forces, 1 over the size of the scene if moments; ghosts nothing.
+        self._weights = np.ones(share.size)
+        self._weights[share.rotations()] = 1 / share.grid.scene.size
+        self._weights[share.multipliers()] = 0.0
+        self._weights[share.num_owned :] = 0.0
+        self._norm = (share.size, doubles(self._weights))
+        self._moves = np.ones(share.size)
         self.leave_out(np.zeros(share.size, dtype=bool))
-        self.diagonal = np.flatnonzero(self._A.rows() == self._A.indices)
+        self.diagonal = np.flatnonzero(self._A.rows() == self._A.indices).astype(np.int32)
         self._at_r, self._at_forces = doubles(self._r), doubles(equation.force)
         self._last_loads: list[Array] = []
         self._loads = 0.0
-        self._correction = np.empty(share.size)
-        self._alive = [
-            *map(doubles, (share.lengths(), self._moves, np.empty(share.size), self._correction)),
-            integers(self.diagonal.astype(np.int32)),
-        ]
-        self.c = c = equation.c
-        c.size, c.scene = share.size, share.grid.scene.size
-        c.rtol, c.modified, c.rate = newton.rtol, newton.modified, math.inf
-        c.weight, c.residual = self._norm[1], self._at_r
-        c.lengths, c.moves, c.space, c.change, c.diagonal = self._alive
-        c.most, c.least = newton.max_iterations, least
+        self.c = fill(
+            equation.c,
+            size=share.size, scene=share.grid.scene.size, rtol=newton.rtol, rate=math.inf,
+            modified=newton.modified, most=newton.max_iterations, least=least,
+            weight=self._weights, residual=r, change=np.empty(share.size),
+            space=np.empty(share.size), lengths=share.lengths(), moves=self._moves,
+            diagonal=self.diagonal,
+        )  # fmt: skip
 
     # -- sizes ---------------------------------------------------------------------------------
 
@@ -67,24 +64,13 @@ class Convergence:
         return self._size(doubles(forces))
 
     def _size(self, forces: Any) -> float:
-        if not self._parallel:
-            size: float = lib.size_of_forces(self.c, forces)
-            return size
-        square = self._share.total(lib.sum_of_squares(*self._norm, forces))
-        if lib.has_its_digits(square):
-            return math.sqrt(square)
-        if math.isnan(square):
-            return square
-        largest = self._share.largest(lib.largest_size(*self._norm, forces))
-        if largest == 0.0 or not math.isfinite(largest):
-            return largest
-        scaled = lib.scaled_sum_of_squares(*self._norm, forces, largest)
-        return largest * math.sqrt(self._share.total(scaled))
+        here: float = lib.norm(*self._norm, forces)
+        return here if self._share.alone else math.hypot(*self._share.comm.allgather(here))
 
     def take_loads(self, loads: list[Array]) -> None:
         """Take vectors of the loads for the scale; new arrays where they have changed."""
         # On several processes they may change on some only.
-        if self._parallel or list(map(id, loads)) != list(map(id, self._last_loads)):
+        if not self._share.alone or list(map(id, loads)) != list(map(id, self._last_loads)):
             self._last_loads = loads
             self._loads = self.c.loads = sum(map(self.size, loads))
 
@@ -99,15 +85,11 @@ class Convergence:
 
     def residuals(self) -> Array:
         """Sizes of the latest residual, moments over the size of the scene, ghosts zero; N."""
-        sizes = np.zeros(self._share.size)
-        number = len(self._weights)
-        sizes[:number] = np.abs(self._r[:number]) * self._weights
-        return sizes
+        return np.asarray(np.abs(self._r) * self._weights)
 
     def work(self, step: Array) -> float:
         """Work of the latest residual on a step; J."""
-        number = len(self._weights)
-        return self._share.total(float(self._r[:number] @ step[:number]))
+        return self._share.total(float(self._r[self._owned] @ step[self._owned]))
 
     # -- the test ------------------------------------------------------------------------------
 
@@ -126,7 +108,7 @@ class Convergence:
             return int(lib.DIVERGED)
         scale = self.scale()
         self._find_motion(self._x)
-        floor = 8 * self._round_off() if iteration > 1 else 0.0
+        floor = 8 * self.size(self._round_off(self._x)) if iteration > 1 else 0.0
         return int(lib.judge(self.c, doubles(self._x), iteration, residual, scale, floor))
 
     def failure(self, reason: int, iterations: int) -> StepFailed:
@@ -146,31 +128,28 @@ class Convergence:
 
     # -- round-off -----------------------------------------------------------------------------
 
-    def _round_off(self) -> float:
-        """Residual that the last digit of displacements, strains and rotations makes; N.
+    def _round_off(self, x: Array) -> Array:
+        """Residual that the last digit of displacements, strains and rotations at ``x`` makes; N.
 
         Stiff or finely divided beams cannot be solved any better, however small the forces are.
         """
-        return self.size(self._A.data[self.diagonal] * self._last_digits(self._x))
+        digits = np.empty(self._share.size)
+        lib.find_last_digits(self.c, doubles(x), doubles(digits))
+        return np.asarray(self._A.data[self.diagonal] * digits)
 
     def _find_motion(self, x: Array) -> None:
         """Note the largest motion in any process, at most the size of the scene."""
         largest = lib.largest_motion(*self._norm, doubles(x))
         self.c.moved = min(self._share.largest(largest), self.c.scene)
 
-    def _last_digits(self, x: Array) -> Array:
-        digits = np.empty(self._share.size)
-        lib.find_last_digits(self.c, doubles(x), doubles(digits))
-        return digits
-
     def least_work(self, s: Array) -> float:
         """Work in a step ``s`` of what the last digit of displacements makes; less is none; J."""
         self._find_motion(self._x)
-        works = self._A.data[self.diagonal] * self._last_digits(self._x) * np.abs(s)
-        return self._share.total(float(works[: len(self._weights)].sum()))
+        works = self._round_off(self._x) * np.abs(s)
+        return self._share.total(float(works[self._owned].sum()))
 
     def random_work(self, x: Array, s: Array) -> float:
         """Work in a step ``s`` of the last digits at ``x``, were they independent; J."""
         self._find_motion(x)
-        works = self._A.data[self.diagonal] * self._last_digits(x) * s
-        return math.sqrt(self._share.total(float(np.sum(works[: len(self._weights)] ** 2))))
+        works = self._round_off(x) * s
+        return math.sqrt(self._share.total(float(np.sum(works[self._owned] ** 2))))

@@ -22,13 +22,14 @@ class DirectSolver:
 
     def __init__(self, share: Share, A: Csr) -> None:
         self._share, self._entries, self._good = share, A.data, False
-        numbers = share.numbers()
+        numbers = share.numbers().astype(PETSc.IntType)
+        self._places = A.indptr.astype(PETSc.IntType), numbers[A.indices]
+        self._rows = numbers
         size = (share.num_owned, share.grid.size)
         self._matrix = PETSc.Mat().create(comm=share.comm)
         self._matrix.setSizes((size, size))
         self._matrix.setType("aij")
-        places = (numbers[A.rows()], numbers[A.indices])
-        self._matrix.setPreallocationCOO(*(x.astype(PETSc.IntType) for x in places))
+        self._matrix.setUp()
         self._factors = PETSc.PC().create(share.comm)
         self._factors.setOperators(self._matrix)
         self._factors.setType("lu")
@@ -39,7 +40,10 @@ class DirectSolver:
 
     def setUp(self, pc: PETSc.PC) -> None:
         """Factor; PETSc asks for it where the matrix has changed."""
-        self._matrix.setValuesCOO(self._entries, PETSc.InsertMode.INSERT_VALUES)
+        self._matrix.zeroEntries()
+        values = (*self._places, self._entries)
+        self._matrix.setValuesIJV(*values, PETSc.InsertMode.ADD_VALUES, rowmap=self._rows)
+        self._matrix.assemble()
         finite = self._share.largest(float(not np.isfinite(self._entries).all())) == 0.0
         self._good = finite and succeeds(self._factors.setUp)
         self._good = self._good and int(self._factors.getFailedReason()) == GOOD

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.sparse import block_array, csr_array, eye_array
 
 from ufl_beam.arrays import Array, Complex
+from ufl_beam.compiled.csr import Csr
 
 TOLERANCE = 1e-12
 """Residual of an eigenpair, as a part of its eigenvalue."""
@@ -45,10 +46,7 @@ def _slepc() -> Any:
 def _petsc(A: csr_array) -> PETSc.Mat:
     A = A.tocsr()
     A.sort_indices()
-    arrays = (A.indptr.astype(PETSc.IntType), A.indices.astype(PETSc.IntType), A.data)
-    matrix = PETSc.Mat().createAIJ(A.shape, csr=arrays, comm=PETSc.COMM_SELF)
-    matrix.assemble()
-    return matrix
+    return Csr(A.data, A.indices, A.indptr).petsc()
 
 
 def linear(

@@ -4,20 +4,20 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import ffi, lib
+from ufl_beam.compiled.c_library import Loop, ffi, lib
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.solvers.vectors import Vectors
 
 
-class Equation(Protocol):
+class Equation(ABC):
     """Equation of a step at the local degrees of freedom of a process.
 
     Unknowns and residuals are in the axes of supports; what several processes add to one degree of
@@ -29,67 +29,98 @@ class Equation(Protocol):
         held: Degrees of freedom that supports hold; what stands for them in A means nothing.
         error: First exception of a user's function since this was last set to None.
         c: ``equation`` of loops.h, which a solver completes with its own numbers.
+        in_c: Whether ``c`` has all parts of the equation, so that SNES need not call Python.
     """
 
-    A: Csr
-    force: Array
-    held: Index
-    error: BaseException | None
-    c: Any
+    def __init__(self, A: Csr, force: Array, held: Index) -> None:
+        self.A, self.force, self.held = A, force, held
+        self.error: BaseException | None = None
+        self.c, self.in_c, self._handles = ffi.new("equation *"), False, list[Any]()
+        self.demand([self.demand_in_python(self.missed)])
 
     def note(self, error: BaseException) -> None:
-        """Keep an exception, which must not pass through C while other processes go on."""
+        """Keep the first exception, which must not pass through C while other processes go on."""
+        self.error = self.error or error
 
+    @abstractmethod
     def residual(self, x: Array, r: Array) -> None:
         """Write the local part of the residual at ``x`` into ``r``."""
 
+    @abstractmethod
     def complete(self, r: Array) -> None:
         """Remove from the summed residual what supports carry."""
 
+    @abstractmethod
     def tangent(self, x: Array) -> None:
         """Fill the matrix with the derivative at ``x``."""
 
+    @abstractmethod
     def missed(self, x: Array, r: Array, scale: float, moved: float) -> float:
         """Return how far the laws of connectors are missed by ``x`` with residual ``r``, relative.
 
         ``scale`` is the size of the forces in the scene (N), ``moved`` the largest motion (m).
         """
 
+    @abstractmethod
     def stiffen(self, stiff: bool) -> bool:
         """Begin again with stiffer tangents, or end that; return whether they differ."""
 
+    @abstractmethod
     def working(self, x: Array, y: Array) -> Array:
         """Return what the residual works on in a step ``y`` from ``x``; a new array."""
 
-    def attach(self, snes: Any, callbacks: SnesCallbacks, f: Any, matrix: Any) -> None:
-        """Let SNES evaluate the equation, by these callbacks or faster, with the residual in f."""
+    # -- functions of Python that C calls --------------------------------------------------------
 
-    def drive(self, snes: Any, factors: Any) -> None:
-        """Let SNES leave Newton's method to the one in C, if the equation is all in C."""
+    def demand(self, demands: list[Loop]) -> None:
+        """Let the solver meet what these functions evaluate, see ``demand`` of loops.h."""
+        self._demands = ffi.new("demand[]", demands)
+        self.c.demands, self.c.demand = len(demands), self._demands
+
+    def part_in_python(self, add: Callable[[Array, Array], None], size: int) -> Loop:
+        """C function that adds to ``size`` numbers what Python does; not a number if that fails."""
+
+        def call(q: Any, out: Any) -> None:
+            result = _lent(out, size)
+            try:
+                add(_lent(q, len(self.force)), result)
+            except BaseException as error:
+                self.note(error)
+                result.fill(np.nan)
+
+        return lib.add_in_python, self._handle(call)
+
+    def demand_in_python(self, missed: Callable[[Array, Array, float, float], float]) -> Loop:
+        """C function that calls :meth:`missed`, or the like; not a number if that fails."""
+
+        def call(q: Any, r: Any, scale: float, moved: float) -> float:
+            try:
+                return missed(_lent(q, len(self.force)), _lent(r, len(self.force)), scale, moved)
+            except BaseException as error:
+                self.note(error)
+                return math.nan
+
+        return lib.missed_in_python, self._handle(call)
+
+    def _handle(self, function: Callable[..., Any]) -> Any:
+        self._handles.append(ffi.new_handle(function))
+        return self._handles[-1]
 
 
-class PythonEquation(Equation):
-    """Base of an equation whose parts Python calls one after the other."""
+def _lent(pointer: Any, size: int) -> Array:
+    """An array that C lends."""
+    return np.frombuffer(ffi.buffer(pointer, 8 * size))
 
-    def __init__(self, A: Csr, force: Array, held: Index) -> None:
-        self.A, self.force, self.held = A, force, held
-        self.error = None
-        self._missed = Demand(self.missed, len(force), self.note)
-        self._demand = ffi.new("demand[]", [self._missed.loop])
-        self.c = ffi.new("equation *", {"demands": 1, "demand": self._demand})
 
-    def note(self, error: BaseException) -> None:
-        """Keep the first exception."""
-        self.error = self.error or error
+@ffi.def_extern()  # type: ignore[misc, untyped-decorator, unused-ignore]
+def add_in_python(handle: Any, q: Any, out: Any) -> None:
+    """Callback of C, declared in c_library.py."""
+    ffi.from_handle(handle)(q, out)
 
-    def attach(self, snes: Any, callbacks: SnesCallbacks, f: Any, matrix: Any) -> None:
-        """Let SNES call Python."""
-        snes.setFunction(callbacks.function, f)
-        snes.setJacobian(callbacks.jacobian, matrix)
-        snes.setConvergenceTest(callbacks.test)
 
-    def drive(self, snes: Any, factors: Any) -> None:
-        """Leave Newton's method to PETSc."""
+@ffi.def_extern()  # type: ignore[misc, untyped-decorator, unused-ignore]
+def missed_in_python(handle: Any, q: Any, r: Any, scale: float, moved: float) -> float:
+    """Callback of C, declared in c_library.py."""
+    return float(ffi.from_handle(handle)(q, r, scale, moved))
 
 
 class Border(Protocol):
@@ -121,7 +152,7 @@ class SnesCallbacks:
     """
 
     def __init__(self, equation: Equation, vectors: Vectors, stop: Callable[[int], int]) -> None:
-        self._equation, self._vectors, self._stop = equation, vectors, stop
+        self.equation, self.vectors, self._stop = equation, vectors, stop
         self.idle: tuple[Index, Array] | None = None
 
     @contextmanager
@@ -130,95 +161,33 @@ class SnesCallbacks:
         try:
             yield
         except BaseException as error:
-            self._equation.note(error)
+            self.equation.note(error)
 
     def function(self, snes: Any, x: Any, f: Any) -> None:
         """Compute the residual ``f`` at ``x``."""
-        self._vectors.update_ghosts(x)
-        r = self._vectors.view(f, writable=True)
+        self.vectors.update_ghosts(x)
+        r = self.vectors.view(f, writable=True)
         with self.noted():
-            self._equation.residual(self._vectors.view(x), r)
-        if self._equation.error is not None:
+            self.equation.residual(self.vectors.view(x), r)
+        if self.equation.error is not None:
             # It may have failed on this process alone; by the sum all give up together.
             r.fill(np.nan)
-        self._vectors.add_ghosts(f)
+        self.vectors.add_ghosts(f)
         f.stateIncrease()
-        self._equation.complete(r)
+        self.equation.complete(r)
 
     def jacobian(self, snes: Any, x: Any, J: Any, P: Any) -> None:
         """Compute the tangent at ``x``, unless the last one is near enough."""
-        if self._equation.c.near:
+        if self.equation.c.near:
             return
-        self._vectors.update_ghosts(x)
+        self.vectors.update_ghosts(x)
         with self.noted():
-            self._equation.tangent(self._vectors.view(x))
+            self.equation.tangent(self.vectors.view(x))
             if self.idle is not None:
                 entries, stiffnesses = self.idle
-                self._equation.A.data[entries] += stiffnesses
+                self.equation.A.data[entries] += stiffnesses
         P.stateIncrease()
 
     def test(self, snes: Any, iteration: int, norms: Any) -> int:
         """Return why to stop after an iteration, or zero."""
         return self._stop(iteration)
-
-
-# -- parts that C leaves to Python ---------------------------------------------------------------
-
-
-@dataclass
-class InPython:
-    """A part of a residual or tangent at its first argument that Python adds to its second."""
-
-    add: Callable[[Array, Array], None]
-    size: tuple[int, int]
-    failed: Callable[[BaseException], None]
-
-    def __post_init__(self) -> None:
-        self.handle = ffi.new_handle(self)
-
-    def __call__(self, q: Any, out: Any) -> None:
-        """Add, to arrays that C lends; not a number where that fails."""
-        result = _lent(out, self.size[1])
-        try:
-            self.add(_lent(q, self.size[0]), result)
-        except BaseException as error:
-            self.failed(error)
-            result.fill(np.nan)
-
-
-@ffi.def_extern()  # type: ignore[misc, untyped-decorator, unused-ignore]
-def add_in_python(handle: Any, q: Any, out: Any) -> None:
-    """Callback of C, declared in loops.h."""
-    ffi.from_handle(handle)(q, out)
-
-
-@dataclass
-class Demand:
-    """Residual of the constraints of connectors, evaluated by Python."""
-
-    missed: Callable[[Array, Array, float, float], float]
-    size: int
-    failed: Callable[[BaseException], None]
-
-    def __post_init__(self) -> None:
-        self.loop = lib.missed_in_python, ffi.new_handle(self)
-
-    def __call__(self, q: Any, r: Any, scale: float, moved: float) -> float:
-        """Return the residual; not a number where it fails."""
-        try:
-            return self.missed(_lent(q, self.size), _lent(r, self.size), scale, moved)
-        except BaseException as error:
-            self.failed(error)
-            return math.nan
-
-
-@ffi.def_extern()  # type: ignore[misc, untyped-decorator, unused-ignore]
-def missed_in_python(handle: Any, q: Any, r: Any, scale: float, moved: float) -> float:
-    """Callback of C, declared in loops.h."""
-    missed: float = ffi.from_handle(handle)(q, r, scale, moved)
-    return missed
-
-
-def _lent(pointer: Any, size: int) -> Array:
-    """An array that C lends."""
-    return np.frombuffer(ffi.buffer(pointer, 8 * size))

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array, Index
+from ufl_beam.compiled.csr import Csr
 
 SCALINGS = 6
 """Passes of the scaling; each one takes the square root of the range of sizes."""
@@ -52,7 +53,9 @@ class Factorisation:
         self.symmetric = bool(abs(S - S.T).max() <= SYMMETRIC)
         self._S = csr_array((S + S.T) / 2) if self.symmetric else S
         self._pc = pc = PETSc.PC().create(PETSc.COMM_SELF)
-        pc.setOperators(self._matrix())
+        matrix = Csr(self._S.data, self._S.indices, self._S.indptr).petsc()
+        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, self.symmetric)
+        pc.setOperators(matrix)
         pc.setType("cholesky" if self.symmetric else "lu")
         pc.setFactorSolverType("mumps")
         pc.setFactorSetUpSolverType()
@@ -66,14 +69,6 @@ class Factorisation:
             if self.symmetric
             else int(factors.getMumpsRinfog(MANTISSA) < 0)
         )
-
-    def _matrix(self) -> PETSc.Mat:
-        arrays = (self._S.indptr.astype(PETSc.IntType), self._S.indices.astype(PETSc.IntType))
-        matrix = PETSc.Mat().createAIJ(
-            self._S.shape, csr=(*arrays, self._S.data), comm=PETSc.COMM_SELF
-        )
-        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, self.symmetric)
-        return matrix
 
     def solve(self, b: Array) -> Array:
         """The solution for one right-hand side, refined once."""

@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from functools import partial
 
 from petsc4py import PETSc
 
 from ufl_beam.compiled.c_library import lib
+from ufl_beam.solvers.convergence import Convergence
+from ufl_beam.solvers.equation import Equation
+from ufl_beam.solvers.vectors import Vectors
 
 EVALUATIONS = 4
 """Residuals that one search may cost."""
@@ -20,7 +22,6 @@ LONGEST, SHORTEST = 1.0, 1e-12
 """Limits of a step, as parts of the full one."""
 
 
-@dataclass
 class SearchingNewton:
     """Newton's method with steps to where the residual does no work on them, for points that flow.
 
@@ -28,25 +29,18 @@ class SearchingNewton:
     one branch to the other and back for ever.  Work is the only product of residuals and steps that
     adds forces and moments, and it is the same in all units.  Forces of connectors are unknowns of
     their own, so the line search of PETSc would add products of forces; here the law of a
-    connector, in the place of its force, does work on the change of its motion. It answers like the
-    SNES whose function and Jacobian it uses.  ``test`` gives the reason to stop after an iteration,
-    ``near`` says to keep the tangent, and ``work(step)`` makes a function that gives the work (J)
-    of the latest residual on a step from the iterate of the tangent.
+    connector, in the place of its force, does work on the change of its motion.  It answers like
+    the SNES whose function, Jacobian and linear solver it uses.
     """
 
-    snes: PETSc.SNES
-    ksp: PETSc.KSP
-    x: PETSc.Vec
-    f: PETSc.Vec
-    y: PETSc.Vec
-    w: PETSc.Vec
-    matrix: PETSc.Mat
-    test: Callable[[int], int]
-    near: Callable[[], bool]
-    work: Callable[[PETSc.Vec], Callable[[], float]]
-    most: int
-    _reason: int = 0
-    _iterations: int = 0
+    def __init__(
+        self, snes: PETSc.SNES, vectors: Vectors, equation: Equation, convergence: Convergence
+    ) -> None:
+        self._snes, self._ksp, self._vectors = snes, snes.getKSP(), vectors
+        self._equation, self._convergence = equation, convergence
+        self._f, self._matrix = snes.getFunction()[0], snes.getJacobian()[0]
+        self._y, self._trial = vectors.new(), vectors.new()
+        self._reason = self._iterations = 0
 
     def getConvergedReason(self) -> int:
         """Why the last solution ended; as of PETSc."""
@@ -59,30 +53,35 @@ class SearchingNewton:
     def solve(self, b: None, x: PETSc.Vec) -> None:
         """Find the root of the residual from ``x``, which takes it."""
         self._iterations = 0
-        self._reason = self._solve()
+        self._reason = self._solve(x)
 
-    def _solve(self) -> int:
-        self.snes.computeFunction(self.x, self.f)
-        while not (reason := self.test(self._iterations)):
-            if self._iterations == self.most:
+    def _solve(self, x: PETSc.Vec) -> int:
+        c = self._equation.c
+        self._snes.computeFunction(x, self._f)
+        while not (reason := self._convergence.test(self._iterations)):
+            if self._iterations == c.most:
                 return int(lib.TOO_MANY)
-            if not self.near():
-                self.snes.computeJacobian(self.x, self.matrix)
-                self.ksp.setOperators(self.matrix)
-            self.ksp.solve(self.f, self.y)
-            if self.ksp.getConvergedReason() < 0:
+            if not c.near:
+                self._snes.computeJacobian(x, self._matrix)
+                self._ksp.setOperators(self._matrix)
+            self._ksp.solve(self._f, self._y)
+            if self._ksp.getConvergedReason() < 0:
                 return int(lib.SINGULAR)
-            self._search(self.work(self.y))
+            self._search(x)
             self._iterations += 1
         return reason
 
-    def _search(self, work: Callable[[], float]) -> None:
+    def _search(self, x: PETSc.Vec) -> None:
         """Go the part of the full step at which the residual does no work, found by secants."""
+        for vector in (x, self._y):
+            self._vectors.update_ghosts(vector)
+        step = self._equation.working(*map(self._vectors.view, (x, self._y)))
+        work = partial(self._convergence.work, step)
         before, part_before, part = work(), 0.0, 1.0
         first, evaluations = before, 0
         while True:
-            self.w.waxpy(-part, self.y, self.x)
-            self.snes.computeFunction(self.w, self.f)
+            self._trial.waxpy(-part, self._y, x)
+            self._snes.computeFunction(self._trial, self._f)
             now = work()
             evaluations += 1
             if evaluations == EVALUATIONS or not abs(now) > PART * abs(first):
@@ -96,4 +95,4 @@ class SearchingNewton:
             if not SHORTEST <= next_part <= LONGEST:
                 break
             before, part_before, part = now, part, next_part
-        self.w.copy(self.x)
+        self._trial.copy(x)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -11,12 +10,13 @@ from petsc4py import PETSc
 
 from ufl_beam.arrays import Array
 from ufl_beam.collective_errors import Agreement
-from ufl_beam.compiled.c_library import doubles, ffi, integers, lib
+from ufl_beam.compiled.c_library import ffi, fill, lib, loop, opaque, petsc
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
 from ufl_beam.solvers.bordered import BorderedNewton
 from ufl_beam.solvers.convergence import Convergence
+from ufl_beam.solvers.direct_solver import DirectSolver
 from ufl_beam.solvers.equation import Border, Equation, SnesCallbacks
 from ufl_beam.solvers.line_search import SearchingNewton
 from ufl_beam.solvers.newton_options import PREFIX, Newton
@@ -38,20 +38,23 @@ class Solver:
     """Finds the configuration in which the residual of an equation vanishes."""
 
     def __init__(
-        self, share: Share, equation: Equation, newton: Newton, least: int, agreement: Agreement
+        self,
+        share: Share,
+        equation: Equation,
+        factors: ChainsFirst | DirectSolver,
+        newton: Newton,
+        least: int,
+        agreement: Agreement,
     ) -> None:
         self._share, self._equation, self._newton = share, equation, newton
         self._agreement, self._vectors = agreement, Vectors(share)
         self._x, self._f = self._vectors.new(), self._vectors.new()
         self._q, r = (self._vectors.view(one, writable=True) for one in (self._x, self._f))
         self.convergence = Convergence(share, equation, self._q, r, newton, least)
-        equation.c.x = ffi.cast("void *", self._x.handle)
+        equation.c.x = opaque(self._x)
         self._callbacks = SnesCallbacks(equation, self._vectors, self.convergence.test)
         self._matrix = self._make_matrix()
-        # A connector alone may hold a part whose own stiffness leaves zeros, or nothing but
-        # round-off, on the diagonal; PETSc's factorisation does not exchange rows, KLU's does.
-        connected = len(share.grid.multipliers) > 0
-        self._factors = ChainsFirst(share, equation.A, "klu" if connected else "petsc")
+        self._factors = factors
         self._ksp = PETSc.KSP().create(self._x.comm)
         self._ksp.setOptionsPrefix(PREFIX)
         self._ksp.setType("preonly")
@@ -59,8 +62,8 @@ class Solver:
         self._ksp.getPC().setPythonContext(self._factors)
         self._bordered: BorderedNewton | None = None
         self._snes = self._make_snes()
-        if not self._chosen():
-            equation.drive(self._snes, self._factors)
+        if equation.in_c and not self._chosen():
+            self._leave_newton_to_c()
         self.iterations = self._done = 0
 
     # -- PETSc ---------------------------------------------------------------------------------
@@ -81,7 +84,15 @@ class Solver:
     def _make_snes(self) -> PETSc.SNES:
         snes = PETSc.SNES().create(self._x.comm)
         snes.setOptionsPrefix(PREFIX)
-        self._equation.attach(snes, self._callbacks, self._f, self._matrix)
+        if self._equation.in_c:
+            petsc("SNESSetFunction", snes, self._f, *loop("snes_function", self._equation.c))
+            matrices = self._matrix, self._matrix
+            petsc("SNESSetJacobian", snes, *matrices, *loop("snes_jacobian", self._equation.c))
+            petsc("SNESSetConvergenceTest", snes, *loop("snes_test", self._equation.c), ffi.NULL)
+        else:
+            snes.setFunction(self._callbacks.function, self._f)
+            snes.setJacobian(self._callbacks.jacobian, self._matrix)
+            snes.setConvergenceTest(self._callbacks.test)
         snes.setTolerances(max_it=self._newton.max_iterations)
         snes.setType("newtonls")
         snes.setKSP(self._ksp)
@@ -100,32 +111,25 @@ class Solver:
                 database[name] = value
         return snes
 
+    def _leave_newton_to_c(self) -> None:
+        self._factors.drive(self._equation.c)
+        solve, context = loop("snes_newton", self._equation.c)
+        self._snes.setType("shell")
+        petsc("SNESShellSetContext", self._snes, context)
+        petsc("SNESShellSetSolve", self._snes, solve)
+
     @cached_property
     def _careful(self) -> PETSc.SNES | SearchingNewton:
         """Newton's method with a line search."""
         if "snes_linesearch_type" in self._chosen():
             return self._snes
-        return SearchingNewton(
-            self._snes, self._ksp, x=self._x, f=self._f, y=self._vectors.new(),
-            w=self._vectors.new(), matrix=self._matrix, test=self.convergence.test,
-            near=lambda: bool(self._equation.c.near), work=self._work_on,
-            most=self._newton.max_iterations,
-        )  # fmt: skip
-
-    def _work_on(self, y: PETSc.Vec) -> Callable[[], float]:
-        """Work of the latest residual on a step from the present iterate; J."""
-        for vector in (self._x, y):
-            self._vectors.update_ghosts(vector)
-        step = self._equation.working(self._q, self._vectors.view(y))
-        return lambda: self.convergence.work(step)
+        return SearchingNewton(self._snes, self._vectors, self._equation, self.convergence)
 
     def _along(self, border: Border) -> PETSc.SNES:
         """SNES of the equation with a border."""
         if self._bordered is None:
-            self._bordered = BorderedNewton(
-                self._callbacks, self._vectors, self._ksp.getPC(), self._equation.held,
-                self._make_snes(), self._f, self._matrix, border,
-            )  # fmt: skip
+            factors = self._ksp.getPC()
+            self._bordered = BorderedNewton(self._make_snes(), self._callbacks, factors, border)
         self._bordered.border = border
         return self._bordered.snes
 
@@ -147,20 +151,13 @@ class Solver:
         if reason <= 0 and self._may_go_on() and self._equation.stiffen(True):
             self._go_to(guess)
             reason = self._stiffened()
-        if reason <= 0:
-            raise self._failure(reason)
-        self._vectors.update_ghosts(self._x)
-        return self._q.copy()
+        return self._solution(reason)
 
     def solve_along(self, guess: Array, loads: list[Array], border: Border) -> Array:
         """Find the configuration as :meth:`solve` does, together with the unknown of a border."""
         self.convergence.take_loads(loads)
         self._go_to(guess)
-        reason = self._iterate(self._along(border), 12)
-        if reason <= 0:
-            raise self._failure(reason)
-        self._vectors.update_ghosts(self._x)
-        return self._q.copy()
+        return self._solution(self._iterate(self._along(border), 12))
 
     @cached_property
     def _idle(self) -> IdleMotions:
@@ -177,10 +174,8 @@ class Solver:
             self._go_to(guess)
             return self._iterate(self._snes, 2)
 
-        reason, convergence = int(lib.SINGULAR), self.convergence
-        while reason == lib.SINGULAR and self._idle.find(
-            convergence.residuals(), convergence.scale()
-        ):
+        reason, now = int(lib.SINGULAR), self.convergence
+        while reason == lib.SINGULAR and self._idle.find(now.residuals(), now.scale()):
             reason = again()
         if reason <= 0 and self._idle.forget():
             reason = again()
@@ -189,9 +184,8 @@ class Solver:
     def _put_idle(self) -> None:
         """Add the stiffnesses against idle motions to tangents from now on."""
         entries, stiffnesses = self._callbacks.idle = self._idle.entries
-        self._at_idle = integers(entries), doubles(stiffnesses)
-        c = self._equation.c
-        c.idle, (c.idle_entry, c.idle_stiffness) = len(entries), self._at_idle
+        idle = {"idle_entry": entries, "idle_stiffness": stiffnesses}
+        fill(self._equation.c, idle=len(entries), **idle)
         self.convergence.leave_out(self._idle.stiffness > 0.0)
 
     def _stiffened(self) -> int:
@@ -238,10 +232,13 @@ class Solver:
         self._agreement.settle(None if isinstance(error, StepFailed) else error)
         return True
 
-    def _failure(self, reason: int) -> StepFailed:
-        """Describe the failure; raise what a function of the user has raised on any process."""
-        self._agreement.settle(self._equation.error)
-        return self.convergence.failure(reason, self._done)
+    def _solution(self, reason: int) -> Array:
+        """Return the latest iterate; raise the failure, or what a function of the user raised."""
+        if reason <= 0:
+            self._agreement.settle(self._equation.error)
+            raise self.convergence.failure(reason, self._done)
+        self._vectors.update_ghosts(self._x)
+        return self.iterate()
 
     # -- what is known of it -------------------------------------------------------------------
 

@@ -31,6 +31,8 @@ class Newton:
             ``PETSC_OPTIONS`` they have the prefix ``ub_``.  With any option PETSc's Newton method
             is used, otherwise an equivalent one in C, which is faster for few cells.  A
             ``snes_linesearch_type`` replaces the line search after full steps.
+        reference: Evaluate the same equations by DOLFINx, NumPy and PETSc alone, to compare with,
+            or to read: some hundred times slower, see docs/theory.md.
 
     Example:
         >>> newton = ub.Newton(rtol=1e-12, petsc={"snes_linesearch_type": "bt"})
@@ -41,6 +43,7 @@ class Newton:
     max_iterations: int = 30
     modified: bool = False
     petsc: dict[str, Any] = field(default_factory=dict)
+    reference: bool = False
 
     def __post_init__(self) -> None:
         require_number(self.rtol, "Newton: rtol", positive=True)
@@ -48,5 +51,6 @@ class Newton:
         object.__setattr__(self, "max_iterations", int(self.max_iterations))
         require_switch(self.modified, "Newton: modified")
         require_kind(self.petsc, dict, "Newton: petsc")
+        require_switch(self.reference, "Newton: reference")
         for option in self.petsc:
             require_text(option, "Newton: petsc, an option")

@@ -118,7 +118,7 @@ class IdleMotions:
     def entries(self) -> tuple[Index, Array]:
         """Positions in the data of the tangent, and what is added there."""
         here = np.flatnonzero(self.stiffness)
-        return self._diagonal[here].astype(np.int32), self.stiffness[here]
+        return self._diagonal[here], self.stiffness[here]
 
     def find(self, forces: Array, scale: float) -> bool:
         """Look for idle motions of the latest tangent; false if one that meets no force is driven.

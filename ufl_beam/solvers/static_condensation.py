@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import doubles, ffi, integers, lib
+from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, opaque
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Share
 
@@ -105,101 +105,71 @@ class Elimination:
     On one process C does the same with :attr:`c`, see newton.c.
 
     Attributes:
-        indptr, indices: Rows of the small matrix, which all processes have, and columns of entries.
-        data: Its entries; summed over the processes by :meth:`factor`.
+        left: The small matrix, which all processes have; its entries are summed over them.
         f: Right-hand side of the small system, of :meth:`reduce`.
         c: All of it in C, see loops.h.
     """
 
     def __init__(self, share: Share, A: Csr) -> None:
-        self._comm, self._A = share.comm, A
+        self._comm = share.comm
         ghosts = np.concatenate(self._comm.allgather(share.dofs[share.num_owned :]))
         chains = Chains(share.cell_dofs, A, ~np.isin(share.dofs, ghosts))
-        left = np.ones(share.size, dtype=bool)
-        left[chains.dofs] = False
-        here = np.flatnonzero(left)
+        stays = np.ones(share.size, dtype=bool)
+        stays[chains.dofs] = False
+        here = np.flatnonzero(stays)
         numbers = np.unique(np.concatenate(self._comm.allgather(share.dofs[here])))
         number = np.full(share.size, -1, dtype=np.int32)
         number[here] = np.searchsorted(numbers, share.dofs[here])
-        ends = number[chains.ends]
-        entries, *places = self._make_matrix(number, ends, len(numbers))
-        owned = here[here < share.num_owned]
-        self._make_arguments(chains, {
-            "entry": entries, "place": places[0], "places": places[1],
+        ends, owned = number[chains.ends], here[here < share.num_owned]
+        entry, place, places = self._make_matrix(A, number, ends, len(numbers))
+        self.f = np.zeros(len(numbers))
+        first, last = (chains.dofs[k] for k in (chains.first[:-1], chains.first[1:] - 1))
+        next_to = np.stack([np.where(chains.spikes[:, None], first, last), last], axis=1)
+        of_ends = np.broadcast_arrays(chains.ends.reshape(-1, 2, 3, 1), next_to[:, :, None, :])
+        vertices = len(chains.dofs)
+        indices = {
+            "first": chains.first, "spike": chains.spikes, "row": chains.dofs,
+            "order": chains.order, "from_ends": A.positions(*map(np.ravel, of_ends)),
+            "entry": entry, "place": place, "places": places,
             "dof": owned, "number": number[owned], "ends": ends,
-        })  # fmt: skip
+        }  # fmt: skip
+        self.c = fill(
+            ffi.new("chains *"),
+            chains=len(ends), left=len(self.left.data), stay=len(entry), rows=len(owned),
+            left_size=len(numbers), left_data=self.left.data, left_f=self.f,
+            data=A.data, indptr=A.indptr, swaps=np.empty(3 * vertices, np.int32),
+            pivots=np.empty(lib.BLOCK * vertices), to_next=np.empty(lib.BLOCK * vertices),
+            sides=np.empty(lib.SIDES * vertices if chains.spikes.any() else 0),
+            f=np.zeros(3 * vertices),
+            **{name: np.ascontiguousarray(x, np.int32) for name, x in indices.items()},
+        )  # fmt: skip
 
-    def _make_matrix(self, number: Index, ends: Index, size: int) -> tuple[Index, Index, Index]:
-        """Make the structure of the small matrix; ``number`` in it is -1 of what is eliminated.
+    def _make_matrix(
+        self, A: Csr, number: Index, ends: Index, size: int
+    ) -> tuple[Index, Index, Index]:
+        """Make the small matrix; ``number`` in it is -1 of what is eliminated.
 
         Returns:
-            Entries of ``A`` that stay, where they are in :attr:`data`, and where the blocks of the
-            ``ends`` (num_chains, 6) of the chains are.
+            Entries of ``A`` that stay, where they are in the small matrix, and where the blocks of
+            the ``ends`` (num_chains, 6) of the chains are.
         """
-        rows, columns, left = self._A.rows(), self._A.indices, number >= 0
+        rows, columns, left = A.rows(), A.indices, number >= 0
         entries = np.flatnonzero(left[rows] & left[columns])
         keys = number[rows[entries]].astype(np.int64) * size + number[columns[entries]]
         of_ends = ends.astype(np.int64).reshape(-1, 2, 3)
-        of_blocks = of_ends[:, :, None, :, None] * size + of_ends[:, None, :, None, :]
-        of_chains = of_blocks.ravel()
+        of_chains = (of_ends[:, :, None, :, None] * size + of_ends[:, None, :, None, :]).ravel()
         mine = np.unique(np.concatenate([keys, of_chains]))
         if self._comm.size > 1:
             mine = np.unique(np.concatenate(self._comm.allgather(mine)))
-        self.indices = (mine % size).astype(np.int32)
-        self.indptr = np.searchsorted(mine, np.arange(size + 1) * size).astype(np.int32)
-        self.data, self.f = np.zeros(len(mine)), np.zeros(size)
+        indptr = np.searchsorted(mine, np.arange(size + 1) * size)
+        self.left = Csr(np.zeros(len(mine)), mine % size, indptr)
         return entries, np.searchsorted(mine, keys), np.searchsorted(mine, of_chains)
 
-    def _make_arguments(self, chains: Chains, left: dict[str, Index]) -> None:
-        """Make the data of C: the chains, and the indices of the remaining system, see loops.h."""
-        A = self._A
-        ends = chains.ends.reshape(-1, 2, 3, 1)
-        first, last = (chains.dofs[k] for k in (chains.first[:-1], chains.first[1:] - 1))
-        next_to = np.stack([np.where(chains.spikes[:, None], first, last), last], axis=1)
-        rows, columns = np.broadcast_arrays(ends, next_to[:, :, None, :])
-        vertices = len(chains.dofs)
-        of_integers = {
-            "first": chains.first,
-            "spike": chains.spikes,
-            "row": chains.dofs,
-            "order": chains.order,
-            "from_ends": A.positions(rows.ravel(), columns.ravel()),
-            "indptr": A.indptr,
-            "swaps": np.empty(3 * vertices, np.int32),
-            **left,
-        }
-        of_doubles = {
-            "data": A.data,
-            "pivots": np.empty(lib.BLOCK * vertices),
-            "to_next": np.empty(lib.BLOCK * vertices),
-            "sides": np.empty(lib.SIDES * vertices if chains.spikes.any() else 0),
-            "f": np.zeros(3 * vertices),
-            "left_data": self.data,
-            "left_f": self.f,
-        }
-        self._alive = {
-            **{k: integers(np.ascontiguousarray(v, np.int32)) for k, v in of_integers.items()},
-            **{k: doubles(v) for k, v in of_doubles.items()},
-        }
-        sizes = {
-            "chains": len(chains.ends),
-            "left": len(self.data),
-            "stay": len(left["entry"]),
-            "rows": len(left["dof"]),
-            "left_size": self.size,
-        }
-        self.c = ffi.new("chains *", {**self._alive, **sizes})
-
-    @property
-    def size(self) -> int:
-        """Number of unknowns of the small system."""
-        return len(self.indptr) - 1
-
     def factor(self) -> bool:
-        """Eliminate the chains and fill :attr:`data`; whether all of it is finite."""
+        """Eliminate the chains and fill :attr:`left`; whether all of it is finite."""
         lib.eliminate(self.c)
-        self._sum(self.data)
-        return bool(lib.all_finite(len(self.data), doubles(self.data)))
+        self._sum(self.left.data)
+        return bool(lib.all_finite(len(self.left.data), doubles(self.left.data)))
 
     def reduce(self, b: Array) -> None:
         """Fill :attr:`f`; ``b`` at the degrees of freedom owned here."""
@@ -227,17 +197,17 @@ def succeeds(function: Callable[..., None], *vectors: PETSc.Vec) -> bool:
 
 
 class ChainsFirst:
-    """Direct solver: condensation along the beams, then factorization by ``package`` of the rest.
+    """Direct solver: condensation along the beams, then factorization of the rest.
 
     Every process factors what is left, which is small, instead of waiting for another.
     """
 
-    def __init__(self, share: Share, A: Csr, package: str) -> None:
-        self._elimination = left = Elimination(share, A)
-        self._good = False
-        arrays = (left.indptr.astype(PETSc.IntType), left.indices.astype(PETSc.IntType), left.data)
-        self._matrix = PETSc.Mat().createAIJWithArrays(left.size, arrays, comm=PETSc.COMM_SELF)
-        self._matrix.assemble()
+    def __init__(self, share: Share, A: Csr) -> None:
+        # A connector alone may hold a part whose own stiffness leaves zeros, or nothing but
+        # round-off, on the diagonal; PETSc's factorisation does not exchange rows, KLU's does.
+        package = "klu" if len(share.grid.multipliers) else "petsc"
+        self._elimination, self._good = Elimination(share, A), False
+        self._matrix = self._elimination.left.petsc()
         self._factors = PETSc.PC().create(PETSc.COMM_SELF)
         self._factors.setOperators(self._matrix)
         self._factors.setType("lu")
@@ -246,16 +216,15 @@ class ChainsFirst:
         if package == "petsc":
             # Of narrow and wide lattices it fills in least: 0.55 and 0.9 of the time of "nd".
             self._factors.setFactorOrdering("amd")
-        self._rhs = PETSc.Vec().createWithArray(left.f, comm=PETSc.COMM_SELF)
+        self._rhs = PETSc.Vec().createWithArray(self._elimination.f, comm=PETSc.COMM_SELF)
         self._solution = self._rhs.duplicate()
         self._found = doubles(self._solution.array_r)
 
     def drive(self, c: Any) -> None:
         """Let Newton's method in C do the same; ``c`` is its ``equation`` of loops.h."""
         c.chains, c.found = self._elimination.c, self._found
-        c.factors, c.left, c.left_f, c.left_x = (
-            ffi.cast("void *", one.handle)
-            for one in (self._factors, self._matrix, self._rhs, self._solution)
+        c.factors, c.left, c.left_f, c.left_x = map(
+            opaque, (self._factors, self._matrix, self._rhs, self._solution)
         )
 
     def setUp(self, pc: PETSc.PC) -> None:

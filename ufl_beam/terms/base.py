@@ -8,10 +8,10 @@ what several processes add to one degree of freedom is summed by the solver.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop, loop
-from ufl_beam.compiled.csr import Csr, StepProduct
-from ufl_beam.discretization.compiled_forms import Kernel
+from ufl_beam.compiled.c_library import Loop
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.time_schemes import Step
 
@@ -19,7 +19,7 @@ KINDS = ("beams", "connectors", "loads", "inertia", "damping")
 """Kinds of forces."""
 
 
-class Term:
+class Term(ABC):
     """Virtual work of one physical effect; a method that a term does not define does nothing."""
 
     kind: str
@@ -32,6 +32,7 @@ class Term:
     def begin(self, step: Step) -> None:
         """Take note of the step that is to be solved."""
 
+    @abstractmethod
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the virtual work at ``q1`` to ``r``."""
 
@@ -54,47 +55,9 @@ class Term:
         """State what later steps depend on; ``q`` is the configuration of the state."""
 
 
-class Beams(Term):
-    """Resultants of cells working on the virtual strains; the residual is an internal force."""
+class InternalForces(Term):
+    """Forces inside a scene: those of its cells and connectors."""
 
+    @abstractmethod
     def change(self, q1: Array) -> float:
-        """Energy that cells of this process store and dissipate in the step to ``q1``; J."""
-        raise NotImplementedError
-
-
-class OfForms(Term):
-    """A term whose forces and their derivative are two forms on cells."""
-
-    _force: Kernel
-    _tangent: Kernel
-    _A: Csr
-
-    def loops(self) -> tuple[Loop, Loop | None]:
-        """C loops over the cells, of force and tangent."""
-        return loop("add_cells", self._force.cells), loop("add_cells", self._tangent.cells)
-
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Add the forces to the residual."""
-        self._force.add(q1, r)
-
-    def add_tangent(self, q1: Array) -> None:
-        """Add the derivative of the forces to the tangent."""
-        self._tangent.add(q1, self._A.data)
-
-
-class OfMatrix(Term):
-    """A term whose forces are a constant matrix times the step of the nodes."""
-
-    _times: StepProduct
-
-    def loops(self) -> tuple[Loop, Loop | None]:
-        """The product, and its derivative."""
-        return self._times.loops()
-
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Add the forces to the residual."""
-        self._times.add_force(q1, r)
-
-    def add_tangent(self, q1: Array) -> None:
-        """Add the derivative of the forces to the tangent."""
-        self._times.add_tangent(q1)
+        """Energy that is stored and dissipated on this process in the step to ``q1``; J."""

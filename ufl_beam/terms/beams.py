@@ -9,16 +9,16 @@ from typing import NamedTuple
 import ufl
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop
+from ufl_beam.compiled.c_library import Loop, loop, struct
 from ufl_beam.compiled.csr import Csr, StepProduct
-from ufl_beam.discretization.compiled_forms import Kernel, stated
+from ufl_beam.discretization.compiled_forms import CellForm, stated
 from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.functional import elastic_energy, resultants, virtual_work
 from ufl_beam.mechanics.kinematics import strain
-from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, Step
-from ufl_beam.terms.base import OfForms, OfMatrix
+from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, Step, has_inertia
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.forms_and_matrices import OfForms, OfMatrix
 from ufl_beam.terms.tangent_derivatives import Cells
 
 
@@ -41,9 +41,9 @@ def _elastic_forms(of: Element, scheme: Scheme) -> _ElasticForms:
     r = scheme.resultants(C, e0, e1, of.constant)
     w_e = scheme.virtual_strain(q0, q1, w, of.axis)
     stored = elastic_energy(e1, C) * dx
-    losses = [d * dx for d in scheme.losses(C, e0, e1, of.constant)]
-    first = None
-    if not scheme.dynamic:
+    lost = 2 * of.constant(scheme.alpha) * elastic_energy(e1 - e0, C) * dx  # P(90)
+    losses, first = [lost] if scheme.alpha else [], None
+    if not has_inertia(scheme):
         dq = ufl.TrialFunction(of.space)
         geometric = virtual_work(resultants(e0, C), ufl.derivative(w_e, q1, dq))
         material = virtual_work(ufl.derivative(r, q1, dq), w_e)
@@ -54,37 +54,30 @@ def _elastic_forms(of: Element, scheme: Scheme) -> _ElasticForms:
 class ElasticBeams(OfForms, Cells):
     """Resultants of elastic cells working on the virtual strains, P(12)."""
 
-    kind = "beams"
+    kind, _entry = "beams", "numerical"
 
     def __init__(self, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger) -> None:
         forms = _elastic_forms(fields.element, scheme)
-        self._q0, self._q1, self._fields = fields.element.q0, fields.element.q1, fields
-        self._work_form = forms.work
-        self._force, self._tangent = fields.force_and_tangent(forms.work, self._q1, A)
-        self._stored, *self._losses = (
-            fields.hot_kernel(form, self._q1) for form in (forms.stored, *forms.losses)
-        )
-        self._first: Kernel | None = None
-        self._tangents = ffi.new("first_cells *", {"then": self._tangent.cells})
+        super().__init__(forms.work, forms.losses, fields, A, ledger)
+        self._fields, self._work_form = fields, forms.work
+        self._stored = fields.hot_kernel(forms.stored, self._q1)
+        self._begins, self._in_c = False, struct("first_cells", then=self._tangent.cells)
+        self._first: CellForm | None = None
         if forms.first is not None:
             self._first = fields.kernel(forms.first, self._q1)
             self._first.place(A)
-            self._tangents.first = self._first.cells
-        self._A, self._ledger = A, ledger
-        if self._losses:
-            ledger.lost["numerical"] += 0.0
+            self._in_c.first = self._first.cells
+            self._of_step.append(self._first)
 
     def begin(self, step: Step) -> None:
         """Remember the configuration at the beginning."""
-        for kernel in (self._force, *self._losses):
+        for kernel in self._of_step:
             kernel.set(self._q0, step.q0)
-        if self._first is not None:
-            self._first.set(self._q0, step.q0)
-            self._tangents.begins = 1
+        self._begins = self._in_c.begins = self._first is not None
 
     def loops(self) -> tuple[Loop, Loop | None]:
         """C loops over the cells, of force and tangent."""
-        return loop("add_cells", self._force.cells), loop("add_first_cells", self._tangents)
+        return loop("add_cells", self._force.cells), loop("add_first_cells", self._in_c)
 
     def add_tangent(self, q1: Array) -> None:
         """Add the stiffness, material and geometric.
@@ -92,13 +85,15 @@ class ElasticBeams(OfForms, Cells):
         Extrapolated displacements strain slender beams by nothing but error; forces from that would
         send the first iteration of a static step astray, so it takes those before the step.
         """
-        lib.add_first_cells(self._tangents, doubles(q1), doubles(self._A.data))
+        form = self._first if self._begins and self._first else self._tangent
+        form.add(q1, self._A.data)
+        self._begins = False
 
     def accept(self, q1: Array, s: Array) -> None:
         """Enter the energy that the scheme lost."""
-        self._tangents.begins = 0
-        for loss in self._losses:
-            self._ledger.lost["numerical"] += loss.value(q1)
+        self._begins = self._in_c.begins = False
+        if self._losses:
+            super().accept(q1, s)
 
     def add_state(self, q: Array) -> None:
         """Add the stored energy to the ledger."""
@@ -162,14 +157,14 @@ class Inertia(OfMatrix):
         v, *more = self.scheme.rates(self._dt, s, self)
         if self.scheme.slips:
             change = v - self.v
-            momentum = self._times(change)
+            momentum = self._times.A(change)
             lost = self.scheme.slip(self._dt, change, self) @ momentum
             self._ledger.lost["numerical"] += float(lost)
         self.v_before, self.v, self.more, self.last_dt = self.v, v, tuple(more), self._dt
 
     def add_state(self, q: Array) -> None:
         """Add the kinetic energy to the ledger."""
-        self._ledger.state["kinetic"] += self._times.square(self.v) / 2
+        self._ledger.state["kinetic"] += self._times.A.square(self.v) / 2
 
     def remember(self, memory: Memory, q: Array) -> None:
         """Save or restore velocities and the last step."""

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from typing import Any
 
@@ -16,12 +17,13 @@ from ufl_beam.model.connector_laws import (
     Controller,
     Coulomb,
     Damper,
+    Guide,
     Motor,
     Stop,
 )
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.time_functions import value_at
-from ufl_beam.terms.connector_responses import Response, Rows, Setting, Working, respond
+from ufl_beam.terms.connector_responses import Response, Rows, Setting, respond
 
 CREEP = 1e-12
 """Part of the size of the scene, or rad, by which what sticks creeps in a step under its limit.
@@ -30,58 +32,61 @@ Only where several places that stick hold the same motion: so they share the for
 """
 
 
-class _Held(Working):
-    """Constraint of a joint: the motion is zero, and there is no work."""
+class _Held(Response):
+    """Constraints of joints and guides: the motion is zero, and there is no work."""
 
     steady = True
 
     def rows(self, e1: Array, λ: Array) -> Rows:
-        """The motion is held."""
         return 1.0, 0.0, 0.0
 
 
-class _Driven(Working):
+class _Driven(Response):
     """Motors: the motion is given."""
 
     steady = True
-    _group, _entry, _sign = "supplied", "motors", -1.0
+    _part, _entry, _sign = "supplied", "motors", -1.0
 
-    def _prepare(self) -> None:
-        self._motors: list[Any] = list(self._links)
-
-    def _note(self, step: Step) -> None:
-        t = step.motion_time
-        wanted = np.array([value_at(link.law.motion, t, link) for link in self._motors])
-        self._target = self._e0 + step.fraction * (wanted - self._e0)
+    def begin(self, e0: Array, step: Step) -> None:
+        super().begin(e0, step)
+        t, motors = step.motion_time, zip(self._laws, self._links, strict=True)
+        wanted = np.array([value_at(law.motion, t, link) for law, link in motors])
+        self._target = e0 + step.fraction * (wanted - e0)
 
     def rows(self, e1: Array, λ: Array) -> Rows:
-        """The motion is given."""
         return 1.0, 0.0, self._target
 
 
-@respond.register
-def _(law: Motor, links: Sequence[Connector], setting: Setting) -> Response:
-    return (_Held if law is HELD else _Driven)(law, links, setting)
+@respond.register(Motor)
+@respond.register(Guide)
+def _(law: Motor | Guide, links: Sequence[Connector], setting: Setting) -> Response:
+    return (_Held if law is HELD or isinstance(law, Guide) else _Driven)(law, links, setting)
 
 
-@respond.register(Actuator)
-class _Pushed(Working):
-    """Actuators: the force is given."""
+class _Given(Response):
+    """Base of laws that give the force."""
 
     steady = True
-    _group, _entry, _sign = "supplied", "loads", -1.0
+    _part, _sign = "supplied", -1.0
 
-    def _prepare(self) -> None:
+    def _prepare(self, law: Any) -> None:
         self._force: Array = np.zeros(len(self._links))
         self._reached: Array = self._force
 
-    def _note(self, step: Step) -> None:
-        wanted = -np.array([self._wanted(link, step) for link in self._links])
+    @abstractmethod
+    def _wanted(self, law: Any, link: Connector, step: Step) -> float:
+        """The force at the end of all parts of a step."""
+
+    def begin(self, e0: Array, step: Step) -> None:
+        super().begin(e0, step)
+        wanted = -np.array([self._wanted(link.law, link, step) for link in self._links])
         self._end = self._reached + step.fraction * (wanted - self._reached)
         self._force = self._reached + step.at * (self._end - self._reached)
 
+    def rows(self, e1: Array, λ: Array) -> Rows:
+        return 0.0, 1.0, self._force
+
     def accept(self, e1: Array, work: float) -> None:
-        """Enter the work."""
         super().accept(e1, work)
         self._reached = self._end
 
@@ -90,64 +95,62 @@ class _Pushed(Working):
         return self._reached[:, None]
 
     def restore(self, rows: Array) -> None:
-        """Go on from these forces."""
         self._reached = rows[:, 0].copy()
 
-    def _wanted(self, link: Any, step: Step) -> float:
-        return value_at(link.law.force, step.load_time, link)
 
-    def rows(self, e1: Array, λ: Array) -> Rows:
-        """The force is given."""
-        return 0.0, 1.0, self._force
+@respond.register(Actuator)
+class _Pushed(_Given):
+    """Actuators: the force is a function of time."""
+
+    _entry = "loads"
+
+    def _wanted(self, law: Any, link: Connector, step: Step) -> float:
+        return value_at(law.force, step.load_time, link)
 
 
 @respond.register(Controller)
-class _Controlled(_Pushed):
+class _Controlled(_Given):
     """Controllers: the force is what they said at the beginning of the step."""
 
     _entry = "controllers"
 
-    def _wanted(self, link: Any, step: Step) -> float:
+    def _wanted(self, law: Any, link: Connector, step: Step) -> float:
         return self._setting.asked[link]
 
 
 @respond.register(Damper)
-class _Damped(Working):
-    """Dampers."""
+class _Damped(Response):
+    """Dampers: the force is viscosity times the mean rate."""
 
+    steady = True
     _entry = "damping"
 
-    def _prepare(self) -> None:
-        self._viscosity = self._numbers("viscosity")
-
     def rows(self, e1: Array, λ: Array) -> Rows:
-        """The force is viscosity times the mean rate."""
-        factor = self._viscosity / self._dt
+        factor = self._numbers("viscosity") / self._dt
         return -factor, 1.0, -factor * self._e0
 
 
 @respond.register(Coulomb)
-class _Rubbing(Working):
+class _Rubbing(Response):
     """Dry friction: each connector sticks (0), or slips one way or the other (-1, 1)."""
 
     _entry = "friction"
 
-    def _prepare(self) -> None:
+    def _prepare(self, law: Any) -> None:
         self._slip: Array = np.zeros(len(self._links))
         self._accepted: Array = self._slip
-        lengths = np.where([c.turns for c in self._links], 1.0, self._setting.size)
-        self._tiny = 1e-14 * lengths
-        self._softness = (CREEP if self._setting.friction_repeats else 0.0) * lengths
+        self._tiny = 1e-14 * self._lengths()
+        self._softness = (CREEP if self._setting.friction_repeats else 0.0) * self._lengths()
 
     def state(self) -> Array:
         """Which way each slips."""
         return self._accepted[:, None]
 
     def restore(self, rows: Array) -> None:
-        """Take over :meth:`state`."""
         self._slip = self._accepted = rows[:, 0].copy()
 
-    def _note(self, step: Step) -> None:
+    def begin(self, e0: Array, step: Step) -> None:
+        super().begin(e0, step)
         setting = self._setting
         self._limit = limit = np.array([setting.asked[link] for link in self._links])
         self._creep = self._softness / np.where(limit > 0, limit, np.inf)
@@ -162,7 +165,6 @@ class _Rubbing(Working):
         self._against = np.zeros(len(self._links), dtype=bool)
 
     def accept(self, e1: Array, work: float) -> None:
-        """Enter the work, and take which way each slips."""
         super().accept(e1, work)
         self._accepted = self._slip
 
@@ -185,15 +187,16 @@ class _Rubbing(Working):
 
 
 @respond.register(Stop)
-class _Stopped(Working):
+class _Stopped(Response):
     """Contact outside an interval: elastic, so that what it takes it gives back."""
 
-    def _prepare(self) -> None:
-        self._low, self._high = self._numbers("low"), self._numbers("high")
+    def _prepare(self, law: Any) -> None:
         self._stiffness = self._numbers("stiffness")
+        self._ends = self._numbers("low"), self._numbers("high")
 
     def _beyond(self, e: Array) -> Array:
-        return np.asarray(np.maximum(e - self._high, 0.0) + np.minimum(e - self._low, 0.0))
+        """How far a motion is outside the interval."""
+        return np.asarray(e - np.clip(e, *self._ends))
 
     def _energy(self, e: Array) -> float:
         return float(self._stiffness @ self._beyond(e) ** 2) / 2
@@ -205,9 +208,7 @@ class _Stopped(Working):
         return -slope, 1.0, force - slope * e1
 
     def add_state(self, e: Array) -> None:
-        """Stored energy."""
         self._setting.ledger.state["stored"] += self._energy(e)
 
     def change(self, e1: Array, work: float) -> float:
-        """Energy stored in the step; J."""
         return self._energy(e1) - self._energy(self._e0)

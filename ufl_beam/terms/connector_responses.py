@@ -7,7 +7,8 @@ held has a row about e, all other laws have one about λ, linear in e around the
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
 from functools import singledispatch
 from typing import Any, NamedTuple
 
@@ -33,43 +34,66 @@ class Setting(NamedTuple):
     ledger: Ledger
     friction_repeats: bool  # True if places that stick may hold what is held already
     search: SearchFlags  # of all points of the scene
+    points: Callable[..., Any]  # class of the material points of springs
+    slips: Callable[[Any, Sequence[Connector], Setting], Response]  # of rigid-plastic connectors
 
 
-class Response:
-    """Some connectors whose laws are of one kind; motions and forces are arrays of them.
+class Response(ABC):
+    """Connectors whose laws are of one kind, that of ``law``; motions and forces are arrays.
 
-    By default nothing is stored, yields or is remembered.
+    By default nothing is stored, yields or is remembered; the work of the forces is entered in
+    ``_entry`` of a part of the ledger, if that has a name.
     """
 
     steady = False  # True if the rows stay the same during a step
     in_c: Mapping[str, Any] = {}  # data of laws evaluated in C, by names in ``couplings``, loops.h
+    openable: Openable | None = None  # connectors that open beyond a limit, if there are any
+    _part, _entry, _sign = "lost", "", 1.0
 
-    def __init__(self, links: Sequence[Connector]) -> None:
-        self._links = links
+    def __init__(self, law: Any, links: Sequence[Connector], setting: Setting) -> None:
+        self._links, self._setting = links, setting
+        self._laws: list[Any] = [link.law for link in links]
+        self._entries = getattr(setting.ledger, self._part)
+        if self._entry:
+            self._entries[self._entry] += 0.0
+        self._e0: Array = np.zeros(len(links))
+        self._prepare(law)
 
-    @property
-    def openable(self) -> Openable | None:
-        """Connectors that open beyond a limit, if there are any."""
-        return None
+    def _prepare(self, law: Any) -> None:
+        """Prepare the response; called once."""
+
+    def _numbers(self, name: str) -> Array:
+        """A number of the laws."""
+        return np.array([getattr(law, name) for law in self._laws], dtype=np.float64)
+
+    def _lengths(self) -> Array:
+        """Motions that are large: the size of the scene, or a radian."""
+        return np.where([link.turns for link in self._links], 1.0, self._setting.size)
 
     def begin(self, e0: Array, step: Step) -> None:
         """Begin a step at the motions ``e0``."""
-        raise NotImplementedError
+        self._e0, self._dt = e0, step.dt
 
+    @abstractmethod
     def rows(self, e1: Array, λ: Array) -> Rows:
         """α, β, γ around an iterate."""
-        raise NotImplementedError
 
     def accept(self, e1: Array, work: float) -> None:
         """Take the end of the step as the new state; ``work`` is what the connectors have taken."""
-        raise NotImplementedError
+        if self._entry:
+            self._entries[self._entry] += self._sign * work
 
     def about_force(self, rows: Array) -> Array:
         """Factors by which rows about the force are divided, zero for rows about the motion.
 
         ``rows`` are the latest ones that Python has put; (num_links, 3).
         """
-        raise NotImplementedError
+        about_motion = np.array([link.holds for link in self._links]) & (rows[:, 1] != 1.0)
+        return np.where(about_motion, 0.0, 1.0)
+
+    def factors(self) -> Array:
+        """Factors that rows about the force were divided by; (num_links,)."""
+        return np.ones(len(self._links))
 
     def motion(self, e: Array) -> Array:
         """Motions of the accepted state as solutions show them; ``e`` are those of the nodes."""
@@ -93,7 +117,6 @@ class Response:
         """Return whether one slips plastically in the latest iterate."""
         return False
 
-    @property
     def dissipated(self) -> Array:
         """Energy that each connector has dissipated plastically; (num_links,); J."""
         return np.zeros(len(self._links))
@@ -124,45 +147,3 @@ class Response:
 def respond(law: Any, links: Sequence[Connector], setting: Setting) -> Response:
     """The response of connectors whose laws are of the kind of ``law``."""
     raise TypeError(f"{law!r} is no law of a connector")
-
-
-class Working(Response):
-    """Base of responses that store nothing: the work of their forces is entered."""
-
-    _group = "lost"
-    _entry = ""
-    _sign = 1.0
-
-    def __init__(self, law: Any, links: Sequence[Connector], setting: Setting) -> None:
-        super().__init__(links)
-        self._laws: list[Any] = [link.law for link in links]
-        self._setting = setting
-        self._entries = getattr(setting.ledger, self._group)
-        if self._entry:
-            self._entries[self._entry] += 0.0
-        self._e0: Array = np.zeros(len(links))
-        self._prepare()
-
-    def _prepare(self) -> None:
-        """Prepare the response; called once."""
-
-    def begin(self, e0: Array, step: Step) -> None:
-        """Begin a step at the motions ``e0``."""
-        self._e0, self._dt = e0, step.dt
-        self._note(step)
-
-    def _note(self, step: Step) -> None:
-        """Prepare a step."""
-
-    def accept(self, e1: Array, work: float) -> None:
-        """Enter the work into the ledger."""
-        if self._entry:
-            self._entries[self._entry] += self._sign * work
-
-    def about_force(self, rows: Array) -> Array:
-        """Factors of one, but for those that are held in the iterate."""
-        about_motion = np.array([link.holds for link in self._links]) & (rows[:, 1] != 1.0)
-        return np.where(about_motion, 0.0, 1.0)
-
-    def _numbers(self, name: str) -> Array:
-        return np.array([getattr(law, name) for law in self._laws], dtype=np.float64)

@@ -4,11 +4,11 @@
 from __future__ import annotations
 
 import math
-from functools import singledispatch
 from typing import Protocol
 
 import numpy as np
 import ufl
+from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.csr import Csr, StepProduct
@@ -22,8 +22,9 @@ from ufl_beam.mechanics.functional import resultants, virtual_work
 from ufl_beam.mechanics.kinematics import strain, virtual_strain
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Rates, Scheme, Step
 from ufl_beam.model.damping import KelvinVoigt, Rayleigh
-from ufl_beam.terms.base import OfForms, OfMatrix, Term
+from ufl_beam.terms.base import Term
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.forms_and_matrices import OfForms, OfMatrix
 
 
 class Inertia(Rates, Protocol):
@@ -32,49 +33,42 @@ class Inertia(Rates, Protocol):
     scheme: DynamicScheme
 
 
-@singledispatch
-def damping_forces(
-    of: object, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger, inertia: Inertia | None
-) -> list[Term]:
-    """Forces of one kind of damping on the cells of a process; none if it has no such cells."""
-    raise TypeError(f"{of!r} is not a damping")
+def _work_and_loss(
+    of: Element, scheme: Scheme | DecayingMidpoint, factor: Expr, before: Expr
+) -> tuple[ufl.Form, ufl.Form]:
+    """Forms of resultants ``factor C (Δe - before)``, Δe being the changes of the strains."""
+    change = strain(of.q1, of.axis) - strain(of.q0, of.axis)
+    r = factor * resultants(change - before, of.stiffness)
+    w_e = scheme.virtual_strain(of.q0, of.q1, of.w, of.axis)
+    return virtual_work(r, w_e) * of.dx(1), virtual_work(r, change) * of.dx(1)
 
 
 @stated
-def _forms(of: Element, scheme: Scheme) -> tuple[ufl.Form, ufl.Form, fem.Function]:
+def _viscous_forms(of: Element, scheme: Scheme) -> tuple[ufl.Form, ufl.Form, fem.Function]:
     """Virtual work, the energy lost, and the time over that of the step."""
-    q0, q1, C, dx, rate = of.q0, of.q1, of.stiffness, of.dx(1), of.at_points()
-    change = strain(q1, of.axis) - strain(q0, of.axis)
-    r = rate * resultants(change, C)
-    work = virtual_work(r, scheme.virtual_strain(q0, q1, of.w, of.axis)) * dx
-    return work, virtual_work(r, change) * dx, rate
+    rate = of.at_points()
+    return *_work_and_loss(of, scheme, rate, ufl.zero(3)), rate
 
 
 class KelvinVoigtForces(OfForms):
     """Resultants in proportion to the rates of the strains, P(89) with a weight of time over dt."""
 
-    kind = "damping"
+    kind = _entry = "damping"
 
     def __init__(
         self, damping: KelvinVoigt, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger
     ) -> None:
-        work, lost, self._rate = _forms(fields.element, scheme)
-        self._q0, self._time, q1 = fields.element.q0, damping.time, fields.element.q1
-        self._force, self._tangent = fields.force_and_tangent(work, q1, A)
-        self._lost = fields.hot_kernel(lost, q1)
-        self._A, self._ledger, self._dt = A, ledger, 0.0
+        work, lost, self._rate = _viscous_forms(fields.element, scheme)
+        super().__init__(work, [lost], fields, A, ledger)
+        self._time, self._dt = damping.time, 0.0
 
     def begin(self, step: Step) -> None:
         """Remember the configuration at the beginning."""
-        for kernel in (self._force, self._lost):
-            kernel.set(self._q0, step.q0)
-            if step.dt != self._dt:
+        super().begin(step)
+        if step.dt != self._dt:
+            self._dt = step.dt
+            for kernel in self._of_step:
                 kernel.put(self._rate, np.array([self._time / step.dt]))
-        self._dt = step.dt
-
-    def accept(self, q1: Array, s: Array) -> None:
-        """Enter the energy that was damped."""
-        self._ledger.lost["damping"] += self._lost.value(q1)
 
 
 @stated
@@ -105,24 +99,19 @@ class RayleighForces(OfMatrix):
 
     def accept(self, q1: Array, s: Array) -> None:
         """Enter the energy that was damped."""
-        self._ledger.lost["damping"] += self._times.square(s) / self._dt
+        self._ledger.lost["damping"] += self._times.A.square(s) / self._dt
 
 
-@damping_forces.register
-def _(
-    of: Rayleigh, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger, inertia: Inertia | None
-) -> list[Term]:
-    if inertia is None:
-        raise SceneError("Rayleigh: it damps velocities, and statics has none; use KelvinVoigt")
+def damping_forces(
+    of: Rayleigh | KelvinVoigt, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger,
+    inertia: Inertia | None,
+) -> list[Term]:  # fmt: skip
+    """Forces of one kind of damping on the cells of a process; none if it has no such cells."""
     ledger.lost["damping"] += 0.0
-    return [RayleighForces(of, fields, A, ledger, inertia)]
-
-
-@damping_forces.register
-def _(
-    of: KelvinVoigt, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger, inertia: Inertia | None
-) -> list[Term]:
-    ledger.lost["damping"] += 0.0
+    if isinstance(of, Rayleigh):
+        if inertia is None:
+            raise SceneError("Rayleigh: it damps velocities, and statics has none; use KelvinVoigt")
+        return [RayleighForces(of, fields, A, ledger, inertia)]
     grid = fields.share.grid
     beams = grid.scene.beams if of.beams is None else of.beams
     pairs = (zip(grid.cells_of(beam), grid.hinges(beam), strict=True) for beam in beams)
@@ -130,7 +119,7 @@ def _(
     part = np.flatnonzero(np.isin(fields.share.cells, cells))
     if not len(part):
         return []
-    return [KelvinVoigtForces(of, Fields(fields.share, part), scheme, A, ledger)]
+    return [KelvinVoigtForces(of, fields.part(part), scheme, A, ledger)]
 
 
 # -- of schemes ----------------------------------------------------------------------------------
@@ -139,45 +128,36 @@ def _(
 @stated
 def _change_forms(of: Element, scheme: DecayingMidpoint) -> tuple[ufl.Form, ufl.Form, fem.Function]:
     """Virtual work, the energy lost, and the changes of the strains in the step before."""
-    q0, q1, C, dx = of.q0, of.q1, of.stiffness, of.dx(1)
-    before, part = of.at_points(3), of.constant(scheme.part)
-    change = strain(q1, of.axis) - strain(q0, of.axis)
-    r = part * resultants(change - before, C)
-    work = virtual_work(r, scheme.virtual_strain(q0, q1, of.w, of.axis)) * dx
-    return work, virtual_work(r, change) * dx, before
+    before = of.at_points(3)
+    return *_work_and_loss(of, scheme, of.constant(scheme.part), before), before
 
 
 class SecondDifferences(OfForms):
     """Resultants c C (Δe - r Δe'), see :class:`DecayingMidpoint`."""
 
-    kind = "beams"
+    kind, _entry = "beams", "numerical"
 
     def __init__(self, scheme: DecayingMidpoint, fields: Fields, A: Csr, ledger: Ledger) -> None:
         work, lost, self._before = _change_forms(fields.element, scheme)
-        self._q0, q1 = fields.element.q0, fields.element.q1
-        self._force, self._tangent = fields.force_and_tangent(work, q1, A)
-        self._lost = fields.hot_kernel(lost, q1)
+        super().__init__(work, [lost], fields, A, ledger)
         self._strains = Strains(fields)
         self._cells = fields.share.cells[fields.order]
         self._q: Array = np.empty(0)
-        self._e: Array = np.zeros(self._strains.shape)
-        self._change: Array = np.zeros(self._strains.shape)
+        self._e, self._change = np.zeros((2, *self._strains.shape))
         self._dt = self._last_dt = math.inf
-        self._A, self._ledger = A, ledger
-        ledger.lost["numerical"] += 0.0
 
     def begin(self, step: Step) -> None:
         """Remember the configuration at the beginning, and the changes in the step before."""
         if step.q0 is not self._q:
             self._q, self._e = step.q0, self._strains(step.q0)
         self._dt = step.dt
-        for kernel in (self._force, self._lost):
-            kernel.set(self._q0, step.q0)
+        super().begin(step)
+        for kernel in self._of_step:
             kernel.put(self._before, min(1.0, step.dt / self._last_dt) * self._change)
 
     def accept(self, q1: Array, s: Array) -> None:
         """Enter the energy that was lost, and keep the changes of the strains."""
-        self._ledger.lost["numerical"] += self._lost.value(q1)
+        super().accept(q1, s)
         e1 = self._strains(q1)
         self._change, self._q, self._e, self._last_dt = e1 - self._e, q1, e1, self._dt
 

@@ -143,18 +143,16 @@ class Energy:
         held = float(np.max(self._held)) + sum(float(lost[-1]) for lost in self.lost.values())
         if part >= 1.0 and held <= NOTHING_HELD * self.throughput:
             return ""  # all works are round-off, as where supports turn a scene as a whole
-        said = (
-            f"the energy ledger is open by {self.worst:.1e} of the energy that went through, and "
-            f"the scheme claims {claimed:.0e}: "
+        reason = (
+            ", the last digits of positions times the largest stiffness; less stiffness of what "
+            "hardly deforms, or fewer cells, close it"
+            if part >= EXPLAINED * self.worst
+            else " and does not explain it; a smaller rtol of Newton may, or a force that the "
+            "ledger does not know"
         )
-        if part >= EXPLAINED * self.worst:
-            return said + (
-                f"round-off is estimated at {part:.1e}, the last digits of positions times the "
-                "largest stiffness; less stiffness of what hardly deforms, or fewer cells, close it"
-            )
-        return said + (
-            f"round-off is estimated at {part:.1e} and does not explain it; a smaller rtol of "
-            "Newton may, or a force that the ledger does not know"
+        return (
+            f"the energy ledger is open by {self.worst:.1e} of the energy that went through, and "
+            f"the scheme claims {claimed:.0e}: round-off is estimated at {part:.1e}{reason}"
         )
 
     def __str__(self) -> str:

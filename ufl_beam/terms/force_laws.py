@@ -13,7 +13,7 @@ from ufl_beam.errors import SceneError, require_returned, shorten
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.force_laws import ForceLaw
-from ufl_beam.terms.connector_responses import Rows, Working, respond
+from ufl_beam.terms.connector_responses import Response, Rows, respond
 
 MISSED = 0.5
 """Part of what the iterate before has missed of a law, from which on a step went too far."""
@@ -155,25 +155,24 @@ class Asked:
 
 
 @respond.register(ForceLaw)
-class AskedLaws(Working):
+class AskedLaws(Response):
     """Forces that functions give; all laws have as many internal variables."""
 
     _entry = "functions"
 
-    def _prepare(self) -> None:
-        weight, size = self._setting.scheme.load_weight, self._setting.size
-        self._each = [
-            Asked(link, law, 1.0 if link.turns else size, weight)
-            for link, law in zip(self._links, self._laws, strict=True)
-        ]
+    def _prepare(self, law: Any) -> None:
+        numbers = zip(self._links, self._laws, self._lengths(), strict=True)
+        self._each = [Asked(*each, self._setting.scheme.load_weight) for each in numbers]
         self._held = 0.0
 
-    def _note(self, step: Step) -> None:
+    def begin(self, e0: Array, step: Step) -> None:
+        """Begin a step at the motions ``e0``."""
+        super().begin(e0, step)
         t, part = step.load_time, step.fraction * step.at
         if part != 1.0:  # a path, whose parts are one, has no beginning in time
             t = step.t0 + part * (t - step.t0)
         for i, one in enumerate(self._each):
-            one.begin(self._e0[i], t, step.dt)
+            one.begin(e0[i], t, step.dt)
 
     def again(self) -> None:
         """Forget the iterates of the step."""

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
@@ -10,9 +12,10 @@ from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
-from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.curves import REACH, nearest, parameter_step, tangent
+from ufl_beam.terms.connector_responses import Setting
 from ufl_beam.terms.links import Links
 
 
@@ -26,88 +29,83 @@ class Guides(Links):
     The motion of a guide is the distance from its curve, zero when a step is accepted.
     """
 
-    def __init__(self, share: Share, here: Index, scheme: Scheme, A: Csr) -> None:
-        super().__init__(share, here, A)
-        self._laws = [link.law for link in self.links if isinstance(link.law, Guide)]
+    def __init__(self, share: Share, here: Index, setting: Setting, A: Csr) -> None:
+        super().__init__(share, here, setting, A)
+        self._curves = [link.law.curve for link in self.links if isinstance(link.law, Guide)]
         self._x, self._y = (self._dofs[:, k].astype(np.int64) for k in (1, 3))
         pairs = [(r, c) for r in (self._x, self._y) for c in (self._x, self._y)]
         self._stiff = [A.positions(r, c) for r, c in pairs]
         self._across = [A.positions(d, self._forces_at) for d in (self._x, self._y)]
         self._rows = [A.positions(self._forces_at, d) for d in (self._x, self._y)]
         self._points = np.array([link.b.point for link in self.links])
-        self._over_step = np.full(len(self.links), scheme.average(0.0, 1.0) != 1.0)
-        n = len(self.links)
-        self._s: Array = np.zeros(n)
-        self._s0: Array = np.zeros(n)
+        self._over_step = setting.scheme.average(0.0, 1.0) != 1.0
+        self._s, self._s0 = np.zeros((2, len(self.links)))
         self._on0 = self._points.copy()
-        self._size = size = share.grid.scene.size
+        self._size = size = setting.size
         last_digit = np.spacing(size + np.abs(self._points).max(axis=1))
         self._shortest = size * (24 * last_digit / size) ** (1 / 3)
-        self._steps: Array = np.array([parameter_step(law.curve, 0.0, size) for law in self._laws])
+        self._steps: Array = np.array([parameter_step(c, 0.0, size) for c in self._curves])
 
     # -- geometry ------------------------------------------------------------------------------
 
+    def _at(self, q: Array) -> Array:
+        return self._points + np.column_stack([q[self._x], q[self._y]])
+
     def _nearest(self, p: Array) -> tuple[Array, Array]:
         """Points of the curves nearest to ``p``, and tangents there; from the latest ones."""
-        curves, steps = [law.curve for law in self._laws], [float(step) for step in self._steps]
+        curves = [(curve, float(self._steps[k])) for k, curve in enumerate(self._curves)]
         found = np.array([
-            nearest(curve, p[k], float(self._s[k]), steps[k], self._size)
-            for k, curve in enumerate(curves)
+            nearest(curve, p[k], float(self._s[k]), step, self._size)
+            for k, (curve, step) in enumerate(curves)
         ])  # fmt: skip
         if not np.isfinite(found).all():
             place = self.links[int(np.argmin(np.isfinite(found)))].b
             raise StepFailed(f"{place} is where no nearest point of its guide curve was found")
         self._s = found
-        t = np.array([tangent(c, float(found[k]), steps[k]) for k, c in enumerate(curves)])
-        on = np.array([curve(s) for curve, s in zip(curves, self._s, strict=True)], dtype=float)
-        return on, t
-
-    def _curvatures(self, n: Array) -> Array:
-        """Curvatures at the latest points towards the normals ``n``, by second differences; 1/m."""
-        found = []
-        for law, s, normal, step in zip(self._laws, self._s, n, self._steps, strict=True):
-            t = tangent(law.curve, s, step)
-            bend = np.add(law.curve(s + step), law.curve(s - step)) - np.multiply(2, law.curve(s))
-            found.append(float(normal @ bend) / (step**2 * float(t @ t)))
-        return np.array(found)
-
-    def _at(self, q: Array) -> Array:
-        return self._points + np.column_stack([q[self._x], q[self._y]])
+        t = np.array([tangent(c, float(found[k]), step) for k, (c, step) in enumerate(curves)])
+        return np.array([c(s) for (c, _), s in zip(curves, found, strict=True)], np.float64), t
 
     def _frames(self, q1: Array) -> tuple[Array, Array, Array, Array]:
-        """Distance, normals there and over the step, and how these change with the point."""
+        """Distances, normals there and over the step, and how the latter change with the points."""
         p = self._at(q1)
         on, t = self._nearest(p)
-        t /= np.linalg.norm(t, axis=1)[:, None]
-        n = np.column_stack([-t[:, 1], t[:, 0]])
-        # In statics forces are across the curve at the end of the step, else across the chord.
-        chord = on - self._on0
-        length = np.linalg.norm(chord, axis=1)
-        far = self._over_step & (length > self._shortest)
-        d, bend = t.copy(), np.zeros_like(t)
-        d[far] = chord[far] / length[far, None]
-        d[far] *= np.sign(np.sum(d[far] * t[far], axis=1))[:, None]
-        # d changes with the point by (I - d d) t t.dp / length
-        back = np.sign(np.sum(chord[far] * d[far], axis=1)) / length[far]
-        bend[far] = (t[far] - d[far] * np.sum(d * t, axis=1)[far, None]) * back[:, None]
-        for k in np.flatnonzero(self._over_step & ~far):
-            d[k], bend[k] = self._in_the_middle(k)
-        m, turning = (np.column_stack([-x[:, 1], x[:, 0]]) for x in (d, bend))
-        distance = np.sum(n * (p - on), axis=1)
-        if not self._over_step.any():
+        frames = [self._frame(k, p[k], on[k], t[k]) for k in range(len(p))]
+        distance, n, m, dm = map(np.array, zip(*frames, strict=True))
+        return distance, n, m, dm
+
+    def _frame(self, k: int, p: Array, on: Array, slope: Array) -> tuple[Any, Array, Array, Any]:
+        """Those of guide ``k``, from the nearest point of its curve and the tangent there."""
+        t = slope / np.sqrt(np.sum(slope**2))
+        n = _turned(t)
+        distance = np.sum(n * (p - on))
+        if not self._over_step:
             # The normal at the end turns by the curvature κ: dn = -κ t t.dp / (1 - κ distance).
-            κ = self._curvatures(n)
-            turning = (-κ / (1 - κ * distance))[:, None] * t
-        return distance, n, m, np.einsum("ki,kj->kij", turning, t)
+            κ = float(n @ self._bend(k, self._s[k])) / (self._steps[k] ** 2 * float(slope @ slope))
+            return distance, n, n, np.outer(-κ / (1 - κ * distance) * t, t)
+        chord = on - self._on0[k]
+        length = np.sqrt(np.sum(chord**2))
+        if length > self._shortest[k]:
+            d = chord / length
+            d *= np.sign(np.sum(d * t))
+            # d changes with the point by (I - d d) t t.dp / length
+            bend = (t - d * np.sum(d * t)) * (np.sign(np.sum(chord * d)) / length)
+        else:
+            d, bend = self._in_the_middle(k)
+        return distance, n, _turned(d), np.outer(_turned(bend), t)
+
+    def _bend(self, k: int, s: float) -> Array:
+        """Second difference of a curve over two steps of its parameter; m."""
+        curve, step = self._curves[k], self._steps[k]
+        ends = np.add(curve(s + step), curve(s - step))
+        return np.asarray(ends - np.multiply(2, curve(s)))
 
     def _in_the_middle(self, k: int) -> tuple[Array, Array]:
         """Direction of a curve in the middle of a short step, and its change with the end."""
-        curve, step, s = self._laws[k].curve, self._steps[k], (self._s0[k] + self._s[k]) / 2
-        t = tangent(curve, s, step)
+        s = (self._s0[k] + self._s[k]) / 2
+        t = tangent(self._curves[k], s, self._steps[k])
         speed = np.linalg.norm(t)
         d = t / speed
-        second = np.add(curve(s + step), curve(s - step)) - np.multiply(2, curve(s))
-        bend = second / (step * speed) ** 2
+        bend = self._bend(k, s) / (self._steps[k] * speed) ** 2
         return d, (bend - d * (d @ bend)) / 2
 
     # -- the step ------------------------------------------------------------------------------
@@ -185,8 +183,13 @@ class Guides(Links):
         self._on0 = rows[:, 5:].copy()
 
 
-def guides(share: Share, scheme: Scheme, A: Csr) -> list[Links]:
+def _turned(a: Array) -> Array:
+    """A vector turned by +90°."""
+    return np.array([-a[1], a[0]])
+
+
+def guides(share: Share, setting: Setting, A: Csr) -> list[Links]:
     """Make the guides of a process, all together; empty if it has none."""
     links = share.grid.scene.links
     here = [i for i, number in enumerate(share.links) if isinstance(links[number].law, Guide)]
-    return [Guides(share, np.array(here), scheme, A)] if here else []
+    return [Guides(share, np.array(here), setting, A)] if here else []

@@ -3,23 +3,24 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import NamedTuple
 
 import numpy as np
 import ufl
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop
+from ufl_beam.compiled.c_library import Loop, doubles, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.compiled_forms import stated
+from ufl_beam.discretization.compiled_forms import Kernel, stated
 from ufl_beam.discretization.function_spaces import Element, Fields, Strains
-from ufl_beam.discretization.partition import Numbering
+from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.functional import virtual_work
 from ufl_beam.mechanics.kinematics import strain
-from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.fibres import Layout
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.material_points import Points, inputs
@@ -27,8 +28,9 @@ from ufl_beam.terms.openings import SearchFlags
 from ufl_beam.terms.tangent_derivatives import Cells
 
 
-def inelastic_cells(grid: Numbering) -> list[tuple[Layout, Index]]:
+def inelastic_cells(share: Share) -> list[tuple[Layout, Index]]:
     """Layouts of material points, and the cells (numbers of the grid) that have them."""
+    grid = share.grid
     groups: dict[Layout, list[int]] = {}
     layouts: dict[object, Layout | None] = {}
     for beam in grid.scene.beams:
@@ -48,7 +50,11 @@ def inelastic_cells(grid: Numbering) -> list[tuple[Layout, Index]]:
     return [(layout, np.array(cells)) for layout, cells in groups.items()]
 
 
-class _Forms(NamedTuple):
+KEPT_WITHOUT_JUMP = np.array([1.0, 1.0, 1.0, 0.0, 1.0, 1.0])
+"""Factors of :attr:`Points.kept` where its jump is a crack of one fibre, and no hinge."""
+
+
+class InelasticForms(NamedTuple):
     """Virtual work of resultants r; the same of b + D e around an iterate, and its derivative."""
 
     work: ufl.Form
@@ -60,15 +66,15 @@ class _Forms(NamedTuple):
 
 
 @stated
-def _forms(of: Element, scheme: Scheme) -> _Forms:
+def _forms(of: Element, scheme: Scheme) -> InelasticForms:
     r, b, D = of.at_points(3), of.at_points(3), of.at_points(3, 3)
     w_e, dx = scheme.virtual_strain(of.q0, of.q1, of.w, of.axis), of.dx(1)
     around = virtual_work(b + ufl.dot(D, strain(of.q1, of.axis)), w_e) * dx
     tangent = ufl.derivative(around, of.q1, ufl.TrialFunction(of.space))
-    return _Forms(virtual_work(r, w_e) * dx, around, tangent, r, b, D)  # P(34)
+    return InelasticForms(virtual_work(r, w_e) * dx, around, tangent, r, b, D)  # P(34)
 
 
-class InelasticBeams(Cells):
+class InelasticBeams(Cells, ABC):
     """Resultants of cells with material points, working on the virtual strains.
 
     The points answer the strains of an iterate with resultants r and their derivatives D; around
@@ -79,23 +85,18 @@ class InelasticBeams(Cells):
     kind = "beams"
 
     def __init__(
-        self,
-        fields: Fields,
-        layout: Layout,
-        scheme: Scheme,
-        A: Csr,
-        ledger: Ledger,
-        search: SearchFlags,
-    ) -> None:
-        self._layout, self._scheme, self._A, self._ledger = layout, scheme, A, ledger
-        self._order = fields.order
+        self, fields: Fields, layout: Layout, scheme: Scheme, A: Csr, ledger: Ledger,
+        search: SearchFlags, points: type[Points],
+    ) -> None:  # fmt: skip
+        self._A, self._ledger = A, ledger
+        self._hinges, self._static = layout.hinges, not has_inertia(scheme)
         self._cells = fields.share.cells[fields.order]
         self._strains = Strains(fields)
         cells, n = len(fields.order), len(layout.weights)
         # Internal variables and numbers of the points: one function in their quadrature space.
         width = len(inputs(layout.statement))
         self._variables = fields.variables(n * width)
-        self.points = Points(
+        self.points = points(
             layout,
             fields.share.grid.keys(self._cells),
             fields.share.cell_lengths()[fields.order],
@@ -111,15 +112,8 @@ class InelasticBeams(Cells):
             fields.hot_kernel(form, self._q1) for form in (forms.work, forms.tangent)
         )
         self._tangent.place(A)
-        self._latest: Array = np.full(fields.share.size, np.nan)
-        self._in_c = c = ffi.new("inelastic *")
-        c.points, c.strains = self.points.points, self._strains.kernel.cells
-        c.force, c.tangent = self._force.cells, self._tangent.cells
-        c.at_r = self._force.position(forms.r)
-        c.at_b, c.at_D = map(self._tangent.position, (forms.b, forms.D))
-        self._at_latest = doubles(self._latest)
-        c.size, c.latest = len(self._latest), self._at_latest
         self._q: Array = np.empty(0)
+        self._prepare(forms)
 
     # -- the step ------------------------------------------------------------------------------
 
@@ -131,25 +125,23 @@ class InelasticBeams(Cells):
             self._q = step.q0
             self.points.start(self._strains(step.q0))
         self.points.begin(step.dt)
-        self._latest.fill(np.nan)
-        self._in_c.begins = not self._scheme.dynamic
+        self._begin()
 
+    @abstractmethod
+    def _prepare(self, forms: InelasticForms) -> None:
+        """Prepare the evaluation; called once."""
+
+    @abstractmethod
+    def _begin(self) -> None:
+        """Prepare a step."""
+
+    @abstractmethod
     def _respond(self, q1: Array) -> None:
-        """Resultants at ``q1``, and their derivatives."""
-        lib.respond_at(self._in_c, doubles(q1))
+        """Let the points answer the strains at ``q1``."""
 
-    def loops(self) -> tuple[Loop, Loop | None]:
-        """The points, and two forms."""
-        functions = ("add_inelastic_force", "add_inelastic_tangent")
-        return loop(functions[0], self._in_c), loop(functions[1], self._in_c)
-
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Add the internal forces."""
-        lib.add_inelastic_force(self._in_c, doubles(q1), doubles(r))
-
-    def add_tangent(self, q1: Array) -> None:
-        """Add the stiffness, material and geometric; see :class:`ElasticBeams`."""
-        lib.add_inelastic_tangent(self._in_c, doubles(q1), doubles(self._A.data))
+    @abstractmethod
+    def _forget(self) -> None:
+        """Forget the latest response: the points would answer otherwise now."""
 
     def change(self, q1: Array) -> float:
         """Energy that cells of this process store and dissipate in the step to ``q1``; J."""
@@ -165,7 +157,7 @@ class InelasticBeams(Cells):
         """Resultants around ``q1`` and their derivatives; points go on as they answer."""
         strains = self._strains(q1)
         r, D = self.points.respond(strains)
-        self._latest.fill(np.nan)
+        self._forget()
         around = r - np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), strains)
         return {self._b: around, self._D: D}
 
@@ -179,15 +171,11 @@ class InelasticBeams(Cells):
     def release(self, least: float) -> None:
         """Let held points open whose excess is so large."""
         self.points.release(least)
-        self._latest.fill(np.nan)
+        self._forget()
 
     def hold(self) -> None:
         """Close again the points that :meth:`release` opened."""
         self.points.hold()
-
-    def freeze(self) -> None:
-        """Keep everything elastic from now on: nothing yields or breaks further."""
-        self.points.freeze()
 
     # -- the state -----------------------------------------------------------------------------
 
@@ -215,11 +203,9 @@ class InelasticBeams(Cells):
     # -- what solutions keep -------------------------------------------------------------------
 
     def kept(self) -> tuple[Index, Array]:
-        """Cells (numbers of the grid), and :attr:`Points.kept` of them; (num_cells, 6)."""
-        rows = self.points.kept.copy()
-        if not self._layout.hinges:
-            rows[:, 3] = 0.0
-        return self._cells, rows
+        """Cells (numbers of the grid), and :attr:`Points.kept` of them; (num_cells, 6); a view."""
+        kept = self.points.kept
+        return self._cells, kept if self._hinges else kept * KEPT_WITHOUT_JUMP
 
     def state(self) -> tuple[Index, Array]:
         """Cells (numbers of the grid), and their internal variables; (num_cells, k)."""
@@ -230,3 +216,83 @@ class InelasticBeams(Cells):
         _, here, there = np.intersect1d(self._cells, cells, return_indices=True)
         if len(here):
             self.points.restore(here, rows[there])
+
+
+class CompiledInelasticBeams(InelasticBeams):
+    """Cells whose points answer, and whose forms are evaluated, in one loop in C."""
+
+    _force: Kernel
+    _tangent: Kernel
+
+    def _prepare(self, forms: InelasticForms) -> None:
+        self._latest: Array = np.full(self._fields.share.size, np.nan)
+        self._in_c = struct(
+            "inelastic", size=len(self._latest), latest=self._latest, **self.points.in_c,
+            strains=self._strains.kernel.cells, force=self._force.cells,
+            tangent=self._tangent.cells, at_r=self._force.position(forms.r),
+            at_b=self._tangent.position(forms.b), at_D=self._tangent.position(forms.D),
+        )  # fmt: skip
+
+    def _begin(self) -> None:
+        self._forget()
+        self._in_c.begins = self._static
+
+    def _forget(self) -> None:
+        self._latest.fill(np.nan)
+
+    def _respond(self, q1: Array) -> None:
+        lib.respond_at(self._in_c, doubles(q1))
+
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """The points, and two forms."""
+        functions = ("add_inelastic_force", "add_inelastic_tangent")
+        return loop(functions[0], self._in_c), loop(functions[1], self._in_c)
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Add the internal forces."""
+        lib.add_inelastic_force(self._in_c, doubles(q1), doubles(r))
+
+    def add_tangent(self, q1: Array) -> None:
+        """Add the stiffness, material and geometric; see :class:`ElasticBeams`."""
+        lib.add_inelastic_tangent(self._in_c, doubles(q1), doubles(self._A.data))
+
+
+class ReferenceInelasticBeams(InelasticBeams):
+    """The same equations as :class:`CompiledInelasticBeams`, line by line.
+
+    Attributes:
+        jump: Jump α of the rotation in the hinges of the cells at the latest iterate, DG0; rad.
+    """
+
+    def _prepare(self, forms: InelasticForms) -> None:
+        self._forms, self._first = forms, False
+        self.jump = fem.Function(fem.functionspace(self._fields.mesh, ("DG", 0)))
+
+    def _begin(self) -> None:
+        self._first = self._static
+
+    def _respond(self, q1: Array) -> None:
+        points = self.points
+        points.respond(self._strains(q1))
+        self.jump.x.array[:] = (points["jump"] + points["direction"] * points["growth"])[:, -1]
+
+    def _forget(self) -> None:
+        """Nothing is kept."""
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Add the work of the resultants on the virtual strains, P(34)."""
+        self._respond(q1)
+        self._force.put(self._forms.r, self.points.r)
+        self._force.add(q1, r)
+
+    def add_tangent(self, q1: Array) -> None:
+        """Add its derivative; that of the first iterate in statics is of the forces before."""
+        self._respond(q1)
+        r: Array = self.points.r
+        D = self.points.D
+        if self._first:
+            self._first, r = False, np.asarray(self.points.kept[:, :3])
+        around = r - np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), self.points.strains)
+        for function, values in ((self._forms.b, around), (self._forms.D, D)):
+            self._tangent.put(function, values)
+        self._tangent.add(q1, self._A.data)

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
+
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
@@ -10,56 +12,50 @@ from ufl_beam.compiled.c_library import Loop
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Share
 from ufl_beam.model.connectors import Connector
-from ufl_beam.terms.base import Beams
-from ufl_beam.terms.connector_responses import Response
-from ufl_beam.terms.openings import Openable
+from ufl_beam.terms.base import InternalForces
+from ufl_beam.terms.connector_responses import Setting, respond
 
 
-class Links(Beams):
+class Links(InternalForces):
     """Connectors that are alike; each has a force among the unknowns.
 
     Attributes:
         numbers: Of the connectors in the scene's links.
+        response: What their law makes of motions and forces.
         work: That they have taken since the beginning; (num_links,); J.
         rate: Mean rate of the motions in the last step; (num_links,); m/s or rad/s.
     """
 
     kind = "connectors"
 
-    def __init__(self, share: Share, here: Index, A: Csr) -> None:
+    def __init__(self, share: Share, here: Index, setting: Setting, A: Csr) -> None:
         self.numbers: Index = share.links[here]
         self.links: list[Connector] = [share.grid.scene.links[i] for i in self.numbers]
         self._dofs = share.link_dofs[here].astype(np.int32)
         self._forces_at = self._dofs[:, 6]
         self._A = A
-        self._before: Array = np.zeros(len(self.links))
-        self.work: Array = np.zeros(len(self.links))
-        self.rate: Array = np.zeros(len(self.links))
-        self.response = Response(self.links)
+        self.response = respond(self.links[0].law, self.links, setting)
+        self._before, self.work, self.rate = np.zeros((3, len(self.links)))
 
     def force(self, q: Array) -> Array:
         """Forces that resist the growth of the motions; (num_links,); N or N m."""
         return q[self._forces_at]
 
+    @abstractmethod
     def motion(self, q: Array) -> Array:
         """Relative motions at ``q``; (num_links,); m or rad."""
-        raise NotImplementedError
 
     def rates(self, q: Array, v: Array) -> Array:
         """Rates of the motions at ``q`` if the velocities are ``v``; (num_links,); m/s or rad/s."""
         return np.zeros(len(self.links))
 
-    def shown_motion(self, q: Array) -> Array:
-        """Motions of the accepted state ``q`` as solutions show them; (num_links,); m or rad."""
-        return self.response.motion(self.motion(q))
-
     def demand(self) -> Loop | None:
         """Return the C function of :meth:`excess` with its data, if there is one."""
         return None
 
+    @abstractmethod
     def excess(self, q: Array, r: Array, force: float, moved: float) -> float:
         """Largest residual of a law, without dimension, see :meth:`Equation.missed`."""
-        raise NotImplementedError
 
     def again(self) -> None:
         """Begin the step again: forget what its iterates have tried."""
@@ -76,29 +72,6 @@ class Links(Beams):
         """Sum of the sizes of the works that the connectors take in the step to ``q1``; J."""
         return 0.0
 
-    # -- yielding, which most laws do not know -------------------------------------------------
-
-    def flows(self) -> bool:
-        """Return whether a connector of this process slips plastically in the latest iterate."""
-        return self.response.flows()
-
     def dissipation(self, q1: Array) -> float:
         """Energy that connectors of this process dissipate plastically in the step to ``q1``; J."""
-        return 0.0
-
-    def dissipated(self) -> Array:
-        """Energy that each connector has dissipated by yielding and softening; (num_links,); J."""
-        return self.response.dissipated
-
-    def remaining(self) -> Array:
-        """Part of the elastic stiffness that is left in the latest iterate; (num_links,)."""
-        return self.response.remaining()
-
-    @property
-    def openable(self) -> Openable | None:
-        """Connectors that open beyond a limit, if there are."""
-        return self.response.openable
-
-    def freeze(self) -> None:
-        """Keep everything elastic from now on: nothing yields or breaks further."""
-        self.response.freeze()
+        return self.response.dissipation(self.motion(q1), self.force(q1))

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from functools import singledispatch
 from typing import Any
@@ -12,14 +13,14 @@ import numpy.typing as npt
 import ufl
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, loop
+from ufl_beam.compiled.c_library import Loop, doubles, loop, struct
 from ufl_beam.compiled.csr import Csr, Product
 from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.kinematics import split, turn
-from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.bodies import carries
 from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame
 from ufl_beam.model.time_functions import value_at
@@ -35,24 +36,31 @@ class LoadTerm(Term):
     """
 
     kind = "loads"
+    _name: str  # in files
 
     def __init__(self, share: Share, scheme: Scheme, ledger: Ledger) -> None:
         self._acting, self._ledger = scheme.acting, ledger
         self.force: Array = np.zeros(share.size)
         self._before: Array = self.force
 
+    @abstractmethod
     def carry_on(self, t: float, q: Array) -> Array:
         """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them."""
-        raise NotImplementedError
 
     def accept(self, q1: Array, s: Array) -> None:
         """Enter the work of the loads."""
         self._ledger.supplied["loads"] += float(self._acting(self._before, self.force) @ s)
         self._before = self.force
 
+    def remember(self, memory: Memory, q: Array) -> None:
+        """The forces in the equation of the last step."""
+        self.force = self._before = memory.added(self._name, self._before)
+
 
 class DeadLoads(LoadTerm):
     """Forces and moments that keep their direction: vectors times functions of time."""
+
+    _name = "dead loads"
 
     def __init__(self, loads: Sequence[Load], share: Share, scheme: Scheme, ledger: Ledger) -> None:
         super().__init__(share, scheme, ledger)
@@ -63,7 +71,7 @@ class DeadLoads(LoadTerm):
             vector += _forces(load, share)
         self._vectors = list(vectors.values())
         self._end: Array = self.force
-        self._in_c = ffi.new("vector *", {"size": share.size})
+        self._in_c = struct("vector", size=share.size)
         self._factors: list[float] = []
 
     def begin(self, step: Step) -> None:
@@ -112,23 +120,24 @@ class DeadLoads(LoadTerm):
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The forces at the end of the last step."""
-        self.force = self._end = self._before = memory.added("dead loads", self._before)
-        self._factors = []
+        super().remember(memory, q)
+        self._end, self._factors = self._before, []
 
 
 class FollowerLoads(LoadTerm):
     """Forces that turn with the cross-section they act on."""
+
+    _name = "follower loads"
 
     def __init__(
         self, loads: Sequence[FollowerLoad], share: Share, scheme: Scheme, ledger: Ledger, A: Csr
     ) -> None:
         super().__init__(share, scheme, ledger)
         here = [i for i, load in enumerate(loads) if share.computes(load.place)]
-        self._numbers, mine = np.array(here, dtype=np.int64), [loads[i] for i in here]
-        dofs = np.array([share.local(share.at(load.place)) for load in mine], dtype=np.int64)
-        self._dofs = dofs.reshape(-1, 3)
-        self._forces = np.array([[*load.force, load.moment] for load in mine]).reshape(-1, 3)
-        self._loads = mine
+        self._numbers, self._loads = np.array(here, dtype=np.int64), [loads[i] for i in here]
+        dofs = [share.local(share.at(load.place)) for load in self._loads]
+        self._dofs = np.array(dofs, dtype=np.int64).reshape(-1, 3)
+        self._forces = np.array([[*load.force, load.moment] for load in self._loads]).reshape(-1, 3)
         x, y, turn = self._dofs.T
         self._entries = np.array([A.positions(x, turn), A.positions(y, turn)])
         self._A = A
@@ -184,9 +193,9 @@ class FollowerLoads(LoadTerm):
         self._sizes_before = self._sizes_at_end
 
     def remember(self, memory: Memory, q: Array) -> None:
-        """The forces in the equation of the last step."""
-        self.force = self._before = memory.added("follower loads", self._before)
-        sizes = memory.rows("follower loads", self._numbers, self._sizes_before)
+        """The forces in the equation of the last step, and their sizes."""
+        super().remember(memory, q)
+        sizes = memory.rows(self._name, self._numbers, self._sizes_before)
         self._sizes = self._sizes_before = sizes
 
 
@@ -264,6 +273,8 @@ class FrameForces(LoadTerm):
     Rotary inertia keeps its spin in steady rotation, so no moments come of it.
     """
 
+    _name = "rotating frame"
+
     def __init__(
         self, frame: RotatingFrame, fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr
     ) -> None:
@@ -272,7 +283,7 @@ class FrameForces(LoadTerm):
         S, G = mass_matrix(fields), turned_mass_matrix(fields)
         S.data[np.isin(S.rows(), share.rotations())] = 0.0
         S.data *= frame.rate**2
-        G.data *= 2 * frame.rate if scheme.dynamic else 0.0
+        G.data *= 2 * frame.rate if has_inertia(scheme) else 0.0
         self._S, self._G, self._pull, self._turn = S.data, G.data, Product(S), Product(G)
         self._from_centre = _positions(fields, frame.about)
         self._A, self._share_of_end, self._grown = A, scheme.load_weight, 0.0
@@ -308,7 +319,7 @@ class FrameForces(LoadTerm):
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The forces in the equation of the last step, and how much of them acts."""
-        self.force = self._before = memory.added("rotating frame", self._before)
+        super().remember(memory, q)
         self._grown = memory.number("growth of the rotating frame", self._grown)
 
 

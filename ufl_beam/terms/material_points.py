@@ -1,30 +1,23 @@
 # SPDX-License-Identifier: MIT
-"""Material points: the return map of many at once, compiled from the statement of the laws.
+"""Material points: what is known of many, what they store, dissipate and remember.
 
-The laws are traced with UFL symbols: UFL derives the consistent tangents, by the implicit function
-theorem where a discontinuity opens, FFCx compiles them, and a loop in C goes over the points.
+The return map has two forms, one in C (compiled_points.py) and one in NumPy (reference_points.py).
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from typing import Any
+
 import numpy as np
-import ufl
-from ufl.conditional import Condition
-from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import doubles, ffi, in_order, integers, lib, names
-from ufl_beam.discretization.compiled_forms import Pointwise, stated
+from ufl_beam.compiled.c_library import lib, names
 from ufl_beam.mechanics.time_schemes import Scheme
-from ufl_beam.model import law_functions
 from ufl_beam.model.fibres import Layout
-from ufl_beam.model.material_laws import Bulk, Softening
+from ufl_beam.model.material_laws import Bulk
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.openings import NOTHING, RELEASED, SPENT, SearchFlags
-
-law_functions.where.register(Condition, ufl.conditional)
-law_functions.below.register(Expr, ufl.lt)
-law_functions.exp.register(Expr, ufl.exp)
 
 
 def inputs(bulk: type[Bulk]) -> tuple[str, ...]:
@@ -44,68 +37,12 @@ def expect_entries(layout: Layout, scheme: Scheme, ledger: Ledger) -> None:
         ledger.lost["plastic"] += 0.0
     if layout.softening is not None:
         ledger.lost["hinges"] += 0.0
-    if scheme.loss or (layout.softening is not None and scheme.theta < 1):
+    if scheme.alpha or (layout.softening is not None and scheme.theta < 1):
         # In the middle of a step no stress is left in what has broken, but perhaps at its ends.
         ledger.lost["numerical"] += 0.0
 
 
-def point_forms(bulk: type[Bulk], softening: Softening | None, scheme: Scheme) -> PointForms:
-    """Compiled laws of points, made once in a process; numbers of ``softening`` do not matter."""
-    return _point_forms(bulk, softening and softening.of(1.0, 1.0), scheme)
-
-
-class PointForms:
-    """Compiled laws: C functions from the inputs of a point to what the loops need.
-
-    They are the stress of the bulk, that of a point that opens by a known growth, and the excess of
-    the bulk over the discontinuity, each with its derivative; and ``point_output`` of loops.h.
-    """
-
-    def __init__(self, statement: type[Bulk], softening: Softening | None, scheme: Scheme) -> None:
-        self._pointwise = pointwise = Pointwise(inputs(statement))
-        at = pointwise.at
-        strain, a = ufl.variable(at["strain"]), ufl.variable(at["growth"])
-        s, p, ξ, length = (at[n] for n in ("direction", "plastic", "accumulated", "length"))
-        θ, dt = at["theta"], at["dt"]
-        bulk = statement(at["stiffness"], *(at[name] for name in statement.numbers()))
-
-        # The incompatible mode: a jump relaxes the strain of the bulk by jump over length.
-        relieved = at["jump"] / length
-        e = (1 - θ) * at["before"] + θ * strain - (relieved + θ * s * a / length)
-        dp = bulk.flow(e, p, ξ, θ, dt)
-        σ = bulk.stress(e, p + θ * dp)
-        self.bulk = pointwise.compile(σ, ufl.diff(σ, strain))
-
-        e0, e1 = at["before"] - relieved - p, strain - (relieved + s * a / length) - p - dp
-        broken, traction = 0 * a, 0 * a
-        self.opening = self.excess = ffi.NULL
-        if softening is not None:
-            law = softening.of(at["softening limit"], at["softening energy"])
-            resistance = scheme.resistance(law, at["opening"], a)
-            excess = s * σ - resistance  # P(32), its second equation
-            growth_by_strain = -ufl.diff(excess, strain) / ufl.diff(excess, a)
-            tangent = ufl.diff(σ, strain) + ufl.diff(σ, a) * growth_by_strain  # P(76)
-            self.opening = pointwise.compile(σ, tangent)
-            self.excess = pointwise.compile(excess, ufl.diff(excess, a))
-            broken = a * law.mean_traction(at["opening"], a)
-            traction = law.traction(at["opening"] + a)
-        end = {
-            "flow": dp,
-            "worked": bulk.dissipation(dp, dt),
-            "broken": broken,
-            "lost": bulk.elastic_energy(e1 - e0) + bulk.hardening_energy(dp, dp),
-            "elastic": bulk.elastic_energy(e1),
-            "hardening": bulk.hardening_energy(p + dp, ξ + abs(dp)),
-            "stress": bulk.stress(e1, 0),
-            "resistance": traction,
-        }
-        self.end = pointwise.compile(*in_order("point_output", end))
-
-
-_point_forms = stated(PointForms)
-
-
-class Points:
+class Points(ABC):
     """Points of the same layout in many cells.
 
     Args:
@@ -119,7 +56,6 @@ class Points:
     Attributes:
         strains: Of the cells at the latest response; (cells, 3); may be written to.
         r, D: The latest response, see :meth:`respond`.
-        points: What the loops over the points take, see loops.h.
         kept: By cell: (N, V, M) in the accepted state, the jump of the last point, and the energy
             dissipated by plastic strains and by discontinuities; (cells, 6); N, N m, rad or m, J.
         sums: Of all cells: dissipated in the last step by plastic strains, by discontinuities,
@@ -138,10 +74,10 @@ class Points:
         storage: Array,
         search: SearchFlags | None = None,
     ) -> None:
-        search = search or SearchFlags()
-        self._forms = point_forms(layout.statement, layout.softening, scheme)
-        self._layout, self._storage, self._loss = layout, storage, scheme.loss
+        self._search = search or SearchFlags()
+        self._layout, self._storage, self._alpha = layout, storage, scheme.alpha
         self._yields, self.softens = layout.yields, layout.softening is not None
+        self._releases = self.softens and scheme.theta < 1  # see expect_entries
         self._at = {name: storage[:, :, i] for i, name in enumerate(inputs(layout.statement))}
         self._bulk = bulk = layout.bulk(keys)
         self._at["stiffness"][:] = bulk.C
@@ -149,8 +85,7 @@ class Points:
             self._at[name][:] = getattr(bulk, name)
         self._at["length"][:] = length[:, None]
         self._at["theta"][:] = scheme.theta
-        self._steps = self._at["dt"]
-        self._steps[:] = self._dt = 1.0
+        self._at["dt"][:] = self._dt = 1.0
         self._at["softening energy"][:] = 1.0
         self._at["traction"][:] = np.inf
         if layout.softening is not None:
@@ -164,23 +99,16 @@ class Points:
         self.sums = np.zeros(int(lib.POINT_SUMS))
         self.r, self.D = np.zeros((cells, 3)), np.zeros((cells, 9))
         self._e0, self.strains = np.zeros((cells, 3)), np.zeros((cells, 3))
-        self._over = np.zeros(1)
-        B, weights, rest = (
-            np.ascontiguousarray(x, dtype=np.float64)
-            for x in (layout.strains, layout.weights, layout.rest)
-        )
-        self._search, forms = search, self._forms
-        self._alive = [
-            *map(doubles, (B, weights, rest, np.ascontiguousarray(length))),
-            *map(doubles, (self._e0, self.strains, storage, self.r, self.D, self.kept, self.sums)),
-            integers(search.flags),
-            doubles(self._over),
-        ]
-        self.points = c = ffi.new("points *")
-        c.B, c.weight, c.rest, c.length = self._alive[:4]
-        c.e0, c.e1, c.w, c.r, c.D, c.kept, c.sum, c.search, c.over = self._alive[4:]
-        c.bulk, c.opening, c.excess, c.end = forms.bulk, forms.opening, forms.excess, forms.end
-        c.cells, c.of_cell, c.width, c.theta = *storage.shape, scheme.theta
+        self._prepare(scheme, length)
+
+    @abstractmethod
+    def _prepare(self, scheme: Scheme, length: Array) -> None:
+        """Prepare the return map; called once, at the end of the constructor."""
+
+    @property
+    def in_c(self) -> dict[str, Any]:
+        """What loops of other terms take, by name in their structs; nothing without loops in C."""
+        return {}
 
     def __getitem__(self, name: str) -> Array:
         """Return the values of an input at the points, by its name; a view; (cells, n)."""
@@ -203,25 +131,23 @@ class Points:
     def begin(self, dt: float) -> None:
         """Begin a step of this length; s."""
         if dt != self._dt:
-            self._steps[:] = self._dt = dt
+            self["dt"][:] = self._dt = dt
 
+    @abstractmethod
     def respond(self, strains: Array) -> tuple[Array, Array]:
         """(N, V, M) that act in a step to these strains, and derivatives; (cells, 3), (cells, 9).
 
         They are not a number where an opening was not found.  The arrays are reused.
         """
-        self.strains[:] = strains
-        lib.respond(self.points)
-        return self.r, self.D
 
     @property
+    @abstractmethod
     def excess(self) -> float:
         """Largest ``|stress| / limit - 1`` of a point that was held closed, or zero."""
-        return float(self._over[0])
 
+    @abstractmethod
     def release(self, least: float) -> None:
         """Let held points open from now on whose excess was so large in the latest response."""
-        lib.release(self.points, least)
 
     def hold(self) -> None:
         """Close again the points that :meth:`release` opened."""
@@ -230,16 +156,16 @@ class Points:
 
     def remaining(self, change: Array) -> Array:
         """Part of the elastic stiffness that is left for small changes of the strains; (cells,)."""
-        layout, stiffness = self._layout, self._at["theta"][0, 0] * self._at["stiffness"]
-        by_point = change @ layout.strains.T
-        elastic = self._at["theta"][0, 0] * change**2 @ layout.rest
+        layout, theta = self._layout, self["theta"][0, 0]
+        stiffness, by_point = theta * self["stiffness"], change @ layout.strains.T
+        elastic = theta * change**2 @ layout.rest
         elastic += (stiffness * by_point**2) @ layout.weights
         now = np.einsum("ci,cij,cj->c", change, self.D.reshape(-1, 3, 3), change)
         return np.asarray(np.divide(now, elastic, out=np.ones(len(now)), where=elastic > 0))
 
+    @abstractmethod
     def accept(self) -> None:
         """Take the strains of the latest response as the new state."""
-        lib.commit(self.points)
 
     def change(self) -> float:
         """Energy that :meth:`accept` would add to what is stored and dissipated; J.
@@ -254,17 +180,9 @@ class Points:
         """Energy that :meth:`accept` would add to what is dissipated; J."""
         return float(np.sum(self._sums_to_come()[:2]))
 
+    @abstractmethod
     def _sums_to_come(self) -> Array:
         """Return :attr:`sums` as :meth:`accept` would leave them."""
-        copy = ffi.new("points *", self.points[0])
-        sums = np.empty_like(self.sums)
-        state = (self._e0, self._storage, self.kept)
-        copy.e0, copy.w, copy.kept, copy.sum = alive = [doubles(x.copy()) for x in state] + [
-            doubles(sums)
-        ]
-        lib.commit(copy)
-        del alive
-        return sums
 
     def freeze(self) -> None:
         """Keep everything elastic from now on; hinges that bear no moment any more are free.
@@ -287,9 +205,9 @@ class Points:
             ledger.lost["plastic"] += plastic
         if self.softens:
             ledger.lost["hinges"] += broken
-        if self._loss:
-            ledger.lost["numerical"] += 2 * self._loss * lost
-        if released:
+        if self._alpha:
+            ledger.lost["numerical"] += 2 * self._alpha * lost
+        if self._releases:
             ledger.lost["numerical"] += released
 
     def enter_stored(self, ledger: Ledger) -> None:
@@ -322,13 +240,10 @@ class Points:
     def refresh(self, strains: Array) -> None:
         """Make forces and stored energies those of a state that no step has led to."""
         layout, bulk, length = self._layout, self._bulk, self["length"][:, :1]
+        p, volume = self["plastic"], layout.weights * length
         e = strains @ layout.strains.T - self["jump"] / self["length"]
-        volume = layout.weights * length
-        self.kept[:, :3] = (
-            layout.rest * strains
-            + (layout.weights * bulk.stress(e, self["plastic"])) @ layout.strains
-        )
-        self.sums[3] = np.sum(volume * bulk.elastic_energy(e - self["plastic"])) + np.sum(
-            strains**2 @ layout.rest / 2 * length[:, 0]
-        )
-        self.sums[4] = np.sum(volume * bulk.hardening_energy(self["plastic"], self["accumulated"]))
+        of_points = (layout.weights * bulk.stress(e, p)) @ layout.strains
+        self.kept[:, :3] = layout.rest * strains + of_points
+        of_rest = strains**2 @ layout.rest / 2 * length[:, 0]
+        self.sums[3] = np.sum(volume * bulk.elastic_energy(e - p)) + np.sum(of_rest)
+        self.sums[4] = np.sum(volume * bulk.hardening_energy(p, self["accumulated"]))

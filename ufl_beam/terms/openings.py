@@ -13,12 +13,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from mpi4py import MPI
-
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import lib
+from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
 
 FALL = 0.7
@@ -59,12 +58,11 @@ class SearchFlags:
 
     def __init__(self) -> None:
         self.flags: Index = np.zeros(lib.SEARCH_FLAGS, dtype=np.int32)
-        self._first: tuple[Index, Index] = (self.flags.copy(), self.flags.copy())
-        self._first[True][HOLD] = 1
 
     def begin(self, hold: bool) -> None:
         """Begin a search for an equilibrium."""
-        self.flags[:] = self._first[hold]
+        self.flags.fill(0)
+        self.flags[HOLD] = hold
 
     @property
     def opened(self) -> bool:
@@ -93,19 +91,9 @@ class Openable(Protocol):
 class Openings:
     """Solves a step with what does not flow held closed, then lets open what bears too much."""
 
-    def __init__(
-        self, search: SearchFlags, places: Sequence[Openable], comm: MPI.Intracomm
-    ) -> None:
-        self._search, self._places, self._comm = search, places, comm
-        self._parallel, self._released = comm.size > 1, False
-
-    @classmethod
-    def of(
-        cls, search: SearchFlags, places: Sequence[Openable], comm: MPI.Intracomm
-    ) -> Openings | None:
-        """The openings of a scene; none if no process has a place that may open."""
-        one = cls(search, places, comm)
-        return one if one._largest(float(bool(places))) else None
+    def __init__(self, search: SearchFlags, places: Sequence[Openable], share: Share) -> None:
+        self._search, self._places, self._share = search, places, share
+        self._released = False
 
     def solve(
         self, guess: Array, solve: Callable[[Array], Array], again: Callable[[], None]
@@ -119,9 +107,10 @@ class Openings:
         search.begin(hold=True)
         try:
             q = solve(guess)
-            return self._open_few(q, solve) if self._parallel or search.flags[OVER] else q
+            opens = search.flags[OVER] or not self._share.alone
+            return self._open_few(q, solve) if opens else q
         except StepFailed:
-            if not self._largest(float(search.flags[OVER])):
+            if not self._share.largest(float(search.flags[OVER])):
                 raise  # nothing would open
         finally:
             search.begin(hold=False)
@@ -135,13 +124,9 @@ class Openings:
     def _open_few(self, q: Array, solve: Callable[[Array], Array]) -> Array:
         """Let places open that bear too much, those with the largest excess first."""
         part = 1.0
-        while excess := self._largest(max((one.excess for one in self._places), default=0.0)):
+        while excess := self._share.largest(max((x.excess for x in self._places), default=0.0)):
             self._released = True
             for one in self._places:
                 one.release(part * excess - TIE)
             q, part = solve(q), part * FALL
         return q
-
-    def _largest(self, here: float) -> float:
-        """Maximum over the processes that share the scene."""
-        return self._comm.allreduce(here, op=MPI.MAX) if self._parallel else here

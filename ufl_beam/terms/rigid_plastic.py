@@ -7,26 +7,25 @@ the law, a function of the slip that grows in the step; see rigid_plastic.c.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from functools import singledispatch
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import doubles, ffi, in_order, integers, lib, names
-from ufl_beam.discretization.compiled_forms import Pointwise, stated
+from ufl_beam.compiled.c_library import names
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import RigidPlastic
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.material_laws import Hardening, HardeningBulk, Softening
+from ufl_beam.model.material_laws import Hardening, HardeningBulk, SofteningLaw
 from ufl_beam.model.plastic_hinges import law_of
-from ufl_beam.terms.connector_responses import Response, Rows, Setting, respond
-from ufl_beam.terms.openings import NOTHING, RELEASED, SPENT, Openable
+from ufl_beam.terms.connector_responses import Response, Setting, respond
+from ufl_beam.terms.openings import NOTHING, RELEASED, SPENT
 
 INPUTS = (*names("slip_input", "slip_"), *("θ", "dt", "limit", "energy", "H", "B", "eta"))
 """Inputs of the compiled laws: the slip of the step and its direction (1 or -1); accumulated slip
@@ -51,7 +50,7 @@ def slip(law: Any, at: Mapping[str, Expr], scheme: Scheme) -> Slip:
 
 
 @slip.register
-def _(law: Softening, at: Mapping[str, Expr], scheme: Scheme) -> Slip:
+def _(law: SofteningLaw, at: Mapping[str, Expr], scheme: Scheme) -> Slip:
     a, ξ, none = at["slip"], at["slipped"], 0 * at["slip"]
     law = law.of(at["limit"], at["energy"])
     force = at["direction"] * scheme.resistance(law, ξ, a)
@@ -97,97 +96,74 @@ def _slope(link: Connector, size: float) -> float:
     return max(early, least) + (2 * steepest if steepest < np.inf else 0.0)
 
 
-class SlipForms:
-    """Compiled laws of slip: force and its derivative by the slip; ``slip_output`` of loops.h."""
-
-    def __init__(self, law: Softening | Hardening, scheme: Scheme) -> None:
-        self._pointwise = pointwise = Pointwise(INPUTS)
-        at = {**pointwise.at, "slip": ufl.variable(pointwise.at["slip"])}
-        end = slip(law, at, scheme)._asdict()
-        force = end.pop("force")
-        self.force = pointwise.compile(force, ufl.diff(force, at["slip"]))
-        self.end = pointwise.compile(*in_order("slip_output", end, "slip_"))
+@respond.register
+def _(law: RigidPlastic, links: Sequence[Connector], setting: Setting) -> Response:
+    return setting.slips(law, links, setting)
 
 
-_slip_forms = stated(SlipForms)
-
-
-def slip_forms(law: Softening | Hardening, scheme: Scheme) -> SlipForms:
-    """Compiled laws of slip, made once in a process; numbers of ``law`` do not matter."""
-    return _slip_forms(Hardening(1.0) if isinstance(law, Hardening) else law.of(1.0, 1.0), scheme)
-
-
-@respond.register(RigidPlastic)
 class RigidPlasticResponse(Response):
     """Rigid-plastic connectors whose laws are of one kind."""
 
-    def __init__(self, law: RigidPlastic, links: Sequence[Connector], setting: Setting) -> None:
-        super().__init__(links)
-        n, ledger = len(links), setting.ledger
-        self._ledger, self._scheme = ledger, setting.scheme
+    def _prepare(self, law: RigidPlastic) -> None:
+        n, ledger, scheme = len(self._links), self._setting.ledger, self._setting.scheme
+        self._ledger, self._law = ledger, law.law
         ledger.lost["hinges"] += 0.0
-        self._stores = isinstance(law.law, Hardening)
-        if self._stores:
+        self._hardens = isinstance(law.law, Hardening)
+        self._loss = 2 * scheme.alpha if self._hardens else 0.0
+        if self._hardens:
             ledger.state["hardening"] += 0.0
-            if setting.scheme.loss:
-                ledger.lost["numerical"] += 0.0
-        self._forms = slip_forms(law.law, setting.scheme)
+        if self._loss:
+            ledger.lost["numerical"] += 0.0
         self._storage = np.zeros((n, len(INPUTS)))
         self._at = {name: self._storage[:, i] for i, name in enumerate(INPUTS)}
-        for i, link in enumerate(links):
+        for i, link in enumerate(self._links):
             for name, value in law_of(link).numbers(np.ones(())).items():
                 self._at[name][i] = value
-        self._at["θ"][:], self._at["dt"][:] = setting.scheme.theta, 1.0
-        self._limit, self._back_force = self._at["limit"].copy(), np.zeros(n)
+        self._at["θ"][:], self._at["dt"][:] = scheme.theta, 1.0
+        self._limit = self._at["limit"].copy()
+        self._back_force, self._dissipated, self._excess = np.zeros((3, n))
         self._slipped, self._way, self._way_before = np.zeros((3, n), dtype=np.int32)
-        self._rows, self._sums, self._stored = np.zeros((n, 3)), np.zeros(3), 0.0
-        self._dissipated: Array = np.zeros(n)
-        self._excess = np.zeros(n)
-        self._slope = np.array([_slope(link, setting.size) for link in links])
-        self._c = c = ffi.new("rigid_plastic *")
-        c.force, c.end, c.number, c.width = self._forms.force, self._forms.end, n, len(INPUTS)
-        arrays = (self._storage, self._limit, self._back_force, self._dissipated, self._rows)
-        self._alive = [
-            *map(doubles, (*arrays, self._slope, self._excess)),
-            *map(integers, (self._slipped, self._way)),
-        ]
-        c.w, c.limit, c.back_force, c.dissipated, c.rows, c.slope = self._alive[:6]
-        c.excess, c.slipped, c.way = self._alive[6:]
-        self._search = integers(setting.search.flags)
-        c.search = self._search
-        self.in_c = {"rigid_plastic": c}
+        self._rows, self._stored = np.zeros((n, 3)), 0.0
+        self._slope = np.array([_slope(link, self._setting.size) for link in self._links])
+        self.openable = self
 
     # -- the step ------------------------------------------------------------------------------
 
     def begin(self, e0: Array, step: Step) -> None:
-        """Begin a step: connectors that slipped in the last one go on."""
+        """Connectors that slipped in the last step go on."""
         self._at["dt"][:] = step.dt
         self.again()
 
-    def rows(self, e1: Array, λ: Array) -> Rows:
-        """Rows of the latest iterate, which C has set."""
-        return self._rows[:, 0], self._rows[:, 1], self._rows[:, 2]
+    def again(self) -> None:
+        """Go on from the accepted state."""
+        self._way[:] = self._way_before
+
+    def about_force(self, rows: Array) -> Array:
+        """Factors of the rows of those that slip, see rigid_plastic.c."""
+        return np.where(self._way == 0, 0.0, -self._slope)
+
+    def factors(self) -> Array:
+        """Factors of motions beside forces."""
+        return self._slope
+
+    @abstractmethod
+    def _commit(self, e1: Array) -> tuple[float, float, float]:
+        """Take the slips as the new state; what is dissipated, lost numerically and stored; J."""
 
     def accept(self, e1: Array, work: float) -> None:
         """Commit the slips of the step."""
-        lib.commit_rigid_plastic(self._c, doubles(e1), doubles(self._sums))
+        dissipated, lost, self._stored = self._commit(e1)
         self._way_before[:] = self._way * self._slipped
-        dissipated, lost, self._stored = self._sums.tolist()
         self._ledger.lost["hinges"] += dissipated
-        if self._stores and self._scheme.loss:
-            self._ledger.lost["numerical"] += 2 * self._scheme.loss * lost
+        if self._loss:
+            self._ledger.lost["numerical"] += self._loss * lost
 
     def add_state(self, e: Array) -> None:
         """Enter the energy that hardening stores."""
-        if self._stores:
+        if self._hardens:
             self._ledger.state["hardening"] += self._stored
 
     # -- openings, see openings.py -------------------------------------------------------------
-
-    @property
-    def openable(self) -> Openable:
-        """Connectors that slip beyond a limit: these."""
-        return self
 
     @property
     def excess(self) -> float:
@@ -202,40 +178,34 @@ class RigidPlasticResponse(Response):
         """Close again the slips that :meth:`release` opened."""
         self._slipped[:] = np.abs(self._way_before)
 
-    # -- energies ------------------------------------------------------------------------------
+    # -- what has slipped ----------------------------------------------------------------------
 
     def motion(self, e: Array) -> Array:
         """Motions without the round-off of those that are held."""
         return self._at["start"].copy()
 
+    @abstractmethod
     def dissipation(self, e1: Array, λ: Array) -> float:
         """Energy dissipated in a step to the motions ``e1``, positive where one would slip; J."""
-        arrays = doubles(e1), doubles(np.ascontiguousarray(λ))
-        dissipated: float = lib.dissipation_of_rigid_plastic(self._c, *arrays)
-        return dissipated
 
-    def again(self) -> None:
-        """Go on from the accepted state."""
-        self._way[:] = self._way_before
-
-    def about_force(self, rows: Array) -> Array:
-        """Factors of the rows of those that slip, see rigid_plastic.c."""
-        return np.where(self._way == 0, 0.0, -self._slope)
-
-    def remaining(self) -> Array:
-        """Part of the stiffness that is left in the latest iterate, 0 of what slips."""
-        return np.where(self._way == 0, 1.0, 0.0)
-
-    @property
     def dissipated(self) -> Array:
         """Energy that each has dissipated; (num_links,); J."""
         return self._dissipated
+
+    def remaining(self) -> Array:
+        """All of the stiffness is left, or none where one slips."""
+        return np.where(self._way == 0, 1.0, 0.0)
 
     def flows(self) -> bool:
         """Return whether one slips in the latest iterate."""
         return bool(self._way.any())
 
     # -- the state -----------------------------------------------------------------------------
+
+    @property
+    def _variables(self) -> tuple[npt.NDArray[Any], ...]:
+        at = self._at["slipped"], self._at["start"]
+        return (*at, self._limit, self._back_force, self._dissipated, self._way_before)
 
     def state(self) -> Array:
         """Internal variables; (num_links, 7)."""
@@ -244,17 +214,12 @@ class RigidPlasticResponse(Response):
         return np.column_stack([*self._variables, stored])
 
     def restore(self, rows: Array) -> None:
-        """Restore the variables that :meth:`state` returned."""
+        """Take over the variables of :meth:`state`."""
         *variables, stored = rows.T
         for mine, values in zip(self._variables, variables, strict=True):
             mine[:] = values
-        self._slipped[:] = np.abs(self._way_before)
+        self.hold()
         self._stored = float(stored.sum())
-
-    @property
-    def _variables(self) -> tuple[npt.NDArray[Any], ...]:
-        at = self._at["slipped"], self._at["start"]
-        return (*at, self._limit, self._back_force, self._dissipated, self._way_before)
 
     def start(self, e: Array) -> None:
         """Begin at motions that no step has led to."""

@@ -66,19 +66,16 @@ class Supports:
             if support.angle and len(share.local(dofs[:2])):
                 self._turned.append(TurnedAxes(share.local(dofs[:2]), support.angle, A))
             for component, motion in support.held.items():
-                held.extend(share.local(dofs[[component]]))
+                here = share.local(dofs[[component]])
+                held.extend(here)
                 if component in support.moving:
-                    self._motions.extend(
-                        (d, motion, support) for d in share.local(dofs[[component]])
-                    )
+                    self._motions.extend((dof, motion, support) for dof in here)
         self.dofs = np.array(sorted(held), dtype=np.int64)
         self.moving = np.array([dof for dof, *_ in self._motions], dtype=np.int64)
         self._held = as_slice(self.dofs)
         rows, columns = A.rows(), A.indices
         zero = np.isin(rows, self.dofs) | np.isin(columns, self.dofs)
-        self._zero = np.flatnonzero(zero)
-        self._diagonal = np.flatnonzero(zero & (rows == columns))
-        self.entries = self._zero, self._diagonal
+        self.entries = np.flatnonzero(zero), np.flatnonzero(zero & (rows == columns))
         self.pivots: Array = np.ones(len(self.dofs))
         self._owned = self.dofs < share.num_owned
         self._acting, self._ledger = scheme.acting, ledger
@@ -135,17 +132,18 @@ class Supports:
         if len(self.dofs):
             # What stands on the diagonal has the right dimension and size for what is held.
             # Where material that flows freely leaves nothing, what stood there before does as well.
-            diagonal = data[self._diagonal]
+            zero, pivots = self.entries
+            diagonal = data[pivots]
             np.copyto(self.pivots, diagonal, where=diagonal != 0.0)
-            data[self._zero] = 0.0
-            data[self._diagonal] = self.pivots
+            data[zero] = 0.0
+            data[pivots] = self.pivots
 
     def accept(self, s: Array) -> None:
         """Work of the supports that move; ``s`` in their axes."""
         if self._motions:
             work = self._acting(self._before, self.reactions) * s[self._held]
             self._ledger.supplied["supports"] += float(np.sum(work[self._owned]))
-            self._before = self.reactions.copy()
+        self.take()
 
     def stop(self, v: Array) -> None:
         """Set velocities of what does not move to zero, in place; else they would ring."""
@@ -154,13 +152,17 @@ class Supports:
         self.leave(v)
 
     def take(self) -> None:
-        """Take the latest reactions as those before the next step."""
-        self._before = self.reactions.copy()
+        """Take the latest reactions as those of the accepted state."""
+        self._before[:] = self.reactions
+
+    def go_back(self) -> None:
+        """Return to the reactions of the accepted state: a step has failed."""
+        self.reactions[:] = self._before
 
     def carry_on(self, memory: Memory, q: Array) -> None:
         """Save or restore the reactions."""
         reactions: Array = np.zeros(len(q))
-        reactions[self._held] = self._before if self._motions else self.reactions
+        reactions[self._held] = self._before
         self.reactions[:] = memory.at_dofs("reactions", reactions)[self._held]
         self.take()
 

@@ -43,12 +43,6 @@ class Statement(NamedTuple):
         return any(self.numbers[name] in known for name in of_time)
 
 
-@stated
-def _number(of: Element, name: str) -> fem.Function:
-    """The function that has the numbers of a name: forms of different works may be one."""
-    return of.in_cells()
-
-
 class _Same:
     """A function of a user, which need not be hashable, as a part of a key."""
 
@@ -78,7 +72,7 @@ def _statement(
     scheme: Scheme,
 ) -> Statement:  # fmt: skip
     work = kind(name, density.function, numbers=dict.fromkeys(names, 1.0), degree=degree)
-    return _state(work, of, scheme, {name: _number(of, name) for name in (*CLOCK, *names)})
+    return _state(work, of, scheme, {name: of.in_cells() for name in (*CLOCK, *names)})
 
 
 @singledispatch
@@ -122,8 +116,8 @@ def _(
     s = _variation(of, scheme)
     force = scheme.mean(lambda at: along(s, at), q0, q1)
     lost = None
-    if scheme.loss:
-        part, way = of.constant(scheme.loss), q1 - q0
+    if scheme.alpha:
+        part, way = of.constant(scheme.alpha), q1 - q0
         force += part * (along(s, q1) - along(s, q0))
         lost = part * (along(way, q1) - along(way, q0)) * dx
     stored = ufl.replace(energy, {q: q1}) * dx

@@ -15,16 +15,16 @@ from ufl.algorithms import expand_derivatives
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, ffi, loop
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.compiled_forms import Kernel
-from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.discretization.compiled_forms import CellForm
+from ufl_beam.discretization.function_spaces import Fields, element_of
 from ufl_beam.discretization.state_io import Memory
+from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError, shorten
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.time_functions import value_at
 from ufl_beam.model.works import Potential, VirtualWork, Work
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.loads import LoadTerm
-from ufl_beam.terms.tangent_derivatives import TangentChange
 from ufl_beam.terms.work_forms import Statement, statement
 
 AT_REST = 1e300
@@ -54,14 +54,14 @@ class Acting:
         with _named(work):
             self.residual = self._kernel(stated.residual)
             self._kernels = [self.residual]
-            self.tangent: Kernel | None = None
+            self.tangent: CellForm | None = None
             if not stated.tangent.empty():
                 self.tangent = self._kernel(stated.tangent)
                 self.tangent.place(A)
                 self._kernels.append(self.tangent)
         self._known: dict[str, float] = {}
 
-    def _kernel(self, form: ufl.Form) -> Kernel:
+    def _kernel(self, form: ufl.Form) -> CellForm:
         return self._fields.hot_kernel(form, self._fields.element.q1)
 
     @staticmethod
@@ -108,16 +108,24 @@ class Acting:
 
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """Add the derivative of the tangent at ``q1`` along ``u``."""
-        if self._change is not None:
+        change, u_of_form = self._change
+        if change is not None:
             for name, value in self._known.items():
-                self._change.put(self._stated.numbers[name], np.array([value]))
-            self._change.add(q1, u)
+                if change.uses(function := self._stated.numbers[name]):
+                    change.put(function, np.array([value]))
+            change.set(u_of_form, u)
+            change.add(q1, self._A.data)
 
     @cached_property
-    def _change(self) -> TangentChange | None:
-        u = self._fields.element.configuration()
-        form = expand_derivatives(ufl.derivative(self._stated.tangent, self._fields.element.q1, u))
-        return None if form.empty() else TangentChange(form, u, self._kernel, self._A)
+    def _change(self) -> tuple[CellForm | None, fem.Function]:
+        of = self._fields.element
+        u = of.configuration()
+        form = expand_derivatives(ufl.derivative(self._stated.tangent, of.q1, u))
+        if form.empty():
+            return None, u
+        change = self._kernel(form)
+        change.place(self._A)
+        return change, u
 
 
 class Working(Acting):
@@ -218,13 +226,14 @@ class Works(LoadTerm):
         super().__init__(share, scheme, ledger)
         self._parts: list[Acting] = []
         for work in grid.scene.works:
-            stated, kind = statement(work, fields.element, scheme), KINDS[type(work)]
-            kind.expect(work, stated, ledger)
+            kind = KINDS[type(work)]
+            kind.expect(work, statement(work, element_of(grid.mesh), scheme), ledger)
             cells = np.concatenate([grid.cells_of(beam) for beam in work.on(grid.scene.beams)])
             part = np.flatnonzero(np.isin(share.cells, cells))
             if len(part):
-                on_part = fields if len(part) == len(share.cells) else Fields(share, part)
-                self._parts.append(kind(work, stated, on_part, scheme, A, ledger))
+                of = fields if len(part) == len(share.cells) else fields.part(part)
+                stated = statement(work, of.element, scheme)
+                self._parts.append(kind(work, stated, of, scheme, A, ledger))
         self._t, self._grown = t0, 0.0
         self._end = t0, 0.0
         tangents = [part.tangent for part in self._parts if part.tangent is not None]
@@ -293,7 +302,7 @@ class Works(LoadTerm):
             one.add_tangent_change(q1, u)
 
 
-def _calls(kernels: list[Kernel]) -> tuple[Any, Any]:
+def _calls(kernels: list[CellForm]) -> tuple[Any, Any]:
     """Argument of ``add_calls`` of loops.h, and what it needs alive."""
     calls = ffi.new("call[]", [loop("add_cells", kernel.cells) for kernel in kernels])
     return ffi.new("calls *", {"number": len(kernels), "part": calls}), calls

@@ -165,29 +165,17 @@ void add_step_tangent(void *self, const double *q, double *tangent)
     tangent[p->entry[k]] += p->data[k] * growth[p->indices[k]];
 }
 
-/* Sum of the squares of w f. */
-double sum_of_squares(int rows, const double *w, const double *f)
+/* Euclidean norm of w f, also where its squares are too small or too large to have all digits. */
+double norm(int rows, const double *w, const double *f)
 {
-  double sum = 0;
+  double sum = 0, largest = 0, scaled = 0;
   for (int i = 0; i < rows; ++i) sum += w[i] * f[i] * (w[i] * f[i]);
-  return sum;
-}
-
-/* The same of w f / unit. */
-double scaled_sum_of_squares(int rows, const double *w, const double *f, double unit)
-{
-  double sum = 0;
-  for (int i = 0; i < rows; ++i) sum += w[i] * (f[i] / unit) * (w[i] * (f[i] / unit));
-  return sum;
-}
-
-/* Largest size of w f. */
-double largest_size(int rows, const double *w, const double *f)
-{
-  double largest = 0;
+  if (isnan(sum) || (1e-250 < sum && sum < 1e250)) return sqrt(sum);
+  for (int i = 0; i < rows; ++i) largest = fmax(largest, w[i] * fabs(f[i]));
+  if (largest == 0 || !isfinite(largest)) return largest;
   for (int i = 0; i < rows; ++i)
-    if (!(w[i] * fabs(f[i]) <= largest)) largest = w[i] * fabs(f[i]);
-  return largest;
+    scaled += w[i] * (f[i] / largest) * (w[i] * (f[i] / largest));
+  return largest * sqrt(scaled);
 }
 
 /* Largest displacement in q, and rotation times the size of the scene; w as for forces. */
@@ -197,10 +185,4 @@ double largest_motion(int rows, const double *w, const double *q)
   for (int i = 0; i < rows; ++i)
     if (w[i] > 0 && !(fabs(q[i]) <= largest * w[i])) largest = fabs(q[i]) / w[i];
   return largest;
-}
-
-/* Whether a sum of squares has all its digits: none of them has become too small or too large. */
-int has_its_digits(double sum)
-{
-  return isnan(sum) || (1e-250 < sum && sum < 1e250);
 }

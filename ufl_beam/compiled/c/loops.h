@@ -80,11 +80,8 @@ double quadratic_form(int rows, const int32_t *indptr, const int32_t *indices, c
                       const double *x);
 double step_of_nodes(int size, int rotations, const int32_t *rotation, double *s,
                      const double *q0, const double *q1);
-double sum_of_squares(int rows, const double *w, const double *f);
-double scaled_sum_of_squares(int rows, const double *w, const double *f, double unit);
-double largest_size(int rows, const double *w, const double *f);
+double norm(int rows, const double *w, const double *f);
 double largest_motion(int rows, const double *w, const double *q);
-int has_its_digits(double sum);
 
 /* -- material points --------------------------------------------------------------------------- */
 
@@ -305,7 +302,6 @@ void assemble(equation *e, const double *q);
 int factor_tangent(const equation *e, int *failed);
 int solve_tangent(const equation *e);
 void find_last_digits(const equation *e, const double *q, double *digits);
-double size_of_forces(const equation *e, const double *f);
 int judge(equation *e, const double *q, int iteration, double residual, double scale,
           double floor);
 int snes_function(void *snes, void *x, void *f, void *self);

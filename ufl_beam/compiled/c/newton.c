@@ -123,28 +123,18 @@ int snes_jacobian(void *snes, void *x, void *A, void *P, void *self)
   return petsc.VecRestoreArrayRead(x, &q);
 }
 
-/* Size of forces, see Solver; N. */
-double size_of_forces(const equation *e, const double *f)
-{
-  const double sum = sum_of_squares(e->size, e->weight, f);
-  if (has_its_digits(sum)) return sqrt(sum);
-  const double largest = largest_size(e->size, e->weight, f);
-  if (largest == 0 || !isfinite(largest)) return largest;
-  return largest * sqrt(scaled_sum_of_squares(e->size, e->weight, f, largest));
-}
-
 /* What becomes of an iterate q. */
 static int verdict(equation *e, const double *q, int iteration)
 {
-  const double now = size_of_forces(e, e->residual);
+  const double now = norm(e->size, e->weight, e->residual);
   if (!isfinite(now)) return DIVERGED;
-  const double scale = e->loads + size_of_forces(e, e->inner_force);
+  const double scale = e->loads + norm(e->size, e->weight, e->inner_force);
   double floor = 0;
   if (iteration > 1 || e->demands) e->moved = fmin(largest_motion(e->size, e->weight, q), e->scene);
   if (iteration > 1 && (now > e->rtol * scale || e->demands)) {
     find_last_digits(e, q, e->space);
     for (int i = 0; i < e->size; ++i) e->space[i] *= e->tangent[e->diagonal[i]];
-    floor = 8 * size_of_forces(e, e->space);
+    floor = 8 * norm(e->size, e->weight, e->space);
   }
   return judge(e, q, iteration, now, scale, floor);
 }

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: MIT
+"""Terms whose forces are a form on cells, or a constant matrix times the step of the nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import ufl
+
+from ufl_beam.arrays import Array
+from ufl_beam.compiled.c_library import Loop, loop
+from ufl_beam.compiled.csr import Csr, StepProduct
+from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.mechanics.time_schemes import Step
+from ufl_beam.terms.base import Term
+from ufl_beam.terms.energy_ledger import Ledger
+
+
+class OfForms(Term):
+    """Forces of a virtual work on cells, and forms of the energy that they lose in a step."""
+
+    _entry: str  # of the losses in the ledger
+
+    def __init__(
+        self, work: ufl.Form, losses: Sequence[ufl.Form], fields: Fields, A: Csr, ledger: Ledger
+    ) -> None:
+        self._q0, self._q1 = fields.element.q0, fields.element.q1
+        self._force, self._tangent = fields.force_and_tangent(work, self._q1, A)
+        self._losses = [fields.hot_kernel(form, self._q1) for form in losses]
+        self._of_step = [self._force, *self._losses]
+        self._A, self._ledger = A, ledger
+        if losses:
+            ledger.lost[self._entry] += 0.0
+
+    def begin(self, step: Step) -> None:
+        """Remember the configuration at the beginning."""
+        for kernel in self._of_step:
+            kernel.set(self._q0, step.q0)
+
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """C loops over the cells, of force and tangent."""
+        return loop("add_cells", self._force.cells), loop("add_cells", self._tangent.cells)
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Add the forces to the residual."""
+        self._force.add(q1, r)
+
+    def add_tangent(self, q1: Array) -> None:
+        """Add the derivative of the forces to the tangent."""
+        self._tangent.add(q1, self._A.data)
+
+    def accept(self, q1: Array, s: Array) -> None:
+        """Enter the energy that was lost."""
+        for loss in self._losses:
+            self._ledger.lost[self._entry] += loss.value(q1)
+
+
+class OfMatrix(Term):
+    """Forces of a constant matrix times the step of the nodes."""
+
+    _times: StepProduct
+
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """The product, and its derivative."""
+        return self._times.loops()
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Add the forces to the residual."""
+        self._times.add_force(q1, r)
+
+    def add_tangent(self, q1: Array) -> None:
+        """Add the derivative of the forces to the tangent."""
+        self._times.add_tangent(q1)
