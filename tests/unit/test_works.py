@@ -249,6 +249,17 @@ def test_numbers_times_and_steps_compile_nothing():
     assert np.abs(first.q[-1] - other.q[-1]).max() > 1e-3
 
 
+def test_a_number_may_have_any_name():
+    """Names of the package's own numbers are no names of parameters."""
+    beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
+
+    def momentum(**numbers):
+        work = ub.VirtualWork("lift", lambda growth, w: growth * w[1], numbers=numbers)
+        return run(ub.Scene([beam], works=[work]), t=(0, 1), dt=0.25).momentum()[-1, 1]
+
+    assert momentum(growth=3.0) == pytest.approx(3.0)
+
+
 def test_a_scene_without_works_has_no_term():
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
     simulation = ub.Simulation(ub.Scene([beam]), ub.Midpoint())
@@ -353,6 +364,7 @@ def test_the_blocks_of_the_page_run(capsys):
 # -- what is refused ---------------------------------------------------------------------------
 
 BEAM = ub.Beam((0, 0), (1, 0), SECTION, cells=2, name="girder")
+BODY = ub.Body((0, 0), mass=1.0, inertia=1.0)
 STRAY = ub.Beam((0, 1), (1, 1), SECTION, cells=2, name="stray")
 
 
@@ -388,6 +400,11 @@ def raises(*parts):
         ),
         (lambda: ub.Potential("a", soil, numbers=3), ("numbers = 3 must be numbers by name",)),
         (lambda: ub.Potential("a", lambda q: q[0], beams=3), ("beams = 3 must be a list",)),
+        (lambda: ub.Potential("a", lambda q: q[0], beams=[]), ("Potential 'a': beams is empty",)),
+        (
+            lambda: ub.Scene(bodies=[BODY], works=[ub.Potential("a", lambda q: q[0])]),
+            ("Potential 'a': there is no beam",),
+        ),
         (lambda: ub.Potential("a", lambda q: q[0], beams=[3]), ("beams[0] = 3 is not a Beam",)),
         (lambda: ub.Potential("a", lambda q: q[0], degree=0.5), ("degree = 0.5",)),
         (

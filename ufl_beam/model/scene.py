@@ -93,6 +93,8 @@ class Scene:
             raise SceneError("Scene: no beams and no bodies")
         if GROUND in self.bodies:
             raise SceneError("Scene: the ground is in every scene; leave it out of bodies")
+        for work in self.works[:1] if not self.beams else ():
+            raise SceneError(f"{work}: there is no beam that it could act on")
         self._require_once()
         known = {GROUND, *self.beams, *self.bodies}
         for owner, place in self.attachments():

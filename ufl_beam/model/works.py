@@ -55,6 +55,8 @@ class Work:
         require_count(self.degree, f"{self}: degree")
         if self.beams is not None:
             object.__setattr__(self, "beams", require_sequence(self.beams, f"{self}: beams"))
+            if not self.beams:
+                raise SceneError(f"{self}: beams is empty; leave it out for all beams")
             for i, beam in enumerate(self.beams):
                 if not isinstance(beam, Member):
                     raise SceneError(f"{self}: beams[{i}] = {shorten(beam)} is not a Beam")

@@ -23,8 +23,8 @@ from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.works import Potential, VirtualWork, Work
 
-CLOCK = ("t", "dt", "growth")
-"""Numbers of each step: time, length, and how much of the works acts."""
+GROWTH = "growth of works"
+"""Name of the part of virtual works that acts, which no number of a user can have."""
 
 
 class Statement(NamedTuple):
@@ -72,7 +72,7 @@ def _statement(
     scheme: Scheme,
 ) -> Statement:  # fmt: skip
     work = kind(name, density.function, numbers=dict.fromkeys(names, 1.0), degree=degree)
-    return _state(work, of, scheme, {name: of.in_cells() for name in (*CLOCK, *names)})
+    return _state(work, of, scheme, {name: of.in_cells() for name in ("t", "dt", GROWTH, *names)})
 
 
 @singledispatch
@@ -87,7 +87,8 @@ def _(
     work: VirtualWork, of: Element, scheme: Scheme, numbers: Mapping[str, fem.Function]
 ) -> Statement:
     q0, q1, w = of.q0, of.q1, of.w
-    q, v = q0 + scheme.load_weight * (q1 - q0), (q1 - q0) / numbers["dt"]
+    part, v = scheme.load_weight, (q1 - q0) / numbers["dt"]
+    q = (1.0 - part) * q0 + part * q1
     known = {"q0": q0, "q1": q1, "q": q, "v": v, "w": w, "axis": of.anywhere, **numbers}
     density, dx = _returned(work, known, of), of.dx(work.degree)
     try:
@@ -96,7 +97,7 @@ def _(
         raise SceneError(
             f"{work}: the function must return what is linear in w, such as f * w[1]"
         ) from None
-    residual = -numbers["growth"] * density * dx
+    residual = -numbers[GROWTH] * density * dx
     return Statement(residual, _derivative(residual, of), numbers)
 
 

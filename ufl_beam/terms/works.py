@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -25,13 +26,10 @@ from ufl_beam.model.time_functions import value_at
 from ufl_beam.model.works import Potential, VirtualWork, Work
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.loads import LoadTerm
-from ufl_beam.terms.work_forms import Statement, statement
+from ufl_beam.terms.work_forms import GROWTH, Statement, statement
 
 AT_REST = 1e300
 """Longest step that forms are told of, in which all rates vanish; s."""
-
-
-# -- on the cells of a process -------------------------------------------------------------------
 
 
 class Clock(NamedTuple):
@@ -42,7 +40,7 @@ class Clock(NamedTuple):
     growth: float
 
 
-class Acting:
+class Acting(ABC):
     """A work on those cells of a process on which it acts."""
 
     def __init__(
@@ -65,17 +63,17 @@ class Acting:
         return self._fields.hot_kernel(form, self._fields.element.q1)
 
     @staticmethod
+    @abstractmethod
     def expect(work: Work, stated: Statement, ledger: Ledger) -> None:
         """Make the entries of the ledger, also on processes without such cells."""
-        raise NotImplementedError
 
     def begin(self, q0: Array, clock: Clock) -> None:
         """Take note of the step that is to be solved."""
         for kernel in self._kernels:
             kernel.set(self._fields.element.q0, q0)
-        self._put(clock.t, dt=clock.dt, growth=clock.growth)
+        self._put(clock.t, {"dt": clock.dt, GROWTH: clock.growth})
 
-    def _put(self, t: float, **clock: float) -> None:
+    def _put(self, t: float, clock: Mapping[str, float]) -> None:
         """Give the forms the numbers at a time, those that have changed."""
         of_time = self._work.numbers.items()
         values = {name: value_at(x, t, self._work) if callable(x) else x for name, x in of_time}
@@ -96,9 +94,9 @@ class Acting:
     def take(self, force: Array) -> None:
         """Take forces as those before the next step."""
 
+    @abstractmethod
     def accept(self, q1: Array, s: Array, force: Array, times: tuple[float, float]) -> None:
         """Enter what the step between two times did."""
-        raise NotImplementedError
 
     def add_state(self, q: Array, t: float) -> None:
         """Enter the energy of the accepted state."""
@@ -186,15 +184,15 @@ class Storing(Acting):
             self._ledger.lost["numerical"] += lost.value(q1)
         if self._varies:
             begin, end = times
-            self._put(float(self._acting(np.array(begin), np.array(self._known["t"]))))
+            self._put(float(self._acting(np.array(begin), np.array(self._known["t"]))), {})
             moved = self._energy.value(q1) - self._energy.value(self._q0)
-            self._put(end)
+            self._put(end, {})
             gained = self._energy.value(q1) - self._held - moved
             self._ledger.supplied[f"{self._name} in time"] += gained
 
     def add_state(self, q: Array, t: float) -> None:
         """Enter the energy of the accepted state."""
-        self._put(t)
+        self._put(t, {})
         self._held = self._energy.value(q)
         self._ledger.state[self._name] += self._held
 
