@@ -13,6 +13,7 @@ import ufl
 
 import ufl_beam as ub
 from ufl_beam.discretization.compiled_forms import prepared
+from ufl_beam.plotting.model import notes_of
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=0.1)
 EXACT = [ub.Midpoint(), ub.Midpoint(0.1, 0.1), ub.DecayingMidpoint(0.6)]
@@ -331,6 +332,12 @@ def test_a_continued_run():
     np.testing.assert_allclose(second.q, first.q[-1][None].repeat(3, 0), atol=1e-9)
     np.testing.assert_allclose(second.energy["load"], 0.0, atol=1e-9)
     assert np.allclose(second.reaction(scene.supports[0]), first.reaction(scene.supports[0])[-1])
+
+
+def test_a_picture_names_the_works():
+    notes = notes_of(flying())
+    assert "magnet: acts as its function says on beam" in notes
+    assert "air: acts as its function says" in notes
 
 
 @pytest.mark.serial

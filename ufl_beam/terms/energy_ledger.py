@@ -69,7 +69,7 @@ class Energy:
     """Energy ledger of a run: energy in the scene, work supplied, losses.
 
     Attributes:
-        state: Arrays by name, "kinetic" and "stored"; each (n+1,); J.
+        state: Arrays by name, "kinetic", "stored", and potentials of a user; each (n+1,); J.
         supplied: Work since the beginning, by source: "loads", "supports"; each (n+1,); J.
         lost: Energy that went out since the beginning, by sink: "numerical", ...; each (n+1,); J.
 
