@@ -47,6 +47,11 @@ RELEASED = float(lib.RELEASED)
 """Value of "flows" of a point that may open in this step although it did not flow in the last."""
 
 
+BEGIN = np.zeros((2, lib.SEARCH_FLAGS), dtype=np.int32)
+"""Flags at the beginning of a search: what does not flow may open, or is held."""
+BEGIN[1, HOLD] = 1
+
+
 class SearchFlags:
     """Flags that all points of a scene share in a step.
 
@@ -61,8 +66,7 @@ class SearchFlags:
 
     def begin(self, hold: bool) -> None:
         """Begin a search for an equilibrium."""
-        self.flags.fill(0)
-        self.flags[HOLD] = hold
+        self.flags[:] = BEGIN[hold]
 
     @property
     def opened(self) -> bool:
