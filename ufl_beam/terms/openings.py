@@ -47,9 +47,8 @@ RELEASED = float(lib.RELEASED)
 """Value of "flows" of a point that may open in this step although it did not flow in the last."""
 
 
-BEGIN = np.zeros((2, lib.SEARCH_FLAGS), dtype=np.int32)
-"""Flags at the beginning of a search: what does not flow may open, or is held."""
-BEGIN[1, HOLD] = 1
+BEGIN = tuple(np.eye(lib.SEARCH_FLAGS, dtype=np.int32)[HOLD] * hold for hold in (0, 1))
+"""Flags at the beginning of a search in which what does not flow may open, or is held."""
 
 
 class SearchFlags:
