@@ -234,7 +234,7 @@ class CompiledInelasticBeams(InelasticBeams):
         )  # fmt: skip
 
     def _begin(self) -> None:
-        self._forget()
+        self._latest.fill(np.nan)
         self._in_c.begins = self._static
 
     def _forget(self) -> None:
