@@ -463,3 +463,26 @@ def test_signs_of_zeros_are_kept():
     memory.total("zero", -0.0)
     assert math.copysign(1.0, memory.state()["zero"][0]) == -1.0
     simulation.close()
+
+
+def test_the_last_step_of_cells_that_the_first_process_does_not_have():
+    """Second differences are those of elastic cells, here the last ones of the scene."""
+    numbers = {"EA": 1e4, "GA": 4e3, "EI": 10.0, "rhoA": 1.0, "rhoI": 0.01}
+    yielding = ub.Section(**numbers, bending=ub.Hardening(50.0))
+    first = ub.Beam((0, 0), (1, 0), yielding, cells=4)
+    last = ub.Beam((1, 0), (2, 0), ub.Section(**numbers), cells=4)
+    scene = ub.Scene(
+        [first, last],
+        joints=[ub.Rigid(first.end, last.start)],
+        supports=[ub.Clamped(first.start)],
+        loads=[ub.PointLoad(last.end, force=(0, -5.0))],
+    )
+    runs = [ub.Simulation(scene, ub.DecayingMidpoint()) for _ in range(2)]
+    for n in range(1, 6):
+        runs[0].step_to(0.01 * n)
+    runs[1].resume(runs[0].state())
+    for one in runs:
+        one.step_to(0.06)
+    assert np.array_equal(*(one.q for one in runs))
+    for one in runs:
+        one.close()

@@ -163,6 +163,8 @@ class SecondDifferences(OfForms):
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The changes of the strains in the last step, and its length."""
-        self._change = memory.rows("changes of strains", self._cells, self._change)
-        self._last_dt = memory.number("step of strains", self._last_dt)
+        # The length is in the rows: the process that says numbers for all may have no such cells.
+        rows = np.column_stack([self._change, np.full(len(self._change), self._last_dt)])
+        rows = memory.rows("changes of strains", self._cells, rows)
+        self._change, self._last_dt = rows[:, :-1].copy(), float(rows[0, -1])
         self._q, self._e = q, self._strains(q)
