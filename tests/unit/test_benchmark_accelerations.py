@@ -194,8 +194,9 @@ def test_the_page(bench, tmp_path):
     assert "3 with 8 cells, 3 with 64 cells" in written
 
 
-def test_times_of_a_small_scene(bench):
-    found = list(bench.measure("large", 8, rounds=2, steps=1))
-    assert [case["variant"] for case in found] == bench.variants("large")
+@pytest.mark.parametrize("scene", ["large", "hinged"])
+def test_times_of_a_small_scene(bench, scene):
+    found = list(bench.measure(scene, 8, rounds=2, steps=1))
+    assert [case["variant"] for case in found] == bench.variants(scene)
     assert all(len(case["times"]) == 2 and case["us_min"] > 0 for case in found)
     assert all(case["iterations"] >= 2 for case in found)
