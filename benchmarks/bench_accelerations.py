@@ -95,7 +95,7 @@ SMALL = {8: (40, 25), 64: (40, 10), 512: (30, 4), 4096: (12, 2)}
 SCENES = {
     ELASTIC: Case(flying_beam, 0.01, 2, SMALL | {100_000: (7, 1)}),
     LARGE: Case(flying_beam, 0.1, 23, SMALL | {100_000: (7, 1)}),
-    HINGED: Case(hinged_beam, 0.01, 0, SMALL | {100_000: (2, 1)}),
+    HINGED: Case(hinged_beam, 0.01, 2, SMALL | {20_000: (3, 1)}),
     JOINTED: Case(jointed_beams, 0.01, 2, SMALL),
 }
 
