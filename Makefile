@@ -1,6 +1,6 @@
 # Every target runs through ./env, which brings DOLFINx where it is missing. `make` lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-mpi test-sid verify sanitize long demos demos-cheap check check-paraview bench bench-peers extremes schemes study
+.PHONY: help demo test test-mpi test-sid verify sanitize long demos demos-cheap check check-paraview accelerations bench bench-peers extremes schemes study
 
 # Natively as root Open MPI refuses to start; with more ranks than cores, too (the last two lines: versions 5 and 6).
 # ./env sets the same in its root.
@@ -72,6 +72,9 @@ study: ## cost and error of each setting, as docs/study.md; twenty minutes, `mak
 
 schemes: ## errors of the time schemes at equal steps, as tables in docs/schemes.md
 	@./env python3 benchmarks/schemes.py
+
+accelerations: ## time of a step without each acceleration, as docs/accelerations.md; under ten minutes
+	@./env python3 benchmarks/bench_accelerations.py
 
 bench: ## time per step
 	@./env python3 benchmarks/bench_step.py

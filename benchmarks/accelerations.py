@@ -1,0 +1,241 @@
+# SPDX-License-Identifier: MIT
+"""The accelerations of a step: what each does, where it is, and what it is compared with."""
+
+import ast
+import re
+from pathlib import Path
+from typing import NamedTuple
+
+import switches as by
+
+import ufl_beam as ub
+
+PACKAGE = Path(ub.__file__).parent
+ELASTIC, LARGE, HINGED, JOINTED = "elastic", "large", "hinged", "jointed"
+
+
+class Acceleration(NamedTuple):
+    """An acceleration.
+
+    Attributes:
+        text: What it does.
+        with_, without: Names of the variants to compare.
+        code: Where it is: a file, a ``file:name`` in it, or the lines ``file~pattern``.
+        scenes: Where it is measured.
+    """
+
+    text: str
+    with_: str
+    without: str
+    code: tuple[str, ...]
+    scenes: tuple[str, ...] = (ELASTIC, HINGED, JOINTED)
+
+
+ACCELERATIONS = {
+    "cell loops in C": Acceleration(
+        "Calls FFCx's kernels in a loop over the cells that knows the degrees of freedom and the "
+        "entries of the matrix of each cell. Without it, `fem.assemble_vector` and "
+        "`fem.assemble_matrix` evaluate the same forms, and NumPy adds what they return.",
+        by.PYTHON, by.ASSEMBLERS,
+        (
+            "discretization/compiled_forms.py:Kernel", "discretization/compiled_forms.py:prepared",
+            "discretization/compiled_forms.py:Prepared",
+            "discretization/compiled_forms.py:tabulator", "compiled/c/loops.c:in_cell",
+            "compiled/c/loops.c:set_cells", "compiled/c/loops.c:put_in_cell",
+            "compiled/c/loops.c:add_cells", "compiled/c/loops.c:add_first_cells",
+            "compiled/c/loops.c:value_of_cells",
+        ),
+    ),
+    "equation in C": Acceleration(
+        "SNES calls residual and tangent in C, which call the loops of all terms one after the "
+        "other. Without it, SNES calls Python, which calls the same loops. Several processes and "
+        "inclined supports need the part in Python anyway.",
+        by.PETSC, by.PYTHON,
+        (
+            "simulation/step_equation.py:StepEquation.leave_to_c",
+            "simulation/step_equation.py:StepEquation._in_python",
+            "solvers/equation.py:Equation.demand", "solvers/equation.py:Equation.part_in_python",
+            "solvers/equation.py:Equation.demand_in_python", "solvers/equation.py:_lent",
+            "solvers/equation.py:add_in_python", "solvers/equation.py:missed_in_python",
+            "terms/base.py:Term.loops", "terms/beams.py:ElasticBeams.loops",
+            "terms/inelastic_beams.py:CompiledInelasticBeams.loops",
+            "terms/forms_and_matrices.py:OfForms.loops",
+            "terms/forms_and_matrices.py:OfMatrix.loops", "terms/loads.py:DeadLoads.loops",
+            "terms/connectors.py:CompiledCouplings.loops", "compiled/csr.py:StepProduct.loops",
+            "compiled/c/newton.c:residual", "compiled/c/newton.c:assemble",
+            "compiled/c/newton.c:snes_function", "compiled/c/newton.c:snes_jacobian",
+            "compiled/c/newton.c:snes_test", "compiled/c/newton.c:verdict",
+        ),
+    ),
+    "Newton's method in C": Acceleration(
+        "Newton's method with full steps as a SNES of the type \"shell\". Without it, PETSc's "
+        "`newtonls` calls the same residual and tangent in C, and the factorization by Python.",
+        by.SHIPPED, by.PETSC,
+        (
+            "solvers/newton.py:Solver._leave_newton_to_c",
+            "solvers/static_condensation.py:ChainsFirst.drive",
+            "solvers/direct_solver.py:DirectSolver.drive", "compiled/c/newton.c:factor_tangent",
+            "compiled/c/newton.c:solve_tangent", "compiled/c/newton.c:snes_newton",
+        ),
+    ),
+    "SIMD kernels": Acceleration(
+        "Kernels of FFCx compiled once more with vectors in the place of numbers, for the "
+        "processor of the machine: four cells at once. Without it, cells are computed one by one "
+        "by FFCx's own kernels.",
+        by.SHIPPED, by.SCALAR,
+        (
+            "compiled/simd_kernels.py", "compiled/c/lanes.c", "compiled/c/lanes.h",
+            "discretization/compiled_forms.py:vectorise",
+            "discretization/compiled_forms.py:Kernel.address_in_lanes",
+            "discretization/compiled_forms.py:Kernel.compute_in_lanes",
+            "discretization/function_spaces.py:CompiledFields._coordinates_in_lanes",
+        ),
+    ),
+    "elimination along beams": Acceleration(
+        "Eliminates the vertices between the ends of beams in blocks of three; PETSc factors what "
+        "remains. Without it, PETSc's LU with the ordering \"amd\" factors the whole tangent, "
+        "called from the same Newton's method in C. On several processes there is nothing else "
+        "that shares this work.",
+        by.SHIPPED, by.WHOLE,
+        (
+            "compiled/c/elimination.c", "solvers/static_condensation.py:Chains",
+            "solvers/static_condensation.py:_runs", "solvers/static_condensation.py:Elimination",
+        ),
+    ),
+    "elimination beside `DirectSolver`": Acceleration(
+        "The same beside `DirectSolver` of the reference path, which copies the tangent and "
+        "factors it by by.KLU. Both are called by PETSc's `newtonls`.",
+        by.PETSC, by.KLU,
+        (
+            "compiled/c/elimination.c", "solvers/static_condensation.py:Chains",
+            "solvers/static_condensation.py:_runs", "solvers/static_condensation.py:Elimination",
+        ),
+    ),
+    "tangent kept in the last iteration": Acceleration(
+        "Keeps the tangent of the iterate before where the residual then falls far below the "
+        "tolerance, at most once in a row. Without it, every iteration makes and factors one.",
+        by.SHIPPED, by.TANGENTS,
+        ("compiled/c/newton.c~kept|near",),
+        (ELASTIC, LARGE, HINGED, JOINTED),
+    ),
+    "`Newton(modified=True)`": Acceleration(
+        "An option: keeps tangents while the residual goes on to fall as it did, also from step "
+        "to step. Without it, the default.",
+        by.MODIFIED, by.SHIPPED,
+        (
+            "compiled/c/newton.c~\\brate|MORE|modified", "solvers/convergence.py~rate|modified",
+            "solvers/newton_options.py~modified|This saves",
+        ),
+        (ELASTIC, LARGE, HINGED, JOINTED),
+    ),
+    "tangent of the last step (`like_last`)": Acceleration(
+        "The part of this option that goes from step to step.",
+        by.MODIFIED, by.ANEW,
+        (
+            "solvers/convergence.py~like_last|rate", "solvers/newton.py~like_last",
+            "simulation/step_solver.py~like_last", "simulation/simulation.py~like_last|alike =",
+        ),
+        (ELASTIC, LARGE, HINGED, JOINTED),
+    ),
+    "cells with points in C": Acceleration(
+        "One loop evaluates strains, points and forces of cells that yield or break, and answers "
+        "the same iterate once. Without it, Python calls these three in turn, and the points "
+        "answer for residual and tangent.",
+        by.SHIPPED, by.POINTS,
+        (
+            "terms/inelastic_beams.py:CompiledInelasticBeams",
+            "compiled/c/material_points.c:linearise",
+            "compiled/c/material_points.c:respond_at",
+            "compiled/c/material_points.c:add_inelastic_force",
+            "compiled/c/material_points.c:add_inelastic_tangent",
+        ),
+        (HINGED,),
+    ),
+    "return map in C": Acceleration(
+        "Points answer one after the other, by laws and tangents that UFL derives and FFCx "
+        "compiles. Without it, NumPy calls the laws on all points at once, with tangents by "
+        "complex steps. In both, Python calls the cells.",
+        by.POINTS, by.NUMPY,
+        (
+            "terms/compiled_points.py", "compiled/c/material_points.c:ask",
+            "compiled/c/material_points.c:growth", "compiled/c/material_points.c:respond",
+            "compiled/c/material_points.c:release", "compiled/c/material_points.c:commit",
+            "discretization/compiled_forms.py:Pointwise",
+        ),
+        (HINGED,),
+    ),
+    "connectors in C": Acceleration(
+        "Evaluates motions, forces and laws of springs and plastic hinges of zero length in C. "
+        "Without it, DOLFINx assembles their forms and NumPy evaluates the slips, called by "
+        "Python.",
+        by.SHIPPED, by.CONNECTORS,
+        (
+            "terms/connectors.py:CompiledCouplings", "terms/compiled_slips.py",
+            "compiled/c/connectors.c", "compiled/c/rigid_plastic.c",
+        ),
+        (JOINTED,),
+    ),
+    "all of them": Acceleration(
+        "The compiled path beside `Newton(reference=True)`, which is there to be read and "
+        "compared with.",
+        by.SHIPPED, by.REFERENCE, (),
+        (ELASTIC, LARGE, HINGED, JOINTED),
+    ),
+}  # fmt: skip
+"""Accelerations by name."""
+
+
+def variants(scene):
+    """Names of the variants that the accelerations measured in a scene compare; shipped first."""
+    here = [one for one in ACCELERATIONS.values() if scene in one.scenes]
+    return list(dict.fromkeys([by.SHIPPED, *(x for one in here for x in (one.with_, one.without))]))
+
+
+# -- lines of code -------------------------------------------------------------------------------
+
+
+def lines_of(place):
+    """Numbers of the lines of code, a set of (file, line); blank ones and comments count."""
+    file, _, name = place.partition(":")
+    file, _, pattern = file.partition("~")
+    text = (PACKAGE / file).read_text(encoding="utf-8").splitlines()
+    if pattern:
+        found = [i for i, line in enumerate(text, 1) if re.search(pattern, line)]
+    elif not name:
+        found = range(1, len(text) + 1)
+    elif file.endswith(".c"):
+        found = lines_of_function(text, name)
+    else:
+        found = lines_of_definition(text, name.split("."))
+    if not found:
+        raise ValueError(f"{place} is not in the package")
+    return {(file, i) for i in found}
+
+
+def lines_of_function(text, name):
+    """Lines of a function of C."""
+    starts = [i for i, line in enumerate(text, 1) if re.match(rf"[a-z].*\b{name}\(", line)]
+    if not starts:
+        return []
+    end = next(i for i, line in enumerate(text, 1) if i > starts[0] and line == "}")
+    return range(starts[0], end + 1)
+
+
+def lines_of_definition(text, names):
+    """Lines of a class, function or method of Python."""
+    node = ast.parse("\n".join(text))
+    for name in names:
+        node = next((x for x in node.body if getattr(x, "name", "") == name), None)
+        if node is None:
+            return []
+    return range(node.lineno, node.end_lineno + 1)
+
+
+def count(code):
+    """Number of lines of code at these places."""
+    return len(set().union(*map(lines_of, code)))
+
+
+def files(code):
+    """Names of the files, in order."""
+    return list(dict.fromkeys(re.split("[:~]", place)[0] for place in code))

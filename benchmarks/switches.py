@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: MIT
+"""Simulations in which an acceleration is switched off.
+
+The package has no switches: classes and functions are replaced here while a simulation is built.
+"""
+
+from contextlib import ExitStack, contextmanager
+from functools import cache
+from typing import Any, NamedTuple
+from unittest.mock import patch
+
+import numpy as np
+
+import ufl_beam as ub
+from ufl_beam.compiled import c_library
+from ufl_beam.compiled.jit import compiled
+from ufl_beam.discretization import function_spaces
+from ufl_beam.discretization.dolfinx_forms import DolfinxFields
+from ufl_beam.simulation import simulation as stepping
+from ufl_beam.simulation.evaluation import COMPILED
+from ufl_beam.simulation.step_equation import StepEquation
+from ufl_beam.simulation.step_solver import StepSolver
+from ufl_beam.solvers import newton, static_condensation
+from ufl_beam.solvers.direct_solver import DirectSolver
+from ufl_beam.terms.connectors import ReferenceCouplings
+from ufl_beam.terms.inelastic_beams import ReferenceInelasticBeams
+from ufl_beam.terms.reference_points import ReferencePoints
+from ufl_beam.terms.reference_slips import ReferenceSlips
+
+Chains = static_condensation.Chains
+
+
+def nothing(*_):
+    """Do nothing, in the place of a function that switches an acceleration on."""
+
+
+def without_chains(cell_dofs, A, alone):
+    """Chains of no vertices: the whole tangent remains for PETSc."""
+    return Chains(cell_dofs, A, np.zeros_like(alone))
+
+
+class EachStepAnew(StepSolver):
+    """Solver that makes a new tangent in the first iteration of every step."""
+
+    def solve(self, step, guess, *, like_last):
+        return super().solve(step, guess, like_last=False)
+
+
+KEEPS = "e->near = !kept && residual > floor"
+"""Where newton.c lets the tangent of the last iterate do."""
+
+
+@cache
+def without_kept_tangents():
+    """Newton's method of newton.c, compiled to make a tangent in every iteration; its address."""
+    assert c_library._SOURCE.count(KEEPS) == 1
+    source = c_library._SOURCE.replace(KEEPS, "e->near = 0 && !kept && residual > floor")
+    declarations = c_library.DECLARATIONS + c_library._CALLBACKS
+    other = compiled(
+        "ufl_beam_tangents", declarations, lambda: source, made_of=[source], flags=["-O3"]
+    )
+    for name, field in other.ffi.typeof("petsc_functions").fields:
+        address = int(c_library.ffi.cast("intptr_t", getattr(c_library.lib.petsc, name)))
+        setattr(other.lib.petsc, name, other.ffi.cast(field.type, address))
+    return int(other.ffi.cast("intptr_t", other.ffi.addressof(other.lib, "snes_newton")))
+
+
+def loop_without_kept_tangents(name, data):
+    """Do what :func:`c_library.loop` does, but for Newton's method."""
+    function, data = c_library.loop(name, data)
+    if name == "snes_newton":
+        ffi = c_library.ffi
+        function = ffi.cast(ffi.typeof(function), without_kept_tangents())
+    return function, data
+
+
+class Variant(NamedTuple):
+    """What is replaced while a simulation is built, and options of Newton's method."""
+
+    replaced: tuple[tuple[Any, str, Any], ...] = ()
+    newton: dict[str, bool] = {}  # noqa: RUF012 - of a tuple, which nothing changes
+
+    @contextmanager
+    def switched(self):
+        """Replace what is to be replaced."""
+        with ExitStack() as stack:
+            for where, name, new in self.replaced:
+                stack.enter_context(patch.object(where, name, new))
+            yield
+
+    def simulation(self, scene):
+        """A simulation of a scene."""
+        with self.switched():
+            return ub.Simulation(scene, ub.Midpoint(), newton=ub.Newton(**self.newton))
+
+
+def classes(**others):
+    """Other classes in the place of some of the compiled ones."""
+    return stepping, "COMPILED", COMPILED._replace(**others)
+
+
+NEWTON_OF_PETSC = (newton.Solver, "_leave_newton_to_c", nothing)
+EQUATION_IN_PYTHON = (StepEquation, "leave_to_c", nothing)
+CELL_BY_CELL = (function_spaces, "vectorise", nothing)
+NO_CHAINS = (static_condensation, "Chains", without_chains)
+ALL_TANGENTS = (newton, "loop", loop_without_kept_tangents)
+EACH_STEP_ANEW = (stepping, "StepSolver", EachStepAnew)
+
+SHIPPED, MODIFIED, REFERENCE = "as shipped", "`modified=True`", "`reference=True`"
+PETSC, PYTHON = "PETSc's `newtonls`", "`newtonls`, equation in Python"
+ASSEMBLERS = "`newtonls`, equation in Python, assemblers of DOLFINx"
+SCALAR, WHOLE, KLU = (
+    "cell by cell",
+    "LU of the whole tangent",
+    "`newtonls`, KLU of the whole tangent",
+)
+TANGENTS, ANEW = "a tangent in each iteration", "`modified=True`, a tangent in each step"
+POINTS, NUMPY = "cells with points in Python", "cells and return map in Python"
+CONNECTORS = "connectors in Python"
+
+VARIANTS = {
+    SHIPPED: Variant(),
+    PETSC: Variant((NEWTON_OF_PETSC,)),
+    PYTHON: Variant((EQUATION_IN_PYTHON,)),
+    ASSEMBLERS: Variant(
+        (classes(fields=DolfinxFields, inelastic=ReferenceInelasticBeams, in_c=False),)
+    ),
+    SCALAR: Variant((CELL_BY_CELL,)),
+    WHOLE: Variant((NO_CHAINS,)),
+    KLU: Variant((NEWTON_OF_PETSC, classes(factors=DirectSolver))),
+    TANGENTS: Variant((ALL_TANGENTS,)),
+    MODIFIED: Variant((), {"modified": True}),
+    ANEW: Variant((EACH_STEP_ANEW,), {"modified": True}),
+    POINTS: Variant((classes(inelastic=ReferenceInelasticBeams),)),
+    NUMPY: Variant((classes(inelastic=ReferenceInelasticBeams, points=ReferencePoints),)),
+    CONNECTORS: Variant((classes(couplings=ReferenceCouplings, slips=ReferenceSlips),)),
+    REFERENCE: Variant((), {"reference": True}),
+}
+"""Variants of a simulation by name."""

@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: MIT
+"""The benchmark of `make accelerations`: what it switches off, compares and writes."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+import ufl_beam as ub
+from ufl_beam.discretization.compiled_forms import Kernel
+from ufl_beam.solvers.direct_solver import DirectSolver
+
+ROOT = Path(__file__).parents[2]
+
+pytestmark = pytest.mark.serial
+
+
+@pytest.fixture(scope="module")
+def bench():
+    """The benchmark, whose modules import each other by their names."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(ROOT / "benchmarks"))
+        import bench_accelerations
+
+        yield bench_accelerations
+    for name in ("bench_accelerations", "accelerations", "switches", "bench_step", "records"):
+        sys.modules.pop(name, None)
+
+
+@pytest.fixture
+def advanced(bench):
+    """Simulation of a variant by name, some large steps after the start of the elastic scene."""
+    runs = []
+
+    def make(name):
+        runs.append(bench.Run(name, bench.flying_beam(8), 0.1))
+        runs[-1].advance(3)
+        return runs[-1].simulation
+
+    yield make
+    for run in runs:
+        run.simulation.close()
+
+
+@pytest.mark.parametrize("scene", ["elastic", "large", "hinged", "jointed"])
+def test_all_variants_reach_the_same_state(bench, scene):
+    runs = bench.compared(scene, 8)
+    assert list(runs) == bench.variants(scene)
+    iterations = {name: run.simulation.iterations for name, run in runs.items()}
+    exact = {n for name, n in iterations.items() if "modified" not in name}
+    assert len(exact) == 1, iterations
+    for run in runs.values():
+        run.simulation.close()
+
+
+def test_the_scenes_have_what_they_are_for(bench):
+    run = bench.Run(bench.SHIPPED, bench.hinged_beam(8), 0.01)
+    run.advance(150)
+    assert (run.simulation.inelastic[0].points["opening"] > 0).sum() > 1
+    jointed = bench.Run(bench.SHIPPED, bench.jointed_beams(16), 0.01)
+    jointed.advance(150)
+    assert min(jointed.simulation.ledger.lost.values()) > 0
+    assert {type(link.law) for link in jointed.simulation.scene.connectors} == {
+        ub.Spring, ub.RigidPlastic,
+    }  # fmt: skip
+    assert len(jointed.simulation.scene.beams) == 4
+
+
+def test_a_variant_that_computes_something_else_is_found(bench, monkeypatch):
+    wrong = bench.VARIANTS["cell by cell"]._replace(newton={"rtol": 1e-3})
+    monkeypatch.setitem(bench.VARIANTS, "cell by cell", wrong)
+    with pytest.raises(RuntimeError, match="elastic, 8 cells: cell by cell is off by"):
+        bench.compared("elastic", 8)
+
+
+def test_what_is_switched_off(bench, advanced):
+    import switches
+
+    def snes(simulation):
+        return simulation._solver._snes.getType()
+
+    shipped = advanced(switches.SHIPPED)
+    assert snes(shipped) == "shell"
+    assert shipped.equation.in_c
+    assert shipped.beams[0]._force.cells.lanes > 1
+    assert shipped._solver._factors._elimination.c.chains == 1
+    assert snes(advanced(switches.PETSC)) == "newtonls"
+    assert not advanced(switches.PYTHON).equation.in_c
+    assert not isinstance(advanced(switches.ASSEMBLERS).beams[0]._force, Kernel)
+    assert advanced(switches.SCALAR).beams[0]._force.cells.lanes == 1
+    whole = advanced(switches.WHOLE)
+    assert snes(whole) == "shell"
+    assert whole._solver._factors._elimination.c.left_size == len(whole.q)
+    assert isinstance(advanced(switches.KLU)._solver._factors, DirectSolver)
+
+
+def test_kept_tangents_are_switched_off(bench):
+    import switches
+
+    def kept(name):
+        run = bench.Run(name, bench.flying_beam(8), 0.1)
+        found = 0
+        for _ in range(80):
+            run.advance(1)
+            found += run.simulation.equation.c.near
+        run.simulation.close()
+        return found
+
+    assert kept(switches.SHIPPED) > 0
+    assert kept(switches.TANGENTS) == 0
+    assert kept(switches.MODIFIED) > 0
+
+
+def test_nothing_stays_replaced(bench, advanced):
+    import switches
+
+    for name in switches.VARIANTS:
+        if name not in {switches.POINTS, switches.NUMPY, switches.CONNECTORS}:
+            advanced(name)
+    simulation = advanced(switches.SHIPPED)
+    assert simulation.equation.in_c
+    assert simulation._solver._snes.getType() == "shell"
+    assert simulation.beams[0]._force.cells.lanes > 1
+
+
+# -- gains and lines -------------------------------------------------------------------------------
+
+
+def case(variant, times, scene="elastic", cells=8):
+    return {
+        "scene": scene, "cells": cells, "variant": variant, "times": times, "rounds": len(times),
+        "steps": 1, "us_median": 1e6 * sorted(times)[len(times) // 2], "us_min": 1e6 * min(times),
+        "iterations": 2.0, "load": 0.5,
+    }  # fmt: skip
+
+
+def cases(bench, factors):
+    """Cases of all scenes; one round is ten times as slow, for all variants alike."""
+    return [
+        case(name, [f, 10 * f, 1.1 * f], scene, cells)
+        for scene in bench.SCENES
+        for cells in (8, 64)
+        for name in bench.variants(scene)
+        for f in [factors.get(name, 2.0) * cells]
+    ]
+
+
+def test_gains_are_ratios_within_a_round(bench):
+    found = bench.gains(cases(bench, {"as shipped": 1.0, "cell by cell": 1.5}))
+    assert found["SIMD kernels"]["elastic", 64] == pytest.approx(1.5)
+    assert found["equation in C"]["hinged", 8] == pytest.approx(1.0)
+    assert {scene for scene, _ in found["return map in C"]} == {"hinged"}
+
+
+def test_what_gains_too_little_is_to_be_deleted(bench):
+    found = bench.gains(cases(bench, {"as shipped": 1.0, "cell by cell": 1.09}))
+    rows = {row.split(" | ")[0][2:]: row for row in bench.summary(found).splitlines()}
+    assert "to be deleted" in rows["SIMD kernels"]
+    assert "| 1.09 | 1.09 |" in rows["SIMD kernels"]
+    assert "to be deleted" not in rows["Newton's method in C"]
+
+
+def test_lines_of_code(bench):
+    import accelerations
+
+    for one in accelerations.ACCELERATIONS.values():
+        for place in one.code:
+            assert accelerations.lines_of(place)
+    text = (ROOT / "ufl_beam/compiled/c/elimination.c").read_text(encoding="utf-8")
+    assert accelerations.count(["compiled/c/elimination.c"]) == len(text.splitlines())
+    nested = ["simulation/evaluation.py:Classes", "simulation/evaluation.py"]
+    assert accelerations.count(nested) == accelerations.count(nested[1:])
+    start = min(accelerations.lines_of("compiled/c/newton.c:snes_newton"))[1]
+    lines = (ROOT / "ufl_beam/compiled/c/newton.c").read_text(encoding="utf-8").splitlines()
+    assert lines[start - 1].startswith("int snes_newton(")
+    for gone in ("compiled/c/newton.c:gone", "solvers/newton.py:Solver.gone", "errors.py~no such"):
+        with pytest.raises(ValueError, match="is not in the package"):
+            accelerations.lines_of(gone)
+
+
+def test_the_page(bench, tmp_path):
+    page = tmp_path / "page.md"
+    text = bench.PAGE.read_text(encoding="utf-8")
+    page.write_text(text, encoding="utf-8")
+    bench.write(page, cases(bench, {"as shipped": 1.0}), 90)
+    written = page.read_text(encoding="utf-8")
+    for key in ("summary", "gains, jointed", "times, large"):
+        inside = written.split(f"<!-- {key} -->\n")[1].split(f"<!-- end of {key} -->")[0]
+        assert inside.startswith("| ")
+        assert inside.endswith(" |\n")
+    names = [name[1:] for name in bench.ACCELERATIONS]
+    assert [name for name in names if name not in written] == []
+    assert [name for name in names if name not in text] == []  # the command has written it
+    assert "3 with 8 cells, 3 with 64 cells" in written
+
+
+@pytest.mark.parametrize("scene", ["large", "hinged"])
+def test_times_of_a_small_scene(bench, scene):
+    found = list(bench.measure(scene, 8, rounds=2, steps=1))
+    assert [case["variant"] for case in found] == bench.variants(scene)
+    assert all(len(case["times"]) == 2 and case["us_min"] > 0 for case in found)
+    assert all(case["iterations"] >= 2 for case in found)
