@@ -104,7 +104,7 @@ ACCELERATIONS = {
     ),
     "elimination beside `DirectSolver`": Acceleration(
         "The same beside `DirectSolver` of the reference path, which copies the tangent and "
-        "factors it by by.KLU. Both are called by PETSc's `newtonls`.",
+        "factors it by KLU. Both are called by PETSc's `newtonls`.",
         by.PETSC, by.KLU,
         (
             "compiled/c/elimination.c", "solvers/static_condensation.py:Chains",
