@@ -25,7 +25,12 @@ from ufl_beam.parameter import Parameter
 from ufl_beam.simulation.assembly import assemble
 from ufl_beam.simulation.diagnosis import no_equilibrium, open_ledger
 from ufl_beam.simulation.evaluation import COMPILED, REFERENCE
-from ufl_beam.simulation.initial_state import checked_grid, initial_state, mesh_of
+from ufl_beam.simulation.initial_state import (
+    checked_grid,
+    checked_newton,
+    initial_state,
+    mesh_of,
+)
 from ufl_beam.simulation.replicas import Copies, sharing
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_solver import (
@@ -90,8 +95,7 @@ class Simulation(StateView):
     ) -> None:
         comm = communicator(comm, "comm")
         require_number(t0, "t0")
-        newton = Newton() if newton is None else newton
-        require_kind(newton, Newton, "newton")
+        newton = checked_newton(newton, comm)
         if not (isinstance(kind, type) and issubclass(kind, Solution)):
             raise SceneError(f"kind = {shorten(kind)} must be a class of solutions, such as Path")
         if start is not None:
