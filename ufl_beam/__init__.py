@@ -83,6 +83,7 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.model.sections import Section
 from ufl_beam.model.supports import Clamped, Pinned, Prescribed, Roller, Support
 from ufl_beam.model.time_functions import Table, ramp
+from ufl_beam.output.dolfinx_view import DolfinxView
 from ufl_beam.output.events import Event, Events
 from ufl_beam.output.extremes import Extent, Extremes
 from ufl_beam.output.fatigue import Fatigue, HotSpot
@@ -117,8 +118,8 @@ __all__ = [
     "VTKHDF", "XDMF", "Actuator", "Adaptive", "ArcLength", "Beam", "Body", "Branch", "Buckling",
     "Checkpoint", "Clamped", "Connector", "Controller", "ConvergenceError", "CopiesDiffer",
     "Coulomb", "CriticalPoint", "Cycles", "Damper", "Decay", "DecayingMidpoint",
-    "DisplacementControl", "DissipationControl", "DuvautLions", "Energy", "Envelope", "Event",
-    "Events", "ExactStatic", "Extent", "Extremes", "Fatigue", "Fibres", "FollowerLoad",
+    "DisplacementControl", "DissipationControl", "DolfinxView", "DuvautLions", "Energy", "Envelope",
+    "Event", "Events", "ExactStatic", "Extent", "Extremes", "Fatigue", "Fibres", "FollowerLoad",
     "ForceLaw", "GeneralizedAlpha", "Gerber", "Goodman", "Gravity", "Guided", "Hardening",
     "History", "HotSpot", "Joint", "KelvinVoigt", "LineLoad", "LinearSoftening", "Link",
     "LoadControl", "Lognormal", "Mesh", "Midpoint", "ModelWarning", "Modes", "Motor", "Newmark",

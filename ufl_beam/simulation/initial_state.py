@@ -3,12 +3,9 @@
 
 from __future__ import annotations
 
-from mpi4py import MPI
-
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.collective_errors import Agreement
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.model_warnings import (
     warn_of_far_points,
@@ -33,8 +30,6 @@ from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.solvers.newton_options import Newton
-from ufl_beam.solvers.petsc_options import require_known_options
 
 
 def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh) -> Grid:
@@ -60,14 +55,6 @@ def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh) -> Grid:
     if has_inertia(scheme):
         warn_of_touching(grid)
     return grid
-
-
-def checked_newton(newton: Newton | None, comm: MPI.Intracomm) -> Newton:
-    """Return the options of Newton's method, or those by default; all processes call it."""
-    newton = Newton() if newton is None else newton
-    require_kind(newton, Newton, "newton")
-    Agreement(comm)(require_known_options, newton)
-    return newton
 
 
 def mesh_of(start: Solution | None, mesh: Mesh | None) -> Mesh:

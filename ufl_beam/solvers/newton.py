@@ -126,8 +126,12 @@ class Solver:
         """SNES of the equation with a border."""
         if self._bordered is None:
             factors, snes, of_steps = self._ksp.getPC(), self._make_snes(), self._snes
-            snes.cancelMonitor()
-            snes.setMonitor(lambda _, iteration, norm: of_steps.monitor(iteration, norm))
+
+            def call_monitors(*arguments: Any) -> None:
+                for monitor, more, named in of_steps.getMonitor() or ():
+                    monitor(*arguments, *more, **named)
+
+            snes.setMonitor(call_monitors)
             self._bordered = BorderedNewton(snes, self._callbacks, factors, border)
         self._bordered.border = border
         return self._bordered.snes

@@ -10,8 +10,9 @@ from typing import Any
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from ufl_beam.collective_errors import Agreement
 from ufl_beam.compiled.c_library import ffi, petsc
-from ufl_beam.errors import SceneError
+from ufl_beam.errors import SceneError, require_kind
 from ufl_beam.solvers.newton_options import PREFIX, Newton
 
 WHILE_SOLVING = (
@@ -69,7 +70,15 @@ def _used(name: str) -> bool:
     return any(bytes(ffi.buffer(used)))
 
 
-def require_known_options(newton: Newton) -> None:
+def checked_newton(newton: Newton | None, comm: MPI.Intracomm) -> Newton:
+    """Return the options of Newton's method, or those by default; all processes call it."""
+    newton = Newton() if newton is None else newton
+    require_kind(newton, Newton, "newton")
+    Agreement(comm)(_require_known, newton)
+    return newton
+
+
+def _require_known(newton: Newton) -> None:
     """Refuse options that PETSc would not use, before there is anything to solve.
 
     Raises:
