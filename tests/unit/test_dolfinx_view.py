@@ -35,7 +35,7 @@ def frame():
 def moved(scene, scheme, reference=False, *, t=0.06, **more):
     """A simulation some steps later."""
     newton = ub.Newton(rtol=1e-12, reference=reference)
-    simulation = ub.Simulation(scene, scheme, newton=newton, **more)
+    simulation = ub.Simulation(scene, scheme, newton=newton, **{"comm": MPI.COMM_SELF, **more})
     for k in range(6):
         simulation.step_to(t * (k + 1) / 6)
     return simulation
@@ -129,6 +129,26 @@ def test_an_own_form(reference, degree):
     simulation.close()
 
 
+@BOTH
+def test_each_process_has_its_cells(reference):
+    """Energies of all of them are those of the ledger; of one process, those of the scene."""
+    scene = frame()
+    simulation = moved(scene, ub.Midpoint(0.1), reference, comm=MPI.COMM_WORLD)
+    view, (state, _, _) = simulation.dolfinx, simulation.entries()
+    v, M = view.velocity.x.array, fem.assemble_matrix(fem.form(view.forms.mass)).to_scipy()
+    kinetic = MPI.COMM_WORLD.allreduce(v @ M @ v / 2)
+    assert kinetic == pytest.approx(state["kinetic"], rel=1e-12)
+    jump = np.zeros(len(simulation.grid.cells))
+    jump[view.cells] = view.jump.x.array
+    MPI.COMM_WORLD.Allreduce(MPI.IN_PLACE, jump)
+    alone = moved(scene, ub.Midpoint(0.1), reference)
+    # Jumps of some 0.1 rad, by steps solved to 1e-12 of the forces.
+    assert np.allclose(jump, alone.damage()[0], rtol=0, atol=1e-8)
+    assert np.abs(jump).max() > 1e-3
+    for one in (simulation, alone):
+        one.close()
+
+
 def test_what_a_scene_does_not_have():
     beam = ub.Beam((0, 0), (1, 0), ub.Section(**STEEL), cells=2)
     simulation = ub.Simulation(ub.Scene([beam], supports=[ub.Clamped(beam.start)]), ub.Static())
@@ -171,7 +191,7 @@ def test_a_monitor_sees_each_iteration_and_changes_none(reference):
     plain = moved(frame(), ub.Midpoint(0.1), reference)
     watched = ub.Simulation(
         frame(), ub.Midpoint(0.1), newton=ub.Newton(rtol=1e-12, reference=reference)
-    )
+    )  # under mpirun, by all processes
     seen = []
     watched.snes.setMonitor(lambda snes, iteration, norm: seen.append((iteration, norm)))
     assert watched.snes.getType() == "newtonls"
@@ -179,8 +199,8 @@ def test_a_monitor_sees_each_iteration_and_changes_none(reference):
         watched.step_to(0.01 * (k + 1))
     assert len(seen) - sum(iteration == 0 for iteration, _ in seen) == watched.iterations
     assert plain.iterations == watched.iterations
-    # In C the operations are contracted otherwise.
-    assert np.allclose(plain.q, watched.q, rtol=0, atol=1e-11)
+    # Sums are in another order, and in C operations are contracted otherwise.
+    assert np.allclose(plain.q, watched.share.gather(watched.q), rtol=0, atol=1e-11)
     for simulation in (plain, watched):
         simulation.close()
 
