@@ -300,7 +300,7 @@ TABLE = {
     "Newton": call(
         ub.Newton,
         rtol=V(1e-8, POSITIVE), max_iterations=V(10, COUNT), modified=V(False, SWITCH),
-        petsc=V({}, [None, 1.0, "x", [], {1: None}]),
+        petsc=V({}, [None, 1.0, "x", [], {1: None}]), reference=V(False, SWITCH),
     ),
     "Adaptive": call(
         ub.Adaptive,
@@ -423,10 +423,14 @@ TABLE |= {
 RECORDS_OF_RUNS = {
     "Branch", "Buckling", "Connector", "CriticalPoint", "Cycles", "Decay", "Energy", "Envelope",
     "Event", "Extent", "Joint", "Modes", "Path", "Solution", "Study", "Support", "Tradeoff",
+    "DolfinxView", "Step",
 }  # fmt: skip
 """Made by runs and by functions of the package, not by users."""
 
-WITHOUT_PARAMETERS = {"Static", "PrintedMidpoint", "Extremes", "Recorder", "say"}
+WITHOUT_PARAMETERS = {
+    "Static", "PrintedMidpoint", "Extremes", "Recorder", "say", "Scheme", "DynamicScheme",
+    "ExactStep", "Midway",
+}  # fmt: skip
 
 OF_SOLUTIONS = {
     "animate", "picture", "plot", "plot_cycles", "plot_damage", "plot_dissipation", "plot_energy",
