@@ -79,12 +79,13 @@ def _forces(solution):
     return np.array([*reactions, *(solution.section_forces_at(place) for place in places)])
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", SEEDS if MPI.COMM_WORLD.size == 1 else SEEDS[::6])
 def test_both_paths_agree(seed):
     found = differences(run(seed, reference=False), run(seed, reference=True))
     assert max(found.values()) < SAME, {k: v for k, v in found.items() if not v < SAME}
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("seed", SEEDS)
 def test_residuals_and_tangents_agree(seed):
     """Somewhere off equilibrium, so that nothing hides behind a converged solution."""
@@ -119,6 +120,7 @@ def step(share):
     return 1e-3 * share.grid.scene.size * random.uniform(-1, 1, share.size)
 
 
+@pytest.mark.serial
 def test_the_scenes_have_everything():
     """The seeds above leave out nothing that hundreds of scenes have."""
 
@@ -260,6 +262,7 @@ def test_everything_yields(compiled):
     assert max(differences(compiled, simulated(reference=True)).values()) < SAME
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_a_mistake_is_found(mistake, compiled, monkeypatch):
     mistake(monkeypatch)
@@ -271,6 +274,7 @@ def test_a_mistake_is_found(mistake, compiled, monkeypatch):
         assert max(differences(compiled, found).values()) > SAME
 
 
+@pytest.mark.serial
 def test_an_inexact_tangent_is_no_mistake(compiled, monkeypatch):
     """Only the number of iterations tells it."""
     solution_of_tangent(monkeypatch)

@@ -9,7 +9,8 @@ import pytest
 import ufl_beam as ub
 from ufl_beam.model.fibres import Layout
 from ufl_beam.model.material_laws import HardeningBulk
-from ufl_beam.terms.material_points import Points, inputs
+from ufl_beam.terms.compiled_points import CompiledPoints
+from ufl_beam.terms.material_points import inputs
 
 C, LENGTH = 200.0, 0.5
 NONE = ub.Hardening(math.inf)
@@ -50,7 +51,7 @@ class Bars:
         )
         self.C, self.length, self.scheme, self.softening = C, length, scheme, softening
         self.numbers = layout.bulk([(0, k) for k in range(cells)])
-        self.points = Points(
+        self.points = CompiledPoints(
             layout,
             [(0, k) for k in range(cells)],
             np.full(cells, length),

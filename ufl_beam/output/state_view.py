@@ -12,6 +12,7 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.arrays import Array, Index, Snapshot
+from ufl_beam.compiled.csr import as_slice
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import Fields, SectionForces
 from ufl_beam.discretization.partition import Share
@@ -89,12 +90,27 @@ class StateView(ABC):
         """Gather the state of all processes."""
         v = [self.share.gather(v) for v in self.velocities()]
         connections = self.connections() if self.scene.links else NO_CONNECTIONS
-        groups = np.concatenate([NO_MATERIAL, *(np.c_[group] for group in self.material())])
-        material = groups[np.argsort(groups[:, 0])]
+        material = self._material_table() if self._has_inelastic else NO_MATERIAL
         return Snapshot(
             self.t, self.share.gather(self.q), v[0] if v else None, self.reactions(),
             self.entries(), material, connections, self.parts, self.iterations,
         )  # fmt: skip
+
+    def _material_table(self) -> Array:
+        """Numbers of cells and rows of their material, in the order of the numbers; (m, 7)."""
+        rows = [rows for _, rows in self.material()]
+        empty, order = self._empty_table
+        table = empty.copy()
+        table[:, 1:] = (rows[0] if len(rows) == 1 else np.concatenate(rows))[order]
+        return table
+
+    @cached_property
+    def _empty_table(self) -> tuple[Array, Index | slice]:
+        """The table of :meth:`_material_table` without material, and its order."""
+        cells = np.concatenate([cells for cells, _ in self.material()])
+        table, order = np.zeros((len(cells), 7)), np.argsort(cells)
+        table[:, 0] = cells[order]
+        return table, as_slice(order)
 
     def velocities(self) -> list[Array]:
         """Velocities at the local degrees of freedom; none in statics."""
@@ -193,7 +209,7 @@ class StateView(ABC):
         return SectionForces(self.fields)
 
     def material(self) -> list[tuple[Index, Array]]:
-        """Cells that can yield or break, and :attr:`Points.kept`."""
+        """Cells that can yield or break, and :attr:`Points.kept`; later steps change them."""
         here = [inelastic.kept() for inelastic in self.inelastic]
         if not self._has_inelastic or self.share.alone:
             return here

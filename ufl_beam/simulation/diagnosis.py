@@ -189,7 +189,8 @@ def _deformations(
 
 def _describe(grid: Grid, motions: Array, links: Deformed, cells: Deformed) -> str:
     """Words for a motion that meets no force; ``motions`` are the sizes of its parts."""
-    parts = [_component(words) for words in grid.worst(np.where(motions >= 1 / 2, motions, 0.0))]
+    alike = np.round(motions, 6)  # the order of equal ones must not be that of their round-off
+    parts = [_component(words) for words in grid.worst(np.where(alike >= 1 / 2, alike, 0.0))]
     if cells.stiff:
         return (
             f"the forces no longer resist a motion that is largest in {_list(parts)}, as at a "

@@ -240,8 +240,9 @@ class Solver:
         if reason <= 0:
             self._agreement.settle(self._equation.error)
             raise self.convergence.failure(reason, self._done)
-        self._vectors.update_ghosts(self._x)
-        return self.iterate()
+        if self._vectors.parallel:
+            self._vectors.update_ghosts(self._x)
+        return self._q.copy()
 
     # -- what is known of it -------------------------------------------------------------------
 

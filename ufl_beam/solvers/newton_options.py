@@ -33,7 +33,7 @@ class Newton:
             ``snes_linesearch_type`` replaces the line search after full steps.  A run raises
             :class:`SceneError` for options that PETSc has no use for.
         reference: Evaluate the same equations by DOLFINx, NumPy and PETSc alone, to compare with,
-            or to read: some hundred times slower, see docs/theory.md.
+            or to read: ten to a hundred times slower, see docs/theory.md.
 
     Example:
         >>> newton = ub.Newton(rtol=1e-12, petsc={"snes_linesearch_type": "bt"})

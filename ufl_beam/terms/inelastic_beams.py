@@ -50,6 +50,10 @@ def inelastic_cells(share: Share) -> list[tuple[Layout, Index]]:
     return [(layout, np.array(cells)) for layout, cells in groups.items()]
 
 
+KEPT_WITHOUT_JUMP = np.array([1.0, 1.0, 1.0, 0.0, 1.0, 1.0])
+"""Factors of :attr:`Points.kept` where its jump is a crack of one fibre, and no hinge."""
+
+
 class InelasticForms(NamedTuple):
     """Virtual work of resultants r; the same of b + D e around an iterate, and its derivative."""
 
@@ -209,11 +213,9 @@ class InelasticBeams(Cells, ABC):
     # -- what solutions keep -------------------------------------------------------------------
 
     def kept(self) -> tuple[Index, Array]:
-        """Cells (numbers of the grid), and :attr:`Points.kept` of them; (num_cells, 6)."""
-        rows = self.points.kept.copy()
-        if not self._hinges:
-            rows[:, 3] = 0.0
-        return self._cells, rows
+        """Cells (numbers of the grid), and :attr:`Points.kept` of them; (num_cells, 6); a view."""
+        kept = self.points.kept
+        return self._cells, kept if self._hinges else kept * KEPT_WITHOUT_JUMP
 
     def state(self) -> tuple[Index, Array]:
         """Cells (numbers of the grid), and their internal variables; (num_cells, k)."""
@@ -242,7 +244,7 @@ class CompiledInelasticBeams(InelasticBeams):
         )  # fmt: skip
 
     def _begin(self) -> None:
-        self._forget()
+        self._latest.fill(np.nan)
         self._in_c.begins = self._static
 
     def _forget(self) -> None:

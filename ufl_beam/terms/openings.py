@@ -47,6 +47,10 @@ RELEASED = float(lib.RELEASED)
 """Value of "flows" of a point that may open in this step although it did not flow in the last."""
 
 
+BEGIN = tuple(np.eye(lib.SEARCH_FLAGS, dtype=np.int32)[HOLD] * hold for hold in (0, 1))
+"""Flags at the beginning of a search in which what does not flow may open, or is held."""
+
+
 class SearchFlags:
     """Flags that all points of a scene share in a step.
 
@@ -61,8 +65,7 @@ class SearchFlags:
 
     def begin(self, hold: bool) -> None:
         """Begin a search for an equilibrium."""
-        self.flags.fill(0)
-        self.flags[HOLD] = hold
+        self.flags[:] = BEGIN[hold]
 
     @property
     def opened(self) -> bool:

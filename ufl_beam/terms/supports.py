@@ -143,7 +143,8 @@ class Supports:
         if self._motions:
             work = self._acting(self._before, self.reactions) * s[self._held]
             self._ledger.supplied["supports"] += float(np.sum(work[self._owned]))
-        self.take()
+        if len(self.dofs):
+            self.take()
 
     def stop(self, v: Array) -> None:
         """Set velocities of what does not move to zero, in place; else they would ring."""
