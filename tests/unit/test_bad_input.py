@@ -1086,6 +1086,7 @@ def test_options_without_effect(database, name, said):
         run(newton=ub.Newton(petsc={"snes_max_it": 20, name: "1"}))
     assert database.getAll() == {}
     database[name] = "1"
+    assert database.hasName(name)  # someone has asked for it, which PETSc remembers
     with raises(f"PETSC_OPTIONS: PETSc has {said}"):
         run()
     assert database.getAll() == {name: "1"}  # for whoever else reads it

@@ -315,12 +315,12 @@ class DolfinxView:
         forms = self._forms
         for function in (forms.q0, forms.q1):
             self._fill(function, self._of.q)
-        for cells, b, D in (one.about_state() for one in self._of.inelastic):
-            here = np.isin(self.cells, cells)
-            rows = np.searchsorted(cells, self.cells[here], sorter=(order := np.argsort(cells)))
-            for function, values in zip(self._around, (b, D), strict=True):
-                dofs = dofs_of_cells(function.function_space)
-                function.x.array[dofs[here]] = values[order[rows]]
+        tables = [np.zeros((len(self._of.share.grid.cells), k)) for k in (3, 9)]
+        for cells, *values in (one.about_state() for one in self._of.inelastic):
+            for table, rows in zip(tables, values, strict=True):
+                table[cells] = rows
+        for function, table in zip(self._around, tables, strict=False):  # none if all is elastic
+            self._put(function, table[self.cells])
         return forms
 
     @cached_property
@@ -330,6 +330,7 @@ class DolfinxView:
         Cells with material points have no elastic stiffness, the others no b and D.
         """
         of, scheme = self._fields.element, self._of.scheme
+        self._around: tuple[fem.Function, ...] = ()
         work = elastic_forms(of, scheme).work
         if self._of.inelastic:
             points = inelastic_forms(of, scheme)
