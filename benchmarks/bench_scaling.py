@@ -91,7 +91,7 @@ class Stopwatch:
 
 def watched(simulation):
     """A stopwatch of the parts of an iteration."""
-    watch, solver = Stopwatch(), simulation._solver
+    watch, solver = Stopwatch(), simulation.solver
     chains_first = solver._ksp.getPC().getPythonContext()
     for owner, names, part in (
         (simulation.equation, ("residual", "tangent"), "assembly"),

@@ -47,7 +47,14 @@ from ufl_beam.analysis.tradeoff_result import Tradeoff
 from ufl_beam.errors import ConvergenceError, CopiesDiffer, ModelWarning, SceneError, TradeoffError
 from ufl_beam.mechanics.classical import GeneralizedAlpha, Newmark, Static
 from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
-from ufl_beam.mechanics.energy_momentum import ExactStatic, Midpoint, PrintedMidpoint
+from ufl_beam.mechanics.energy_momentum import (
+    ExactStatic,
+    ExactStep,
+    Midpoint,
+    Midway,
+    PrintedMidpoint,
+)
+from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, Step
 from ufl_beam.model.beams import Beam
 from ufl_beam.model.bodies import Body, Place, Spot, ground
 from ufl_beam.model.connector_laws import (
@@ -84,6 +91,7 @@ from ufl_beam.model.sections import Section
 from ufl_beam.model.supports import Clamped, Pinned, Prescribed, Roller, Support
 from ufl_beam.model.time_functions import Table, ramp
 from ufl_beam.model.works import Potential, VirtualWork
+from ufl_beam.output.dolfinx_view import DolfinxView
 from ufl_beam.output.events import Event, Events
 from ufl_beam.output.extremes import Extent, Extremes
 from ufl_beam.output.fatigue import Fatigue, HotSpot
@@ -118,19 +126,20 @@ __all__ = [
     "VTKHDF", "XDMF", "Actuator", "Adaptive", "ArcLength", "Beam", "Body", "Branch", "Buckling",
     "Checkpoint", "Clamped", "Connector", "Controller", "ConvergenceError", "CopiesDiffer",
     "Coulomb", "CriticalPoint", "Cycles", "Damper", "Decay", "DecayingMidpoint",
-    "DisplacementControl", "DissipationControl", "DuvautLions", "Energy", "Envelope", "Event",
-    "Events", "ExactStatic", "Extent", "Extremes", "Fatigue", "Fibres", "FollowerLoad", "ForceLaw",
-    "GeneralizedAlpha", "Gerber", "Goodman", "Gravity", "Guided", "Hardening", "History", "HotSpot",
-    "Joint", "KelvinVoigt", "LineLoad", "LinearSoftening", "Link", "LoadControl", "Lognormal",
-    "Mesh", "Midpoint", "ModelWarning", "Modes", "Motor", "Newmark", "Newton", "Normal", "Path",
-    "Perzyna", "Pinned", "Place", "PointLoad", "PointMass", "Potential", "Prescribed",
-    "PrintedMidpoint", "Prismatic", "Rayleigh", "Recorder", "Release", "Revolute", "Rigid",
-    "RigidLink", "RigidPlastic", "Roller", "RotatingFrame", "SNCurve", "Scene", "SceneError",
-    "Section", "Simulation", "Slide", "Softening", "Solution", "Spot", "Spring", "Static", "Stop",
-    "Stretch", "Study", "Support", "Table", "Tradeoff", "TradeoffError", "TruncatedNormal", "Turn",
-    "Velocity", "VirtualWork", "Weibull", "animate", "buckling", "damping", "damping_ratio",
-    "fit_decay", "follow", "ground", "load", "logarithmic_decrement", "modes", "peaks", "picture",
-    "plot", "plot_cycles", "plot_damage", "plot_dissipation", "plot_energy", "plot_extremes",
-    "plot_hinge", "plot_history", "plot_modes", "plot_moment_curvature", "plot_shapes",
-    "plot_tradeoff", "rainflow", "ramp", "render", "say", "simulate", "study", "tradeoff",
+    "DisplacementControl", "DissipationControl", "DolfinxView", "DuvautLions", "DynamicScheme",
+    "Energy", "Envelope", "Event", "Events", "ExactStatic", "ExactStep", "Extent", "Extremes",
+    "Fatigue", "Fibres", "FollowerLoad", "ForceLaw", "GeneralizedAlpha", "Gerber", "Goodman",
+    "Gravity", "Guided", "Hardening", "History", "HotSpot", "Joint", "KelvinVoigt", "LineLoad",
+    "LinearSoftening", "Link", "LoadControl", "Lognormal", "Mesh", "Midpoint", "Midway",
+    "ModelWarning", "Modes", "Motor", "Newmark", "Newton", "Normal", "Path", "Perzyna", "Pinned",
+    "Place", "PointLoad", "PointMass", "Potential", "Prescribed", "PrintedMidpoint", "Prismatic",
+    "Rayleigh", "Recorder", "Release", "Revolute", "Rigid", "RigidLink", "RigidPlastic", "Roller",
+    "RotatingFrame", "SNCurve", "Scene", "SceneError", "Scheme", "Section", "Simulation", "Slide",
+    "Softening", "Solution", "Spot", "Spring", "Static", "Step", "Stop", "Stretch", "Study",
+    "Support", "Table", "Tradeoff", "TradeoffError", "TruncatedNormal", "Turn", "Velocity",
+    "VirtualWork", "Weibull", "animate", "buckling", "damping", "damping_ratio", "fit_decay",
+    "follow", "ground", "load", "logarithmic_decrement", "modes", "peaks", "picture", "plot",
+    "plot_cycles", "plot_damage", "plot_dissipation", "plot_energy", "plot_extremes", "plot_hinge",
+    "plot_history", "plot_modes", "plot_moment_curvature", "plot_shapes", "plot_tradeoff",
+    "rainflow", "ramp", "render", "say", "simulate", "study", "tradeoff",
 ]  # fmt: skip

@@ -1051,15 +1051,57 @@ def test_section_forces_of_a_beam_elsewhere():
         run().section_forces(STRAY)
 
 
-@pytest.mark.serial  # PETSc reports an error of all ranks by aborting some of them
-def test_wrong_petsc_options_do_no_harm_to_the_next_run():
+@pytest.fixture
+def database():
+    """PETSc's options of Newton's method, which a test may change."""
     from petsc4py import PETSc
 
     database = PETSc.Options("ub_")
-    try:
-        with pytest.raises(PETSc.Error):
-            run(newton=ub.Newton(petsc={"snes_type": "nonsense"}))
-        assert database.getAll() == {}
-    finally:
-        for name in database.getAll():
-            del database[name]
+    before = database.getAll()
+    yield database
+    for name in database.getAll():
+        del database[name]
+    for name, value in before.items():
+        database[name] = value
+
+
+@pytest.mark.serial  # PETSc reports an error of all ranks by aborting some of them
+def test_wrong_petsc_options_do_no_harm_to_the_next_run(database):
+    with raises("PETSc refuses the options -ub_snes_type nonsense: "):
+        run(newton=ub.Newton(petsc={"snes_type": "nonsense"}))
+    assert database.getAll() == {}
+    run()
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("snes_monitr", "no use for the option ub_snes_monitr; did you mean ub_snes_monitor"),
+        ("snes_tr_delta0", "no use for the option ub_snes_tr_delta0; "),  # of another method
+        ("tolerance", "no use for the option ub_tolerance; leave it out"),
+    ],
+)
+def test_options_without_effect(database, name, said):
+    with raises(f"Newton: petsc: PETSc has {said}"):
+        run(newton=ub.Newton(petsc={"snes_max_it": 20, name: "1"}))
+    assert database.getAll() == {}
+    database[name] = "1"
+    assert database.hasName(name)  # someone has asked for it, which PETSc remembers
+    with raises(f"PETSC_OPTIONS: PETSc has {said}"):
+        run()
+    assert database.getAll() == {name: "1"}  # for whoever else reads it
+
+
+def test_options_that_petsc_asks_for_later(database):
+    with raises("ub_snes_view; such options must stand in PETSC_OPTIONS"):
+        run(newton=ub.Newton(petsc={"snes_view": None}))
+    database["snes_view"] = ":/dev/null"
+    run()
+    run()  # known as used by now
+
+
+def test_options_of_another_linear_solver():
+    """PETSc asks for some options only where others choose their solver."""
+    with raises("ub_pc_factor_mat_ordering_type"):
+        run(newton=ub.Newton(petsc={"pc_factor_mat_ordering_type": "rcm"}))
+    run(newton=ub.Newton(petsc={"ksp_type": "richardson", "ksp_richardson_scale": 1.0}))

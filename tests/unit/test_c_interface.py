@@ -88,7 +88,7 @@ def test_errors_of_petsc_that_c_meets(simulation):
     """They end Newton's method in C, and are no singular tangent."""
     simulation.step_to(0.5)
     short = PETSc.Vec().createSeq(2)
-    simulation._solver._equation.c.left_x = ffi.cast("void *", short.handle)
+    simulation.solver._equation.c.left_x = ffi.cast("void *", short.handle)
     with pytest.raises(PETSc.Error, match="Nonconforming object sizes"):
         simulation.step_to(1.0)
 
@@ -115,7 +115,7 @@ def test_a_solve_in_python_that_fails(monkeypatch, simulation):
     scene = simulation.scene
     for error in (lib.OF_LIBRARY, 60):
         simulation = ub.Simulation(scene, ub.Static())
-        chains = simulation._solver._factors
+        chains = simulation.solver._factors
         chains._factors = FailsOnce(chains._factors, error)
         if error == lib.OF_LIBRARY:
             simulation.step_to(1.0)

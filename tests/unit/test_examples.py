@@ -2,6 +2,7 @@
 """Every public name has an example in its docstring, and it does what it shows."""
 
 import doctest
+import inspect
 import re
 
 import pytest
@@ -37,6 +38,26 @@ def names():
 def test_example(name, names, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run(name, getattr(ub, name), names)
+
+
+MEMBERS = [
+    (name, member)
+    for name in ub.__all__
+    for member, thing in inspect.getmembers_static(getattr(ub, name))
+    if inspect.isclass(getattr(ub, name)) and member[0] != "_" and ">>>" in (thing.__doc__ or "")
+]
+"""Members of public classes whose docstrings have examples of their own."""
+
+
+@pytest.mark.parametrize("owner", sorted({owner for owner, _ in MEMBERS}))
+def test_examples_of_members(owner, names, tmp_path, monkeypatch):
+    """One after the other, with the names of the example of the class."""
+    monkeypatch.chdir(tmp_path)
+    known = run(owner, getattr(ub, owner), dict(names))
+    for name, member in MEMBERS:
+        if name == owner:
+            thing = inspect.getattr_static(getattr(ub, owner), member)
+            known = run(f"{owner}.{member}", thing, known)
 
 
 def test_an_example_can_fail(names):

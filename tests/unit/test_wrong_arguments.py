@@ -440,10 +440,14 @@ TABLE |= {
 RECORDS_OF_RUNS = {
     "Branch", "Buckling", "Connector", "CriticalPoint", "Cycles", "Decay", "Energy", "Envelope",
     "Event", "Extent", "Joint", "Modes", "Path", "Solution", "Study", "Support", "Tradeoff",
+    "DolfinxView", "Step",
 }  # fmt: skip
 """Made by runs and by functions of the package, not by users."""
 
-WITHOUT_PARAMETERS = {"Static", "PrintedMidpoint", "Extremes", "Recorder", "say"}
+WITHOUT_PARAMETERS = {
+    "Static", "PrintedMidpoint", "Extremes", "Recorder", "say", "Scheme", "DynamicScheme",
+    "ExactStep", "Midway",
+}  # fmt: skip
 
 OF_SOLUTIONS = {
     "animate", "picture", "plot", "plot_cycles", "plot_damage", "plot_dissipation", "plot_energy",

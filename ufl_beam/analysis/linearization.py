@@ -18,7 +18,7 @@ from scipy.sparse.linalg import splu
 from ufl_beam.arrays import Array, Complex, Index
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.errors import ModelWarning, SceneError
-from ufl_beam.mechanics.classical import Static
+from ufl_beam.mechanics.classical import Newmark
 from ufl_beam.mechanics.time_schemes import Rates, Step
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
@@ -33,14 +33,12 @@ COUPLING_TOLERANCE = 1e-9  # couplings below this part of the largest damping do
 AT_REST = 1e300  # length of a step in which all rates vanish; s
 
 
-class _Standstill(Static):
+class _Standstill(Newmark):
     """Scheme of small motions: all terms are taken at the present state, and no step is made."""
 
-    dynamic = True
-    slips = False
     has_mean_velocity = True
     rings = False
-    kept: tuple[str, ...] = ()
+    kept: tuple[str, ...] = ()  # type: ignore[assignment]
 
     def velocity(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
         return 1 / dt, 0.0, rates.v

@@ -30,6 +30,7 @@ from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.parallel import communicator
+from ufl_beam.simulation.initial_state import require_scheme
 from ufl_beam.simulation.run import simulate
 from ufl_beam.simulation.step_control import Adaptive
 from ufl_beam.solvers.newton_options import Newton
@@ -110,7 +111,9 @@ def tradeoff(
     comm = communicator(comm, "tradeoff: comm")
     meshes = _several(Mesh() if mesh is None else mesh, Mesh, "mesh")
     newtons = _several(Newton() if newton is None else newton, Newton, "newton")
-    schemes = _several(scheme, Scheme, "scheme")
+    schemes: tuple[Scheme, ...] = _several(scheme, object, "scheme")
+    for i, one in enumerate(schemes):
+        require_scheme(one, f"tradeoff: scheme[{i}]" if len(schemes) > 1 else "tradeoff: scheme")
     steps: tuple[float | Adaptive, ...] = _several(dt, object, "dt")
     for i, step in enumerate(steps):
         if not isinstance(step, Adaptive):

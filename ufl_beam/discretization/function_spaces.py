@@ -225,7 +225,8 @@ class CompiledFields(Fields):
 
 
 @stated
-def _mass(of: Element) -> ufl.Form:
+def mass_form(of: Element) -> ufl.Form:
+    """Mass of the beams, a bilinear form; kg, kg m²."""
     v = of.configuration()
     momentum = ufl.derivative(kinetic_energy(v, of.inertia) * of.dx_of_mass(), v, of.w)
     return ufl.derivative(momentum, v, ufl.TrialFunction(of.space))  # P(67)
@@ -233,7 +234,7 @@ def _mass(of: Element) -> ufl.Form:
 
 def mass_matrix(fields: Fields) -> Csr:
     """Mass of the beams, the point masses and the bodies."""
-    share, M = fields.share, fields.assembled(_mass(fields.element))
+    share, M = fields.share, fields.assembled(mass_form(fields.element))
     scene = share.grid.scene
     for one in (*scene.masses, *scene.bodies):
         dofs = share.at(one.middle if isinstance(one, Body) else one.place)

@@ -71,7 +71,14 @@ class _OverStep:
 
 
 class ExactStep(_OverStep):
-    """Steps whose works are exact increments of energy."""
+    """Base of schemes in whose steps works are exact increments of energy.
+
+    A scheme has an ``alpha``: the energy that its resultants take, P(89).
+
+    Example:
+        >>> issubclass(ub.Midpoint, ub.ExactStep), issubclass(ub.ExactStatic, ub.ExactStep)
+        (True, True)
+    """
 
     exact_ledger = True
 
@@ -143,7 +150,15 @@ class ExactStatic(InParts, ExactStep):
 
 
 class Midway:
-    """Base of dynamic schemes whose loads act in the middle of the step."""
+    """Base of dynamic schemes whose loads act in the middle of the step.
+
+    A scheme states its ``inertia``, ``rates``, ``slips`` and ``slip``, ``way_to_rest`` and
+    ``error_weights``, see :class:`DynamicScheme`.
+
+    Example:
+        >>> issubclass(ub.DecayingMidpoint, ub.Midway), issubclass(ub.Newmark, ub.Midway)
+        (True, False)
+    """
 
     dynamic = True
     slack = math.inf

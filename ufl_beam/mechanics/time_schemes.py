@@ -10,7 +10,7 @@ the step are in energy_momentum.py, those whose forces act at its end in classic
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple, Protocol, TypeGuard, runtime_checkable
+from typing import NamedTuple, Protocol, TypeGuard
 
 from ufl.core.expr import Expr
 
@@ -25,7 +25,13 @@ Constant = Callable[[float], Expr]
 
 
 class Step(NamedTuple):
-    """A step in time."""
+    """A step in time, as a scheme has it: its ends, and where loads and motions are taken.
+
+    Example:
+        >>> step = ub.Midpoint().step(0.0, 0.1, 0.1, np.zeros(3))
+        >>> step.load_time, step.motion_time, step.dt  # s
+        (0.05, 0.1, 0.1)
+    """
 
     t0: float  # beginning; s
     t1: float  # end; s
@@ -41,9 +47,19 @@ class Step(NamedTuple):
         return self.t1 - self.t0
 
 
-@runtime_checkable
 class Scheme(Protocol):
-    """Protocol of time schemes."""
+    """Protocol of time schemes, static ones and those with inertia.
+
+    Any hashable object with these attributes and methods is a scheme; a run names what it lacks.
+    A base class to begin with is :class:`ExactStep`; docs/extending.md has an example.
+
+    Example:
+        >>> class Mine:
+        ...     dynamic, theta = False, 1.0
+        >>> ub.simulate(scene, Mine(), t=(0, 1), dt=0.1)
+        Traceback (most recent call last):
+        ufl_beam.errors.SceneError: scheme: Mine is not a time scheme: it lacks advice, ...
+    """
 
     dynamic: bool  # True if the scene has inertia
     advice: str  # where a step finds no equilibrium
@@ -99,7 +115,19 @@ class Rates(Protocol):
 
 
 class DynamicScheme(Scheme, Protocol):
-    """Protocol of time schemes with inertia."""
+    """Protocol of time schemes with inertia, whose ``dynamic`` is true.
+
+    A base class to begin with is :class:`Midway`; docs/extending.md has an example.
+
+    Example:
+        >>> from dataclasses import dataclass
+        >>> @dataclass(frozen=True)
+        ... class Mine(ub.ExactStep, ub.Midway):
+        ...     alpha = 0.0
+        >>> ub.simulate(scene, Mine(), t=(0, 1), dt=0.1)
+        Traceback (most recent call last):
+        ufl_beam.errors.SceneError: scheme: Mine is not a time scheme: it lacks way_to_rest, ...
+    """
 
     kept: tuple[str, ...]  # names of the rates kept besides velocities, such as accelerations
     slips: bool  # True if it loses energy by :meth:`slip`

@@ -12,9 +12,10 @@ from mpi4py import MPI
 
 from ufl_beam.arrays import State
 from ufl_beam.collective_errors import on_first
-from ufl_beam.errors import SceneError, require_kind, require_sequence
+from ufl_beam.errors import SceneError, require_sequence, shorten
 from ufl_beam.output.output_files import Output, require_apart, require_writable
 from ufl_beam.output.state_view import StateView
+from ufl_beam.protocols import require_members
 
 
 class Recorder(ABC):
@@ -78,7 +79,12 @@ def recorders_of(
     outputs = []
     for i, recorder in enumerate(recorders):
         name = f"record[{i}]"
-        require_kind(recorder, Recorder, f"{call}: {name}")
+        if not isinstance(recorder, Recorder):
+            raise SceneError(
+                f"{call}: {name} = {shorten(recorder)} is not a Recorder; classes of your own are "
+                "derived from ub.Recorder"
+            )
+        require_members(recorder, Recorder, f"{call}: {name}", "a recorder")
         first = next(k for k, one in enumerate(recorders) if one is recorder)
         if first != i:
             raise SceneError(

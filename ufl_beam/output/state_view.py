@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from functools import cached_property
+from typing import Any
 
 from mpi4py import MPI
 
@@ -23,6 +24,7 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 from ufl_beam.output.joint_histories import Connection, links_of, motion_of, velocity_of
 from ufl_beam.parameter import Parameter
+from ufl_beam.solvers.newton import Solver
 from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.inelastic_beams import InelasticBeams
@@ -53,6 +55,7 @@ class StateView(ABC):
     reactions_known: bool = False  # those of the initial state; in dynamics they are not
     couplings: list[Links]
     inelastic: list[InelasticBeams]
+    solver: Solver  # Newton's method
     _has_inelastic: bool
 
     @property
@@ -61,9 +64,27 @@ class StateView(ABC):
         """Time, or the load factor of a path."""
 
     @property
-    @abstractmethod
     def iterations(self) -> int:
         """Newton iterations so far."""
+        return self.solver.iterations
+
+    @property
+    def snes(self) -> Any:
+        """SNES that solves the steps, of petsc4py; it takes monitors, histories and other methods.
+
+        From when it is asked for, steps are solved by PETSc's ``newtonls``, also in the compiled
+        path, where an equivalent method in C is faster for few cells.  Its norms add forces (N),
+        moments (N m) and what connectors miss; convergence is judged by :class:`Newton`'s ``rtol``.
+        Monitors are also called in line searches and along paths.
+
+        Example:
+            >>> simulation, norms = ub.Simulation(scene, ub.Midpoint()), []
+            >>> simulation.snes.setMonitor(lambda snes, iteration, norm: norms.append(norm))
+            >>> simulation.step_to(0.05)
+            >>> len(norms) == simulation.iterations + 1
+            True
+        """
+        return self.solver.snes
 
     def gather(self) -> Snapshot:
         """Gather the state of all processes."""

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ufl_beam.arrays import Array
@@ -17,7 +19,7 @@ from ufl_beam.discretization.model_warnings import (
 from ufl_beam.discretization.state_io import State
 from ufl_beam.discretization.state_transfer import Transfer, same_unknowns
 from ufl_beam.errors import SceneError, require_kind, shorten, warn
-from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
+from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, has_inertia
 from ufl_beam.model.connector_laws import HELD
 from ufl_beam.model.constraint_checks import (
     require_independent,
@@ -29,6 +31,7 @@ from ufl_beam.model.constraint_checks import (
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
+from ufl_beam.protocols import lacking, members, require_members
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.terms.work_forms import require_works
 
@@ -36,10 +39,7 @@ from ufl_beam.terms.work_forms import require_works
 def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh) -> Grid:
     """Make the grid of a scene, once the scheme is known to be able to compute it."""
     require_kind(scene, Scene, "scene")
-    if not isinstance(scheme, Scheme) or isinstance(scheme, type):
-        raise SceneError(
-            f"scheme = {shorten(scheme)} must be a scheme, such as Static() or Midpoint()"
-        )
+    require_scheme(scheme, "scheme")
     if has_inertia(scheme):
         require_masses(scene)
         require_inertia(scene)
@@ -57,6 +57,24 @@ def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh) -> Grid:
     if has_inertia(scheme):
         warn_of_touching(grid)
     return grid
+
+
+def require_scheme(scheme: Any, what: str) -> None:
+    """Raise :class:`SceneError` naming ``what`` unless it is a complete time scheme."""
+    # An array, too, has a "mean"; what lacks most of it was not meant to be a scheme.
+    if isinstance(scheme, type) or 2 * len(lacking(scheme, Scheme)) > len(members(Scheme)):
+        raise SceneError(
+            f"{what} = {shorten(scheme)} must be a scheme, such as Static() or Midpoint()"
+        )
+    dynamic = getattr(scheme, "dynamic", False)
+    require_members(scheme, DynamicScheme if dynamic else Scheme, what, "a time scheme")
+    try:
+        hash(scheme)
+    except TypeError:
+        raise SceneError(
+            f"{what}: {type(scheme).__name__} cannot be hashed, and forms are kept by scheme; "
+            "decorate the class with @dataclass(frozen=True)"
+        ) from None
 
 
 def mesh_of(start: Solution | None, mesh: Mesh | None) -> Mesh:

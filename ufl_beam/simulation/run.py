@@ -14,7 +14,14 @@ from mpi4py import MPI
 
 from tqdm import tqdm
 
-from ufl_beam.errors import SceneError, require_count, require_kind, require_number, require_switch
+from ufl_beam.errors import (
+    SceneError,
+    require_count,
+    require_kind,
+    require_number,
+    require_switch,
+    warn,
+)
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
@@ -23,6 +30,7 @@ from ufl_beam.output.output_files import Output, take
 from ufl_beam.output.recorders import Recorder, close_all, recorders_of
 from ufl_beam.parallel import communicator, in_study, say
 from ufl_beam.simulation.checkpoint import Checkpoint, Keeper, end_of
+from ufl_beam.simulation.diagnosis import open_ledger
 from ufl_beam.simulation.fingerprint import kind_of
 from ufl_beam.simulation.initial_state import mesh_of
 from ufl_beam.simulation.simulation import Simulation
@@ -170,10 +178,25 @@ def simulate(
                 simulation.together(after_step)
                 bar.update(pace.progress - bar.n)
         simulation.end()
-        simulation.check_ledger()
+        check_ledger(simulation)
     if comm.rank == 0:
         solution.opened.warn(scheme, solution.times)
     return solution
+
+
+def check_ledger(simulation: Simulation) -> None:
+    """Warn, and note in the solution, if a ledger is open that the scheme claims to close.
+
+    All processes call it together, at the end of a run.
+
+    Warns:
+        ModelWarning: It is open, perhaps by round-off.
+    """
+    solution = simulation.solution
+    if getattr(simulation.scheme, "exact_ledger", False) and len(solution) > 1:
+        solution.open_ledger = open_ledger(solution, simulation.share, simulation.solver)
+    if solution.open_ledger and simulation.comm.rank == 0:
+        warn(solution.open_ledger)
 
 
 @contextmanager

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from functools import partial
+from functools import cached_property, partial
 from typing import NoReturn
 
 from mpi4py import MPI
@@ -15,15 +15,16 @@ from ufl_beam.compiled.c_library import extrapolated
 from ufl_beam.discretization.model_warnings import warn_of_jumps
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory, Restoring, Saving, State
-from ufl_beam.errors import SceneError, StepFailed, require_kind, require_number, shorten, warn
+from ufl_beam.errors import SceneError, StepFailed, require_kind, require_number, shorten
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
+from ufl_beam.output.dolfinx_view import DolfinxView
 from ufl_beam.output.state_view import StateView
 from ufl_beam.parallel import communicator
 from ufl_beam.parameter import Parameter
 from ufl_beam.simulation.assembly import assemble
-from ufl_beam.simulation.diagnosis import no_equilibrium, open_ledger
+from ufl_beam.simulation.diagnosis import no_equilibrium
 from ufl_beam.simulation.evaluation import COMPILED, REFERENCE
 from ufl_beam.simulation.initial_state import checked_grid, initial_state, mesh_of
 from ufl_beam.simulation.replicas import Copies, sharing
@@ -39,6 +40,7 @@ from ufl_beam.simulation.step_solver import (
 )
 from ufl_beam.solvers.equation import Border
 from ufl_beam.solvers.newton_options import Newton
+from ufl_beam.solvers.petsc_options import checked_newton
 
 
 class Simulation(StateView):
@@ -90,8 +92,7 @@ class Simulation(StateView):
     ) -> None:
         comm = communicator(comm, "comm")
         require_number(t0, "t0")
-        newton = Newton() if newton is None else newton
-        require_kind(newton, Newton, "newton")
+        newton = checked_newton(newton, comm)
         if not (isinstance(kind, type) and issubclass(kind, Solution)):
             raise SceneError(f"kind = {shorten(kind)} must be a class of solutions, such as Path")
         if start is not None:
@@ -133,7 +134,7 @@ class Simulation(StateView):
         self._steps = StepSolver(
             scheme, self.equation, parts.openings, self._branch, newton, factors, together
         )
-        self._solver = self._steps.newton
+        self.solver = self._steps.newton
         self.solution = kind(scene, grid)
 
     # -- stepping ------------------------------------------------------------------------------
@@ -255,7 +256,7 @@ class Simulation(StateView):
         self.supports.go_back()
         self.end()
         raise no_equilibrium(
-            self.equation, self._solver, self.solution, failure, self.q, (self.t, end),
+            self.equation, self.solver, self.solution, failure, self.q, (self.t, end),
             advice or self.scheme.advice,
         ) from failure  # fmt: skip
 
@@ -280,10 +281,10 @@ class Simulation(StateView):
         """Time, or the load factor of a path."""
         return self.solution.parameter
 
-    @property
-    def iterations(self) -> int:
-        """Newton iterations so far."""
-        return self._solver.iterations
+    @cached_property
+    def dolfinx(self) -> DolfinxView:
+        """Mesh, functions and forms of this simulation, in the types of DOLFINx."""
+        return DolfinxView(self)
 
     def keep(self) -> None:
         """Append the state to the solution; all processes call it together."""
@@ -321,7 +322,7 @@ class Simulation(StateView):
         self.t = memory.number("t", self.t)
         self.last_dt = memory.number("last dt", self.last_dt)
         self.parts = int(memory.number("parts", self.parts))
-        self._solver.remember(memory)
+        self.solver.remember(memory)
         self.q = memory.at_dofs("q", self.q)
         self._q_before = memory.at_dofs("q before", self._q_before)
         self.ledger.remember(memory)
@@ -331,19 +332,6 @@ class Simulation(StateView):
         if self._branch is not None:
             self._branch.remember(memory, self.q)
 
-    def check_ledger(self) -> None:
-        """Warn, and note in the solution, if a ledger is open that the scheme claims to close.
-
-        All processes call it together, at the end of a run.
-
-        Warns:
-            ModelWarning: It is open, perhaps by round-off.
-        """
-        if getattr(self.scheme, "exact_ledger", False) and len(self.solution) > 1:
-            self.solution.open_ledger = open_ledger(self.solution, self.share, self._solver)
-        if self.solution.open_ledger and self.comm.rank == 0:
-            warn(self.solution.open_ledger)
-
     def close(self) -> None:
         """Give back what PETSc holds."""
-        self._solver.destroy()
+        self.solver.destroy()

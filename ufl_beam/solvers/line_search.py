@@ -58,7 +58,7 @@ class SearchingNewton:
     def _solve(self, x: PETSc.Vec) -> int:
         c = self._equation.c
         self._snes.computeFunction(x, self._f)
-        while not (reason := self._convergence.test(self._iterations)):
+        while not (reason := self._test()):
             if self._iterations == c.most:
                 return int(lib.TOO_MANY)
             if not c.near:
@@ -70,6 +70,11 @@ class SearchingNewton:
             self._search(x)
             self._iterations += 1
         return reason
+
+    def _test(self) -> int:
+        """Show the monitors of the SNES an iterate; return why to stop there, or zero."""
+        self._snes.monitor(self._iterations, self._f.norm())
+        return self._convergence.test(self._iterations)
 
     def _search(self, x: PETSc.Vec) -> None:
         """Go the part of the full step at which the residual does no work, found by secants."""

@@ -21,6 +21,7 @@ from ufl_beam.solvers.equation import Border, Equation, SnesCallbacks
 from ufl_beam.solvers.line_search import SearchingNewton
 from ufl_beam.solvers.newton_options import PREFIX, Newton
 from ufl_beam.solvers.null_vectors import IdleMotions
+from ufl_beam.solvers.petsc_options import database, take_options
 from ufl_beam.solvers.static_condensation import ChainsFirst
 from ufl_beam.solvers.vectors import Vectors, unlock
 
@@ -79,7 +80,7 @@ class Solver:
 
     def _chosen(self) -> dict[str, Any]:
         """PETSc options that the user has chosen."""
-        return {**PETSc.Options(PREFIX).getAll(), **self._newton.petsc}
+        return {**database(), **self._newton.petsc}
 
     def _make_snes(self) -> PETSc.SNES:
         snes = PETSc.SNES().create(self._x.comm)
@@ -96,19 +97,7 @@ class Solver:
         snes.setTolerances(max_it=self._newton.max_iterations)
         snes.setType("newtonls")
         snes.setKSP(self._ksp)
-        database = PETSc.Options(PREFIX)
-        before = database.getAll()
-        chosen = {**FULL_STEPS, **self._chosen()}
-        try:
-            for name, value in chosen.items():
-                database[name] = value
-            snes.setFromOptions()
-        finally:
-            # PETSc may have given those of before 3.24 their new names.
-            for name in {**chosen, **database.getAll()}:
-                del database[name]
-            for name, value in before.items():
-                database[name] = value
+        take_options(snes, {**FULL_STEPS, **self._chosen()})
         return snes
 
     def _leave_newton_to_c(self) -> None:
@@ -117,6 +106,14 @@ class Solver:
         self._snes.setType("shell")
         petsc("SNESShellSetContext", self._snes, context)
         petsc("SNESShellSetSolve", self._snes, solve)
+
+    @property
+    def snes(self) -> PETSc.SNES:
+        """SNES of the steps; from when it is asked for, their method is PETSc's ``newtonls``."""
+        if self._snes.getType() == "shell":
+            self._snes.setType("newtonls")
+            take_options(self._snes, FULL_STEPS)  # SNES has forgotten its line search
+        return self._snes
 
     @cached_property
     def _careful(self) -> PETSc.SNES | SearchingNewton:
@@ -128,8 +125,14 @@ class Solver:
     def _along(self, border: Border) -> PETSc.SNES:
         """SNES of the equation with a border."""
         if self._bordered is None:
-            factors = self._ksp.getPC()
-            self._bordered = BorderedNewton(self._make_snes(), self._callbacks, factors, border)
+            factors, snes, of_steps = self._ksp.getPC(), self._make_snes(), self._snes
+
+            def call_monitors(*arguments: Any) -> None:
+                for monitor, more, named in of_steps.getMonitor() or ():
+                    monitor(*arguments, *more, **named)
+
+            snes.setMonitor(call_monitors)
+            self._bordered = BorderedNewton(snes, self._callbacks, factors, border)
         self._bordered.border = border
         return self._bordered.snes
 

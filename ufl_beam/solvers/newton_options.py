@@ -30,7 +30,8 @@ class Newton:
         petsc: PETSc options without their prefix, such as ``{"snes_monitor": None}``; in
             ``PETSC_OPTIONS`` they have the prefix ``ub_``.  With any option PETSc's Newton method
             is used, otherwise an equivalent one in C, which is faster for few cells.  A
-            ``snes_linesearch_type`` replaces the line search after full steps.
+            ``snes_linesearch_type`` replaces the line search after full steps.  A run raises
+            :class:`SceneError` for options that PETSc has no use for.
         reference: Evaluate the same equations by DOLFINx, NumPy and PETSc alone, to compare with,
             or to read: ten to a hundred times slower, see docs/theory.md.
 

@@ -22,7 +22,7 @@ from ufl_beam.terms.forms_and_matrices import OfForms, OfMatrix
 from ufl_beam.terms.tangent_derivatives import Cells
 
 
-class _ElasticForms(NamedTuple):
+class ElasticForms(NamedTuple):
     """Forms of elastic beams: virtual work, stored energy, and what a scheme loses of it.
 
     ``first`` is the tangent of the first iteration of a static step.
@@ -35,7 +35,8 @@ class _ElasticForms(NamedTuple):
 
 
 @stated
-def _elastic_forms(of: Element, scheme: Scheme) -> _ElasticForms:
+def elastic_forms(of: Element, scheme: Scheme) -> ElasticForms:
+    """Forms of a step of a time scheme."""
     q0, q1, w, C, dx = of.q0, of.q1, of.w, of.stiffness, of.dx(1)
     e0, e1 = strain(q0, of.axis), strain(q1, of.axis)
     r = scheme.resultants(C, e0, e1, of.constant)
@@ -48,7 +49,7 @@ def _elastic_forms(of: Element, scheme: Scheme) -> _ElasticForms:
         geometric = virtual_work(resultants(e0, C), ufl.derivative(w_e, q1, dq))
         material = virtual_work(ufl.derivative(r, q1, dq), w_e)
         first = (geometric + material) * dx
-    return _ElasticForms(virtual_work(r, w_e) * dx, stored, losses, first)
+    return ElasticForms(virtual_work(r, w_e) * dx, stored, losses, first)
 
 
 class ElasticBeams(OfForms, Cells):
@@ -57,7 +58,7 @@ class ElasticBeams(OfForms, Cells):
     kind, _entry = "beams", "numerical"
 
     def __init__(self, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger) -> None:
-        forms = _elastic_forms(fields.element, scheme)
+        forms = elastic_forms(fields.element, scheme)
         super().__init__(forms.work, forms.losses, fields, A, ledger)
         self._fields, self._work_form = fields, forms.work
         self._stored = fields.hot_kernel(forms.stored, self._q1)

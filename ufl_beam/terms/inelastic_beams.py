@@ -66,7 +66,8 @@ class InelasticForms(NamedTuple):
 
 
 @stated
-def _forms(of: Element, scheme: Scheme) -> InelasticForms:
+def inelastic_forms(of: Element, scheme: Scheme) -> InelasticForms:
+    """Forms of a step of a time scheme."""
     r, b, D = of.at_points(3), of.at_points(3), of.at_points(3, 3)
     w_e, dx = scheme.virtual_strain(of.q0, of.q1, of.w, of.axis), of.dx(1)
     around = virtual_work(b + ufl.dot(D, strain(of.q1, of.axis)), w_e) * dx
@@ -105,7 +106,7 @@ class InelasticBeams(Cells, ABC):
             search,
         )
 
-        forms = _forms(fields.element, scheme)
+        forms = inelastic_forms(fields.element, scheme)
         self._q0, self._q1 = fields.element.q0, fields.element.q1
         self._b, self._D, self._fields, self._work_form = forms.b, forms.D, fields, forms.around
         self._force, self._tangent = (
@@ -160,6 +161,15 @@ class InelasticBeams(Cells, ABC):
         self._forget()
         around = r - np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), strains)
         return {self._b: around, self._D: D}
+
+    def about_state(self) -> tuple[Index, Array, Array]:
+        """Cells (numbers of the grid), and b, D of resultants b + D e about the accepted state.
+
+        Shapes (num_cells, 3) and (num_cells, 9).  D is that of a step like the last one.
+        """
+        strains, D = self.points.tangent()
+        elastic = np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), strains)
+        return self._cells, self.points.kept[:, :3] - elastic, D
 
     # -- see openings.py -----------------------------------------------------------------------
 

@@ -149,6 +149,19 @@ class Points(ABC):
     def release(self, least: float) -> None:
         """Let held points open from now on whose excess was so large in the latest response."""
 
+    def tangent(self) -> tuple[Array, Array]:
+        """Strains of the accepted state, and derivatives of a response to them; nothing changes.
+
+        Shapes (cells, 3) and (cells, 9).
+        """
+        arrays = self._storage, self.strains, self.r, self.D, self._search.flags
+        before = [array.copy() for array in arrays]
+        try:
+            return self._e0.copy(), self.respond(self._e0)[1].copy()
+        finally:
+            for array, values in zip(arrays, before, strict=True):
+                array[:] = values
+
     def hold(self) -> None:
         """Close again the points that :meth:`release` opened."""
         flows = self["flows"]

@@ -222,6 +222,7 @@ int all_finite(int size, const double *values);
  * error, or zero, as what SNES calls does. */
 typedef struct {
   int (*PetscErrorMessage)(int error, const char **text, char **specific);
+  int (*PetscOptionsUsed)(void *options, const char *name, void *used); /* a bool or an int */
   int (*VecGetArrayRead)(void *vec, const double **values);
   int (*VecRestoreArrayRead)(void *vec, const double **values);
   int (*VecGetArray)(void *vec, double **values);

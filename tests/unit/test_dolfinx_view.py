@@ -1,0 +1,266 @@
+# SPDX-License-Identifier: MIT
+"""Functions, forms and the SNES of a simulation are those of the equations that run."""
+
+from mpi4py import MPI
+
+import numpy as np
+import pytest
+import ufl
+from dolfinx import fem, has_adios2
+
+import ufl_beam as ub
+from ufl_beam.discretization.dolfinx_forms import DolfinxFields
+from ufl_beam.output import dolfinx_view
+
+BOTH = pytest.mark.parametrize("reference", [False, True], ids=["compiled", "reference"])
+
+STEEL = {"EA": 1e6, "GA": 4e5, "EI": 800.0, "rhoA": 10.0, "rhoI": 0.01}
+
+
+@pytest.fixture(autouse=True)
+def _shuffled(monkeypatch):
+    """Cells of the mesh in an order that is not theirs in the scene, as DOLFINx may choose."""
+
+    def fields(share):
+        order = np.random.default_rng(3).permutation(len(share.cells))
+        return DolfinxFields(share, order)
+
+    monkeypatch.setattr(dolfinx_view, "DolfinxFields", fields)
+
+
+def frame():
+    """Elastic cells, cells that yield and hinge, and hinges of zero length; a rigid corner."""
+    weak = ub.Section(
+        **STEEL, bending=ub.Hardening(30.0, modulus=80.0), hinge=ub.Softening(40.0, energy=15.0)
+    )
+    left = ub.Beam((0, 0), (0, 1), weak, cells=5)
+    roof = ub.Beam(
+        (0, 1), (1, 1.2), ub.Section(**STEEL), cells=4, hinges={0.5: ub.Softening(20, 5)}
+    )
+    return ub.Scene(
+        [left, roof],
+        joints=[ub.Rigid(left.end, roof.start)],
+        supports=[ub.Clamped(left.start), ub.Pinned(roof.end)],
+        loads=[ub.PointLoad(roof.at(0.25), force=(900.0, -700.0), time=ub.ramp(0.1))],
+    )
+
+
+def moved(scene, scheme, reference=False, *, t=0.06, **more):
+    """A simulation some steps later."""
+    newton = ub.Newton(rtol=1e-12, reference=reference)
+    simulation = ub.Simulation(scene, scheme, newton=newton, **{"comm": MPI.COMM_SELF, **more})
+    for k in range(6):
+        simulation.step_to(t * (k + 1) / 6)
+    return simulation
+
+
+def assembled(simulation, work):
+    """A linear form on the mesh, at the degrees of freedom of the scene."""
+    r, view = np.zeros(len(simulation.q)), simulation.dolfinx
+    np.add.at(r, view.dofs, fem.assemble_vector(fem.form(work)).array)
+    return r
+
+
+@BOTH
+@pytest.mark.parametrize("scheme", [ub.Midpoint(0.1), ub.ExactStatic(), ub.GeneralizedAlpha()])
+def test_forms_are_those_of_the_terms(reference, scheme):
+    """In a step that has not begun; cells that flow have the tangent of a step."""
+    simulation = moved(frame(), scheme, reference, t=0.06 if scheme.dynamic else 0.03)
+    assert simulation.damage()[1].max() > 1e-3  # J
+    beams = [term for term in simulation.terms if term.kind == "beams"]
+    points = [one.points for one in simulation.inelastic]
+    before = [[one["growth"].copy(), one["flows"].copy(), one.r.copy()] for one in points]
+    forms = simulation.dolfinx.forms
+    for one, values in zip(points, before, strict=True):  # asking changes nothing
+        assert all(map(np.array_equal, [one["growth"], one["flows"], one.r], values))
+
+    work, q = assembled(simulation, forms.work), simulation.q
+    K, dofs = (
+        fem.assemble_matrix(fem.form(forms.tangent)).to_scipy().tocoo(),
+        simulation.dolfinx.dofs,
+    )
+    tangent = np.zeros((len(q), len(q)))
+    np.add.at(tangent, (dofs[K.row], dofs[K.col]), K.data)
+
+    step = scheme.step(simulation.t, simulation.t + 0.01, simulation.t + 0.01, q)
+    r, A = np.zeros(len(q)), simulation.equation.A
+    A.data.fill(0.0)
+    for term in beams:
+        term.begin(step)
+        term.add_tangent(q)  # in statics the first one is of the forces before
+        A.data.fill(0.0)
+    for term in beams:
+        term.add_residual(q, r)
+        term.add_tangent(q)
+    expected = np.zeros_like(tangent)
+    expected[A.rows(), A.indices] = A.data
+    # Round-off of strains from displacements of the size of the frame, times EA.
+    assert np.allclose(work, r, rtol=0, atol=1e-12 * STEEL["EA"])
+    assert np.allclose(tangent, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+    simulation.close()
+
+
+@BOTH
+def test_forms_asked_for_on_the_way(reference):
+    """They change no digit of the steps to come."""
+    plain, asked = (
+        ub.Simulation(frame(), ub.Midpoint(0.1), newton=ub.Newton(reference=reference))
+        for _ in range(2)
+    )
+    for k in range(8):
+        asked.dolfinx.forms  # noqa: B018
+        for one in (plain, asked):
+            one.step_to(0.01 * (k + 1))
+    assert np.array_equal(plain.q, asked.q)
+    assert plain.entries() == asked.entries()
+    for one in (plain, asked):
+        one.close()
+
+
+@BOTH
+def test_functions_follow_the_state(reference):
+    simulation = moved(frame(), ub.Midpoint(0.1), reference)
+    view, first = simulation.dolfinx, simulation.dolfinx.configuration
+    before = first.x.array.copy()
+    simulation.step_to(0.08)
+    assert view.configuration is first
+    assert not np.allclose(first.x.array, before)
+    assert np.array_equal(first.x.array, simulation.q[view.dofs])
+    assert np.array_equal(view.velocity.x.array, simulation.inertia.v[view.dofs])
+    jump, _ = simulation.damage()
+    assert np.array_equal(view.jump.x.array, jump[view.cells])
+    of_left, of_roof = (np.abs(view.jump.x.array[view.cell_tags.find(n)]) for n in (0, 1))
+    assert of_left.max() > 0  # embedded
+    assert of_roof.max() > 0  # of zero length
+    # Resultants of elastic cells are theirs of the strains.
+    elastic = view.cell_tags.find(1)
+    strains, forces = (f.x.array.reshape(-1, 3)[elastic] for f in (view.strains, view.forces))
+    assert np.allclose(forces, strains * [STEEL[name] for name in ("EA", "GA", "EI")])
+    simulation.close()
+
+
+@BOTH
+@pytest.mark.parametrize("degree", [1, 3])
+def test_an_own_form(reference, degree):
+    """The length of a beam by a load of 1 N/m, and the load of the scene by internal forces."""
+    beam = ub.Beam((0, 0), (2, 0.3), ub.Section(**STEEL), cells=4)
+    down = ub.PointLoad(beam.at(0.5), force=(0, -30.0))
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), ub.Pinned(beam.end)], loads=[down])
+    simulation = moved(scene, ub.ExactStatic(), reference, mesh=ub.Mesh(degree=degree))
+    view = simulation.dolfinx
+    w = ufl.TestFunction(view.function_space)
+    weight = assembled(simulation, w[1] * view.dx)
+    length = fem.assemble_scalar(fem.form(fem.Constant(view.mesh, 1.0) * view.dx))
+    assert weight.sum() == pytest.approx(length, rel=1e-14)
+    r = assembled(simulation, view.forms.work)
+    free = np.ones(len(r), dtype=bool)
+    free[simulation.supports.dofs] = False
+    assert np.abs(r[free]).max() == pytest.approx(30.0, rel=1e-8)
+    assert np.sum(np.abs(r[free]) > 1e-6) == 1
+    simulation.close()
+
+
+@BOTH
+def test_each_process_has_its_cells(reference):
+    """Energies of all of them are those of the ledger; of one process, those of the scene."""
+    scene = frame()
+    simulation = moved(scene, ub.Midpoint(0.1), reference, comm=MPI.COMM_WORLD)
+    view, (state, _, _) = simulation.dolfinx, simulation.entries()
+    v, M = view.velocity.x.array, fem.assemble_matrix(fem.form(view.forms.mass)).to_scipy()
+    kinetic = MPI.COMM_WORLD.allreduce(v @ M @ v / 2)
+    assert kinetic == pytest.approx(state["kinetic"], rel=1e-12)
+    jump = np.zeros(len(simulation.grid.cells))
+    jump[view.cells] = view.jump.x.array
+    MPI.COMM_WORLD.Allreduce(MPI.IN_PLACE, jump)
+    alone = moved(scene, ub.Midpoint(0.1), reference)
+    # Jumps of some 0.1 rad, by steps solved to 1e-12 of the forces.
+    assert np.allclose(jump, alone.damage()[0], rtol=0, atol=1e-8)
+    assert np.abs(jump).max() > 1e-3
+    for one in (simulation, alone):
+        one.close()
+
+
+def test_what_a_scene_does_not_have():
+    beam = ub.Beam((0, 0), (1, 0), ub.Section(**STEEL), cells=2)
+    simulation = ub.Simulation(ub.Scene([beam], supports=[ub.Clamped(beam.start)]), ub.Static())
+    with pytest.raises(ub.SceneError, match=r"dolfinx\.jump: nothing in the scene can hinge; give"):
+        simulation.dolfinx.jump  # noqa: B018
+    with pytest.raises(ub.SceneError, match=r"dolfinx\.velocity: a static scheme has no velocit"):
+        simulation.dolfinx.velocity  # noqa: B018
+    simulation.close()
+
+
+@pytest.mark.serial
+@pytest.mark.skipif(not has_adios2, reason="DOLFINx without ADIOS2")
+def test_files_of_dolfinx(tmp_path):
+    from dolfinx.io import VTXWriter
+
+    simulation = moved(frame(), ub.Midpoint(0.1), t=0.03)
+    view = simulation.dolfinx
+    ψ = fem.Function(fem.functionspace(view.mesh, ("Lagrange", 1)))
+    with (
+        VTXWriter(MPI.COMM_SELF, tmp_path / "jump.bp", [view.jump]) as in_cells,
+        VTXWriter(MPI.COMM_SELF, tmp_path / "turn.bp", [ψ]) as at_nodes,
+    ):
+        for t in (0.04, 0.05):
+            simulation.step_to(t)
+            assert view.jump.name == "jump"  # asked for, it has the values of the state
+            ψ.interpolate(view.configuration.sub(2))
+            for file in (in_cells, at_nodes):
+                file.write(t)
+    assert np.abs(ψ.x.array).max() == np.abs(view.configuration.sub(2).collapse().x.array).max() > 0
+    for name in ("jump", "turn"):
+        assert sum(path.stat().st_size for path in (tmp_path / f"{name}.bp").rglob("*")) > 1000
+    simulation.close()
+
+
+# -- the SNES ------------------------------------------------------------------------------------
+
+
+@BOTH
+def test_a_monitor_sees_each_iteration_and_changes_none(reference):
+    plain = moved(frame(), ub.Midpoint(0.1), reference)
+    watched = ub.Simulation(
+        frame(), ub.Midpoint(0.1), newton=ub.Newton(rtol=1e-12, reference=reference)
+    )  # under mpirun, by all processes
+    seen = []
+    watched.snes.setMonitor(lambda snes, iteration, norm: seen.append((iteration, norm)))
+    assert watched.snes.getType() == "newtonls"
+    for k in range(6):
+        watched.step_to(0.01 * (k + 1))
+    assert len(seen) - sum(iteration == 0 for iteration, _ in seen) == watched.iterations
+    assert plain.iterations == watched.iterations
+    # Sums are in another order, and in C operations are contracted otherwise.
+    assert np.allclose(plain.q, watched.share.gather(watched.q), rtol=0, atol=1e-11)
+    for simulation in (plain, watched):
+        simulation.close()
+
+
+def test_a_history_of_residuals():
+    simulation = ub.Simulation(frame(), ub.Midpoint(0.1))
+    simulation.snes.setConvergenceHistory()
+    simulation.step_to(0.01)
+    norms, _ = simulation.snes.getConvergenceHistory()
+    assert len(norms) == simulation.iterations + 1
+    assert norms[-1] < 1e-6 * norms.max()
+    simulation.close()
+
+
+class Monitored(ub.Recorder):
+    """Iterations of a path."""
+
+    def open(self, simulation):
+        self.seen = []
+        simulation.snes.setMonitor(lambda snes, iteration, norm: self.seen.append(iteration))
+
+    def write(self, simulation):
+        self.iterations = simulation.iterations
+
+
+def test_a_monitor_of_a_path():
+    beam = ub.Beam((0, 0), (1, 0), ub.Section(**STEEL), cells=4)
+    down = ub.PointLoad(beam.end, force=(0, -100.0), time=lambda t: t)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[down])
+    watch = Monitored()
+    ub.follow(scene, ub.ArcLength(0.1), steps=3, record=watch)
+    assert len([iteration for iteration in watch.seen if iteration]) == watch.iterations > 0

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: MIT
+"""Schemes and recorders of users that are incomplete are refused by the names of what they lack."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+import ufl_beam as ub
+from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme
+from ufl_beam.protocols import members
+from ufl_beam.simulation import assembly
+
+BEAM = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0), cells=2)
+SCENE = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)])
+
+
+@pytest.fixture(autouse=True)
+def no_mesh(monkeypatch):
+    """Whatever is refused below is refused before any mesh exists."""
+
+    def made(*_, **__):
+        raise AssertionError("a mesh was made")
+
+    monkeypatch.setattr(assembly, "Fields", made)
+    monkeypatch.setattr("ufl_beam.simulation.simulation.Share", made)
+
+
+def refused(said, scheme=None, **more):
+    with pytest.raises(ub.SceneError) as caught:
+        ub.simulate(SCENE, scheme or ub.Midpoint(), t=(0, 0.1), dt=0.01, **more)
+    assert said in str(caught.value)
+
+
+def without(*names):
+    """A scheme in statics that has all but some members."""
+    static = ub.Static()
+    return type("Mine", (), {n: getattr(static, n) for n in members(Scheme) if n not in names})()
+
+
+def test_members():
+    assert members(Scheme)["theta"] is None
+    assert members(Scheme)["step"] is Scheme.step
+    assert [*members(DynamicScheme)][: len(members(Scheme))] == [*members(Scheme)]
+    assert {"kept", "inertia"} <= {*members(DynamicScheme)} - {*members(Scheme)}
+
+
+@pytest.mark.parametrize("names", [("nodal_step",), ("theta", "acting"), ("step",)])
+def test_a_scheme_that_lacks_something(names):
+    refused(f"scheme: Mine is not a time scheme: it lacks {', '.join(names)}", without(*names))
+
+
+@pytest.mark.parametrize("name", [n for n in members(Scheme) if n != "dynamic"])
+def test_each_member_counts(name):
+    refused(f"it lacks {name}", without(name))
+
+
+def test_a_scheme_with_inertia_that_lacks_something():
+    @dataclass(frozen=True)
+    class Mine(ub.ExactStep, ub.Midway):
+        alpha = 0.0
+
+    refused("lacks way_to_rest, slips, inertia, rates, slip, error_weights", Mine())
+
+
+def test_a_method_with_other_arguments():
+    class Mine(ub.Midpoint):
+        def slip(self, change):
+            return change
+
+    said = "Mine is not a time scheme: its method slip cannot be called as slip(dt, change, rates)"
+    refused(said, Mine())
+    named = without("step")
+    type(named).step = 1.0
+    refused("its method step cannot be called as step(t0, t1, end, q0)", named)
+
+
+def test_more_arguments_with_defaults_are_no_fault():
+    class Mine(ub.Midpoint):
+        def slip(self, dt, change, rates, more=0):
+            return 0.0 * change
+
+    with pytest.raises(AssertionError, match="a mesh was made"):
+        ub.simulate(SCENE, Mine(), t=(0, 0.1), dt=0.01)
+
+
+def test_a_scheme_that_cannot_be_hashed():
+    mine = without()
+    type(mine).__hash__ = None
+    refused("Mine cannot be hashed, and forms are kept by scheme; decorate the class with", mine)
+
+
+@pytest.mark.parametrize("value", [1.0, "Midpoint", ub.Midpoint, object(), np.zeros(3)])
+def test_no_scheme_at_all(value):
+    with pytest.raises(
+        ub.SceneError, match=r"must be a scheme, such as Static\(\) or Midpoint\(\)"
+    ):
+        ub.simulate(SCENE, value, t=(0, 0.1), dt=0.01)
+
+
+# -- recorders -----------------------------------------------------------------------------------
+
+
+def test_a_recorder_without_its_base_class():
+    class Mine:
+        def open(self, simulation): ...
+        def write(self, simulation): ...
+
+    refused("simulate: record[0] = <", record=[Mine()])
+    refused("is not a Recorder; classes of your own are derived from ub.Recorder", record=[Mine()])
+
+
+def test_a_recorder_that_lacks_a_method():
+    class Mine(ub.Recorder):
+        def open(self, simulation): ...
+
+    with pytest.raises(TypeError, match=r"Mine .*write"):
+        Mine()
+
+
+def test_a_recorder_with_other_arguments():
+    class Mine(ub.Recorder):
+        def open(self, simulation): ...
+        def write(self, simulation, t): ...
+
+    said = "record[0]: Mine is not a recorder: its method write cannot be called as "
+    refused(said + "write(simulation)", record=Mine())

@@ -1,0 +1,341 @@
+# SPDX-License-Identifier: MIT
+"""State of a simulation as functions and forms of DOLFINx, for forms and files of users."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import NamedTuple, Protocol
+
+import numpy as np
+import ufl
+
+from ufl_beam.arrays import Array, Index
+from ufl_beam.discretization.dolfinx_forms import DolfinxFields, dofs_of_cells
+from ufl_beam.discretization.function_spaces import Strains, derivative, mass_form
+from ufl_beam.discretization.partition import Share
+from ufl_beam.dolfinx_compat import fem
+from ufl_beam.dolfinx_compat import mesh as meshes
+from ufl_beam.errors import SceneError
+from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
+from ufl_beam.model.scene import Scene
+from ufl_beam.terms.beams import elastic_forms
+from ufl_beam.terms.inelastic_beams import InelasticBeams, inelastic_forms
+
+
+class Viewed(Protocol):
+    """What a view shows: a simulation, see :class:`StateView`."""
+
+    scene: Scene
+    scheme: Scheme
+    share: Share
+    q: Array
+    inelastic: list[InelasticBeams]
+
+    def velocities(self) -> list[Array]:
+        """Velocities at the local degrees of freedom; none in statics."""
+
+    def section_forces(self) -> Array:
+        """(N, V, M) in all cells; (num_cells, 3); N, N, N m."""
+
+    def damage(self) -> tuple[Array, Array]:
+        """Jump of rotation (rad) and dissipated energy (J) of each cell; both (num_cells,)."""
+
+
+class BeamForms(NamedTuple):
+    """Forms of the resultants and the inertia of the beams.
+
+    What a scene has besides, such as joints, loads and supports, is in none of them.
+
+    Attributes:
+        q0, q1: Configurations at the beginning and at the end of a step.
+        work: Virtual work of the resultants in the step from q0 to q1, P(12); linear.
+        tangent: Its derivative by q1; bilinear.
+        mass: Mass of the beams without point masses and bodies, P(67); bilinear.
+    """
+
+    q0: fem.Function
+    q1: fem.Function
+    work: ufl.Form
+    tangent: ufl.Form
+    mass: ufl.Form
+
+
+class DolfinxView:
+    """Mesh, functions and forms of a simulation, in the types of DOLFINx; ``simulation.dolfinx``.
+
+    A function is made when it is asked for first.  It is the same object ever after, and has the
+    values of the accepted state when it was asked for last.  All are copies: nothing that is done
+    to them changes the run.  With several processes that share a scene each has a mesh of its own
+    cells; all of them ask together.
+
+    Beams have vertices of their own, also where joints connect them: a function of the mesh may
+    jump there, and :attr:`dofs` leads from it to the unknowns of the scene, which joints share.
+
+    Example:
+        >>> from dolfinx import fem
+        >>> simulation = ub.Simulation(scene, ub.Midpoint())
+        >>> simulation.step_to(0.5)
+        >>> view = simulation.dolfinx
+        >>> C, e = view.stiffness, view.strains  # (EA, GA, EI), (Σ, Γ, K)
+        >>> energy = sum(C[i] * e[i] ** 2 / 2 for i in range(3)) * view.dx
+        >>> stored = fem.assemble_scalar(fem.form(energy))
+        >>> bool(np.isclose(stored, simulation.entries()[0]["stored"], rtol=1e-12))
+        True
+    """
+
+    def __init__(self, of: Viewed) -> None:
+        self._of = of
+
+    @cached_property
+    def _fields(self) -> DolfinxFields:
+        return DolfinxFields(self._of.share)
+
+    # -- mesh and spaces -------------------------------------------------------------------------
+
+    @property
+    def mesh(self) -> meshes.Mesh:
+        """Mesh of the cells of this process, in the plane, undeformed; m.
+
+        Example:
+            >>> view.mesh.topology.index_map(1).size_local, view.mesh.geometry.dim
+            (4, 2)
+        """
+        return self._fields.mesh
+
+    @cached_property
+    def cells(self) -> Index:
+        """Number in the scene of each cell of the mesh: row of section forces, and the like.
+
+        Example:
+            >>> simulation.section_forces()[view.cells].shape
+            (4, 3)
+        """
+        return np.asarray(self._of.share.cells[self._fields.order])
+
+    @cached_property
+    def cell_tags(self) -> meshes.MeshTags:
+        """Number in ``scene.beams`` of the beam of each cell.
+
+        Example:
+            >>> import ufl
+            >>> dx = ufl.Measure("dx", domain=view.mesh, subdomain_data=view.cell_tags)
+            >>> print(round(fem.assemble_scalar(fem.form(fem.Constant(view.mesh, 1.0) * dx(0))), 9))
+            2.0
+        """
+        beams = self._of.share.grid.beam_of_cell[self.cells]
+        numbers = np.arange(len(beams), dtype=np.int32)
+        return meshes.meshtags(self.mesh, 1, numbers, beams.astype(np.int32))
+
+    @property
+    def function_space(self) -> fem.FunctionSpace:
+        """Space of configurations (u_x, u_y, ψ): continuous, P1 with cells of degree 1.
+
+        Example:
+            >>> len(fem.Function(view.function_space).x.array)
+            15
+        """
+        return self._fields.element.space
+
+    @cached_property
+    def dofs(self) -> Index:
+        """Local degree of freedom of the scene of each of :attr:`function_space`.
+
+        Example:
+            >>> import ufl
+            >>> w = ufl.TestFunction(view.function_space)
+            >>> weight = fem.assemble_vector(fem.form(w[1] * view.dx))  # of a load of 1 N/m
+            >>> r = np.zeros(len(simulation.q))
+            >>> np.add.at(r, view.dofs, weight.array)
+            >>> print(round(r.sum(), 9))
+            2.0
+            >>> bool((view.configuration.x.array == simulation.q[view.dofs]).all())
+            True
+        """
+        here = dofs_of_cells(self.function_space)
+        of_scene = np.empty(here.max(initial=-1) + 1, dtype=np.int32)
+        of_scene[here] = self._fields.cell_dofs
+        return of_scene
+
+    @property
+    def dx(self) -> ufl.Measure:
+        """Integration over the cells with the points of the resultants, one for degree 1.
+
+        Example:
+            >>> view.dx.metadata()
+            {'quadrature_degree': 1}
+        """
+        return self._fields.element.dx(1)
+
+    # -- functions -------------------------------------------------------------------------------
+
+    @property
+    def stiffness(self) -> fem.Function:
+        """Elastic stiffnesses (EA, GA, EI) of the sections, constant in a cell; N, N, N m².
+
+        Example:
+            >>> bool(view.stiffness.x.array[2] == section.EI)
+            True
+        """
+        return self._put(self._stiffness, self._fields.of_sections(self._fields.element.stiffness))
+
+    @property
+    def configuration(self) -> fem.Function:
+        """Configuration (u_x, u_y, ψ) of the accepted state; m, m, rad.
+
+        Example:
+            >>> ψ = view.configuration.sub(2).collapse()
+            >>> bool(np.isclose(ψ.x.array.min(), simulation.displacement(beam.end)[2]))
+            True
+        """
+        return self._fill(self._configuration, self._of.q)
+
+    @property
+    def velocity(self) -> fem.Function:
+        """Velocity of the configuration in the accepted state; m/s, m/s, rad/s.
+
+        Raises:
+            SceneError: The scheme is a static one.
+
+        Example:
+            >>> v = view.velocity.sub(1).collapse()
+            >>> bool(np.isclose(v.x.array.min(), simulation.velocity(beam.end)[1]))
+            True
+        """
+        if not has_inertia(self._of.scheme):
+            raise SceneError("dolfinx.velocity: a static scheme has no velocities; run dynamics")
+        return self._fill(self._velocity, self._of.velocities()[0])
+
+    @property
+    def strains(self) -> fem.Function:
+        """Strains (Σ, Γ, K) of the configuration, means of the cells; 1, 1, 1/m.
+
+        Those of the bulk have no part of a jump, see ``mechanics/functional.py``.
+
+        Example:
+            >>> view.strains.x.array.reshape(-1, 3).shape
+            (4, 3)
+        """
+        return self._put(self._strains, self._mean_strains.mean(self._of.q))
+
+    @property
+    def forces(self) -> fem.Function:
+        """Resultants (N, V, M), means of the cells; N, N, N m.
+
+        Example:
+            >>> M = view.forces.x.array.reshape(-1, 3)[:, 2]
+            >>> bool(np.allclose(M, simulation.section_forces()[view.cells, 2]))
+            True
+        """
+        return self._put(self._forces, self._of.section_forces()[self.cells])
+
+    @property
+    def jump(self) -> fem.Function:
+        """Jump α of the rotation in the hinge of each cell, in DG0; rad.
+
+        A plastic hinge of zero length belongs to the cell before it, at the start of a beam to the
+        first one; of several jumps of a cell it is the largest.
+
+        Raises:
+            SceneError: Nothing in the scene can hinge.
+
+        Example:
+            >>> opening = ub.Simulation(hinged, ub.Static())
+            >>> opening.step_to(1.0)
+            >>> print(opening.dolfinx.jump.x.array.round(3)[:3])
+            [-0.024  0.     0.   ]
+        """
+        scene = self._of.scene
+        if not scene.hinges and all(beam.section.hinge is None for beam in scene.beams):
+            raise SceneError(
+                "dolfinx.jump: nothing in the scene can hinge; give a beam "
+                "hinges={0.5: Softening(...)}, or a section hinge=Softening(...)"
+            )
+        return self._put(self._jump, self._of.damage()[0][self.cells])
+
+    @cached_property
+    def _configuration(self) -> fem.Function:
+        return self._named("configuration", self.function_space)
+
+    @cached_property
+    def _velocity(self) -> fem.Function:
+        return self._named("velocity", self.function_space)
+
+    @cached_property
+    def _stiffness(self) -> fem.Function:
+        return self._named("stiffness", self._fields.element.stiffness.function_space)
+
+    @cached_property
+    def _strains(self) -> fem.Function:
+        return self._named("strains", self._stiffness.function_space)
+
+    @cached_property
+    def _mean_strains(self) -> Strains:
+        return Strains(self._fields)
+
+    @cached_property
+    def _forces(self) -> fem.Function:
+        return self._named("forces", self._stiffness.function_space)
+
+    @cached_property
+    def _jump(self) -> fem.Function:
+        return self._named("jump", fem.functionspace(self.mesh, ("DG", 0)))
+
+    def _named(self, name: str, space: fem.FunctionSpace) -> fem.Function:
+        return fem.Function(space, name=name)
+
+    def _fill(self, function: fem.Function, values: Array) -> fem.Function:
+        """Give a function values at the degrees of freedom of the scene."""
+        function.x.array[:] = values[self.dofs]
+        return function
+
+    def _put(self, function: fem.Function, values: Array) -> fem.Function:
+        """Give a function values in the cells of the mesh."""
+        dofs = dofs_of_cells(function.function_space)
+        function.x.array[dofs] = values.reshape(dofs.shape)
+        return function
+
+    # -- forms -----------------------------------------------------------------------------------
+
+    @property
+    def forms(self) -> BeamForms:
+        """Forms of the beams as the time scheme has them, at a step that has not begun: q0 is q1.
+
+        Cells that may yield or break have the resultants of the state, and the consistent tangent
+        of a step like the last one.
+
+        Example:
+            >>> forms = view.forms
+            >>> r = fem.assemble_vector(fem.form(forms.work)).array  # internal forces
+            >>> K = fem.assemble_matrix(fem.form(forms.tangent)).to_scipy()
+            >>> M = fem.assemble_matrix(fem.form(forms.mass)).to_scipy()
+            >>> v = view.velocity.x.array
+            >>> bool(np.isclose(v @ M @ v / 2, simulation.entries()[0]["kinetic"], rtol=1e-12))
+            True
+        """
+        forms = self._forms
+        for function in (forms.q0, forms.q1):
+            self._fill(function, self._of.q)
+        tables = [np.zeros((len(self._of.share.grid.cells), k)) for k in (3, 9)]
+        for cells, *values in (one.about_state() for one in self._of.inelastic):
+            for table, rows in zip(tables, values, strict=True):
+                table[cells] = rows
+        for function, table in zip(self._around, tables, strict=False):  # none if all is elastic
+            self._put(function, table[self.cells])
+        return forms
+
+    @cached_property
+    def _forms(self) -> BeamForms:
+        """Forms that are stated once.
+
+        Cells with material points have no elastic stiffness, the others no b and D.
+        """
+        of, scheme = self._fields.element, self._of.scheme
+        self._around: tuple[fem.Function, ...] = ()
+        work = elastic_forms(of, scheme).work
+        if self._of.inelastic:
+            points = inelastic_forms(of, scheme)
+            work, self._around = work + points.around, (points.b, points.D)
+            of_points = np.concatenate([one.kept()[0] for one in self._of.inelastic])
+            dofs = dofs_of_cells(of.stiffness.function_space)
+            of.stiffness.x.array[dofs[np.isin(self.cells, of_points)]] = 0.0
+        return BeamForms(of.q0, of.q1, work, derivative(work, of.q1), mass_form(of))
