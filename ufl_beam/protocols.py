@@ -35,11 +35,6 @@ def members(of: type) -> dict[str, Callable[..., Any] | None]:
     return found
 
 
-def lacking(value: object, of: type) -> list[str]:
-    """Names of the members of a protocol that an object lacks."""
-    return [name for name in members(of) if not hasattr(value, name)]
-
-
 def require_members(value: object, of: type, what: str, kind: str) -> None:
     """Raise :class:`SceneError` naming ``what`` unless an object has the members of a protocol.
 
@@ -47,7 +42,7 @@ def require_members(value: object, of: type, what: str, kind: str) -> None:
     should be, such as "a time scheme".
     """
     name = type(value).__name__
-    if missing := lacking(value, of):
+    if missing := [name for name in members(of) if not hasattr(value, name)]:
         raise SceneError(f"{what}: {name} is not {kind}: it lacks {', '.join(missing)}")
     known = _calls_match.setdefault(type(value), set())
     if of in known:
