@@ -77,21 +77,21 @@ def test_what_is_switched_off(bench, advanced):
     import switches
 
     def snes(simulation):
-        return simulation._solver._snes.getType()
+        return simulation.solver._snes.getType()
 
     shipped = advanced(switches.SHIPPED)
     assert snes(shipped) == "shell"
     assert shipped.equation.in_c
     assert shipped.beams[0]._force.cells.lanes > 1
-    assert shipped._solver._factors._elimination.c.chains == 1
+    assert shipped.solver._factors._elimination.c.chains == 1
     assert snes(advanced(switches.PETSC)) == "newtonls"
     assert not advanced(switches.PYTHON).equation.in_c
     assert not isinstance(advanced(switches.ASSEMBLERS).beams[0]._force, Kernel)
     assert advanced(switches.SCALAR).beams[0]._force.cells.lanes == 1
     whole = advanced(switches.WHOLE)
     assert snes(whole) == "shell"
-    assert whole._solver._factors._elimination.c.left_size == len(whole.q)
-    assert isinstance(advanced(switches.KLU)._solver._factors, DirectSolver)
+    assert whole.solver._factors._elimination.c.left_size == len(whole.q)
+    assert isinstance(advanced(switches.KLU).solver._factors, DirectSolver)
 
 
 def test_kept_tangents_are_switched_off(bench):
@@ -119,7 +119,7 @@ def test_nothing_stays_replaced(bench, advanced):
             advanced(name)
     simulation = advanced(switches.SHIPPED)
     assert simulation.equation.in_c
-    assert simulation._solver._snes.getType() == "shell"
+    assert simulation.solver._snes.getType() == "shell"
     assert simulation.beams[0]._force.cells.lanes > 1
 
 
