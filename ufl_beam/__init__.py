@@ -48,6 +48,7 @@ from ufl_beam.errors import ConvergenceError, CopiesDiffer, ModelWarning, SceneE
 from ufl_beam.mechanics.classical import GeneralizedAlpha, Newmark, Static
 from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
 from ufl_beam.mechanics.energy_momentum import ExactStatic, Midpoint, PrintedMidpoint
+from ufl_beam.model import law_functions
 from ufl_beam.model.beams import Beam
 from ufl_beam.model.bodies import Body, Place, Spot, ground
 from ufl_beam.model.connector_laws import (
@@ -77,6 +78,7 @@ from ufl_beam.model.joints import (
 )
 from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, PointLoad, RotatingFrame
 from ufl_beam.model.masses import PointMass, Velocity
+from ufl_beam.model.material_law import MaterialLaw
 from ufl_beam.model.material_laws import DuvautLions, Hardening, LinearSoftening, Perzyna, Softening
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
@@ -121,14 +123,16 @@ __all__ = [
     "Events", "ExactStatic", "Extent", "Extremes", "Fatigue", "Fibres", "FollowerLoad",
     "ForceLaw", "GeneralizedAlpha", "Gerber", "Goodman", "Gravity", "Guided", "Hardening",
     "History", "HotSpot", "Joint", "KelvinVoigt", "LineLoad", "LinearSoftening", "Link",
-    "LoadControl", "Lognormal", "Mesh", "Midpoint", "ModelWarning", "Modes", "Motor", "Newmark",
-    "Newton", "Normal", "Path", "Perzyna", "Pinned", "Place", "PointLoad", "PointMass",
+    "LoadControl", "Lognormal", "MaterialLaw", "Mesh", "Midpoint", "ModelWarning", "Modes",
+    "Motor", "Newmark", "Newton", "Normal", "Path", "Perzyna", "Pinned", "Place", "PointLoad",
+    "PointMass",
     "Prescribed", "PrintedMidpoint", "Prismatic", "Rayleigh", "Recorder", "Release", "Revolute",
     "Rigid", "RigidLink", "RigidPlastic", "Roller", "RotatingFrame", "SNCurve", "Scene",
     "SceneError", "Section", "Simulation", "Slide", "Softening", "Solution", "Spot", "Spring",
     "Static", "Stop", "Stretch", "Study", "Support", "Table", "Tradeoff", "TradeoffError",
     "TruncatedNormal", "Turn", "Velocity", "Weibull", "animate", "buckling", "damping",
-    "damping_ratio", "fit_decay", "follow", "ground", "load", "logarithmic_decrement", "modes",
+    "damping_ratio", "fit_decay", "follow", "ground", "law_functions", "load",
+    "logarithmic_decrement", "modes",
     "peaks", "picture", "plot", "plot_cycles", "plot_damage", "plot_dissipation", "plot_energy",
     "plot_extremes", "plot_hinge", "plot_history", "plot_modes", "plot_moment_curvature",
     "plot_shapes", "plot_tradeoff", "rainflow", "ramp", "render", "say", "simulate", "study",

@@ -8,8 +8,8 @@ import pytest
 
 import ufl_beam as ub
 from ufl_beam.model.fibres import Layout
-from ufl_beam.model.material_laws import HardeningBulk
-from ufl_beam.terms.material_points import Points, inputs
+from ufl_beam.terms.compiled_points import CompiledPoints
+from ufl_beam.terms.point_equations import inputs
 
 C, LENGTH = 200.0, 0.5
 NONE = ub.Hardening(math.inf)
@@ -49,18 +49,19 @@ class Bars:
             hinges=True,
         )
         self.C, self.length, self.scheme, self.softening = C, length, scheme, softening
-        self.numbers = layout.bulk([(0, k) for k in range(cells)])
-        self.points = Points(
+        self.numbers = layout.numbers([(0, k) for k in range(cells)])
+        self.points = CompiledPoints(
             layout,
             [(0, k) for k in range(cells)],
             np.full(cells, length),
             scheme,
-            np.zeros((cells, 1, len(inputs(HardeningBulk)))),
+            np.zeros((cells, 1, len(inputs(layout)))),
         )
         self.strain = np.zeros(cells)
 
     def __getitem__(self, name):
-        return self.points[name][:, 0].copy()
+        state = f"state {name}"
+        return self.points[state if state in self.points.names else name][:, 0].copy()
 
     def _strains(self, strain):
         return np.column_stack([strain, np.zeros((len(strain), 2))])
@@ -110,7 +111,7 @@ def test_laws_hold_after_each_step(law, scheme):
     some, dt, θ = bars(law, scheme), 0.1, scheme.theta
     bulk, softening = LAWS[law]
     H, B = bulk.modulus, bulk.kinematic
-    eta = float(np.ravel(some.numbers.eta)[0])
+    eta = float(np.ravel(some.numbers["viscosity"])[0])
     seen = set()
     for strain in histories(200):
         p, ξ, opening, jump = (some[n] for n in ("plastic", "accumulated", "opening", "jump"))

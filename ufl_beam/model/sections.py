@@ -16,10 +16,12 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_kind, require_number
 from ufl_beam.model.fibres import Fibres, Layout, PlacedFibres
-from ufl_beam.model.material_laws import AnySoftening, BulkLaw, Hardening, require_bulk_law
+from ufl_beam.model.law_checks import require_bulk_law
+from ufl_beam.model.material_law import MaterialLaw
+from ufl_beam.model.material_laws import AnySoftening, Hardening
 from ufl_beam.model.records import Instance, NotNegative, Positive, Record
 
-ResultantLaw = Annotated[BulkLaw | None, require_bulk_law]
+ResultantLaw = Annotated[MaterialLaw | None, require_bulk_law]
 
 
 @dataclass(frozen=True, eq=False)
