@@ -37,7 +37,8 @@ def jacobian(
 def solved(A: Array, b: Array) -> Array:
     """Solve A x = b at many points; (n, n, ...), (n, k, ...); NaN where A is singular."""
     A, b = (np.moveaxis(x, (0, 1), (-2, -1)) for x in (A, b))
-    A = np.where((np.linalg.det(A) == 0)[..., None, None], np.nan, A)
+    with np.errstate(invalid="ignore"):
+        A = np.where((np.linalg.det(A) == 0)[..., None, None], np.nan, A)
     return np.asarray(np.moveaxis(np.linalg.solve(A, b), (-2, -1), (0, 1)))
 
 

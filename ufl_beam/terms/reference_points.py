@@ -118,6 +118,7 @@ class ReferencePoints(Points):
         self.D[:] = D.reshape(-1, 9)
         return self.r, self.D
 
+    @np.errstate(over="ignore")  # in the branch of a series that is not taken
     def _resistance(self, at: At) -> tuple[Array, Array]:
         """Resistance of the discontinuities in the step, and its derivative by their growth."""
         return derivative(lambda a: self._equations.resistance(at, a), at["growth"])
