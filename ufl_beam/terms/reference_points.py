@@ -67,9 +67,10 @@ class ReferencePoints(Points):
             z, δ = np.array([at[name] for name in unknown]), solved(J, R[:, None])[:, 0]
             sizes = np.einsum("ij...,j...->i...", abs(J), abs(δ))
             digits = np.einsum("ij...,j...->i...", abs(J), abs(z))
-            digits = digits + np.einsum("ij...,j...->i...", abs(E), abs(ε))
-            small = (abs(R) <= 4 * EPS * digits) | (abs(δ) <= 1e-9 * abs(z))
+            digits = 4 * EPS * (digits + np.einsum("ij...,j...->i...", abs(E), abs(ε)))
+            small = (abs(R) <= digits) | (abs(δ) <= 1e-9 * abs(z))
             ends = ~done & small.all(axis=0)
+            sizes = sizes + digits
             before = part_of(R, sizes)
             part: Array = np.ones(done.shape)
             for _ in range(10):
@@ -152,8 +153,9 @@ class ReferencePoints(Points):
             # Those that do not open, or were over the limit by a last digit.
             none = np.logical_not(np.logical_and(opens, over > 0))
             a = np.where(slope < 0, np.fmin(bound, -over / slope), bound)
+            last = np.full_like(stress, np.inf)
             for _ in range(200):
-                over, slope = excess(a)
+                before, (over, slope) = over, excess(a)
                 low, high = np.where(over > 0, a, low), np.where(over > 0, high, a)
                 better = a - over / slope
                 step = np.abs(better - a)
@@ -163,7 +165,9 @@ class ReferencePoints(Points):
                 if (none | ~np.isnan(found)).all():
                     break
                 halved = np.where(np.isfinite(high), (low + high) / 2, 2 * a)
-                a = np.where((better > low) & (better < high), better, halved)
+                wanders = ((before > 0) != (over > 0)) & (step > last / 2) & np.isfinite(high)
+                within, last = (better > low) & (better < high) & ~wanders, step
+                a = np.where(within, better, halved)
         return np.where(none, 0.0, found)
 
     @property

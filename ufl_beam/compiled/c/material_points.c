@@ -59,7 +59,7 @@ static double part_of(int m, const double *residuals, const double *sizes)
  *
  * The law answers with residuals R, their derivatives J by the variables and E by the strains; with
  * stresses, and their derivatives by strains and by variables. A correction is halved until the largest
- * residual falls, each as a part of the terms that the correction cancels in it.
+ * residual falls, each as a part of the terms that the correction cancels in it and their round-off.
  */
 static void solve_law(const points *p, double *w, double *s)
 {
@@ -89,7 +89,9 @@ static void solve_law(const points *p, double *w, double *s)
       for (int k = 0; k < d; ++k) digits += fabs(E[d * i + k] * w[p->strain + k]);
       /* Round-off of the terms, or a correction whose square is none. */
       const int small = fabs(B[(1 + d) * i]) <= 1e-9 * fabs(z[i]);
-      ends = ends && (fabs(a[i]) <= 4 * DBL_EPSILON * digits || small);
+      digits *= 4 * DBL_EPSILON;
+      sizes[i] += digits;
+      ends = ends && (fabs(a[i]) <= digits || small);
     }
     if (!solved || (!ends && corrections == MOST_CORRECTIONS)) {
       for (int i = 0; i < d + d * d; ++i) s[i] = NAN;
@@ -131,7 +133,7 @@ static inline void answer(const points *p, double *w, double *s)
  *
  * The excess is positive at zero, falls, and is concave unless the bulk flows back in tension:
  * Newton's method comes to its root from above, from where the bulk would be unloaded. Bisection
- * stands by.
+ * stands by: beyond the bounds, and where steps go to and fro without growing shorter.
  */
 static double growth(const points *p, double *w, double *s)
 {
@@ -144,17 +146,24 @@ static double growth(const points *p, double *w, double *s)
   double excess = way * s[0] - t[0], slope = -s[1] / length - t[1];
   if (excess <= 0) return 0; /* over the limit by a last digit */
   double a = slope < 0 ? fmin(bound, -excess / slope) : bound, low = 0, high = INFINITY;
+  double last = INFINITY;
+  int turns = 0;
   for (int i = 0; i < 200; ++i) {
     w[GROWTH] = a;
     answer(p, w, s);
     ask(p->resistance, w, 2, t);
+    turns = excess > 0;
     excess = way * s[0] - t[0], slope = -s[1] / length - t[1];
+    turns = turns != (excess > 0);
     if (excess > 0) low = a;
     else high = a;
     double next = a - excess / slope, step = fabs(next - a);
     /* So small a relative step was the last but none: the next one would be its square. */
     if (step <= 1e-9 * a || step <= 4 * DBL_EPSILON * (bound + far)) return next > 0 ? next : a;
-    if (!(next > low && next < high)) next = high < INFINITY ? (low + high) / 2 : 2 * a;
+    const int wanders = turns && step > last / 2;
+    last = step;
+    if (!(next > low && next < high) || (wanders && high < INFINITY))
+      next = high < INFINITY ? (low + high) / 2 : 2 * a;
     a = next;
   }
   return NAN;
