@@ -67,6 +67,7 @@ from ufl_beam.model.damping import KelvinVoigt, Rayleigh
 from ufl_beam.model.distributions import Lognormal, Normal, TruncatedNormal, Weibull
 from ufl_beam.model.fibres import Fibres
 from ufl_beam.model.hysteresis_laws import ArmstrongFrederick, BoucWen, RambergOsgood
+from ufl_beam.model.interaction_laws import AxialBending
 from ufl_beam.model.joints import (
     Guided,
     Joint,
@@ -117,21 +118,21 @@ from ufl_beam.version import version
 __version__ = version()
 
 __all__ = [
-    "VTKHDF", "XDMF", "Actuator", "Adaptive", "ArcLength", "ArmstrongFrederick", "Beam", "Body",
-    "BoucWen", "Branch", "Buckling", "Checkpoint", "Clamped", "Connector", "Controller",
-    "ConvergenceError", "CopiesDiffer", "Coulomb", "CriticalPoint", "Cycles", "Damper", "Decay",
-    "DecayingMidpoint", "DisplacementControl", "DissipationControl", "DuvautLions", "Energy",
-    "Envelope", "Event", "Events", "ExactStatic", "Extent", "Extremes", "Fatigue", "Fibres",
-    "FollowerLoad", "ForceLaw", "GeneralizedAlpha", "Gerber", "Goodman", "Gravity", "Guided",
-    "Hardening", "History", "HotSpot", "Joint", "KelvinVoigt", "LineLoad", "LinearSoftening",
-    "Link", "LoadControl", "Lognormal", "MaterialLaw", "Mesh", "Midpoint", "ModelWarning", "Modes",
-    "Motor", "Newmark", "Newton", "Normal", "Path", "Perzyna", "Pinned", "Place", "PointLoad",
-    "PointMass", "Prescribed", "PrintedMidpoint", "Prismatic", "RambergOsgood", "Rayleigh",
-    "Recorder", "Release", "Revolute", "Rigid", "RigidLink", "RigidPlastic", "Roller",
-    "RotatingFrame", "SNCurve", "Scene", "SceneError", "Section", "Simulation", "Slide",
-    "Softening", "Solution", "Spot", "Spring", "Static", "Stop", "Stretch", "Study", "Support",
-    "Table", "Tradeoff", "TradeoffError", "TruncatedNormal", "Turn", "Velocity", "Weibull",
-    "animate", "buckling", "damping", "damping_ratio", "fit_decay", "follow", "ground",
+    "VTKHDF", "XDMF", "Actuator", "Adaptive", "ArcLength", "ArmstrongFrederick", "AxialBending",
+    "Beam", "Body", "BoucWen", "Branch", "Buckling", "Checkpoint", "Clamped", "Connector",
+    "Controller", "ConvergenceError", "CopiesDiffer", "Coulomb", "CriticalPoint", "Cycles",
+    "Damper", "Decay", "DecayingMidpoint", "DisplacementControl", "DissipationControl",
+    "DuvautLions", "Energy", "Envelope", "Event", "Events", "ExactStatic", "Extent", "Extremes",
+    "Fatigue", "Fibres", "FollowerLoad", "ForceLaw", "GeneralizedAlpha", "Gerber", "Goodman",
+    "Gravity", "Guided", "Hardening", "History", "HotSpot", "Joint", "KelvinVoigt", "LineLoad",
+    "LinearSoftening", "Link", "LoadControl", "Lognormal", "MaterialLaw", "Mesh", "Midpoint",
+    "ModelWarning", "Modes", "Motor", "Newmark", "Newton", "Normal", "Path", "Perzyna", "Pinned",
+    "Place", "PointLoad", "PointMass", "Prescribed", "PrintedMidpoint", "Prismatic",
+    "RambergOsgood", "Rayleigh", "Recorder", "Release", "Revolute", "Rigid", "RigidLink",
+    "RigidPlastic", "Roller", "RotatingFrame", "SNCurve", "Scene", "SceneError", "Section",
+    "Simulation", "Slide", "Softening", "Solution", "Spot", "Spring", "Static", "Stop", "Stretch",
+    "Study", "Support", "Table", "Tradeoff", "TradeoffError", "TruncatedNormal", "Turn", "Velocity",
+    "Weibull", "animate", "buckling", "damping", "damping_ratio", "fit_decay", "follow", "ground",
     "law_functions", "load", "logarithmic_decrement", "modes", "peaks", "picture", "plot",
     "plot_cycles", "plot_damage", "plot_dissipation", "plot_energy", "plot_extremes", "plot_hinge",
     "plot_history", "plot_modes", "plot_moment_curvature", "plot_shapes", "plot_tradeoff",

@@ -22,6 +22,16 @@ def require_bulk_law(law: object, what: str) -> None:
         )
 
 
+def require_interaction(law: object, what: str) -> None:
+    """Raise :class:`SceneError` naming ``what`` unless resultants of a section can follow a law."""
+    require_law(law, what)
+    if law.resultants not in ("NM", "NVM"):  # type: ignore[attr-defined]
+        raise SceneError(
+            f"{what} = {shorten(law)} is no law of N and M together, with resultants = 'NM' or "
+            "'NVM'; use it as axial, shear or bending"
+        )
+
+
 def require_law(law: object, what: str) -> None:
     """Raise :class:`SceneError` unless a law is complete; it is called with numbers."""
     if not isinstance(law, MaterialLaw):
