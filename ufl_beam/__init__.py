@@ -55,6 +55,7 @@ from ufl_beam.mechanics.energy_momentum import (
     PrintedMidpoint,
 )
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, Step
+from ufl_beam.model import law_functions
 from ufl_beam.model.beams import Beam
 from ufl_beam.model.bodies import Body, Place, Spot, ground
 from ufl_beam.model.connector_laws import (
@@ -72,6 +73,8 @@ from ufl_beam.model.damping import KelvinVoigt, Rayleigh
 from ufl_beam.model.distributions import Lognormal, Normal, TruncatedNormal, Weibull
 from ufl_beam.model.fibres import Fibres
 from ufl_beam.model.force_laws import ForceLaw
+from ufl_beam.model.hysteresis_laws import ArmstrongFrederick, BoucWen, RambergOsgood
+from ufl_beam.model.interaction_laws import AxialBending
 from ufl_beam.model.joints import (
     Guided,
     Joint,
@@ -84,6 +87,7 @@ from ufl_beam.model.joints import (
 )
 from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, PointLoad, RotatingFrame
 from ufl_beam.model.masses import PointMass, Velocity
+from ufl_beam.model.material_law import MaterialLaw
 from ufl_beam.model.material_laws import DuvautLions, Hardening, LinearSoftening, Perzyna, Softening
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
@@ -123,22 +127,24 @@ from ufl_beam.version import version
 __version__ = version()
 
 __all__ = [
-    "VTKHDF", "XDMF", "Actuator", "Adaptive", "ArcLength", "Beam", "Body", "Branch", "Buckling",
-    "Checkpoint", "Clamped", "Connector", "Controller", "ConvergenceError", "CopiesDiffer",
-    "Coulomb", "CriticalPoint", "Cycles", "Damper", "Decay", "DecayingMidpoint",
-    "DisplacementControl", "DissipationControl", "DolfinxView", "DuvautLions", "DynamicScheme",
-    "Energy", "Envelope", "Event", "Events", "ExactStatic", "ExactStep", "Extent", "Extremes",
-    "Fatigue", "Fibres", "FollowerLoad", "ForceLaw", "GeneralizedAlpha", "Gerber", "Goodman",
-    "Gravity", "Guided", "Hardening", "History", "HotSpot", "Joint", "KelvinVoigt", "LineLoad",
-    "LinearSoftening", "Link", "LoadControl", "Lognormal", "Mesh", "Midpoint", "Midway",
-    "ModelWarning", "Modes", "Motor", "Newmark", "Newton", "Normal", "Path", "Perzyna", "Pinned",
-    "Place", "PointLoad", "PointMass", "Potential", "Prescribed", "PrintedMidpoint", "Prismatic",
-    "Rayleigh", "Recorder", "Release", "Revolute", "Rigid", "RigidLink", "RigidPlastic", "Roller",
-    "RotatingFrame", "SNCurve", "Scene", "SceneError", "Scheme", "Section", "Simulation", "Slide",
-    "Softening", "Solution", "Spot", "Spring", "Static", "Step", "Stop", "Stretch", "Study",
-    "Support", "Table", "Tradeoff", "TradeoffError", "TruncatedNormal", "Turn", "Velocity",
-    "VirtualWork", "Weibull", "animate", "buckling", "damping", "damping_ratio", "fit_decay",
-    "follow", "ground", "load", "logarithmic_decrement", "modes", "peaks", "picture", "plot",
+    "VTKHDF", "XDMF", "Actuator", "Adaptive", "ArcLength", "ArmstrongFrederick", "AxialBending",
+    "Beam", "Body", "BoucWen", "Branch", "Buckling", "Checkpoint", "Clamped", "Connector",
+    "Controller", "ConvergenceError", "CopiesDiffer", "Coulomb", "CriticalPoint", "Cycles",
+    "Damper", "Decay", "DecayingMidpoint", "DisplacementControl", "DissipationControl",
+    "DolfinxView", "DuvautLions", "DynamicScheme", "Energy", "Envelope", "Event", "Events",
+    "ExactStatic", "ExactStep", "Extent", "Extremes", "Fatigue", "Fibres", "FollowerLoad",
+    "ForceLaw", "GeneralizedAlpha", "Gerber", "Goodman", "Gravity", "Guided", "Hardening",
+    "History", "HotSpot", "Joint", "KelvinVoigt", "LineLoad", "LinearSoftening", "Link",
+    "LoadControl", "Lognormal", "MaterialLaw", "Mesh", "Midpoint", "Midway", "ModelWarning",
+    "Modes", "Motor", "Newmark", "Newton", "Normal", "Path", "Perzyna", "Pinned", "Place",
+    "PointLoad", "PointMass", "Potential", "Prescribed", "PrintedMidpoint", "Prismatic",
+    "RambergOsgood", "Rayleigh", "Recorder", "Release", "Revolute", "Rigid", "RigidLink",
+    "RigidPlastic", "Roller", "RotatingFrame", "SNCurve", "Scene", "SceneError", "Scheme",
+    "Section", "Simulation", "Slide", "Softening", "Solution", "Spot", "Spring", "Static", "Step",
+    "Stop", "Stretch", "Study", "Support", "Table", "Tradeoff", "TradeoffError", "TruncatedNormal",
+    "Turn", "Velocity", "VirtualWork", "Weibull", "animate", "buckling", "damping", "damping_ratio",
+    "fit_decay", "follow", "ground", "law_functions", "load", "logarithmic_decrement", "modes",
+    "peaks", "picture", "plot",
     "plot_cycles", "plot_damage", "plot_dissipation", "plot_energy", "plot_extremes", "plot_hinge",
     "plot_history", "plot_modes", "plot_moment_curvature", "plot_shapes", "plot_tradeoff",
     "rainflow", "ramp", "render", "say", "simulate", "study", "tradeoff",

@@ -138,8 +138,8 @@ def sign_of_jump(patch):
     """A hinge that opens adds to the strain of the bulk."""
     flow = ReferencePoints._flow
 
-    def wrong(self, at, strain, growth):
-        return flow(self, {**at, "jump": -at["jump"]}, strain, growth)
+    def wrong(self, at):
+        return flow(self, {**at, "jump": -at["jump"]})
 
     patch.setattr(ReferencePoints, "_flow", wrong)
 
@@ -149,9 +149,9 @@ def hardening_twice(patch):
     commit = ReferencePoints._commit
 
     def wrong(self, storage, e0, kept):
-        before = self._state(storage)["accumulated"].copy()
+        before = self._state(storage)["state accumulated"].copy()
         sums = commit(self, storage, e0, kept)
-        accumulated = self._state(storage)["accumulated"]
+        accumulated = self._state(storage)["state accumulated"]
         accumulated += accumulated - before
         return sums
 

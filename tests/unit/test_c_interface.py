@@ -20,24 +20,27 @@ from ufl_beam.compiled.c_library import ffi, in_order, lib, names, petsc
 from ufl_beam.discretization import compiled_forms
 from ufl_beam.discretization.compiled_forms import Kernel
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
-from ufl_beam.model.material_laws import HardeningBulk
-from ufl_beam.terms import material_points, rigid_plastic
+from ufl_beam.terms import rigid_plastic
+from ufl_beam.terms.point_equations import inputs as inputs_of_points
 from ufl_beam.terms.supports import Supports
 
 pytestmark = pytest.mark.serial  # nothing here depends on the number of processes
 
 
+SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, bending=ub.Hardening(1.0))
+
+
 def test_inputs_of_points_are_where_c_has_them():
     """Python takes their order from loops.h."""
     for inputs, enum, prefix in (
-        (material_points.inputs(HardeningBulk), "point_input", ""),
+        (inputs_of_points(SECTION.layout(None)), "point_input", ""),
         (rigid_plastic.INPUTS, "slip_input", "slip_"),
     ):
         of_c = names(enum, prefix)
         assert inputs[: len(of_c)] == of_c
         assert len(set(inputs)) == len(inputs)
     for name in names("point_input"):
-        assert getattr(lib, name.upper()) == material_points.inputs(HardeningBulk).index(name)
+        assert getattr(lib, name.upper()) == inputs_of_points(SECTION.layout(None)).index(name)
     assert len(names("point_input")) == lib.POINT_INPUTS
 
 

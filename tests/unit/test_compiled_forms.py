@@ -209,7 +209,7 @@ def no_points(monkeypatch):
     monkeypatch.setattr("ufl_beam.terms.inelastic_beams.InelasticBeams.__init__", refuse)
     monkeypatch.setattr("ufl_beam.discretization.function_spaces.Element.at_points", refuse)
     monkeypatch.setattr("ufl_beam.model.material_laws.Softening.traction", refuse)
-    monkeypatch.setattr("ufl_beam.model.material_laws.HardeningBulk.flow", refuse)
+    monkeypatch.setattr("ufl_beam.terms.point_equations.PointEquations.__init__", refuse)
 
 
 @pytest.mark.parametrize(

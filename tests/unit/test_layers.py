@@ -235,7 +235,8 @@ def test_public_names():
     for name in names:
         thing = getattr(ub, name)
         assert (thing.__doc__ or "").strip(), f"{name} has no docstring"
-        assert thing.__module__.startswith("ufl_beam."), name
+        module = thing.__name__ if name == "law_functions" else thing.__module__
+        assert module.startswith("ufl_beam."), name
 
 
 @pytest.mark.parametrize("module", FILES)

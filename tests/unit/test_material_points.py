@@ -5,14 +5,10 @@ import math
 
 import numpy as np
 import pytest
+from bars import LENGTH, Bars, C, histories
 
 import ufl_beam as ub
-from ufl_beam.model.fibres import Layout
-from ufl_beam.model.material_laws import HardeningBulk
-from ufl_beam.terms.compiled_points import CompiledPoints
-from ufl_beam.terms.material_points import inputs
 
-C, LENGTH = 200.0, 0.5
 NONE = ub.Hardening(math.inf)
 LAWS = {
     "elastic": (NONE, None),
@@ -35,70 +31,9 @@ each_law = pytest.mark.parametrize("law", LAWS)
 each_scheme = pytest.mark.parametrize("scheme", [STATIC, *EXACT], ids=str)
 
 
-class Bars:
-    """Cells with one point each that the axial strain strains; all else has no stiffness."""
-
-    def __init__(self, cells, bulk, softening, scheme, *, C=C, length=LENGTH):
-        layout = Layout(
-            strains=np.array([[1.0, 0.0, 0.0]]),
-            weights=np.ones(1),
-            stiffness=np.array([C]),
-            laws=((bulk, 1),),
-            rest=np.zeros(3),
-            softening=softening,
-            breaking=slice(None),
-            hinges=True,
-        )
-        self.C, self.length, self.scheme, self.softening = C, length, scheme, softening
-        self.numbers = layout.bulk([(0, k) for k in range(cells)])
-        self.points = CompiledPoints(
-            layout,
-            [(0, k) for k in range(cells)],
-            np.full(cells, length),
-            scheme,
-            np.zeros((cells, 1, len(inputs(HardeningBulk)))),
-        )
-        self.strain = np.zeros(cells)
-
-    def __getitem__(self, name):
-        return self.points[name][:, 0].copy()
-
-    def _strains(self, strain):
-        return np.column_stack([strain, np.zeros((len(strain), 2))])
-
-    def respond(self, strain, dt=0.1):
-        """Stresses of a step to `strain`, and their derivatives."""
-        self.points.start(self._strains(self.strain))
-        self.points.begin(dt)
-        r, D = self.points.respond(self._strains(np.asarray(strain)))
-        return r[:, 0].copy(), D[:, 0].copy()
-
-    def step(self, strain, dt=0.1):
-        """The same, and the end becomes the state."""
-        σ, _ = self.respond(strain, dt)
-        self.points.accept()
-        self.strain = np.asarray(strain).copy()
-        return σ
-
-    def stress(self):
-        """In the accepted state."""
-        return self.points.kept[:, 0].copy()
-
-    def dissipated(self):
-        """By plastic strains and by discontinuities, of each cell."""
-        return self.points.kept[:, 4].copy(), self.points.kept[:, 5].copy()
-
-
 def bars(law, scheme, cells=200):
     bulk, softening = LAWS[law]
     return Bars(cells, bulk, softening, scheme)
-
-
-def histories(cells, steps=20, seed=0, size=0.06):
-    """Random walks of strains, those of the first cells within the elastic range."""
-    random = np.random.default_rng(seed)
-    walks = np.cumsum(random.uniform(-1, 1, (steps, cells)), axis=0)
-    return walks * size * np.linspace(0.01, 1, cells)
 
 
 # -- after a step the laws hold ------------------------------------------------------------------
@@ -111,7 +46,7 @@ def test_laws_hold_after_each_step(law, scheme):
     some, dt, θ = bars(law, scheme), 0.1, scheme.theta
     bulk, softening = LAWS[law]
     H, B = bulk.modulus, bulk.kinematic
-    eta = float(np.ravel(some.numbers.eta)[0])
+    eta = float(np.ravel(some.numbers["viscosity"])[0])
     seen = set()
     for strain in histories(200):
         p, ξ, opening, jump = (some[n] for n in ("plastic", "accumulated", "opening", "jump"))

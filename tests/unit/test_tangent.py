@@ -110,7 +110,7 @@ class Probe:
     def at_random(inelastic, random):
         """Random plastic strains, jumps and their sums, the latter at least as large."""
         cells, state = inelastic.state()
-        n = inelastic.points["plastic"].shape[1]
+        n = inelastic.points["state plastic"].shape[1]
         p, jump = random.uniform(-0.5, 0.5, (2, len(cells), n))
         if not np.isfinite(inelastic.points["traction"]).any():
             jump[:] = 0.0
@@ -283,9 +283,9 @@ def test_laws_show_in_the_tangent(kind):
         probe = Probe(inelastic_scene(kind), ub.Midpoint(), turn=1.0, seed=seed)
         probe.tangent()
         (inelastic,) = probe.simulation.inelastic
-        p, opening = (inelastic.points[name].copy() for name in ("plastic", "opening"))
+        p, opening = (inelastic.points[name].copy() for name in ("state plastic", "opening"))
         inelastic.accept(probe.simulation.supports.in_plane(probe.x), None)
-        flow, growth = inelastic.points["plastic"] != p, inelastic.points["opening"] > opening
+        flow, growth = inelastic.points["state plastic"] != p, inelastic.points["opening"] > opening
         flows, opens = flows or flow.any(), opens or growth.any()
         both = both or (flow & growth).any()
     assert opens == ("hinge" in LAWS[kind] or "softening" in LAWS[kind])

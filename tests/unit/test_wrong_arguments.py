@@ -120,6 +120,7 @@ TABLE = {
         depth=V(0.0, FROM_ZERO), axial=V(None, optional(OBJECT)),
         shear=V(None, optional(OBJECT)), bending=V(None, optional(OBJECT)),
         hinge=V(None, optional(OBJECT)), fibres=V(None, optional(OBJECT)),
+        interaction=V(None, optional(OBJECT)),
     ),
     "Section.of_shape": call(
         ub.Section.of_shape,
@@ -149,6 +150,24 @@ TABLE = {
         ub.Hardening,
         limit=V(1.0, LIMIT), modulus=V(0.0, FROM_ZERO), kinematic=V(0.0, FROM_ZERO),
         viscosity=V(ub.Perzyna(0.0), OBJECT),
+    ),
+    "RambergOsgood": call(
+        ub.RambergOsgood,
+        limit=V(1.0, POSITIVE), offset=V(0.002, POSITIVE), exponent=V(5.0, [*POSITIVE, 0.5]),
+    ),
+    "ArmstrongFrederick": call(
+        ub.ArmstrongFrederick,
+        limit=V(1.0, POSITIVE), kinematic=V(1.0, POSITIVE), recovery=V(1.0, POSITIVE),
+    ),
+    "BoucWen": call(
+        ub.BoucWen,
+        limit=V(1.0, POSITIVE), hardening=V(0.1, [*FROM_ZERO, 1.0]),
+        exponent=V(2.0, [*POSITIVE, 0.5]), shape=V(0.6, [*FROM_ZERO, 0.4, 1.1]),
+        strength=V(0.1, FROM_ZERO),
+    ),
+    "AxialBending": call(
+        ub.AxialBending,
+        axial=V(1.0, POSITIVE), bending=V(1.0, POSITIVE), rounding=V(0.1, POSITIVE),
     ),
     "Perzyna": call(ub.Perzyna, eta=V(1.0, LIMIT)),
     "DuvautLions": call(ub.DuvautLions, tau=V(1.0, LIMIT)),
@@ -446,7 +465,7 @@ RECORDS_OF_RUNS = {
 
 WITHOUT_PARAMETERS = {
     "Static", "PrintedMidpoint", "Extremes", "Recorder", "say", "Scheme", "DynamicScheme",
-    "ExactStep", "Midway",
+    "ExactStep", "Midway", "MaterialLaw", "law_functions",
 }  # fmt: skip
 
 OF_SOLUTIONS = {

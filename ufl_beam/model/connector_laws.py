@@ -13,13 +13,9 @@ from typing import Annotated, Any, Protocol
 from ufl_beam.errors import SceneError, require_function, require_number, require_returned
 from ufl_beam.model.curves import Curve
 from ufl_beam.model.force_laws import ForceLaw as ForceLaw
-from ufl_beam.model.material_laws import (
-    AnySoftening,
-    BulkLaw,
-    HingeLaw,
-    require_bulk_law,
-    require_hinge_law,
-)
+from ufl_beam.model.law_checks import require_bulk_law
+from ufl_beam.model.material_law import MaterialLaw
+from ufl_beam.model.material_laws import AnySoftening, HingeLaw, require_hinge_law
 from ufl_beam.model.records import Instance, NotNegative, Positive, Record
 from ufl_beam.model.time_functions import Constant, Timed
 
@@ -120,7 +116,7 @@ class Spring(Record):
     """
 
     stiffness: Positive
-    law: Annotated[BulkLaw | None, require_bulk_law] = None
+    law: Annotated[MaterialLaw | None, require_bulk_law] = None
     softening: Instance[AnySoftening | None] = None
 
 

@@ -6,18 +6,34 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_array, require_count, require_kind
+from ufl_beam.model.law_checks import require_bulk_law
 from ufl_beam.model.law_functions import Values
-from ufl_beam.model.material_laws import AnySoftening, Bulk, BulkLaw, require_bulk_law
+from ufl_beam.model.material_law import MaterialLaw
+from ufl_beam.model.material_laws import AnySoftening
 from ufl_beam.model.records import Instance, Record
 
 Below = Callable[[Array], Array]
 """Area of a shape below y, from any line, and its first moment about y = 0; (2, n); m², m³."""
+
+
+class Kind(NamedTuple):
+    """A law whose numbers do not matter, and their names."""
+
+    law: MaterialLaw
+    numbers: tuple[str, ...]
+
+    @classmethod
+    def of_law(cls, law: MaterialLaw) -> Kind:
+        """The kind of a law."""
+        C = tuple(np.ones(()) for _ in law.resultants or "x")
+        names = tuple(law.numbers(law.as_argument(C)))
+        return cls(law.of(1.0, dict.fromkeys(names, 1.0)), names)
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,8 +45,8 @@ class Layout:
 
     strains: Values  # of each point per strain (Σ, Γ, K) of the section; (n, 3)
     weights: Values  # area of fibres, 1 for resultants; (n,)
-    stiffness: Values  # elastic; (n,)
-    laws: tuple[tuple[BulkLaw, int], ...]  # with the number of points in a row that follow them
+    stiffness: Values  # elastic; (n,); of interacting resultants, strains and stiffness have rows
+    laws: tuple[tuple[MaterialLaw, int], ...]  # with the number of points in a row that follow them
     rest: Values  # stiffness (axial, shear, bending) of what has no points; (3,)
     softening: AnySoftening | None  # law of the discontinuities, if points can break
     breaking: slice  # the points that can
@@ -44,30 +60,41 @@ class Layout:
     @property
     def yields(self) -> bool:
         """True if the bulk can yield."""
-        return any(law.limit != np.inf for law, _ in self.laws)
+        return any(not law.elastic for law, _ in self.laws)
 
     @cached_property
-    def statement(self) -> type[Bulk]:
+    def kind(self) -> Kind:
         """The law of one kind that points of the bulk follow, with numbers of their own."""
-        laws = [law for law, _ in self.laws if law.limit != np.inf] or [self.laws[0][0]]
-        kinds = dict.fromkeys(type(law) for law in laws)
+        laws = [law for law, _ in self.laws if not law.elastic] or [self.laws[0][0]]
+        kinds = dict.fromkeys(Kind.of_law(law) for law in laws)
         if len(kinds) > 1:
-            names = " and ".join(kind.__name__ for kind in kinds)
+            names = " and ".join(dict.fromkeys(type(kind.law).__name__ for kind in kinds))
             raise SceneError(f"Section: its laws must be of one kind, not {names}")
-        return laws[0].statement
+        kind = next(iter(kinds))
+        for law, _ in self.laws:
+            if type(law) is not type(kind.law):
+                raise SceneError(
+                    f"Section: beside {type(kind.law).__name__}, a resultant that yields or hinges "
+                    "needs a law of the same kind, with numbers at which it stays elastic"
+                )
+        return kind
 
-    def bulk(self, keys: list[tuple[int, int]]) -> Bulk:
-        """The laws at the points of many cells; random limits depend on their keys and a seed."""
+    def numbers(self, keys: list[tuple[int, int]]) -> dict[str, Values]:
+        """Numbers of the laws at the points of many cells, each (cells, n).
+
+        Random numbers depend on the keys of the cells and a seed.
+        """
         shape, first = (len(keys), len(self.weights)), 0
-        columns = {name: np.zeros(shape) for name in self.statement.numbers()}
+        columns = {name: np.zeros(shape) for name in self.kind.numbers}
+        stiffness = np.reshape(self.stiffness, (len(self.weights), -1))
         for law, n in self.laws:
             at = slice(first, first + n)
-            for name, value in law.numbers(self.stiffness[at]).items():
-                if name in columns:
-                    drawn = hasattr(value, "draw")
-                    columns[name][:, at] = [value.draw(n, k) for k in keys] if drawn else value
+            C = law.as_argument(tuple(stiffness[at].T))
+            for name, value in law.numbers(C).items():
+                drawn = hasattr(value, "draw")
+                columns[name][:, at] = [value.draw(n, k) for k in keys] if drawn else value
             first += n
-        return self.statement(self.stiffness, **columns)
+        return columns
 
 
 @dataclass(frozen=True)
@@ -90,7 +117,7 @@ class Fibres(Record):
         1.39e+07
     """
 
-    law: Annotated[BulkLaw, require_bulk_law]
+    law: Annotated[MaterialLaw, require_bulk_law]
     _: KW_ONLY
     number: Annotated[int, require_count] = 20
     softening: Instance[AnySoftening | None] = None

@@ -1,5 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""Functions that laws of materials are written with, for arrays and for UFL expressions."""
+"""Functions that laws of materials are written with, for arrays and for UFL expressions.
+
+Arrays may be complex: the reference path differentiates by complex steps, so that ``abs`` is wrong
+there and :func:`absolute` is right.  The operators + - * / and ** are those of Python.
+
+Example:
+    >>> f = ub.law_functions
+    >>> print(f.positive(np.array([-1.0, 2.0])), f.absolute(np.array([-1.0, 2.0])))
+    [0. 2.] [1. 2.]
+"""
 
 from __future__ import annotations
 
@@ -38,3 +47,36 @@ def sign(x: Values) -> Values:
 def positive(x: Values) -> Values:
     """Macaulay's bracket <x>: x where it is positive, else zero."""
     return where(below(-x, 0.0), x, 0.0)
+
+
+def absolute(x: Values) -> Values:
+    """Size of x; its slope at zero is 1."""
+    return where(below(x, 0.0), -x, x)
+
+
+def larger(x: Values, y: Values) -> Values:
+    """The larger of x and y; x where they are equal."""
+    return where(below(x - y, 0.0), y, x)
+
+
+def smaller(x: Values, y: Values) -> Values:
+    """The smaller of x and y; x where they are equal."""
+    return where(below(y - x, 0.0), y, x)
+
+
+@singledispatch
+def sqrt(x: Values) -> Values:
+    """Square root of numbers that are not negative."""
+    return np.sqrt(x)
+
+
+@singledispatch
+def log(x: Values) -> Values:
+    """Natural logarithm of positive numbers."""
+    return np.log(x)
+
+
+@singledispatch
+def tanh(x: Values) -> Values:
+    """Hyperbolic tangent of numbers or arrays."""
+    return np.tanh(x)

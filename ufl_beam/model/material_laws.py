@@ -10,13 +10,15 @@ derives their tangents and FFCx compiles them for the time loop, see
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
-from ufl_beam.errors import SceneError, is_infinite, require_kind, require_number, shorten
+from ufl_beam.errors import SceneError, is_infinite, require_kind, require_number
 from ufl_beam.model.law_functions import Values, below, exp, positive, sign, where
+from ufl_beam.model.material_law import MaterialLaw, State
 
 
 def _require_from_zero_to_infinity(value: float, what: str) -> None:
@@ -75,88 +77,8 @@ class DuvautLions:
         return np.asarray(self.tau * stiffness)  # P(46)
 
 
-@dataclass(frozen=True, eq=False)
-class Bulk(ABC):
-    """Law of the bulk at many points, stated for arrays and for symbols.
-
-    The internal variables of a point are its plastic strain and the sum of the sizes of its
-    increments.  A law has further numbers as fields; those of :attr:`numbers` are the inputs of
-    the compiled law.
-    """
-
-    C: Values  # stiffness; all fields are arrays of one shape, or numbers
-    limit: Values  # yield stress; infinite where the bulk stays elastic
-
-    @classmethod
-    def numbers(cls) -> tuple[str, ...]:
-        """Names of the numbers of the law but for the stiffness."""
-        return tuple(field.name for field in fields(cls))[1:]
-
-    @abstractmethod
-    def flow(self, strain: Values, p: Values, ξ: Values, θ: Values, dt: Values) -> Values:
-        """Increment of the plastic strain over a step of the length dt; s.
-
-        From the strain at t_n+θ, the plastic strain and its accumulated amount at t_n; θ = 1/2 is
-        of second order, 1 is backward Euler.
-        """
-
-    @abstractmethod
-    def hardening_energy(self, p: Values, ξ: Values) -> Values:
-        """Energy per volume that hardening stores."""
-
-    @abstractmethod
-    def dissipation(self, dp: Values, dt: Values) -> Values:
-        """Energy per volume that a plastic increment dissipates."""
-
-    def stress(self, strain: Values, p: Values) -> Values:
-        """Stress of the elastic part of the strain."""
-        return self.C * (strain - p)
-
-    def elastic_energy(self, strain: Values) -> Values:
-        """Energy per volume of an elastic strain."""
-        return self.C * strain**2 / 2
-
-
-class BulkLaw(ABC):
-    """Base of records of laws of the bulk, such as :class:`Hardening`."""
-
-    statement: ClassVar[type[Bulk]]  # the law of many points
-    limit: Any  # yield stress, a number or a distribution; infinite if the bulk stays elastic
-
-    @abstractmethod
-    def numbers(self, C: Values) -> dict[str, Any]:
-        """Numbers of :attr:`statement` by name, at points of stiffness ``C``."""
-
-
-@dataclass(frozen=True, eq=False)
-class HardeningBulk(Bulk):
-    """Statement of :class:`Hardening`: moduli H, isotropic, and B, kinematic; viscosity eta."""
-
-    H: Values
-    B: Values
-    eta: Values
-
-    def flow(self, strain: Values, p: Values, ξ: Values, θ: Values, dt: Values) -> Values:
-        """Increment of the plastic strain over a step, in closed form, P(38)-P(44)."""
-        trial = self.C * (strain - p) - self.B * p
-        direction = sign(trial)
-        overstress = direction * trial - (self.limit + self.H * ξ)  # P(38)
-        γ = positive(overstress) / (self.eta / dt + θ * (self.C + self.H + self.B))  # P(44)
-        return direction * γ
-
-    def hardening_energy(self, p: Values, ξ: Values) -> Values:
-        """Energy per volume that hardening stores."""
-        return (self.B * p**2 + self.H * ξ**2) / 2  # P(35)
-
-    def dissipation(self, dp: Values, dt: Values) -> Values:
-        """Energy per volume that a plastic increment dissipates, by yield stress and viscosity."""
-        γ = abs(dp)
-        flows = below(-γ, 0.0)  # a limit that is infinite must not meet an increment of zero
-        return (where(flows, self.limit, 0.0) + where(flows, self.eta, 0.0) * γ / dt) * γ  # P(37)
-
-
 @dataclass(frozen=True)
-class Hardening(BulkLaw):
+class Hardening(MaterialLaw):
     """Elasto-(visco)plastic law with linear isotropic and kinematic hardening, P(35)-P(48).
 
     Args:
@@ -177,7 +99,7 @@ class Hardening(BulkLaw):
     limit: Any
     modulus: float = 0.0
     kinematic: float = 0.0
-    viscosity: Perzyna | DuvautLions = Perzyna(0.0)
+    viscosity: Any = Perzyna(0.0)
 
     def __post_init__(self) -> None:
         if not hasattr(self.limit, "draw"):
@@ -192,17 +114,53 @@ class Hardening(BulkLaw):
                 )
         require_kind(self.viscosity, (Perzyna, DuvautLions), "Hardening: viscosity")
 
-    statement: ClassVar[type[Bulk]] = HardeningBulk
+    variables: ClassVar[Mapping[str, float]] = {"plastic": 0.0, "accumulated": 0.0}
 
     def numbers(self, C: Values) -> dict[str, Any]:
-        """Limit, both moduli and viscosity."""
+        """Limit and moduli; in the place of the viscosity, the overstress per plastic rate."""
         eta = self.viscosity.coefficient(C + self.modulus + self.kinematic)
-        return {"limit": self.limit, "H": self.modulus, "B": self.kinematic, "eta": eta}
+        return super().numbers(C) | {"viscosity": eta}
+
+    def stress(self, strain: Values, state: State) -> Values:
+        """Stress of the elastic part of the strain."""
+        return self.C * (strain - state.plastic)
+
+    def increments(self, strain: Values, state: State, dt: Values) -> dict[str, Values]:
+        """Plastic strain of a step, and the size of it, in closed form, P(38)-P(44)."""
+        trial = self.stress(strain, state) - self.kinematic * state.plastic
+        direction = sign(trial)
+        overstress = direction * trial - (self.limit + self.modulus * state.accumulated)  # P(38)
+        stiffness = self.viscosity / dt + (self.C + self.modulus + self.kinematic)
+        γ = positive(overstress) / stiffness  # P(44)
+        return {"plastic": direction * γ, "accumulated": γ}
+
+    def elastic_energy(self, strain: Values, state: State) -> Values:
+        """Energy per volume of the elastic part of the strain."""
+        return self.C * (strain - state.plastic) ** 2 / 2
+
+    def hardening_energy(self, state: State) -> Values:
+        """Energy per volume that hardening stores."""
+        return (
+            self.kinematic * state.plastic**2 + self.modulus * state.accumulated**2
+        ) / 2  # P(35)
+
+    def dissipation(self, strain: Values, state: State, changes: State, dt: Values) -> Values:
+        """Energy per volume that a plastic increment dissipates, by yield stress and viscosity."""
+        γ = changes.accumulated
+        flows = below(-γ, 0.0)  # a limit that is infinite must not meet an increment of zero
+        return (
+            where(flows, self.limit, 0.0) + where(flows, self.viscosity, 0.0) * γ / dt
+        ) * γ  # P(37)
+
+    @property
+    def elastic(self) -> bool:
+        """True if it never flows."""
+        return bool(self.limit == np.inf)
 
     @property
     def opens(self) -> bool:
         """True if it ever flows."""
-        return bool(self.limit != np.inf)
+        return not self.elastic
 
     @property
     def energy(self) -> float:
@@ -328,18 +286,18 @@ def _mean_of_decay(x: Values) -> Values:
     return where(small, series, (1 - exp(-safe)) / safe)
 
 
-def require_bulk_law(law: object, what: str) -> None:
-    """Raise :class:`SceneError` naming ``what`` unless a bulk can follow a law."""
-    if not isinstance(law, BulkLaw):
-        raise SceneError(f"{what} = {shorten(law)} is not a Hardening")
-
-
 HingeLaw = AnySoftening | Hardening
 """Laws of a plastic hinge of zero length, which has no elasticity of its own."""
 
 
 def require_hinge_law(law: object, what: str) -> None:
     """Raise :class:`SceneError` naming ``what`` unless a rigid-plastic hinge can follow a law."""
+    if isinstance(law, MaterialLaw) and not isinstance(law, Hardening):
+        raise SceneError(
+            f"{what}: {type(law).__name__} is the law of an elastic stiffness, and a hinge of zero "
+            "length has none; use it as Section(bending=), or join both sides by "
+            "Turn(a, b, Spring(stiffness, law=))"
+        )
     require_kind(law, (Softening, Hardening, LinearSoftening), what)
     if isinstance(law, Hardening):
         _require_from_zero_to_infinity(law.limit, f"{what}: limit")

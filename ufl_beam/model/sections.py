@@ -16,10 +16,12 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_kind, require_number
 from ufl_beam.model.fibres import Fibres, Layout, PlacedFibres
-from ufl_beam.model.material_laws import AnySoftening, BulkLaw, Hardening, require_bulk_law
+from ufl_beam.model.law_checks import require_bulk_law, require_interaction
+from ufl_beam.model.material_law import MaterialLaw
+from ufl_beam.model.material_laws import AnySoftening, Hardening
 from ufl_beam.model.records import Instance, NotNegative, Positive, Record
 
-ResultantLaw = Annotated[BulkLaw | None, require_bulk_law]
+ResultantLaw = Annotated[MaterialLaw | None, require_bulk_law]
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +44,8 @@ class Section(Record):
             For hinges in chosen cells see :class:`Beam`.
         fibres: Fibres in the place of the laws of N, M and the hinge; the shapes below and
             :meth:`of_fibres` place them.
+        interaction: Law of N and M together, such as :class:`AxialBending`, in the place of those
+            of single resultants and the hinge.
 
     Raises:
         SceneError: A stiffness is not positive, a number is not finite, a law is none, or laws of
@@ -67,6 +71,7 @@ class Section(Record):
     bending: ResultantLaw = None
     hinge: Instance[AnySoftening | None] = None
     fibres: Instance[PlacedFibres | None] = None
+    interaction: Annotated[MaterialLaw | None, require_interaction] = None
     massless_by_default: bool = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -81,12 +86,30 @@ class Section(Record):
             raise SceneError(
                 f"Section: a law {laws[0]} beside fibres; the fibres bear N and M, shear is elastic"
             )
+        if self.interaction is not None and (laws or self.fibres is not None):
+            other = laws[0] if laws else "fibres"
+            raise SceneError(
+                f"Section: {other} beside interaction, the law of N and M; give one of both"
+            )
 
     def layout(self, hinge: AnySoftening | None) -> Layout | None:
         """Material points of a cell with a hinge of this law; none if the cell is elastic."""
         if self.fibres is not None:
             return self.fibres.layout(self.GA)
         stiffness = np.array([self.EA, self.GA, self.EI])
+        if self.interaction is not None:
+            together = np.array([name in self.interaction.resultants for name in "NVM"])
+            if hinge is not None and hinge.opens:
+                raise SceneError("Section: a hinge in a cell whose N and M interact; leave one out")
+            return Layout(
+                strains=np.eye(3)[together],
+                weights=np.ones(1),
+                stiffness=stiffness[together],
+                laws=((self.interaction, 1),),
+                rest=np.where(together, 0.0, stiffness),
+                softening=None,
+                breaking=slice(None),
+            )
         laws = [self.axial, self.shear, self.bending]
         if hinge is not None and hinge.opens:
             laws[2] = self.bending or Hardening(limit=math.inf)

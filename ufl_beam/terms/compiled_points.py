@@ -7,6 +7,7 @@ theorem where a discontinuity opens, FFCx compiles them, and a loop in C goes ov
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,65 +18,81 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, in_order, lib, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, stated
+from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model import law_functions
-from ufl_beam.model.material_laws import Bulk, SofteningLaw
-from ufl_beam.terms.material_points import Points, inputs
+from ufl_beam.model.fibres import Kind
+from ufl_beam.model.material_laws import SofteningLaw
+from ufl_beam.terms.material_points import Points
+from ufl_beam.terms.point_equations import End, PointEquations, inputs, prefixed, rows
 
 law_functions.where.register(Condition, ufl.conditional)
 law_functions.below.register(Expr, ufl.lt)
 law_functions.exp.register(Expr, ufl.exp)
+law_functions.sqrt.register(Expr, ufl.sqrt)
+law_functions.log.register(Expr, ufl.ln)
+law_functions.tanh.register(Expr, ufl.tanh)
 
 
 class PointForms:
     """Compiled laws: C functions from the inputs of a point to what the loops need.
 
-    They are the stress of the bulk, that of a point that opens by a known growth, and the excess of
-    the bulk over the discontinuity, each with its derivative; and ``point_output`` of loops.h.
     The numbers of ``softening`` do not matter: they are inputs.
+
+    Attributes:
+        law: Stresses and their derivatives by strains; of a law that solves for its variables
+            residuals and their derivatives, then stresses and theirs, see solve_law in C.
+        resistance: That of the discontinuity, and its derivative by the growth.
+        end: ``point_output`` of loops.h, stresses, and changes of the variables.
     """
 
     def __init__(
-        self, statement: type[Bulk], softening: SofteningLaw | None, scheme: Scheme
+        self, inputs: tuple[str, ...], kind: Kind, softening: SofteningLaw | None, scheme: Scheme
     ) -> None:
-        self._pointwise = pointwise = Pointwise(inputs(statement))
-        at = pointwise.at
-        strain, a = ufl.variable(at["strain"]), ufl.variable(at["growth"])
-        s, p, ξ, length = (at[n] for n in ("direction", "plastic", "accumulated", "length"))
-        θ, dt = at["theta"], at["dt"]
-        bulk = statement(at["stiffness"], *(at[name] for name in statement.numbers()))
-
-        # The incompatible mode: a jump relaxes the strain of the bulk by jump over length.
-        relieved = at["jump"] / length
-        e = (1 - θ) * at["before"] + θ * strain - (relieved + θ * s * a / length)
-        dp = bulk.flow(e, p, ξ, θ, dt)
-        σ = bulk.stress(e, p + θ * dp)
-        self.bulk = pointwise.compile(σ, ufl.diff(σ, strain))
-
-        e0, e1 = at["before"] - relieved - p, strain - (relieved + s * a / length) - p - dp
-        broken, traction = 0 * a, 0 * a
-        self.opening = self.excess = ffi.NULL
+        self._pointwise = pointwise = Pointwise(inputs)
+        self._equations = equations = PointEquations(kind, softening, scheme)
+        law = kind.law
+        self._strains = rows(law, "strain")
+        unknown = prefixed("new", law.variables) if law.solves else ()
+        free = {name: ufl.variable(pointwise.at[name]) for name in (*self._strains, *unknown)}
+        self._at = at = {**pointwise.at, **free}
+        try:
+            stress = tuple(map(ufl.as_ufl, equations.stress(at)))
+            answer = [*stress, *self._derivatives(stress, self._strains)]
+            if law.solves:
+                r = tuple(map(ufl.as_ufl, equations.residuals(at)))
+                by_both = [self._derivatives(r, names) for names in (unknown, self._strains)]
+                answer = [
+                    *r,
+                    *by_both[0],
+                    *by_both[1],
+                    *answer,
+                    *self._derivatives(stress, unknown),
+                ]
+            *numbers, stress, changes = equations.end(at)
+        except Exception as error:
+            raise SceneError(
+                f"{type(law).__name__}: it cannot be called with symbols of UFL: {error}. Laws are "
+                "written with + - * / ** and the functions of ub.law_functions"
+            ) from error
+        self.law = pointwise.compile(*answer)
+        end = in_order("point_output", dict(zip(End._fields, numbers, strict=False)))
+        self.end = pointwise.compile(*end, *stress, *changes)
+        self.resistance = ffi.NULL
         if softening is not None:
-            law = softening.of(at["softening limit"], at["softening energy"])
-            resistance = scheme.resistance(law, at["opening"], a)
-            excess = s * σ - resistance  # P(32), its second equation
-            growth_by_strain = -ufl.diff(excess, strain) / ufl.diff(excess, a)
-            tangent = ufl.diff(σ, strain) + ufl.diff(σ, a) * growth_by_strain  # P(76)
-            self.opening = pointwise.compile(σ, tangent)
-            self.excess = pointwise.compile(excess, ufl.diff(excess, a))
-            broken = a * law.mean_traction(at["opening"], a)
-            traction = law.traction(at["opening"] + a)
-        end = {
-            "flow": dp,
-            "worked": bulk.dissipation(dp, dt),
-            "broken": broken,
-            "lost": bulk.elastic_energy(e1 - e0) + bulk.hardening_energy(dp, dp),
-            "elastic": bulk.elastic_energy(e1),
-            "hardening": bulk.hardening_energy(p + dp, ξ + abs(dp)),
-            "stress": bulk.stress(e1, 0),
-            "resistance": traction,
-        }
-        self.end = pointwise.compile(*in_order("point_output", end))
+            a = ufl.variable(pointwise.at["growth"])
+            resistance = equations.resistance({**pointwise.at, "growth": a}, a)
+            self.resistance = pointwise.compile(resistance, ufl.diff(resistance, a))
+
+    @cached_property
+    def elastic(self) -> Any:
+        """Stresses and their derivatives by strains while the variables stay as they are."""
+        stress = tuple(map(ufl.as_ufl, self._equations.elastic_stress(self._at)))
+        return self._pointwise.compile(*stress, *self._derivatives(stress, self._strains))
+
+    def _derivatives(self, of: tuple[Expr, ...], by: tuple[str, ...]) -> list[Expr]:
+        """Derivatives, one row of each function."""
+        return [ufl.diff(f, self._at[name]) for f in of for name in by]
 
 
 _point_forms = stated(PointForms)
@@ -89,9 +106,9 @@ class CompiledPoints(Points):
     """
 
     def _prepare(self, scheme: Scheme, length: Array) -> None:
-        layout = self._layout
-        kind = layout.softening and layout.softening.of(1.0, 1.0)
-        self._forms = forms = _point_forms(layout.statement, kind, scheme)
+        layout, law = self._layout, self._layout.kind.law
+        softening = layout.softening and layout.softening.of(1.0, 1.0)
+        self._forms = forms = _point_forms(inputs(layout), layout.kind, softening, scheme)
         self._over = np.zeros(1)
         arrays = {"B": layout.strains, "weight": layout.weights, "rest": layout.rest}
         arrays = {k: np.ascontiguousarray(x, np.float64) for k, x in arrays.items()}
@@ -99,7 +116,9 @@ class CompiledPoints(Points):
         self.points = struct(
             "points", cells=cells, of_cell=of_cell, width=width, w=self._storage,
             theta=scheme.theta, length=np.ascontiguousarray(length), **arrays,
-            bulk=forms.bulk, opening=forms.opening, excess=forms.excess, end=forms.end,
+            law=forms.law, resistance=forms.resistance, end=forms.end, solves=law.solves,
+            components=self._components, variables=len(law.variables),
+            strain=inputs(layout).index(rows(law, "strain")[0]),
             e0=self._e0, e1=self.strains, r=self.r, D=self.D, kept=self.kept, sum=self.sums,
             over=self._over, search=self._search.flags,
         )  # fmt: skip
@@ -127,6 +146,10 @@ class CompiledPoints(Points):
     def accept(self) -> None:
         """Take the strains of the latest response as the new state."""
         lib.commit(self.points)
+
+    def _let_stay(self) -> None:
+        """Let the variables of the bulk stay as they are from now on."""
+        self.points.law, self.points.solves = self._forms.elastic, False
 
     def _sums_to_come(self) -> Array:
         """Return :attr:`sums` as :meth:`accept` would leave them."""

@@ -23,8 +23,9 @@ from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.fibres import Layout
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.material_points import Points, inputs
+from ufl_beam.terms.material_points import Points
 from ufl_beam.terms.openings import SearchFlags
+from ufl_beam.terms.point_equations import inputs
 from ufl_beam.terms.tangent_derivatives import Cells
 
 
@@ -95,7 +96,7 @@ class InelasticBeams(Cells, ABC):
         self._strains = Strains(fields)
         cells, n = len(fields.order), len(layout.weights)
         # Internal variables and numbers of the points: one function in their quadrature space.
-        width = len(inputs(layout.statement))
+        width = len(inputs(layout))
         self._variables = fields.variables(n * width)
         self.points = points(
             layout,

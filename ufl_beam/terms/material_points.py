@@ -12,22 +12,19 @@ from typing import Any
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import lib, names
+from ufl_beam.compiled.c_library import lib
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.fibres import Layout
-from ufl_beam.model.material_laws import Bulk
+from ufl_beam.model.material_law import MaterialLaw
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.openings import NOTHING, RELEASED, SPENT, SearchFlags
+from ufl_beam.terms.point_equations import PointEquations, inputs, prefixed, rows
 
 
-def inputs(bulk: type[Bulk]) -> tuple[str, ...]:
-    """Inputs of the law of a point, as they are stored; the first ones are those of loops.h."""
-    others = ("dt", *bulk.numbers(), "softening limit", "softening energy")
-    return (*names("point_input"), *others)
-
-
-STATE = ("plastic", "accumulated", "jump", "opening", "before", "traction", "flows")
-"""The internal variables, and what else of an accepted state the next step depends on."""
+def kept_inputs(law: MaterialLaw) -> tuple[str, ...]:
+    """The internal variables, and what else of an accepted state the next step depends on."""
+    others = ("jump", "opening", *rows(law, "before"), "traction", "flows")
+    return (*prefixed("state", law.variables), *others)
 
 
 def expect_entries(layout: Layout, scheme: Scheme, ledger: Ledger) -> None:
@@ -47,13 +44,14 @@ class Points(ABC):
 
     Args:
         layout: The points of a cell.
-        keys: See :meth:`Layout.bulk`.
+        keys: See :meth:`Layout.numbers`.
         length: Of the cells; (cells,); m.
         scheme: The time scheme.
         storage: Zeros, for all that is known of the points; (cells, n, number of inputs).
         search: Shared by all points of a scene.
 
     Attributes:
+        names: Names of the inputs.
         strains: Of the cells at the latest response; (cells, 3); may be written to.
         r, D: The latest response, see :meth:`respond`.
         kept: By cell: (N, V, M) in the accepted state, the jump of the last point, and the energy
@@ -78,11 +76,19 @@ class Points(ABC):
         self._layout, self._storage, self._alpha = layout, storage, scheme.alpha
         self._yields, self.softens = layout.yields, layout.softening is not None
         self._releases = self.softens and scheme.theta < 1  # see expect_entries
-        self._at = {name: storage[:, :, i] for i, name in enumerate(inputs(layout.statement))}
-        self._bulk = bulk = layout.bulk(keys)
-        self._at["stiffness"][:] = bulk.C
-        for name in bulk.numbers():
-            self._at[name][:] = getattr(bulk, name)
+        self.names, law = inputs(layout), layout.kind.law
+        self._at = {name: storage[:, :, i] for i, name in enumerate(self.names)}
+        self._kept = kept_inputs(law)
+        self._components = len(law.resultants or "x")
+        softening = layout.softening and layout.softening.of(1.0, 1.0)
+        self._equations = PointEquations(layout.kind, softening, scheme)
+        stiffness = np.reshape(layout.stiffness, (len(layout.weights), -1)).T
+        for name, value in zip(rows(law, "stiffness"), stiffness, strict=True):
+            self._at[name][:] = value
+        for name, value in layout.numbers(keys).items():
+            self._at[f"number {name}"][:] = value
+        for name, initial in law.variables.items():
+            self._at[f"state {name}"][:] = initial
         self._at["length"][:] = length[:, None]
         self._at["theta"][:] = scheme.theta
         self._at["dt"][:] = self._dt = 1.0
@@ -114,6 +120,15 @@ class Points(ABC):
         """Return the values of an input at the points, by its name; a view; (cells, n)."""
         return self._at[name]
 
+    def _rows(self, name: str) -> tuple[str, ...]:
+        """Names of the components of a strain or stiffness."""
+        return rows(self._layout.kind.law, name)
+
+    def _of_points(self, strains: Array) -> tuple[Array, ...]:
+        """Strains of the points by component, each (cells, n), from those of the cells."""
+        d = self._components
+        return tuple(strains @ self._layout.strains[k::d].T for k in range(d))
+
     def _resist(self) -> None:
         """Resistance after the openings so far."""
         softening, breaking = self._layout.softening, self._layout.breaking
@@ -125,7 +140,8 @@ class Points(ABC):
     def start(self, strains: Array) -> None:
         """Begin at these strains of the cells and not at those accepted; (cells, 3); 1, 1, 1/m."""
         self._e0[:] = strains
-        self["before"][:] = strains @ self._layout.strains.T
+        for name, values in zip(self._rows("before"), self._of_points(strains), strict=True):
+            self[name][:] = values
         self._resist()
 
     def begin(self, dt: float) -> None:
@@ -170,9 +186,9 @@ class Points(ABC):
     def remaining(self, change: Array) -> Array:
         """Part of the elastic stiffness that is left for small changes of the strains; (cells,)."""
         layout, theta = self._layout, self["theta"][0, 0]
-        stiffness, by_point = theta * self["stiffness"], change @ layout.strains.T
         elastic = theta * change**2 @ layout.rest
-        elastic += (stiffness * by_point**2) @ layout.weights
+        for name, by_point in zip(self._rows("stiffness"), self._of_points(change), strict=True):
+            elastic += (theta * self[name] * by_point**2) @ layout.weights
         now = np.einsum("ci,cij,cj->c", change, self.D.reshape(-1, 3, 3), change)
         return np.asarray(np.divide(now, elastic, out=np.ones(len(now)), where=elastic > 0))
 
@@ -207,7 +223,12 @@ class Points(ABC):
             borne, limit = (self[name][:, breaking] for name in ("traction", "softening limit"))
             spent = np.isfinite(limit) & (borne <= SPENT * limit)
             self["stiffness"][:, breaking] *= np.where(spent, NOTHING, 1.0)
-        self["traction"][:] = self["limit"][:] = np.inf
+        self["traction"][:] = np.inf
+        self._let_stay()
+
+    @abstractmethod
+    def _let_stay(self) -> None:
+        """Let the variables of the bulk stay as they are from now on."""
 
     # -- the ledger ----------------------------------------------------------------------------
 
@@ -236,27 +257,30 @@ class Points(ABC):
         """Return the internal variables of the accepted state; (cells, k); a copy."""
         stored = np.zeros((len(self.kept), 2))
         stored[:1] = self.sums[3:5]  # of all cells together; to whom it belongs does not matter
-        return np.hstack([*(self[name] for name in STATE), self.kept, self._e0, stored])
+        return np.hstack([*(self[name] for name in self._kept), self.kept, self._e0, stored])
 
     def restore(self, cells: Index, rows: Array) -> None:
         """Take over :meth:`state` in some of the cells.
 
         Call :meth:`start` and :meth:`refresh` where strains or laws are not those it is of.
         """
-        ends = np.arange(1, len(STATE) + 1) * self._storage.shape[1]
+        ends = np.arange(1, len(self._kept) + 1) * self._storage.shape[1]
         *variables, kept, e0, stored = np.split(rows, [*ends, ends[-1] + 6, ends[-1] + 9], axis=1)
-        for name, values in zip(STATE, variables, strict=True):
+        for name, values in zip(self._kept, variables, strict=True):
             self[name][cells] = values
         self.kept[cells], self._e0[cells] = kept, e0
         self.sums[3:5] = stored.sum(axis=0)
 
     def refresh(self, strains: Array) -> None:
         """Make forces and stored energies those of a state that no step has led to."""
-        layout, bulk, length = self._layout, self._bulk, self["length"][:, :1]
-        p, volume = self["plastic"], layout.weights * length
-        e = strains @ layout.strains.T - self["jump"] / self["length"]
-        of_points = (layout.weights * bulk.stress(e, p)) @ layout.strains
-        self.kept[:, :3] = layout.rest * strains + of_points
+        layout, length, law = self._layout, self["length"][:, :1], self._equations.law(self._at)
+        state, volume = self._equations.state(self._at), layout.weights * length
+        relieved = self["jump"] / self["length"]
+        e = law.as_argument(tuple(x - relieved for x in self._of_points(strains)))
+        self.kept[:, :3] = layout.rest * strains
+        for k, stress in enumerate(law.as_tuple(law.stress(e, state))):
+            of_points = (layout.weights * stress) @ layout.strains[k :: self._components]
+            self.kept[:, :3] += of_points
         of_rest = strains**2 @ layout.rest / 2 * length[:, 0]
-        self.sums[3] = np.sum(volume * bulk.elastic_energy(e - p)) + np.sum(of_rest)
-        self.sums[4] = np.sum(volume * bulk.hardening_energy(p, self["accumulated"]))
+        self.sums[3] = np.sum(volume * law.elastic_energy(e, state)) + np.sum(of_rest)
+        self.sums[4] = np.sum(volume * law.hardening_energy(state))

@@ -22,12 +22,16 @@ from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import RigidPlastic
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.material_laws import Hardening, HardeningBulk, SofteningLaw
+from ufl_beam.model.material_law import State
+from ufl_beam.model.material_laws import Hardening, SofteningLaw
 from ufl_beam.model.plastic_hinges import law_of
 from ufl_beam.terms.connector_responses import Response, Setting, respond
 from ufl_beam.terms.openings import NOTHING, RELEASED, SPENT
 
-INPUTS = (*names("slip_input", "slip_"), *("θ", "dt", "limit", "energy", "H", "B", "eta"))
+INPUTS = (
+    *names("slip_input", "slip_"),
+    *("θ", "dt", "limit", "energy", "modulus", "kinematic", "viscosity"),
+)
 """Inputs of the compiled laws: the slip of the step and its direction (1 or -1); accumulated slip
 and motion at t_n, which loops.h names as well; numbers of the scheme and the law."""
 
@@ -59,14 +63,16 @@ def _(law: SofteningLaw, at: Mapping[str, Expr], scheme: Scheme) -> Slip:
 
 @slip.register
 def _(law: Hardening, at: Mapping[str, Expr], scheme: Scheme) -> Slip:
-    a, ξ, s, e, θ, H, B = (at[n] for n in ("slip", "slipped", "direction", "start", "θ", "H", "B"))
-    numbers = HardeningBulk(0.0, at["limit"], H, B, at["eta"])
-    resistance = at["limit"] + H * (ξ + θ * a) + at["eta"] * a / at["dt"]
+    a, ξ, s, e, θ, dt = (at[n] for n in ("slip", "slipped", "direction", "start", "θ", "dt"))
+    numbers = {name: at[name] for name in ("limit", "modulus", "kinematic", "viscosity")}
+    H, B, change = at["modulus"], at["kinematic"], State({"plastic": a, "accumulated": a})
+    bulk = law.of(np.inf, numbers)
+    resistance = at["limit"] + H * (ξ + θ * a) + at["viscosity"] * a / dt
     return Slip(
         s * resistance + B * (e + θ * s * a),
-        numbers.dissipation(a, at["dt"]),
-        numbers.hardening_energy(a, a),
-        numbers.hardening_energy(e + s * a, ξ + a),
+        bulk.dissipation(s * a, change, change, dt),
+        bulk.hardening_energy(change),
+        bulk.hardening_energy(State({"plastic": e + s * a, "accumulated": ξ + a})),
         at["limit"] + H * (ξ + a),
         B * (e + s * a),
     )

@@ -11,7 +11,8 @@ from ufl_beam.model.connector_laws import Spring
 from ufl_beam.model.fibres import Layout
 from ufl_beam.model.material_laws import Hardening
 from ufl_beam.terms.connector_responses import Response, Rows, respond
-from ufl_beam.terms.material_points import Points, expect_entries, inputs
+from ufl_beam.terms.material_points import Points, expect_entries
+from ufl_beam.terms.point_equations import inputs
 
 
 @respond.register(Spring)
@@ -30,7 +31,7 @@ class _Sprung(Response):
         )
         setting, number = self._setting, len(self._links)
         keys = [(0, i) for i in range(number)]
-        storage = np.zeros((number, 1, len(inputs(layout.statement))))
+        storage = np.zeros((number, 1, len(inputs(layout))))
         of = (layout, keys, np.ones(number), setting.scheme, storage, setting.search)
         self.points: Points = setting.points(*of)
         expect_entries(layout, setting.scheme, setting.ledger)

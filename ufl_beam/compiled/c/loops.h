@@ -87,21 +87,25 @@ double largest_motion(int rows, const double *w, const double *q);
 
 /* Python asks for the names in these enums, in their order; the last of each is their number. */
 
-/* The first inputs of the law of a point; what laws need beside them comes after them. */
+/* The first inputs of the law of a point. After them come, from `strain` of points on: the strains at
+ * the end of the step, those before it, and stiffnesses, `components` of each; `variables` before the
+ * step; as many that are being solved for, if `solves`; and numbers that C does not know. */
 enum point_input {
-  STRAIN, GROWTH, DIRECTION,                                   /* of an iterate: at the end; opening */
-  TRACTION, BEFORE, PLASTIC, ACCUMULATED, JUMP, OPENING, FLOWS, /* the state before the step */
-  STIFFNESS, LENGTH, THETA,
+  GROWTH, DIRECTION,             /* of an iterate: opening */
+  TRACTION, JUMP, OPENING, FLOWS, /* the state before the step */
+  LENGTH, THETA, DT,
   POINT_INPUTS
 };
 
 /* Values of FLOWS: did not grow in the last step, grew in it, may open in this one. */
 enum { CLOSED, FLOWING, RELEASED };
 
-/* What the end of a step brings a point. */
+/* What the end of a step brings a point; then come stresses and changes of variables. */
 enum point_output {
-  FLOW, WORKED, BROKEN, LOST, ELASTIC, HARDENING, STRESS, RESISTANCE, POINT_OUTPUTS
+  WORKED, BROKEN, LOST, ELASTIC, HARDENING, RELAXED, RESISTANCE, LEFT, POINT_OUTPUTS
 };
+
+enum { MOST_VARIABLES = 16, MOST_CORRECTIONS = 100 }; /* of a law */
 
 enum { POINT_KEPT = 6, POINT_SUMS = 7 }; /* numbers of a cell, and of all: `kept` and `sum` of points */
 
@@ -111,7 +115,10 @@ enum search { OPENED, STIFF, HOLD, OVER, SEARCH_FLAGS };
 /* Points in cells, `of_cell` in each, with `width` numbers of each in w; see material_points.py. */
 typedef struct {
   int32_t *search;
-  kernel *bulk, *opening, *excess, *end;
+  /* Of the law: stresses and their derivatives by strains; or, if it solves, residuals and these, see
+   * solve_law. Of a discontinuity: resistance and its derivative by the growth. */
+  kernel *law, *resistance, *end;
+  int solves, components, variables, strain;
   int cells, of_cell, width;
   const double *B, *weight, *rest, *length;
   double theta;

@@ -9,35 +9,195 @@ static void ask(kernel *tabulate, const double *w, int answers, double *e)
   CALL(tabulate, e, w, 0, unit_cell);
 }
 
-/* Growth at which the excess of what the bulk bears over the resistance vanishes, or NAN.
+/* Solve A x = b for several b, the columns of B, which x replace; zero if A is singular. */
+static int solve_dense(int n, double *A, int columns, double *B)
+{
+  for (int k = 0; k < n; ++k) {
+    int pivot = k;
+    for (int i = k + 1; i < n; ++i)
+      if (fabs(A[n * i + k]) > fabs(A[n * pivot + k])) pivot = i;
+    const double largest = A[n * pivot + k];
+    if (!(fabs(largest) > 0 && fabs(largest) < INFINITY)) return 0;
+    for (int j = 0; j < n && pivot != k; ++j) {
+      double a = A[n * k + j];
+      A[n * k + j] = A[n * pivot + j];
+      A[n * pivot + j] = a;
+    }
+    for (int j = 0; j < columns && pivot != k; ++j) {
+      double b = B[columns * k + j];
+      B[columns * k + j] = B[columns * pivot + j];
+      B[columns * pivot + j] = b;
+    }
+    for (int i = k + 1; i < n; ++i) {
+      const double factor = A[n * i + k] / largest;
+      for (int j = k + 1; j < n; ++j) A[n * i + j] -= factor * A[n * k + j];
+      for (int j = 0; j < columns; ++j) B[columns * i + j] -= factor * B[columns * k + j];
+    }
+  }
+  for (int k = n - 1; k >= 0; --k)
+    for (int j = 0; j < columns; ++j) {
+      double b = B[columns * k + j];
+      for (int i = k + 1; i < n; ++i) b -= A[n * k + i] * B[columns * i + j];
+      B[columns * k + j] = b / A[n * k + k];
+    }
+  return 1;
+}
+
+/* Largest part that the residuals of a law are of their sizes. */
+static double part_of(int m, const double *residuals, const double *sizes)
+{
+  double largest = 0;
+  for (int i = 0; i < m; ++i) {
+    const double part = fabs(residuals[i]) / sizes[i];
+    if (residuals[i] != 0 && !(part <= largest)) largest = part == part ? part : INFINITY;
+  }
+  return largest;
+}
+
+/* Find the variables of a law from its residuals, by Newton's method from the state before the step;
+ * s gets the stresses and their derivatives by the implicit function theorem.
+ *
+ * The law answers with residuals R, their derivatives J by the variables and E by the strains; with
+ * stresses, and their derivatives by strains and by variables. A correction is halved until the largest
+ * residual falls, each as a part of the terms that the correction cancels in it and their round-off.
+ */
+static void solve_law(const points *p, double *w, double *s)
+{
+  enum { M = MOST_VARIABLES };
+  const int m = p->variables, d = p->components, all = m * (1 + m + d) + d * (1 + d + m);
+  double *z = w + p->strain + 3 * d + m, x[M], sizes[M], a[M * (1 + M + 3) + 3 * (1 + 3 + M)];
+  double J[M * M], B[M * 4];
+  memcpy(z, z - m, m * sizeof *z);
+  ask(p->law, w, all, a);
+  for (int corrections = 0;; ++corrections) {
+    const double *E = a + m + m * m, *stress = E + m * d, *by_strain = stress + d;
+    const double *by_variables = by_strain + d * d;
+    memcpy(J, a + m, m * m * sizeof *J);
+    for (int i = 0; i < m; ++i) {
+      B[(1 + d) * i] = a[i];
+      for (int k = 0; k < d; ++k) B[(1 + d) * i + 1 + k] = E[d * i + k];
+    }
+    const int solved = solve_dense(m, J, 1 + d, B);
+    int ends = 1;
+    for (int i = 0; i < m; ++i) {
+      double digits = 0;
+      sizes[i] = 0;
+      for (int j = 0; j < m; ++j) {
+        sizes[i] += fabs(a[m + m * i + j] * B[(1 + d) * j]);
+        digits += fabs(a[m + m * i + j] * z[j]);
+      }
+      for (int k = 0; k < d; ++k) digits += fabs(E[d * i + k] * w[p->strain + k]);
+      /* Round-off of the terms, or a correction whose square is none. */
+      const int small = fabs(B[(1 + d) * i]) <= 1e-9 * fabs(z[i]);
+      digits *= 4 * DBL_EPSILON;
+      sizes[i] += digits;
+      ends = ends && (fabs(a[i]) <= digits || small);
+    }
+    if (!solved || (!ends && corrections == MOST_CORRECTIONS)) {
+      for (int i = 0; i < d + d * d; ++i) s[i] = NAN;
+      return;
+    }
+    if (ends) {
+      for (int k = 0; k < d; ++k) {
+        s[k] = stress[k];
+        for (int j = 0; j < m; ++j) s[k] -= by_variables[m * k + j] * B[(1 + d) * j];
+        for (int l = 0; l < d; ++l) {
+          double tangent = by_strain[d * k + l];
+          for (int j = 0; j < m; ++j) tangent -= by_variables[m * k + j] * B[(1 + d) * j + 1 + l];
+          s[d + d * k + l] = tangent;
+        }
+      }
+      for (int j = 0; j < m; ++j) z[j] -= B[(1 + d) * j];
+      return;
+    }
+    const double before = part_of(m, a, sizes);
+    memcpy(x, z, m * sizeof *x);
+    for (double part = 1; part > 1e-3; part /= 2) {
+      for (int j = 0; j < m; ++j) z[j] = x[j] - part * B[(1 + d) * j];
+      ask(p->law, w, all, a);
+      if (part_of(m, a, sizes) <= (1 - part / 10) * before) break;
+    }
+  }
+}
+
+/* Stresses of the bulk, and their derivatives by the strains at the end of the step. */
+static inline void answer(const points *p, double *w, double *s)
+{
+  if (p->solves) solve_law(p, w, s);
+  else if (p->components == 1) ask(p->law, w, 2, s); /* the size is known to the compiler */
+  else ask(p->law, w, p->components * (1 + p->components), s);
+}
+
+/* Growth at which the excess of what the bulk bears over the resistance vanishes, or NAN; s gets the
+ * stress, and its derivative with the growth condensed.
  *
  * The excess is positive at zero, falls, and is concave unless the bulk flows back in tension:
  * Newton's method comes to its root from above, from where the bulk would be unloaded. Bisection
- * stands by.
+ * stands by: beyond the bounds, and where steps go to and fro without growing shorter.
  */
-static double growth(kernel *excess, double *w)
+static double growth(const points *p, double *w, double *s)
 {
-  double g[2], theta = w[THETA];
-  double strain = (1 - theta) * w[BEFORE] + theta * w[STRAIN] - w[JUMP] / w[LENGTH];
-  double bound = fabs(strain - w[PLASTIC]) * w[LENGTH] / theta + DBL_MIN;
+  double t[2];
+  const double *strain = w + p->strain, theta = w[THETA], way = w[DIRECTION], length = w[LENGTH];
+  const double bound = fabs(s[0]) / strain[2] * length / theta + DBL_MIN;
   /* Where a jump has relieved the strain, what the bulk bears has the last digits of both. */
-  double far = fmax(fabs(w[BEFORE]), fabs(w[STRAIN])) * w[LENGTH] + fabs(w[JUMP]);
-  w[GROWTH] = 0;
-  ask(excess, w, 2, g);
-  if (g[0] <= 0) return 0; /* over the limit by a last digit */
-  double a = g[1] < 0 ? fmin(bound, -g[0] / g[1]) : bound, low = 0, high = INFINITY;
+  const double far = fmax(fabs(strain[1]), fabs(strain[0])) * length + fabs(w[JUMP]);
+  ask(p->resistance, w, 2, t);
+  double excess = way * s[0] - t[0], slope = -s[1] / length - t[1];
+  if (excess <= 0) return 0; /* over the limit by a last digit */
+  double a = slope < 0 ? fmin(bound, -excess / slope) : bound, low = 0, high = INFINITY;
+  double last = INFINITY;
+  int turns = 0;
   for (int i = 0; i < 200; ++i) {
     w[GROWTH] = a;
-    ask(excess, w, 2, g);
-    if (g[0] > 0) low = a;
+    answer(p, w, s);
+    ask(p->resistance, w, 2, t);
+    turns = excess > 0;
+    excess = way * s[0] - t[0], slope = -s[1] / length - t[1];
+    turns = turns != (excess > 0);
+    if (excess > 0) low = a;
     else high = a;
-    double next = a - g[0] / g[1], step = fabs(next - a);
+    double next = a - excess / slope, step = fabs(next - a);
     /* So small a relative step was the last but none: the next one would be its square. */
     if (step <= 1e-9 * a || step <= 4 * DBL_EPSILON * (bound + far)) return next > 0 ? next : a;
-    if (!(next > low && next < high)) next = high < INFINITY ? (low + high) / 2 : 2 * a;
+    const int wanders = turns && step > last / 2;
+    last = step;
+    if (!(next > low && next < high) || (wanders && high < INFINITY))
+      next = high < INFINITY ? (low + high) / 2 : 2 * a;
     a = next;
   }
   return NAN;
+}
+
+/* Let a point open until nothing is over the resistance; s becomes its stress and the derivative. */
+static void open_point(const points *p, double *w, double *s)
+{
+  double t[2];
+  w[DIRECTION] = s[0] < 0 ? -1 : 1;
+  w[GROWTH] = growth(p, w, s);
+  answer(p, w, s);
+  ask(p->resistance, w, 2, t);
+  s[1] *= t[1] / (s[1] / w[LENGTH] + t[1]); /* P(76) */
+}
+
+/* Strains of a point in a cell of strains e; b are its d rows of B. */
+static inline void find_strains(int d, const double *b, const double *e, double *strain)
+{
+  for (int a = 0; a < d; ++a)
+    strain[a] = b[3 * a] * e[0] + b[3 * a + 1] * e[1] + b[3 * a + 2] * e[2];
+}
+
+/* Add stresses s of a point and their derivatives, which follow them, to those of its cell. */
+static inline void add_answer(int d, const double *b, double weight, const double *s, double *r,
+                              double *D)
+{
+  for (int a = 0; a < d; ++a)
+    for (int k = 0; k < 3; ++k) {
+      r[k] += weight * s[a] * b[3 * a + k];
+      for (int g = 0; g < d; ++g)
+        for (int l = 0; l < 3; ++l)
+          D[3 * k + l] += weight * s[d + d * a + g] * b[3 * a + k] * b[3 * g + l];
+    }
 }
 
 /* Resultants r of cells whose strains grow from e0 to e1, and their derivatives D.
@@ -51,8 +211,9 @@ static double growth(kernel *excess, double *w)
  */
 void respond(const points *p)
 {
-  double s[2], *w = p->w, *r = p->r, *D = p->D;
+  double s[3 + 9], *w = p->w, *r = p->r, *D = p->D;
   const double *e0 = p->e0, *e1 = p->e1;
+  const int d = p->components;
   *p->over = 0;
   for (int c = 0; c < p->cells; ++c, e0 += 3, e1 += 3, r += 3, D += 9) {
     memset(D, 0, 9 * sizeof *D);
@@ -61,26 +222,24 @@ void respond(const points *p)
       D[4 * k] = p->rest[k] * p->theta;
     }
     for (int i = 0; i < p->of_cell; ++i, w += p->width) {
-      const double *b = p->B + 3 * i;
-      w[STRAIN] = b[0] * e1[0] + b[1] * e1[1] + b[2] * e1[2];
+      double *strain = w + p->strain;
+      if (d == 1) find_strains(1, p->B + 3 * i, e1, strain);
+      else find_strains(d, p->B + 3 * d * i, e1, strain);
       w[GROWTH] = w[DIRECTION] = 0;
-      ask(p->bulk, w, 2, s);
+      answer(p, w, s);
       const int over = fabs(s[0]) > w[TRACTION]; /* P(51) */
       if (over && p->search[HOLD] && w[FLOWS] == CLOSED && w[TRACTION] > 0) {
         *p->over = fmax(*p->over, fabs(s[0]) / w[TRACTION] - 1);
         p->search[OVER] = 1;
       } else if (over) {
-        w[DIRECTION] = s[0] < 0 ? -1 : 1;
-        w[GROWTH] = growth(p->excess, w);
-        ask(p->opening, w, 2, s);
+        open_point(p, w, s);
         p->search[OPENED] = 1;
       } else if (p->search[STIFF]) {
-        s[1] = p->theta * w[STIFFNESS];
+        for (int a = 0; a < d * d; ++a)
+          s[d + a] = a % (d + 1) ? 0 : p->theta * strain[2 * d + a / (d + 1)];
       }
-      for (int k = 0; k < 3; ++k) {
-        r[k] += p->weight[i] * s[0] * b[k];
-        for (int l = 0; l < 3; ++l) D[3 * k + l] += p->weight[i] * s[1] * b[k] * b[l];
-      }
+      if (d == 1) add_answer(1, p->B + 3 * i, p->weight[i], s, r, D);
+      else add_answer(d, p->B + 3 * d * i, p->weight[i], s, r, D);
     }
   }
 }
@@ -88,10 +247,10 @@ void respond(const points *p)
 /* Let the closed points open, in this step, whose excess in the latest response is so large. */
 void release(const points *p, double least)
 {
-  double s[2], *w = p->w;
+  double s[3 + 9], *w = p->w;
   for (int i = 0; i < p->cells * p->of_cell; ++i, w += p->width) {
     if (w[FLOWS] != CLOSED || !(w[TRACTION] < INFINITY)) continue;
-    ask(p->bulk, w, 2, s);
+    answer(p, w, s);
     if (fabs(s[0]) > w[TRACTION] && fabs(s[0]) / w[TRACTION] - 1 >= least) w[FLOWS] = RELEASED;
   }
 }
@@ -156,8 +315,10 @@ void add_inelastic_tangent(void *self, const double *q, double *tangent)
  */
 void commit(const points *p)
 {
-  double s[POINT_OUTPUTS], *e0 = p->e0, *w = p->w, *kept = p->kept, *sum = p->sum;
+  double s[POINT_OUTPUTS + 3 + MOST_VARIABLES], *e0 = p->e0, *w = p->w, *kept = p->kept, *sum = p->sum;
   const double *e1 = p->e1, *rest = p->rest, *length = p->length, *weight = p->weight;
+  const double *stress = s + POINT_OUTPUTS, *changes = stress + p->components;
+  const int d = p->components;
   memset(sum, 0, POINT_SUMS * sizeof *sum);
   for (int c = 0; c < p->cells; ++c, e0 += 3, e1 += 3, kept += POINT_KEPT) {
     double plastic = 0, broken = 0;
@@ -169,16 +330,11 @@ void commit(const points *p)
       e0[k] = e1[k];
     }
     for (int i = 0; i < p->of_cell; ++i, w += p->width) {
-      double volume = weight[i] * length[c];
-      ask(p->end, w, POINT_OUTPUTS, s);
-      const double before = w[STIFFNESS] * (w[BEFORE] - w[JUMP] / w[LENGTH] - w[PLASTIC]);
-      const double change = s[STRESS] - before;
-      const double hardened = s[LOST] - change / w[STIFFNESS] * change / 2;
-      const double relaxed = hardened - change / 2 * s[FLOW];
-      if (s[FLOW] != 0 && relaxed > 0) sum[6] += volume * relaxed;
-      w[BEFORE] = w[STRAIN];
-      w[PLASTIC] += s[FLOW];
-      w[ACCUMULATED] += fabs(s[FLOW]);
+      const double volume = weight[i] * length[c];
+      double *strain = w + p->strain;
+      ask(p->end, w, POINT_OUTPUTS + d + p->variables, s);
+      for (int a = 0; a < d; ++a) strain[d + a] = strain[a];
+      for (int j = 0; j < p->variables; ++j) strain[3 * d + j] += changes[j];
       w[JUMP] += w[DIRECTION] * w[GROWTH];
       w[OPENING] += w[GROWTH];
       w[FLOWS] = w[GROWTH] > 0 ? FLOWING : CLOSED;
@@ -187,16 +343,19 @@ void commit(const points *p)
       if (w[TRACTION] == 0) {
         /* Broken: the mean stress of each step is zero from now on, but stresses at the ends may
          * alternate about that. The discontinuity takes the elastic strain, which nothing holds. */
-        w[JUMP] += s[STRESS] / w[STIFFNESS] * w[LENGTH];
-        sum[5] += volume * s[ELASTIC];
-        s[STRESS] = s[ELASTIC] = 0;
+        w[JUMP] += stress[0] / strain[2] * w[LENGTH];
+        sum[5] += volume * (s[ELASTIC] - s[LEFT]);
+        s[ELASTIC] = s[LEFT];
+        s[POINT_OUTPUTS] = 0;
       }
       plastic += volume * s[WORKED];
       broken += weight[i] * s[BROKEN];
       sum[2] += volume * s[LOST];
       sum[3] += volume * s[ELASTIC];
       sum[4] += volume * s[HARDENING];
-      for (int k = 0; k < 3; ++k) kept[k] += weight[i] * s[STRESS] * p->B[3 * i + k];
+      sum[6] += volume * s[RELAXED];
+      for (int a = 0; a < d; ++a)
+        for (int k = 0; k < 3; ++k) kept[k] += weight[i] * stress[a] * p->B[3 * (d * i + a) + k];
     }
     kept[3] = w[JUMP - p->width];
     kept[4] += plastic;

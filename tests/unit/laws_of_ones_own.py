@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: MIT
+"""Material laws for tests: by residuals, in closed form, with one variable, several or none."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import ufl_beam as ub
+
+f = ub.law_functions
+
+
+@dataclass(frozen=True)
+class PowerLaw(ub.MaterialLaw):
+    """Plastic strain k0 (|stress|/M0)^n under growing stresses; by residuals."""
+
+    M0: float
+    k0: float
+    n: float
+    variables: ClassVar = {"plastic": 0.0, "largest": 0.0}
+
+    def stress(self, strain, state):
+        return self.C * (strain - state.plastic)
+
+    def residuals(self, strain, old, new, dt):
+        M = self.stress(strain, new)
+        largest = f.larger(old.largest, self.k0 * (f.absolute(M) / self.M0) ** self.n)
+        flows = f.sign(M) * (new.largest - old.largest)
+        return {"largest": new.largest - largest, "plastic": new.plastic - old.plastic - flows}
+
+    def elastic_energy(self, strain, state):
+        return self.C * (strain - state.plastic) ** 2 / 2
+
+
+@dataclass(frozen=True)
+class Dashpot(ub.MaterialLaw):
+    """A spring and a dashpot in a row (Maxwell); in closed form."""
+
+    eta: float
+    variables: ClassVar = {"creep": 0.0}
+
+    def stress(self, strain, state):
+        return self.C * (strain - state.creep)
+
+    def increments(self, strain, state, dt):
+        return {"creep": self.stress(strain, state) / (self.eta / dt + self.C)}
+
+    def elastic_energy(self, strain, state):
+        return self.C * (strain - state.creep) ** 2 / 2
+
+
+@dataclass(frozen=True)
+class SameHardening(ub.MaterialLaw):
+    """What `Hardening` is, stated by residuals."""
+
+    limit: float
+    H: float
+    B: float
+    eta: float
+    variables: ClassVar = {"p": 0.0, "xi": 0.0}
+
+    def stress(self, strain, state):
+        return self.C * (strain - state.p)
+
+    def residuals(self, strain, old, new, dt):
+        trial = self.C * (strain - old.p) - self.B * old.p
+        over = f.sign(trial) * (self.stress(strain, new) - self.B * new.p)
+        over = over - self.limit - self.H * new.xi
+        flows = f.below(self.limit + self.H * old.xi - f.absolute(trial), 0.0)
+        flow = over * dt - self.eta * (new.xi - old.xi)
+        return {
+            "p": new.p - old.p - f.sign(trial) * (new.xi - old.xi),
+            "xi": f.where(flows, flow, new.xi - old.xi),
+        }
+
+    def elastic_energy(self, strain, state):
+        return self.C * (strain - state.p) ** 2 / 2
+
+    def hardening_energy(self, state):
+        return (self.B * state.p**2 + self.H * state.xi**2) / 2
+
+
+@dataclass(frozen=True)
+class Stiffening(ub.MaterialLaw):
+    """Elastic, with a stress that grows with the cube of the strain; no variables."""
+
+    cubic: float
+
+    def stress(self, strain, state):
+        return self.C * strain + self.cubic * strain**3
+
+    def elastic_energy(self, strain, state):
+        return self.C * strain**2 / 2 + self.cubic * strain**4 / 4

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: MIT
+"""Laws with curved branches against closed forms and independent integration."""
+
+import math
+
+import numpy as np
+import pytest
+from bars import LENGTH, Bars, C, histories
+from scipy.integrate import solve_ivp
+
+import ufl_beam as ub
+from ufl_beam.terms.compiled_points import CompiledPoints
+from ufl_beam.terms.reference_points import ReferencePoints
+
+MIDDLE = ub.ExactStatic(0.5)
+LAWS = {
+    "Ramberg-Osgood": ub.RambergOsgood(limit=2.0, offset=0.01, exponent=6),
+    "Armstrong-Frederick": ub.ArmstrongFrederick(limit=1.0, kinematic=150.0, recovery=60.0),
+    "Bouc-Wen": ub.BoucWen(limit=2.0, hardening=0.05, exponent=2),
+    "degrading": ub.BoucWen(2.0, 0.05, 1.5, shape=0.7, strength=0.05),
+}
+SCHEMES = [ub.Static(), MIDDLE, ub.ExactStatic(0.8), ub.ExactStatic(1.0)]
+each_law = pytest.mark.parametrize("law", LAWS)
+
+
+def follow(law, strains, scheme=MIDDLE):
+    """Stresses and bar after small steps of strain; second order."""
+    one = Bars(1, law, None, scheme)
+    stresses = []
+    for strain in strains:
+        one.step([strain])
+        stresses.append(one.stress()[0])
+    return np.array(stresses), one
+
+
+def test_ramberg_osgood():
+    """[closed] strain = stress/C + offset (stress/limit)^n, then elastic; in one step or many."""
+    law = LAWS["Ramberg-Osgood"]
+    for σ in (0.5, 2.0, 3.7):
+        strain = σ / C + 0.01 * (σ / 2) ** 6
+        for steps in (1, 7):
+            found, one = follow(law, strain * np.arange(1, steps + 1) / steps, ub.ExactStatic(1.0))
+            assert found[-1] == pytest.approx(σ, rel=1e-12)
+        one.step([strain - 0.5 * σ / C])
+        assert one.stress()[0] == pytest.approx(0.5 * σ, rel=1e-11)
+
+
+def test_armstrong_frederick_hardens_exponentially():
+    """[closed] back stress = kinematic/recovery (1 - exp(-recovery p)); 4000 steps, 1e-7."""
+    law = LAWS["Armstrong-Frederick"]
+    _, one = follow(law, np.linspace(0, 0.06, 4001)[1:])
+    p = one["plastic"][0]
+    assert one["back"][0] == pytest.approx(150 / 60 * (1 - math.exp(-60 * p)), rel=1e-6)
+    found, one = follow(law, np.linspace(0, 0.06, 31)[1:], ub.ExactStatic(1.0))
+    assert found[-1] == pytest.approx(1 + one["back"][0], rel=1e-12)
+
+
+def test_armstrong_frederick_ratchets():
+    """[closed] A cycle of stress from low to high leaves ln((B² - r²X1²)/(B² - r²X0²))/r, less.
+
+    X0 = low + limit and X1 = high - limit are the back stresses at its ends.
+    """
+    limit, B, r = 1.0, 150.0, 60.0
+    high, low = 2.2, -1.6
+    X1, X0 = high - limit, low + limit
+    exact = math.log((B - r * X0) / (B - r * X1)) / r - math.log((B + r * X1) / (B + r * X0)) / r
+    law = ub.ArmstrongFrederick(limit, B, r)
+    section = ub.Section(EA=200.0, GA=1.0, EI=1.0, axial=law)
+    beam = ub.Beam((0, 0), (1, 0), section, cells=1)
+
+    def stress(t):
+        return high * t if t < 1 else low + (high - low) * abs(1 - 2 * (t % 1.0))
+
+    load = ub.PointLoad(beam.end, force=(1.0, 0.0), time=stress)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    found = []
+    for n in (400, 800):
+        run = ub.simulate(scene, ub.Static(), t=(0, 3), dt=1 / n, progress=False)
+        u = run.displacement(beam.end)[:, 0]
+        found.append(u[3 * n] - u[2 * n])
+    # Backward Euler is of first order, so twice the finer less the coarser is of second.
+    assert 2 * found[1] - found[0] == pytest.approx(exact, rel=1e-3)
+
+
+@pytest.mark.parametrize("law", ["Bouc-Wen", "degrading"])
+def test_bouc_wen_against_integration(law):
+    """Independent integration of the equations of Wen, and of Baber and Wen; second order."""
+    law = LAWS[law]
+    z0, a = law.limit / C, law.hardening
+
+    def x(t):
+        return 0.04 * t * np.sin(2 * np.pi * t)
+
+    def rates(t, y):
+        z, e = y
+        dx = 0.04 * (np.sin(2 * np.pi * t) + 2 * np.pi * t * np.cos(2 * np.pi * t))
+        bends = 1 - law.shape + law.shape * np.sign(z * dx)
+        flow = (1 + law.strength * e) * abs(z / z0) ** law.exponent * bends
+        dz = dx * (1 - flow)
+        return [dz, z * (dx - dz) / z0**2]
+
+    exact = solve_ivp(rates, (0, 2), [0, 0], rtol=1e-11, atol=1e-14, max_step=1e-3)
+    z, e = exact.y[:, -1]
+    expected = C * (a * x(2.0) + (1 - a) * z)
+    errors = []
+    for n in (3000, 6000):
+        found, one = follow(law, x(np.linspace(0, 2, n + 1)[1:]))
+        errors.append(abs(found[-1] - expected) / law.limit)
+        assert one["energy"][0] == pytest.approx(e, rel=1e-4)
+    assert errors[1] < 1e-5
+    assert errors[0] / errors[1] > 1.8 or errors[1] < 1e-8
+
+
+@each_law
+@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+def test_both_paths_agree(law, scheme):
+    """As in test_point_paths.py; with a crack on top as well."""
+    for softening in (None, ub.Softening(2.5, 0.3)):
+        of = (LAWS[law], softening, scheme)
+        paths = [Bars(500, *of, by=by) for by in (CompiledPoints, ReferencePoints)]
+        for strain in histories(500, steps=6, size=0.03):
+            (σ, D), (σ_ref, D_ref) = (some.respond(strain) for some in paths)
+            assert np.isfinite(σ).all()
+            assert np.abs(σ - σ_ref).max() < 1e-12 * C
+            assert np.abs(D - D_ref).max() <= 1e-7 * np.abs(D).max()
+            for some in paths:
+                some.step(strain)
+            states = [np.nan_to_num(some.points.state(), posinf=0.0) for some in paths]
+            assert np.abs(states[0] - states[1]).max() < 1e-11 * np.abs(states[0]).max()
+
+
+@each_law
+@pytest.mark.parametrize("scheme", SCHEMES[1:], ids=str)
+def test_energies(law, scheme):
+    """Work is stored, dissipated or lost; over small steps nothing comes back from dissipation."""
+    one, stored = Bars(1, LAWS[law], None, scheme), 0.0
+    for strain in 0.05 * np.sin(np.linspace(0, 9, 400)[1:]):
+        before = one.strain[0]
+        (σ,) = one.step([strain])
+        plastic, _, lost, elastic, hardening, _, _ = one.points.sums
+        work, now = σ * (strain - before) * LENGTH, elastic + hardening
+        sinks = plastic + (2 * scheme.theta - 1) * lost
+        assert abs(work - (now - stored) - sinks) < 1e-13 * C
+        assert plastic > -1e-6  # of second order in the step where a branch turns
+        stored = now
+    assert one.dissipated()[0][0] > 0.1
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: ub.RambergOsgood(0.0, 0.002, 5), "RambergOsgood: limit"),
+        (lambda: ub.RambergOsgood(1.0, 0.002, 0.5), "RambergOsgood: exponent"),
+        (lambda: ub.ArmstrongFrederick(1.0, 1.0, 0.0), "ArmstrongFrederick: recovery"),
+        (lambda: ub.BoucWen(1.0, hardening=1.0), "BoucWen: hardening = 1 must lie between"),
+        (lambda: ub.BoucWen(1.0, shape=0.2), "BoucWen: shape"),
+        (lambda: ub.BoucWen(1.0, strength=-1.0), "BoucWen: strength"),
+    ],
+)
+def test_numbers_out_of_range_are_refused(make, says):
+    with pytest.raises(ub.SceneError, match=says):
+        make()

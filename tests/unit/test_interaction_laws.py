@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: MIT
+"""Axial force and moment that yield together."""
+
+import numpy as np
+import pytest
+
+import ufl_beam as ub
+from ufl_beam.model.fibres import Layout
+from ufl_beam.terms.compiled_points import CompiledPoints
+from ufl_beam.terms.point_equations import inputs
+from ufl_beam.terms.reference_points import ReferencePoints
+
+EA, EI, NP, MP = 1000.0, 50.0, 10.0, 2.0
+LAW = ub.AxialBending(NP, MP)
+SCHEMES = [ub.Static(), ub.ExactStatic(0.5), ub.ExactStatic(1.0)]
+
+
+def section(**more):
+    return ub.Section(EA=EA, GA=400.0, EI=EI, rhoA=1.0, rhoI=0.01, **more)
+
+
+class Cells:
+    """Cells of the section whose strains are given."""
+
+    def __init__(self, n, scheme, by=CompiledPoints):
+        layout = section(interaction=LAW).layout(None)
+        assert isinstance(layout, Layout)
+        storage = np.zeros((n, 1, len(inputs(layout))))
+        self.points = by(layout, [(0, k) for k in range(n)], np.full(n, 0.5), scheme, storage)
+        self.strain = np.zeros((n, 3))
+
+    def respond(self, strain):
+        self.points.start(self.strain)
+        self.points.begin(0.1)
+        r, D = self.points.respond(strain)
+        return r.copy(), D.reshape(-1, 3, 3).copy()
+
+    def step(self, strain):
+        r, _ = self.respond(strain)
+        self.points.accept()
+        self.strain = strain.copy()
+        return r
+
+
+def histories(n, steps):
+    """Random walks of (Σ, Γ, K), up to ten times the elastic range."""
+    random = np.random.default_rng(0)
+    walk = np.cumsum(random.uniform(-1, 1, (steps, n, 3)), axis=0)
+    return walk * [NP / EA, 0.01, MP / EI] * np.linspace(0.01, 4, n)[:, None]
+
+
+@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+def test_resultants_lie_within_the_surface(scheme):
+    """On it where it flows, with plastic strains along its normal; both paths alike."""
+    paths = [Cells(500, scheme, by) for by in (CompiledPoints, ReferencePoints)]
+    flows = 0
+    for strain in histories(500, 6):
+        (r, D), (r_ref, D_ref) = (cells.respond(strain) for cells in paths)
+        assert np.abs(r - r_ref).max() < 1e-12 * EA
+        assert np.abs(D - D_ref).max() < 1e-7 * EA
+        assert LAW.excess(r[:, 0], r[:, 2]).max() < 1e-12
+        before = [paths[0].points[f"state {x}"][:, 0].copy() for x in ("stretch", "curvature")]
+        for cells in paths:
+            cells.step(strain)
+        now = [paths[0].points[f"state {x}"][:, 0] for x in ("stretch", "curvature")]
+        dp = np.array(now) - before
+        on = np.abs(dp).max(axis=0) > 0
+        flows += on.sum()
+        assert np.abs(LAW.excess(r[on, 0], r[on, 2])).max() < 1e-12
+        # Work on plastic strains is not negative: the surface is convex and contains the origin.
+        assert (r[on, 0] * dp[0][on] + r[on, 2] * dp[1][on] > 0).all()
+    assert flows > 500
+
+
+@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+def test_tangents(scheme):
+    """Against central differences, coupled in N and M."""
+    cells = Cells(300, scheme)
+    *before, last = histories(300, 4)
+    for strain in before:
+        cells.step(strain)
+    _, D = cells.respond(last)
+    for k, ε in ((0, 1e-8), (2, 1e-7)):
+        step = ε * np.eye(3)[k]
+        central = (cells.respond(last + step)[0] - cells.respond(last - step)[0]) / (2 * ε)
+        # Curvature of the rounded ridge times ε, away from corners; medians beside them
+        assert np.median(np.abs(D[:, :, k] - central)) < 1e-6 * EA
+        assert np.mean(np.abs(D[:, :, k] - central).max(axis=1) > 1e-3 * EA) < 0.02
+
+
+def test_pure_resultants():
+    """[closed] N = Np without curvature, M = Mp without strain, far beyond the elastic range."""
+    strain = np.array([[0.1, 0.0, 0.0], [0.0, 0.0, 1.0], [-0.1, 0.0, 0.0], [0.0, 0.0, -1.0]])
+    r = Cells(4, ub.Static()).step(strain)
+    assert r[:, [0, 2]] == pytest.approx(np.array([[NP, 0], [0, MP], [-NP, 0], [0, -MP]]), abs=1e-9)
+
+
+@pytest.mark.parametrize("reference", [False, True])
+def test_a_column_under_axial_force(reference):
+    """[closed] Beyond yielding M = Mp (1 - n²) under a constant force n Np; rounded by 0.01."""
+    beam = ub.Beam((0, 0), (1, 0), section(interaction=LAW), cells=1)
+    press = ub.PointLoad(beam.end, force=(-0.6 * NP, 0.0), time=lambda t: min(t, 1.0))
+    turn = ub.Prescribed(beam.end, psi=lambda t: 0.4 * max(t - 1.0, 0.0))
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), turn], loads=[press])
+    newton = ub.Newton(reference=reference)
+    run = ub.simulate(scene, ub.Static(), t=(0, 2), dt=0.05, newton=newton, progress=False)
+    M = run.section_forces_at(beam.end)[-1, 2]
+    N = run.section_forces_at(beam.end)[-1, 0]
+    assert LAW.excess(N, M) == pytest.approx(0.0, abs=1e-9)
+    # The force turns with the axis, by 0.2 rad in the middle.
+    assert pytest.approx(MP * (1 - (N / NP) ** 2), rel=0.02) == M
+
+
+def test_the_ledger_closes():
+    """Of a beam that is thrown and yields in tension and bending."""
+    beam = ub.Beam((0, 0), (2, 0), section(interaction=LAW), cells=4)
+    load = ub.PointLoad(beam.end, force=(3.0, 8.0), time=lambda t: float(t < 0.5))
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    for scheme in (ub.Midpoint(), ub.Midpoint(0.1)):
+        run = ub.simulate(scene, scheme, t=(0, 1), dt=0.01, progress=False)
+        assert run.energy.worst < 1e-9
+        assert run.energy.lost["plastic"][-1] > 0.01 * run.energy.throughput
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: section(bending=LAW), r"is a law of NM together; use it as Section\(interaction"),
+        (lambda: section(interaction=ub.Hardening(1.0)), "is no law of N and M together"),
+        (lambda: section(interaction=LAW, bending=ub.Hardening(1.0)), "bending beside interaction"),
+        (lambda: section(interaction=LAW, hinge=ub.Softening(1.0, 1.0)), "hinge beside interact"),
+        (lambda: ub.Spring(1.0, law=LAW), "Spring: law = .* is a law of NM together"),
+        (lambda: ub.Fibres(LAW), "Fibres: law = .* is a law of NM together"),
+        (lambda: ub.AxialBending(0.0, 1.0), "AxialBending: axial"),
+    ],
+)
+def test_refusals(make, says):
+    with pytest.raises(ub.SceneError, match=says):
+        make()

@@ -1,0 +1,304 @@
+# SPDX-License-Identifier: MIT
+"""Laws of one's own in scenes: closed forms, the ledger, saved states, refusals."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from bars import Bars, C
+from laws_of_ones_own import Dashpot, PowerLaw, SameHardening, Stiffening
+
+import ufl_beam as ub
+from ufl_beam.model.fibres import Fibres
+
+f = ub.law_functions
+
+LAW = PowerLaw(M0=100.0, k0=0.05, n=5.0)
+
+
+def section(**more):
+    return ub.Section(EA=1e6, GA=1e6, EI=1e3, rhoA=1.0, rhoI=1e-3, **more)
+
+
+def bent(law, cells=4, moment=200.0, time=lambda t: t):
+    """A cantilever under a moment at its end."""
+    beam = ub.Beam((0, 0), (2, 0), section(bending=law), cells=cells)
+    load = ub.PointLoad(beam.end, moment=moment, time=time)
+    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+
+
+def rotation(run):
+    return run.displacement(run.scene.beams[0].end)[:, 2]
+
+
+@pytest.mark.parametrize("reference", [False, True])
+def test_curvature_of_ramberg_and_osgood(reference):
+    """[closed] κ = M/EI + k0 (M/M0)^n under a growing moment; 2e-9 is 1e-9 of 7 rad."""
+    run = ub.simulate(
+        bent(LAW), ub.Static(), t=(0, 1), dt=0.1, newton=ub.Newton(reference=reference)
+    )
+    M = 200.0 * run.times
+    assert rotation(run) == pytest.approx(2 * (M / 1e3 + 0.05 * (M / 100) ** 5), abs=2e-9)
+
+
+def test_unloading_is_elastic():
+    """[closed] From 150 N m back to zero: the plastic curvature stays."""
+    scene = bent(LAW, moment=150.0, time=lambda t: t if t < 1 else 2 - t)
+    run = ub.simulate(scene, ub.Static(), t=(0, 2), dt=0.1)
+    assert rotation(run)[-1] == pytest.approx(2 * 0.05 * 1.5**5, abs=1e-9)
+
+
+def test_a_law_without_variables():
+    """[closed] N = EA Σ + c Σ³ of a bar that is pulled."""
+    beam = ub.Beam((0, 0), (1, 0), section(axial=Stiffening(1e8)), cells=2)
+    pull = ub.Prescribed(beam.end, u=lambda t: 0.1 * t, v=0.0)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), pull])
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25)
+    Σ = 0.1 * run.times
+    assert run.section_forces_at(beam.at(0.5))[:, 0] == pytest.approx(
+        1e6 * Σ + 1e8 * Σ**3, rel=1e-9
+    )
+
+
+def test_relaxation():
+    """[closed] At constant strain stress decays as exp(-t C/eta); of second order at θ = 1/2."""
+    errors = []
+    for n in (10, 20):
+        one = Bars(1, Dashpot(eta=40.0), None, ub.ExactStatic(0.5))  # C/eta = 5/s
+        for dt in (1e-12, *[0.5 / n] * n):
+            one.step([0.1], dt=dt)
+        errors.append(abs(one.stress()[0] / (C * 0.1) - np.exp(-2.5)))
+    # Two step sizes of a method of second order: a factor 4, up to the next order
+    assert errors[0] / errors[1] == pytest.approx(4, rel=0.1)
+    assert errors[1] < 1e-3
+
+
+SCENES = {
+    "bending": lambda: thrown_one(LAW),
+    "bending, hinge": lambda: hinged(),
+    "fibres": lambda: layered(),
+    "spring": lambda: sprung(PowerLaw(100.0, 0.01, 3.0)),
+    "dashpot": lambda: thrown_one(Dashpot(50.0)),
+    "stiffening": lambda: thrown_one(Stiffening(1e4)),
+    "by residuals": lambda: thrown_one(SameHardening(50.0, 100.0, 100.0, 1.0)),
+}
+
+
+def thrown(beam, **more):
+    load = ub.PointLoad(beam.end, force=(0, 300.0), time=lambda t: float(t < 0.05))
+    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load], **more)
+
+
+def thrown_one(law):
+    return thrown(ub.Beam((0, 0), (2, 0), section(bending=law), cells=4))
+
+
+def hinged():
+    return thrown(
+        ub.Beam((0, 0), (2, 0), section(bending=LAW, hinge=ub.Softening(120.0, 20.0)), cells=4)
+    )
+
+
+def layered():
+    fibres = ub.Fibres(PowerLaw(2e6, 1e-3, 3.0), number=6, softening=ub.Softening(4e6, 3e3))
+    whole = ub.Section.rectangle(0.1, 0.1, E=1e9, nu=0.2, rho=1e3, fibres=fibres)
+    return thrown(ub.Beam((0, 0), (2, 0), whole, cells=3))
+
+
+def sprung(law):
+    beam = ub.Beam((0, 0), (2, 0), section(), cells=2)
+    link = ub.Stretch(ub.ground(2, 1), beam.end, ub.Spring(1e4, law=law))
+    return thrown(beam, connectors=[link])
+
+
+@pytest.mark.parametrize("scheme", [ub.Midpoint(), ub.Midpoint(0.1), ub.Midpoint(0.5)], ids=str)
+@pytest.mark.parametrize("name", SCENES)
+def test_the_ledger_closes_in_both_paths(name, scheme):
+    """Energies of laws that do not state their dissipation, too."""
+    runs = [
+        ub.simulate(
+            SCENES[name](), scheme, t=(0, 0.1), dt=5e-3,
+            newton=ub.Newton(rtol=1e-12, reference=reference),
+        )
+        for reference in (False, True)
+    ]  # fmt: skip
+    for run in runs:
+        assert run.energy.worst < 1e-9
+    through = runs[0].energy.throughput
+    for kind in ("state", "lost"):
+        mine, other = (getattr(run.energy, kind) for run in runs)
+        for entry in mine:
+            assert np.abs(mine[entry] - other[entry]).max() < 1e-9 * through
+    if name != "stiffening":
+        assert runs[0].energy.lost["plastic"][-1] > 1e-3 * through
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_run_that_goes_on_is_the_whole_one(name):
+    """By ``start``: internal variables of any name are taken over."""
+    scene, scheme = SCENES[name](), ub.Midpoint()
+    whole = ub.simulate(scene, scheme, t=(0, 0.1), dt=5e-3)
+    half = ub.simulate(scene, scheme, t=(0, 0.05), dt=5e-3)
+    rest = ub.simulate(scene, scheme, t=(0.05, 0.1), dt=5e-3, start=half)
+    # The tolerance of Newton's method, 1e-9 of the forces
+    assert np.abs(rest.q[-1] - whole.q[-1]).max() < 1e-7 * np.abs(whole.q).max()
+
+
+def test_checkpoints_carry_the_variables(tmp_path, monkeypatch):
+    """A run that was interrupted and goes on from its file is the whole one, bit by bit."""
+    attempt = ub.Simulation.attempt
+
+    def interrupted(simulation, t1, end=None):
+        if t1 > 0.65:
+            raise InterruptedError
+        return attempt(simulation, t1, end)
+
+    whole = ub.simulate(bent(LAW), ub.Static(), t=(0, 1), dt=0.1)
+    checkpoint = ub.Checkpoint(tmp_path / "run.h5", every=2)
+    of = {"t": (0, 1), "dt": 0.1, "checkpoint": checkpoint}
+    monkeypatch.setattr(ub.Simulation, "attempt", interrupted)
+    with pytest.raises(InterruptedError):
+        ub.simulate(bent(LAW), ub.Static(), **of)
+    monkeypatch.undo()
+    again = ub.simulate(bent(LAW), ub.Static(), **of)
+    assert np.array_equal(rotation(again), rotation(whole))
+
+
+def test_modes_are_those_of_elastic_unloading():
+    """After plastic bending, with a law by residuals as with the elastic section."""
+    bare = ub.modes(bent(None), 3)
+    scene = bent(LAW, moment=150.0)
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1)
+    straight = ub.modes(bent(PowerLaw(1e9, 1.0, 2.0)), 3)
+    assert straight.frequencies == pytest.approx(bare.frequencies, rel=1e-9)
+    # About the bent state the tangent of growing plastic strain would be less than half as stiff.
+    curved = ub.modes(scene, 3, at=run).frequencies
+    assert (curved > 0.8 * bare.frequencies).all()
+
+
+# -- refusals ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Half(ub.MaterialLaw):
+    """Neither increments nor residuals."""
+
+    k: float = 1.0
+    variables: ClassVar = {"p": 0.0}
+
+    def stress(self, strain, state):
+        return self.C * (strain - state.p)
+
+    def elastic_energy(self, strain, state):
+        return self.C * (strain - state.p) ** 2 / 2
+
+
+@dataclass(frozen=True)
+class Misspelt(Half):
+    def increments(self, strain, state, dt):
+        return {"q": strain}
+
+
+@dataclass(frozen=True)
+class Unknown(Half):
+    def increments(self, strain, state, dt):
+        return {"p": state.plastic}
+
+
+@dataclass(frozen=True)
+class Short(Half):
+    def residuals(self, strain, old, new, dt):
+        return new.p
+
+
+@dataclass(frozen=True)
+class Both(Misspelt):
+    def residuals(self, strain, old, new, dt):
+        return {"p": new.p}
+
+
+@dataclass(frozen=True, eq=False)
+class Soft(Half):
+    def increments(self, strain, state, dt):
+        return {"p": 0.0 * strain}
+
+
+@dataclass(frozen=True)
+class Infinite(Half):
+    def increments(self, strain, state, dt):
+        return {"p": 0.0 * strain}
+
+    def stress(self, strain, state):
+        return strain / 0.0 if np.isscalar(strain) else np.full_like(strain, np.nan)
+
+
+@dataclass(frozen=True)
+class OfNumPy(Half):
+    def increments(self, strain, state, dt):
+        return {"p": np.tanh(strain)}
+
+
+@pytest.mark.parametrize(
+    ("law", "says"),
+    [
+        (Half(), "Half has neither increments nor residuals"),
+        (Misspelt(), "Misspelt.increments: what it returns lacks p and has q"),
+        (Unknown(), "Unknown.increments fails .* no internal variable 'plastic'; .*: p"),
+        (Short(), r"Short.residuals returns .* must return a dict with the names p"),
+        (Both(), "Both has both increments and residuals"),
+        (Infinite(), "Infinite.stress is .* must be a number"),
+        (PowerLaw("strong", 1.0, 2.0), "PowerLaw: M0 = 'strong' is no number"),
+        (PowerLaw, "is not a Hardening or another MaterialLaw"),
+        (3.0, "3.0 is not a Hardening or another MaterialLaw"),
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("place", ["section", "fibres", "spring"])
+def test_incomplete_laws_are_refused(law, says, place):
+    """When the section, the fibres or the spring is made."""
+    make = {
+        "section": lambda: section(bending=law),
+        "fibres": lambda: Fibres(law),
+        "spring": lambda: ub.Spring(1.0, law=law),
+    }[place]
+    with pytest.raises(ub.SceneError, match=says):
+        make()
+
+
+def test_a_law_must_be_frozen():
+    with pytest.raises(ub.SceneError, match="Soft must be a dataclass"):
+        section(bending=Soft())
+
+
+def test_missing_methods_are_named():
+    """By Python, as a class without them is abstract."""
+
+    @dataclass(frozen=True)
+    class Empty(ub.MaterialLaw):
+        k: float
+
+    with pytest.raises(TypeError, match=r"elastic_energy.*stress"):
+        Empty(1.0)
+
+
+def test_what_ufl_cannot_trace_is_refused():
+    scene = bent(OfNumPy())
+    with pytest.raises(ub.SceneError, match=r"OfNumPy: .* symbols of UFL.*ub\.law_functions"):
+        ub.Simulation(scene, ub.Static())
+
+
+def test_hinges_of_zero_length_have_no_elastic_stiffness():
+    with pytest.raises(ub.SceneError, match=r"PowerLaw is the law of an elastic stiffness.*Spring"):
+        ub.Beam((0, 0), (1, 0), section(), hinges={0.5: LAW})
+    with pytest.raises(ub.SceneError, match="PowerLaw is the law of an elastic stiffness"):
+        ub.RigidPlastic(LAW)
+
+
+def test_laws_of_one_section_are_of_one_kind():
+    scene = ub.Scene(
+        [beam := ub.Beam((0, 0), (1, 0), section(axial=ub.Hardening(1.0), bending=LAW))],
+        supports=[ub.Clamped(beam.start)],
+    )
+    with pytest.raises(ub.SceneError, match="one kind, not Hardening and PowerLaw"):
+        ub.Simulation(scene, ub.Static())

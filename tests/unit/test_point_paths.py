@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: MIT
+"""Return maps in C and in NumPy agree at thousands of points, also for laws of one's own."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from bars import LENGTH, Bars, C, histories
+from laws_of_ones_own import Dashpot, PowerLaw, SameHardening, Stiffening
+
+import ufl_beam as ub
+from ufl_beam.terms.compiled_points import CompiledPoints
+from ufl_beam.terms.reference_points import ReferencePoints
+
+SOFTENS = ub.Softening(3.0, 0.3)
+LAWS = {
+    "plastic": (ub.Hardening(3.0), None),
+    "viscous": (ub.Hardening(3.0, 20.0, 10.0, ub.Perzyna(0.5)), None),
+    "relaxing": (ub.Hardening(3.0, 20.0, viscosity=ub.DuvautLions(0.1)), None),
+    "softening": (ub.Hardening(math.inf), SOFTENS),
+    "linear": (ub.Hardening(math.inf), ub.LinearSoftening(4.0, 0.3)),
+    "both": (ub.Hardening(2.0, 30.0), SOFTENS),
+    "joint": (ub.Hardening(math.inf), ub.Softening(0.0, 1.0)),
+    "power": (PowerLaw(3.0, 0.01, 5.0), None),
+    "power, softening": (PowerLaw(2.5, 0.01, 5.0), SOFTENS),
+    "dashpot": (Dashpot(20.0), None),
+    "dashpot, softening": (Dashpot(20.0), SOFTENS),
+    "by residuals": (SameHardening(2.0, 20.0, 10.0, 0.5), None),
+    "by residuals, softening": (SameHardening(2.0, 20.0, 10.0, 0.5), SOFTENS),
+    "stiffening": (Stiffening(1e4), None),
+}
+"""Bulk and discontinuity of a point of stiffness C, at strains up to 0.06."""
+
+SCHEMES = [ub.Static(), ub.ExactStatic(0.5), ub.ExactStatic(0.8), ub.ExactStatic(1.0)]
+each_law = pytest.mark.parametrize("law", LAWS)
+each_scheme = pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+OPENS = [law for law, (_, softening) in LAWS.items() if softening is not None]
+
+
+@each_law
+@each_scheme
+def test_both_paths_agree(law, scheme):
+    """Stresses, tangents, states and energies after random steps; 1e-12 of the largest."""
+    paths = [Bars(1000, *LAWS[law], scheme, by=by) for by in (CompiledPoints, ReferencePoints)]
+    largest = C * 0.3  # of strains in those walks
+    for strain in histories(1000, steps=8):
+        (σ, D), (σ_ref, D_ref) = (some.respond(strain) for some in paths)
+        assert np.isfinite(σ).all()
+        assert np.abs(σ - σ_ref).max() < 1e-12 * largest
+        # Tangents in C of a law by residuals are those before its last correction, 1e-9 of it.
+        assert np.median(np.abs(D - D_ref)) < 1e-13 * C
+        assert np.abs(D - D_ref).max() <= 1e-8 * np.abs(D).max()
+        for some in paths:
+            some.step(strain)
+        states = [np.nan_to_num(some.points.state(), posinf=0.0) for some in paths]
+        assert np.abs(states[0] - states[1]).max() < 1e-12 * max(largest, np.abs(states[0]).max())
+        sums = [some.points.sums for some in paths]
+        assert sums[0] == pytest.approx(sums[1], rel=1e-11, abs=1e-12 * C * 0.3**2)
+
+
+@each_law
+@each_scheme
+@pytest.mark.parametrize("by", [CompiledPoints, ReferencePoints])
+def test_tangents_of_both_paths(law, scheme, by):
+    """Against central differences; cells at a corner of a law are left out."""
+    some = Bars(300, *LAWS[law], scheme, by=by)
+    *before, last = histories(300, steps=5)
+    for strain in before:
+        some.step(strain)
+    ε = 1e-8
+    exact = some.respond(last)[1]
+    central = (some.respond(last + ε)[0] - some.respond(last - ε)[0]) / (2 * ε)
+    # 1e-16/ε of strains of 0.3, and curvature of the power law times ε
+    assert np.abs(exact - central).max() < 1e-5 * C
+
+
+@pytest.mark.parametrize("scheme", SCHEMES[1:], ids=str)
+@each_law
+def test_work_is_stored_or_dissipated_or_lost(law, scheme):
+    """Of each bar in each step, whether a law states its dissipation or leaves it to be found."""
+    for k in range(4):
+        one, stored, through = Bars(1, *LAWS[law], scheme), 0.0, 0.0
+        for strain in histories(8)[:, 2 * k + 1]:
+            before = one.strain[0]
+            (σ,) = one.step([strain])
+            plastic, breaks, lost, elastic, hardening, released, _ = one.points.sums
+            work, now = σ * (strain - before) * LENGTH, elastic + hardening
+            sinks = plastic + breaks + (2 * scheme.theta - 1) * lost + released
+            through = max(through, abs(work), now, abs(sinks), C * strain**2 * LENGTH)
+            assert abs(work - (now - stored) - sinks) < 1e-13 * through
+            stored = now
+
+
+def test_hardening_by_residuals_is_hardening():
+    """The same law by Newton's method at the point: states, energies, tangents to round-off."""
+    laws = ub.Hardening(2.0, 20.0, 10.0, ub.Perzyna(0.5)), SameHardening(2.0, 20.0, 10.0, 0.5)
+    for scheme in SCHEMES[1:]:
+        one, other = (Bars(500, law, SOFTENS, scheme) for law in laws)
+        for strain in histories(500, steps=10):
+            for x, y in zip(one.respond(strain), other.respond(strain), strict=True):
+                assert np.abs(x - y).max() < 1e-10 * C
+            one.step(strain)
+            other.step(strain)
+            assert other["p"] == pytest.approx(one["plastic"], abs=1e-13)
+            assert other["xi"] == pytest.approx(one["accumulated"], abs=1e-13)
+            assert other.points.sums == pytest.approx(one.points.sums, rel=1e-10, abs=1e-12)
+
+
+def test_residuals_that_have_no_solution_are_no_number():
+    """An impossible law: the stress is NaN, in both paths, and so the step will be cut."""
+
+    @dataclass(frozen=True)
+    class Impossible(PowerLaw):
+        def residuals(self, strain, old, new, dt):
+            return {"largest": new.largest**2 + 1, "plastic": new.plastic}
+
+    for by in (CompiledPoints, ReferencePoints):
+        σ, _ = Bars(3, Impossible(1.0, 1.0, 2.0), None, SCHEMES[0], by=by).respond(np.ones(3))
+        assert np.isnan(σ).all()

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: MIT
+"""Checks of laws of material points when the section or spring is made that follows them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from numbers import Real
+
+import numpy as np
+
+from ufl_beam.errors import SceneError, shorten
+from ufl_beam.model.material_law import MaterialLaw, State
+
+
+def require_bulk_law(law: object, what: str) -> None:
+    """Raise :class:`SceneError` naming ``what`` unless a bulk can follow a law."""
+    require_law(law, what)
+    if resultants := law.resultants:  # type: ignore[attr-defined]
+        raise SceneError(
+            f"{what} = {shorten(law)} is a law of {resultants} together; use it as "
+            "Section(interaction=)"
+        )
+
+
+def require_interaction(law: object, what: str) -> None:
+    """Raise :class:`SceneError` naming ``what`` unless resultants of a section can follow a law."""
+    require_law(law, what)
+    if law.resultants not in ("NM", "NVM"):  # type: ignore[attr-defined]
+        raise SceneError(
+            f"{what} = {shorten(law)} is no law of N and M together, with resultants = 'NM' or "
+            "'NVM'; use it as axial, shear or bending"
+        )
+
+
+def require_law(law: object, what: str) -> None:
+    """Raise :class:`SceneError` unless a law is complete; it is called with numbers."""
+    if not isinstance(law, MaterialLaw):
+        raise SceneError(f"{what} = {shorten(law)} is not a Hardening or another MaterialLaw")
+    kind = type(law).__name__
+    parameters = getattr(type(law), "__dataclass_params__", None)
+    if parameters is None or not parameters.frozen or not parameters.eq:
+        raise SceneError(f"{what}: {kind} must be a dataclass: @dataclass(frozen=True)")
+    ways = [w for w in WAYS if getattr(type(law), w) is not getattr(MaterialLaw, w)]
+    if len(ways) != (1 if law.variables else len(ways)):
+        has = "both increments and residuals" if ways else "neither increments nor residuals"
+        raise SceneError(f"{what}: {kind} has {has}; define one of both methods")
+    C = tuple(np.ones(1) for _ in law.resultants or "x")
+    numbers = law.numbers(law.as_argument(C))
+    for name, value in numbers.items():
+        number = isinstance(value, Real | np.ndarray) and not isinstance(value, bool)
+        if not number and not hasattr(value, "draw"):
+            raise SceneError(
+                f"{what}: {kind}: {name} = {shorten(value)} is no number; fields of a law are its "
+                "numbers, what else it knows can be a class variable"
+            )
+    tried = law.of(
+        law.as_argument(C), {n: np.ones(1) if hasattr(v, "draw") else v for n, v in numbers.items()}
+    )
+    state = State({name: np.full(1, float(x)) for name, x in law.variables.items()})
+    _try(tried, state, f"{what}: {kind}", (*ways, "increments")[0])
+
+
+WAYS = ("increments", "residuals")
+"""Methods of a law by which its variables evolve."""
+
+
+def _try(law: MaterialLaw, state: State, what: str, way: str) -> None:
+    """Call the methods of a law at no strain; raise :class:`SceneError` if they do not fit."""
+    strain = law.as_argument(tuple(np.zeros(1) for _ in law.resultants or "x"))
+    between = (state,) if way == "increments" else (state, state)
+    calls = {
+        "stress": (strain, state),
+        "elastic_energy": (strain, state),
+        "hardening_energy": (state,),
+        way: (strain, *between, 1.0),
+        "dissipation": (strain, state, state, 1.0),
+    }
+    for name, arguments in calls.items():
+        try:
+            with np.errstate(all="ignore"):
+                found = getattr(law, name)(*arguments)
+        except Exception as error:
+            raise SceneError(f"{what}.{name} fails at no strain: {error}") from error
+        if name == way:
+            _require_names(found, law, f"{what}.{name}")
+        elif name == "stress" and not np.all(np.isfinite(law.as_tuple(found))):
+            raise SceneError(f"{what}.stress is {shorten(found)} at no strain; it must be a number")
+        elif name == "stress" and len(law.as_tuple(found)) != len(law.resultants or "x"):
+            raise SceneError(f"{what}.stress must return one stress for each of {law.resultants}")
+
+
+def _require_names(found: object, law: MaterialLaw, what: str) -> None:
+    """Raise :class:`SceneError` unless a method returned the variables of a law by name."""
+    if not isinstance(found, Mapping):
+        raise SceneError(
+            f"{what} returns {shorten(found)}; it must return a dict with the names "
+            f"{', '.join(law.variables)}"
+        )
+    missing, unknown = (
+        sorted(set(one) - set(other))
+        for one, other in ((law.variables, found), (found, law.variables))
+    )
+    if missing or unknown:
+        wrong = [f"lacks {', '.join(missing)}"] * bool(missing)
+        wrong += [f"has {', '.join(unknown)}, which `variables` does not name"] * bool(unknown)
+        raise SceneError(f"{what}: what it returns {' and '.join(wrong)}")

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: MIT
+"""Base of the laws of a material point: stress, evolution of internal variables, energies."""
+
+from __future__ import annotations
+
+import copy
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any, ClassVar
+
+Values = Any
+"""Array of real or complex numbers, or a UFL expression; for interacting resultants a tuple."""
+
+
+class State:
+    """Internal variables of a material point, as attributes."""
+
+    def __init__(self, variables: Mapping[str, Values]) -> None:
+        vars(self).update(variables)
+
+    def __getattr__(self, name: str) -> Values:
+        raise AttributeError(
+            f"the law has no internal variable {name!r}; its variables: {', '.join(vars(self))}"
+        )
+
+
+class MaterialLaw(ABC):
+    """Base of the laws of material points; a law of one's own is a frozen dataclass of it.
+
+    The fields of the dataclass are the numbers of the law.  Its methods are written with the
+    functions of ``ub.law_functions``, for they are called with arrays and with UFL
+    expressions.  In them ``self.C`` is the elastic stiffness at the point: that of the resultant in
+    a :class:`Section` (EA, GA or EI), Young's modulus of a fibre, the stiffness of a
+    :class:`Spring`.  A law evolves by :meth:`increments` or by :meth:`residuals`, one of both.
+    See docs/extending_laws.md.
+
+    Attributes:
+        variables: Internal variables, and their values before anything has happened.
+        resultants: ``"NM"`` or ``"NVM"`` of a law in which these interact; strain, stress and ``C``
+            are tuples then.  By default a law is of one strain and one stress.
+        C: Elastic stiffness.
+
+    Example:
+        >>> from dataclasses import dataclass
+        >>> @dataclass(frozen=True)
+        ... class Dashpot(ub.MaterialLaw):
+        ...     eta: float  # N m² s
+        ...     variables = {"creep": 0.0}  # 1/m
+        ...     def stress(self, strain, state):
+        ...         return self.C * (strain - state.creep)
+        ...     def increments(self, strain, state, dt):
+        ...         return {"creep": self.stress(strain, state) / (self.eta / dt + self.C)}
+        ...     def elastic_energy(self, strain, state):
+        ...         return self.C * (strain - state.creep) ** 2 / 2
+        >>> creeps = ub.Section(EA=4e9, GA=1e9, EI=1.4e7, rhoA=157.0, bending=Dashpot(1e9))
+    """
+
+    variables: ClassVar[Mapping[str, float]] = {}
+    resultants: ClassVar[str] = ""
+    C: Values
+
+    @abstractmethod
+    def stress(self, strain: Values, state: State) -> Values:
+        """Stress; at fixed variables its derivative by the strain is ``C``."""
+
+    @abstractmethod
+    def elastic_energy(self, strain: Values, state: State) -> Values:
+        """Stored energy per volume, that of hardening left out."""
+
+    def hardening_energy(self, state: State) -> Values:
+        """Energy per volume that hardening stores, a function of the variables; zero by default."""
+        return 0.0
+
+    def increments(self, strain: Values, state: State, dt: Values) -> Mapping[str, Values]:
+        """Changes of the variables over a backward-Euler step of length dt, in closed form.
+
+        Args:
+            strain: At the end of the step.
+            state: Variables at its beginning.
+            dt: s.
+        """
+        return {}
+
+    def residuals(self, strain: Values, old: State, new: State, dt: Values) -> Mapping[str, Values]:
+        """Equations of a backward-Euler step, one of each variable, that vanish at its end.
+
+        Args:
+            strain: At the end of the step.
+            old: Variables at its beginning.
+            new: Variables at its end.
+            dt: s.
+        """
+        return {}
+
+    def dissipation(
+        self, strain: Values, state: State, changes: State, dt: Values
+    ) -> Values | None:
+        """Energy per volume dissipated over a step; None: all work that is not stored.
+
+        Args:
+            strain: At the time of the step at which the law holds.
+            state: Variables at that time.
+            changes: Of the variables over the step.
+            dt: s.
+        """
+        return None
+
+    @property
+    def elastic(self) -> bool:
+        """True if the variables never change."""
+        return False
+
+    def numbers(self, C: Values) -> dict[str, Any]:
+        """Numbers of the law by name at points of stiffness ``C``, by default its fields."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
+
+    def of(self, C: Values, numbers: Mapping[str, Values]) -> MaterialLaw:
+        """Return the law with a stiffness, and arrays or symbols in the place of its numbers."""
+        law = copy.copy(self)
+        vars(law).update(numbers, C=C)
+        return law
+
+    @property
+    def solves(self) -> bool:
+        """True if the variables are found by Newton's method from :meth:`residuals`."""
+        return type(self).residuals is not MaterialLaw.residuals
+
+    def as_tuple(self, values: Values) -> tuple[Values, ...]:
+        """Strains or stresses of a point as a tuple, of one if nothing interacts."""
+        return tuple(values) if self.resultants else (values,)
+
+    def as_argument(self, values: tuple[Values, ...]) -> Values:
+        """Strains or stiffnesses of a point as the methods take them."""
+        return values if self.resultants else values[0]

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: MIT
+"""Equations of a material point over a step, stated once for UFL and for arrays.
+
+The law holds at t_n+θ: its variables there are those after a backward-Euler step of the length
+θ dt, and grow on in proportion to the end of the step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from ufl_beam.compiled.c_library import names
+from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.model.fibres import Kind, Layout
+from ufl_beam.model.law_functions import Values, positive
+from ufl_beam.model.material_law import MaterialLaw, State
+from ufl_beam.model.material_laws import SofteningLaw
+
+At = Mapping[str, Values]
+"""Numbers of points by name, see :func:`inputs`."""
+
+
+def rows(law: MaterialLaw, name: str) -> tuple[str, ...]:
+    """Names of the components of a strain or stiffness."""
+    return tuple(f"{name} {x}" for x in law.resultants) if law.resultants else (name,)
+
+
+def prefixed(prefix: str, names: Mapping[str, object] | tuple[str, ...]) -> tuple[str, ...]:
+    """Names of inputs that a user has named."""
+    return tuple(f"{prefix} {name}" for name in names)
+
+
+def inputs(layout: Layout) -> tuple[str, ...]:
+    """Inputs of the law of a point, as they are stored; loops.h explains their order."""
+    law, numbers = layout.kind
+    return (
+        *names("point_input"),
+        *rows(law, "strain"), *rows(law, "before"), *rows(law, "stiffness"),
+        *prefixed("state", law.variables),
+        *(prefixed("new", law.variables) if law.solves else ()),
+        *prefixed("number", numbers), "softening limit", "softening energy",
+    )  # fmt: skip
+
+
+class End(NamedTuple):
+    """What the end of a step brings a point; energies in J/m³ or J/m."""
+
+    worked: Values  # dissipated by the bulk
+    broken: Values  # dissipated by the discontinuity, per area
+    lost: Values  # numerically by backward Euler, over ``2 alpha`` of the scheme
+    elastic: Values  # stored elastically
+    hardening: Values  # stored by hardening
+    relaxed: Values  # work of the mean of both stresses on plastic strain, less that at the end
+    resistance: Values  # of the discontinuity
+    left: Values  # stored elastically if the point lets go of its stress
+    stress: tuple[Values, ...]
+    changes: tuple[Values, ...]  # of the variables
+
+
+class PointEquations:
+    """Equations of points of one kind with discontinuities of one kind."""
+
+    def __init__(self, kind: Kind, softening: SofteningLaw | None, scheme: Scheme) -> None:
+        self._kind, self._softening, self._scheme = kind, softening, scheme
+        self._names = kind.law.variables
+
+    def law(self, at: At) -> MaterialLaw:
+        """The law with the numbers of points."""
+        law, numbers = self._kind
+        C = tuple(at[name] for name in rows(law, "stiffness"))
+        return law.of(law.as_argument(C), {name: at[f"number {name}"] for name in numbers})
+
+    def softening(self, at: At) -> SofteningLaw | None:
+        """The law of the discontinuity with the numbers of points."""
+        law = self._softening
+        return law and law.of(at["softening limit"], at["softening energy"])
+
+    def resistance(self, at: At, growth: Values) -> Values:
+        """Resistance of a discontinuity that grows in the step."""
+        law = self.softening(at)
+        return 0 * growth if law is None else self._scheme.resistance(law, at["opening"], growth)
+
+    def state(self, at: At, prefix: str = "state") -> State:
+        """Variables at the beginning of the step, or those that are being solved for."""
+        return State({name: at[f"{prefix} {name}"] for name in self._names})
+
+    def strain(self, at: At) -> Values:
+        """Strain of the bulk at t_n+θ; a jump relieves it by jump over length."""
+        law, θ = self._kind.law, at["theta"]
+        jump = at["jump"] + θ * at["direction"] * at["growth"]
+        ends = zip(rows(law, "before"), rows(law, "strain"), strict=True)
+        return law.as_argument(
+            tuple((1 - θ) * at[e0] + θ * at[e1] - jump / at["length"] for e0, e1 in ends)
+        )
+
+    def changes(self, at: At) -> State:
+        """Changes of the variables from t_n to t_n+θ."""
+        law, old = self.law(at), self.state(at)
+        if law.solves:
+            new = self.state(at, "new")
+            return State({n: getattr(new, n) - getattr(old, n) for n in self._names})
+        return State(law.increments(self.strain(at), old, at["theta"] * at["dt"]))
+
+    def residuals(self, at: At) -> tuple[Values, ...]:
+        """Equations of the variables at t_n+θ, where they are solved for."""
+        new, dt = self.state(at, "new"), at["theta"] * at["dt"]
+        found = self.law(at).residuals(self.strain(at), self.state(at), new, dt)
+        return tuple(found[name] for name in self._names)
+
+    def stress(self, at: At) -> tuple[Values, ...]:
+        """Stresses of the bulk at t_n+θ, where the law holds."""
+        law, old, changes = self.law(at), self.state(at), self.changes(at)
+        return law.as_tuple(law.stress(self.strain(at), _plus(old, changes)))
+
+    def elastic_stress(self, at: At) -> tuple[Values, ...]:
+        """Stresses at t_n+θ if the variables stayed as they are."""
+        law = self.law(at)
+        return law.as_tuple(law.stress(self.strain(at), self.state(at)))
+
+    def end(self, at: At) -> End:
+        """State and energies at the end of the step."""
+        law, softening, θ, a = self.law(at), self.softening(at), at["theta"], at["growth"]
+        some, zero = law.as_argument, 0 * a
+        relieved, length = at["jump"], at["length"]
+        e0 = tuple(at[n] - relieved / length for n in rows(law, "before"))
+        relieved = relieved + at["direction"] * a
+        e1 = tuple(at[n] - relieved / length for n in rows(law, "strain"))
+        de = tuple(y - x for x, y in zip(e0, e1, strict=True))
+
+        at_θ, old = self.changes(at), self.state(at)
+        changes = State({name: getattr(at_θ, name) * (1 / θ) for name in self._names})
+        new = _plus(old, changes)
+        before, now = (law.as_tuple(law.stress(some(e), z)) for e, z in ((e0, old), (e1, new)))
+        elastic, hardening = law.elastic_energy(some(e1), new), law.hardening_energy(new)
+        # Energies are quadratic but for laws that state no dissipation: these account for the rest.
+        hardened = law.hardening_energy(changes)
+        lost = law.elastic_energy(some(de), changes) + hardened
+        worked = law.dissipation(self.strain(at), _plus(old, at_θ), changes, at["dt"])
+        if worked is None:
+            work = sum(σ * e for σ, e in zip(self.stress(at), de, strict=True))
+            stored = elastic - law.elastic_energy(some(e0), old)
+            stored = stored + hardening - law.hardening_energy(old)
+            worked = work - stored - (2 * θ - 1) * lost
+        C = tuple(at[n] for n in rows(law, "stiffness"))
+        relaxed = hardened
+        for σ0, σ1, e, c in zip(before, now, de, C, strict=True):
+            relaxed = relaxed - (σ1 - σ0) / 2 * (e - (σ1 - σ0) / c)
+        broken, resistance, left = zero, zero, zero
+        if softening is not None:
+            broken = a * softening.mean_traction(at["opening"], a)
+            resistance = softening.traction(at["opening"] + a)
+            left = law.elastic_energy(e1[0] - now[0] / C[0], new)
+        return End(
+            worked + zero, broken, lost + zero, elastic + zero, hardening + zero,
+            positive(relaxed) + zero, resistance, left, now,
+            tuple(getattr(changes, name) for name in self._names),
+        )  # fmt: skip
+
+
+def _plus(state: State, changes: State) -> State:
+    """Variables and their changes, added."""
+    return State({name: z + getattr(changes, name) for name, z in vars(state).items()})
