@@ -179,7 +179,8 @@ FINE = ub.Mesh(refine=2, degree=3)
 
 
 def column(k):
-    section = ub.Section(EA=1e9, GA=1e9, EI=1.0, rhoA=2.0, rhoI=0.0)
+    # Strains and shear count 1e-6; round-off of so slender a column counts less.
+    section = ub.Section(EA=1e7, GA=1e7, EI=1.0, rhoA=2.0, rhoI=0.0)
     beam = ub.Beam((0, 0), (math.pi, 0), section, cells=8)
     held = [ub.Pinned(beam.start), ub.Roller(beam.end)]
     bed = ub.Potential("bed", lambda q, k: k * q[1] ** 2 / 2, numbers={"k": k})
@@ -190,7 +191,7 @@ def test_frequencies_on_an_elastic_foundation():
     """ω² = (EI (nπ/L)⁴ + k)/ρA of a pinned beam of length π [closed]."""
     beam, held, bed = column(7.0)
     found = ub.modes(ub.Scene([beam], supports=held, works=[bed]), 3, mesh=FINE)
-    np.testing.assert_allclose(found.omega**2, [(n**4 + 7) / 2 for n in (1, 2, 3)], rtol=2e-6)
+    np.testing.assert_allclose(found.omega**2, [(n**4 + 7) / 2 for n in (1, 2, 3)], rtol=5e-6)
 
 
 def test_damping_ratio_of_viscous_air():
@@ -199,7 +200,7 @@ def test_damping_ratio_of_viscous_air():
     drag = ub.VirtualWork("drag", lambda v, w: -0.3 * v[1] * w[1])
     scene = ub.Scene([beam], supports=held, works=[bed, drag])
     found = ub.modes(scene, 2, mesh=FINE)
-    np.testing.assert_allclose(found.damping, 0.3 / (4 * found.omega), rtol=2e-6)
+    np.testing.assert_allclose(found.damping, 0.3 / (4 * found.omega), rtol=5e-6)
 
 
 def test_buckling_on_an_elastic_foundation():
@@ -208,7 +209,7 @@ def test_buckling_on_an_elastic_foundation():
     push = ub.PointLoad(beam.end, force=(-1.0, 0.0))
     scene = ub.Scene([beam], supports=held, loads=[push], works=[bed])
     factors = ub.buckling(scene, 2, mesh=FINE).factors
-    np.testing.assert_allclose(factors, [4 + 10 / 4, 9 + 10 / 9], rtol=2e-6)
+    np.testing.assert_allclose(factors, [4 + 10 / 4, 9 + 10 / 9], rtol=5e-6)
 
 
 def test_buckling_by_a_field():

@@ -48,8 +48,8 @@ static double part_of(int m, const double *residuals, const double *sizes)
 {
   double largest = 0;
   for (int i = 0; i < m; ++i) {
-    const double part = fabs(residuals[i]) / sizes[i];
-    if (residuals[i] != 0 && !(part <= largest)) largest = part == part ? part : INFINITY;
+    const double ratio = fabs(residuals[i]) / sizes[i];
+    if (residuals[i] != 0 && !(ratio <= largest)) largest = ratio == ratio ? ratio : INFINITY;
   }
   return largest;
 }
@@ -112,10 +112,10 @@ static void solve_law(const points *p, double *w, double *s)
     }
     const double before = part_of(m, a, sizes);
     memcpy(x, z, m * sizeof *x);
-    for (double part = 1; part > 1e-3; part /= 2) {
-      for (int j = 0; j < m; ++j) z[j] = x[j] - part * B[(1 + d) * j];
+    for (double way = 1; way > 1e-3; way /= 2) {
+      for (int j = 0; j < m; ++j) z[j] = x[j] - way * B[(1 + d) * j];
       ask(p->law, w, all, a);
-      if (part_of(m, a, sizes) <= (1 - part / 10) * before) break;
+      if (part_of(m, a, sizes) <= (1 - way / 10) * before) break;
     }
   }
 }
