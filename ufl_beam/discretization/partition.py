@@ -16,7 +16,7 @@ from ufl_beam.model.bodies import Anchor, Member, Place, Spot
 
 
 class _Numbering(Protocol):
-    """What a share, and whoever computes on it, asks a :class:`Grid`; documented there."""
+    """Members of :class:`Grid` that a share and its users need; documented there."""
 
     scene: Any
     mesh: Any

@@ -23,7 +23,7 @@ from ufl_beam.terms.inelastic_beams import InelasticBeams, inelastic_forms
 
 
 class Viewed(Protocol):
-    """What a view shows: a simulation, see :class:`StateView`."""
+    """Source of a view: a simulation, see :class:`StateView`."""
 
     scene: Scene
     scheme: Scheme

@@ -195,7 +195,7 @@ class _Stopped(Response):
         self._ends = self._numbers("low"), self._numbers("high")
 
     def _beyond(self, e: Array) -> Array:
-        """How far a motion is outside the interval."""
+        """Length by which a motion is outside of the interval."""
         return np.asarray(e - np.clip(e, *self._ends))
 
     def _energy(self, e: Array) -> float:

@@ -113,7 +113,7 @@ class Points(ABC):
 
     @property
     def in_c(self) -> dict[str, Any]:
-        """What loops of other terms take, by name in their structs; nothing without loops in C."""
+        """Data for loops in C of other terms, by name in their structs; empty without them."""
         return {}
 
     def __getitem__(self, name: str) -> Array:

@@ -44,7 +44,7 @@ def inputs(layout: Layout) -> tuple[str, ...]:
 
 
 class End(NamedTuple):
-    """What the end of a step brings a point; energies in J/m³ or J/m."""
+    """Changes and energies of a point at the end of a step; J/m³ or J/m."""
 
     worked: Values  # dissipated by the bulk
     broken: Values  # dissipated by the discontinuity, per area

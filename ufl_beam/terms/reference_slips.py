@@ -18,7 +18,7 @@ class ReferenceSlips(RigidPlasticResponse):
     """Rigid-plastic connectors that NumPy evaluates, see rigid_plastic.c for the equation."""
 
     def _slip(self, slips: Values, way: Index) -> Slip:
-        """What the law says of these slips."""
+        """Force and energies of these slips."""
         return slip(self._law, {**self._at, "slip": slips, "direction": way}, self._setting.scheme)
 
     def _force(self, motion: Array, way: Index) -> tuple[Array, Array]:
