@@ -3,6 +3,7 @@
 
 import math
 
+import numpy as np
 import pytest
 
 import ufl_beam as ub
@@ -91,3 +92,11 @@ def test_default_depth_is_that_of_the_rectangle_of_the_same_stiffness():
 def test_records_are_frozen():
     with pytest.raises(AttributeError):
         ub.Section(EA=1.0, GA=1.0, EI=1.0).EA = 2.0
+
+
+def test_layers_of_a_circle_end_at_its_rim():
+    """For some diameters r² - y² has a negative last digit there."""
+    for d in np.append(np.random.default_rng(1).uniform(1e-3, 1.0, 300), 0.00976466):
+        fibres = ub.Fibres(ub.Hardening(1e6), number=4)
+        section = ub.Section.circle(d=d, E=1e9, nu=0.3, fibres=fibres)
+        assert pytest.approx(1e9 * np.pi * d**2 / 4, rel=1e-12) == section.EA

@@ -267,7 +267,7 @@ def _below_in_circle(y: Array, d: float) -> Array:
     """Area below y, and its first moment; (2, n)."""
     r = d / 2
     y = np.clip(y, -r, r)
-    half_chord = np.sqrt(r**2 - y**2)
+    half_chord = np.sqrt((r - y) * (r + y))  # never the root of a negative last digit
     area = y * half_chord + (r**2 * np.arcsin(y / r) if r else 0.0)
     return np.array([area, -2 / 3 * half_chord**3])
 
