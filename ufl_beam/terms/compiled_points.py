@@ -109,7 +109,7 @@ class CompiledPoints(Points):
         layout, law = self._layout, self._layout.kind.law
         softening = layout.softening and layout.softening.of(1.0, 1.0)
         self._forms = forms = _point_forms(inputs(layout), layout.kind, softening, scheme)
-        self._over = np.zeros(1)
+        self._over, self._solves = np.zeros(1), law.solves
         arrays = {"B": layout.strains, "weight": layout.weights, "rest": layout.rest}
         arrays = {k: np.ascontiguousarray(x, np.float64) for k, x in arrays.items()}
         cells, of_cell, width = self._storage.shape
@@ -127,6 +127,12 @@ class CompiledPoints(Points):
     def in_c(self) -> dict[str, Any]:
         """The points, by their name in the structs of loops.h."""
         return {"points": self.points}
+
+    def begin(self, dt: float) -> None:
+        """Begin a step of this length; s."""
+        super().begin(dt)
+        if self._solves:
+            self.points.tried = 0
 
     def respond(self, strains: Array) -> tuple[Array, Array]:
         """Answer the strains of an iterate."""

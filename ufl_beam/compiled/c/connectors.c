@@ -18,7 +18,7 @@ static void put_row(const couplings *c, int cell, const double *row)
 /* The laws of springs around their motions at q. */
 static void set_rows_of_springs(const couplings *c)
 {
-  const points *p = c->points;
+  points *p = c->points;
   for (int i = 0; i < c->number; ++i) p->e1[3 * i] = c->e1[i];
   respond(p);
   for (int k = 0; k < c->number; ++k) {

@@ -124,12 +124,13 @@ typedef struct {
   double theta;
   double *e0, *e1, *w, *r, *D, *kept, *sum;
   double *over; /* largest excess of a closed point over its limit in the latest response */
+  int tried;    /* whether an iterate of the step was answered */
 } points;
 
 /* Cells with points: forms of the strains, of the forces, which know the resultants r, and of their
  * tangent, which knows them as affine functions b + D e of the strains. */
 typedef struct {
-  const points *points;
+  points *points;
   const cells *strains, *force, *tangent;
   int at_r, at_b, at_D; /* where the coefficients of `force` and `tangent` have r, b and D */
   int size, begins;
@@ -161,7 +162,7 @@ typedef struct {
  * a e + b f = c in the motion e and the force f; those of springs come of points. */
 typedef struct {
   const cells *work, *tangent, *motion;
-  const points *points;            /* or none */
+  points *points;                  /* or none */
   const rigid_plastic *rigid_plastic; /* or none; if neither, the rows stay during a step */
   int number;
   const int32_t *link, *force;     /* of each cell; where each link's force is among the unknowns */
@@ -181,12 +182,12 @@ void add_couplings_force(void *self, const double *q, double *r);
 double missed_by_couplings(void *self, const double *q, const double *r, double scale,
                            double moved);
 double commit_couplings(const couplings *c, const double *q, double dt);
-void respond(const points *p);
+void respond(points *p);
 void release(const points *p, double least);
 void respond_at(const inelastic *m, const double *q);
 void add_inelastic_force(void *self, const double *q, double *r);
 void add_inelastic_tangent(void *self, const double *q, double *tangent);
-void commit(const points *p);
+void commit(points *p);
 
 /* -- elimination along chains ------------------------------------------------------------------ */
 

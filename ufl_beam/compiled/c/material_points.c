@@ -10,7 +10,7 @@ static void ask(kernel *tabulate, const double *w, int answers, double *e)
 }
 
 /* Solve A x = b for several b, the columns of B, which x replace; zero if A is singular. */
-static int solve_dense(int n, double *A, int columns, double *B)
+static inline int solve_dense(int n, double *A, int columns, double *B)
 {
   for (int k = 0; k < n; ++k) {
     int pivot = k;
@@ -54,20 +54,19 @@ static double part_of(int m, const double *residuals, const double *sizes)
   return largest;
 }
 
-/* Find the variables of a law from its residuals, by Newton's method from the state before the step;
- * s gets the stresses and their derivatives by the implicit function theorem.
+/* Improve the m variables of a law of d strains until its residuals vanish, by Newton's method; zero
+ * if it fails. s gets the stresses and their derivatives by the implicit function theorem.
  *
  * The law answers with residuals R, their derivatives J by the variables and E by the strains; with
  * stresses, and their derivatives by strains and by variables. A correction is halved until the largest
  * residual falls, each as a part of the terms that the correction cancels in it and their round-off.
  */
-static void solve_law(const points *p, double *w, double *s)
+static inline int improve_sized(int m, int d, const points *p, double *w, double *s)
 {
   enum { M = MOST_VARIABLES };
-  const int m = p->variables, d = p->components, all = m * (1 + m + d) + d * (1 + d + m);
+  const int all = m * (1 + m + d) + d * (1 + d + m);
   double *z = w + p->strain + 3 * d + m, x[M], sizes[M], a[M * (1 + M + 3) + 3 * (1 + 3 + M)];
   double J[M * M], B[M * 4];
-  memcpy(z, z - m, m * sizeof *z);
   ask(p->law, w, all, a);
   for (int corrections = 0;; ++corrections) {
     const double *E = a + m + m * m, *stress = E + m * d, *by_strain = stress + d;
@@ -93,10 +92,7 @@ static void solve_law(const points *p, double *w, double *s)
       sizes[i] += digits;
       ends = ends && (fabs(a[i]) <= digits || small);
     }
-    if (!solved || (!ends && corrections == MOST_CORRECTIONS)) {
-      for (int i = 0; i < d + d * d; ++i) s[i] = NAN;
-      return;
-    }
+    if (!solved || (!ends && corrections == MOST_CORRECTIONS)) return 0;
     if (ends) {
       for (int k = 0; k < d; ++k) {
         s[k] = stress[k];
@@ -108,7 +104,7 @@ static void solve_law(const points *p, double *w, double *s)
         }
       }
       for (int j = 0; j < m; ++j) z[j] -= B[(1 + d) * j];
-      return;
+      return 1;
     }
     const double before = part_of(m, a, sizes);
     memcpy(x, z, m * sizeof *x);
@@ -118,6 +114,30 @@ static void solve_law(const points *p, double *w, double *s)
       if (part_of(m, a, sizes) <= (1 - way / 10) * before) break;
     }
   }
+}
+
+/* The same; frequent sizes are known to the compiler. */
+static int improve(const points *p, double *w, double *s)
+{
+  const int m = p->variables, d = p->components;
+  if (d == 1 && m == 1) return improve_sized(1, 1, p, w, s);
+  if (d == 1 && m == 2) return improve_sized(2, 1, p, w, s);
+  return improve_sized(m, d, p, w, s);
+}
+
+/* Stresses and derivatives of a law that solves for its variables, or no numbers.
+ *
+ * It starts from the variables of the last iterate of the step; if there is none, or if that fails,
+ * from those before the step.
+ */
+static void solve_law(const points *p, double *w, double *s)
+{
+  const int m = p->variables, d = p->components;
+  double *z = w + p->strain + 3 * d + m;
+  if (p->tried && improve(p, w, s)) return;
+  memcpy(z, z - m, m * sizeof *z);
+  if (improve(p, w, s)) return;
+  for (int i = 0; i < d + d * d; ++i) s[i] = NAN;
 }
 
 /* Stresses of the bulk, and their derivatives by the strains at the end of the step. */
@@ -209,7 +229,7 @@ static inline void add_answer(int d, const double *b, double weight, const doubl
  * While `search` asks to hold, closed points stay closed whatever they bear, and `over` is the
  * largest of |stress| / limit - 1 of those that bear more than their limit, else zero.
  */
-void respond(const points *p)
+void respond(points *p)
 {
   double s[3 + 9], *w = p->w, *r = p->r, *D = p->D;
   const double *e0 = p->e0, *e1 = p->e1;
@@ -242,6 +262,7 @@ void respond(const points *p)
       else add_answer(d, p->B + 3 * d * i, p->weight[i], s, r, D);
     }
   }
+  p->tried = 1;
 }
 
 /* Let the closed points open, in this step, whose excess in the latest response is so large. */
@@ -258,7 +279,7 @@ void release(const points *p, double least)
 /* Resultants as affine functions b + D e of the strains, for the tangent. */
 static void linearise(const inelastic *m)
 {
-  const points *p = m->points;
+  points *p = m->points;
   const double *e = p->e1, *r = p->r, *D = p->D;
   for (int c = 0; c < p->cells; ++c, e += 3, r += 3, D += 9) {
     double b[3];
@@ -275,7 +296,7 @@ static void linearise(const inelastic *m)
  */
 void respond_at(const inelastic *m, const double *q)
 {
-  const points *p = m->points;
+  points *p = m->points;
   if (!memcmp(q, m->latest, m->size * sizeof *q)) return;
   memcpy(m->latest, q, m->size * sizeof *q);
   memset(p->e1, 0, 3 * p->cells * sizeof *p->e1);
@@ -295,7 +316,7 @@ void add_inelastic_force(void *self, const double *q, double *r)
 void add_inelastic_tangent(void *self, const double *q, double *tangent)
 {
   inelastic *m = self;
-  const points *p = m->points;
+  points *p = m->points;
   respond_at(m, q);
   if (m->begins) {
     for (int c = 0; c < p->cells; ++c) memcpy(p->r + 3 * c, p->kept + POINT_KEPT * c, 3 * sizeof *p->r);
@@ -313,7 +334,7 @@ void add_inelastic_tangent(void *self, const double *q, double *tangent)
  * numerically at theta = 1, what they store elastically and by hardening, what breaking points let go
  * of, and what mean stresses do more on plastic strains than those at the end, where these are less.
  */
-void commit(const points *p)
+void commit(points *p)
 {
   double s[POINT_OUTPUTS + 3 + MOST_VARIABLES], *e0 = p->e0, *w = p->w, *kept = p->kept, *sum = p->sum;
   const double *e1 = p->e1, *rest = p->rest, *length = p->length, *weight = p->weight;
@@ -363,4 +384,5 @@ void commit(const points *p)
     sum[0] += plastic;
     sum[1] += broken;
   }
+  p->tried = 0;
 }
