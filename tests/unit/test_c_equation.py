@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The equation of a step in C against the same terms called by Python."""
 
+import sys
+
 from petsc4py import PETSc
 
 import numpy as np
@@ -127,3 +129,33 @@ def test_what_python_raises_in_the_middle_arrives():
 )
 def test_reasons_are_those_of_petsc(mine, theirs):
     assert getattr(lib, mine) == int(getattr(PETSc.SNES.ConvergedReason, theirs))
+
+
+@pytest.mark.parametrize(
+    ("name", "reference"), [("add_in_python", False), ("missed_in_python", True)]
+)
+def test_an_interrupt_at_the_door_of_a_callback_is_not_lost(name, reference):
+    """It comes before the first line of what C calls, and cffi would only print it."""
+
+    def interrupt(frame, event, argument):
+        if frame.f_code.co_name == name:
+            sys.settrace(None)
+            raise KeyboardInterrupt
+
+    simulation, whole = (
+        ub.Simulation(machine(), ub.Midpoint(), newton=ub.Newton(reference=reference))
+        for _ in range(2)
+    )
+    simulation.step_to(0.02)
+    before = sys.gettrace()
+    sys.settrace(interrupt)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            simulation.step_to(0.04)
+    finally:
+        sys.settrace(before)
+    assert simulation.t == 0.02
+    simulation.step_to(0.04)
+    whole.step_to(0.02)
+    whole.step_to(0.04)
+    np.testing.assert_array_equal(simulation.q, whole.q)

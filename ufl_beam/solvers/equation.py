@@ -7,7 +7,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -78,32 +78,23 @@ class Equation(ABC):
 
     def part_in_python(self, add: Callable[[Array, Array], None], size: int) -> Loop:
         """C function that adds to ``size`` numbers what Python does; not a number if that fails."""
-
-        def call(q: Any, out: Any) -> None:
-            result = _lent(out, size)
-            try:
-                add(_lent(q, len(self.force)), result)
-            except BaseException as error:
-                self.note(error)
-                result.fill(np.nan)
-
-        return lib.add_in_python, self._handle(call)
+        return lib.add_in_python, self._handle(InPython(self, add, size))
 
     def demand_in_python(self, missed: Callable[[Array, Array, float, float], float]) -> Loop:
         """C function that calls :meth:`missed`, or the like; not a number if that fails."""
+        return lib.missed_in_python, self._handle(InPython(self, missed, len(self.force)))
 
-        def call(q: Any, r: Any, scale: float, moved: float) -> float:
-            try:
-                return missed(_lent(q, len(self.force)), _lent(r, len(self.force)), scale, moved)
-            except BaseException as error:
-                self.note(error)
-                return math.nan
-
-        return lib.missed_in_python, self._handle(call)
-
-    def _handle(self, function: Callable[..., Any]) -> Any:
+    def _handle(self, function: InPython) -> Any:
         self._handles.append(ffi.new_handle(function))
         return self._handles[-1]
+
+
+class InPython(NamedTuple):
+    """A function of an equation that C calls, and how many numbers it is lent besides unknowns."""
+
+    equation: Equation
+    function: Callable[..., Any]
+    size: int
 
 
 def _lent(pointer: Any, size: int) -> Array:
@@ -111,16 +102,27 @@ def _lent(pointer: Any, size: int) -> Array:
     return np.frombuffer(ffi.buffer(pointer, 8 * size))
 
 
-@ffi.def_extern()  # type: ignore[misc, untyped-decorator, unused-ignore]
+def _note(kind: type, error: BaseException, traceback: Any) -> None:
+    """Note an exception in a callback; an interrupt may come before its first line has run."""
+    arguments = traceback.tb_frame.f_locals
+    of = ffi.from_handle(arguments["handle"])
+    of.equation.note(error.with_traceback(traceback))
+    if "out" in arguments:
+        _lent(arguments["out"], of.size).fill(np.nan)
+
+
+@ffi.def_extern(onerror=_note)  # type: ignore[misc, untyped-decorator, unused-ignore]
 def add_in_python(handle: Any, q: Any, out: Any) -> None:
     """Callback of C, declared in c_library.py."""
-    ffi.from_handle(handle)(q, out)
+    of = ffi.from_handle(handle)
+    of.function(_lent(q, len(of.equation.force)), _lent(out, of.size))
 
 
-@ffi.def_extern()  # type: ignore[misc, untyped-decorator, unused-ignore]
+@ffi.def_extern(error=math.nan, onerror=_note)  # type: ignore[misc, untyped-decorator, unused-ignore]
 def missed_in_python(handle: Any, q: Any, r: Any, scale: float, moved: float) -> float:
     """Callback of C, declared in c_library.py."""
-    return float(ffi.from_handle(handle)(q, r, scale, moved))
+    of = ffi.from_handle(handle)
+    return float(of.function(_lent(q, of.size), _lent(r, of.size), scale, moved))
 
 
 class Border(Protocol):
