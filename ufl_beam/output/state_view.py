@@ -127,8 +127,9 @@ class StateView(ABC):
     def _support_forces(self) -> Array:
         """Forces of all supports in the latest residual; (num_supports, 3); N, N, N m."""
         dofs, mine = self._support_dofs
-        here = np.where(mine, self.supports.all_reactions(self.share.size)[dofs], 0.0)
+        here: Array = self.supports.all_reactions(self.share.size)[dofs]
         if not self.share.alone:
+            here[~mine] = 0.0
             self.share.comm.Allreduce(MPI.IN_PLACE, here)
         return here
 
