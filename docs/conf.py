@@ -34,9 +34,10 @@ extensions = [
 exclude_patterns = ["_build", "conf.py", "demos/README.md", "**/output", "requirements.txt"]
 html_theme = "furo"
 html_title = "ufl_beam"
+html_favicon = "_static/favicon.svg"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
-html_show_sourcelink = False
+html_show_sourcelink = html_show_copyright = html_show_sphinx = False
 html_copy_source = False
 html_theme_options = {
     "light_css_variables": {"color-brand-primary": "#00598a", "color-brand-content": "#00598a"},
@@ -90,7 +91,7 @@ def read_demo(text):
 
 
 def gallery():
-    """The table of demos as cards with their titles and first pictures.
+    """The table of demos as cards with titles and pictures, of shapes if there are any.
 
     Documents are read in the order of their names, so the demos have been run before.
     """
@@ -100,9 +101,10 @@ def gallery():
         script, topic = row.groups()
         source = (DOCS / "demos" / script).read_text(encoding="utf-8")
         title = source.splitlines()[1].removeprefix("# # ")
-        saved = [f"demos/output/{name}" for name in re.findall(r"[/ ]\"(\w+\.png)\"", source)]
-        saved = [name for name in saved if (DOCS / name).exists()][:1]
-        picture = [f":img-top: {name}" for name in saved]
+        name, folder = script.removeprefix("demo_").removesuffix(".py"), DOCS / "demos" / "output"
+        saved = [*folder.glob(f"{name}*.png")] or [*folder.glob(f"{name.split('_')[-1]}*.png")]
+        saved.sort(key=lambda path: ("shapes" not in path.name, path.name))
+        picture = [f":img-top: {path.relative_to(DOCS)}" for path in saved[:1]]
         head = f":::{{grid-item-card}} {title}"
         link = [f":link: demos/{script.removesuffix('.py')}", ":link-type: doc"]
         return "\n".join([head, *link, *picture, "", topic, ":::", ""])

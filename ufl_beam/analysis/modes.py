@@ -174,8 +174,8 @@ class Modes(Shapes):
     """Vibration modes ``x exp(s t)`` about a state; made by :func:`modes`.
 
     Attributes:
-        exponents: s = -ζω ± iω√(1-ζ²) of each, imaginary part not negative, ``|s|`` ascending; (n,);
-            1/s.
+        exponents: s = -ζω ± iω√(1-ζ²) of each, imaginary part not negative, ``|s|`` ascending;
+            (n,); 1/s.
 
     Example:
         >>> shapes = ub.modes(scene, 3)
