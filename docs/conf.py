@@ -214,7 +214,11 @@ def formula(display):
 
     def visit(self, node):
         mathml = latex2mathml.converter.convert(node.astext(), display=display)
-        self.body.append(f"<div>{mathml}</div>" if display == "block" else mathml)
+        # Few fonts have italic Greek letters.
+        mathml = re.sub(
+            r"<mi>(&#x003[9A-C][0-9A-F];)</mi>", r'<mi mathvariant="normal">\1</mi>', mathml
+        )
+        self.body.append(f"<div class="formula">{mathml}</div>" if display == "block" else mathml)
         raise nodes.SkipNode
 
     return visit, None
