@@ -55,6 +55,7 @@ class _Writer(Laws):
 
     def __init__(self, seed, statement):
         self._random = np.random.default_rng(seed)
+        self._others = np.random.default_rng([seed, 1])
         self._scattered = self._chance(0.1)
         self._say = Numbers(statement, places_stay=self._scattered)
         self._lists = {name: [] for name in PARTS}

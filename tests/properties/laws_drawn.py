@@ -3,6 +3,13 @@
 
 import math
 
+STRAINS = {"N m2": "1/m", "N": "1", "Pa": "1", "N/m": "m", "N m": "1"}
+"""Dimension of what a stiffness of each dimension is multiplied by."""
+
+INVERSE = {"1/m": "m", "1": "1", "m": "1/m"}
+
+CLASSES = ["Hardening", "Hardening", "RambergOsgood", "ArmstrongFrederick", "BoucWen"]
+
 
 class Laws:
     """The part of the writer of random scenes that draws laws."""
@@ -30,6 +37,27 @@ class Laws:
         if viscous == "DuvautLions":
             more.append(f"viscosity=ub.DuvautLions({say.number(time, 's')})")
         return f"ub.Hardening({', '.join(more)})"
+
+    def _yielding(self, name, limit, size, stiffness, dimensions):
+        """A law of a class that yields at about a limit, given as text and in SI.
+
+        What these laws draw of their own leaves the other draws of a seed as they are.
+        """
+        hardening = self._hardening(limit, stiffness, dimensions)
+        of, say, some = dimensions[0], self._say.number, self._others.uniform
+        strain = size / stiffness
+        strains = STRAINS[of]
+        kinematic = say(stiffness * 10 ** some(-2, -0.5), of)
+        recovery = say(10 ** some(-1.5, 0.5) / strain, INVERSE[strains])
+        offset = say(strain * 10 ** some(-1, 0.5), strains)
+        strength = self._others.choice([0.0, 0.1])
+        exponent, hardens, shape = some(1, 6), some(0, 0.3), some(0.5, 1)
+        return {
+            "Hardening": hardening,
+            "RambergOsgood": f"ub.RambergOsgood({limit}, {offset}, {exponent:.2f})",
+            "ArmstrongFrederick": f"ub.ArmstrongFrederick({limit}, {kinematic}, {recovery})",
+            "BoucWen": f"ub.BoucWen({limit}, {hardens:.2f}, {exponent:.2f}, {shape:.2f}, {strength:.1f})",
+        }[name]
 
     def _softening(self, limit, energy, dimensions):
         """A law that breaks; limit and energy in SI, and their dimensions."""
@@ -67,13 +95,18 @@ class Laws:
         ]  # fmt: skip
         hinges = {}
         if kind in ("resultants", "both"):
-            law = self._hardening(say.number(limit, "N m"), EI, ("N m2", "N m2 s"))
-            more.append(f"bending={law}")
+            name = self._others.choice(CLASSES)
+            law = self._yielding(name, say.number(limit, "N m"), limit, EI, ("N m2", "N m2 s"))
+            laws = [f"bending={law}"]
             force = limit / self._L * self._size(0, 1)
-            law = self._hardening(say.number(force, "N"), EA, ("N", "N s"))
-            more += [f"axial={law}"] if self._chance(0.3) else []
-            law = self._hardening(say.number(force, "N"), EA, ("N", "N s"))
-            more += [f"shear={law}"] if self._chance(0.3) else []
+            law = self._yielding(name, say.number(force, "N"), force, EA, ("N", "N s"))
+            laws += [f"axial={law}"] if self._chance(0.3) else []
+            law = self._yielding(name, say.number(force, "N"), force, EA, ("N", "N s"))
+            laws += [f"shear={law}"] if self._chance(0.3) else []
+            if kind == "resultants" and self._others.random() < 0.2:
+                both = f"{say.number(force, 'N')}, {say.number(limit, 'N m')}"
+                laws = [f"interaction=ub.AxialBending({both})"]
+            more += laws
         if kind in ("hinge", "both"):
             size = limit * self._size(0, 0.5)
             laws = [
@@ -110,7 +143,8 @@ class Laws:
             f"ub.TruncatedNormal({mean}, {scatter}, seed={i})",
             f"ub.Weibull({mean}, 3.0, seed={i})",
         ])  # fmt: skip
-        law = self._hardening(drawn if self._scattered else mean, E, ("Pa", "Pa s"))
+        limit = drawn if self._scattered else mean
+        law = self._yielding(self._others.choice(CLASSES), limit, strength, E, ("Pa", "Pa s"))
         size = strength * self._size(0, 0.5)
         crack = self._softening(size, size * h * self._size(-1, 0.5), ("Pa", "N/m"))
         crack = f", softening={crack}" if self._chance(0.4) else ""
@@ -154,7 +188,8 @@ class Laws:
         c = stiffness * self._T * self._size(-2, 0)
         high, low = way * self._size(-2.5, -1), way * self._size(-2.5, -1)
         cubic = f"{of_k[:-1]}m3" if of_k == "N/m" else of_k
-        yields = self._hardening(say.number(f, of_f), k, (of_k, of_c))
+        name = self._others.choice(CLASSES)
+        yields = self._yielding(name, say.number(f, of_f), f, k, (of_k, of_c))
         breaks = self._softening(f, f**2 / k * self._size(0.3, 1.5), (of_f, "J"))
         ω = say.number(self._some(1, 6) / self._end, "1/s")
         self._last_limits = (low, high)

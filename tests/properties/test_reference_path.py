@@ -19,10 +19,10 @@ from ufl_beam.terms.connectors import ReferenceCouplings
 from ufl_beam.terms.reference_points import ReferencePoints
 from ufl_beam.terms.reference_slips import ReferenceSlips
 
-WANDERING = (25, 32, 36, 38)
+WANDERING = (19, 25, 26, 32, 36, 38)
 """Scenes in whose steps Newton's method wanders, so that round-off decides where a step is cut."""
 
-SEEDS = [seed for seed in range(46) if seed not in WANDERING]
+SEEDS = [seed for seed in range(48) if seed not in WANDERING]
 """Scenes that have, between them, every object, law and scheme that `any_scene` draws."""
 
 SAME = 1e-9

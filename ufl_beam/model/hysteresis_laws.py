@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.model.law_functions import (
@@ -16,11 +16,21 @@ from ufl_beam.model.law_functions import (
     larger,
     positive,
     sign,
+    smaller,
     sqrt,
     where,
 )
 from ufl_beam.model.material_law import MaterialLaw, State
 from ufl_beam.model.records import NotNegative, Positive, Record
+
+
+def _require_positive_or_random(value: Any, what: str) -> None:
+    if not hasattr(value, "draw"):
+        require_number(value, what, positive=True)
+
+
+Limit = Annotated[Any, _require_positive_or_random]
+"""A positive number, or a distribution."""
 
 AtLeastOne = Annotated[float, partial(require_number, at_least=1.0)]
 
@@ -60,7 +70,8 @@ class RambergOsgood(_Plastic):
     NACA TN 902 (1943).
 
     Args:
-        limit: Stress at which the plastic strain is ``offset``; Pa, N or N m.
+        limit: Stress at which the plastic strain is ``offset``, or a distribution such as
+            :class:`Normal`; Pa, N or N m.
         offset: Plastic strain or curvature at that stress, such as 0.002; 1 or 1/m.
         exponent: At least 1.
 
@@ -72,7 +83,7 @@ class RambergOsgood(_Plastic):
         >>> curved = ub.Section.rectangle(b=0.1, h=0.2, E=70e9, nu=0.3, fibres=ub.Fibres(law))
     """
 
-    limit: Positive
+    limit: Limit
     offset: Positive
     exponent: AtLeastOne
     variables: ClassVar[Mapping[str, float]] = {"plastic": 0.0, "largest": 0.0}
@@ -96,7 +107,7 @@ class ArmstrongFrederick(_Plastic):
     (1966).
 
     Args:
-        limit: Yield stress; Pa, N or N m.
+        limit: Yield stress, or a distribution such as :class:`Normal`; Pa, N or N m.
         kinematic: Initial hardening; stress per plastic strain.
         recovery: Rate at which hardening fades; per plastic strain.  Without it use
             :class:`Hardening` with ``kinematic``.
@@ -109,7 +120,7 @@ class ArmstrongFrederick(_Plastic):
         >>> ratchets = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, fibres=ub.Fibres(law))
     """
 
-    limit: Positive
+    limit: Limit
     kinematic: Positive
     recovery: Positive
     variables: ClassVar[Mapping[str, float]] = {"plastic": 0.0, "back": 0.0}
@@ -144,7 +155,8 @@ class BoucWen(Record, MaterialLaw):
     left out: in unloading it would give back energy that was dissipated.
 
     Args:
-        limit: Stress at which the tangents of both branches meet, hardening left out; Pa, N, N m.
+        limit: Stress at which the tangents of both branches meet, hardening left out, or a
+            distribution such as :class:`Normal`; Pa, N, N m.
         hardening: Slope of the plastic branch as a part of C, below 1.
         exponent: Sharpness n of the transition, at least 1.
         shape: β from 1/2, unloading along C, to 1.
@@ -158,7 +170,7 @@ class BoucWen(Record, MaterialLaw):
         >>> base = ub.Turn(ub.ground(0, 0), beam.start, ub.Spring(1e7, law=law))
     """
 
-    limit: Positive
+    limit: Limit
     hardening: Annotated[float, _require_part] = 0.0
     exponent: AtLeastOne = 1.0
     shape: Annotated[float, _require_shape] = 0.5
@@ -170,11 +182,17 @@ class BoucWen(Record, MaterialLaw):
         return self.C * (strain - (1 - self.hardening) * state.slip)
 
     def residuals(self, strain: Values, old: State, new: State, dt: Values) -> Mapping[str, Values]:
-        """Evolution of the hysteretic strain; strain and dissipated energy are remembered."""
+        """Evolution of the hysteretic strain; strain and dissipated energy are remembered.
+
+        Far beyond all solutions the flow grows no more with z, and so has one zero there, too.
+        """
         z, z0, dx = strain - new.slip, self.limit / self.C, strain - old.strain
-        weaker = 1 + self.strength * larger(old.energy, new.energy)
+        before = old.strain - old.slip
+        size = smaller(absolute(z), 2 * larger(z0, absolute(before)))
+        slips = dx + before - sign(z) * size
+        weaker = 1 + self.strength * (old.energy + positive(sign(z) * size * slips) / z0**2)
         bends = 1 - self.shape + self.shape * sign(z * dx)
-        flow = dx * weaker * (absolute(z) / z0) ** self.exponent * bends
+        flow = dx * weaker * (size / z0) ** self.exponent * bends
         slip = new.slip - old.slip
         return {
             "slip": slip - flow,
