@@ -8,8 +8,8 @@ from pages import DOCS, blocks_of
 
 PAGES = [
     *sorted(DOCS.glob("extending*.md")),
-    DOCS / "hinges.md",
     *sorted(DOCS.glob("howto_*.md")),
+    *(DOCS / name for name in ("coming_from.md", "hinges.md", "start.md")),
 ]
 
 
@@ -35,6 +35,7 @@ def test_the_script_of_a_page_runs(page, tmp_path, monkeypatch, capsys):
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_pictures_of_a_page_are_those_of_its_script(page):
     """A picture that a page shows is saved by its script under the same name."""
-    saved = re.findall(r'savefig\("(\w+\.png)"\)', "".join(blocks_of(page)))
+    scripts = "".join(blocks_of(page) + blocks_of(page, "py"))
+    saved = re.findall(r'(?:savefig|SaveScreenshot)\("(\w+\.png)"', scripts)
     shown = re.findall(r"\]\(pictures/(\w+\.png)\)", page.read_text(encoding="utf-8"))
     assert set(shown) <= set(saved)
