@@ -218,7 +218,7 @@ def formula(display):
         mathml = re.sub(
             r"<mi>(&#x003[9A-C][0-9A-F];)</mi>", r'<mi mathvariant="normal">\1</mi>', mathml
         )
-        self.body.append(f"<div class="formula">{mathml}</div>" if display == "block" else mathml)
+        self.body.append(f'<div class="formula">{mathml}</div>' if display == "block" else mathml)
         raise nodes.SkipNode
 
     return visit, None
