@@ -1,6 +1,6 @@
 # Every target runs through ./env, which brings DOLFINx where it is missing. `make` lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-mpi test-sid verify sanitize long demos demos-cheap check check-paraview accelerations bench bench-peers extremes schemes study
+.PHONY: help demo test test-mpi test-sid verify sanitize long demos demos-cheap check check-paraview docs docs-cheap check-docs docs-pictures accelerations bench bench-peers extremes schemes study
 
 # Natively as root Open MPI refuses to start; with more ranks than cores, too (the last two lines: versions 5 and 6).
 # ./env sets the same in its root.
@@ -63,6 +63,18 @@ check: ## lint, format and types
 
 check-paraview: ## time series opened in ParaView; builds a root with ParaView once, 2.3 GB
 	@tests/paraview/check
+
+docs: ## the documentation site, in docs/_build/html; runs the demos, six minutes
+	@docs/build
+
+docs-cheap: ## the site with the output of the cheap demos only; two minutes
+	@UFL_BEAM_DEMOS=cheap docs/build
+
+check-docs: ## the built site in Chromium, on a desk and on a phone; builds a root with Chromium once, 0.9 GB
+	@tests/browser/check
+
+docs-pictures: docs ## pictures of the site in docs/pictures/site
+	@tests/browser/check docs/pictures/site
 
 extremes: ## results at extreme parameters, as tables in docs/extremes.md
 	@./env python3 benchmarks/extremes

@@ -33,9 +33,9 @@ class Acceleration(NamedTuple):
 
 ACCELERATIONS = {
     "cell loops in C": Acceleration(
-        "Calls FFCx's kernels in a loop over the cells that knows the degrees of freedom and the "
-        "entries of the matrix of each cell. Without it, `fem.assemble_vector` and "
-        "`fem.assemble_matrix` evaluate the same forms, and NumPy adds what they return.",
+        "A loop over the cells calls FFCx's kernels and adds their results to known entries of "
+        "vector and matrix. Without it, `fem.assemble_vector` and `fem.assemble_matrix` evaluate "
+        "the same forms, and NumPy adds the results.",
         by.PYTHON, by.ASSEMBLERS,
         (
             "discretization/compiled_forms.py:Kernel", "discretization/compiled_forms.py:prepared",
@@ -79,7 +79,7 @@ ACCELERATIONS = {
         ),
     ),
     "SIMD kernels": Acceleration(
-        "Kernels of FFCx compiled once more with vectors in the place of numbers, for the "
+        "Kernels of FFCx compiled a second time with vectors instead of numbers, for the "
         "processor of the machine: four cells at once. Without it, cells are computed one by one "
         "by FFCx's own kernels.",
         by.SHIPPED, by.SCALAR,
@@ -92,10 +92,10 @@ ACCELERATIONS = {
         ),
     ),
     "elimination along beams": Acceleration(
-        "Eliminates the vertices between the ends of beams in blocks of three; PETSc factors what "
-        "remains. Without it, PETSc's LU with the ordering \"amd\" factors the whole tangent, "
-        "called from the same Newton's method in C. On several processes there is nothing else "
-        "that shares this work.",
+        "Eliminates the vertices between the ends of beams in blocks of three; PETSc factors the "
+        "remaining matrix. Without it, PETSc's LU with the ordering \"amd\" factors the whole "
+        "tangent, called from the same Newton's method in C. On several processes this work is "
+        "shared, the factorization is not.",
         by.SHIPPED, by.WHOLE,
         (
             "compiled/c/elimination.c", "solvers/static_condensation.py:Chains",
@@ -112,15 +112,16 @@ ACCELERATIONS = {
         ),
     ),
     "tangent kept in the last iteration": Acceleration(
-        "Keeps the tangent of the iterate before where the residual then falls far below the "
-        "tolerance, at most once in a row. Without it, every iteration makes and factors one.",
+        "Keeps the tangent of the previous iterate if the residual then decreases far below the "
+        "tolerance, at most once in a row. Without it, every iteration assembles and factors a "
+        "tangent.",
         by.SHIPPED, by.TANGENTS,
         ("compiled/c/newton.c~kept|near",),
         (ELASTIC, LARGE, HINGED, JOINTED),
     ),
     "`Newton(modified=True)`": Acceleration(
-        "An option: keeps tangents while the residual goes on to fall as it did, also from step "
-        "to step. Without it, the default.",
+        "An option: keeps tangents while the residual continues to decrease at the same rate, "
+        "also from step to step. Without it, the default.",
         by.MODIFIED, by.SHIPPED,
         (
             "compiled/c/newton.c~\\brate|MORE|modified", "solvers/convergence.py~rate|modified",
@@ -129,7 +130,7 @@ ACCELERATIONS = {
         (ELASTIC, LARGE, HINGED, JOINTED),
     ),
     "tangent of the last step (`like_last`)": Acceleration(
-        "The part of this option that goes from step to step.",
+        "The part of this option that keeps a tangent from one step to the next.",
         by.MODIFIED, by.ANEW,
         (
             "solvers/convergence.py~like_last|rate", "solvers/newton.py~like_last",
@@ -138,9 +139,9 @@ ACCELERATIONS = {
         (ELASTIC, LARGE, HINGED, JOINTED),
     ),
     "cells with points in C": Acceleration(
-        "One loop evaluates strains, points and forces of cells that yield or break, and answers "
-        "the same iterate once. Without it, Python calls these three in turn, and the points "
-        "answer for residual and tangent.",
+        "One loop evaluates strains, points and forces of cells that yield or break, once for "
+        "each iterate. Without it, Python calls these three in turn, and evaluates the points for "
+        "the residual and again for the tangent.",
         by.SHIPPED, by.POINTS,
         (
             "terms/inelastic_beams.py:CompiledInelasticBeams",
@@ -152,9 +153,9 @@ ACCELERATIONS = {
         (HINGED,),
     ),
     "return map in C": Acceleration(
-        "Points answer one after the other, by laws and tangents that UFL derives and FFCx "
-        "compiles. Without it, NumPy calls the laws on all points at once, with tangents by "
-        "complex steps. In both, Python calls the cells.",
+        "Points are evaluated one after the other, with laws and tangents that UFL derives and "
+        "FFCx compiles. Without it, NumPy evaluates the laws at all points at once, with tangents "
+        "by complex steps. In both variants, Python calls the cells.",
         by.POINTS, by.NUMPY,
         (
             "terms/compiled_points.py", "compiled/c/material_points.c:ask",
@@ -176,8 +177,8 @@ ACCELERATIONS = {
         (JOINTED,),
     ),
     "all of them": Acceleration(
-        "The compiled path beside `Newton(reference=True)`, which is there to be read and "
-        "compared with.",
+        "The compiled path beside `Newton(reference=True)`, which is meant for reading and "
+        "comparison.",
         by.SHIPPED, by.REFERENCE, (),
         (ELASTIC, LARGE, HINGED, JOINTED),
     ),

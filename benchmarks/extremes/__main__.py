@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The extremes: what was tried and what happened.
+"""Results at extreme parameters.
 
 Run by ``make extremes``.  Each row is a process of its own, two at a time, so that a hang is caught
 and a crash is seen.  Writes ``docs/extremes.md`` and its figure; fails if anything is wrong.

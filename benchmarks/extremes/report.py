@@ -27,12 +27,12 @@ def save(results: Results) -> None:
         for verdict in ("works", "stops", "WRONG", "HANG")
     }
     lines = [
-        "# The extremes: what was tried and what happened",
+        "# Results at extreme parameters",
         "",
         "Written by `make extremes`; do not edit. Each value is a simulation of its own; its",
-        "error is the difference from an independent answer, and what is allowed is argued in",
+        "error is the difference from an independent result; the allowed error is derived in",
         "[benchmarks/extremes](../benchmarks/extremes): the tolerance of Newton's method, the",
-        "order of the scheme, and last digits times what magnifies them.",
+        "order of the scheme, and round-off times its amplification.",
         "",
         f"Of {sum(counts.values())} runs {counts['works']} work, {counts['stops']} stop with a "
         f"message that names what is wrong, {counts['WRONG']} are wrong "

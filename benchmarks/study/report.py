@@ -14,12 +14,12 @@ Case = dict[str, Any]
 INTRODUCTION = """\
 # Speed and accuracy: the study
 
-Written by `make study`; do not edit. What each dial costs and what it errs, over scenes that are
-smooth, stiff, impulsive, plastic, softening and static. Times are the wall time of a run, building
-the scene included, compiling not. Errors are the largest distance of a place at ten instants from a
-reference that is finer than all that is compared, as a part of the size of the scene; what is below
-twice the error of the reference itself is not counted. The scenes are small and the numbers those
-of one machine: take ratios from here, and settings for your own scene from
+Written by `make study`; do not edit. Time and error of each setting, over scenes that are smooth,
+stiff, impulsive, plastic, softening and static. Times are the wall time of a run, including the
+building of the scene, without compilation. The error is the largest distance of a place, at ten
+instants, from a reference run that is finer than all others, relative to the size of the scene;
+errors below twice that of the reference itself are not counted. The scenes are small, and the times
+are those of one machine: use the ratios, and find the settings for your own scene by
 [`ub.tradeoff`](tradeoff.md).
 """
 
@@ -41,18 +41,18 @@ def save(study: dict[str, Any], docs: Path) -> None:
         "",
         *advice(cases),
         "",
-        "How many times as long as the fastest scheme each takes, the geometric mean over the "
-        "scenes where it reaches the error at all, and in how many it does:",
+        "Time of each scheme relative to the fastest one: the geometric mean over the scenes in "
+        "which it reaches the error, and their number:",
         "",
         *overall(cases),
         "",
-        "## Each dial by itself",
+        "## Each setting by itself",
         "",
-        "One dial is turned at a time, from the setting that the tables of the scenes name. Time "
-        "and error are ratios to that setting; the change is what the dial alone does to the "
-        "result.",
+        "One setting is varied at a time, from the base that the tables of the scenes name. Time "
+        "and error are ratios to the base; the change is that of the result by this setting "
+        "alone.",
         "",
-        "![Time and error as each dial is turned](pictures/study_dials.png)",
+        "![Time and error as each setting is varied](pictures/study_dials.png)",
         "",
     ]
     draw_dials(cases, pictures / "study_dials.png")
@@ -80,13 +80,13 @@ def _section(case: Case, picture: Path) -> list[str]:
         run = cheapest(case, target)
         lines.append(f"| {target:g} | " + (_row(run) if run else "not reached | | | | | |") + " |")
     if "failed" in here:
-        return [*lines, "", f"The setting for single dials failed: {here['failed']}", ""]
+        return [*lines, "", f"The base of single settings failed: {here['failed']}", ""]
     lines += [
         "",
-        f"Dials turned from: {here['scheme']}, {here['cells']} cells, {here['taken']} steps, "
+        f"Base: {here['scheme']}, {here['cells']} cells, {here['taken']} steps, "
         f"{here['seconds']:.3g} s, error {here['error']:.1e}.",
         "",
-        "| dial | time | error | change | iterations | imbalance of the ledger |",
+        "| setting | time | error | change | iterations | imbalance of the ledger |",
         "|---|---|---|---|---|---|",
     ]
     for run in case["dials"]:

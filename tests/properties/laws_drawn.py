@@ -52,11 +52,12 @@ class Laws:
         offset = say(strain * 10 ** some(-1, 0.5), strains)
         strength = self._others.choice([0.0, 0.1])
         exponent, hardens, shape = some(1, 6), some(0, 0.3), some(0.5, 1)
+        smooth = f"{hardens:.2f}, {exponent:.2f}, {shape:.2f}, {strength:.1f}"
         return {
             "Hardening": hardening,
             "RambergOsgood": f"ub.RambergOsgood({limit}, {offset}, {exponent:.2f})",
             "ArmstrongFrederick": f"ub.ArmstrongFrederick({limit}, {kinematic}, {recovery})",
-            "BoucWen": f"ub.BoucWen({limit}, {hardens:.2f}, {exponent:.2f}, {shape:.2f}, {strength:.1f})",
+            "BoucWen": f"ub.BoucWen({limit}, {smooth})",
         }[name]
 
     def _softening(self, limit, energy, dimensions):

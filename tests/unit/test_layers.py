@@ -274,18 +274,3 @@ def test_sources_state_their_licence():
             text = text.partition("\n# %%\n")[2]
         first = text.partition("\n")[0]
         assert first in (f"# {licence}", f"/* {licence} */"), path
-
-
-@pytest.mark.serial
-def test_the_script_of_the_readme_runs(tmp_path, monkeypatch):
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    (script,) = re.findall(
-        r"^```python\n(import ufl_beam.*?)^```", readme, re.MULTILINE | re.DOTALL
-    )
-    monkeypatch.chdir(tmp_path)
-    names = {}
-    exec(script, names)
-    assert names["solution"].times[-1] == 0.4
-    assert names["solution"].energy.worst < 1e-9  # the ledger closes
-    assert (tmp_path / "portal.png").stat().st_size > 1000
-    assert (tmp_path / "portal.xdmf").exists()

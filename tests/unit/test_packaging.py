@@ -66,10 +66,12 @@ def copied(tmp_path_factory):
     source.mkdir()
     unwanted = shutil.ignore_patterns("__pycache__", "*.egg-info")
     for name in SHIPPED:
-        shutil.copytree(ROOT / name, source / name, ignore=unwanted)
+        shutil.copytree(ROOT / name, source / name, ignore=unwanted, symlinks=True)
     for file in ROOT.iterdir():
         if file.is_file() and not file.name.startswith("."):
             shutil.copy(file, source)
+    for built in ("demos/output", "docs/_build", "docs/api"):
+        shutil.rmtree(source / built, ignore_errors=True)
     return source
 
 

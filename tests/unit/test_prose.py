@@ -16,12 +16,12 @@ PAGES = [
     for path in sorted((ROOT / folder).glob("*.md"))
 ]
 
-FILES = {"portal.py", "axis.h"}.union(
+FILES = {"portal.py", "mast.py", "arm.py", "axis.h"}.union(
     path.name
     for folder in ("ufl_beam", "tests", "demos", "benchmarks")
     for path in (ROOT / folder).rglob("*.*")
 )
-"""Names of the files of the repository, the script of the README, and an attribute."""
+"""Names of the files of the repository, scripts of its pages, and an attribute."""
 
 
 def docstrings(tree, owner):

@@ -174,8 +174,8 @@ class Modes(Shapes):
     """Vibration modes ``x exp(s t)`` about a state; made by :func:`modes`.
 
     Attributes:
-        exponents: s = -ζω ± iω√(1-ζ²) of each, imaginary part not negative, |s| ascending; (n,);
-            1/s.
+        exponents: s = -ζω ± iω√(1-ζ²) of each, imaginary part not negative, ``|s|`` ascending;
+            (n,); 1/s.
 
     Example:
         >>> shapes = ub.modes(scene, 3)
@@ -189,7 +189,7 @@ class Modes(Shapes):
 
     @property
     def omega(self) -> Array:
-        """Natural circular frequencies |s|; (n,); rad/s."""
+        """Natural circular frequencies ``|s|``; (n,); rad/s."""
         return np.asarray(np.abs(self.exponents))
 
     @property
@@ -199,7 +199,7 @@ class Modes(Shapes):
 
     @property
     def damping(self) -> Array:
-        """Damping ratios ζ = -Re s/|s|; (n,).
+        """Damping ratios ζ = ``-Re s/|s|``; (n,).
 
         Negative: the motion grows; ±1: it does not oscillate; not a number: nothing drives it back.
         """
@@ -222,7 +222,7 @@ class Buckling(Shapes):
     """Buckling modes and their load factors; made by :func:`buckling`.
 
     Attributes:
-        factors: Factors on the loads, |factor| ascending; negative: with loads reversed; (n,).
+        factors: Factors on the loads, ``|factor|`` ascending; negative: with loads reversed; (n,).
 
     Example:
         >>> load = ub.PointLoad(beam.end, force=(-1e6, 0))
@@ -294,7 +294,7 @@ def buckling(
 
     Args:
         scene: Model.
-        n: Number of factors, from the smallest |λ|.
+        n: Number of factors, from the smallest ``|λ|``.
         t: Time at which loads are taken; s.
         at: Solution whose last state the loads grow from, of the same beams joined alike.
         mesh: Discretization; as ``at``, or with the cells of the beams.

@@ -282,9 +282,9 @@ class Solution:
         """Largest part of its limit by which the place of an embedded hinge shifts it, by beam.
 
         A hinge of ``Section(hinge=)`` is in the middle of its cell of length h and opens where the
-        moment there reaches the limit; at the ends of the cell the moment differs by |V| h/2.  The
-        number is |V| h / (2 limit), V being that of the last kept time before the opening.  Beams
-        without embedded hinges that opened in the run are left out.
+        moment there reaches the limit; at the ends of the cell the moment differs by ``|V| h/2``.
+        The number is ``|V| h / (2 limit)``, V being that of the last kept time before the opening.
+        Beams without embedded hinges that opened in the run are left out.
         """
         return {one.beam: one.error for one in self.opened.hinges()}
 
