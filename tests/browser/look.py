@@ -23,6 +23,9 @@ PAGES = {
     "reference": "reference.html",
     "reference_page": "api/Softening.html",
     "theory": "theory.html",
+    "start": "start.html",
+    "howto": "howto_pushover.html",
+    "coming_from": "coming_from.html",
     "search": "search.html?q=hinge",
 }
 WIDTHS = {"desk": (1280, 900), "phone": (390, 844)}
