@@ -1,6 +1,6 @@
 # Every target runs through ./env, which brings DOLFINx where it is missing. `make` lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-mpi test-sid verify sanitize long demos demos-cheap check check-paraview docs docs-cheap check-docs docs-pictures accelerations bench bench-peers extremes schemes study
+.PHONY: help demo test test-mpi test-sid verify sanitize long demos demos-cheap check check-paraview docs docs-cheap docs-links check-docs docs-pictures accelerations bench bench-peers extremes schemes study
 
 # Natively as root Open MPI refuses to start; with more ranks than cores, too (the last two lines: versions 5 and 6).
 # ./env sets the same in its root.
@@ -69,6 +69,9 @@ docs: ## the documentation site, in docs/_build/html; runs the demos, six minute
 
 docs-cheap: ## the site with the output of the cheap demos only; two minutes
 	@UFL_BEAM_DEMOS=cheap docs/build
+
+docs-links: ## addresses that the pages link to
+	@docs/build -b linkcheck -D nb_execution_mode=off
 
 check-docs: ## the built site in Chromium, on a desk and on a phone; builds a root with Chromium once, 0.9 GB
 	@tests/browser/check

@@ -23,7 +23,10 @@ PAGES = {
     "reference": "reference.html",
     "reference_page": "api/Softening.html",
     "theory": "theory.html",
-    "search": "search.html?q=hinge",
+    "start": "start.html",
+    "howto": "howto_pushover.html",
+    "coming_from": "coming_from.html",
+    "search": "search.html?q=hinge",  # the last one: other pages would highlight the word, too
 }
 WIDTHS = {"desk": (1280, 900), "phone": (390, 844)}
 
@@ -83,8 +86,8 @@ def main():
     try:
         wrong = [
             line
-            for width in WIDTHS
             for name, page in PAGES.items()
+            for width in WIDTHS
             for line in look(driver, site, name, page, width, folder)
         ]
     finally:
