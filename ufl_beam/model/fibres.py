@@ -52,6 +52,9 @@ class Layout:
     breaking: slice  # the points that can
     hinges: bool = False  # True if the discontinuity is one hinge, a jump of rotation
 
+    def __post_init__(self) -> None:
+        _ = self.kind  # refuses laws of several kinds
+
     @property
     def elastic(self) -> bool:
         """True if nothing can happen at the points."""
@@ -66,10 +69,10 @@ class Layout:
     def kind(self) -> Kind:
         """The law of one kind that points of the bulk follow, with numbers of their own."""
         laws = [law for law, _ in self.laws if not law.elastic] or [self.laws[0][0]]
-        kinds = dict.fromkeys(Kind.of_law(law) for law in laws)
+        kinds = {Kind.of_law(law): law for law in laws}
         if len(kinds) > 1:
-            names = " and ".join(dict.fromkeys(type(kind.law).__name__ for kind in kinds))
-            raise SceneError(f"Section: its laws must be of one kind, not {names}")
+            different = " and ".join(map(repr, kinds.values()))
+            raise SceneError(f"Section: its laws must be of one class, not {different}")
         kind = next(iter(kinds))
         for law, _ in self.laws:
             if type(law) is not type(kind.law):

@@ -91,6 +91,7 @@ class Section(Record):
             raise SceneError(
                 f"Section: {other} beside interaction, the law of N and M; give one of both"
             )
+        self.layout(self.hinge)  # refuses laws that do not go together
 
     def layout(self, hinge: AnySoftening | None) -> Layout | None:
         """Material points of a cell with a hinge of this law; none if the cell is elastic."""
