@@ -126,7 +126,11 @@ def rewrite(app, docname, source):
         text += gallery()
     if (below := {"gallery": "demos/demo_*", "reference": "api/*"}.get(docname)) is not None:
         text += "\n".join(["", "```{toctree}", ":hidden:", ":glob:", "", below, "```", ""])
-    text = text.replace("](../demos/", "](demos/").replace("](demos/README.md)", "](gallery.md)")
+    text = (
+        text.replace("](../demos)", "](gallery.md)")
+        .replace("](../demos/", "](demos/")
+        .replace("](demos/README.md)", "](gallery.md)")
+    )
     text = re.sub(r"\[(\w+\.md)\]\(\1\)", r"[](\1)", text)  # the title in the place of the file
     source[0] = OUTSIDE.sub(r"] (`\1`)", text)
 
