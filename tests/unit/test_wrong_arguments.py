@@ -359,7 +359,8 @@ TABLE = {
     "follow": call(
         ub.follow,
         scene=V(SCENE, OBJECT), control=V(ub.LoadControl(1.0), [*OBJECT, ub.LoadControl]),
-        until=V(None, optional(FUNCTION)), steps=V(1, COUNT), **ALONG,
+        until=V(None, optional(FUNCTION)), steps=V(1, COUNT), progress=V(False, SWITCH),
+        **ALONG,
     ),
     "ArcLength": call(ub.ArcLength, step=V(1.0, [*NUMBER, 0.0]), factor=V(1.0, POSITIVE)),
     "LoadControl": call(ub.LoadControl, step=V(1.0, [*NUMBER, 0.0])),
@@ -394,7 +395,8 @@ TABLE = {
         scheme=V(ub.Midpoint(), [*OBJECT, ub.Midpoint]), t=V((0, 1), [*VECTOR, (1, 0)]),
         dt=V(0.5, [*(v for v in POSITIVE if not isinstance(v, list)), []]),
         tolerance=V(1e-3, optional(POSITIVE)),
-        budget=V(None, optional(POSITIVE)), most=V(1.0, POSITIVE), **RUN,
+        budget=V(None, optional(POSITIVE)), most=V(1.0, POSITIVE), progress=V(False, SWITCH),
+        **RUN,
     ),
     # files
     "XDMF": call(ub.XDMF, path=V("run.xdmf", [*PATH, "run.h5"]), every=V(1, COUNT)),
