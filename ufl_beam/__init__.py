@@ -104,6 +104,7 @@ from ufl_beam.output.rainflow import Cycles, Gerber, Goodman, SNCurve, rainflow
 from ufl_beam.output.recorders import Recorder
 from ufl_beam.output.time_series import VTKHDF, XDMF
 from ufl_beam.parallel import say
+from ufl_beam.plotting import notebook  # noqa: F401 - says how notebooks show models and results
 from ufl_beam.plotting.analyses import plot_cycles, plot_extremes, plot_modes, plot_tradeoff
 from ufl_beam.plotting.inelastic import (
     plot_damage,

@@ -37,6 +37,8 @@ from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers.newton_options import Newton
 
+MOST_POINTS = 5  # critical points that the text of a path names
+
 ADVICE = (
     "Try a shorter step or another control: ArcLength goes through limit points of loads and of "
     "displacements, DissipationControl through softening that snaps back"
@@ -62,6 +64,13 @@ class Path(Solution):
     def factor(self) -> Array:
         """Load factors, the time of the time functions; (n+1,)."""
         return self.times
+
+    def summary(self) -> list[str]:
+        """Return lines on the model, the path, embedded hinges, and the first critical points."""
+        first = ", ".join(map(str, self.critical[:MOST_POINTS]))
+        rest = len(self.critical) - MOST_POINTS
+        points = f"{first} and {rest} more" if rest > 0 else first
+        return [*super().summary(), *filter(None, [points])]
 
     def _content(self) -> tuple[dict[str, Any], State]:
         text, arrays = super()._content()

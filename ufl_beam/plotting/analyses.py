@@ -18,6 +18,7 @@ from ufl_beam.output.fatigue import Fatigue, HotSpot
 from ufl_beam.plotting import drawing, style
 from ufl_beam.plotting.diagrams import draw_frame
 from ufl_beam.plotting.style import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY, picture
+from ufl_beam.rich_display import picture_of
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LEAST_ERROR = 1e-12  # errors below are drawn there, in the unit of the quantity
+MODES = 6  # modes in a notebook
 CLASSES = 40  # classes of ranges and of means of cycles in pictures
 
 
@@ -69,6 +71,13 @@ def plot_modes(shapes: Shapes, which: Sequence[int] = (), *, amplitude: float = 
     return figure
 
 
+@picture_of.register(Shapes)
+def picture_of_shapes(shapes: Shapes) -> Figure:
+    """Draw the first modes in a notebook."""
+    return plot_modes(shapes, range(min(MODES, len(shapes))))
+
+
+@picture_of.register(Tradeoff)
 def plot_tradeoff(tradeoff: Tradeoff) -> Figure:
     """Draw errors over wall times of all runs, and the recommended run in a ring.
 

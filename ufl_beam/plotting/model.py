@@ -23,6 +23,7 @@ from ufl_beam.plotting.load_symbols import badge
 from ufl_beam.plotting.model_sheet import CAPTIONS, MOST_LABELS, NAMES, Sheet, Subject
 from ufl_beam.plotting.model_symbols import TEXT, draw
 from ufl_beam.plotting.style import INK, POINTS, RED, half_size, picture, with_unit
+from ufl_beam.rich_display import picture_of
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
@@ -83,6 +84,12 @@ def plot(
         )
     require_independent(shown)
     return plot_model(shown)
+
+
+@picture_of.register(Scene)
+def picture_of_scene(scene: Scene) -> Figure:
+    """Draw a scene in a notebook, see :func:`plot`."""
+    return plot(scene)
 
 
 def plot_model(scene: Scene) -> Figure:

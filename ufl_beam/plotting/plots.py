@@ -12,6 +12,7 @@ import numpy as np
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.model.bodies import Anchor
 from ufl_beam.plotting import drawing, style, symbols
+from ufl_beam.rich_display import picture_of
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
@@ -22,6 +23,10 @@ COMPONENTS = {
     "du/dt": ("velocity", "m/s"), "dv/dt": ("velocity", "m/s"),
     "dpsi/dt": ("angular velocity", "rad/s"),
 }  # fmt: skip
+
+SHAPES = 5  # shapes of a solution in a notebook
+VISIBLE = 0.1  # displacements, as a part of the size of the scene, up to which it magnifies them
+FACTORS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)  # larger ones would show round-off
 
 
 def plot_shapes(
@@ -65,6 +70,15 @@ def plot_shapes(
         drawing.draw_fixings(axes, poses[-1])
         style.draw_bar(figure, axes, of_time, solution.parameter.name)
     return figure
+
+
+@picture_of.register(Solution)
+def picture_of_solution(solution: Solution) -> Figure:
+    """Draw shapes on the way in a notebook; displacements that can hardly be seen are magnified."""
+    moved = solution.q[:, solution.grid.dofs[:, :2]]
+    part = float(np.abs(moved).max(initial=0.0)) / solution.scene.size
+    magnify = max(factor for factor in FACTORS if factor == 1 or factor * part <= VISIBLE)
+    return plot_shapes(solution, count=SHAPES, magnify=magnify if part > 0 else 1)
 
 
 def plot_history(

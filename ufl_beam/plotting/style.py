@@ -15,7 +15,6 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError
-from ufl_beam.parallel import active_comm
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -80,7 +79,8 @@ def require_choice(choice: str, choices: Iterable[str], what: str) -> None:
 def picture(size: tuple[float, float]) -> Iterator[Figure]:
     """Open a new figure in the style of this module, for pictures of your own.
 
-    Only the first process saves it, as all of them run the same script.
+    Only the first process saves it, as all of them run the same script.  A cell of a notebook that
+    ends with the figure shows it.
 
     Args:
         size: Width and height; inch.
@@ -91,13 +91,11 @@ def picture(size: tuple[float, float]) -> Iterator[Figure]:
         >>> figure.savefig("drop.png")
     """
     import matplotlib as mpl
-    from matplotlib.figure import Figure
+
+    from ufl_beam.plotting.figures import Picture
 
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=size, dpi=150, layout="constrained")
-        if active_comm().rank > 0:
-            figure.savefig = lambda *args, **options: None  # type: ignore[method-assign]
-        yield figure
+        yield Picture(figsize=size, dpi=150, layout="constrained")
 
 
 def plane_axes(figure: Figure, title: str) -> Axes:

@@ -25,6 +25,7 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import Place
+from ufl_beam.one_line import one_line
 from ufl_beam.output.archive import above, below
 
 LEDGER = ("state", "supplied", "lost")
@@ -45,6 +46,9 @@ class Material(NamedTuple):
     jump: Array
     plastic: Array
     hinge: Array
+
+    def __repr__(self) -> str:
+        return one_line(self)
 
 
 class KeptStates(list[Snapshot]):

@@ -32,13 +32,14 @@ from ufl_beam.output.joint_histories import (
 from ufl_beam.output.output_files import require_path
 from ufl_beam.parallel import active_comm
 from ufl_beam.parameter import TIME
+from ufl_beam.rich_display import Rich
 from ufl_beam.simulation.kept_states import KeptStates, Material
 from ufl_beam.simulation.opened_hinges import Opened
 from ufl_beam.simulation.solution_files import FORMAT, NAMED, grid_of, made_of_file, text_of
 from ufl_beam.terms.energy_ledger import Energy
 
 
-class Solution:
+class Solution(Rich):
     """Results of a run: motions and forces at the kept times; the same on every process.
 
     It can be saved, see :meth:`save`, and pickled, with what a file has.
@@ -303,21 +304,22 @@ class Solution:
         """
         return self._kept.momentum()
 
-    def __str__(self) -> str:
-        scene = self.scene
-        counts = (
-            (len(scene.beams), "beam", "beams"), (len(self.grid.cells), "cell", "cells"),
-            (len(scene.bodies), "body", "bodies"), (len(scene.links), "link", "links"),
-        )  # fmt: skip
-        span = f"{self._kept[0].t:g} to {self._kept[-1].t:g}"
-        parts = [f"{n} {one if n == 1 else many}" for n, one, many in counts if n]
-        return (
-            f"{', '.join(parts)}, {self.grid.size} degrees of freedom\n"
-            f"{self.parameter.value.format(span)} in {self.parts} steps, "
+    def summary(self) -> list[str]:
+        """Return lines on the model, the run, and embedded hinges that opened."""
+        ends = " to ".join(f"{state.t:g}" for state in self._kept[:1] + self._kept[-1:])
+        return [
+            str(self.grid),
+            f"{self.parameter.value.format(ends)} in {self.parts} steps, "
             f"{self.iterations / max(self.parts, 1):.2f} Newton iterations each, "
-            f"{self.seconds:.2f} s of wall time\n{self.opened.summary()}{self.energy}"
-            + (f"\n{self.open_ledger}" if self.open_ledger else "")
-        )
+            f"{self.seconds:.2f} s of wall time",
+            *self.opened.summary(),
+        ]
+
+    def __str__(self) -> str:
+        return "\n".join([*self.summary(), str(self.energy), self.open_ledger]).rstrip()
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {'; '.join(self.summary()[:2])}>"
 
 
 def load(path: str | Path) -> Solution:
