@@ -22,7 +22,8 @@ def progress_bar(shown: bool, comm: MPI.Intracomm, **options: Any) -> Any:
     """Make a bar of tqdm, which the first process shows if someone can see it.
 
     Nothing is printed by members of a study, nor if the output is neither a terminal nor a
-    notebook, nor by what takes less than half a second.
+    notebook, nor by what takes less than half a second.  A notebook whose kernel has TQDM_DISABLE=1
+    in its environment shows none, as in a documentation.
 
     Args:
         shown: Whether the user wants it.
@@ -30,10 +31,10 @@ def progress_bar(shown: bool, comm: MPI.Intracomm, **options: Any) -> Any:
         options: Arguments of tqdm.
     """
     if not shown or comm.rank > 0 or in_study():
-        disable: bool | None = True
-    else:
-        disable = False if in_notebook() else None  # None: if the output is a terminal
-    return tqdm(disable=disable, delay=DELAY, mininterval=DELAY, **options)
+        options["disable"] = True
+    elif not in_notebook():
+        options["disable"] = None  # unless the output is a terminal
+    return tqdm(delay=DELAY, mininterval=DELAY, **options)
 
 
 def in_notebook() -> bool:
