@@ -40,13 +40,13 @@ _SHORT = _Short().repr
 
 
 def one_line(record: Any) -> str:
-    """Write a record with the fields that are not as by default: ``Section(EA=4.2e+09, ...)``."""
-    given = (
-        (name, _SHORT(getattr(record, name)), _SHORT(parameter.default))
-        for name, parameter in signature(type(record)).parameters.items()
-    )
-    fields = ", ".join(f"{name}={value}" for name, value, default in given if value != default)
-    return f"{type(record).__name__}({fields})"
+    """Write a record: ``Mesh(refine=2)``; fields as by default and empty ones are left out."""
+    fields = []
+    for name, parameter in signature(type(record)).parameters.items():
+        value = _SHORT(getattr(record, name))
+        if value not in (_SHORT(parameter.default), "{}"):
+            fields.append(f"{name}={value}")
+    return f"{type(record).__name__}({', '.join(fields)})"
 
 
 def bracketed(named: Any) -> str:

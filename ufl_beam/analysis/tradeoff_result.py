@@ -15,7 +15,7 @@ from ufl_beam.analysis.targets import Target
 from ufl_beam.arrays import Array
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.mesh_options import Mesh
-from ufl_beam.one_line import one_line
+from ufl_beam.one_line import bracketed, one_line
 from ufl_beam.rich_display import Rich
 from ufl_beam.solvers.newton_options import Newton
 
@@ -49,20 +49,10 @@ class Dials:
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
     def __str__(self) -> str:
-        return ", ".join(map(_in_words, self.arguments.values()))
+        step = f"dt={self.dt:.4g}" if isinstance(self.dt, float | int) else one_line(self.dt)
+        return ", ".join([one_line(self.scheme), step, one_line(self.mesh), one_line(self.newton)])
 
-
-def _in_words(value: Any) -> str:
-    """A number, or the fields of a record that are not as by default."""
-    if isinstance(value, float | int):
-        return f"dt={value:.4g}"
-    given = {field.name: (getattr(value, field.name), field.default) for field in fields(value)}
-    shown = (
-        f"{name}={one:.4g}" if isinstance(one, float) else f"{name}={one}"
-        for name, (one, default) in given.items()
-        if one and one != default
-    )  # fmt: skip
-    return f"{type(value).__name__}({', '.join(shown)})"
+    __repr__ = bracketed
 
 
 class Refinement(NamedTuple):
@@ -87,7 +77,8 @@ class Run:
     iterations: float  # newton iterations per step
     spent: float  # wall time of all repetitions; s
 
-    __repr__ = one_line
+    def __repr__(self) -> str:
+        return f"<Run: {self.dials}: {self.seconds:.3g} s>"
 
 
 @dataclass(frozen=True, eq=False)

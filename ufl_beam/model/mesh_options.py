@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from ufl_beam.errors import SceneError, require_kind, require_memory, require_number, shorten
 from ufl_beam.model.bodies import Member
+from ufl_beam.one_line import one_line
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,8 @@ class Mesh:
     refine: int | Fraction = 1
     degree: int = 1
     lumped: bool = False
+
+    __repr__ = one_line
 
     def __post_init__(self) -> None:
         require_kind(self.lumped, bool, "Mesh: lumped")

@@ -81,7 +81,8 @@ class Opened:
         return found
 
     def __repr__(self) -> str:
-        return f"<Opened: {np.count_nonzero(self.first >= 0)} of {len(self.first)} cells>"
+        number = np.count_nonzero(self.first >= 0)
+        return f"<Opened: hinges or cracks in {number} of {len(self.first)} cells>"
 
     def summary(self) -> list[str]:
         """A line about embedded hinges that opened, if there are any."""
