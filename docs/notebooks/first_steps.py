@@ -50,7 +50,7 @@ scene
 # should be.
 
 # %%
-modes = ub.modes(scene, 4)
+modes = ub.modes(scene, 3)
 modes
 
 # %% [markdown]
@@ -93,8 +93,8 @@ ub.animate(solution, "first_steps.gif", fps=10, seconds=3, size=(640, 360), magn
 # ## Feet that soften
 #
 # A plastic hinge of zero length is rigid until its moment reaches the limit. Then it softens and
-# dissipates its fracture energy. The ledger has an entry for it, and the frame keeps a permanent
-# drift.
+# dissipates its fracture energy, an entry of the ledger. Both hinges spend it here: the feet end as
+# joints, and the frame swings more slowly.
 
 # %%
 softening = ub.Softening(limit=150e3, energy=5e3)  # N m, J
