@@ -105,6 +105,8 @@ from ufl_beam.output.recorders import Recorder
 from ufl_beam.output.time_series import VTKHDF, XDMF
 from ufl_beam.parallel import say
 from ufl_beam.plotting.analyses import plot_cycles, plot_extremes, plot_modes, plot_tradeoff
+from ufl_beam.plotting.camera import Camera
+from ufl_beam.plotting.films import Film
 from ufl_beam.plotting.inelastic import (
     plot_damage,
     plot_dissipation,
@@ -128,11 +130,11 @@ __version__ = version()
 
 __all__ = [
     "VTKHDF", "XDMF", "Actuator", "Adaptive", "ArcLength", "ArmstrongFrederick", "AxialBending",
-    "Beam", "Body", "BoucWen", "Branch", "Buckling", "Checkpoint", "Clamped", "Connector",
+    "Beam", "Body", "BoucWen", "Branch", "Buckling", "Camera", "Checkpoint", "Clamped", "Connector",
     "Controller", "ConvergenceError", "CopiesDiffer", "Coulomb", "CriticalPoint", "Cycles",
     "Damper", "Decay", "DecayingMidpoint", "DisplacementControl", "DissipationControl",
     "DolfinxView", "DuvautLions", "DynamicScheme", "Energy", "Envelope", "Event", "Events",
-    "ExactStatic", "ExactStep", "Extent", "Extremes", "Fatigue", "Fibres", "FollowerLoad",
+    "ExactStatic", "ExactStep", "Extent", "Extremes", "Fatigue", "Fibres", "Film", "FollowerLoad",
     "ForceLaw", "GeneralizedAlpha", "Gerber", "Goodman", "Gravity", "Guided", "Hardening",
     "History", "HotSpot", "Joint", "KelvinVoigt", "LineLoad", "LinearSoftening", "Link",
     "LoadControl", "Lognormal", "MaterialLaw", "Mesh", "Midpoint", "Midway", "ModelWarning",

@@ -13,7 +13,7 @@ import pytest
 import scenes
 
 import ufl_beam as ub
-from ufl_beam.plotting import symbols
+from ufl_beam.plotting import films, symbols
 from ufl_beam.plotting.connector_glyphs import AROUND, STRAIGHT
 from ufl_beam.plotting.diagrams import moments_at_ends
 from ufl_beam.plotting.scene_layout import Stage
@@ -638,6 +638,8 @@ def test_symbols_of_supports_stand_away_from_the_beam():
         (lambda s: ub.render(s, "a.png", n=7), "n = 7"),
         (lambda s: ub.render(s, "a.png", thickness=-1), "thickness = -1 must be positive"),
         (lambda s: ub.render(s, "a.png", size=(800, 0)), "size = 0 must be at least"),
+        (lambda s: ub.render(s, "a.png", camera="front"), "camera = 'front' is not a Camera"),
+        (lambda s: ub.animate(s, "a.gif", progress=2), "progress = 2 must be True or False"),
         (lambda s: ub.animate(s, "a.avi"), "must end in .gif or .mp4"),
         (lambda s: ub.animate(s, "a.gif", fps=0), "fps = 0 must be positive"),
         (lambda s: ub.animate(s, "a.gif", seconds=0), "seconds = 0 must be positive"),
@@ -677,14 +679,46 @@ def test_render(swing, tmp_path, color):
         assert np.count_nonzero(picture[30:160, :, :3].min(axis=-1) < 0.8) > 300
 
 
+def frames_of(film):
+    """Images of a GIF, (n, height, width, 3), and their durations in ms."""
+    from PIL import Image, ImageSequence
+
+    with Image.open(film) as gif:
+        shown = [
+            (np.asarray(f.convert("RGB")), f.info["duration"]) for f in ImageSequence.Iterator(gif)
+        ]
+    images, durations = zip(*shown, strict=True)
+    return np.array(images), list(durations)
+
+
+@pytest.mark.usefixtures("no_screen")
+def test_front_camera_follows_a_place(tmp_path):
+    bar = ub.Section(EA=1e4, GA=1e4, EI=10.0, rhoA=1.0, rhoI=1e-3)
+    beam = ub.Beam((0, 0), (1, 0), bar)
+    scene = ub.Scene(beams=[beam], initial=[ub.Velocity([beam], linear=(0.0, 3.0))])
+    flight = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.25)
+    camera = ub.Camera((0, 0, -1), follow=beam.at(0.5), width=2.0)
+    film = ub.animate(
+        flight, tmp_path / "flight.gif", fps=4, seconds=1, thickness=3, camera=camera,
+        size=(400, 200),
+    )  # fmt: skip
+    assert os.fspath(film) == str(tmp_path / "flight.gif")
+    if FIRST:
+        for frame in frames_of(film)[0]:
+            # The beam is half as wide as the picture, and in the middle of it.
+            dark = np.flatnonzero(frame[60:140].min(axis=(0, 2)) < 240)
+            np.testing.assert_allclose([dark[0], dark[-1]], [100, 300], atol=3)
+        assert film._repr_html_().startswith('<img alt="flight"')
+
+
 @pytest.mark.usefixtures("no_screen")
 def test_camera_sees_the_whole_motion_and_stands_still(swing, tmp_path):
-    imageio = pytest.importorskip("imageio.v3")
     path = tmp_path / "swing.gif"
     ub.animate(swing, path, fps=10, seconds=0.5, color="N", magnify=3, size=(240, 160))
     assert path.exists() == FIRST
     if FIRST:
-        frames = imageio.imread(path)
+        frames, durations = frames_of(path)
+        assert durations == [100] * 5
         assert frames.shape[:3] == (5, 160, 240)
         middle = frames[:, 25:130].astype(float).mean(axis=-1)
         assert np.abs(middle[-1] - middle[0]).max() > 50  # it moves
@@ -696,12 +730,11 @@ def test_camera_sees_the_whole_motion_and_stands_still(swing, tmp_path):
 
 @pytest.mark.usefixtures("no_screen")
 def test_film_without_beams(engine, tmp_path):
-    imageio = pytest.importorskip("imageio.v3")
     path = tmp_path / "engine.gif"
     ub.animate(engine, path, fps=10, seconds=0.4, size=(320, 160))
     assert path.exists() == FIRST
     if FIRST:
-        frames = imageio.imread(path).astype(float).mean(axis=-1)[:, 25:]
+        frames = frames_of(path)[0].astype(float).mean(axis=-1)[:, 25:]
         assert len(frames) == 4
         assert np.count_nonzero(frames[0] < 200) > 500  # bodies, and all that is on them
         assert np.count_nonzero(np.abs(frames[-1] - frames[0]) > 50) > 100  # they move
@@ -709,17 +742,59 @@ def test_film_without_beams(engine, tmp_path):
         assert edge.min() > 240  # and stay within the picture
 
 
+def images(count):
+    return iter(np.full((count, 15, 21, 3), 200, np.uint8))
+
+
+def test_mp4_by_ffmpeg(tmp_path):
+    try:
+        films.write_mp4(tmp_path / "a.mp4", images(3), fps=10)
+    except ImportError as error:
+        pytest.skip(str(error))
+    film = ub.Film(tmp_path / "a.mp4")
+    with open(film, "rb") as file:
+        assert file.read(12)[4:8] == b"ftyp"
+    assert '<video controls loop style="max-width: 100%" src="data:video/mp4;base64,AAAA' in (
+        film._repr_html_()
+    )
+
+
+def test_message_of_ffmpeg_is_passed_on(tmp_path, monkeypatch):
+    program = tmp_path / "ffmpeg"
+    program.write_text("#!/bin/sh\necho no such codec >&2\nexit 3\n")
+    program.chmod(0o755)
+    monkeypatch.setattr(films, "_ffmpeg", lambda: str(program))
+    with pytest.raises(RuntimeError, match="ffmpeg: no such codec"):
+        films.write_mp4(tmp_path / "a.mp4", images(2000), fps=10)
+
+
+def test_interrupted_film_leaves_no_file(tmp_path, monkeypatch):
+    program = tmp_path / "ffmpeg"
+    program.write_text('#!/bin/sh\nfor last; do :; done\ncat > "$last"\n')
+    program.chmod(0o755)
+    monkeypatch.setattr(films, "_ffmpeg", lambda: str(program))
+
+    def interrupted():
+        yield from images(3)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        films.write_mp4(tmp_path / "a.mp4", interrupted(), fps=10)
+    assert not (tmp_path / "a.mp4").exists()
+
+
 @pytest.mark.skipif(not FIRST, reason="only the first process makes pictures of bodies")
 @pytest.mark.parametrize(
     ("missing", "path", "message"),
     [
         ("pyvista", "a.gif", r"pip install ufl_beam\[view\]"),
-        ("imageio_ffmpeg", "a.mp4", "pip install imageio-ffmpeg"),
+        ("imageio_ffmpeg", "a.mp4", "pip install imageio-ffmpeg, or: apt-get install ffmpeg"),
     ],
 )
 @pytest.mark.usefixtures("no_screen")
 def test_missing_package_is_named(portal, tmp_path, monkeypatch, missing, path, message):
     monkeypatch.setitem(sys.modules, missing, None)
+    monkeypatch.setattr(shutil, "which", lambda name: None)
     with pytest.raises(ImportError, match=message):
         ub.animate(portal, tmp_path / path)
     assert not (tmp_path / path).exists()
