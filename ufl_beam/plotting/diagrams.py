@@ -30,7 +30,7 @@ AROUND, LEAST, MOST = (1.0, 1.2), (3.6, 2.6), (9.0, 6.8)
 """Room for words and numbers around the axes; least and largest size of a figure; inch."""
 
 
-Diagram = tuple[Member, Array]  # a beam, and the values at both ends of its cells, (num_cells, 2)
+Values = tuple[Member, Array]  # a beam, and the values in points of its cells, (num_cells, points)
 
 
 def plot_state(solution: Solution, what: str, *, n: int, magnify: float) -> Figure:
@@ -40,12 +40,15 @@ def plot_state(solution: Solution, what: str, *, n: int, magnify: float) -> Figu
     name = f"{RESULTANTS[what][0]} {what}" if what in RESULTANTS else "shape"
     title = f"{name} at {solution.parameter.at(solution.times[n])}{style.magnified(magnify)}"
     beams = solution.scene.beams if what in RESULTANTS else ()
-    diagrams = [(beam, _values(solution, beam, what, n)) for beam in beams]
+    found = [(beam, getattr(solution.diagram(beam, n), what)) for beam in beams]
+    diagrams = [
+        (beam, values.reshape(len(solution.grid.cells_of(beam)), -1)) for beam, values in found
+    ]
     return draw_frame(solution, pose, title, what, diagrams)
 
 
 def draw_frame(
-    solution: Solution, pose: Pose, title: str, what: str, diagrams: Sequence[Diagram]
+    solution: Solution, pose: Pose, title: str, what: str, diagrams: Sequence[Values]
 ) -> Figure:
     """Draw the frame in a pose, with diagrams of a section force and their extreme values."""
     with style.picture(drawing.plane_size(pose.stage.points())) as figure:
@@ -58,30 +61,6 @@ def draw_frame(
     return figure
 
 
-def moments_at_ends(solution: Solution, beam: Member, n: int = -1) -> Array:
-    """Compute the moments at both ends of each cell; (num_cells, 2); N m.
-
-    The moment of a cell is that in its middle.  From there it changes by ``N Γ - V (1 + Σ)`` over a
-    unit of length, which is what equilibrium of the cell asks for: moments at the ends of cells are
-    in equilibrium with loads, joints and supports at the nodes.  With ``Mesh(degree=1)`` loads on
-    beams act at the nodes, too.
-    """
-    N, V, M = solution.section_forces(beam, n).T
-    axial, shear, _ = solution.strains(beam, n).T
-    chain = solution.grid.points[solution.grid.vertices_of(beam)]
-    half = np.linalg.norm(np.diff(chain, axis=0), axis=1) / 2
-    change = half * (N * shear - V * (1.0 + axial))
-    return np.column_stack([M - change, M + change])
-
-
-def _values(solution: Solution, beam: Member, what: str, n: int) -> Array:
-    """Values of a section force at both ends of each cell; (num_cells, 2); N, N m."""
-    if what == "M":
-        return moments_at_ends(solution, beam, n)
-    values = solution.section_forces(beam, n)[:, list(RESULTANTS).index(what)]
-    return np.column_stack([values, values])
-
-
 class Extreme(NamedTuple):
     """Largest or least value of a diagram."""
 
@@ -92,7 +71,7 @@ class Extreme(NamedTuple):
 
 
 def _draw_diagrams(
-    axes: Axes, solution: Solution, nodes: Array, what: str, diagrams: Sequence[Diagram]
+    axes: Axes, solution: Solution, nodes: Array, what: str, diagrams: Sequence[Values]
 ) -> list[Extreme]:
     """Draw diagrams of a section force, all to one scale; return both extreme values."""
     index, side = list(RESULTANTS).index(what), -1.0 if what == "M" else 1.0
@@ -103,12 +82,10 @@ def _draw_diagrams(
         return []
     largest = max(sizes)
     scale = 0.13 * side * math.hypot(*np.ptp(nodes, axis=0)) / largest
-    rows = []  # value, point of the diagram, and vector away from the axis, at the ends of cells
+    rows = []  # value, point of the diagram, and vector away from the axis
     for beam, found in diagrams:
         values = np.where(np.abs(found) > DRAWN_AS_ZERO * largest, found, 0.0).ravel()
-        chain = nodes[solution.grid.vertices_of(beam)]
-        axis = np.repeat(chain, 2, axis=0)[1:-1]
-        left = np.repeat(left_of(unit_vectors(np.diff(chain, axis=0))), 2, axis=0)
+        axis, left = _along(solution, beam, nodes, found.shape[1])
         tips = axis + scale * values[:, None] * left
         _draw_areas(axes, axis, tips, values)
         rows.append(np.column_stack([values, tips, side * np.sign(values)[:, None] * left]))
@@ -120,19 +97,28 @@ def _draw_diagrams(
     ]
 
 
+def _along(solution: Solution, beam: Member, nodes: Array, points: int) -> tuple[Array, Array]:
+    """Points of the axis as drawn and unit vectors to its left; both (num_cells points, 2)."""
+    mesh, parts = solution.grid.mesh, np.linspace(0.0, 1.0, points)
+    start, end, *between = solution.grid.nodes_of_cells[solution.grid.cells_of(beam)].T
+    chains = nodes[np.column_stack([start, *between, end])]
+    left = left_of(unit_vectors(mesh.slopes(parts) @ chains))
+    return (mesh.weights(parts) @ chains).reshape(-1, 2), left.reshape(-1, 2)
+
+
 def _draw_areas(axes: Axes, axis: Array, tips: Array, values: Array) -> None:
-    """Draw an area for each part of a beam with values of one sign; two points for each cell."""
-    # A cell in which the sign changes becomes two.
-    first = 2 * np.flatnonzero(values[::2] * values[1::2] < 0.0)
+    """Draw an area for each part of a beam with values of one sign."""
+    # Where the sign changes, both areas end in a point of the axis.
+    first = np.flatnonzero(values[:-1] * values[1:] < 0.0)
     part = values[first] / (values[first] - values[first + 1])
-    zeros = np.repeat(axis[first] + part[:, None] * (axis[first + 1] - axis[first]), 2, axis=0)
-    at = np.repeat(first + 1, 2)
-    axis, tips = (np.insert(points, at, zeros, axis=0) for points in (axis, tips))
-    values = np.insert(values, at, 0.0)
-    signs = np.sign(values[::2] + values[1::2])
-    for run in np.split(np.arange(len(values)), 2 * np.flatnonzero(np.diff(signs)) + 2):
-        if (sign := signs[run[0] // 2]) != 0.0:
-            outline = np.concatenate([axis[run[:1]], tips[run], axis[run[:0:-1]]])
+    zeros = axis[first] + part[:, None] * (axis[first + 1] - axis[first])
+    axis, tips = (np.insert(points, first + 1, zeros, axis=0) for points in (axis, tips))
+    values = np.insert(values, first + 1, 0.0)
+    signs = np.sign(values[:-1] + values[1:])
+    for run in np.split(np.arange(len(signs)), np.flatnonzero(np.diff(signs)) + 1):
+        if (sign := signs[run[0]]) != 0.0:
+            chain = np.append(run, run[-1] + 1)
+            outline = np.concatenate([axis[run[:1]], tips[chain], axis[chain[:0:-1]]])
             color = RED if sign > 0 else BLUE
             axes.fill(*outline.T, facecolor=(color, 0.28), edgecolor=color, linewidth=1.0, zorder=2)
 

@@ -50,8 +50,8 @@ def plot(
 
     Of a :class:`Solution` it draws the frame at the n-th kept time, with the diagram of a section
     force if ``what`` names one: M on the side in tension, positive N and V to the left of the way
-    from start to end, positive values red, negative ones blue.  N and V are constant in each cell;
-    M is linear between the moments at its ends.
+    from start to end, positive values red, negative ones blue.  Between vertices they follow
+    equilibrium, see :meth:`Solution.diagram`.
 
     What is orange drives: filled if it gives the motion, hollow if it gives the force.
 
