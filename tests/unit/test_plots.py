@@ -11,12 +11,13 @@ from mpi4py import MPI
 import numpy as np
 import pytest
 import scenes
+from matplotlib.text import Text
 
 import ufl_beam as ub
 from ufl_beam.plotting import symbols
 from ufl_beam.plotting.connector_glyphs import AROUND, STRAIGHT
 from ufl_beam.plotting.scene_layout import Stage
-from ufl_beam.plotting.style import with_unit
+from ufl_beam.plotting.style import decimal_prefix, number, with_unit
 from ufl_beam.plotting.symbols import EDGE, FILLED, support_direction
 
 FIRST = MPI.COMM_WORLD.rank == 0
@@ -71,6 +72,11 @@ def pose(solution, n=-1, *, unit=0.05):
     return Stage(solution, 1.0, unit).pose(n)
 
 
+def boxes_of(figure):
+    """Boxes of the labels, without the lines that lead to them; pixels."""
+    return [Text.get_window_extent(text).frozen() for text in figure.axes[0].texts]
+
+
 def texts(figure):
     return {text.get_text() for text in figure.axes[0].texts}
 
@@ -95,11 +101,16 @@ def test_shape_draws_the_frame_where_it_is(swing):
 @pytest.mark.parametrize("what", ["N", "V", "M"])
 def test_extreme_values_are_those_of_the_solution(portal, what):
     values = np.concatenate(values_of(portal, what))
-    expected = {with_unit(values.max(), UNIT[what])} if values.max() > 0 else set()
-    expected |= {with_unit(values.min(), UNIT[what])} if values.min() < 0 else set()
+    factor, prefix = decimal_prefix(np.abs(values).max())
+    expected = {number(x / factor) for x in (values.max(), values.min())}
+    if what == "N":  # all beams are in compression
+        expected = {number(values.min() / factor)}
     figure = ub.plot(portal, what)
-    assert texts(figure) == expected
-    assert f" {what} at t = 1 s" in figure.axes[0].get_title(loc="left")
+    bold = {text.get_text() for text in figure.axes[0].texts if text.get_weight() == "bold"}
+    assert bold == expected
+    assert texts(figure) <= {number(x / factor) for x in values}
+    title = figure.axes[0].get_title(loc="left")
+    assert f" {what} ({prefix}{UNIT[what]}) at t = 1 s" in title
 
 
 @pytest.mark.parametrize("what", ["N", "V", "M"])
@@ -151,7 +162,7 @@ def test_moments_under_a_line_load(direction):
     """[closed] w l²/8 = 45 kN m, a parabola without steps; the deflection is 2e-5 of l."""
     solution = simple_beam(4, direction=direction)
     figure = ub.plot(solution, "M")
-    assert texts(figure) == {"45 kN m"}
+    assert texts(figure) == {"45"}
     (area,) = figure.axes[0].patches
     x = np.repeat(np.linspace(0.0, 6.0, 33), [1, *(1, 1, 1, 1, 1, 1, 1, 2) * 3, *[1] * 8])
     along = np.array([math.cos(direction), math.sin(direction)])
@@ -165,7 +176,7 @@ def test_moments_under_a_line_load(direction):
 @pytest.mark.parametrize("what", ["N", "V", "M"])
 @pytest.mark.parametrize("name", ["portal", "beam", "upright"])
 def test_extreme_values_cover_nothing(portal, name, what):
-    """Neither areas of the diagram, nor beams, nor each other; all of them are in the picture."""
+    """Neither areas of the diagram nor beams; labels do not overlap and are in the picture."""
     solution = {
         "portal": lambda: portal,
         "beam": lambda: simple_beam(8),
@@ -173,13 +184,14 @@ def test_extreme_values_cover_nothing(portal, name, what):
     }[name]()
     figure = ub.plot(solution, what)
     figure.draw_without_rendering()
-    axes = figure.axes[0]
-    boxes = [text.get_window_extent().frozen() for text in axes.texts]
+    axes, boxes = figure.axes[0], boxes_of(figure)
     whole = figure.bbox
-    for number, box in enumerate(boxes):
+    for k, box in enumerate(boxes):
         assert whole.x0 <= box.x0 and box.x1 <= whole.x1  # noqa: PT018
         assert whole.y0 <= box.y0 and box.y1 <= whole.y1  # noqa: PT018
-        assert not any(box.overlaps(other) for other in boxes[:number])
+        assert not any(box.overlaps(other) for other in boxes[:k])
+        if axes.texts[k].get_weight() != "bold":
+            continue
         inside = np.stack(
             np.meshgrid(np.linspace(box.x0, box.x1, 20), np.linspace(box.y0, box.y1, 10)), axis=-1
         ).reshape(-1, 2)
@@ -189,6 +201,62 @@ def test_extreme_values_cover_nothing(portal, name, what):
         for line in axes.lines[: 2 * len(solution.scene.beams)]:
             drawn = line.get_path().transformed(line.get_transform())
             assert not drawn.intersects_bbox(box, filled=False)
+
+
+def storeys(bays, floors):
+    """A frame of many members under line loads and wind."""
+    section = ub.Section.rectangle(b=0.3, h=0.3, E=30e9, nu=0.2, rho=2500.0)
+    posts = {
+        (i, k): ub.Beam((5 * i, 3 * k), (5 * i, 3 * k + 3), section, cells=2)
+        for i in range(bays + 1) for k in range(floors)
+    }  # fmt: skip
+    roofs = {
+        (i, k): ub.Beam((5 * i, 3 * k + 3), (5 * i + 5, 3 * k + 3), section, cells=2)
+        for i in range(bays) for k in range(floors)
+    }  # fmt: skip
+    corners = [
+        [
+            posts[i, k].end,
+            *([posts[i, k + 1].start] if k + 1 < floors else []),
+            *([roofs[i - 1, k].end] if i > 0 else []),
+            *([roofs[i, k].start] if i < bays else []),
+        ]
+        for i, k in posts
+    ]
+    loads = [ub.LineLoad(roof, force=(0, -25e3)) for roof in roofs.values()]
+    loads += [ub.PointLoad(posts[0, k].end, force=(40e3, 0)) for k in range(floors)]
+    return ub.Scene(
+        [*posts.values(), *roofs.values()],
+        joints=[ub.Rigid(*places) for places in corners],
+        supports=[ub.Clamped(posts[i, 0].start) for i in range(bays + 1)],
+        loads=loads,
+    )
+
+
+def test_forty_labels_do_not_overlap():
+    scene = storeys(3, 4)
+    figure = ub.plot(ub.simulate(scene, ub.Static(), t=(0, 1), dt=1, progress=False), "M")
+    figure.draw_without_rendering()
+    boxes = boxes_of(figure)
+    assert len(boxes) >= 40
+    for k, box in enumerate(boxes):
+        assert not any(box.overlaps(other) for other in boxes[:k])
+        assert figure.bbox.containsx(box.x0)
+        assert figure.bbox.containsx(box.x1)
+    # Lines that lead to labels cross no other label
+    for mark, own in zip(figure.axes[0].texts, boxes, strict=True):
+        if mark.arrow_patch is not None:
+            line = mark.arrow_patch.get_path().transformed(mark.arrow_patch.get_transform())
+            assert not any(line.intersects_bbox(box) for box in boxes if box is not own)
+
+
+def test_legend_names_the_signs_in_the_picture(portal):
+    """The roof of the portal is in compression, and so are its posts."""
+    (legend,) = ub.plot(portal, "N").legends
+    assert [text.get_text() for text in legend.get_texts()] == ["N < 0: compression"]
+    (legend,) = ub.plot(portal, "M").legends
+    assert [text.get_text()[:5] for text in legend.get_texts()] == ["M > 0", "M < 0"]
+    assert not ub.plot(portal).legends
 
 
 @pytest.mark.parametrize(("width", "height"), [(1.0, 1.0), (1.0, 3.0), (4.0, 1.0), (1.0, 1.6)])

@@ -20,7 +20,6 @@ from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 class OpenHinge(NamedTuple):
@@ -95,14 +94,6 @@ def draw_undeformed(axes: Axes, solution: Solution, stage: Stage) -> None:
     draw_axes(axes, solution, pose.nodes, color=GREY, linewidth=1.2, zorder=1)
     for stroke in (*symbols.bodies(pose), *symbols.rods(pose)):
         axes.plot(*stroke.points.T, color=GREY, linewidth=1.2, zorder=1)
-
-
-def make_room(figure: Figure, axes: Axes) -> None:
-    """Extend the limits such that texts stay off the edge."""
-    figure.draw_without_rendering()
-    for text in axes.texts:
-        axes.update_datalim(axes.transData.inverted().transform(text.get_window_extent()))
-    axes.autoscale_view()
 
 
 def draw_symbols(axes: Axes, pose: Pose) -> None:

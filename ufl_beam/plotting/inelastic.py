@@ -137,7 +137,7 @@ def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Fig
             title = "dissipated by plastic strains" + (" and cracks" if cracks else "")
             style.draw_bar(figure, axes, colors, f"{title} ({prefix}J/m)")
         _draw_hinges(figure, axes, solution, n, pose.nodes)
-        drawing.make_room(figure, axes)
+        style.make_room(figure, axes)
     return figure
 
 

@@ -49,9 +49,10 @@ def plot(
     Names and sizes for which there is no room are left out.
 
     Of a :class:`Solution` it draws the frame at the n-th kept time, with the diagram of a section
-    force if ``what`` names one: M on the side in tension, positive N and V to the left of the way
+    force if ``what`` names one: M on the side in tension, positive N and V to the left of the beam
     from start to end, positive values red, negative ones blue.  Between vertices they follow
-    equilibrium, see :meth:`Solution.diagram`.
+    equilibrium, see :meth:`Solution.diagram`.  Numbers are the peaks of areas, in the unit of the
+    title; the largest and the least value are bold.
 
     What is orange drives: filled if it gives the motion, hollow if it gives the force.
 
