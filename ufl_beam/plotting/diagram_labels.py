@@ -45,6 +45,7 @@ class Peak(NamedTuple):
 def finish(figure: Figure, axes: Axes, peaks: Sequence[Peak]) -> None:
     """Fit the figure to what is drawn, and write the peaks where they cover least."""
     axes.margins(MARGIN)
+    figure.set_size_inches(MOST)
     without_texts = axes.dataLim.frozen()
     written: list[Annotation] = []
     _fit(figure, axes)

@@ -13,6 +13,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.model.bodies import Member
 from ufl_beam.model.sections import Section
 from ufl_beam.plotting import drawing, style
+from ufl_beam.plotting.damage_marks import draw_damage
 from ufl_beam.plotting.diagram_labels import Peak, finish
 from ufl_beam.plotting.geometry import left_of, unit_vectors
 from ufl_beam.plotting.scene_layout import Pose
@@ -20,6 +21,7 @@ from ufl_beam.plotting.style import BLUE, INK, RED, RESULTANTS, number
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -46,22 +48,23 @@ def plot_state(solution: Solution, what: str, *, n: int, magnify: float) -> Figu
     pose = drawing.plane_stage(solution, [n], magnify).pose(n)
     when = f"at {solution.parameter.at(solution.times[n])}{style.magnified(magnify)}"
     if what == "shape":
-        return draw_frame(solution, pose, ("shape", when))
+        return draw_frame(solution, n, pose, ("shape", when))
     found = [(beam, getattr(solution.diagram(beam, n), what)) for beam in solution.scene.beams]
     diagrams = [(b, values.reshape(len(solution.grid.cells_of(b)), -1)) for b, values in found]
-    return draw_frame(solution, pose, (f"{RESULTANTS[what][0]} {what}", when), what, diagrams)
+    return draw_frame(solution, n, pose, (f"{RESULTANTS[what][0]} {what}", when), what, diagrams)
 
 
 def draw_frame(
     solution: Solution,
+    n: int,
     pose: Pose,
     title: tuple[str, str],
     what: str = "",
     diagrams: Sequence[Values] = (),
 ) -> Figure:
-    """Draw the frame in a pose, with diagrams of a section force and their peaks.
+    """Draw the frame in a pose, with diagrams of a section force, their peaks, and damage.
 
-    The two parts of the title stand before and after the unit.
+    The damage is that of the n-th kept time.  The unit stands between both parts of the title.
     """
     largest = max((float(np.abs(values).max()) for _, values in diagrams), default=0.0)
     factor, prefix = style.decimal_prefix(largest)
@@ -74,9 +77,13 @@ def draw_frame(
         if _is_loaded(what, diagrams):
             rows = _draw_diagrams(axes, solution, pose.nodes, what, diagrams)
             peaks = _peaks(rows, factor)
-            _draw_legend(figure, axes, what)
         drawing.draw_axes(axes, solution, pose.nodes, color=INK, linewidth=2.6, zorder=4)
         drawing.draw_symbols(axes, pose)
+        named = {**_signs(axes, what), **draw_damage(axes, solution, n, pose.nodes)}
+        if named:
+            columns = 1 + (len(named) > 2)
+            place: dict[str, Any] = {"loc": "outside lower left", "ncols": columns}
+            figure.legend(named.values(), named.keys(), fontsize=11, **place)
         finish(figure, axes, peaks)
     return figure
 
@@ -182,12 +189,8 @@ def _draw_direction(axes: Axes, axis: Array) -> None:
     axes.plot(*axis[middle], marker=(3, 0, angle - 90.0), ms=9.0, color=INK, mew=0.0, zorder=4.1)
 
 
-def _draw_legend(figure: Figure, axes: Axes, what: str) -> None:
-    """Say what the signs mean that are in the picture."""
-    meanings = dict(zip((RED, BLUE), SIGNS[what], strict=True))
+def _signs(axes: Axes, what: str) -> dict[str, Artist]:
+    """What the signs mean that are in the picture, with an area of each."""
+    meanings = dict(zip((RED, BLUE), SIGNS.get(what, ()), strict=False))
     areas = {area.get_gid(): area for area in axes.patches}
-    present = [color for color in meanings if color in areas]
-    figure.legend(
-        [areas[color] for color in present], [meanings[color] for color in present],
-        loc="outside lower left", fontsize=11,
-    )  # fmt: skip
+    return {meaning: areas[color] for color, meaning in meanings.items() if color in areas}

@@ -52,7 +52,8 @@ def plot(
     force if ``what`` names one: M on the side in tension, positive N and V to the left of the beam
     from start to end, positive values red, negative ones blue.  Between vertices they follow
     equilibrium, see :meth:`Solution.diagram`.  Numbers are the peaks of areas, in the unit of the
-    title; the largest and the least value are bold.
+    title; the largest and the least value are bold.  Yielded or cracked cells are orange, open
+    hinges circles as in :func:`plot_damage`.
 
     What is orange drives: filled if it gives the motion, hollow if it gives the force.
 
