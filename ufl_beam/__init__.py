@@ -118,9 +118,11 @@ from ufl_beam.plotting.plots import plot_energy, plot_history, plot_shapes
 from ufl_beam.plotting.render3d import animate, render
 from ufl_beam.plotting.style import picture
 from ufl_beam.simulation.checkpoint import Checkpoint
+from ufl_beam.simulation.force_diagrams import Diagram
+from ufl_beam.simulation.loading import load
 from ufl_beam.simulation.run import simulate
 from ufl_beam.simulation.simulation import Simulation
-from ufl_beam.simulation.solution import Solution, load
+from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_control import Adaptive
 from ufl_beam.solvers.newton_options import Newton
 from ufl_beam.terms.energy_ledger import Energy
@@ -132,7 +134,7 @@ __all__ = [
     "VTKHDF", "XDMF", "Actuator", "Adaptive", "ArcLength", "ArmstrongFrederick", "AxialBending",
     "Beam", "Body", "BoucWen", "Branch", "Buckling", "Camera", "Checkpoint", "Clamped", "Connector",
     "Controller", "ConvergenceError", "CopiesDiffer", "Coulomb", "CriticalPoint", "Cycles",
-    "Damper", "Decay", "DecayingMidpoint", "DisplacementControl", "DissipationControl",
+    "Damper", "Decay", "DecayingMidpoint", "Diagram", "DisplacementControl", "DissipationControl",
     "DolfinxView", "DuvautLions", "DynamicScheme", "Energy", "Envelope", "Event", "Events",
     "ExactStatic", "ExactStep", "Extent", "Extremes", "Fatigue", "Fibres", "Film", "FollowerLoad",
     "ForceLaw", "GeneralizedAlpha", "Gerber", "Goodman", "Gravity", "Guided", "Hardening",

@@ -15,7 +15,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import require_number
 from ufl_beam.model.bodies import Anchor, Member, Place
 from ufl_beam.plotting import style, symbols
-from ufl_beam.plotting.drawing import open_hinges
+from ufl_beam.plotting.damage_marks import open_hinges
 from ufl_beam.plotting.geometry import directions, left_of, unit_vectors
 from ufl_beam.plotting.scene_layout import Pose, Stage
 from ufl_beam.plotting.style import RESULTANTS
