@@ -329,6 +329,11 @@ TABLE = {
     "Newmark": call(ub.Newmark, gamma=V(0.5, [*NUMBER, 0.4]), beta=V(0.25, [*NUMBER, 0.1])),
     "GeneralizedAlpha": call(ub.GeneralizedAlpha, rho_inf=V(0.8, [*NUMBER, -0.1, 1.1])),
     "ExactStatic": call(ub.ExactStatic, theta=V(1.0, [*NUMBER, 0.4, 1.1])),
+    "Camera": call(
+        ub.Camera,
+        direction=V((0, 0, -1), [*OBJECT, (0, 1, 0), (0, 0, NAN), ("0", "0", "1")]),
+        follow=V(BEAM.end, ["x", 1.0, BEAM, ARRAY]), width=V(1.0, optional(POSITIVE)),
+    ),
     "Mesh": call(
         ub.Mesh,
         refine=V(1, [*POSITIVE, 1.5]), degree=V(1, [*COUNT, 4]), lumped=V(False, SWITCH),
@@ -461,7 +466,7 @@ TABLE |= {
 RECORDS_OF_RUNS = {
     "Branch", "Buckling", "Connector", "CriticalPoint", "Cycles", "Decay", "Energy", "Envelope",
     "Event", "Extent", "Joint", "Modes", "Path", "Solution", "Study", "Support", "Tradeoff",
-    "DolfinxView", "Step",
+    "DolfinxView", "Film", "Step",
 }  # fmt: skip
 """Made by runs and by functions of the package, not by users."""
 

@@ -149,10 +149,10 @@ def plot_extremes(solution: Solution, extremes: Extremes, what: str = "M") -> Fi
         for beam, found in reached
         for values in (found.high, found.low)
     ]
-    until = solution.parameter.at(solution.times[-1])
-    title = f"extremes of the {style.RESULTANTS[what][0]} {what} until {until}"
+    until = f"until {solution.parameter.at(solution.times[-1])}"
+    title = f"extremes of the {style.RESULTANTS[what][0]} {what}", until
     pose = drawing.plane_stage(solution, [], 1.0).undeformed
-    return draw_frame(solution, pose, title, what, diagrams)
+    return draw_frame(solution, -1, pose, title, what, diagrams)
 
 
 def plot_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:

@@ -14,6 +14,7 @@ from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.plastic_hinges import law_of
 from ufl_beam.plotting import drawing, style
+from ufl_beam.plotting.damage_marks import OpenHinge, circle, dissipated_per_length, open_hinges
 from ufl_beam.plotting.style import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY, with_unit
 from ufl_beam.simulation.solution import Solution
 
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
-
-FULLY_OPEN = 0.99  # part of the fracture energy from which on a hinge is drawn as a joint
 
 
 def plot_moment_curvature(solution: Solution, place: Place) -> Figure:
@@ -109,8 +108,10 @@ def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Fig
     from matplotlib.collections import LineCollection
 
     grid = solution.grid
+    for beam in solution.scene.beams[:1]:
+        solution.material(beam)  # or its error
     stage = drawing.plane_stage(solution, [n], magnify)
-    pose, density = stage.pose(n), _dissipated_per_length(solution, n)
+    pose, density = stage.pose(n), dissipated_per_length(solution, n)
     points = stage.points()
     (width, height), (length, rise) = drawing.plane_size(points), np.ptp(points, axis=0)
     # Upright frames need less; the bar and the legend have their own widths.
@@ -136,8 +137,9 @@ def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Fig
             cracks = any(p is not None and p.fibres.softening is not None for p in placed)
             title = "dissipated by plastic strains" + (" and cracks" if cracks else "")
             style.draw_bar(figure, axes, colors, f"{title} ({prefix}J/m)")
-        _draw_hinges(figure, axes, solution, n, pose.nodes)
-        drawing.make_room(figure, axes)
+        if hinges := open_hinges(solution, n, pose.nodes):
+            _draw_hinges(figure, axes, hinges)
+        style.make_room(figure, axes)
     return figure
 
 
@@ -178,18 +180,6 @@ def plot_dissipation(solution: Solution) -> Figure:
         axes.set_title(f"worst imbalance {worst} of {through} throughput", loc="left", color=INK)
         figure.legend(loc="outside upper left", ncols=3)
     return figure
-
-
-def _dissipated_per_length(solution: Solution, n: int) -> Array:
-    """Energy dissipated by plastic strains and cracks in all cells; (num_cells,); J/m."""
-    grid = solution.grid
-    ends = grid.points[grid.cells]
-    energy = np.zeros(len(grid.cells))
-    for beam in solution.scene.beams:
-        state = solution.material(beam, n)
-        cracks = state.hinge if beam.section.fibres is not None else 0.0
-        energy[grid.cells_of(beam)] = state.plastic + cracks
-    return np.asarray(energy / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
 
 
 def _monotone(x: Array) -> list[slice]:
@@ -233,19 +223,10 @@ def _draw_path(figure: Figure, axes: Axes, solution: Solution, x: Array, M: Arra
     figure.legend(loc="outside upper left", ncols=2)
 
 
-def _draw_hinges(figure: Figure, axes: Axes, solution: Solution, n: int, points: Array) -> None:
+def _draw_hinges(figure: Figure, axes: Axes, hinges: list[OpenHinge]) -> None:
     """Circles at the hinges that have opened, and what their sizes mean."""
-    hinges = drawing.open_hinges(solution, n, points)
-    if not hinges:
-        return
-
-    def circle(part: float) -> dict[str, Any]:
-        inside = "white" if part >= FULLY_OPEN else BLUE
-        size = 4.0 + 6.0 * math.sqrt(part)
-        return {"ms": size, "mfc": inside, "mec": "white" if inside == BLUE else BLUE, "ls": "none"}
-
     for hinge in hinges:
-        axes.plot(*hinge.at, "o", mew=1.8, zorder=6, **circle(hinge.part))
+        axes.plot(*hinge.at, **circle(hinge.part))
     for example, text in ((0.1, "hinge, 10 % broken"), (0.5, "50 %"), (1.0, "fully open")):
-        axes.plot([], [], "o", mew=1.8, label=text, **circle(example))
+        axes.plot([], [], **circle(example), label=text)
     figure.legend(loc="outside upper left", ncols=3)

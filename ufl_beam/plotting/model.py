@@ -50,9 +50,11 @@ def plot(
     Names and sizes for which there is no room are left out.
 
     Of a :class:`Solution` it draws the frame at the n-th kept time, with the diagram of a section
-    force if ``what`` names one: M on the side in tension, positive N and V to the left of the way
-    from start to end, positive values red, negative ones blue.  N and V are constant in each cell;
-    M is linear between the moments at its ends.
+    force if ``what`` names one: M on the side in tension, positive N and V to the left of the beam
+    from start to end, positive values red, negative ones blue.  Between vertices they follow
+    equilibrium, see :meth:`Solution.diagram`.  Numbers are the peaks of areas, in the unit of the
+    title; the largest and the least value are bold.  Yielded or cracked cells are orange, open
+    hinges circles as in :func:`plot_damage`.
 
     What is orange drives: filled if it gives the motion, hollow if it gives the force.
 

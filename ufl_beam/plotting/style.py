@@ -60,7 +60,12 @@ def decimal_prefix(value: float) -> tuple[float, str]:
 def with_unit(value: float, unit: str) -> str:
     """Write a value with three digits and a decimal prefix: "−12.3 kN m"."""
     factor, prefix = decimal_prefix(value)
-    return f"{value / factor:.3g} {prefix}{unit}".replace("-", "−")
+    return f"{number(value / factor)} {prefix}{unit}"
+
+
+def number(value: float) -> str:
+    """Write a number with three digits and a minus sign that is one: "−12.3"."""
+    return f"{value:.3g}".replace("-", "−")
 
 
 def magnified(factor: float, before: str = ", ") -> str:
@@ -103,7 +108,7 @@ def plane_axes(figure: Figure, title: str) -> Axes:
     axes = figure.add_subplot(aspect="equal")
     axes.margins(0.06, 0.10)
     axes.set(xlabel="x (m)", ylabel="y (m)")
-    axes.set_title(title, loc="left", color=INK)
+    axes.set_title(title, loc="left", color=INK, wrap=True)
     axes.tick_params(labelsize=12, color="#888888")
     return axes
 
@@ -132,6 +137,19 @@ def draw_bar(figure: Figure, axes: Axes, colors: Any, label: str) -> None:
     bar = figure.colorbar(colors, ax=axes, shrink=0.85, aspect=25, pad=0.02)
     bar.set_label(label)
     bar.ax.spines["outline"].set_visible(False)
+
+
+def make_room(figure: Figure, axes: Axes) -> None:
+    """Extend the limits such that texts and symbols stay off the edge."""
+    figure.draw_without_rendering()
+    boxes = [text.get_window_extent().get_points() for text in axes.texts]
+    for line in axes.lines:
+        if len(at := np.asarray(line.get_xydata())) == 1:
+            half = line.get_markersize() / 2 * figure.dpi / POINTS
+            boxes.append(axes.transData.transform(at) + np.array([[-half], [half]]))
+    for box in boxes:
+        axes.update_datalim(axes.transData.inverted().transform(box))
+    axes.autoscale_view()
 
 
 def half_size(figure: Figure, axes: Axes, text: str, size: float, **style: Any) -> Array:

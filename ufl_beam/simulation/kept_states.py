@@ -130,6 +130,16 @@ class KeptStates(list[Snapshot]):
         forces[cells] = rows[:, :3]
         return forces
 
+    def forces_in_points(self, state: Snapshot) -> Array:
+        """(N, V, M) in the Gauss points, as :meth:`forces`; (num_cells, degree, 3)."""
+        fields = self._fields
+        forces = np.empty((len(fields.order), self._grid.mesh.degree, 3))
+        C = fields.of_sections(fields.element.stiffness)
+        forces[fields.order] = self._strains(state.q).reshape(forces.shape) * C[:, None]
+        cells, rows = cells_of(state)
+        forces[cells] = rows[:, None, :3]
+        return forces
+
     def strains(self, n: int) -> Array:
         """(Σ, Γ, K); (num_cells, 3); 1, 1, 1/m."""
         strains = np.empty((len(self._grid.cells), 3))

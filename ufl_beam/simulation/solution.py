@@ -13,7 +13,7 @@ from ufl_beam.arrays import Array, Snapshot
 from ufl_beam.collective_errors import on_first
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.state_io import State
-from ufl_beam.errors import SceneError
+from ufl_beam.errors import SceneError, require_number
 from ufl_beam.model.bodies import Anchor, Member, Place
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
@@ -33,9 +33,10 @@ from ufl_beam.output.output_files import require_path
 from ufl_beam.parallel import active_comm
 from ufl_beam.parameter import TIME
 from ufl_beam.rich_display import Rich
+from ufl_beam.simulation.force_diagrams import Diagram, ForcesAlongCells
 from ufl_beam.simulation.kept_states import KeptStates, Material
 from ufl_beam.simulation.opened_hinges import Opened
-from ufl_beam.simulation.solution_files import FORMAT, NAMED, grid_of, made_of_file, text_of
+from ufl_beam.simulation.solution_files import FORMAT, NAMED, grid_of, text_of
 from ufl_beam.terms.energy_ledger import Energy
 
 
@@ -75,6 +76,7 @@ class Solution(Rich):
         self.every, self.open_ledger = 1, ""
         self.internal: State = {}
         self._kept = KeptStates(grid)
+        self._along = ForcesAlongCells(grid, self._kept.forces_in_points)
 
     def keep(self, state: Snapshot) -> None:
         """Append a state of a run."""
@@ -239,6 +241,22 @@ class Solution(Rich):
         """
         return self._kept.at(place, self._kept.forces)
 
+    def diagram(self, beam: Member, n: int = -1, *, points: int = 9) -> Diagram:
+        """Section forces along a beam, by equilibrium of its cells, at the n-th kept time.
+
+        Between the vertices V is linear and M parabolic under a uniform load in statics; in
+        dynamics loads and inertia act on the nodes.  ``points`` are those of each cell, equally
+        spaced, both ends included.
+
+        Raises:
+            SceneError: The beam is not in the scene, or ``points`` is less than 2.
+        """
+        require_number(points, "diagram: points", at_least=2)
+        s, cells = self.grid.parameters(beam), self.grid.cells_of(beam)
+        at = s[:-1, None] + np.linspace(0.0, 1.0, int(points)) * np.diff(s)[:, None]
+        forces = self._along(self._kept[n], int(points))[cells]
+        return Diagram(at.ravel(), *forces.reshape(-1, 3).T)
+
     def strains(self, beam: Member, n: int = -1) -> Array:
         """(Σ, Γ, K) in the cells of a beam at the n-th kept time; (num_cells, 3); 1, 1, 1/m.
 
@@ -320,24 +338,6 @@ class Solution(Rich):
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {'; '.join(self.summary()[:2])}>"
-
-
-def load(path: str | Path) -> Solution:
-    """Read a solution that :meth:`Solution.save` wrote.
-
-    Its places are those of its own scene: ``loaded.displacement(loaded.scene["left"].end)``.
-
-    Raises:
-        SceneError: There is no such file, or it holds no solution, or is damaged, or is of a
-            version that numbers degrees of freedom otherwise.
-
-    Example:
-        >>> solution.save("beam.h5")
-        >>> loaded = ub.load("beam.h5")
-        >>> bool((loaded.q == solution.q).all())
-        True
-    """
-    return made_of_file(require_path(path, "load"), restored)
 
 
 def restored(text: dict[str, Any], arrays: State) -> Solution:
