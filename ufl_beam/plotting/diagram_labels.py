@@ -16,7 +16,6 @@ from ufl_beam.plotting.style import POINTS, figure_of, font_size, half_size, mak
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from matplotlib.text import Annotation
 
 AROUND, LEAST, MOST = (1.0, 1.2), (3.6, 2.6), (9.0, 6.8)
@@ -36,26 +35,30 @@ class Peak(NamedTuple):
     extreme: bool  # largest or least of all
 
 
-def fit(axes: Axes, peaks: Sequence[Peak]) -> None:
-    """Fit the figure to what is drawn, and write the peaks where they cover least."""
-    figure = figure_of(axes)
+def arrange(axes: Axes, peaks: Sequence[Peak], fit: Callable[[Axes], None]) -> None:
+    """Fit limits, and perhaps the figure, to what is drawn; write peaks where they cover least."""
     axes.margins(MARGIN)
-    figure.set_size_inches(MOST)
     without_texts = axes.dataLim.frozen()
     written: list[Annotation] = []
-    _fit(figure, axes)
+    fit(axes)
     # Room for the texts changes the scale, and with it what is beside them.
     for _ in range(3):
         for text in written:
             text.remove()
-        written = write(axes, peaks)
+        written = _write(axes, peaks)
         axes.dataLim.set(without_texts)
         make_room(axes)
-        _fit(figure, axes)
+        fit(axes)
 
 
-def _fit(figure: Figure, axes: Axes) -> None:
+def keep_figure(axes: Axes) -> None:
+    """Fit the limits of axes in a figure of the user."""
+    axes.autoscale_view()
+
+
+def fit_figure(axes: Axes) -> None:
     """Make the figure as wide and high as what is drawn, at the largest scale that fits."""
+    figure = figure_of(axes)
     axes.autoscale_view()
     figure.draw_without_rendering()
     wide, high = 0.0, 0.0
@@ -69,7 +72,7 @@ def _fit(figure: Figure, axes: Axes) -> None:
     figure.set_size_inches(np.clip(inches + around, np.minimum(least, MOST), MOST))
 
 
-def write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
+def _write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
     """Write peaks beside areas and lines; those without room are left out but for extremes."""
     if not peaks:
         return []

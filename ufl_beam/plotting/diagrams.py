@@ -14,7 +14,7 @@ from ufl_beam.model.bodies import Member
 from ufl_beam.model.sections import Section
 from ufl_beam.plotting import drawing, style
 from ufl_beam.plotting.damage_marks import draw_damage
-from ufl_beam.plotting.diagram_labels import Peak, fit, write
+from ufl_beam.plotting.diagram_labels import MOST, Peak, arrange, fit_figure, keep_figure
 from ufl_beam.plotting.geometry import left_of, unit_vectors
 from ufl_beam.plotting.scene_layout import Pose
 from ufl_beam.plotting.style import BLUE, INK, RED, RESULTANTS, number, shade
@@ -72,7 +72,7 @@ def draw_frame(
     factor, prefix = style.decimal_prefix(largest)
     name, when = title
     unit = f"({prefix}{RESULTANTS[what][1]}) " if diagrams else ""
-    with style.panel(ax, drawing.plane_size(pose.stage.points())) as axes:
+    with style.panel(ax, MOST) as axes:
         style.plane_axes(axes, f"{name} {unit}{when}")
         drawing.draw_undeformed(axes, solution, pose.stage)
         peaks: list[Peak] = []
@@ -90,10 +90,7 @@ def draw_frame(
             style.draw_legend(
                 axes, ax, [*named.values()], loc="outside lower left", ncols=columns, fontsize=small
             )
-        if ax is None:
-            fit(axes, peaks)
-        else:
-            write(axes, peaks)
+        arrange(axes, peaks, fit_figure if ax is None else keep_figure)
     return style.figure_of(axes)
 
 

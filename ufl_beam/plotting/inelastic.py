@@ -56,8 +56,8 @@ def plot_moment_curvature(solution: Solution, place: Place, *, ax: Axes | None =
     """
     M, K = solution.material_at(place).forces[:, 2], solution.strains_at(place)[:, 2]
     with style.panel(ax, (8.0, 5.4)) as axes:
-        ends = _draw_path(axes, solution, K, M)
-        style.draw_legend(axes, ax, ends, loc="outside upper left", ncols=2)
+        _draw_path(axes, solution, K, M)
+        style.draw_legend(axes, ax, loc="outside upper left", ncols=2)
         axes.set_xlabel("curvature K (1/m)")
         axes.set_title(f"cell at {place}", loc="left")
     return style.figure_of(axes)
@@ -92,8 +92,8 @@ def plot_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> F
     with style.panel(ax, (8.0, 5.4)) as axes:
         for part in _monotone(jump):
             axes.fill_between(jump[part], M[part], facecolor=(ORANGE, 0.3), linewidth=0.0, zorder=2)
-        ends = _draw_path(axes, solution, jump, M)
-        style.draw_legend(axes, ax, ends, loc="outside upper left", ncols=2)
+        _draw_path(axes, solution, jump, M)
+        style.draw_legend(axes, ax, loc="outside upper left", ncols=2)
         _prefix(axes.xaxis, jump, "jump of rotation", "rad")
         spent = f"{with_unit(lost, 'J')} dissipated"
         if math.isfinite(law.energy):
@@ -222,8 +222,8 @@ def _prefix(axis: Axis, values: Array, quantity: str, unit: str) -> None:
     axis.set_label_text(f"{quantity} ({prefix}{unit})")
 
 
-def _draw_path(axes: Axes, solution: Solution, x: Array, M: Array) -> list[Line2D]:
-    """M against x, from light to dark in time; return ring and dot at its beginning and end."""
+def _draw_path(axes: Axes, solution: Solution, x: Array, M: Array) -> None:
+    """M against x, from light to dark in time; a ring at the beginning, a dot at the end."""
     from matplotlib.collections import LineCollection
 
     times, named = solution.progress, solution.parameter
@@ -238,14 +238,11 @@ def _draw_path(axes: Axes, solution: Solution, x: Array, M: Array) -> list[Line2
         at_zero(0.0, color=GREY, linewidth=1.0, zorder=1)
     axes.add_collection(pieces)
     ring: dict[str, Any] = {"ms": 8.0, "mec": shade(INK), "mew": 1.6, "zorder": 5, "ls": "none"}
-    ends = [
-        axes.plot(*path[i], "o", mfc=shade(inside), label=named.at(solution.times[i]), **ring)[0]
-        for i, inside in ((0, WHITE), (-1, INK))
-    ]
+    for i, inside in ((0, WHITE), (-1, INK)):
+        axes.plot(*path[i], "o", mfc=shade(inside), label=named.at(solution.times[i]), **ring)
     axes.autoscale_view()
     _prefix(axes.yaxis, M, "bending moment M", "N m")
     style.draw_bar(axes, colors, named.progress)
-    return ends
 
 
 def _draw_hinges(axes: Axes, hinges: list[OpenHinge]) -> list[Line2D]:

@@ -120,7 +120,7 @@ def plot_model(scene: Scene, ax: Axes | None = None) -> Figure:
         _set_limits(axes, sheet.scale, frame)
         if ax is None:
             _fit(axes, frame, len(notes))
-        axes.set_aspect("equal", adjustable="box" if ax is None else "datalim")
+        axes.set_aspect("equal")
         _paint(axes, sheet)
         _write(axes, placed, sheet.scale)
         _write_badges(axes, scene, measure, frame)

@@ -193,7 +193,7 @@ def draw_legend(
     if ax is None:
         figure_of(axes).legend(handles=handles, **outside)
     else:
-        axes.legend(handles=handles)
+        axes.legend(handles=handles, loc="best" if handles is None else "lower left")
 
 
 def scale(name: str, first: float, last: float, low: float, high: float) -> Any:
@@ -214,7 +214,7 @@ def draw_bar(axes: Axes, colors: Any, label: str) -> None:
 
 
 def make_room(axes: Axes) -> None:
-    """Extend the limits such that texts and symbols stay off the edge."""
+    """Extend the limits such that texts and symbols stay off the edge, and off a legend below."""
     figure = figure_of(axes)
     figure.draw_without_rendering()
     boxes = [text.get_window_extent().get_points() for text in axes.texts]
@@ -224,6 +224,10 @@ def make_room(axes: Axes) -> None:
             boxes.append(axes.transData.transform(at) + np.array([[-half], [half]]))
     for box in boxes:
         axes.update_datalim(axes.transData.inverted().transform(box))
+    if legend := axes.get_legend():
+        x, y = axes.transData.transform(axes.dataLim.min)
+        below = x, y - legend.get_window_extent().height
+        axes.update_datalim([axes.transData.inverted().transform(below)])
     axes.autoscale_view()
 
 
