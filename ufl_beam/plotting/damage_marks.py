@@ -12,7 +12,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.model.bodies import Member
 from ufl_beam.model.material_laws import HingeLaw
 from ufl_beam.model.plastic_hinges import law_of, place_of
-from ufl_beam.plotting.style import BLUE, ORANGE
+from ufl_beam.plotting.style import BLUE, ORANGE, WHITE, shade
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
@@ -71,7 +71,8 @@ def dissipated_per_length(solution: Solution, n: int) -> Array:
 
 def circle(part: float) -> dict[str, Any]:
     """Return the look of a hinge of which a part of the fracture energy is spent."""
-    inside, edge = ("white", BLUE) if part >= FULLY_OPEN else (BLUE, "white")
+    paper = shade(WHITE)
+    inside, edge = (paper, BLUE) if part >= FULLY_OPEN else (BLUE, paper)
     size = 4.0 + 6.0 * math.sqrt(part)
     look: dict[str, Any] = {"marker": "o", "ms": size, "mfc": inside, "mec": edge, "mew": 1.8}
     return {**look, "ls": "none", "zorder": 6}

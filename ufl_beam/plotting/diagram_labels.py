@@ -12,18 +12,11 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.plotting.geometry import directions, segments
 from ufl_beam.plotting.labels import Label, Spot, leader_of, place
-from ufl_beam.plotting.style import POINTS, half_size, make_room
+from ufl_beam.plotting.style import POINTS, figure_of, font_size, half_size, make_room
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from matplotlib.text import Annotation
-
-LOOKS: dict[bool, dict[str, Any]] = {
-    False: {"size": 10.0},
-    True: {"size": 13.0, "weight": "bold"},
-}
-"""Looks of labels; the second is that of extreme values."""
 
 AROUND, LEAST, MOST = (1.0, 1.2), (3.6, 2.6), (9.0, 6.8)
 """Room for words and numbers around the axes; least and largest size of a figure; inch."""
@@ -42,25 +35,30 @@ class Peak(NamedTuple):
     extreme: bool  # largest or least of all
 
 
-def finish(figure: Figure, axes: Axes, peaks: Sequence[Peak]) -> None:
-    """Fit the figure to what is drawn, and write the peaks where they cover least."""
+def arrange(axes: Axes, peaks: Sequence[Peak], fit: Callable[[Axes], None]) -> None:
+    """Fit limits, and perhaps the figure, to what is drawn; write peaks where they cover least."""
     axes.margins(MARGIN)
-    figure.set_size_inches(MOST)
     without_texts = axes.dataLim.frozen()
     written: list[Annotation] = []
-    _fit(figure, axes)
+    fit(axes)
     # Room for the texts changes the scale, and with it what is beside them.
     for _ in range(3):
         for text in written:
             text.remove()
-        written = _write(figure, axes, peaks)
+        written = _write(axes, peaks)
         axes.dataLim.set(without_texts)
-        make_room(figure, axes)
-        _fit(figure, axes)
+        make_room(axes)
+        fit(axes)
 
 
-def _fit(figure: Figure, axes: Axes) -> None:
+def keep_figure(axes: Axes) -> None:
+    """Fit the limits of axes in a figure of the user."""
+    axes.autoscale_view()
+
+
+def fit_figure(axes: Axes) -> None:
     """Make the figure as wide and high as what is drawn, at the largest scale that fits."""
+    figure = figure_of(axes)
     axes.autoscale_view()
     figure.draw_without_rendering()
     wide, high = 0.0, 0.0
@@ -74,10 +72,11 @@ def _fit(figure: Figure, axes: Axes) -> None:
     figure.set_size_inches(np.clip(inches + around, np.minimum(least, MOST), MOST))
 
 
-def _write(figure: Figure, axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
+def _write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
     """Write peaks beside areas and lines; those without room are left out but for extremes."""
     if not peaks:
         return []
+    figure = figure_of(axes)
     figure.draw_without_rendering()
 
     def in_points(xy: Any) -> Array:
@@ -91,11 +90,11 @@ def _write(figure: Figure, axes: Axes, peaks: Sequence[Peak]) -> list[Annotation
         ways = directions(math.atan2(outward[1], outward[0]) + turns)
         at = in_points(tip)
         labels.append(Label(text, color, number, tuple(Spot(at, way) for way in ways)))
-        halves.append(half_size(figure, axes, text, **LOOKS[extreme]))
+        halves.append(half_size(axes, text, **_look(extreme)))
     written = []
     for one in place(labels, halves, lines):
         text, color, number, _ = one.label
-        look, (x, y), away = LOOKS[peaks[number].extreme], peaks[number].tip, one.center - one.spot
+        look, (x, y), away = _look(peaks[number].extreme), peaks[number].tip, one.center - one.spot
         arrow = None
         if len(leader := leader_of(one)):
             end = (leader[1] - one.center + one.half) / (2 * one.half)
@@ -108,6 +107,12 @@ def _write(figure: Figure, axes: Axes, peaks: Sequence[Peak]) -> list[Annotation
             )  # fmt: skip
             written.append(mark)
     return written
+
+
+def _look(extreme: bool) -> dict[str, Any]:
+    """Font of a label; extreme values are bold."""
+    weight = "bold" if extreme else "normal"
+    return {"size": font_size(13.0 if extreme else 10.0), "weight": weight}
 
 
 def _lines(axes: Axes, in_points: Callable[[Any], Array]) -> Array:

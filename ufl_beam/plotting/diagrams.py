@@ -14,10 +14,10 @@ from ufl_beam.model.bodies import Member
 from ufl_beam.model.sections import Section
 from ufl_beam.plotting import drawing, style
 from ufl_beam.plotting.damage_marks import draw_damage
-from ufl_beam.plotting.diagram_labels import Peak, finish
+from ufl_beam.plotting.diagram_labels import MOST, Peak, arrange, fit_figure, keep_figure
 from ufl_beam.plotting.geometry import left_of, unit_vectors
 from ufl_beam.plotting.scene_layout import Pose
-from ufl_beam.plotting.style import BLUE, INK, RED, RESULTANTS, number
+from ufl_beam.plotting.style import BLUE, INK, RED, RESULTANTS, number, shade
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
@@ -42,19 +42,21 @@ SIGNS = {
 Values = tuple[Member, Array]  # a beam, and the values in points of its cells, (num_cells, points)
 
 
-def plot_state(solution: Solution, what: str, *, n: int, magnify: float) -> Figure:
+def plot_state(solution: Solution, what: str, *, n: int, magnify: float, ax: Axes | None) -> Figure:
     """Draw the frame at a time, with a diagram of a section force; see :func:`plot`."""
     style.require_choice(what, ("shape", *RESULTANTS), "plot: what")
     pose = drawing.plane_stage(solution, [n], magnify).pose(n)
     when = f"at {solution.parameter.at(solution.times[n])}{style.magnified(magnify)}"
     if what == "shape":
-        return draw_frame(solution, n, pose, ("shape", when))
+        return draw_frame(ax, solution, n, pose, ("shape", when))
     found = [(beam, getattr(solution.diagram(beam, n), what)) for beam in solution.scene.beams]
     diagrams = [(b, values.reshape(len(solution.grid.cells_of(b)), -1)) for b, values in found]
-    return draw_frame(solution, n, pose, (f"{RESULTANTS[what][0]} {what}", when), what, diagrams)
+    name = f"{RESULTANTS[what][0]} {what}"
+    return draw_frame(ax, solution, n, pose, (name, when), what, diagrams)
 
 
 def draw_frame(
+    ax: Axes | None,
     solution: Solution,
     n: int,
     pose: Pose,
@@ -70,22 +72,26 @@ def draw_frame(
     factor, prefix = style.decimal_prefix(largest)
     name, when = title
     unit = f"({prefix}{RESULTANTS[what][1]}) " if diagrams else ""
-    with style.picture(drawing.plane_size(pose.stage.points())) as figure:
-        axes = style.plane_axes(figure, f"{name} {unit}{when}")
+    with style.panel(ax, MOST) as axes:
+        style.plane_axes(axes, f"{name} {unit}{when}")
         drawing.draw_undeformed(axes, solution, pose.stage)
         peaks: list[Peak] = []
         if _is_loaded(what, diagrams):
             rows = _draw_diagrams(axes, solution, pose.nodes, what, diagrams)
             peaks = _peaks(rows, factor)
-        drawing.draw_axes(axes, solution, pose.nodes, color=INK, linewidth=2.6, zorder=4)
+        drawing.draw_axes(axes, solution, pose.nodes, color=shade(INK), linewidth=2.6, zorder=4)
         drawing.draw_symbols(axes, pose)
         named = {**_signs(axes, what), **draw_damage(axes, solution, n, pose.nodes)}
+        for meaning, artist in named.items():
+            artist.set_label(meaning)
         if named:
-            columns = 1 + (len(named) > 2)
-            place: dict[str, Any] = {"loc": "outside lower left", "ncols": columns}
-            figure.legend(named.values(), named.keys(), fontsize=11, **place)
-        finish(figure, axes, peaks)
-    return figure
+            columns = 1 if len(named) <= 2 else 2
+            small = style.font_size(11.0)
+            style.draw_legend(
+                axes, ax, [*named.values()], loc="outside lower left", ncols=columns, fontsize=small
+            )
+        arrange(axes, peaks, fit_figure if ax is None else keep_figure)
+    return style.figure_of(axes)
 
 
 def _is_loaded(what: str, diagrams: Sequence[Values]) -> bool:
@@ -186,7 +192,9 @@ def _draw_direction(axes: Axes, axis: Array) -> None:
     middle = len(axis) // 2
     x, y = axis[middle + 1] - axis[middle - 1]
     angle = math.degrees(math.atan2(y, x))
-    axes.plot(*axis[middle], marker=(3, 0, angle - 90.0), ms=9.0, color=INK, mew=0.0, zorder=4.1)
+    axes.plot(
+        *axis[middle], marker=(3, 0, angle - 90.0), ms=9.0, color=shade(INK), mew=0.0, zorder=4.1
+    )
 
 
 def _signs(axes: Axes, what: str) -> dict[str, Artist]:

@@ -11,7 +11,7 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.plotting import symbols
 from ufl_beam.plotting.scene_layout import Pose, Stage
-from ufl_beam.plotting.style import GREY, INK, Stroke
+from ufl_beam.plotting.style import GREY, INK, WHITE, Stroke, shade
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
@@ -64,20 +64,20 @@ def draw_symbols(axes: Axes, pose: Pose) -> None:
     draw_fixings(axes, pose)
     draw_strokes(axes, symbols.centres(pose))
     for pin in symbols.pins(pose):
-        marker, size, inside = ("o", 8.0, "white") if pin.turns else ("s", 6.0, INK)
-        axes.plot(*pin.at, marker, ms=size, mfc=inside, mec=INK, mew=1.6, zorder=5)
-    draw_masses(axes, pose, INK)
+        marker, size, inside = ("o", 8.0, WHITE) if pin.turns else ("s", 6.0, INK)
+        axes.plot(*pin.at, marker, ms=size, mfc=shade(inside), mec=shade(INK), mew=1.6, zorder=5)
+    draw_masses(axes, pose, shade(INK))
 
 
 def draw_strokes(axes: Axes, strokes: Iterable[Stroke], color: Any = None) -> None:
     """Draw lines and areas, in their own colours or all in one."""
     for points, own, weight, fill, layer in strokes:
         line: dict[str, Any] = {"linewidth": weight, "zorder": layer}
-        edge = own if color is None else color
+        edge = shade(own) if color is None else color
         if fill is None:
             axes.plot(*points.T, color=edge, solid_joinstyle="round", **line)
         else:
-            inside = fill if color is None else (color, 0.15)
+            inside = shade(fill) if color is None else (color, 0.15)
             axes.fill(*points.T, facecolor=inside, edgecolor=edge, joinstyle="round", **line)
 
 

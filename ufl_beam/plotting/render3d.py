@@ -10,16 +10,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tqdm.auto import tqdm
 
 from ufl_beam.errors import SceneError, require_kind, require_number, require_switch
-from ufl_beam.parallel import active_comm, in_study
+from ufl_beam.parallel import active_comm
 from ufl_beam.plotting.camera import Camera
 from ufl_beam.plotting.drawing import evenly
 from ufl_beam.plotting.films import WRITERS, Film
 from ufl_beam.plotting.screen import screen
 from ufl_beam.plotting.solids import QUANTITIES, Solids
 from ufl_beam.plotting.style import decimal_prefix, magnified
+from ufl_beam.progress_bar import progress_bar
 from ufl_beam.simulation.solution import Solution
 
 CAMERA = Camera()  # stands still and sees the whole motion
@@ -99,7 +99,7 @@ def animate(
         magnify: Factor on the displacements.
         camera: Where the camera looks, and the place that it follows.
         size: Width and height; pixels.
-        progress: Show a progress bar if the output is a terminal or a notebook.
+        progress: Show a progress bar in a terminal or notebook.
 
     Returns:
         The film: a path that a notebook plays.
@@ -122,9 +122,9 @@ def animate(
     shown = evenly(solution, max(1, round(fps * seconds)))
     camera.origin(solids.stage(shown).undeformed)
     if active_comm().rank == 0:
-        quiet = None if progress and not in_study() else True
         with closing(_film(solids, shown, camera)) as frames:
-            bar = tqdm(frames, total=len(shown), unit="frame", disable=quiet)
+            about = {"iterable": frames, "total": len(shown), "unit": "frame"}
+            bar = progress_bar(progress, active_comm(), **about)
             WRITERS[path.suffix.lower()](path, iter(bar), fps)
     return Film(path)
 
