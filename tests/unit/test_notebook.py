@@ -64,6 +64,11 @@ def test_figures_are_pictures(cells, plot):
     assert "text/html" not in data
 
 
+def test_the_film_plays(cells):
+    (source,) = (source for source in cells if source.startswith("ub.animate"))
+    assert "data:image/gif;base64," in shown(cells[source])["text/html"]
+
+
 def test_nothing_else_is_printed(cells):
     """No warnings; bars of progress, where they are text, go to the output of errors."""
     streams = [one for each in cells.values() for one in each if one.output_type == "stream"]

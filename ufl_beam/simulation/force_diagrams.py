@@ -13,6 +13,7 @@ from ufl_beam.arrays import Array, Complex, Snapshot
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.model.loads import Gravity, LineLoad, Load, RotatingFrame
 from ufl_beam.model.time_functions import value_at
+from ufl_beam.one_line import one_line
 
 GAUSS: Array = (1 + np.polynomial.legendre.leggauss(3)[0]) / 2
 WEIGHTS: Array = np.polynomial.legendre.leggauss(3)[1] / 2
@@ -38,6 +39,9 @@ class Diagram(NamedTuple):
     N: Array
     V: Array
     M: Array
+
+    def __repr__(self) -> str:
+        return one_line(self)
 
 
 class ForcesAlongCells:
