@@ -3,58 +3,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.model.bodies import Member
-from ufl_beam.model.material_laws import HingeLaw
-from ufl_beam.model.plastic_hinges import law_of, place_of
 from ufl_beam.plotting import symbols
 from ufl_beam.plotting.scene_layout import Pose, Stage
-from ufl_beam.plotting.style import GREY, INK, Stroke
+from ufl_beam.plotting.style import GREY, INK, WHITE, Stroke, shade
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-
-class OpenHinge(NamedTuple):
-    """Hinge that has opened."""
-
-    beam: Member
-    at: Array  # where it is now; (2,); m
-    part: float  # of its fracture energy, from 0 (closed) to 1 (a joint); 0 if it hardens
-
-
-def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
-    """Find hinges, in cells and of zero length, that are open; ``points`` are nodes as drawn."""
-    grid, found = solution.grid, []
-    for beam in solution.scene.beams:
-        laws = grid.hinges(beam)
-        if all(law is None or math.isinf(law.limit) for law in laws):
-            continue
-        state = solution.material(beam, n)
-        rows = zip(grid.cells_of(beam), laws, state.jump, state.hinge, strict=True)
-        for cell, law, jump, lost in rows:
-            if law is not None and (jump != 0.0 or lost > 0.0):
-                at = points[grid.cells[cell]].mean(axis=0)
-                found.append(OpenHinge(beam, at, _spent(law, lost)))
-    for hinge, vertex in zip(solution.scene.hinges, grid.vertices_at_hinges, strict=True):
-        kept = solution.connector(hinge)
-        if kept.motion[n] != 0.0 or kept.dissipated[n] > 0.0:
-            part = _spent(law_of(hinge), float(kept.dissipated[n]))
-            found.append(OpenHinge(place_of(hinge).beam, points[vertex], part))
-    return found
-
-
-def _spent(law: HingeLaw, dissipated: float) -> float:
-    """Part of the fracture energy that is spent; a hinge that never resisted is a joint."""
-    return min(dissipated / law.energy, 1.0) if law.limit > 0.0 else 1.0
 
 
 def evenly(solution: Solution, count: int) -> list[int]:
@@ -97,34 +58,26 @@ def draw_undeformed(axes: Axes, solution: Solution, stage: Stage) -> None:
         axes.plot(*stroke.points.T, color=GREY, linewidth=1.2, zorder=1)
 
 
-def make_room(figure: Figure, axes: Axes) -> None:
-    """Extend the limits such that texts stay off the edge."""
-    figure.draw_without_rendering()
-    for text in axes.texts:
-        axes.update_datalim(axes.transData.inverted().transform(text.get_window_extent()))
-    axes.autoscale_view()
-
-
 def draw_symbols(axes: Axes, pose: Pose) -> None:
     """Draw bodies, joints, connectors, supports and masses."""
     draw_strokes(axes, (*symbols.bodies(pose), *symbols.rods(pose)))
     draw_fixings(axes, pose)
     draw_strokes(axes, symbols.centres(pose))
     for pin in symbols.pins(pose):
-        marker, size, inside = ("o", 8.0, "white") if pin.turns else ("s", 6.0, INK)
-        axes.plot(*pin.at, marker, ms=size, mfc=inside, mec=INK, mew=1.6, zorder=5)
-    draw_masses(axes, pose, INK)
+        marker, size, inside = ("o", 8.0, WHITE) if pin.turns else ("s", 6.0, INK)
+        axes.plot(*pin.at, marker, ms=size, mfc=shade(inside), mec=shade(INK), mew=1.6, zorder=5)
+    draw_masses(axes, pose, shade(INK))
 
 
 def draw_strokes(axes: Axes, strokes: Iterable[Stroke], color: Any = None) -> None:
     """Draw lines and areas, in their own colours or all in one."""
     for points, own, weight, fill, layer in strokes:
         line: dict[str, Any] = {"linewidth": weight, "zorder": layer}
-        edge = own if color is None else color
+        edge = shade(own) if color is None else color
         if fill is None:
             axes.plot(*points.T, color=edge, solid_joinstyle="round", **line)
         else:
-            inside = fill if color is None else (color, 0.15)
+            inside = shade(fill) if color is None else (color, 0.15)
             axes.fill(*points.T, facecolor=inside, edgecolor=edge, joinstyle="round", **line)
 
 

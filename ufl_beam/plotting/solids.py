@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +15,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import require_number
 from ufl_beam.model.bodies import Anchor, Member, Place
 from ufl_beam.plotting import style, symbols
-from ufl_beam.plotting.drawing import open_hinges
+from ufl_beam.plotting.damage_marks import open_hinges
 from ufl_beam.plotting.geometry import directions, left_of, unit_vectors
 from ufl_beam.plotting.scene_layout import Pose, Stage
 from ufl_beam.plotting.style import RESULTANTS
@@ -69,9 +69,9 @@ class Solids:
         """Return the stage of bodies, joints, connectors and supports."""
         return Stage(self.solution, self.magnify, self.symbol, sorted(set(shown)))
 
-    def bounds(self, stage: Stage) -> Array:
-        """Compute lower and upper corner of the box around a stage; (2, 3); m."""
-        margin, xy = 2.2 * self.symbol, stage.points()
+    def bounds(self, points: Sequence[Array]) -> Array:
+        """Compute lower and upper corner of the box around points and symbols; (2, 3); m."""
+        margin, xy = 2.2 * self.symbol, np.concatenate(points)
         half = self._thickest(self.solution.scene.beams)[1] / 2
         low, high = xy.min(axis=0) - margin, xy.max(axis=0) + margin
         return np.array([[*low, -half], [*high, half]])

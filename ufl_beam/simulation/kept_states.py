@@ -25,6 +25,7 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import Place
+from ufl_beam.one_line import one_line
 from ufl_beam.output.archive import above, below
 
 LEDGER = ("state", "supplied", "lost")
@@ -45,6 +46,9 @@ class Material(NamedTuple):
     jump: Array
     plastic: Array
     hinge: Array
+
+    def __repr__(self) -> str:
+        return one_line(self)
 
 
 class KeptStates(list[Snapshot]):
@@ -124,6 +128,16 @@ class KeptStates(list[Snapshot]):
         self._section_forces.write(self[n].q, forces)
         cells, rows = cells_of(self[n])
         forces[cells] = rows[:, :3]
+        return forces
+
+    def forces_in_points(self, state: Snapshot) -> Array:
+        """(N, V, M) in the Gauss points, as :meth:`forces`; (num_cells, degree, 3)."""
+        fields = self._fields
+        forces = np.empty((len(fields.order), self._grid.mesh.degree, 3))
+        C = fields.of_sections(fields.element.stiffness)
+        forces[fields.order] = self._strains(state.q).reshape(forces.shape) * C[:, None]
+        cells, rows = cells_of(state)
+        forces[cells] = rows[:, None, :3]
         return forces
 
     def strains(self, n: int) -> Array:
