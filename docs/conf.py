@@ -21,6 +21,7 @@ import ufl_beam as ub
 
 DOCS = Path(__file__).parent
 sys.path.insert(0, str(DOCS))  # for "conf.read_demo"
+os.environ["TQDM_DISABLE"] = "1"  # progress bars would be text on pages
 
 project = "ufl_beam"
 author = "The ufl_beam developers"
