@@ -26,11 +26,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LEAST_STRAIN = 1e-10  # strain that rounding and the tolerance of iterations leave behind
-DRAWN_AS_ZERO = 1e-6  # part of the largest value below which a value is drawn as zero
+DRAWN_AS_ZERO = 1e-4  # part of the largest value below which a value is drawn as zero
 ALIKE = 0.999  # part of the peak of an area from which on values are as large
 LABELLED = 0.15  # part of the largest value from which on the peak of an area is labelled
-MOST_LABELS = 60  # number of peaks beyond which the extreme values alone are labelled
-MOST_ARROWS = 60  # number of beams beyond which their directions are not drawn
+MANY = 60  # beams beyond which both extreme values alone are labelled, and no directions drawn
 
 SIGNS = {
     "N": ("N > 0: tension", "N < 0: compression"),
@@ -78,7 +77,7 @@ def draw_frame(
         peaks: list[Peak] = []
         if _is_loaded(what, diagrams):
             rows = _draw_diagrams(axes, solution, pose.nodes, what, diagrams)
-            peaks = _peaks(rows, factor)
+            peaks = _peaks(rows, factor, LABELLED if len(diagrams) <= MANY else 1.0)
         drawing.draw_axes(axes, solution, pose.nodes, color=shade(INK), linewidth=2.6, zorder=4)
         drawing.draw_symbols(axes, pose)
         named = {**_signs(axes, what), **draw_damage(axes, solution, n, pose.nodes)}
@@ -125,21 +124,24 @@ def _draw_diagrams(
         up = scale * values[:, None] * left
         peaks, places = _draw_areas(axes, axis, axis + up, values)
         rows.append(np.column_stack([peaks, axis[places], up[places]]))
-        if what != "N" and len(diagrams) <= MOST_ARROWS:
+        if what != "N" and len(diagrams) <= MANY:
             _draw_direction(axes, axis)
     return np.concatenate(rows)
 
 
-def _peaks(rows: Array, unit: float) -> list[Peak]:
-    """Peaks to be labelled, both extreme values first; corners have one label for both beams."""
+def _peaks(rows: Array, unit: float, least: float) -> list[Peak]:
+    """Peaks to be labelled, both extreme values first; corners have one label for both beams.
+
+    Others have at least a part of the largest size, ``least``.
+    """
     values, axis, up = rows[:, 0], rows[:, 1:3], rows[:, 3:]
     ends = (1, int(values.argmax())), (-1, int(values.argmin()))
     extremes = [k for sign, k in ends if sign * values[k] > 0.0]
-    large = [k for k, size in enumerate(np.abs(values)) if size > LABELLED * np.abs(values).max()]
+    large = [k for k, size in enumerate(np.abs(values)) if size > least * np.abs(values).max()]
     numbers = [number(value / unit) for value in values]
     places = np.round(axis / (1e-3 * math.hypot(*np.ptp(axis, axis=0)) or 1.0))
     chosen: dict[tuple[object, ...], int] = {}
-    for k in [*extremes, *(large if len(large) <= MOST_LABELS else ())]:
+    for k in [*extremes, *large]:
         chosen.setdefault((numbers[k].lstrip("−"), *places[k]), k)
     return [
         Peak(
@@ -155,7 +157,13 @@ def _along(solution: Solution, beam: Member, nodes: Array, points: int) -> tuple
     mesh, parts = solution.grid.mesh, np.linspace(0.0, 1.0, points)
     start, end, *between = solution.grid.nodes_of_cells[solution.grid.cells_of(beam)].T
     chains = nodes[np.column_stack([start, *between, end])]
-    left = left_of(unit_vectors(mesh.slopes(parts) @ chains))
+    ahead = unit_vectors(mesh.slopes(parts) @ chains)
+    # Ordinates at corners between cells halve the angle, and lean towards it in the cells.
+    lean = np.zeros((len(chains), 2, 2))
+    lean[:-1, 1] = unit_vectors(ahead[:-1, -1] + ahead[1:, 0]) - ahead[:-1, -1]
+    lean[1:, 0] = unit_vectors(ahead[:-1, -1] + ahead[1:, 0]) - ahead[1:, 0]
+    ahead = ahead + np.column_stack([1.0 - parts, parts]) @ lean
+    left = left_of(unit_vectors(ahead))
     return (mesh.weights(parts) @ chains).reshape(-1, 2), left.reshape(-1, 2)
 
 
