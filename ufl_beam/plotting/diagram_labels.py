@@ -124,8 +124,9 @@ def _lines(axes: Axes, in_points: Callable[[Any], Array]) -> Array:
             half = line.get_markersize() / 2
             chain = chain + np.array([[-half, -half], [half, half], [-half, half], [half, -half]])
         found.append(segments(chain))
-    for patch in axes.patches:
-        outline = in_points(patch.get_path().vertices)
+    outlines = [patch.get_path().vertices for patch in axes.patches]
+    outlines += [path.vertices for areas in axes.collections for path in areas.get_paths()]
+    for outline in map(in_points, outlines):
         found.append(segments(outline))
         # Ordinates, from a point of the outline to the one across the axis
         for part in (0.0, 0.5):
