@@ -103,6 +103,35 @@ def test_continuous_in_a_rotating_frame(degree):
     close(N, 100.0 * 64.0 * (1.2**2 - (0.2 + s) ** 2) / 2, 1e-6)
 
 
+def test_curved_beam():
+    """[closed] A quarter of a ring, φ from its end: N = -P sin φ, V = P cos φ, size of M P r sin φ.
+
+    Chords of 1/16 of a right angle: N and V are exact to the square of their angle, 0.1²/8.
+    """
+    angle, radius, force = np.pi / 2, 2.0, 1e3
+    ring = ub.Beam.arc((0, 0), radius, (0.0, angle), STIFF, cells=16)
+    load = ub.PointLoad(ring.end, force=(0, -force))
+    scene = ub.Scene([ring], supports=[ub.Clamped(ring.start)], loads=[load])
+    s, N, V, M = static(scene).diagram(ring)
+    φ = angle * (1 - s)
+    close(N, -force * np.sin(φ), 1.3e-3)
+    close(V, force * np.cos(φ), 1.3e-3)
+    np.testing.assert_allclose(np.diff([N, V])[:, 8::9], 0.0, atol=1e-6 * force)
+    close(np.abs(M), force * radius * np.sin(φ), 2e-3)
+
+
+def test_corners_stay():
+    """An L of one beam: N and V change places at its corner."""
+    section = ub.Section(EA=1e10, GA=1e10, EI=1e9)
+    bent = ub.Beam.polyline([(0, 0), (0, 2), (2, 2)], section, cells=4)
+    load = ub.PointLoad(bent.end, force=(0, -1e3))
+    scene = ub.Scene([bent], supports=[ub.Clamped(bent.start)], loads=[load])
+    s, N, V, _ = static(scene).diagram(bent)
+    post = np.arange(len(s)) < 18
+    close(N, np.where(post, -1e3, 0.0), 1e-4)
+    close(V, np.where(post, 0.0, -1e3), 1e-4)
+
+
 def test_the_initial_state_bears_nothing():
     scene, beam = supported(4, lambda b: ub.LineLoad(b, force=(0, -10e3)))
     assert not np.any(static(scene).diagram(beam, 0)[1:])

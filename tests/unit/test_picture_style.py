@@ -52,6 +52,13 @@ def test_axes_of_the_user(bent, draw):
     np.testing.assert_array_equal(figure.get_size_inches(), (10, 4))
 
 
+def test_axes_of_a_part_of_a_figure(bent):
+    whole = Figure(figsize=(14, 5), layout="constrained")
+    axes = whole.subfigures(1, 2)[1].subplots()
+    assert ub.plot_damage(bent[0], ax=axes) is whole
+    whole.draw_without_rendering()
+
+
 @pytest.mark.parametrize("draw", ONE_PANEL.values(), ids=ONE_PANEL)
 def test_what_is_no_axes_is_refused(bent, draw):
     with pytest.raises(ub.SceneError, match=r"ax = .* must be axes of Matplotlib"):

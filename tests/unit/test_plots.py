@@ -11,6 +11,7 @@ from mpi4py import MPI
 import numpy as np
 import pytest
 import scenes
+from matplotlib.path import Path
 from matplotlib.text import Text
 
 import ufl_beam as ub
@@ -77,6 +78,12 @@ def boxes_of(figure):
     return [Text.get_window_extent(text).frozen() for text in figure.axes[0].texts]
 
 
+def areas_of(figure):
+    """Outlines of the areas of a diagram, each closed; m."""
+    areas = figure.axes[0].collections
+    return [path.vertices for one in areas for path in one.get_paths()]
+
+
 def texts(figure):
     return {text.get_text() for text in figure.axes[0].texts}
 
@@ -96,6 +103,7 @@ def test_shape_draws_the_frame_where_it_is(swing):
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("x (m)", "y (m)")
     assert axes.get_title(loc="left") == "shape at t = 0.1 s"
     assert not axes.patches
+    assert not axes.collections
 
 
 @pytest.mark.parametrize("what", ["N", "V", "M"])
@@ -116,7 +124,7 @@ def test_extreme_values_are_those_of_the_solution(portal, what):
 @pytest.mark.parametrize("what", ["N", "V", "M"])
 def test_an_area_for_each_run_of_one_sign(portal, what):
     runs = sum(1 + np.count_nonzero(np.diff(f > 0)) for f in values_of(portal, what))
-    assert len(ub.plot(portal, what).axes[0].patches) == runs
+    assert len(areas_of(ub.plot(portal, what))) == runs
 
 
 def test_ordinates_are_in_proportion_to_the_values(portal):
@@ -124,8 +132,8 @@ def test_ordinates_are_in_proportion_to_the_values(portal):
     # displacement at this load some millimetres: 1 % of the ordinates.
     roof = portal.scene.beams[1]
     s, values, *_ = portal.diagram(roof)
-    patches = ub.plot(portal, "N").axes[0].patches
-    (outline,) = [p.get_xy() for p in patches if np.ptp(p.get_xy()[:, 0]) > 5.5]
+    outlines = areas_of(ub.plot(portal, "N"))
+    (outline,) = [outline for outline in outlines if np.ptp(outline[:, 0]) > 5.5]
     tips, shape = outline[1 : 1 + len(values)], portal.shape(roof)
     heights = tips[:, 1] - np.interp(s, portal.grid.parameters(roof), shape[:, 1])
     np.testing.assert_allclose(heights / heights[0], values / values[0], rtol=0.01)
@@ -139,8 +147,8 @@ def test_moments_stand_on_the_side_in_tension():
         load = ub.PointLoad(right, force=(0, -force))
         scene = ub.Scene([beam], supports=[ub.Clamped(left)], loads=[load])
         solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1)
-        (area,) = ub.plot(solution, "M").axes[0].patches
-        assert area.get_xy()[:, 1].max() > 0.05  # the upper fibre of a cantilever pulled down
+        (area,) = areas_of(ub.plot(solution, "M"))
+        assert area[:, 1].max() > 0.05  # the upper fibre of a cantilever pulled down
 
 
 def simple_beam(cells, length=6.0, load=10e3, direction=0.0):
@@ -163,10 +171,10 @@ def test_moments_under_a_line_load(direction):
     solution = simple_beam(4, direction=direction)
     figure = ub.plot(solution, "M")
     assert texts(figure) == {"45"}
-    (area,) = figure.axes[0].patches
+    (area,) = areas_of(figure)
     x = np.repeat(np.linspace(0.0, 6.0, 33), [1, *(1, 1, 1, 1, 1, 1, 1, 2) * 3, *[1] * 8])
     along = np.array([math.cos(direction), math.sin(direction)])
-    tips = area.get_xy()[1 : 1 + len(x)]
+    tips = area[1 : 1 + len(x)]
     np.testing.assert_allclose(tips @ along, x, atol=1e-3)
     depth = tips @ (along[1], -along[0])
     parabola = 4 * (x / 6) * (1 - x / 6)
@@ -195,8 +203,8 @@ def test_extreme_values_cover_nothing(portal, name, what):
         inside = np.stack(
             np.meshgrid(np.linspace(box.x0, box.x1, 20), np.linspace(box.y0, box.y1, 10)), axis=-1
         ).reshape(-1, 2)
-        for patch in axes.patches:
-            outline = patch.get_path().transformed(patch.get_transform())
+        for outline in map(Path, areas_of(figure)):
+            outline = outline.transformed(axes.transData)
             assert not outline.contains_points(inside).any()
         for line in axes.lines[: 2 * len(solution.scene.beams)]:
             drawn = line.get_path().transformed(line.get_transform())
@@ -279,9 +287,19 @@ def test_no_blank_margins(width, height):
     assert (blank < 1.5).all()
 
 
+def test_extremes_of_beams_of_one_cell():
+    beam = ub.Beam((0, 0), (0, 1), scenes.SLENDER, cells=1)
+    load = ub.PointLoad(beam.end, force=(1.0, 0.0), time=lambda t: t)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    extremes = ub.Extremes()
+    times = {"t": (0, 1), "dt": 1, "progress": False}
+    run = ub.simulate(scene, ub.Static(), record=extremes, **times)
+    assert len(areas_of(ub.plot_extremes(run, extremes, "V"))) == 1
+
+
 def test_no_diagram_where_there_is_no_force(swing):
     figure = ub.plot(swing, "M", n=0)
-    assert not figure.axes[0].patches
+    assert not areas_of(figure)
     assert not texts(figure)
 
 

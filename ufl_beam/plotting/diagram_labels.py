@@ -22,6 +22,7 @@ AROUND, LEAST, MOST = (1.0, 1.2), (3.6, 2.6), (9.0, 6.8)
 """Room for words and numbers around the axes; least and largest size of a figure; inch."""
 
 
+CROWDED = 0.08  # part of the axes that labels cover, beyond which extreme values alone have some
 MARGIN = 0.03  # part of the axes beyond what is drawn
 
 
@@ -82,15 +83,22 @@ def _write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
     def in_points(xy: Any) -> Array:
         return np.asarray(axes.transData.transform(xy) * POINTS / figure.dpi)
 
+    def half(peak: Peak) -> Array:
+        return half_size(axes, peak.text, **_look(peak.extreme))
+
+    box = axes.get_window_extent()
+    room = box.width * box.height * (POINTS / figure.dpi) ** 2
+    if sum(4 * float(np.prod(half(peak))) for peak in peaks) > CROWDED * room:
+        peaks = [peak for peak in peaks if peak.extreme]
     lines = _lines(axes, in_points)
     labels, halves = [], []
-    for number, (text, color, tip, outward, extreme) in enumerate(peaks):
+    for number, (text, color, tip, outward, _) in enumerate(peaks):
         # Straight away from the axis first, then more and more aside
         turns = np.radians((0, 40, -40, 75, -75, 105, -105, 140, -140))
         ways = directions(math.atan2(outward[1], outward[0]) + turns)
         at = in_points(tip)
         labels.append(Label(text, color, number, tuple(Spot(at, way) for way in ways)))
-        halves.append(half_size(axes, text, **_look(extreme)))
+        halves.append(half(peaks[number]))
     written = []
     for one in place(labels, halves, lines):
         text, color, number, _ = one.label
@@ -124,8 +132,9 @@ def _lines(axes: Axes, in_points: Callable[[Any], Array]) -> Array:
             half = line.get_markersize() / 2
             chain = chain + np.array([[-half, -half], [half, half], [-half, half], [half, -half]])
         found.append(segments(chain))
-    for patch in axes.patches:
-        outline = in_points(patch.get_path().vertices)
+    outlines = [patch.get_path().vertices for patch in axes.patches]
+    outlines += [path.vertices for areas in axes.collections for path in areas.get_paths()]
+    for outline in map(in_points, outlines):
         found.append(segments(outline))
         # Ordinates, from a point of the outline to the one across the axis
         for part in (0.0, 0.5):

@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Index
+from ufl_beam.arrays import Array
 from ufl_beam.model.bodies import Member
 from ufl_beam.model.sections import Section
 from ufl_beam.plotting import drawing, style
@@ -26,11 +27,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LEAST_STRAIN = 1e-10  # strain that rounding and the tolerance of iterations leave behind
-DRAWN_AS_ZERO = 1e-6  # part of the largest value below which a value is drawn as zero
+DRAWN_AS_ZERO = 1e-4  # part of the largest value below which a value is drawn as zero
 ALIKE = 0.999  # part of the peak of an area from which on values are as large
 LABELLED = 0.15  # part of the largest value from which on the peak of an area is labelled
-MOST_LABELS = 60  # number of peaks beyond which the extreme values alone are labelled
-MOST_ARROWS = 60  # number of beams beyond which their directions are not drawn
+MANY = 60  # beams beyond which both extreme values alone are labelled, and no directions drawn
 
 SIGNS = {
     "N": ("N > 0: tension", "N < 0: compression"),
@@ -78,7 +78,7 @@ def draw_frame(
         peaks: list[Peak] = []
         if _is_loaded(what, diagrams):
             rows = _draw_diagrams(axes, solution, pose.nodes, what, diagrams)
-            peaks = _peaks(rows, factor)
+            peaks = _peaks(rows, factor, LABELLED if len(diagrams) <= MANY else 1.0)
         drawing.draw_axes(axes, solution, pose.nodes, color=shade(INK), linewidth=2.6, zorder=4)
         drawing.draw_symbols(axes, pose)
         named = {**_signs(axes, what), **draw_damage(axes, solution, n, pose.nodes)}
@@ -115,31 +115,42 @@ def _draw_diagrams(
         The peak of each area, its point of the axis, and the vector from there to the diagram;
         (num_areas, 5).
     """
+    from matplotlib.collections import PolyCollection
+
     side = -1.0 if what == "M" else 1.0
     largest = max(float(np.abs(values).max()) for _, values in diagrams)
     scale = 0.13 * side * math.hypot(*np.ptp(nodes, axis=0)) / largest
-    rows = []
+    rows: list[Array] = []
+    outlines: defaultdict[str, list[Array]] = defaultdict(list)
     for beam, found in diagrams:
         values = np.where(np.abs(found) > DRAWN_AS_ZERO * largest, found, 0.0).ravel()
         axis, left = _along(solution, beam, nodes, found.shape[1])
         up = scale * values[:, None] * left
-        peaks, places = _draw_areas(axes, axis, axis + up, values)
-        rows.append(np.column_stack([peaks, axis[places], up[places]]))
-        if what != "N" and len(diagrams) <= MOST_ARROWS:
-            _draw_direction(axes, axis)
-    return np.concatenate(rows)
+        for area in _areas(axis, axis + up, values):
+            outlines[RED if area.peak > 0 else BLUE].append(area.outline)
+            rows.append(np.array([area.peak, *axis[area.place], *up[area.place]]))
+        if what != "N" and len(diagrams) <= MANY:
+            first, second = (len(axis) - 1) // 2, len(axis) // 2
+            _draw_direction(axes, (axis[first] + axis[second]) / 2, left[second])
+    for color, group in outlines.items():
+        look: dict[str, Any] = {"facecolors": [(color, 0.28)], "edgecolors": color, "gid": color}
+        axes.add_collection(PolyCollection(group, **look, linewidths=1.0, zorder=2))
+    return np.array(rows)
 
 
-def _peaks(rows: Array, unit: float) -> list[Peak]:
-    """Peaks to be labelled, both extreme values first; corners have one label for both beams."""
+def _peaks(rows: Array, unit: float, least: float) -> list[Peak]:
+    """Peaks to be labelled, both extreme values first; corners have one label for both beams.
+
+    Others have at least a part of the largest size, ``least``.
+    """
     values, axis, up = rows[:, 0], rows[:, 1:3], rows[:, 3:]
     ends = (1, int(values.argmax())), (-1, int(values.argmin()))
     extremes = [k for sign, k in ends if sign * values[k] > 0.0]
-    large = [k for k, size in enumerate(np.abs(values)) if size > LABELLED * np.abs(values).max()]
+    large = [k for k, size in enumerate(np.abs(values)) if size > least * np.abs(values).max()]
     numbers = [number(value / unit) for value in values]
     places = np.round(axis / (1e-3 * math.hypot(*np.ptp(axis, axis=0)) or 1.0))
     chosen: dict[tuple[object, ...], int] = {}
-    for k in [*extremes, *(large if len(large) <= MOST_LABELS else ())]:
+    for k in [*extremes, *large]:
         chosen.setdefault((numbers[k].lstrip("−"), *places[k]), k)
     return [
         Peak(
@@ -155,50 +166,51 @@ def _along(solution: Solution, beam: Member, nodes: Array, points: int) -> tuple
     mesh, parts = solution.grid.mesh, np.linspace(0.0, 1.0, points)
     start, end, *between = solution.grid.nodes_of_cells[solution.grid.cells_of(beam)].T
     chains = nodes[np.column_stack([start, *between, end])]
-    left = left_of(unit_vectors(mesh.slopes(parts) @ chains))
+    ahead = unit_vectors(mesh.slopes(parts) @ chains)
+    # Ordinates at corners between cells halve the angle, and lean towards it in the cells.
+    lean = np.zeros((len(chains), 2, 2))
+    lean[:-1, 1] = unit_vectors(ahead[:-1, -1] + ahead[1:, 0]) - ahead[:-1, -1]
+    lean[1:, 0] = unit_vectors(ahead[:-1, -1] + ahead[1:, 0]) - ahead[1:, 0]
+    ahead = ahead + np.column_stack([1.0 - parts, parts]) @ lean
+    left = left_of(unit_vectors(ahead))
     return (mesh.weights(parts) @ chains).reshape(-1, 2), left.reshape(-1, 2)
 
 
-def _draw_areas(axes: Axes, axis: Array, tips: Array, values: Array) -> tuple[Array, Index]:
-    """Draw an area for each part of a beam with values of one sign; return the peak of each.
+class Area(NamedTuple):
+    """Part of a diagram along a beam with values of one sign."""
 
-    They are values, and numbers of points; of equal ones the point in the middle.
-    """
-    # Where the sign changes, both areas end in a point of the axis.
+    outline: Array  # (n, 2); m
+    peak: float  # its largest value in size
+    place: int  # number of the point of the peak; of equal ones that in the middle
+
+
+def _areas(axis: Array, tips: Array, values: Array) -> Iterator[Area]:
+    """Divide a diagram where its sign changes."""
+    # There both areas end in a point of the axis.
     first = np.flatnonzero(values[:-1] * values[1:] < 0.0)
     part = values[first] / (values[first] - values[first + 1])
     zeros = axis[first] + part[:, None] * (axis[first + 1] - axis[first])
-    number = np.insert(np.arange(len(values)), first + 1, first)
+    places = np.insert(np.arange(len(values)), first + 1, first)
     axis, tips = (np.insert(points, first + 1, zeros, axis=0) for points in (axis, tips))
     values = np.insert(values, first + 1, 0.0)
     signs = np.sign(values[:-1] + values[1:])
-    peaks, places = [], []
     for run in np.split(np.arange(len(signs)), np.flatnonzero(np.diff(signs)) + 1):
         if (sign := signs[run[0]]) != 0.0:
             chain = np.append(run, run[-1] + 1)
             outline = np.concatenate([axis[run[:1]], tips[chain], axis[chain[:0:-1]]])
-            color = RED if sign > 0 else BLUE
-            look: dict[str, Any] = {"facecolor": (color, 0.28), "edgecolor": color}
-            axes.fill(*outline.T, **look, linewidth=1.0, zorder=2, gid=color)
             sizes = np.abs(values[chain])
             equal = chain[sizes >= ALIKE * sizes.max()]
-            peaks.append(sign * sizes.max())
-            places.append(number[equal[len(equal) // 2]])
-    return np.array(peaks), np.array(places, dtype=np.int64)
+            yield Area(outline, float(sign * sizes.max()), int(places[equal[len(equal) // 2]]))
 
 
-def _draw_direction(axes: Axes, axis: Array) -> None:
-    """Draw an arrow in the middle of a beam, from its start to its end."""
-    middle = len(axis) // 2
-    x, y = axis[middle + 1] - axis[middle - 1]
-    angle = math.degrees(math.atan2(y, x))
-    axes.plot(
-        *axis[middle], marker=(3, 0, angle - 90.0), ms=9.0, color=shade(INK), mew=0.0, zorder=4.1
-    )
+def _draw_direction(axes: Axes, at: Array, left: Array) -> None:
+    """Draw an arrow on a beam from its start to its end, whose left is known."""
+    turn = math.degrees(math.atan2(left[1], left[0])) - 180.0  # of an arrow that points up
+    axes.plot(*at, marker=(3, 0, turn), ms=9.0, color=shade(INK), mew=0.0, zorder=4.1)
 
 
 def _signs(axes: Axes, what: str) -> dict[str, Artist]:
     """What the signs mean that are in the picture, with an area of each."""
     meanings = dict(zip((RED, BLUE), SIGNS.get(what, ()), strict=False))
-    areas = {area.get_gid(): area for area in axes.patches}
+    areas = {area.get_gid(): area for area in axes.collections}
     return {meaning: areas[color] for color, meaning in meanings.items() if color in areas}

@@ -44,7 +44,7 @@ SIZES = {
 """Sizes of fonts where that of texts is :data:`FONT`; points."""
 
 STYLE: dict[str, Any] = {
-    "font.size": FONT, "text.color": INK, "figure.dpi": 150.0, "lines.linewidth": 2.0,
+    "text.color": INK, "figure.dpi": 150.0, "lines.linewidth": 2.0,
     "axes.edgecolor": FRAME, "axes.spines.top": False, "axes.spines.right": False,
     "xtick.color": FRAME, "ytick.color": FRAME, "grid.color": "#E8E8E8",
     "legend.frameon": False, "lines.solid_capstyle": "round",
@@ -112,13 +112,13 @@ def picture(size: tuple[float, float]) -> Iterator[Figure]:
 
     from ufl_beam.plotting.figures import Picture
 
-    with mpl.rc_context(_settings()):
+    with mpl.rc_context(_unless_chosen({**STYLE, **_sizes()})):
         yield Picture(figsize=size, layout="constrained")
 
 
 @contextmanager
 def panel(ax: Axes | None, size: tuple[float, float]) -> Iterator[Axes]:
-    """Open the given axes, or those of a new :func:`picture` of a size, in the same style."""
+    """Open those of a new :func:`picture` of a size, or axes of the user, whose sizes stay."""
     import matplotlib as mpl
     from matplotlib.axes import Axes
 
@@ -128,20 +128,27 @@ def panel(ax: Axes | None, size: tuple[float, float]) -> Iterator[Axes]:
         return
     if not isinstance(ax, Axes):
         raise SceneError(f"ax = {shorten(ax)} must be axes of Matplotlib, as plt.subplots() makes")
-    with mpl.rc_context(_settings()):
+    with mpl.rc_context(_unless_chosen(STYLE)):
         yield ax
 
 
-def _settings() -> dict[str, Any]:
-    """Our settings, where Matplotlib has its own; where the user has changed them they stay."""
+def _sizes() -> dict[str, float]:
+    """Sizes of fonts, in proportion to that of texts if the user has chosen it; points."""
+    import matplotlib as mpl
+
+    now, default = mpl.rcParams["font.size"], mpl.rcParamsDefault["font.size"]
+    font = FONT if now == default else now
+    return {"font.size": font, **{name: size / FONT * font for name, size in SIZES.items()}}
+
+
+def _unless_chosen(ours: dict[str, Any]) -> dict[str, Any]:
+    """Our settings and colours of lines, where the user has left those of Matplotlib."""
     import matplotlib as mpl
     from cycler import cycler
 
     now, default = mpl.rcParams, mpl.rcParamsDefault
-    font = FONT if now["font.size"] == default["font.size"] else now["font.size"]
-    sizes = {name: size / FONT * font for name, size in SIZES.items()}
     labels = {f"{x}tick.labelcolor": now["axes.labelcolor"] for x in "xy"}
-    ours = {**STYLE, **sizes, **labels, "axes.prop_cycle": cycler(color=COLORS)}
+    ours = {**ours, **labels, "axes.prop_cycle": cycler(color=COLORS)}
     return {name: value for name, value in ours.items() if now[name] == default[name]}
 
 
@@ -185,13 +192,19 @@ def figure_of(axes: Axes) -> Figure:
 
 
 def draw_legend(
-    axes: Axes, ax: Axes | None, handles: Sequence[Artist] | None = None, **outside: Any
+    axes: Axes,
+    ax: Axes | None,
+    handles: Sequence[Artist] | None = None,
+    *,
+    fontsize: float | None = None,
+    **outside: Any,
 ) -> None:
     """Draw a legend outside of the axes of a picture, or within axes ``ax`` that were given."""
     if ax is None:
-        figure_of(axes).legend(handles=handles, **outside)
+        figure_of(axes).legend(handles=handles, fontsize=fontsize, **outside)
     else:
-        axes.legend(handles=handles, loc="best" if handles is None else "lower left")
+        where = "best" if handles is None else "lower left"
+        axes.legend(handles=handles, fontsize=fontsize, loc=where)
 
 
 def scale(name: str, first: float, last: float, low: float, high: float) -> Any:
@@ -206,7 +219,7 @@ def scale(name: str, first: float, last: float, low: float, high: float) -> Any:
 
 def draw_bar(axes: Axes, colors: Any, label: str) -> None:
     """Draw the colour bar of a :func:`scale`."""
-    bar = figure_of(axes).colorbar(colors, ax=axes, shrink=0.85, aspect=25, pad=0.02)
+    bar = axes.figure.colorbar(colors, ax=axes, shrink=0.85, aspect=25, pad=0.02)
     bar.set_label(label)
     bar.ax.spines["outline"].set_visible(False)
 

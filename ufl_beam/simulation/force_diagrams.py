@@ -109,8 +109,25 @@ def forces_along_cells(grid: Grid, state: Snapshot, forces: Array, parts: Array)
     before = (parts[:, None] * GAUSS).ravel()
     change = by_lever_arms(before, resultants(before)[:, :, 0])
     moments = M.real + parts * (change.reshape(*F.shape, len(GAUSS)) @ WEIGHTS)
-    F = F * np.conj(tangent(parts))
+    F = F * np.conj(tangent(parts) * np.exp(1j * _turns(grid, np.angle(chord), parts)))
     return np.stack([F.real, F.imag, moments], axis=2)
+
+
+def _turns(grid: Grid, angles: Array, parts: Array) -> Array:
+    """Angles to the smooth axis of a curved beam from its straight cells; (num_cells, points); rad.
+
+    Vertices halve the angle between two cells, but at corners of the beam; it is linear in a cell.
+    """
+    half = np.angle(np.exp(1j * np.diff(angles))) / 2
+    half[np.diff(grid.beam_of_cell) != 0] = np.nan
+    for beam in grid.scene.beams:
+        if beam.corners:
+            at_corners = np.isin(grid.parameters(beam)[1:-1], beam.corners)
+            half[grid.cells_of(beam)[:-1][at_corners]] = np.nan
+    start, end = np.append(np.nan, -half), np.append(half, np.nan)
+    # As a circle where there is no neighbour
+    both = np.where(np.isnan(start), -end, start), np.where(np.isnan(end), -start, end)
+    return np.asarray(np.nan_to_num(np.column_stack(both)) @ np.array([1.0 - parts, parts]))
 
 
 def _loads(grid: Grid, state: Snapshot) -> Complex:
