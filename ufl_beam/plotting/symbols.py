@@ -37,12 +37,13 @@ STEEL, DARK, GROUND_GREY = "#6E6E6E", "#4A4A4A", "#808080"  # of rails, rods and
 
 # Outlines of the symbols of supports; half a symbol is 1, the place is the origin, the beam comes
 # from above.
-Outline = list[tuple[float, float]]
-_TRIANGLE = [(0.0, 0.0), (-0.6, -0.8), (0.6, -0.8), (0.0, 0.0)]
-_CLAMP = [(-1.0, 0.0), (1.0, 0.0), (1.0, -0.5), (-1.0, -0.5), (-1.0, 0.0)]
-_PLATE = [(-1.0, -0.8), (1.0, -0.8), (1.0, -0.9), (-1.0, -0.9), (-1.0, -0.8)]
-_TRACK = [(-1.0, -1.0), (1.0, -1.0), (1.0, -1.1), (-1.0, -1.1), (-1.0, -1.0)]
-_DIAMOND = [(-0.6, 0.0), (0.0, 0.6), (0.6, 0.0), (0.0, -0.6), (-0.6, 0.0)]
+Outline = tuple[tuple[float, float], ...]
+Outlines = tuple[Outline, ...]
+_TRIANGLE = ((0.0, 0.0), (-0.6, -0.8), (0.6, -0.8), (0.0, 0.0))
+_CLAMP = ((-1.0, 0.0), (1.0, 0.0), (1.0, -0.5), (-1.0, -0.5), (-1.0, 0.0))
+_PLATE = ((-1.0, -0.8), (1.0, -0.8), (1.0, -0.9), (-1.0, -0.9), (-1.0, -0.8))
+_TRACK = ((-1.0, -1.0), (1.0, -1.0), (1.0, -1.1), (-1.0, -1.1), (-1.0, -1.0))
+_DIAMOND = ((-0.6, 0.0), (0.0, 0.6), (0.6, 0.0), (0.0, -0.6), (-0.6, 0.0))
 
 
 class Pin(NamedTuple):
@@ -58,7 +59,7 @@ class Footing(NamedTuple):
 
     at: Array  # (2,); m
     angle: float  # by which it is turned; rad
-    outlines: list[Outline]  # half a symbol is 1, the place is the origin
+    outlines: Outlines  # half a symbol is 1, the place is the origin
     color: str  # orange ones move
     place: Anchor
 
@@ -158,10 +159,10 @@ def footings(pose: Pose) -> Iterator[Footing]:
         angle = support_direction(support, pose.turn(support.place))
         color = ORANGE if support.moving else GROUND_GREY
         held = 3 if len(support.held) == 3 else len({0, 1} & set(support.held))
-        symbol = [[_DIAMOND], [_TRIANGLE, _TRACK], [_TRIANGLE, _PLATE], [_CLAMP]][held]
+        symbol = ((_DIAMOND,), (_TRIANGLE, _TRACK), (_TRIANGLE, _PLATE), (_CLAMP,))[held]
         yield Footing(pose.at(support.place), angle, symbol, color, support.place)
     for spot, (inward, turns) in _grounds(pose.stage.scene).items():
-        symbol = [_TRIANGLE, _PLATE] if turns else [_CLAMP]
+        symbol = (_TRIANGLE, _PLATE) if turns else (_CLAMP,)
         angle = _upright(inward) if turns else inward - math.pi / 2
         yield Footing(np.array(spot.point), angle, symbol, GROUND_GREY, spot)
 
