@@ -121,6 +121,19 @@ def test_the_number_of_lines_does_not_grow_with_the_scene():
     assert count(3) == count(30)
 
 
+def test_pins_shrink_where_beams_are_short():
+    def size(count):
+        ends = np.linspace(0.0, 1.0, count + 1)
+        beams = [ub.Beam((a, 0), (b, 0), scenes.SLENDER) for a, b in pairwise(ends)]
+        joints = [ub.Rigid(a.end, b.start) for a, b in pairwise(beams)]
+        scene = ub.Scene(beams=beams, joints=joints, supports=[ub.Clamped(beams[0].start)])
+        axes = ub.plot(ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0)).axes[0]
+        return next(x.get_markersize() for x in axes.lines if x.get_marker() == "s")
+
+    assert size(3) == 6.0
+    assert size(60) == pytest.approx(0.3 * 6.0)
+
+
 @pytest.mark.parametrize("what", ["N", "V", "M"])
 def test_extreme_values_are_those_of_the_solution(portal, what):
     values = np.concatenate(values_of(portal, what))

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
@@ -12,8 +13,9 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.plotting import symbols
 from ufl_beam.plotting.geometry import joined
+from ufl_beam.plotting.model_sheet import SHORT_BEAM, SMALLEST, SYMBOL
 from ufl_beam.plotting.scene_layout import Pose, Stage
-from ufl_beam.plotting.style import GREY, INK, Stroke
+from ufl_beam.plotting.style import GREY, INK, POINTS, Stroke
 from ufl_beam.plotting.symbols import Outlines
 from ufl_beam.simulation.solution import Solution
 
@@ -44,7 +46,7 @@ def plane_stage(solution: Solution, shown: Sequence[int], magnify: float) -> Sta
     width, height = np.ptp(points, axis=0)
     inches = plane_size(points)
     scale = max(1.12 * width / (inches[0] - 0.9), 1.20 * height / (inches[1] - 1.1))
-    return Stage(solution, magnify, scale / 6.0, shown)  # 12 points
+    return Stage(solution, magnify, scale * SYMBOL / POINTS, shown)
 
 
 def draw_axes(axes: Axes, solution: Solution, points: Array, **line: Any) -> None:
@@ -67,10 +69,14 @@ def draw_symbols(axes: Axes, pose: Pose) -> None:
     draw_strokes(axes, (*symbols.bodies(pose), *symbols.rods(pose)))
     draw_fixings(axes, pose)
     draw_strokes(axes, symbols.centres(pose))
+    # Pins shrink where beams are short, as in pictures of the model.
+    lengths = [math.dist(beam.start.point, beam.end.point) for beam in pose.stage.scene.beams]
+    typical = SYMBOL * np.median(lengths or [math.inf]) / pose.stage.unit
+    shrunk = float(np.clip(typical / SHORT_BEAM, SMALLEST, 1.0))
     pins = [*symbols.pins(pose)]
     for turns, marker, size, inside in ((False, "s", 6.0, INK), (True, "o", 8.0, "white")):
         at = np.reshape([pin.at for pin in pins if pin.turns == turns], (-1, 2))
-        axes.plot(*at.T, marker, ms=size, mfc=inside, mec=INK, mew=1.6, zorder=5)
+        axes.plot(*at.T, marker, ms=shrunk * size, mfc=inside, mec=INK, mew=shrunk * 1.6, zorder=5)
     draw_masses(axes, pose, INK)
 
 
