@@ -128,10 +128,13 @@ def _lines(axes: Axes, in_points: Callable[[Any], Array]) -> Array:
     found: list[Array] = [np.empty((0, 4))]
     for line in axes.lines:
         chain = in_points(line.get_xydata())
-        if len(chain) == 1:  # a symbol
+        if line.get_linestyle() == "None":  # symbols
             half = line.get_markersize() / 2
-            chain = chain + np.array([[-half, -half], [half, half], [-half, half], [half, -half]])
-        found.append(segments(chain))
+            cross = np.array([[-half, -half], [half, half], [-half, half], [half, -half]])
+            found += [segments(point + cross) for point in chain]
+        else:
+            pieces = segments(chain)
+            found.append(pieces[np.isfinite(pieces).all(axis=1)])
     outlines = [patch.get_path().vertices for patch in axes.patches]
     outlines += [path.vertices for areas in axes.collections for path in areas.get_paths()]
     for outline in map(in_points, outlines):

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import math
+from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -10,8 +12,11 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.plotting import symbols
+from ufl_beam.plotting.geometry import joined
+from ufl_beam.plotting.model_sheet import SHORT_BEAM, SMALLEST, SYMBOL
 from ufl_beam.plotting.scene_layout import Pose, Stage
-from ufl_beam.plotting.style import GREY, INK, WHITE, Stroke, shade
+from ufl_beam.plotting.style import GREY, INK, POINTS, WHITE, Stroke, shade
+from ufl_beam.plotting.symbols import Outlines
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
@@ -41,21 +46,22 @@ def plane_stage(solution: Solution, shown: Sequence[int], magnify: float) -> Sta
     width, height = np.ptp(points, axis=0)
     inches = plane_size(points)
     scale = max(1.12 * width / (inches[0] - 0.9), 1.20 * height / (inches[1] - 1.1))
-    return Stage(solution, magnify, scale / 6.0, shown)  # 12 points
+    return Stage(solution, magnify, scale * SYMBOL / POINTS, shown)
 
 
 def draw_axes(axes: Axes, solution: Solution, points: Array, **line: Any) -> None:
     """Draw the axes of all beams through these points."""
-    for beam in solution.scene.beams:
-        axes.plot(*points[solution.grid.nodes_along(beam)].T, **line)
+    grid = solution.grid
+    chains = [points[grid.nodes_along(beam)] for beam in solution.scene.beams]
+    axes.plot(*joined(chains).T, **line)
 
 
 def draw_undeformed(axes: Axes, solution: Solution, stage: Stage) -> None:
     """Draw undeformed beams, bodies and rods in grey."""
     pose = stage.undeformed
     draw_axes(axes, solution, pose.nodes, color=GREY, linewidth=1.2, zorder=1)
-    for stroke in (*symbols.bodies(pose), *symbols.rods(pose)):
-        axes.plot(*stroke.points.T, color=GREY, linewidth=1.2, zorder=1)
+    strokes = (*symbols.bodies(pose), *symbols.rods(pose))
+    axes.plot(*joined(s.points for s in strokes).T, color=GREY, linewidth=1.2, zorder=1)
 
 
 def draw_symbols(axes: Axes, pose: Pose) -> None:
@@ -63,28 +69,44 @@ def draw_symbols(axes: Axes, pose: Pose) -> None:
     draw_strokes(axes, (*symbols.bodies(pose), *symbols.rods(pose)))
     draw_fixings(axes, pose)
     draw_strokes(axes, symbols.centres(pose))
-    for pin in symbols.pins(pose):
-        marker, size, inside = ("o", 8.0, WHITE) if pin.turns else ("s", 6.0, INK)
-        axes.plot(*pin.at, marker, ms=size, mfc=shade(inside), mec=shade(INK), mew=1.6, zorder=5)
-    draw_masses(axes, pose, shade(INK))
+    # Pins shrink where beams are short, as in pictures of the model.
+    lengths = [math.dist(beam.start.point, beam.end.point) for beam in pose.stage.scene.beams]
+    typical = SYMBOL * np.median(lengths or [math.inf]) / pose.stage.unit
+    shrunk = float(np.clip(typical / SHORT_BEAM, SMALLEST, 1.0))
+    pins = [*symbols.pins(pose)]
+    edge = shade(INK)
+    for turns, marker, size, inside in ((False, "s", 6.0, INK), (True, "o", 8.0, WHITE)):
+        at = np.reshape([pin.at for pin in pins if pin.turns == turns], (-1, 2))
+        axes.plot(
+            *at.T, marker, ms=shrunk * size, mfc=shade(inside), mec=edge, mew=shrunk * 1.6, zorder=5
+        )
+    draw_masses(axes, pose, edge)
 
 
 def draw_strokes(axes: Axes, strokes: Iterable[Stroke], color: Any = None) -> None:
     """Draw lines and areas, in their own colours or all in one."""
+    lines: defaultdict[tuple[str, float, float], list[Array]] = defaultdict(list)
     for points, own, weight, fill, layer in strokes:
-        line: dict[str, Any] = {"linewidth": weight, "zorder": layer}
-        edge = shade(own) if color is None else color
         if fill is None:
-            axes.plot(*points.T, color=edge, solid_joinstyle="round", **line)
+            lines[own, weight, layer].append(points)
         else:
+            edge = shade(own) if color is None else color
             inside = shade(fill) if color is None else (color, 0.15)
-            axes.fill(*points.T, facecolor=inside, edgecolor=edge, joinstyle="round", **line)
+            axes.fill(
+                *points.T, facecolor=inside, edgecolor=edge, joinstyle="round", linewidth=weight,
+                zorder=layer,
+            )  # fmt: skip
+    for (own, weight, layer), alike in lines.items():
+        axes.plot(
+            *joined(alike).T, color=shade(own) if color is None else color, linewidth=weight,
+            solid_joinstyle="round", zorder=layer,
+        )  # fmt: skip
 
 
 def draw_masses(axes: Axes, pose: Pose, color: Any) -> None:
     """Draw dots at the point masses."""
-    for mass in pose.stage.scene.masses:
-        axes.plot(*pose.at(mass.place), "o", ms=10.0, color=color, zorder=5)
+    at = np.reshape([pose.at(mass.place) for mass in pose.stage.scene.masses], (-1, 2))
+    axes.plot(*at.T, "o", ms=10.0, color=color, zorder=5)
 
 
 def draw_fixings(axes: Axes, pose: Pose) -> None:
@@ -93,9 +115,12 @@ def draw_fixings(axes: Axes, pose: Pose) -> None:
     from matplotlib.path import Path
 
     draw_strokes(axes, (*symbols.rails(pose), *symbols.connectors(pose)))
-    for footing in symbols.footings(pose):
-        symbol = MarkerStyle(Path.make_compound_path(*map(Path, footing.outlines)))
+    places: defaultdict[tuple[Outlines, float, str], list[Array]] = defaultdict(list)
+    for at, angle, outlines, color, _ in symbols.footings(pose):
+        places[outlines, angle, color].append(at)
+    for (outlines, angle, color), alike in places.items():
+        symbol = MarkerStyle(Path.make_compound_path(*map(Path, outlines))).rotated(rad=angle)
         axes.plot(
-            *footing.at, marker=symbol.rotated(rad=footing.angle), ms=24.0, mfc=footing.color,
-            mec=footing.color, mew=0.5, zorder=3.5,
+            *np.transpose(alike), marker=symbol, ms=24.0, mfc=color, mec=color, mew=0.5,
+            linestyle="none", zorder=3.5,
         )  # fmt: skip

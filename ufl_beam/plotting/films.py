@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import socket
 import subprocess
 import tempfile
 from base64 import b64encode
@@ -75,23 +76,25 @@ def write_mp4(path: Path, frames: Frames, fps: float) -> None:
         "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white", "-pix_fmt", "yuv420p",
         str(path.absolute()),
     ]  # fmt: skip
-    with tempfile.TemporaryFile() as messages:
+    # Not a pipe: PETSc ends the interpreter at the signal of a broken one.
+    ours, theirs = socket.socketpair()
+    with ours, theirs, tempfile.TemporaryFile() as messages:
         # Ctrl-C is for this process.
         writer = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stderr=messages, start_new_session=True
+            command, stdin=theirs.fileno(), stderr=messages, start_new_session=True
         )
-        assert writer.stdin is not None
+        theirs.close()
         try:
-            with writer.stdin as pipe:
-                for frame in chain([first], frames):
-                    pipe.write(np.ascontiguousarray(frame))
-        except BrokenPipeError:
+            for frame in chain([first], frames):
+                ours.sendall(np.ascontiguousarray(frame), socket.MSG_NOSIGNAL)
+        except ConnectionError:
             pass  # it has ended, and said why
         except BaseException:
             writer.kill()
             writer.wait()
             path.unlink(missing_ok=True)
             raise
+        ours.close()
         if writer.wait():
             messages.seek(0)
             raise RuntimeError(f"{program}: {messages.read().decode(errors='replace').strip()}")

@@ -136,7 +136,7 @@ def _draw_connectors(sheet: Sheet, pose: Pose) -> None:
     unit, scale = sheet.unit, sheet.scale
     for connector in sheet.subject.scene.connectors:
         offset = pose.stage.offsets[connector]
-        a, b = np.array(connector.a.point), np.array(connector.b.point)
+        a, b = symbols.ends_of(pose, connector)
         if connector.turns:
             spots = sheet.around(b, (1.6 + offset + 0.8) * unit)
         else:

@@ -230,9 +230,10 @@ def make_room(axes: Axes) -> None:
     figure.draw_without_rendering()
     boxes = [text.get_window_extent().get_points() for text in axes.texts]
     for line in axes.lines:
-        if len(at := np.asarray(line.get_xydata())) == 1:
+        at = axes.transData.transform(line.get_xydata())
+        if line.get_linestyle() == "None" and len(at):  # symbols
             half = line.get_markersize() / 2 * figure.dpi / POINTS
-            boxes.append(axes.transData.transform(at) + np.array([[-half], [half]]))
+            boxes.append(np.array([at.min(axis=0) - half, at.max(axis=0) + half]))
     for box in boxes:
         axes.update_datalim(axes.transData.inverted().transform(box))
     if legend := axes.get_legend():

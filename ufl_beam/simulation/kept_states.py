@@ -57,6 +57,7 @@ class KeptStates(list[Snapshot]):
     def __init__(self, grid: Grid) -> None:
         super().__init__()
         self._grid = grid
+        self._computed: tuple[Snapshot, Array] | None = None  # forces in the last state asked for
 
     @property
     def q(self) -> list[Array]:
@@ -124,11 +125,15 @@ class KeptStates(list[Snapshot]):
 
     def forces(self, n: int) -> Array:
         """(N, V, M), kept where history decides, else computed from the motion; (num_cells, 3)."""
-        forces = np.empty((len(self._grid.cells), 3))
-        self._section_forces.write(self[n].q, forces)
-        cells, rows = cells_of(self[n])
-        forces[cells] = rows[:, :3]
-        return forces
+        state = self[n]
+        if self._computed is None or self._computed[0] is not state:
+            forces = np.empty((len(self._grid.cells), 3))
+            self._section_forces.write(state.q, forces)
+            cells, rows = cells_of(state)
+            forces[cells] = rows[:, :3]
+            forces.flags.writeable = False
+            self._computed = state, forces
+        return self._computed[1]
 
     def forces_in_points(self, state: Snapshot) -> Array:
         """(N, V, M) in the Gauss points, as :meth:`forces`; (num_cells, degree, 3)."""
