@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.plotting.geometry import directions, segments
+from ufl_beam.plotting.geometry import directions, joined, segments
 from ufl_beam.plotting.labels import Label, Spot, leader_of, place
 from ufl_beam.plotting.style import POINTS, figure_of, font_size, half_size, make_room
 
@@ -23,6 +23,7 @@ AROUND, LEAST, MOST = (1.0, 1.2), (3.6, 2.6), (9.0, 6.8)
 
 
 CROWDED = 0.08  # part of the axes that labels cover, beyond which extreme values alone have some
+FEW = 500  # areas whose ordinates texts should not cover
 MARGIN = 0.03  # part of the axes beyond what is drawn
 
 
@@ -135,10 +136,12 @@ def _lines(axes: Axes, in_points: Callable[[Any], Array]) -> Array:
         else:
             pieces = segments(chain)
             found.append(pieces[np.isfinite(pieces).all(axis=1)])
-    outlines = [patch.get_path().vertices for patch in axes.patches]
-    outlines += [path.vertices for areas in axes.collections for path in areas.get_paths()]
-    for outline in map(in_points, outlines):
-        found.append(segments(outline))
+    paths = [patch.get_path() for patch in axes.patches]
+    paths += [path for areas in axes.collections for path in areas.get_paths()]
+    outlines = [np.asarray(path.vertices) for path in paths]
+    pieces = segments(in_points(joined(outlines)))
+    found.append(pieces[np.isfinite(pieces).all(axis=1)])
+    for outline in map(in_points, outlines[:FEW]):
         # Ordinates, from a point of the outline to the one across the axis
         for part in (0.0, 0.5):
             between = outline[:-1] + part * np.diff(outline, axis=0)

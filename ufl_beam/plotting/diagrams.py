@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ufl_beam.arrays import Array
+from ufl_beam.arrays import Array, Index
 from ufl_beam.model.bodies import Member
 from ufl_beam.model.sections import Section
 from ufl_beam.plotting import drawing, style
@@ -118,20 +118,24 @@ def _draw_diagrams(
     from matplotlib.collections import PolyCollection
 
     side = -1.0 if what == "M" else 1.0
-    largest = max(float(np.abs(values).max()) for _, values in diagrams)
+    cells = np.concatenate([solution.grid.cells_of(beam) for beam, _ in diagrams])
+    found = np.concatenate([values for _, values in diagrams])
+    largest = float(np.abs(found).max())
     scale = 0.13 * side * math.hypot(*np.ptp(nodes, axis=0)) / largest
+    values = np.where(np.abs(found) > DRAWN_AS_ZERO * largest, found, 0.0).ravel()
+    axis, left = _along(solution, cells, nodes, found.shape[1])
+    up = scale * values[:, None] * left
     rows: list[Array] = []
     outlines: defaultdict[str, list[Array]] = defaultdict(list)
-    for beam, found in diagrams:
-        values = np.where(np.abs(found) > DRAWN_AS_ZERO * largest, found, 0.0).ravel()
-        axis, left = _along(solution, beam, nodes, found.shape[1])
-        up = scale * values[:, None] * left
-        for area in _areas(axis, axis + up, values):
-            outlines[RED if area.peak > 0 else BLUE].append(area.outline)
-            rows.append(np.array([area.peak, *axis[area.place], *up[area.place]]))
-        if what != "N" and len(diagrams) <= MANY:
-            first, second = (len(axis) - 1) // 2, len(axis) // 2
-            _draw_direction(axes, (axis[first] + axis[second]) / 2, left[second])
+    beams = np.repeat(solution.grid.beam_of_cell[cells], found.shape[1])
+    for area in _areas(axis, axis + up, values, beams):
+        outlines[RED if area.peak > 0 else BLUE].append(area.outline)
+        rows.append(np.array([area.peak, *axis[area.place], *up[area.place]]))
+    if what != "N" and len(diagrams) <= MANY:
+        for first in np.flatnonzero(np.diff(beams, prepend=-1)):
+            last = first + np.count_nonzero(beams == beams[first]) - 1
+            low, high = (first + last) // 2, (first + last + 1) // 2
+            _draw_direction(axes, (axis[low] + axis[high]) / 2, left[high])
     for color, group in outlines.items():
         look: dict[str, Any] = {"facecolors": [(color, 0.28)], "edgecolors": color, "gid": color}
         axes.add_collection(PolyCollection(group, **look, linewidths=1.0, zorder=2))
@@ -146,8 +150,8 @@ def _peaks(rows: Array, unit: float, least: float) -> list[Peak]:
     values, axis, up = rows[:, 0], rows[:, 1:3], rows[:, 3:]
     ends = (1, int(values.argmax())), (-1, int(values.argmin()))
     extremes = [k for sign, k in ends if sign * values[k] > 0.0]
-    large = [k for k, size in enumerate(np.abs(values)) if size > least * np.abs(values).max()]
-    numbers = [number(value / unit) for value in values]
+    large: list[int] = [*map(int, np.flatnonzero(np.abs(values) > least * np.abs(values).max()))]
+    numbers = {k: number(values[k] / unit) for k in {*extremes, *large}}
     places = np.round(axis / (1e-3 * math.hypot(*np.ptp(axis, axis=0)) or 1.0))
     chosen: dict[tuple[object, ...], int] = {}
     for k in [*extremes, *large]:
@@ -161,16 +165,17 @@ def _peaks(rows: Array, unit: float, least: float) -> list[Peak]:
     ]  # fmt: skip
 
 
-def _along(solution: Solution, beam: Member, nodes: Array, points: int) -> tuple[Array, Array]:
-    """Points of the axis as drawn and unit vectors to its left; both (num_cells points, 2)."""
+def _along(solution: Solution, cells: Index, nodes: Array, points: int) -> tuple[Array, Array]:
+    """Points of the axes as drawn and unit vectors to their left; both (num_cells points, 2)."""
     mesh, parts = solution.grid.mesh, np.linspace(0.0, 1.0, points)
-    start, end, *between = solution.grid.nodes_of_cells[solution.grid.cells_of(beam)].T
+    start, end, *between = solution.grid.nodes_of_cells[cells].T
     chains = nodes[np.column_stack([start, *between, end])]
     ahead = unit_vectors(mesh.slopes(parts) @ chains)
-    # Ordinates at corners between cells halve the angle, and lean towards it in the cells.
-    lean = np.zeros((len(chains), 2, 2))
-    lean[:-1, 1] = unit_vectors(ahead[:-1, -1] + ahead[1:, 0]) - ahead[:-1, -1]
-    lean[1:, 0] = unit_vectors(ahead[:-1, -1] + ahead[1:, 0]) - ahead[1:, 0]
+    # Ordinates at corners between cells of a beam halve the angle, and lean towards it in both.
+    beams, lean = solution.grid.beam_of_cell[cells], np.zeros((len(chains), 2, 2))
+    k = np.flatnonzero(beams[:-1] == beams[1:])
+    half = unit_vectors(ahead[k, -1] + ahead[k + 1, 0])
+    lean[k, 1], lean[k + 1, 0] = half - ahead[k, -1], half - ahead[k + 1, 0]
     ahead = ahead + np.column_stack([1.0 - parts, parts]) @ lean
     left = left_of(unit_vectors(ahead))
     return (mesh.weights(parts) @ chains).reshape(-1, 2), left.reshape(-1, 2)
@@ -184,23 +189,27 @@ class Area(NamedTuple):
     place: int  # number of the point of the peak; of equal ones that in the middle
 
 
-def _areas(axis: Array, tips: Array, values: Array) -> Iterator[Area]:
-    """Divide a diagram where its sign changes."""
+def _areas(axis: Array, tips: Array, values: Array, beams: Index) -> Iterator[Area]:
+    """Divide diagrams of beams where the sign changes."""
     # There both areas end in a point of the axis.
-    first = np.flatnonzero(values[:-1] * values[1:] < 0.0)
+    first = np.flatnonzero((values[:-1] * values[1:] < 0.0) & (beams[:-1] == beams[1:]))
     part = values[first] / (values[first] - values[first + 1])
     zeros = axis[first] + part[:, None] * (axis[first + 1] - axis[first])
     places = np.insert(np.arange(len(values)), first + 1, first)
     axis, tips = (np.insert(points, first + 1, zeros, axis=0) for points in (axis, tips))
-    values = np.insert(values, first + 1, 0.0)
-    signs = np.sign(values[:-1] + values[1:])
-    for run in np.split(np.arange(len(signs)), np.flatnonzero(np.diff(signs)) + 1):
-        if (sign := signs[run[0]]) != 0.0:
-            chain = np.append(run, run[-1] + 1)
-            outline = np.concatenate([axis[run[:1]], tips[chain], axis[chain[:0:-1]]])
+    values, beams = np.insert(values, first + 1, 0.0), np.insert(beams, first + 1, beams[first])
+    signs = np.where(beams[:-1] == beams[1:], np.sign(values[:-1] + values[1:]), 0.0)
+    ends = np.flatnonzero(np.diff(signs, append=np.nan))
+    for begin, end in zip([0, *(ends[:-1] + 1)], ends, strict=True):
+        if (sign := signs[begin]) != 0.0:
+            chain = slice(begin, end + 2)
+            outline = np.concatenate(
+                [axis[begin : begin + 1], tips[chain], axis[end + 1 : begin : -1]]
+            )
             sizes = np.abs(values[chain])
-            equal = chain[sizes >= ALIKE * sizes.max()]
-            yield Area(outline, float(sign * sizes.max()), int(places[equal[len(equal) // 2]]))
+            largest = float(sizes.max())
+            equal = np.flatnonzero(sizes >= ALIKE * largest)
+            yield Area(outline, sign * largest, int(places[begin + equal[len(equal) // 2]]))
 
 
 def _draw_direction(axes: Axes, at: Array, left: Array) -> None:
