@@ -1,6 +1,6 @@
 # Every target runs through ./env, which brings DOLFINx where it is missing. `make` lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-mpi test-sid verify sanitize long demos demos-cheap check check-paraview docs docs-cheap docs-links check-docs docs-pictures accelerations bench bench-peers extremes schemes study
+.PHONY: help demo test test-mpi test-sid verify sanitize long demos demos-cheap check check-paraview docs docs-cheap docs-links test-notebook check-docs docs-pictures accelerations bench bench-peers extremes schemes study
 
 # Natively as root Open MPI refuses to start; with more ranks than cores, too (the last two lines: versions 5 and 6).
 # ./env sets the same in its root.
@@ -65,13 +65,16 @@ check-paraview: ## time series opened in ParaView; builds a root with ParaView o
 	@tests/paraview/check
 
 docs: ## the documentation site, in docs/_build/html; runs the demos, six minutes
-	@docs/build
+	@$(site)
 
 docs-cheap: ## the site with the output of the cheap demos only; two minutes
-	@UFL_BEAM_DEMOS=cheap docs/build
+	@export UFL_BEAM_DEMOS=cheap; $(site)
 
 docs-links: ## addresses that the pages link to
-	@docs/build -b linkcheck -D nb_execution_mode=off
+	@$(sphinx) -D nb_execution_mode=off -b linkcheck docs docs/_build/links
+
+test-notebook: ## the notebook in a kernel of Jupyter
+	@docs/python -m pytest -q -p no:cacheprovider tests/unit/test_notebook.py
 
 check-docs: ## the built site in Chromium, on a desk and on a phone; builds a root with Chromium once, 0.9 GB
 	@tests/browser/check
@@ -103,6 +106,11 @@ bench-peers: ## time, memory and error beside Exudyn, OpenSees and a C loop, as 
 
 alone = set -e; for demo in $(1); do echo "== $$demo"; ./env python3 $$demo; done
 on_two = set -e; for demo in $(1); do echo "== $$demo, 2 ranks"; $(call mpi,2) python3 $$demo; done
+
+# Warnings are errors. All is built anew: what is kept does not notice changes of the package.
+sphinx = rm -rf docs/_build; docs/python -m sphinx -q -W --keep-going
+site = $(sphinx) -b html -d docs/_build/doctrees docs docs/_build/html; \
+	echo "$$(find docs/_build/html -name '*.html' | wc -l) pages, $$(du -sh docs/_build/html | cut -f1): docs/_build/html/index.html"
 
 # The library of the address sanitizer must be the first one of Python; exceptions of C++ need theirs beside it. Leaks are
 # looked for by no one: Python and MPI leave many. Each object has memory of its own, so that one sees where it ends, and

@@ -144,16 +144,15 @@ points = solution.grid.points
 at = points[solution.grid.cells]
 fastest = max(speed.max() for speed in speeds)
 
-with ub.picture((12, 3.7)) as waves:
+with ub.picture((12, 3.3)) as waves:
     for ax, t, speed in zip(waves.subplots(1, 4), solution.times[1:], speeds, strict=True):
-        lines = LineCollection(at, linewidths=60 / bays, cmap="inferno")
+        lines = LineCollection(at, linewidths=60 / bays, cmap="YlGnBu")
         lines.set_array(speed)
         lines.set_norm(LogNorm(1e-3 * fastest, fastest, clip=True))
         ax.add_collection(lines)
         ax.set_xlim(0, bays * bay)
         ax.set_ylim(0, bays * bay)
         ax.set_aspect("equal")
-        ax.set_facecolor("black")
         ax.set_xticks(())
         ax.set_yticks(())
         ax.set_title(f"{1e3 * t:.1f} ms", fontsize="medium")

@@ -21,6 +21,7 @@ import ufl_beam as ub
 
 DOCS = Path(__file__).parent
 sys.path.insert(0, str(DOCS))  # for "conf.read_demo"
+os.environ["TQDM_DISABLE"] = "1"  # progress bars would be text on pages
 
 project = "ufl_beam"
 author = "The ufl_beam developers"
@@ -126,7 +127,11 @@ def rewrite(app, docname, source):
         text += gallery()
     if (below := {"gallery": "demos/demo_*", "reference": "api/*"}.get(docname)) is not None:
         text += "\n".join(["", "```{toctree}", ":hidden:", ":glob:", "", below, "```", ""])
-    text = text.replace("](../demos/", "](demos/").replace("](demos/README.md)", "](gallery.md)")
+    text = (
+        text.replace("](../demos)", "](gallery.md)")
+        .replace("](../demos/", "](demos/")
+        .replace("](demos/README.md)", "](gallery.md)")
+    )
     text = re.sub(r"\[(\w+\.md)\]\(\1\)", r"[](\1)", text)  # the title in the place of the file
     source[0] = OUTSIDE.sub(r"] (`\1`)", text)
 

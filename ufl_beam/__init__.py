@@ -104,7 +104,10 @@ from ufl_beam.output.rainflow import Cycles, Gerber, Goodman, SNCurve, rainflow
 from ufl_beam.output.recorders import Recorder
 from ufl_beam.output.time_series import VTKHDF, XDMF
 from ufl_beam.parallel import say
+from ufl_beam.plotting import notebook  # noqa: F401 - says how notebooks show models and results
 from ufl_beam.plotting.analyses import plot_cycles, plot_extremes, plot_modes, plot_tradeoff
+from ufl_beam.plotting.camera import Camera
+from ufl_beam.plotting.films import Film
 from ufl_beam.plotting.inelastic import (
     plot_damage,
     plot_dissipation,
@@ -116,9 +119,11 @@ from ufl_beam.plotting.plots import plot_energy, plot_history, plot_shapes
 from ufl_beam.plotting.render3d import animate, render
 from ufl_beam.plotting.style import picture
 from ufl_beam.simulation.checkpoint import Checkpoint
+from ufl_beam.simulation.force_diagrams import Diagram
+from ufl_beam.simulation.loading import load
 from ufl_beam.simulation.run import simulate
 from ufl_beam.simulation.simulation import Simulation
-from ufl_beam.simulation.solution import Solution, load
+from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_control import Adaptive
 from ufl_beam.solvers.newton_options import Newton
 from ufl_beam.terms.energy_ledger import Energy
@@ -128,11 +133,11 @@ __version__ = version()
 
 __all__ = [
     "VTKHDF", "XDMF", "Actuator", "Adaptive", "ArcLength", "ArmstrongFrederick", "AxialBending",
-    "Beam", "Body", "BoucWen", "Branch", "Buckling", "Checkpoint", "Clamped", "Connector",
+    "Beam", "Body", "BoucWen", "Branch", "Buckling", "Camera", "Checkpoint", "Clamped", "Connector",
     "Controller", "ConvergenceError", "CopiesDiffer", "Coulomb", "CriticalPoint", "Cycles",
-    "Damper", "Decay", "DecayingMidpoint", "DisplacementControl", "DissipationControl",
+    "Damper", "Decay", "DecayingMidpoint", "Diagram", "DisplacementControl", "DissipationControl",
     "DolfinxView", "DuvautLions", "DynamicScheme", "Energy", "Envelope", "Event", "Events",
-    "ExactStatic", "ExactStep", "Extent", "Extremes", "Fatigue", "Fibres", "FollowerLoad",
+    "ExactStatic", "ExactStep", "Extent", "Extremes", "Fatigue", "Fibres", "Film", "FollowerLoad",
     "ForceLaw", "GeneralizedAlpha", "Gerber", "Goodman", "Gravity", "Guided", "Hardening",
     "History", "HotSpot", "Joint", "KelvinVoigt", "LineLoad", "LinearSoftening", "Link",
     "LoadControl", "Lognormal", "MaterialLaw", "Mesh", "Midpoint", "Midway", "ModelWarning",

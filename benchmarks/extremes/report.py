@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
-import matplotlib.pyplot as plt
+import numpy as np
 from rows import Row
+
+import ufl_beam as ub
+from ufl_beam.plotting.style import INK, scale
 
 DOCS = Path(__file__).parents[2] / "docs"
 SMALLEST = 1e-17
@@ -38,9 +39,9 @@ def save(results: Results) -> None:
         f"message that names what is wrong, {counts['WRONG']} are wrong "
         f"in silence, {counts['HANG']} hang.",
         "",
-        "![Errors over what was varied](pictures/extremes.png)",
+        "![Errors as parts of what is allowed](pictures/extremes.png)",
         "",
-        "*Dots: error, bars: what is allowed, crosses: stopped with a message.*",
+        "*Dots: error as a part of what is allowed, crosses: stopped with a message.*",
         "",
         "| what | varied | works: error, of allowed; iterations per step | stops |",
         "|---|---|---|---|",
@@ -93,33 +94,34 @@ def _cut(message: str, length: int) -> str:
 
 
 def _draw(results: Results, path: Path) -> None:
-    """Small multiples: error over what was varied, for all rows of numbers."""
+    """Errors over what is allowed, a line for each row of numbers and a dot for each value."""
     drawn = [(row, one) for row, one in results if isinstance(row.values[0], int | float)]
-    mpl.use("Agg")
-    columns = 6
-    rows = math.ceil(len(drawn) / columns)
-    figure, axes = plt.subplots(
-        rows, columns, figsize=(16, 2.0 * rows), sharey=True, layout="constrained"
-    )
-    for ax in axes.flat[len(drawn) :]:
-        ax.axis("off")
-    for ax, (row, one) in zip(axes.flat, drawn, strict=False):
-        ticks = range(len(one))
-        for i, r in zip(ticks, one, strict=True):
-            if r["verdict"] == "works":
-                error, allowed = (max(r[name], SMALLEST) for name in ("error", "allowed"))
-                ax.plot([i, i], [SMALLEST, min(allowed, 1.0)], color="0.85", lw=5, zorder=1)
-                ax.plot(i, error, "o", color="C0", ms=4, zorder=2)
-            else:
-                right = r["verdict"] == "stops"
-                ax.plot(i, 1e-1, "x", color="C1" if right else "C3", ms=5, zorder=2)
-        ax.set_yscale("log")
-        ax.set_ylim(SMALLEST / 3, 3.0)
-        ax.set_title(row.name, fontsize=8)
-        shown = [i for i in ticks if i in (0, len(one) // 2, len(one) - 1)]
-        ax.set_xticks(shown, [_text(one[i]["value"]) for i in shown], fontsize=7)
-        ax.tick_params(axis="y", labelsize=7)
-        ax.spines[["top", "right"]].set_visible(False)
-    figure.supylabel("error", fontsize=9)
+    ends = [(row.name, *(_text(one[k]["value"]) for k in (0, -1))) for row, one in drawn]
+    names = [f"{name}: {first} to {last}" for name, first, last in ends]
+    with ub.picture((11.0, 1.6 + 0.29 * len(drawn))) as figure:
+        axes = figure.subplots()
+        along = scale("viridis", 0.0, 0.92, 0.0, 1.0)
+        for number, (_, one) in enumerate(drawn):
+            stopped = 0
+            for part, r in zip(np.linspace(0.0, 1.0, len(one)), one, strict=True):
+                look = {"color": along.to_rgba(part), "clip_on": False}
+                if r["verdict"] == "works":
+                    error = max(r["error"], SMALLEST) / min(r["allowed"], 1.0)
+                    axes.plot(error, number, "o", ms=6, alpha=0.85, **look)
+                else:
+                    axes.plot(
+                        1.02 + 0.014 * stopped, number, "x", ms=6, mew=1.8, **look,
+                        transform=axes.get_yaxis_transform(),
+                    )  # fmt: skip
+                    stopped += 1
+        axes.axvline(1.0, color=INK, lw=1.4, zorder=0)
+        axes.set(xscale="log", xlabel="error / allowed error")
+        axes.set_yticks(range(len(drawn)), names, fontsize=10)
+        axes.grid(axis="y", color="0.92")
+        axes.set_axisbelow(True)
+        axes.set_ylim(len(drawn) - 0.5, -0.5)
+        axes.set_title("dots: computed; crosses: stopped with a message", loc="left", fontsize=12)
+        bar = figure.colorbar(along, ax=axes, orientation="horizontal", shrink=0.5, aspect=40)
+        bar.set_ticks([0.0, 1.0], labels=["first value", "last value"])
+        bar.outline.set_visible(False)
     figure.savefig(path, dpi=110)
-    plt.close(figure)

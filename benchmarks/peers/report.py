@@ -19,8 +19,9 @@ NAMES = {
     "P1": "Roll-up", "P2": "Flying beam", "P3": "Swing", "P4": "Portal", "P5": "Cantilever",
 }  # fmt: skip
 PROGRAMS = {"ufl_beam": "ufl_beam", "exudyn": "Exudyn", "opensees": "OpenSees", "c": "C loop"}
-COLOURS = {"ufl_beam": "C3", "exudyn": "C0", "opensees": "C2"}
-STYLES = ("o-", "s--", "^:", "v-.")
+COLOURS = {"ufl_beam": "#D55E00", "exudyn": "#0072B2", "opensees": "#222222"}
+"""Two of Okabe and Ito's palette and a black: apart for the colour-blind, and in print."""
+STYLES = ("o-", "s--", "^:", "v-.", "D-", "P--")
 
 
 def read():
@@ -102,18 +103,20 @@ def draw(records):
     problems = sorted({r["problem"] for r in drawn})
     if not problems:
         return
+    # A setting has the same style in all panels.
+    settings = {
+        name: sorted({r["label"] for r in drawn if r["program"] == name}) for name in COLOURS
+    }
     mpl.use("Agg")
     figure, axes = plt.subplots(
         1, len(problems), figsize=(4.6 * len(problems), 5.0), layout="constrained", squeeze=False
     )
     for ax, problem in zip(axes.flat, problems, strict=True):
-        used = dict.fromkeys(COLOURS, 0)
         here = [r for r in drawn if r["problem"] == problem]
         curves = sorted({(r["program"], r["label"]) for r in here}, reverse=True)
         for program, label in curves:
             some = [r for r in here if (r["program"], r["label"]) == (program, label)]
-            style, colour = STYLES[used[program] % len(STYLES)], COLOURS[program]
-            used[program] += 1
+            style, colour = STYLES[settings[program].index(label)], COLOURS[program]
             dots = [(statistics.median(r["wall"]), r["measures"]["error"]) for r in some]
             ax.loglog(*zip(*dots, strict=True), style[0], color=colour, ms=3, alpha=0.3)
             name = f"{PROGRAMS[program]}, {label}"

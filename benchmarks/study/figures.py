@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from advice import good, schemes
+from matplotlib.ticker import LogLocator, NullFormatter
 
 import ufl_beam as ub
 from ufl_beam.analysis.richardson import pareto
@@ -65,6 +66,9 @@ def draw_dials(cases: list[Case], path: Path) -> None:
             axes.axvline(1.0, color=GREY, lw=1.2, zorder=0)
             axes.set(xscale="log", title=f"{title}, of that of the base")
             axes.grid(axis="y", color="0.92")
+        left.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        left.xaxis.set_minor_formatter(NullFormatter())
+        left.xaxis.set_major_formatter("{x:g}")
         left.set_yticks(range(len(names)), names, fontsize=10)
         left.invert_yaxis()
         figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=4,

@@ -24,6 +24,7 @@ PAGES = {
     "reference_page": "api/Softening.html",
     "theory": "theory.html",
     "start": "start.html",
+    "notebook": "notebooks/first_steps.html",
     "howto": "howto_pushover.html",
     "coming_from": "coming_from.html",
     "search": "search.html?q=hinge",  # the last one: other pages would highlight the word, too

@@ -37,7 +37,24 @@ def names():
 @pytest.mark.parametrize("name", ub.__all__)
 def test_example(name, names, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    run(name, getattr(ub, name), names)
+    made = run(name, getattr(ub, name), dict(names))
+    require_lines({key: made[key] for key in made.keys() - names.keys()})
+
+
+def require_lines(made):
+    """Objects of the package are shown at the prompt in one line, without their address."""
+    for name, thing in made.items():
+        if type(thing).__module__.startswith("ufl_beam."):
+            shown = repr(thing)
+            assert "\n" not in shown, f"{name}: {shown}"
+            assert " object at 0x" not in shown, f"{name}: {shown}"
+            assert len(shown) < 200, f"{name}: {shown}"
+
+
+def test_the_common_objects_are_shown_in_one_line(names):
+    require_lines(names)
+    with pytest.raises(AssertionError, match=r"wrong: <ufl_beam\.own\.Wrong object at"):
+        require_lines({"wrong": type("Wrong", (), {"__module__": "ufl_beam.own"})()})
 
 
 MEMBERS = [

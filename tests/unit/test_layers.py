@@ -159,7 +159,7 @@ def test_only_what_compiles_and_solves_imports_petsc():
 
 @pytest.mark.parametrize("module", [m for m in FILES if room(m) != "plotting"])
 def test_pictures_are_at_the_end(module):
-    assert not outside(module) & {"matplotlib", "pyvista", "imageio"}
+    assert not outside(module) & {"matplotlib", "pyvista", "PIL"}
 
 
 # -- equations ---------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ import scenes
 from time_series import read_xdmf
 
 import ufl_beam as ub
-from ufl_beam.plotting.drawing import open_hinges
+from ufl_beam.plotting.damage_marks import open_hinges
 from ufl_beam.plotting.style import decimal_prefix, with_unit
 
 LIMIT, FRACTURE, YIELD = 10.0, 3.0, 8.0
@@ -187,6 +187,22 @@ def test_what_is_fully_open_is_hollow(law):
     solution = ub.simulate(scene, ub.ExactStatic(), t=(0, 1), dt=0.05)
     (mark,) = circles(ub.plot_damage(solution).axes[0])
     assert mark.get_markerfacecolor() == "white"
+
+
+@pytest.mark.parametrize("what", ["shape", "M"])
+def test_diagrams_mark_hinges_and_yielded_cells(bent, arm, what):
+    figure = ub.plot(bent, what, n=50)
+    axes = figure.axes[0]
+    (mark,) = circles(axes)
+    np.testing.assert_allclose(mark.get_xydata()[0], bent.shape(arm, 50)[0])
+    ends = bent.shape(arm, 50)
+    (zone,) = np.flatnonzero(bent.material(arm, 50).plastic)
+    bands = [line.get_xydata() for line in axes.lines if line.get_linewidth() > 5]
+    np.testing.assert_allclose(bands, [ends[zone : zone + 2]])
+    assert legend(figure)[-2:] == ["yielded or cracked", "hinge, open"]
+    nothing_yet = ub.plot(bent, what, n=1)
+    assert not circles(nothing_yet.axes[0])
+    assert not any(line.get_linewidth() > 5 for line in nothing_yet.axes[0].lines)
 
 
 def test_cracks_of_fibres_are_damage():

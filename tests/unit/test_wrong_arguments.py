@@ -329,6 +329,11 @@ TABLE = {
     "Newmark": call(ub.Newmark, gamma=V(0.5, [*NUMBER, 0.4]), beta=V(0.25, [*NUMBER, 0.1])),
     "GeneralizedAlpha": call(ub.GeneralizedAlpha, rho_inf=V(0.8, [*NUMBER, -0.1, 1.1])),
     "ExactStatic": call(ub.ExactStatic, theta=V(1.0, [*NUMBER, 0.4, 1.1])),
+    "Camera": call(
+        ub.Camera,
+        direction=V((0, 0, -1), [*OBJECT, (0, 1, 0), (0, 0, NAN), ("0", "0", "1")]),
+        follow=V(BEAM.end, ["x", 1.0, BEAM, ARRAY]), width=V(1.0, optional(POSITIVE)),
+    ),
     "Mesh": call(
         ub.Mesh,
         refine=V(1, [*POSITIVE, 1.5]), degree=V(1, [*COUNT, 4]), lumped=V(False, SWITCH),
@@ -359,7 +364,8 @@ TABLE = {
     "follow": call(
         ub.follow,
         scene=V(SCENE, OBJECT), control=V(ub.LoadControl(1.0), [*OBJECT, ub.LoadControl]),
-        until=V(None, optional(FUNCTION)), steps=V(1, COUNT), **ALONG,
+        until=V(None, optional(FUNCTION)), steps=V(1, COUNT), progress=V(False, SWITCH),
+        **ALONG,
     ),
     "ArcLength": call(ub.ArcLength, step=V(1.0, [*NUMBER, 0.0]), factor=V(1.0, POSITIVE)),
     "LoadControl": call(ub.LoadControl, step=V(1.0, [*NUMBER, 0.0])),
@@ -394,7 +400,8 @@ TABLE = {
         scheme=V(ub.Midpoint(), [*OBJECT, ub.Midpoint]), t=V((0, 1), [*VECTOR, (1, 0)]),
         dt=V(0.5, [*(v for v in POSITIVE if not isinstance(v, list)), []]),
         tolerance=V(1e-3, optional(POSITIVE)),
-        budget=V(None, optional(POSITIVE)), most=V(1.0, POSITIVE), **RUN,
+        budget=V(None, optional(POSITIVE)), most=V(1.0, POSITIVE), progress=V(False, SWITCH),
+        **RUN,
     ),
     # files
     "XDMF": call(ub.XDMF, path=V("run.xdmf", [*PATH, "run.h5"]), every=V(1, COUNT)),
@@ -459,7 +466,7 @@ TABLE |= {
 RECORDS_OF_RUNS = {
     "Branch", "Buckling", "Connector", "CriticalPoint", "Cycles", "Decay", "Energy", "Envelope",
     "Event", "Extent", "Joint", "Modes", "Path", "Solution", "Study", "Support", "Tradeoff",
-    "DolfinxView", "Step",
+    "Diagram", "DolfinxView", "Film", "Step",
 }  # fmt: skip
 """Made by runs and by functions of the package, not by users."""
 

@@ -12,6 +12,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import SceneError, StepFailed
+from ufl_beam.one_line import bracketed, one_line
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers.factorization import Factorisation, SingularMatrix
 
@@ -59,6 +60,8 @@ class Branch:
     state: Solution
     mode: Array
 
+    __repr__ = one_line
+
 
 @dataclass(frozen=True, eq=False)
 class CriticalPoint:
@@ -85,6 +88,8 @@ class CriticalPoint:
     n: int
     state: Solution
     mode: Array
+
+    __repr__ = bracketed
 
     def branch(self, sign: int = 1) -> Branch:
         """Return the start of the path along the mode, or against it with ``sign = -1``.

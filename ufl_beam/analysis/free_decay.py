@@ -11,6 +11,7 @@ import scipy  # its parts are loaded when they are used
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_array, require_number, require_row
+from ufl_beam.one_line import one_line
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,8 @@ class Envelope:
     initial_95: float
     rate_95: float
     rms: float
+
+    __repr__ = one_line
 
     def __str__(self) -> str:
         return (
@@ -106,6 +109,9 @@ class Decay:
         linear, exponential = (max(law.rms, least) for law in (self.linear, self.exponential))
         with np.errstate(over="ignore"):
             return float(np.exp(len(self.times) * abs(np.log(linear / exponential))))
+
+    def __repr__(self) -> str:
+        return f"<Decay: {len(self.times)} peaks, damping ratio {self.ratio:.4g}>"
 
     def __str__(self) -> str:
         spacing, each = np.diff(self.times), self.decrements

@@ -30,14 +30,16 @@ from ufl_beam.model.works import VirtualWork
 from ufl_beam.output.joint_histories import Connection, velocity_of
 from ufl_beam.output.time_series import VTKHDF, XDMF, TimeSeries
 from ufl_beam.parallel import active_comm
+from ufl_beam.rich_display import Rich
 from ufl_beam.simulation.initial_state import mesh_of
 from ufl_beam.simulation.solution import Solution
 
+MOST_TITLES = 4  # modes that a text of one line names
 AMPLITUDE = 0.1  # largest displacement of a mode that is shown, as a part of the scene's size
 
 
 @dataclass(frozen=True, eq=False)
-class Shapes(ABC):
+class Shapes(Rich, ABC):
     """Modes about a state; the same on every process.
 
     Attributes:
@@ -62,6 +64,10 @@ class Shapes(ABC):
 
     def __str__(self) -> str:
         return "\n".join(f"{self.word} {k}: {title}" for k, title in enumerate(self.titles))
+
+    def __repr__(self) -> str:
+        titles = self.titles[:MOST_TITLES] + ["..."] * (len(self) > MOST_TITLES)
+        return f"<{type(self).__name__}: {'; '.join(titles)}>"
 
     def __len__(self) -> int:
         return int(self.shapes.shape[1])
@@ -169,7 +175,7 @@ class _Frame:
         return np.asarray((ends[0] - ends[1]) / (2 * ε))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Modes(Shapes):
     """Vibration modes ``x exp(s t)`` about a state; made by :func:`modes`.
 
@@ -217,7 +223,7 @@ class Modes(Shapes):
         ]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Buckling(Shapes):
     """Buckling modes and their load factors; made by :func:`buckling`.
 

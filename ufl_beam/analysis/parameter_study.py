@@ -18,13 +18,12 @@ from typing import Any
 from mpi4py import MPI
 from mpi4py.futures import MPICommExecutor
 
-from tqdm import tqdm
-
 from ufl_beam.analysis.study_file import Outcome, Study, numbers_of, text_of
 from ufl_beam.collective_errors import on_first
 from ufl_beam.errors import SceneError, require_sequence, require_switch, shorten
 from ufl_beam.output.output_files import require_apart, require_path, take
 from ufl_beam.parallel import alone, communicator, say
+from ufl_beam.progress_bar import progress_bar
 
 Case = dict[str, Any]
 Member = Callable[..., dict[str, Any]]
@@ -59,7 +58,7 @@ def study(
             other cases stays.
         anew: Compute all cases again and discard the results in the file, after a change of the
             member.
-        progress: Show a progress bar if the output is a terminal.
+        progress: Show a progress bar in a terminal or notebook.
         comm: Processes; all of them, or this one alone in a member of another study.  A member
             leaves out ``comm`` of :func:`simulate`.
 
@@ -120,8 +119,8 @@ def study(
 
     def gather() -> None:
         missing = {key: case for key, case in todo.items() if key not in records}
-        next_save, quiet, done = 0.0, None if progress else True, len(todo) - len(missing)
-        bar = tqdm(total=len(todo), initial=done, unit="member", disable=quiet)
+        next_save, done = 0.0, len(todo) - len(missing)
+        bar = progress_bar(progress, comm, total=len(todo), initial=done, unit="member")
         try:
             with bar, closing(_outcomes(comm, member, missing)) as outcomes:
                 for key, outcome, seconds in outcomes:

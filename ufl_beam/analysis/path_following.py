@@ -21,6 +21,7 @@ from ufl_beam.errors import (
     require_count,
     require_function,
     require_kind,
+    require_switch,
 )
 from ufl_beam.mechanics.classical import Static
 from ufl_beam.model.connector_laws import Controller
@@ -30,10 +31,13 @@ from ufl_beam.output.archive import above, below
 from ufl_beam.output.recorders import Recorder, recorders_of
 from ufl_beam.parallel import communicator
 from ufl_beam.parameter import FACTOR
+from ufl_beam.progress_bar import progress_bar
 from ufl_beam.simulation.run import running
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers.newton_options import Newton
+
+MOST_POINTS = 5  # critical points that the text of a path names
 
 ADVICE = (
     "Try a shorter step or another control: ArcLength goes through limit points of loads and of "
@@ -60,6 +64,13 @@ class Path(Solution):
     def factor(self) -> Array:
         """Load factors, the time of the time functions; (n+1,)."""
         return self.times
+
+    def summary(self) -> list[str]:
+        """Return lines on the model, the path, embedded hinges, and the first critical points."""
+        first = ", ".join(map(str, self.critical[:MOST_POINTS]))
+        rest = len(self.critical) - MOST_POINTS
+        points = f"{first} and {rest} more" if rest > 0 else first
+        return [*super().summary(), *filter(None, [points])]
 
     def _content(self) -> tuple[dict[str, Any], State]:
         text, arrays = super()._content()
@@ -96,6 +107,7 @@ def follow(
     record: Sequence[Recorder] | Recorder = (),
     newton: Newton | None = None,
     mesh: Mesh | None = None,
+    progress: bool = True,
     comm: MPI.Intracomm | None = None,
 ) -> Path:
     """Follow a path of static equilibria through limit points and snap-backs.
@@ -117,6 +129,7 @@ def follow(
         record: Files to write on the way.
         newton: Tolerances and PETSc options; line searches and Krylov methods are not used.
         mesh: Discretization; as ``start``, or with the cells of the beams.
+        progress: Show a progress bar in a terminal or notebook.
         comm: Processes that share the scene.
 
     Raises:
@@ -139,6 +152,7 @@ def follow(
         )
     control.require(scene)
     require_count(steps, "follow: steps")
+    require_switch(progress, "follow: progress")
     if start is not None:
         require_kind(start, (Solution, Branch), "follow: start")
     recorders, outputs = recorders_of(record, comm, "follow")
@@ -161,7 +175,8 @@ def follow(
             recorder.write(simulation)
         return until is not None and bool(until(simulation))
 
-    with running(simulation, recorders, outputs, began):
+    bar = progress_bar(progress, comm, total=steps, unit="step")
+    with running(simulation, recorders, outputs, began), bar:
         try:
             stepper.begin(branch, fresh=state is None)
             for recorder in recorders:
@@ -169,6 +184,8 @@ def follow(
             simulation.keep()
             for _ in range(steps):
                 stepper.advance()
+                bar.set_postfix_str(FACTOR.at(simulation.t), refresh=False)
+                bar.update()
                 if simulation.share.largest(simulation.together(after_step)):
                     break
         except StepFailed as failure:

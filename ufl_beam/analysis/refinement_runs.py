@@ -39,6 +39,7 @@ class RefinementRuns:
     t: tuple[float, float]
     most: float  # wall time that all runs together may take; s
     comm: MPI.Intracomm
+    bar: Any  # progress bar
     runs: dict[Refinement, Run] = field(default_factory=dict, init=False)
     failed: dict[Refinement, str] = field(default_factory=dict, init=False)  # why runs failed
     spent: float = field(default=0.0, init=False)  # wall time of all runs, and of compiling; s
@@ -80,12 +81,16 @@ class RefinementRuns:
                 f"{self.dials(missing[-1])}",
                 tuple(self.runs.values()),
             )
+        self.bar.set_postfix_str(f"{len(missing)} more up to {self.dials(missing[-1])}")
         cases = [one._asdict() | {"short": short} for one in missing]
         try:
             done = study(self._member, cases, progress=False, comm=self.comm)
         except RuntimeError as error:  # all of them failed
             self.failed |= dict.fromkeys(missing, str(error))
             return
+        finally:
+            self.bar.set_postfix_str("", refresh=False)
+            self.bar.update(len(missing))
         for k, one in enumerate(missing):
             if k in done.failed:
                 self.failed[one] = done.failed[k]

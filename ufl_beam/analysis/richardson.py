@@ -15,6 +15,7 @@ import numpy as np
 import scipy  # its parts are loaded when they are used
 
 from ufl_beam.arrays import Array
+from ufl_beam.one_line import one_line
 
 Level = tuple[int, int]  # of the cells and of the steps
 LEAST_ORDER = 0.5  # differences that fall more slowly than with this power show no convergence
@@ -42,6 +43,8 @@ class Convergence:
     error: float  # of the finest level; where changes are negligible, of every level
     rest: Array  # what the finest level lacks of the limit, with its sign
     safety: float  # factor by which ``error`` may be wrong
+
+    __repr__ = one_line
 
     @classmethod
     def of(
@@ -91,6 +94,8 @@ class Cross:
     steps: Convergence  # with the steps
     limit: Array  # extrapolated value
     mixed: float  # what refining both changes that refining each does not, extrapolated
+
+    __repr__ = one_line
 
     @staticmethod
     def levels(base: Level) -> list[Level]:

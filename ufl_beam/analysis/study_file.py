@@ -14,6 +14,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_kind
+from ufl_beam.rich_display import Rich
 
 Outcome = dict[str, Array] | str  # result of a member, or the reason of its failure
 
@@ -21,7 +22,7 @@ FORMAT = "study of ufl_beam, 1"
 
 
 @dataclass(frozen=True, eq=False)
-class Study:
+class Study(Rich):
     """Results of the members of a study, the same on every process.
 
     ``study["peak"]`` has a row for each case; that of a failed member is NaN.
@@ -72,6 +73,10 @@ class Study:
         if name not in self.results:
             raise SceneError(f"study: no result {name!r}; there is {', '.join(self.results)}")
         return self.results[name]
+
+    def __repr__(self) -> str:
+        names = ", ".join(self.results) or "no results"
+        return f"<Study of {self.member}: {len(self)} cases, {len(self.failed)} failed; {names}>"
 
     def __str__(self) -> str:
         lines = [f"study of {self.member}: {len(self)} members, {len(self.failed)} failed"]

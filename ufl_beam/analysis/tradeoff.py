@@ -23,6 +23,7 @@ from ufl_beam.errors import (
     TradeoffError,
     require_kind,
     require_number,
+    require_switch,
     require_text,
     shorten,
 )
@@ -30,6 +31,7 @@ from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.parallel import communicator
+from ufl_beam.progress_bar import progress_bar
 from ufl_beam.simulation.initial_state import require_scheme
 from ufl_beam.simulation.run import simulate
 from ufl_beam.simulation.step_control import Adaptive
@@ -39,6 +41,7 @@ NEWTON_SHARE = 0.1  # part of the error that another tolerance of Newton's metho
 MOST_DOUBTS, MOST_TRIALS = 4, 6  # refinements without self-convergence; settings tried
 SHORT_CHOICE = 2.0  # settings that are tried in a shorter time are run three times; s
 ROUNDING = 1e-9  # part of a quantity up to which changes are of rounding or Newton's method
+BAR = "trade-off: {n} runs [{elapsed}{postfix}]"
 STEP_ORDER = 2.0  # order of the schemes, at most; that of cells is twice their degree
 
 One = TypeVar("One")
@@ -56,6 +59,7 @@ def tradeoff(
     mesh: Mesh | Sequence[Mesh] | None = None,
     newton: Newton | Sequence[Newton] | None = None,
     most: float = 600.0,
+    progress: bool = True,
     comm: MPI.Intracomm | None = None,
 ) -> Tradeoff:
     """Find the cheapest setting for a tolerance, or the most accurate one for a time.
@@ -80,6 +84,7 @@ def tradeoff(
         newton: How exactly equilibria are found; of several the first is used, and the others are
             tried in the end.
         most: Wall time of all runs; s.
+        progress: Show the number of runs in a terminal or notebook.
         comm: Processes; each run is done by one of them, several at a time.  Runs that go on
             together disturb each other's times: leave cores idle where times matter.
 
@@ -108,6 +113,7 @@ def tradeoff(
             )
     target = target_of(quantities, tolerance, budget)
     require_number(most, "tradeoff: most", positive=True)
+    require_switch(progress, "tradeoff: progress")
     comm = communicator(comm, "tradeoff: comm")
     meshes = _several(Mesh() if mesh is None else mesh, Mesh, "mesh")
     newtons = _several(Newton() if newton is None else newton, Newton, "newton")
@@ -119,33 +125,19 @@ def tradeoff(
         if not isinstance(step, Adaptive):
             require_number(step, f"tradeoff: dt[{i}]" if len(steps) > 1 else "tradeoff: dt")
     families = [Dials(*one, newtons[0]) for one in product(schemes, steps, meshes)]
-    runs = RefinementRuns(scene, quantities, simulate, families, newtons, t=t, most=most, comm=comm)
-    found: list[_Found] = []
-    notes: list[str] = []
-    wrong: list[SceneError] = []
-    for family, dials in enumerate(families):
-        try:
-            runs.begin(family)
-        except SceneError as error:
-            wrong.append(error)
-            notes.append(f"{dials}: {error}")
-            continue
-        try:
-            found.append(_Search(runs, family, target).find(found))
-        except TradeoffError as error:
-            notes.append(f"{dials}: {error}")
-    if len(wrong) == len(families):
-        raise wrong[0]
-    if not found:
-        raise TradeoffError("tradeoff: " + "\n".join(notes), tuple(runs.runs.values()))
-    best = min(found, key=lambda one: one.rank(target))
+    with progress_bar(progress, comm, unit="run", bar_format=BAR) as bar:
+        runs = RefinementRuns(
+            scene, quantities, simulate, families, newtons, t=t, most=most, comm=comm, bar=bar
+        )
+        found, notes = _find_all(runs, target)
+        best = min(found, key=lambda one: one.rank(target))
+        run = _other_newton(runs, best)
     crosses = best.prediction.crosses
     for other in found:
         for name, cross in other.prediction.crosses.items():
             apart = size(cross.limit - crosses[name].limit)
             if apart > cross.uncertainty + crosses[name].uncertainty:
                 notes.append(f"{other.run.dials}: its limit of {name} is {apart:.2g} away")
-    run = _other_newton(runs, best)
     if not target.accepts(run.seconds, replace(best, run=run).ratio):
         notes.append(f"no setting was found that is nearer to {target}")
     return Tradeoff(
@@ -275,6 +267,29 @@ class _Search:
     @property
     def _mean(self) -> float:
         return geometric_mean(self._slower or [1.0])
+
+
+def _find_all(runs: RefinementRuns, target: Target) -> tuple[list[_Found], list[str]]:
+    """Find the setting of each family that serves, and notes on the others; raise if none does."""
+    found: list[_Found] = []
+    notes: list[str] = []
+    wrong: list[SceneError] = []
+    for family, dials in enumerate(runs.families):
+        try:
+            runs.begin(family)
+        except SceneError as error:
+            wrong.append(error)
+            notes.append(f"{dials}: {error}")
+            continue
+        try:
+            found.append(_Search(runs, family, target).find(found))
+        except TradeoffError as error:
+            notes.append(f"{dials}: {error}")
+    if len(wrong) == len(runs.families):
+        raise wrong[0]
+    if not found:
+        raise TradeoffError("tradeoff: " + "\n".join(notes), tuple(runs.runs.values()))
+    return found, notes
 
 
 def _other_newton(runs: RefinementRuns, best: _Found) -> Run:

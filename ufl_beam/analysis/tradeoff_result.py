@@ -15,6 +15,8 @@ from ufl_beam.analysis.targets import Target
 from ufl_beam.arrays import Array
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.mesh_options import Mesh
+from ufl_beam.one_line import bracketed, one_line
+from ufl_beam.rich_display import Rich
 from ufl_beam.solvers.newton_options import Newton
 
 
@@ -47,20 +49,10 @@ class Dials:
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
     def __str__(self) -> str:
-        return ", ".join(map(_in_words, self.arguments.values()))
+        step = f"dt={self.dt:.4g}" if isinstance(self.dt, float | int) else one_line(self.dt)
+        return ", ".join([one_line(self.scheme), step, one_line(self.mesh), one_line(self.newton)])
 
-
-def _in_words(value: Any) -> str:
-    """A number, or the fields of a record that are not as by default."""
-    if isinstance(value, float | int):
-        return f"dt={value:.4g}"
-    given = {field.name: (getattr(value, field.name), field.default) for field in fields(value)}
-    shown = (
-        f"{name}={one:.4g}" if isinstance(one, float) else f"{name}={one}"
-        for name, (one, default) in given.items()
-        if one and one != default
-    )  # fmt: skip
-    return f"{type(value).__name__}({', '.join(shown)})"
+    __repr__ = bracketed
 
 
 class Refinement(NamedTuple):
@@ -85,9 +77,12 @@ class Run:
     iterations: float  # newton iterations per step
     spent: float  # wall time of all repetitions; s
 
+    def __repr__(self) -> str:
+        return f"<Run: {self.dials}: {self.seconds:.3g} s>"
+
 
 @dataclass(frozen=True, eq=False)
-class Tradeoff:
+class Tradeoff(Rich):
     """Result of :func:`tradeoff`: runs, errors and the recommended setting.
 
     Attributes:
@@ -149,7 +144,12 @@ class Tradeoff:
         ratios = np.array([self.ratio(run) for run in self.runs])
         return [self.runs[k] for k in pareto(seconds, ratios)]
 
-    def __str__(self) -> str:
+    def title(self) -> str:
+        """Return what was asked, in words."""
+        return f"trade-off for {self.target}; errors are distances from the extrapolated limit"
+
+    def table(self) -> list[list[str]]:
+        """Return cost, errors and dials of the runs that no other one beats, below a head."""
         rows = [["", "seconds", "steps", "cells", "iterations", *self.limit, "dials"]]
         for run in sorted({*self.front, self.best}, key=lambda run: run.seconds):
             rows.append([
@@ -157,10 +157,12 @@ class Tradeoff:
                 f"{run.cells:.0f}", f"{run.iterations:.2f}",
                 *(f"{error:.2g}" for error in self.errors(run).values()), str(run.dials),
             ])  # fmt: skip
-        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        widths[-1] = 0  # dials begin in one column
-        lines = ["  ".join(map(str.rjust, row, widths)) for row in rows]
-        lines.append(f"and {len(self.runs) - len(lines) + 1} runs that others beat in both")
+        return rows
+
+    def remarks(self) -> list[str]:
+        """Return lines on convergence, cost and the recommended setting."""
+        shown = {*self.front, self.best}
+        lines = [f"and {len(self.runs) - len(shown)} runs that others beat in both"]
         for name, cross in self.crosses.items():
             value = np.array2string(cross.limit, precision=9, threshold=6, edgeitems=2)
             lines.append(f"{name}: limit {value} ± {cross.uncertainty:.1g}{cross}")
@@ -168,7 +170,18 @@ class Tradeoff:
             f"{len(self.runs)} runs took {self.spent:.3g} s, "
             f"{self.spent / self.best.seconds:.2g} times the recommended one"
         )
-        return "\n".join([
-            f"trade-off for {self.target}; errors are distances from the extrapolated limit",
-            *lines, *self.notes, f"recommended: {self.best.dials}: {self.best.seconds:.3g} s",
-        ])  # fmt: skip
+        return [*lines, *self.notes, f"recommended: {self._recommended}"]
+
+    @property
+    def _recommended(self) -> str:
+        return f"{self.best.dials}: {self.best.seconds:.3g} s"
+
+    def __str__(self) -> str:
+        rows = self.table()
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        widths[-1] = 0  # dials begin in one column
+        lines = ["  ".join(map(str.rjust, row, widths)) for row in rows]
+        return "\n".join([self.title(), *lines, *self.remarks()])
+
+    def __repr__(self) -> str:
+        return f"<Tradeoff: {len(self.runs)} runs; recommended {self._recommended}>"

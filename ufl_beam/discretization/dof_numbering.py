@@ -25,6 +25,7 @@ from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.plastic_hinges import place_of
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
+from ufl_beam.one_line import counted
 
 
 class Grid:
@@ -72,6 +73,17 @@ class Grid:
         self._add_hinges([place_of(hinge) for hinge in scene.hinges])
         self.nodes_of_cells = np.hstack([self.cells, numbers])
         self._number()
+
+    def __str__(self) -> str:
+        scene = self.scene
+        return counted(
+            (len(scene.beams), "beam", "beams"), (len(self.cells), "cell", "cells"),
+            (len(scene.bodies), "body", "bodies"), (len(scene.links), "link", "links"),
+            (self.size, "degree of freedom", "degrees of freedom"),
+        )  # fmt: skip
+
+    def __repr__(self) -> str:
+        return f"<Grid: {self}>"
 
     def _require_length(self) -> None:
         lengths = self.lengths(np.arange(len(self.cells)))

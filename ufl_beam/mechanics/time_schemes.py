@@ -19,6 +19,7 @@ from ufl_beam.errors import SceneError, require_number
 from ufl_beam.mechanics.kinematics import Axis
 from ufl_beam.model.law_functions import Values
 from ufl_beam.model.material_laws import SofteningLaw
+from ufl_beam.one_line import one_line
 
 Constant = Callable[[float], Expr]
 """Makes a number of the scheme a constant of the form, so that changing it compiles nothing."""
@@ -40,6 +41,9 @@ class Step(NamedTuple):
     motion_time: float  # at which prescribed motions are taken; s
     fraction: float  # part of the way to these loads and motions that the step goes; 1: all of it
     at: float = 1.0  # part of the way between loads at both ends, in the equation; 1: at the end
+
+    def __repr__(self) -> str:
+        return one_line(self)
 
     @property
     def dt(self) -> float:

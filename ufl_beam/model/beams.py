@@ -117,6 +117,10 @@ class Beam(Member):
                 "Units are SI: m, N, N m². If EI is large on purpose, give the section its depth"
             )
 
+    def __repr__(self) -> str:
+        a, b = (f"({x:g}, {y:g})" for x, y in (self.a, self.b))
+        return f"<Beam {self.name!r}: {a} to {b}, {self.cells} cells>"
+
     @property
     def hinge_laws(self) -> dict[Place, HingeLaw]:
         """Laws of the plastic hinges of zero length that the beam may have, by place."""

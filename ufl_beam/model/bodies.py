@@ -23,6 +23,7 @@ from ufl_beam.errors import (
 )
 from ufl_beam.model.curves import Curve, Point, tangent_within
 from ufl_beam.model.records import NotNegative, Record, Vector
+from ufl_beam.one_line import bracketed
 
 TOGETHER = 1e-9
 """Distance below which two places of a beam are one, as a part of a cell."""
@@ -93,6 +94,8 @@ class Place:
     beam: Member
     s: float
     beyond: bool = False
+
+    __repr__ = bracketed
 
     def __post_init__(self) -> None:
         if not isinstance(self.beam, Member):
@@ -188,6 +191,8 @@ class Spot:
 
     body: Body
     point: Point
+
+    __repr__ = bracketed
 
     def __post_init__(self) -> None:
         require_kind(self.body, Body, "Spot: body")

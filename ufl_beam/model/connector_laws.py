@@ -18,6 +18,7 @@ from ufl_beam.model.material_law import MaterialLaw
 from ufl_beam.model.material_laws import AnySoftening, HingeLaw, require_hinge_law
 from ufl_beam.model.records import Instance, NotNegative, Positive, Record
 from ufl_beam.model.time_functions import Constant, Timed
+from ufl_beam.one_line import one_line
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,8 @@ class Motor(Record):
 
     motion: Timed
 
+    __repr__ = one_line
+
 
 @dataclass(frozen=True)
 class Actuator(Record):
@@ -54,6 +57,8 @@ class Actuator(Record):
     """
 
     force: Timed
+
+    __repr__ = one_line
 
 
 class Bearing:
@@ -88,6 +93,8 @@ class Controller(Record):
     """
 
     force: Annotated[Callable[[Any], float], partial(require_function, of="the simulation")]
+
+    __repr__ = one_line
 
     def ask(self, simulation: Running, link: object) -> float:
         """Evaluate the force of ``link`` in the next step; all processes call it together."""

@@ -10,6 +10,7 @@ from ufl_beam.errors import SceneError, require_kind, require_vector
 from ufl_beam.model.bodies import Anchor, arm, require_anchors
 from ufl_beam.model.connector_laws import Coulomb, Guide, Law, Motor, RigidPlastic
 from ufl_beam.model.curves import Point
+from ufl_beam.one_line import bracketed
 
 Factors = tuple[float, float, float]
 """Derivatives of a relative motion by (u, v, ψ) of a node."""
@@ -46,6 +47,8 @@ class Connector:
     law: Law
     axis: Point = (1.0, 0.0)
     corner: Point | None = None
+
+    __repr__ = bracketed
 
     def __post_init__(self) -> None:
         require_anchors(self.kind, self.a, self.b)

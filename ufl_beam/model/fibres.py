@@ -17,6 +17,7 @@ from ufl_beam.model.law_functions import Values
 from ufl_beam.model.material_law import MaterialLaw
 from ufl_beam.model.material_laws import AnySoftening
 from ufl_beam.model.records import Instance, Record
+from ufl_beam.one_line import one_line
 
 Below = Callable[[Array], Array]
 """Area of a shape below y, from any line, and its first moment about y = 0; (2, n); m², m³."""
@@ -125,6 +126,8 @@ class Fibres(Record):
     number: Annotated[int, require_count] = 20
     softening: Instance[AnySoftening | None] = None
 
+    __repr__ = one_line
+
 
 @dataclass(frozen=True, eq=False)
 class PlacedFibres:
@@ -134,6 +137,8 @@ class PlacedFibres:
     E: float  # Young's modulus; Pa
     y: Array  # distances from the axis, positive to the left of its direction; (n,); m
     A: Array  # areas; (n,); m²
+
+    __repr__ = one_line
 
     @classmethod
     def at(cls, fibres: Fibres, E: float, y: Sequence[float], A: Sequence[float]) -> PlacedFibres:

@@ -9,6 +9,7 @@ from typing import Any
 
 from ufl_beam.errors import SceneError, require_function, require_row
 from ufl_beam.model.named_parameters import parameters_by_name
+from ufl_beam.one_line import one_line
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,8 @@ class ForceLaw:
     force: Callable[..., Any]
     state: Sequence[float] = ()
     stored: Callable[..., float] | None = None
+
+    __repr__ = one_line
 
     def __post_init__(self) -> None:
         require_function(self.force, "ForceLaw: force", "(motion, rate)")

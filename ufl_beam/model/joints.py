@@ -11,6 +11,7 @@ from ufl_beam.model.bodies import Anchor, NodeDof, Place, carries, ground, node,
 from ufl_beam.model.connector_laws import HELD, Bearing, Guide
 from ufl_beam.model.connectors import Connector, require_apart, unit_axis
 from ufl_beam.model.curves import Curve, Point, point_of
+from ufl_beam.one_line import bracketed
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +44,8 @@ class Joint(Bearing):
     meets: bool = False
     advice: str = "RigidLink and Link join places that are apart"
     look: str = ""
+
+    __repr__ = bracketed
 
     def __post_init__(self) -> None:
         if len(self.places) < 2:

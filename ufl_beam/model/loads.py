@@ -10,6 +10,7 @@ from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import Anchor, Member, carries, require_anchors, require_beam
 from ufl_beam.model.records import Number, Record, Vector
 from ufl_beam.model.time_functions import Timed, TimeFunction, steady
+from ufl_beam.one_line import one_line
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +50,8 @@ class PointLoad(LoadAtPlace):
         [    312. -100000. -174990.]
     """
 
+    __repr__ = one_line
+
 
 @dataclass(frozen=True, eq=False)
 class FollowerLoad(LoadAtPlace):
@@ -67,6 +70,8 @@ class FollowerLoad(LoadAtPlace):
         >>> bool(run.reaction(pushed.supports[0])[-1, 0] > 1e3)  # N: the force has turned
         True
     """
+
+    __repr__ = one_line
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -100,6 +105,8 @@ class LineLoad(Record):
     moment: Number = 0.0
     time: Timed = steady
 
+    __repr__ = one_line
+
     def __post_init__(self) -> None:
         require_beam(self.beam, "LineLoad: beam")
         super().__post_init__()
@@ -127,6 +134,8 @@ class Gravity(Record):
 
     acceleration: Vector = (0.0, -9.81)
     time: Timed = steady
+
+    __repr__ = one_line
 
     def __str__(self) -> str:
         return "Gravity"

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from ufl_beam.errors import SceneError, require_kind, require_memory, require_number, shorten
 from ufl_beam.model.bodies import Member
+from ufl_beam.one_line import one_line
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,8 @@ class Mesh:
     refine: int | Fraction = 1
     degree: int = 1
     lumped: bool = False
+
+    __repr__ = one_line
 
     def __post_init__(self) -> None:
         require_kind(self.lumped, bool, "Mesh: lumped")
@@ -75,9 +78,15 @@ class Mesh:
         at = np.polynomial.legendre.Legendre.basis(p)(2 * self.nodes - 1)
         return np.asarray(1 / (p * (p + 1) * at**2))
 
-    def weights(self, part: float) -> npt.NDArray[np.float64]:
-        """Weights of the nodes of a cell in the value at a part of it, by Lagrange."""
-        return np.asarray(part ** np.arange(self.degree + 1) @ self._polynomials)
+    def weights(self, part: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Lagrange weights of the nodes of a cell in the values at parts of it; (..., nodes)."""
+        powers = np.power.outer(part, np.arange(self.degree + 1))
+        return np.asarray(powers @ self._polynomials)
+
+    def slopes(self, part: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Derivatives of :meth:`weights` by the part; (..., nodes)."""
+        powers = np.arange(1, self.degree + 1) * np.power.outer(part, np.arange(self.degree))
+        return np.asarray(powers @ self._polynomials[1:])
 
     @cached_property
     def _polynomials(self) -> npt.NDArray[np.float64]:

@@ -38,10 +38,12 @@ from ufl_beam.model.plastic_hinges import plastic_hinges
 from ufl_beam.model.supports import COMPONENTS, Support
 from ufl_beam.model.time_functions import TimeFunction, value_at
 from ufl_beam.model.works import Potential, VirtualWork, Work
+from ufl_beam.one_line import counted
+from ufl_beam.rich_display import Rich
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class Scene(Rich):
     """Model: beams and bodies with joints, supports, loads, masses and connectors.
 
     Args:
@@ -126,6 +128,18 @@ class Scene:
                 f"there is {there}; scene.beams[i] and scene.bodies[i] are those of a number"
             )
         return found[0]
+
+    def __str__(self) -> str:
+        return counted(
+            (len(self.beams), "beam", "beams"), (len(self.bodies), "body", "bodies"),
+            (len(self.joints), "joint", "joints"), (len(self.supports), "support", "supports"),
+            (len(self.connectors), "connector", "connectors"),
+            (len(self.masses), "mass", "masses"), (len(self.loads), "load", "loads"),
+            (len(self.works), "work", "works"),
+        )  # fmt: skip
+
+    def __repr__(self) -> str:
+        return f"<Scene: {self}>"
 
     @cached_property
     def size(self) -> float:

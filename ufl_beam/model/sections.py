@@ -20,6 +20,7 @@ from ufl_beam.model.law_checks import require_bulk_law, require_interaction
 from ufl_beam.model.material_law import MaterialLaw
 from ufl_beam.model.material_laws import AnySoftening, Hardening
 from ufl_beam.model.records import Instance, NotNegative, Positive, Record
+from ufl_beam.one_line import one_line
 
 ResultantLaw = Annotated[MaterialLaw | None, require_bulk_law]
 
@@ -73,6 +74,8 @@ class Section(Record):
     fibres: Instance[PlacedFibres | None] = None
     interaction: Annotated[MaterialLaw | None, require_interaction] = None
     massless_by_default: bool = field(init=False, repr=False)
+
+    __repr__ = one_line
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -11,6 +11,7 @@ from ufl_beam.model.bodies import Anchor, require_node
 from ufl_beam.model.connector_laws import Bearing
 from ufl_beam.model.curves import Point
 from ufl_beam.model.time_functions import Constant, TimeFunction, require_time_function
+from ufl_beam.one_line import bracketed
 
 COMPONENTS = ("u", "v", "psi")
 
@@ -39,6 +40,8 @@ class Support(Bearing):
     place: Anchor
     held: dict[int, TimeFunction]
     angle: float = 0.0
+
+    __repr__ = bracketed
 
     def __post_init__(self) -> None:
         require_node(self.place, self.kind)

@@ -12,6 +12,7 @@ from typing import Annotated
 import numpy as np
 
 from ufl_beam.errors import SceneError, require_number, require_returned, require_sequence, shorten
+from ufl_beam.one_line import one_line
 
 TimeFunction = Callable[[float], float]
 
@@ -63,6 +64,8 @@ class Table:
 
     times: Sequence[float]
     values: Sequence[float]
+
+    __repr__ = one_line
 
     def __post_init__(self) -> None:
         for name in ("times", "values"):

@@ -19,6 +19,7 @@ from ufl_beam.errors import (
 from ufl_beam.model.bodies import Member
 from ufl_beam.model.named_parameters import parameters_by_name
 from ufl_beam.model.time_functions import TimeFunction, require_time_function
+from ufl_beam.one_line import bracketed
 
 ENTRIES = (
     *("kinetic", "stored", "hardening", "loads", "supports", "motors", "controllers"),
@@ -152,6 +153,8 @@ class VirtualWork(Work):
 
     arguments = ("q0", "q1", "q", "v", "w", "axis", "t", "dt")
 
+    __repr__ = bracketed
+
 
 @dataclass(frozen=True, eq=False)
 class Potential(Work):
@@ -184,3 +187,5 @@ class Potential(Work):
     """
 
     arguments = ("q", "axis", "t")
+
+    __repr__ = bracketed

@@ -86,6 +86,9 @@ class DolfinxView:
     def __init__(self, of: Viewed) -> None:
         self._of = of
 
+    def __repr__(self) -> str:
+        return f"<DolfinxView of {self._of!r}>"
+
     @cached_property
     def _fields(self) -> DolfinxFields:
         return DolfinxFields(self._of.share)

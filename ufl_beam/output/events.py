@@ -16,6 +16,7 @@ from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import Coulomb, Stop
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.plastic_hinges import law_of
+from ufl_beam.one_line import bracketed
 from ufl_beam.output.recorders import Recorder
 from ufl_beam.output.state_view import StateView
 from ufl_beam.parameter import TIME, Parameter
@@ -51,6 +52,9 @@ class Event(NamedTuple):
     what: str
     parameter: Parameter = TIME
 
+    def __repr__(self) -> str:
+        return bracketed(self)
+
     def __str__(self) -> str:
         return f"{self.parameter.at(self.time, '.9g')}: {self.where} {self.what}"
 
@@ -80,6 +84,9 @@ class Events(Recorder):
         self._tell = tell or (lambda event: None)
         self.found: list[Event] = []
         self._rows: list[Row] = []
+
+    def __repr__(self) -> str:
+        return f"<Events: {len(self.found)}>"
 
     def open(self, simulation: StateView) -> None:
         """Take note of the initial state."""

@@ -11,6 +11,7 @@ from ufl_beam.arrays import Array, Index, State
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import Body, Member
+from ufl_beam.one_line import one_line
 from ufl_beam.output.recorders import Recorder
 from ufl_beam.output.state_view import StateView
 
@@ -36,6 +37,9 @@ class Extent(NamedTuple):
     high: Array
     time_low: Array
     time_high: Array
+
+    def __repr__(self) -> str:
+        return one_line(self)
 
     @classmethod
     def around(cls, values: Array, t: float) -> Extent:

@@ -13,6 +13,7 @@ from ufl_beam.arrays import Array, State
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import SceneError, require_kind, require_number, require_sequence
 from ufl_beam.model.bodies import Place
+from ufl_beam.one_line import one_line
 from ufl_beam.output.rainflow import Cycles, RainflowCounter, SNCurve
 from ufl_beam.output.recorders import Recorder
 from ufl_beam.output.state_view import StateView
@@ -40,6 +41,8 @@ class HotSpot:
 
     place: Place
     stress: Callable[[Array, Array, Array], Array]
+
+    __repr__ = one_line
 
     def __post_init__(self) -> None:
         require_kind(self.place, Place, "HotSpot: place")

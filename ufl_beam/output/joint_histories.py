@@ -17,6 +17,7 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import nearest, parameter_step, tangent
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
+from ufl_beam.one_line import one_line
 
 
 class Connection(NamedTuple):
@@ -37,6 +38,9 @@ class Connection(NamedTuple):
     rate: Any
     dissipated: Any
 
+    def __repr__(self) -> str:
+        return one_line(self)
+
 
 class JointHistory(NamedTuple):
     """History of a joint, b being its second place and a its first.
@@ -55,6 +59,9 @@ class JointHistory(NamedTuple):
     in_a: Array
     in_b: Array
     moment: Array
+
+    def __repr__(self) -> str:
+        return one_line(self)
 
 
 def links_of(scene: Scene, of: Connector | Joint) -> list[int]:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, is_infinite, require_function, require_number, require_row
+from ufl_beam.one_line import one_line
 
 
 @dataclass(frozen=True)
@@ -106,6 +107,8 @@ class SNCurve:
     limit: float = math.inf
     mean: Callable[[Array, Array], Array] = any_mean
 
+    __repr__ = one_line
+
     def __post_init__(self) -> None:
         for name in ("range", "cycles", "slope", "slope_beyond"):
             require_number(getattr(self, name), f"SNCurve: {name}", positive=True)
@@ -160,6 +163,8 @@ class Cycles:
     range: Array
     mean: Array
     count: Array
+
+    __repr__ = one_line
 
     def damage(self, curve: SNCurve) -> float:
         """Compute Miner's sum: the part of the life that these cycles take, 1 at failure."""

@@ -30,6 +30,9 @@ class Recorder(ABC):
         >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=Speed())
     """
 
+    def __repr__(self) -> str:
+        return f"<{' '.join([type(self).__name__, *map(str, self.files)])}>"
+
     @property
     def files(self) -> tuple[Path, ...]:
         """Files that it writes: two outputs of a run must not share one."""

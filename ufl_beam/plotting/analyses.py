@@ -17,7 +17,8 @@ from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import Fatigue, HotSpot
 from ufl_beam.plotting import drawing, style
 from ufl_beam.plotting.diagrams import draw_frame
-from ufl_beam.plotting.style import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY, picture
+from ufl_beam.plotting.style import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY, picture, shade
+from ufl_beam.rich_display import picture_of
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LEAST_ERROR = 1e-12  # errors below are drawn there, in the unit of the quantity
+MODES = 6  # modes in a notebook
 CLASSES = 40  # classes of ranges and of means of cycles in pictures
 
 
@@ -69,7 +71,14 @@ def plot_modes(shapes: Shapes, which: Sequence[int] = (), *, amplitude: float = 
     return figure
 
 
-def plot_tradeoff(tradeoff: Tradeoff) -> Figure:
+@picture_of.register(Shapes)
+def picture_of_shapes(shapes: Shapes) -> Figure:
+    """Draw the first modes in a notebook."""
+    return plot_modes(shapes, range(min(MODES, len(shapes))))
+
+
+@picture_of.register(Tradeoff)
+def plot_tradeoff(tradeoff: Tradeoff, *, ax: Axes | None = None) -> Figure:
     """Draw errors over wall times of all runs, and the recommended run in a ring.
 
     Each kind of scheme, steps and cells has a colour; the line is that of runs that no other one
@@ -77,6 +86,10 @@ def plot_tradeoff(tradeoff: Tradeoff) -> Figure:
 
     Args:
         tradeoff: Result of :func:`tradeoff`.
+        ax: Axes to draw in; by default those of a new figure.
+
+    Raises:
+        SceneError: ``ax`` is no axes.
 
     Example:
         >>> tip = {"tip": lambda run: run.position(beam.end)[-1]}
@@ -87,8 +100,7 @@ def plot_tradeoff(tradeoff: Tradeoff) -> Figure:
     def error(run: Run) -> float:
         return max(tradeoff.ratio(run), LEAST_ERROR)
 
-    with picture((9.0, 6.0)) as figure:
-        axes = figure.subplots()
+    with style.panel(ax, (9.0, 6.0)) as axes:
         looks = cycle(product("os^", (BLUE, RED, GREEN, ORANGE, PINK, SKY)))
         for family, (name, look) in enumerate(zip(tradeoff.families, looks, strict=False)):
             marker, color = look
@@ -99,22 +111,30 @@ def plot_tradeoff(tradeoff: Tradeoff) -> Figure:
                 marker=marker, color=color, alpha=0.75, lw=0, label=f"from {name}", zorder=3,
             )  # fmt: skip
         front, best = tradeoff.front, tradeoff.best
-        axes.plot([r.seconds for r in front], [*map(error, front)], color=INK, lw=1.2, zorder=2)
-        axes.plot(best.seconds, error(best), "o", ms=18, mfc="none", mec=INK, mew=1.8, zorder=4)
+        axes.plot(
+            [r.seconds for r in front], [*map(error, front)], color=shade(INK), lw=1.2, zorder=2
+        )
+        axes.plot(
+            best.seconds, error(best), "o", ms=18, mfc="none", mec=shade(INK), mew=1.8, zorder=4
+        )
         axes.set(xscale="log", yscale="log", xlabel="wall time of a run (s)")
         axes.set_ylabel(f"error ({tradeoff.target.measure})")
-        axes.set_title(f"recommended: {best.dials}", loc="left", fontsize=11)
+        axes.set_title(f"recommended: {best.dials}", loc="left", fontsize=style.font_size(11.0))
         time, ratio = tradeoff.target.bounds
         for draw, bound in ((axes.axvline, time), (axes.axhline, ratio)):
             if np.isfinite(bound):
                 draw(bound, color=GREY, ls="--", lw=1.2, zorder=1)
-        figure.legend(
-            loc="outside lower center", ncols=2, fontsize=9, title="size: cells", title_fontsize=9
-        )
-    return figure
+        small = style.font_size(9.0)
+        style.draw_legend(
+            axes, ax, loc="outside lower center", ncols=2, fontsize=small, title="size: cells",
+            title_fontsize=small,
+        )  # fmt: skip
+    return style.figure_of(axes)
 
 
-def plot_extremes(solution: Solution, extremes: Extremes, what: str = "M") -> Figure:
+def plot_extremes(
+    solution: Solution, extremes: Extremes, what: str = "M", *, ax: Axes | None = None
+) -> Figure:
     """Draw the envelope of a section force on the frame: maxima red, minima blue.
 
     As in :func:`plot`, on the undeformed axis; the values of each cell may be of different times.
@@ -123,9 +143,11 @@ def plot_extremes(solution: Solution, extremes: Extremes, what: str = "M") -> Fi
         solution: Of the run that the extremes were recorded in.
         extremes: The recorder.
         what: "N", "V" or "M".
+        ax: Axes to draw in; by default those of a new figure.
 
     Raises:
-        SceneError: Unknown ``what``, or the extremes are of another scene or of no run.
+        SceneError: Unknown ``what``, the extremes are of another scene or of no run, or ``ax`` is
+            no axes.
 
     Example:
         >>> extremes = ub.Extremes()
@@ -140,10 +162,10 @@ def plot_extremes(solution: Solution, extremes: Extremes, what: str = "M") -> Fi
         for beam, found in reached
         for values in (found.high, found.low)
     ]
-    until = solution.parameter.at(solution.times[-1])
-    title = f"extremes of the {style.RESULTANTS[what][0]} {what} until {until}"
+    until = f"until {solution.parameter.at(solution.times[-1])}"
+    title = f"extremes of the {style.RESULTANTS[what][0]} {what}", until
     pose = drawing.plane_stage(solution, [], 1.0).undeformed
-    return draw_frame(solution, pose, title, what, diagrams)
+    return draw_frame(ax, solution, -1, pose, title, what, diagrams)
 
 
 def plot_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:
@@ -175,12 +197,14 @@ def plot_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:
     edges = np.linspace(0.0, ranges[-1] * (1 + 1e-9), CLASSES + 1)
     with picture((13.0, 5.0)) as figure:
         matrix, spectrum, damage = figure.subplots(1, 3, sharey=True, width_ratios=(1.25, 1, 0.8))
-        _draw_matrix(figure, matrix, edges, ranges, means, cycles.count)
+        _draw_matrix(matrix, edges, ranges, means, cycles.count)
         matrix.set(xlabel="mean stress (MPa)", ylabel="stress range (MPa)")
         more = np.cumsum(cycles.count[::-1])[::-1]
         spectrum.plot(more, ranges, color=BLUE, drawstyle="steps-post", label="reached")
         some = np.linspace(edges[1] / 10, 1.1 * edges[-1], 1000)
-        spectrum.plot(curve.endurance(1e6 * some), some, color=INK, lw=1.4, ls="--", label="borne")
+        spectrum.plot(
+            curve.endurance(1e6 * some), some, color=shade(INK), lw=1.4, ls="--", label="borne"
+        )
         spectrum.set(xscale="log", xlabel="number of cycles")
         spectrum.legend(loc="lower left")
         total = done.sum()
@@ -191,13 +215,10 @@ def plot_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:
         titles = "cycles", "spectrum and S-N curve", f"damage {total:.3g}"
         for axes, title in zip((matrix, spectrum, damage), titles, strict=True):
             axes.set_title(title, loc="left")
-            axes.tick_params(labelsize=12, color="#888888")
     return figure
 
 
-def _draw_matrix(
-    figure: Figure, axes: Axes, edges: Array, ranges: Array, means: Array, count: Array
-) -> None:
+def _draw_matrix(axes: Axes, edges: Array, ranges: Array, means: Array, count: Array) -> None:
     """Number of cycles by range and mean; none is white."""
     from matplotlib.colors import LogNorm
 
@@ -209,4 +230,4 @@ def _draw_matrix(
         columns, edges, shown, norm=LogNorm(0.5, max(10.0, found.max())),
         cmap="viridis_r", rasterized=True,
     )  # fmt: skip
-    style.draw_bar(figure, axes, colors, "number")
+    style.draw_bar(axes, colors, "number")

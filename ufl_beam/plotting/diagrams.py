@@ -4,214 +4,222 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ufl_beam.arrays import Array
+from ufl_beam.arrays import Array, Index
 from ufl_beam.model.bodies import Member
+from ufl_beam.model.sections import Section
 from ufl_beam.plotting import drawing, style
-from ufl_beam.plotting.geometry import directions, left_of, segments, unit_vectors
-from ufl_beam.plotting.labels import Label, Spot, leader_of, place
+from ufl_beam.plotting.damage_marks import draw_damage
+from ufl_beam.plotting.diagram_labels import MOST, Peak, arrange, fit_figure, keep_figure
+from ufl_beam.plotting.geometry import left_of, unit_vectors
 from ufl_beam.plotting.scene_layout import Pose
-from ufl_beam.plotting.style import BLUE, INK, POINTS, RED, RESULTANTS, half_size, with_unit
+from ufl_beam.plotting.style import BLUE, INK, RED, RESULTANTS, number, shade
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.text import Annotation
 
-DRAWN_AS_ZERO = 1e-6  # part of the largest value below which a value is drawn as zero
-LABEL_SIZE, TITLE_SIZE = 13.0, 14.0  # sizes of the texts and of the title; points
+LEAST_STRAIN = 1e-10  # strain that rounding and the tolerance of iterations leave behind
+DRAWN_AS_ZERO = 1e-4  # part of the largest value below which a value is drawn as zero
+ALIKE = 0.999  # part of the peak of an area from which on values are as large
+LABELLED = 0.15  # part of the largest value from which on the peak of an area is labelled
+MANY = 60  # beams beyond which both extreme values alone are labelled, and no directions drawn
 
-AROUND, LEAST, MOST = (1.0, 1.2), (3.6, 2.6), (9.0, 6.8)
-"""Room for words and numbers around the axes; least and largest size of a figure; inch."""
+SIGNS = {
+    "N": ("N > 0: tension", "N < 0: compression"),
+    "V": ("V > 0: left of the arrow", "V < 0: right of the arrow"),
+    "M": ("M > 0: tension right of the arrow", "M < 0: tension left of the arrow"),
+}
+"""What both signs mean; the arrow on a beam points from its start to its end."""
+
+Values = tuple[Member, Array]  # a beam, and the values in points of its cells, (num_cells, points)
 
 
-Diagram = tuple[Member, Array]  # a beam, and the values at both ends of its cells, (num_cells, 2)
-
-
-def plot_state(solution: Solution, what: str, *, n: int, magnify: float) -> Figure:
+def plot_state(solution: Solution, what: str, *, n: int, magnify: float, ax: Axes | None) -> Figure:
     """Draw the frame at a time, with a diagram of a section force; see :func:`plot`."""
     style.require_choice(what, ("shape", *RESULTANTS), "plot: what")
     pose = drawing.plane_stage(solution, [n], magnify).pose(n)
-    name = f"{RESULTANTS[what][0]} {what}" if what in RESULTANTS else "shape"
-    title = f"{name} at {solution.parameter.at(solution.times[n])}{style.magnified(magnify)}"
-    beams = solution.scene.beams if what in RESULTANTS else ()
-    diagrams = [(beam, _values(solution, beam, what, n)) for beam in beams]
-    return draw_frame(solution, pose, title, what, diagrams)
+    when = f"at {solution.parameter.at(solution.times[n])}{style.magnified(magnify)}"
+    if what == "shape":
+        return draw_frame(ax, solution, n, pose, ("shape", when))
+    found = [(beam, getattr(solution.diagram(beam, n), what)) for beam in solution.scene.beams]
+    diagrams = [(b, values.reshape(len(solution.grid.cells_of(b)), -1)) for b, values in found]
+    name = f"{RESULTANTS[what][0]} {what}"
+    return draw_frame(ax, solution, n, pose, (name, when), what, diagrams)
 
 
 def draw_frame(
-    solution: Solution, pose: Pose, title: str, what: str, diagrams: Sequence[Diagram]
+    ax: Axes | None,
+    solution: Solution,
+    n: int,
+    pose: Pose,
+    title: tuple[str, str],
+    what: str = "",
+    diagrams: Sequence[Values] = (),
 ) -> Figure:
-    """Draw the frame in a pose, with diagrams of a section force and their extreme values."""
-    with style.picture(drawing.plane_size(pose.stage.points())) as figure:
-        axes = style.plane_axes(figure, title)
-        drawing.draw_undeformed(axes, solution, pose.stage)
-        extremes = _draw_diagrams(axes, solution, pose.nodes, what, diagrams) if diagrams else []
-        drawing.draw_axes(axes, solution, pose.nodes, color=INK, linewidth=2.6, zorder=4)
-        drawing.draw_symbols(axes, pose)
-        _finish(figure, axes, extremes)
-    return figure
+    """Draw the frame in a pose, with diagrams of a section force, their peaks, and damage.
 
-
-def moments_at_ends(solution: Solution, beam: Member, n: int = -1) -> Array:
-    """Compute the moments at both ends of each cell; (num_cells, 2); N m.
-
-    The moment of a cell is that in its middle.  From there it changes by ``N Γ - V (1 + Σ)`` over a
-    unit of length, which is what equilibrium of the cell asks for: moments at the ends of cells are
-    in equilibrium with loads, joints and supports at the nodes.  With ``Mesh(degree=1)`` loads on
-    beams act at the nodes, too.
+    The damage is that of the n-th kept time.  The unit stands between both parts of the title.
     """
-    N, V, M = solution.section_forces(beam, n).T
-    axial, shear, _ = solution.strains(beam, n).T
-    chain = solution.grid.points[solution.grid.vertices_of(beam)]
-    half = np.linalg.norm(np.diff(chain, axis=0), axis=1) / 2
-    change = half * (N * shear - V * (1.0 + axial))
-    return np.column_stack([M - change, M + change])
+    largest = max((float(np.abs(values).max()) for _, values in diagrams), default=0.0)
+    factor, prefix = style.decimal_prefix(largest)
+    name, when = title
+    unit = f"({prefix}{RESULTANTS[what][1]}) " if diagrams else ""
+    with style.panel(ax, MOST) as axes:
+        style.plane_axes(axes, f"{name} {unit}{when}")
+        drawing.draw_undeformed(axes, solution, pose.stage)
+        peaks: list[Peak] = []
+        if _is_loaded(what, diagrams):
+            rows = _draw_diagrams(axes, solution, pose.nodes, what, diagrams)
+            peaks = _peaks(rows, factor, LABELLED if len(diagrams) <= MANY else 1.0)
+        drawing.draw_axes(axes, solution, pose.nodes, color=shade(INK), linewidth=2.6, zorder=4)
+        drawing.draw_symbols(axes, pose)
+        named = {**_signs(axes, what), **draw_damage(axes, solution, n, pose.nodes)}
+        for meaning, artist in named.items():
+            artist.set_label(meaning)
+        if named:
+            columns = 1 if len(named) <= 2 else 2
+            small = style.font_size(11.0)
+            style.draw_legend(
+                axes, ax, [*named.values()], loc="outside lower left", ncols=columns, fontsize=small
+            )
+        arrange(axes, peaks, fit_figure if ax is None else keep_figure)
+    return style.figure_of(axes)
 
 
-def _values(solution: Solution, beam: Member, what: str, n: int) -> Array:
-    """Values of a section force at both ends of each cell; (num_cells, 2); N, N m."""
-    if what == "M":
-        return moments_at_ends(solution, beam, n)
-    values = solution.section_forces(beam, n)[:, list(RESULTANTS).index(what)]
-    return np.column_stack([values, values])
+def _is_loaded(what: str, diagrams: Sequence[Values]) -> bool:
+    """Return whether a section force is more than what rounding and iterations leave behind."""
 
+    def stiffness(section: Section) -> float:
+        return {"N": section.EA, "V": section.GA, "M": section.EI / section.depth}[what]
 
-class Extreme(NamedTuple):
-    """Largest or least value of a diagram."""
-
-    text: str
-    color: str
-    tip: Array  # point of the diagram; (2,); m
-    outward: Array  # unit vector away from the axis; (2,)
+    return any(
+        bool(np.abs(values).max() > LEAST_STRAIN * stiffness(beam.section))
+        for beam, values in diagrams
+    )
 
 
 def _draw_diagrams(
-    axes: Axes, solution: Solution, nodes: Array, what: str, diagrams: Sequence[Diagram]
-) -> list[Extreme]:
-    """Draw diagrams of a section force, all to one scale; return both extreme values."""
-    index, side = list(RESULTANTS).index(what), -1.0 if what == "M" else 1.0
-    # A strain of 1e-10 is what rounding and the tolerance of the iteration leave behind.
-    limits = [(s.EA, s.GA, s.EI / s.depth)[index] for s in (b.section for b, _ in diagrams)]
-    sizes = [float(np.abs(values).max()) for _, values in diagrams]
-    if all(size <= 1e-10 * limit for size, limit in zip(sizes, limits, strict=True)):
-        return []
-    largest = max(sizes)
+    axes: Axes, solution: Solution, nodes: Array, what: str, diagrams: Sequence[Values]
+) -> Array:
+    """Draw diagrams of a section force, all to one scale.
+
+    Returns:
+        The peak of each area, its point of the axis, and the vector from there to the diagram;
+        (num_areas, 5).
+    """
+    from matplotlib.collections import PolyCollection
+
+    side = -1.0 if what == "M" else 1.0
+    cells = np.concatenate([solution.grid.cells_of(beam) for beam, _ in diagrams])
+    found = np.concatenate([values for _, values in diagrams])
+    largest = float(np.abs(found).max())
     scale = 0.13 * side * math.hypot(*np.ptp(nodes, axis=0)) / largest
-    rows = []  # value, point of the diagram, and vector away from the axis, at the ends of cells
-    for beam, found in diagrams:
-        values = np.where(np.abs(found) > DRAWN_AS_ZERO * largest, found, 0.0).ravel()
-        chain = nodes[solution.grid.vertices_of(beam)]
-        axis = np.repeat(chain, 2, axis=0)[1:-1]
-        left = np.repeat(left_of(unit_vectors(np.diff(chain, axis=0))), 2, axis=0)
-        tips = axis + scale * values[:, None] * left
-        _draw_areas(axes, axis, tips, values)
-        rows.append(np.column_stack([values, tips, side * np.sign(values)[:, None] * left]))
-    value, tip, outward = np.split(np.concatenate(rows), [1, 3], axis=1)
+    values = np.where(np.abs(found) > DRAWN_AS_ZERO * largest, found, 0.0).ravel()
+    axis, left = _along(solution, cells, nodes, found.shape[1])
+    up = scale * values[:, None] * left
+    rows: list[Array] = []
+    outlines: defaultdict[str, list[Array]] = defaultdict(list)
+    beams = np.repeat(solution.grid.beam_of_cell[cells], found.shape[1])
+    for area in _areas(axis, axis + up, values, beams):
+        outlines[RED if area.peak > 0 else BLUE].append(area.outline)
+        rows.append(np.array([area.peak, *axis[area.place], *up[area.place]]))
+    if what != "N" and len(diagrams) <= MANY:
+        for first in np.flatnonzero(np.diff(beams, prepend=-1)):
+            last = first + np.count_nonzero(beams == beams[first]) - 1
+            low, high = (first + last) // 2, (first + last + 1) // 2
+            _draw_direction(axes, (axis[low] + axis[high]) / 2, left[high])
+    for color, group in outlines.items():
+        look: dict[str, Any] = {"facecolors": [(color, 0.28)], "edgecolors": color, "gid": color}
+        axes.add_collection(PolyCollection(group, **look, linewidths=1.0, zorder=2))
+    return np.array(rows)
+
+
+def _peaks(rows: Array, unit: float, least: float) -> list[Peak]:
+    """Peaks to be labelled, both extreme values first; corners have one label for both beams.
+
+    Others have at least a part of the largest size, ``least``.
+    """
+    values, axis, up = rows[:, 0], rows[:, 1:3], rows[:, 3:]
+    ends = (1, int(values.argmax())), (-1, int(values.argmin()))
+    extremes = [k for sign, k in ends if sign * values[k] > 0.0]
+    large: list[int] = [*map(int, np.flatnonzero(np.abs(values) > least * np.abs(values).max()))]
+    numbers = {k: number(values[k] / unit) for k in {*extremes, *large}}
+    places = np.round(axis / (1e-3 * math.hypot(*np.ptp(axis, axis=0)) or 1.0))
+    chosen: dict[tuple[object, ...], int] = {}
+    for k in [*extremes, *large]:
+        chosen.setdefault((numbers[k].lstrip("−"), *places[k]), k)
     return [
-        Extreme(with_unit(value[k, 0], RESULTANTS[what][1]), color, tip[k], outward[k])
-        for k, sign, color in ((np.argmax(value), 1, RED), (np.argmin(value), -1, BLUE))
-        if sign * value[k, 0] > 0
-    ]
+        Peak(
+            numbers[k], RED if values[k] > 0 else BLUE, axis[k] + up[k], unit_vectors(up[k]),
+            k in extremes,
+        )
+        for k in chosen.values()
+    ]  # fmt: skip
 
 
-def _draw_areas(axes: Axes, axis: Array, tips: Array, values: Array) -> None:
-    """Draw an area for each part of a beam with values of one sign; two points for each cell."""
-    # A cell in which the sign changes becomes two.
-    first = 2 * np.flatnonzero(values[::2] * values[1::2] < 0.0)
+def _along(solution: Solution, cells: Index, nodes: Array, points: int) -> tuple[Array, Array]:
+    """Points of the axes as drawn and unit vectors to their left; both (num_cells points, 2)."""
+    mesh, parts = solution.grid.mesh, np.linspace(0.0, 1.0, points)
+    start, end, *between = solution.grid.nodes_of_cells[cells].T
+    chains = nodes[np.column_stack([start, *between, end])]
+    ahead = unit_vectors(mesh.slopes(parts) @ chains)
+    # Ordinates at corners between cells of a beam halve the angle, and lean towards it in both.
+    beams, lean = solution.grid.beam_of_cell[cells], np.zeros((len(chains), 2, 2))
+    k = np.flatnonzero(beams[:-1] == beams[1:])
+    half = unit_vectors(ahead[k, -1] + ahead[k + 1, 0])
+    lean[k, 1], lean[k + 1, 0] = half - ahead[k, -1], half - ahead[k + 1, 0]
+    ahead = ahead + np.column_stack([1.0 - parts, parts]) @ lean
+    left = left_of(unit_vectors(ahead))
+    return (mesh.weights(parts) @ chains).reshape(-1, 2), left.reshape(-1, 2)
+
+
+class Area(NamedTuple):
+    """Part of a diagram along a beam with values of one sign."""
+
+    outline: Array  # (n, 2); m
+    peak: float  # its largest value in size
+    place: int  # number of the point of the peak; of equal ones that in the middle
+
+
+def _areas(axis: Array, tips: Array, values: Array, beams: Index) -> Iterator[Area]:
+    """Divide diagrams of beams where the sign changes."""
+    # There both areas end in a point of the axis.
+    first = np.flatnonzero((values[:-1] * values[1:] < 0.0) & (beams[:-1] == beams[1:]))
     part = values[first] / (values[first] - values[first + 1])
-    zeros = np.repeat(axis[first] + part[:, None] * (axis[first + 1] - axis[first]), 2, axis=0)
-    at = np.repeat(first + 1, 2)
-    axis, tips = (np.insert(points, at, zeros, axis=0) for points in (axis, tips))
-    values = np.insert(values, at, 0.0)
-    signs = np.sign(values[::2] + values[1::2])
-    for run in np.split(np.arange(len(values)), 2 * np.flatnonzero(np.diff(signs)) + 2):
-        if (sign := signs[run[0] // 2]) != 0.0:
-            outline = np.concatenate([axis[run[:1]], tips[run], axis[run[:0:-1]]])
-            color = RED if sign > 0 else BLUE
-            axes.fill(*outline.T, facecolor=(color, 0.28), edgecolor=color, linewidth=1.0, zorder=2)
-
-
-def _finish(figure: Figure, axes: Axes, extremes: Sequence[Extreme]) -> None:
-    """Fit the figure to what is drawn, and write the extreme values where they cover nothing."""
-    without_texts = axes.dataLim.frozen()
-    written: list[Annotation] = []
-    _fit(figure, axes)
-    # Room for the texts changes the scale, and with it what is beside them.
-    for _ in range(3):
-        for text in written:
-            text.remove()
-        written = _write(figure, axes, extremes)
-        axes.dataLim.set(without_texts)
-        drawing.make_room(figure, axes)
-        _fit(figure, axes)
-
-
-def _fit(figure: Figure, axes: Axes) -> None:
-    """Make the figure as wide and high as what is drawn, at the largest scale that fits."""
-    axes.autoscale_view()
-    figure.draw_without_rendering()
-    title = 2 * half_size(figure, axes, axes.get_title(loc="left"), TITLE_SIZE)[0]
-    width, height = np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())
-    least = np.array([max(LEAST[0], title / POINTS + AROUND[0]), LEAST[1]])
-    room = np.array(MOST) - AROUND
-    inches = np.array([width, height]) * np.min(room / (width, height))
-    figure.set_size_inches(np.clip(inches + AROUND, np.minimum(least, MOST), MOST))
-
-
-def _write(figure: Figure, axes: Axes, extremes: Sequence[Extreme]) -> list[Annotation]:
-    """Write extreme values beside the areas and lines of a style.picture."""
-    if not extremes:
-        return []
-    figure.draw_without_rendering()
-
-    def in_points(xy: Any) -> Array:
-        return np.asarray(axes.transData.transform(xy) * POINTS / figure.dpi)
-
-    lines = _lines(axes, in_points)
-    labels, halves = [], []
-    for number, (text, color, tip, outward) in enumerate(extremes):
-        # Straight away from the axis first, then more and more aside
-        turns = np.radians((0, 40, -40, 75, -75, 105, -105))
-        ways = directions(math.atan2(outward[1], outward[0]) + turns)
-        at = in_points(tip)
-        labels.append(Label(text, color, number, tuple(Spot(at, way) for way in ways)))
-        halves.append(half_size(figure, axes, text, LABEL_SIZE, weight="bold"))
-    written = []
-    for one in place(labels, halves, lines):
-        text, color, number, _ = one.label
-        (x, y), (right, up) = extremes[number].tip, one.center - one.spot
-        arrow = {"arrowstyle": "-", "color": color, "linewidth": 0.8}
-        written.append(
-            axes.annotate(
-                text, (x, y), (right, up), textcoords="offset points", ha="center", va="center",
-                fontsize=LABEL_SIZE, color=color, weight="bold", zorder=6,
-                arrowprops=arrow if len(leader_of(one)) else None,
+    zeros = axis[first] + part[:, None] * (axis[first + 1] - axis[first])
+    places = np.insert(np.arange(len(values)), first + 1, first)
+    axis, tips = (np.insert(points, first + 1, zeros, axis=0) for points in (axis, tips))
+    values, beams = np.insert(values, first + 1, 0.0), np.insert(beams, first + 1, beams[first])
+    signs = np.where(beams[:-1] == beams[1:], np.sign(values[:-1] + values[1:]), 0.0)
+    ends = np.flatnonzero(np.diff(signs, append=np.nan))
+    for begin, end in zip([0, *(ends[:-1] + 1)], ends, strict=True):
+        if (sign := signs[begin]) != 0.0:
+            chain = slice(begin, end + 2)
+            outline = np.concatenate(
+                [axis[begin : begin + 1], tips[chain], axis[end + 1 : begin : -1]]
             )
-        )  # fmt: skip
-    return written
+            sizes = np.abs(values[chain])
+            largest = float(sizes.max())
+            equal = np.flatnonzero(sizes >= ALIKE * largest)
+            yield Area(outline, sign * largest, int(places[begin + equal[len(equal) // 2]]))
 
 
-def _lines(axes: Axes, in_points: Callable[[Any], Array]) -> Array:
-    """Lines that texts should not cover, those within areas too; (n, 4); points."""
-    found: list[Array] = [np.empty((0, 4))]
-    for line in axes.lines:
-        chain = in_points(line.get_xydata())
-        if len(chain) == 1:  # a symbol
-            half = line.get_markersize() / 2
-            chain = chain + np.array([[-half, -half], [half, half], [-half, half], [half, -half]])
-        found.append(segments(chain))
-    for patch in axes.patches:
-        outline = in_points(patch.get_path().vertices)
-        found.append(segments(outline))
-        # Ordinates, from a point of the outline to the one across the axis
-        for part in np.linspace(0.0, 1.0, 5):
-            between = outline[:-1] + part * np.diff(outline, axis=0)
-            feet = (outline[1:] - part * np.diff(outline, axis=0))[::-1]
-            found.append(np.hstack([between, feet])[1 : len(outline) // 2])
-    return np.concatenate(found)
+def _draw_direction(axes: Axes, at: Array, left: Array) -> None:
+    """Draw an arrow on a beam from its start to its end, whose left is known."""
+    turn = math.degrees(math.atan2(left[1], left[0])) - 180.0  # of an arrow that points up
+    axes.plot(*at, marker=(3, 0, turn), ms=9.0, color=shade(INK), mew=0.0, zorder=4.1)
+
+
+def _signs(axes: Axes, what: str) -> dict[str, Artist]:
+    """What the signs mean that are in the picture, with an area of each."""
+    meanings = dict(zip((RED, BLUE), SIGNS.get(what, ()), strict=False))
+    areas = {area.get_gid(): area for area in axes.collections}
+    return {meaning: areas[color] for color, meaning in meanings.items() if color in areas}

@@ -4,57 +4,23 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.model.bodies import Member
-from ufl_beam.model.material_laws import HingeLaw
-from ufl_beam.model.plastic_hinges import law_of, place_of
 from ufl_beam.plotting import symbols
+from ufl_beam.plotting.geometry import joined
+from ufl_beam.plotting.model_sheet import SHORT_BEAM, SMALLEST, SYMBOL
 from ufl_beam.plotting.scene_layout import Pose, Stage
-from ufl_beam.plotting.style import GREY, INK, Stroke
+from ufl_beam.plotting.style import GREY, INK, POINTS, WHITE, Stroke, shade
+from ufl_beam.plotting.symbols import Outlines
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-
-class OpenHinge(NamedTuple):
-    """Hinge that has opened."""
-
-    beam: Member
-    at: Array  # where it is now; (2,); m
-    part: float  # of its fracture energy, from 0 (closed) to 1 (a joint); 0 if it hardens
-
-
-def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
-    """Find hinges, in cells and of zero length, that are open; ``points`` are nodes as drawn."""
-    grid, found = solution.grid, []
-    for beam in solution.scene.beams:
-        laws = grid.hinges(beam)
-        if all(law is None or math.isinf(law.limit) for law in laws):
-            continue
-        state = solution.material(beam, n)
-        rows = zip(grid.cells_of(beam), laws, state.jump, state.hinge, strict=True)
-        for cell, law, jump, lost in rows:
-            if law is not None and (jump != 0.0 or lost > 0.0):
-                at = points[grid.cells[cell]].mean(axis=0)
-                found.append(OpenHinge(beam, at, _spent(law, lost)))
-    for hinge, vertex in zip(solution.scene.hinges, grid.vertices_at_hinges, strict=True):
-        kept = solution.connector(hinge)
-        if kept.motion[n] != 0.0 or kept.dissipated[n] > 0.0:
-            part = _spent(law_of(hinge), float(kept.dissipated[n]))
-            found.append(OpenHinge(place_of(hinge).beam, points[vertex], part))
-    return found
-
-
-def _spent(law: HingeLaw, dissipated: float) -> float:
-    """Part of the fracture energy that is spent; a hinge that never resisted is a joint."""
-    return min(dissipated / law.energy, 1.0) if law.limit > 0.0 else 1.0
 
 
 def evenly(solution: Solution, count: int) -> list[int]:
@@ -80,29 +46,22 @@ def plane_stage(solution: Solution, shown: Sequence[int], magnify: float) -> Sta
     width, height = np.ptp(points, axis=0)
     inches = plane_size(points)
     scale = max(1.12 * width / (inches[0] - 0.9), 1.20 * height / (inches[1] - 1.1))
-    return Stage(solution, magnify, scale / 6.0, shown)  # 12 points
+    return Stage(solution, magnify, scale * SYMBOL / POINTS, shown)
 
 
 def draw_axes(axes: Axes, solution: Solution, points: Array, **line: Any) -> None:
     """Draw the axes of all beams through these points."""
-    for beam in solution.scene.beams:
-        axes.plot(*points[solution.grid.nodes_along(beam)].T, **line)
+    grid = solution.grid
+    chains = [points[grid.nodes_along(beam)] for beam in solution.scene.beams]
+    axes.plot(*joined(chains).T, **line)
 
 
 def draw_undeformed(axes: Axes, solution: Solution, stage: Stage) -> None:
     """Draw undeformed beams, bodies and rods in grey."""
     pose = stage.undeformed
     draw_axes(axes, solution, pose.nodes, color=GREY, linewidth=1.2, zorder=1)
-    for stroke in (*symbols.bodies(pose), *symbols.rods(pose)):
-        axes.plot(*stroke.points.T, color=GREY, linewidth=1.2, zorder=1)
-
-
-def make_room(figure: Figure, axes: Axes) -> None:
-    """Extend the limits such that texts stay off the edge."""
-    figure.draw_without_rendering()
-    for text in axes.texts:
-        axes.update_datalim(axes.transData.inverted().transform(text.get_window_extent()))
-    axes.autoscale_view()
+    strokes = (*symbols.bodies(pose), *symbols.rods(pose))
+    axes.plot(*joined(s.points for s in strokes).T, color=GREY, linewidth=1.2, zorder=1)
 
 
 def draw_symbols(axes: Axes, pose: Pose) -> None:
@@ -110,28 +69,44 @@ def draw_symbols(axes: Axes, pose: Pose) -> None:
     draw_strokes(axes, (*symbols.bodies(pose), *symbols.rods(pose)))
     draw_fixings(axes, pose)
     draw_strokes(axes, symbols.centres(pose))
-    for pin in symbols.pins(pose):
-        marker, size, inside = ("o", 8.0, "white") if pin.turns else ("s", 6.0, INK)
-        axes.plot(*pin.at, marker, ms=size, mfc=inside, mec=INK, mew=1.6, zorder=5)
-    draw_masses(axes, pose, INK)
+    # Pins shrink where beams are short, as in pictures of the model.
+    lengths = [math.dist(beam.start.point, beam.end.point) for beam in pose.stage.scene.beams]
+    typical = SYMBOL * np.median(lengths or [math.inf]) / pose.stage.unit
+    shrunk = float(np.clip(typical / SHORT_BEAM, SMALLEST, 1.0))
+    pins = [*symbols.pins(pose)]
+    edge = shade(INK)
+    for turns, marker, size, inside in ((False, "s", 6.0, INK), (True, "o", 8.0, WHITE)):
+        at = np.reshape([pin.at for pin in pins if pin.turns == turns], (-1, 2))
+        axes.plot(
+            *at.T, marker, ms=shrunk * size, mfc=shade(inside), mec=edge, mew=shrunk * 1.6, zorder=5
+        )
+    draw_masses(axes, pose, edge)
 
 
 def draw_strokes(axes: Axes, strokes: Iterable[Stroke], color: Any = None) -> None:
     """Draw lines and areas, in their own colours or all in one."""
+    lines: defaultdict[tuple[str, float, float], list[Array]] = defaultdict(list)
     for points, own, weight, fill, layer in strokes:
-        line: dict[str, Any] = {"linewidth": weight, "zorder": layer}
-        edge = own if color is None else color
         if fill is None:
-            axes.plot(*points.T, color=edge, solid_joinstyle="round", **line)
+            lines[own, weight, layer].append(points)
         else:
-            inside = fill if color is None else (color, 0.15)
-            axes.fill(*points.T, facecolor=inside, edgecolor=edge, joinstyle="round", **line)
+            edge = shade(own) if color is None else color
+            inside = shade(fill) if color is None else (color, 0.15)
+            axes.fill(
+                *points.T, facecolor=inside, edgecolor=edge, joinstyle="round", linewidth=weight,
+                zorder=layer,
+            )  # fmt: skip
+    for (own, weight, layer), alike in lines.items():
+        axes.plot(
+            *joined(alike).T, color=shade(own) if color is None else color, linewidth=weight,
+            solid_joinstyle="round", zorder=layer,
+        )  # fmt: skip
 
 
 def draw_masses(axes: Axes, pose: Pose, color: Any) -> None:
     """Draw dots at the point masses."""
-    for mass in pose.stage.scene.masses:
-        axes.plot(*pose.at(mass.place), "o", ms=10.0, color=color, zorder=5)
+    at = np.reshape([pose.at(mass.place) for mass in pose.stage.scene.masses], (-1, 2))
+    axes.plot(*at.T, "o", ms=10.0, color=color, zorder=5)
 
 
 def draw_fixings(axes: Axes, pose: Pose) -> None:
@@ -140,9 +115,12 @@ def draw_fixings(axes: Axes, pose: Pose) -> None:
     from matplotlib.path import Path
 
     draw_strokes(axes, (*symbols.rails(pose), *symbols.connectors(pose)))
-    for footing in symbols.footings(pose):
-        symbol = MarkerStyle(Path.make_compound_path(*map(Path, footing.outlines)))
+    places: defaultdict[tuple[Outlines, float, str], list[Array]] = defaultdict(list)
+    for at, angle, outlines, color, _ in symbols.footings(pose):
+        places[outlines, angle, color].append(at)
+    for (outlines, angle, color), alike in places.items():
+        symbol = MarkerStyle(Path.make_compound_path(*map(Path, outlines))).rotated(rad=angle)
         axes.plot(
-            *footing.at, marker=symbol.rotated(rad=footing.angle), ms=24.0, mfc=footing.color,
-            mec=footing.color, mew=0.5, zorder=3.5,
+            *np.transpose(alike), marker=symbol, ms=24.0, mfc=color, mec=color, mew=0.5,
+            linestyle="none", zorder=3.5,
         )  # fmt: skip

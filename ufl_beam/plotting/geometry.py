@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -43,3 +44,10 @@ def points_along(line: Array, lengths: Array) -> Array:
 def segments(line: Array) -> Array:
     """Pieces of a line between its points, as (x, y, x, y) of both ends; (n - 1, 4)."""
     return np.hstack([line[:-1], line[1:]])
+
+
+def joined(lines: Iterable[Array]) -> Array:
+    """Lines one after the other, with NaN between them: one line to Matplotlib; (n, 2)."""
+    gap = np.full((1, 2), np.nan)
+    chains: list[Array] = [chain for line in lines for chain in (line, gap)]
+    return np.concatenate(chains[:-1] or [np.empty((0, 2))])

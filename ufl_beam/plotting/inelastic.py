@@ -14,18 +14,30 @@ from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.plastic_hinges import law_of
 from ufl_beam.plotting import drawing, style
-from ufl_beam.plotting.style import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY, with_unit
+from ufl_beam.plotting.damage_marks import OpenHinge, circle, dissipated_per_length, open_hinges
+from ufl_beam.plotting.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    PINK,
+    RED,
+    SKY,
+    WHITE,
+    shade,
+    with_unit,
+)
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
-FULLY_OPEN = 0.99  # part of the fracture energy from which on a hinge is drawn as a joint
 
-
-def plot_moment_curvature(solution: Solution, place: Place) -> Figure:
+def plot_moment_curvature(solution: Solution, place: Place, *, ax: Axes | None = None) -> Figure:
     """Draw the moment M (N m) of a cell against its curvature K (1/m), coloured by time.
 
     The curvature includes the jump of a hinge over the length of the cell; the area of loops is the
@@ -34,23 +46,24 @@ def plot_moment_curvature(solution: Solution, place: Place) -> Figure:
     Args:
         solution: Solution to draw.
         place: Where; at a vertex it is the cell before it.
+        ax: Axes to draw in; by default those of a new figure.
 
     Raises:
-        SceneError: The scene is elastic, or the beam of the place is not in it.
+        SceneError: The scene is elastic, the beam of the place is not in it, or ``ax`` is no axes.
 
     Example:
         >>> ub.plot_moment_curvature(broken, weak.start).savefig("loops.png")
     """
     M, K = solution.material_at(place).forces[:, 2], solution.strains_at(place)[:, 2]
-    with style.picture((8.0, 5.4)) as figure:
-        axes = figure.add_subplot()
-        _draw_path(figure, axes, solution, K, M)
+    with style.panel(ax, (8.0, 5.4)) as axes:
+        _draw_path(axes, solution, K, M)
+        style.draw_legend(axes, ax, loc="outside upper left", ncols=2)
         axes.set_xlabel("curvature K (1/m)")
-        axes.set_title(f"cell at {place}", loc="left", color=INK)
-    return figure
+        axes.set_title(f"cell at {place}", loc="left")
+    return style.figure_of(axes)
 
 
-def plot_hinge(solution: Solution, place: Place) -> Figure:
+def plot_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> Figure:
     """Draw the moment M (N m) of a hinge against its jump (rad), coloured by time.
 
     The area between the path and the axis is the energy that the hinge dissipated; the title says
@@ -60,10 +73,11 @@ def plot_hinge(solution: Solution, place: Place) -> Figure:
         solution: Solution to draw.
         place: Where; without a plastic hinge at the place it is that of the cell, at a vertex of
             the cell before it.
+        ax: Axes to draw in; by default those of a new figure.
 
     Raises:
-        SceneError: The scene is elastic, there is no hinge, or the beam of the place is not in the
-            scene.
+        SceneError: The scene is elastic, there is no hinge, the beam of the place is not in the
+            scene, or ``ax`` is no axes.
 
     Example:
         >>> ub.plot_hinge(broken, weak.start).savefig("hinge.png")
@@ -75,20 +89,22 @@ def plot_hinge(solution: Solution, place: Place) -> Figure:
     if law is None or np.isinf(law.limit):
         raise SceneError(f"plot_hinge: neither {place} nor the cell there has a hinge")
     M, jump, lost = kept.forces[:, 2], kept.jump, float(kept.hinge[-1])
-    with style.picture((8.0, 5.4)) as figure:
-        axes = figure.add_subplot()
+    with style.panel(ax, (8.0, 5.4)) as axes:
         for part in _monotone(jump):
             axes.fill_between(jump[part], M[part], facecolor=(ORANGE, 0.3), linewidth=0.0, zorder=2)
-        _draw_path(figure, axes, solution, jump, M)
+        _draw_path(axes, solution, jump, M)
+        style.draw_legend(axes, ax, loc="outside upper left", ncols=2)
         _prefix(axes.xaxis, jump, "jump of rotation", "rad")
         spent = f"{with_unit(lost, 'J')} dissipated"
         if math.isfinite(law.energy):
             spent += f", {100 * lost / law.energy:.3g} % of {with_unit(law.energy, 'J')}"
-        axes.set_title(f"hinge at {place}: {spent}", loc="left", color=INK)
-    return figure
+        axes.set_title(f"hinge at {place}: {spent}", loc="left")
+    return style.figure_of(axes)
 
 
-def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Figure:
+def plot_damage(
+    solution: Solution, n: int = -1, *, magnify: float = 1.0, ax: Axes | None = None
+) -> Figure:
     """Draw yielded cells and opened hinges on the frame at the n-th kept time.
 
     Cells that have yielded are coloured by the energy that plastic strains dissipated per length
@@ -99,9 +115,11 @@ def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Fig
         solution: Solution to draw.
         n: Number of the kept time; negative from the end.
         magnify: Factor on the displacements.
+        ax: Axes to draw in; by default those of a new figure.
 
     Raises:
-        SceneError: The scene is elastic, no such time, or ``magnify`` is not positive.
+        SceneError: The scene is elastic, no such time, ``magnify`` is not positive, or ``ax`` is no
+            axes.
 
     Example:
         >>> ub.plot_damage(broken).savefig("damage.png")
@@ -109,18 +127,20 @@ def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Fig
     from matplotlib.collections import LineCollection
 
     grid = solution.grid
+    for beam in solution.scene.beams[:1]:
+        solution.material(beam)  # or its error
     stage = drawing.plane_stage(solution, [n], magnify)
-    pose, density = stage.pose(n), _dissipated_per_length(solution, n)
+    pose, density = stage.pose(n), dissipated_per_length(solution, n)
     points = stage.points()
     (width, height), (length, rise) = drawing.plane_size(points), np.ptp(points, axis=0)
     # Upright frames need less; the bar and the legend have their own widths.
     across = height * length / max(rise, 1e-12)
-    with style.picture((min(width, max(6.0, across + 3.0)), height)) as figure:
+    with style.panel(ax, (min(width, max(6.0, across + 3.0)), height)) as axes:
         time = solution.parameter.at(solution.times[n])
-        axes = style.plane_axes(figure, f"damage at {time}{style.magnified(magnify)}")
+        style.plane_axes(axes, f"damage at {time}{style.magnified(magnify)}")
         axes.set_adjustable("datalim")  # room for the broad lines of a slender frame
         drawing.draw_undeformed(axes, solution, stage)
-        drawing.draw_axes(axes, solution, pose.nodes, color=INK, linewidth=2.0, zorder=2)
+        drawing.draw_axes(axes, solution, pose.nodes, color=shade(INK), linewidth=2.0, zorder=2)
         drawing.draw_symbols(axes, pose)
         yielded = density > 0.0
         if yielded.any():
@@ -135,21 +155,27 @@ def plot_damage(solution: Solution, n: int = -1, *, magnify: float = 1.0) -> Fig
             placed = [beam.section.fibres for beam in solution.scene.beams]
             cracks = any(p is not None and p.fibres.softening is not None for p in placed)
             title = "dissipated by plastic strains" + (" and cracks" if cracks else "")
-            style.draw_bar(figure, axes, colors, f"{title} ({prefix}J/m)")
-        _draw_hinges(figure, axes, solution, n, pose.nodes)
-        drawing.make_room(figure, axes)
-    return figure
+            style.draw_bar(axes, colors, f"{title} ({prefix}J/m)")
+        if hinges := open_hinges(solution, n, pose.nodes):
+            sizes = _draw_hinges(axes, hinges)
+            style.draw_legend(axes, ax, sizes, loc="outside upper left", ncols=3)
+        style.make_room(axes)
+    return style.figure_of(axes)
 
 
-def plot_dissipation(solution: Solution) -> Figure:
+def plot_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
     """Draw the energy losses over time (J) by their sinks, as stacked areas.
 
     The line above them is the supplied work, plus the initial energy of the scene; the gap between
     is the energy in the scene, which also has a line of its own.  The title states the worst
     imbalance of the ledger.
 
+    Args:
+        solution: Solution to draw.
+        ax: Axes to draw in; by default those of a new figure.
+
     Raises:
-        SceneError: The scene is elastic, and has no connectors.
+        SceneError: The scene is elastic, and has no connectors; or ``ax`` is no axes.
 
     Example:
         >>> ub.plot_dissipation(broken).savefig("dissipation.png")
@@ -162,34 +188,22 @@ def plot_dissipation(solution: Solution) -> Figure:
     held = energy.total
     supplied = held[0] + sum(energy.supplied.values(), np.zeros_like(t))
     start = held[0] > 1e-12 * energy.throughput
-    with style.picture((8.0, 5.0)) as figure:
-        axes = style.time_axes(figure.add_subplot())
+    with style.panel(ax, (8.0, 5.0)) as axes:
+        style.time_axes(axes)
         # Blue is the energy in the scene; colours come again after the last.
         colors = [(color, 0.75) for color in (ORANGE, RED, GREEN, PINK, SKY)]
         labels = [f"lost: {name}" for name in energy.lost]
         axes.stackplot(t, *energy.lost.values(), labels=labels, colors=colors)
         label = "at the start, and supplied" if start else "supplied"
-        axes.plot(t, supplied, color=INK, label=label)
+        axes.plot(t, supplied, color=shade(INK), label=label)
         axes.plot(t, held, color=BLUE, label="in the scene")
         _prefix(axes.yaxis, np.concatenate([supplied, held]), "energy", "J")
         axes.set_xlabel(solution.parameter.progress)
         digits, power = f"{energy.worst:.1e}".split("e")
         worst, through = rf"${digits}\times10^{{{int(power)}}}$", with_unit(energy.throughput, "J")
-        axes.set_title(f"worst imbalance {worst} of {through} throughput", loc="left", color=INK)
-        figure.legend(loc="outside upper left", ncols=3)
-    return figure
-
-
-def _dissipated_per_length(solution: Solution, n: int) -> Array:
-    """Energy dissipated by plastic strains and cracks in all cells; (num_cells,); J/m."""
-    grid = solution.grid
-    ends = grid.points[grid.cells]
-    energy = np.zeros(len(grid.cells))
-    for beam in solution.scene.beams:
-        state = solution.material(beam, n)
-        cracks = state.hinge if beam.section.fibres is not None else 0.0
-        energy[grid.cells_of(beam)] = state.plastic + cracks
-    return np.asarray(energy / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
+        axes.set_title(f"worst imbalance {worst} of {through} throughput", loc="left")
+        style.draw_legend(axes, ax, loc="outside upper left", ncols=3)
+    return style.figure_of(axes)
 
 
 def _monotone(x: Array) -> list[slice]:
@@ -208,7 +222,7 @@ def _prefix(axis: Axis, values: Array, quantity: str, unit: str) -> None:
     axis.set_label_text(f"{quantity} ({prefix}{unit})")
 
 
-def _draw_path(figure: Figure, axes: Axes, solution: Solution, x: Array, M: Array) -> None:
+def _draw_path(axes: Axes, solution: Solution, x: Array, M: Array) -> None:
     """M against x, from light to dark in time; a ring at the beginning, a dot at the end."""
     from matplotlib.collections import LineCollection
 
@@ -223,29 +237,17 @@ def _draw_path(figure: Figure, axes: Axes, solution: Solution, x: Array, M: Arra
     for at_zero in (axes.axhline, axes.axvline):
         at_zero(0.0, color=GREY, linewidth=1.0, zorder=1)
     axes.add_collection(pieces)
-    ring: dict[str, Any] = {"ms": 8.0, "mec": INK, "mew": 1.6, "zorder": 5, "ls": "none"}
-    for i, inside in ((0, "white"), (-1, INK)):
-        axes.plot(*path[i], "o", mfc=inside, label=named.at(solution.times[i]), **ring)
+    ring: dict[str, Any] = {"ms": 8.0, "mec": shade(INK), "mew": 1.6, "zorder": 5, "ls": "none"}
+    for i, inside in ((0, WHITE), (-1, INK)):
+        axes.plot(*path[i], "o", mfc=shade(inside), label=named.at(solution.times[i]), **ring)
     axes.autoscale_view()
-    axes.tick_params(labelsize=12, color="#888888")
     _prefix(axes.yaxis, M, "bending moment M", "N m")
-    style.draw_bar(figure, axes, colors, named.progress)
-    figure.legend(loc="outside upper left", ncols=2)
+    style.draw_bar(axes, colors, named.progress)
 
 
-def _draw_hinges(figure: Figure, axes: Axes, solution: Solution, n: int, points: Array) -> None:
-    """Circles at the hinges that have opened, and what their sizes mean."""
-    hinges = drawing.open_hinges(solution, n, points)
-    if not hinges:
-        return
-
-    def circle(part: float) -> dict[str, Any]:
-        inside = "white" if part >= FULLY_OPEN else BLUE
-        size = 4.0 + 6.0 * math.sqrt(part)
-        return {"ms": size, "mfc": inside, "mec": "white" if inside == BLUE else BLUE, "ls": "none"}
-
+def _draw_hinges(axes: Axes, hinges: list[OpenHinge]) -> list[Line2D]:
+    """Circles at the hinges that have opened; return examples of their sizes, with words."""
     for hinge in hinges:
-        axes.plot(*hinge.at, "o", mew=1.8, zorder=6, **circle(hinge.part))
-    for example, text in ((0.1, "hinge, 10 % broken"), (0.5, "50 %"), (1.0, "fully open")):
-        axes.plot([], [], "o", mew=1.8, label=text, **circle(example))
-    figure.legend(loc="outside upper left", ncols=3)
+        axes.plot(*hinge.at, **circle(hinge.part))
+    examples = (0.1, "hinge, 10 % broken"), (0.5, "50 %"), (1.0, "fully open")
+    return [axes.plot([], [], **circle(part), label=text)[0] for part, text in examples]

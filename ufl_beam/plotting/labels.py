@@ -12,6 +12,7 @@ from ufl_beam.arrays import Array
 
 GAPS = (4.0, 12.0, 24.0, 40.0, 60.0)  # distances of a label from its spot that are tried; points
 CLEARANCE = 2.0  # room around a label; points
+ROUNDS = 6  # times that each label is placed at most
 
 LINE_COST, LABEL_COST, OUTSIDE_COST, DISTANCE_COST, RANK_COST = 8.0, 40.0, 100.0, 0.6, 0.4
 """Costs of a candidate: of a point of length of lines under the label, of a square point of another
@@ -51,17 +52,20 @@ class Placed(NamedTuple):
 def place(
     labels: Sequence[Label], halves: Sequence[Array], lines: Array, frame: Array | None = None
 ) -> list[Placed]:
-    """Place labels where they cover least; each again when all others have a place.
+    """Place labels where they cover least; each again until all stay where they are.
 
     Spots, half widths and heights, segments that should stay visible, (n, 4), and the corners of a
     frame that labels should not leave, (4,), are all in points.
     """
     order = sorted(range(len(labels)), key=lambda k: labels[k].rank)
     placed: dict[int, Placed] = {}
-    for _ in range(2):
+    for _ in range(ROUNDS):
+        before = [one.center for one in placed.values()]
         for k in order:
             others = [one for j, one in placed.items() if j != k]
             placed[k] = _best(labels[k], np.asarray(halves[k], dtype=float), lines, others, frame)
+        if np.array_equal([one.center for one in placed.values()], before):
+            break
     return [placed[k] for k in order]
 
 

@@ -21,8 +21,20 @@ from ufl_beam.plotting.geometry import segments
 from ufl_beam.plotting.labels import Placed, leader_of, place
 from ufl_beam.plotting.load_symbols import badge
 from ufl_beam.plotting.model_sheet import CAPTIONS, MOST_LABELS, NAMES, Sheet, Subject
-from ufl_beam.plotting.model_symbols import TEXT, draw
-from ufl_beam.plotting.style import INK, POINTS, RED, half_size, picture, with_unit
+from ufl_beam.plotting.model_symbols import draw
+from ufl_beam.plotting.style import (
+    POINTS,
+    RED,
+    TEXT,
+    WHITE,
+    figure_of,
+    font_size,
+    half_size,
+    panel,
+    shade,
+    with_unit,
+)
+from ufl_beam.rich_display import picture_of
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
@@ -39,7 +51,12 @@ UNBOUNDED = np.array([-np.inf, -np.inf, np.inf, np.inf])  # frame, before its pl
 
 
 def plot(
-    shown: Scene | Solution, what: str = "shape", *, n: int = -1, magnify: float = 1.0
+    shown: Scene | Solution,
+    what: str = "shape",
+    *,
+    n: int = -1,
+    magnify: float = 1.0,
+    ax: Axes | None = None,
 ) -> Figure:
     """Draw a model before any run, or a solution at one of its times.
 
@@ -49,9 +66,11 @@ def plot(
     Names and sizes for which there is no room are left out.
 
     Of a :class:`Solution` it draws the frame at the n-th kept time, with the diagram of a section
-    force if ``what`` names one: M on the side in tension, positive N and V to the left of the way
-    from start to end, positive values red, negative ones blue.  N and V are constant in each cell;
-    M is linear between the moments at its ends.
+    force if ``what`` names one: M on the side in tension, positive N and V to the left of the beam
+    from start to end, positive values red, negative ones blue.  Between vertices they follow
+    equilibrium, see :meth:`Solution.diagram`.  Numbers are the peaks of areas, in the unit of the
+    title; the largest and the least value are bold.  Yielded or cracked cells are orange, open
+    hinges circles as in :func:`plot_damage`.
 
     What is orange drives: filled if it gives the motion, hollow if it gives the force.
 
@@ -60,17 +79,19 @@ def plot(
         what: Of a solution: "shape", "N", "V" or "M".
         n: Number of the kept time of a solution; negative from the end.
         magnify: Factor on the displacements of a solution.
+        ax: Axes to draw in; by default those of a new figure.
 
     Raises:
         SceneError: Neither a scene nor a solution; a scene whose constraints repeat; anything but
-            the shape of a scene; an unknown ``what``, no such time, or ``magnify`` not positive.
+            the shape of a scene; an unknown ``what``, no such time, ``magnify`` not positive, or
+            ``ax`` no axes.
 
     Example:
         >>> ub.plot(scene).savefig("model.png")
         >>> ub.plot(solution, "M", magnify=10).savefig("moments.png")
     """
     if isinstance(shown, Solution):
-        return plot_state(shown, what, n=n, magnify=magnify)
+        return plot_state(shown, what, n=n, magnify=magnify, ax=ax)
     if not isinstance(shown, Scene):
         raise SceneError(
             f"plot: {shown!r} is a {type(shown).__name__}; give a Scene, or the Solution of a run"
@@ -82,33 +103,54 @@ def plot(
             f"plot(solution, {what!r}) what a run found"
         )
     require_independent(shown)
-    return plot_model(shown)
+    return plot_model(shown, ax)
 
 
-def plot_model(scene: Scene) -> Figure:
+@picture_of.register(Scene)
+def picture_of_scene(scene: Scene) -> Figure:
+    """Draw a scene in a notebook, see :func:`plot`."""
+    return plot(scene)
+
+
+def plot_model(scene: Scene, ax: Axes | None = None) -> Figure:
     """Draw the undeformed model with all that is in it; see :func:`plot`."""
     subject, notes = Subject(scene), notes_of(scene)
-    skeleton = _skeleton(subject)
-    with picture(MOST) as figure:
-        figure.set_layout_engine("none")
-        probe = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-        measure: Measure = cache(lambda text: half_size(figure, probe, text, LABEL_SIZE))
-        words = _width_of_words(subject, notes, measure)
-        width, height = np.ptp(skeleton, axis=0)
-        scale, frame = max(width / 400.0, height / 250.0, scene.size / 500.0), UNBOUNDED
-        # What stands around the beams has a size in points: with the second plan it fits.
-        for _ in range(2):
-            sheet = draw(subject, scale)
-            box = _box(sheet, _arrange(sheet, measure, frame))
-            scale, frame = _plan(skeleton, scale, box, len(notes), words)
-        sheet = draw(subject, scale)
-        placed = _arrange(sheet, measure, frame)
-        axes = _axes(figure, scale, frame, _title(subject), notes)
+    with panel(ax, MOST) as axes:
+        measure: Measure = cache(lambda text: half_size(axes, text, font_size(LABEL_SIZE)))
+        _write_around(axes, _title(subject), notes)
+        if ax is None:
+            figure_of(axes).set_layout_engine("none")
+            least, most = _room(measure, subject, notes)
+        else:
+            least = most = _size(axes)
+        sheet, placed, frame = _planned(subject, measure, least, most)
+        _set_limits(axes, sheet.scale, frame)
+        if ax is None:
+            _fit(axes, frame, len(notes))
+        axes.set_aspect("equal")
         _paint(axes, sheet)
-        _write(axes, placed, scale)
+        _write(axes, placed, sheet.scale)
         _write_badges(axes, scene, measure, frame)
-        probe.remove()
-    return figure
+    return figure_of(axes)
+
+
+def _planned(
+    subject: Subject, measure: Measure, least: Array, most: Array
+) -> tuple[Sheet, list[Placed], Array]:
+    """The sheet at the largest scale at which it fits, its labels, and the corners of the axes.
+
+    The sizes of the axes, at least and at most, and the corners are in points.
+    """
+    skeleton = _skeleton(subject)
+    width, height = np.ptp(skeleton, axis=0)
+    scale, frame = max(width / 400.0, height / 250.0, subject.scene.size / 500.0), UNBOUNDED
+    # What stands around the beams has a size in points: with the second plan it fits.
+    for _ in range(2):
+        sheet = draw(subject, scale)
+        box = _box(sheet, _arrange(sheet, measure, frame))
+        scale, frame = _plan(skeleton, scale, box, least, most)
+    sheet = draw(subject, scale)
+    return sheet, _arrange(sheet, measure, frame), frame
 
 
 def _title(subject: Subject) -> str:
@@ -183,19 +225,32 @@ def _width_of_words(subject: Subject, notes: list[str], measure: Measure) -> flo
     return float(max([first, *(2 * measure(note)[0] for note in notes)]))
 
 
+def _room(measure: Measure, subject: Subject, notes: list[str]) -> tuple[Array, Array]:
+    """Least and largest size of the axes in a figure of their own; (2,), (2,); points."""
+    around_axes = (LEFT + RIGHT, font_size(BELOW + ABOVE + NOTE * len(notes)))
+    least, most = (POINTS * np.array(size) - around_axes for size in (LEAST, MOST))
+    least[0] = min(max(least[0], _width_of_words(subject, notes, measure)), most[0])
+    return least, most
+
+
+def _size(axes: Axes) -> Array:
+    """Size of axes as they are; (2,); points."""
+    figure = figure_of(axes)
+    figure.draw_without_rendering()
+    box = axes.get_window_extent()
+    return np.asarray(np.array([box.width, box.height]) * POINTS / figure.dpi)
+
+
 def _plan(
-    skeleton: Array, scale: float, box: Array, notes: int, words: float
+    skeleton: Array, scale: float, box: Array, least: Array, most: Array
 ) -> tuple[float, Array]:
     """The largest scale at which everything fits, and the corners of the axes; points.
 
-    The ``box`` around everything and the width of the ``words`` above it are in points.
+    The ``box`` around everything and the sizes of the axes are in points.
     """
     low, high = skeleton.min(axis=0), skeleton.max(axis=0)
     # What stands out beyond the skeleton has a size in points.
     below, beyond = low / scale - box[:2] + 8.0, box[2:] - high / scale + 8.0
-    around_axes = (LEFT + RIGHT, BELOW + ABOVE + NOTE * notes)
-    least, most = (POINTS * np.array(size) - around_axes for size in (LEAST, MOST))
-    least[0] = min(max(least[0], words), most[0])
     room = np.maximum(most - below - beyond, 0.3 * most)
     scale = float(np.max((high - low) / room)) or scale
     frame = np.array([*(low / scale - below), *(high / scale + beyond)])
@@ -203,34 +258,42 @@ def _plan(
     return scale, frame + np.concatenate([-more, more])
 
 
-def _axes(figure: Figure, scale: float, frame: Array, title: str, notes: list[str]) -> Axes:
-    """The axes, and the words above them."""
+def _write_around(axes: Axes, title: str, notes: list[str]) -> None:
+    """Write title, notes and names of the axes."""
+    note = font_size(NOTE)
+    axes.set(xlabel="x (m)", ylabel="y (m)")
+    axes.set_title(title, loc="left", fontsize=font_size(TITLE_SIZE), pad=8.0 + note * len(notes))
+    for k, words in enumerate(reversed(notes)):
+        axes.annotate(
+            words, (0.0, 1.0), (0.0, 6.0 + note * k), xycoords="axes fraction",
+            textcoords="offset points", fontsize=font_size(LABEL_SIZE), color=shade(TEXT),
+            gid="notes",
+        )  # fmt: skip
+
+
+def _set_limits(axes: Axes, scale: float, frame: Array) -> None:
+    """Set limits, and as many ticks as there is room for."""
     from matplotlib.ticker import MaxNLocator
 
     x0, y0, x1, y1 = frame
-    left, width, height = LEFT, x1 - x0 + LEFT + RIGHT, y1 - y0 + BELOW + ABOVE + NOTE * len(notes)
-    axes = figure.add_axes((0.1, 0.1, 0.8, 0.8))
     axes.set(xlim=(x0 * scale, x1 * scale), ylim=(y0 * scale, y1 * scale))
-    axes.set(xlabel="x (m)", ylabel="y (m)")
     for line, length, each in ((axes.xaxis, x1 - x0, 60.0), (axes.yaxis, y1 - y0, 32.0)):
-        number = min(max(int(length / each), 2), 9)
+        number = min(max(int(length / font_size(each)), 2), 9)
         line.set_major_locator(MaxNLocator(number, steps=[1, 2, 2.5, 5, 10]))
-    axes.tick_params(labelsize=12, color="#888888")
+
+
+def _fit(axes: Axes, frame: Array, notes: int) -> None:
+    """Make the figure as large as the axes, and words around them, need."""
+    figure, (across, up) = figure_of(axes), frame[2:] - frame[:2]
+    below, above = font_size(BELOW), font_size(ABOVE + NOTE * notes)
+    left, width, height = LEFT, across + LEFT + RIGHT, up + below + above
     for _ in range(2):  # the second time with as much room as the numbers at the axis take
         figure.set_size_inches(width / POINTS, height / POINTS)
-        axes.set_position((left / width, BELOW / height, (x1 - x0) / width, (y1 - y0) / height))
+        axes.set_position((left / width, below / height, across / width, up / height))
         outer: Any = axes.get_tightbbox()
         beyond = axes.get_window_extent().x0 - outer.x0
         more = beyond * POINTS / figure.dpi + 8.0 - left
         left, width = left + more, width + more
-    axes.set_aspect("equal")
-    axes.set_title(title, loc="left", color=INK, fontsize=TITLE_SIZE, pad=8.0 + NOTE * len(notes))
-    for k, note in enumerate(reversed(notes)):
-        axes.annotate(
-            note, (0.0, 1.0), (0.0, 6.0 + NOTE * k), xycoords="axes fraction",
-            textcoords="offset points", fontsize=LABEL_SIZE, color=TEXT, gid="notes",
-        )  # fmt: skip
-    return axes
 
 
 def _paint(axes: Axes, sheet: Sheet) -> None:
@@ -244,8 +307,8 @@ def _paint(axes: Axes, sheet: Sheet) -> None:
         for (color, weight, fill, layer), chains in alike.items():
             kind = LineCollection if fill is None else PolyCollection
             collection = kind(
-                chains, edgecolors=color, facecolors=fill or "none", linewidths=weight,
-                zorder=layer, joinstyle="round", capstyle="round", gid=group,
+                chains, edgecolors=shade(color), facecolors=shade(fill or "none"),
+                linewidths=weight, zorder=layer, joinstyle="round", capstyle="round", gid=group,
             )  # fmt: skip
             axes.add_collection(collection, autolim=False)
 
@@ -258,9 +321,9 @@ def _write(axes: Axes, placed: list[Placed], scale: float) -> None:
             axes.plot(*leader.T, color="#999999", linewidth=0.8, zorder=6, gid="leaders")
         x, y = scale * one.center
         axes.text(
-            x, y, one.label.text, color=one.label.color, fontsize=LABEL_SIZE, ha="center",
-            va="center", zorder=7, gid="labels",
-            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.8},
+            x, y, one.label.text, color=shade(one.label.color), fontsize=font_size(LABEL_SIZE),
+            ha="center", va="center", zorder=7, gid="labels",
+            bbox={"facecolor": shade(WHITE), "edgecolor": "none", "alpha": 0.75, "pad": 0.8},
         )  # fmt: skip
 
 
@@ -271,6 +334,6 @@ def _write_badges(axes: Axes, scene: Scene, measure: Measure, frame: Array) -> N
         for words, size, turn in ((text, LABEL_SIZE, 0.0), (arrow, ARROW_SIZE, angle)):
             axes.annotate(
                 words, (x, y), xycoords="axes points", ha="right", va="center", color=RED,
-                fontsize=size, rotation=turn, gid="badges", annotation_clip=False,
+                fontsize=font_size(size), rotation=turn, gid="badges", annotation_clip=False,
             )  # fmt: skip
             x -= 2 * float(measure(text)[0]) + 6.0 if words is text else BADGE

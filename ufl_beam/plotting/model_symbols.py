@@ -18,10 +18,10 @@ from ufl_beam.plotting.labels import Spot
 from ufl_beam.plotting.load_symbols import draw_load, draw_prescribed, draw_velocity
 from ufl_beam.plotting.model_sheet import CAPTIONS, MOST_LABELS, NAMES, SYMBOL, Sheet, Subject
 from ufl_beam.plotting.scene_layout import Pose, Stage
-from ufl_beam.plotting.style import GREY, INK, ORANGE, WHITE, Stroke, with_unit
+from ufl_beam.plotting.style import GREY, INK, ORANGE, TEXT, WHITE, Stroke, with_unit
 from ufl_beam.plotting.symbols import Footing
 
-HINGE, TEXT = "#B0508A", "#444444"  # colours of hinges, and of words that are no loads
+HINGE = "#B0508A"  # colour of hinges
 MOST_CELLS = 300  # number of cells, and of bodies, beyond which they are drawn without details
 
 
@@ -136,7 +136,7 @@ def _draw_connectors(sheet: Sheet, pose: Pose) -> None:
     unit, scale = sheet.unit, sheet.scale
     for connector in sheet.subject.scene.connectors:
         offset = pose.stage.offsets[connector]
-        a, b = np.array(connector.a.point), np.array(connector.b.point)
+        a, b = symbols.ends_of(pose, connector)
         if connector.turns:
             spots = sheet.around(b, (1.6 + offset + 0.8) * unit)
         else:

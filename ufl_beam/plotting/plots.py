@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import cycle
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,9 +11,12 @@ import numpy as np
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.model.bodies import Anchor
 from ufl_beam.plotting import drawing, style, symbols
+from ufl_beam.plotting.style import INK, shade
+from ufl_beam.rich_display import picture_of
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 COMPONENTS = {
@@ -23,9 +25,18 @@ COMPONENTS = {
     "dpsi/dt": ("angular velocity", "rad/s"),
 }  # fmt: skip
 
+SHAPES = 5  # shapes of a solution in a notebook
+VISIBLE = 0.1  # displacements, as a part of the size of the scene, up to which it magnifies them
+FACTORS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)  # larger ones would show round-off
+
 
 def plot_shapes(
-    solution: Solution, times: Sequence[float] = (), *, count: int = 8, magnify: float = 1.0
+    solution: Solution,
+    times: Sequence[float] = (),
+    *,
+    count: int = 8,
+    magnify: float = 1.0,
+    ax: Axes | None = None,
 ) -> Figure:
     """Draw successive shapes in one picture, coloured by time or load factor.
 
@@ -36,10 +47,11 @@ def plot_shapes(
             or along the path.
         count: How many, if no times are given.
         magnify: Factor on the displacements.
+        ax: Axes to draw in; by default those of a new figure.
 
     Raises:
-        SceneError: ``times`` is one number, ``count`` is less than 1, or ``magnify`` is not
-            positive.
+        SceneError: ``times`` is one number, ``count`` is less than 1, ``magnify`` is not positive,
+            or ``ax`` is no axes.
 
     Example:
         >>> ub.plot_shapes(solution, count=5, magnify=10).savefig("shapes.png")
@@ -54,21 +66,34 @@ def plot_shapes(
     chosen = drawing.nearest(kept, times) if len(times) else drawing.evenly(solution, int(count))
     stage = drawing.plane_stage(solution, chosen, magnify)
     poses = [stage.pose(n) for n in chosen]
-    with style.picture(drawing.plane_size(stage.points())) as figure:
+    with style.panel(ax, drawing.plane_size(stage.points())) as axes:
         of_time = style.scale("viridis", 0.0, 0.88, kept[chosen].min(), kept[chosen].max())
-        axes = style.plane_axes(figure, style.magnified(magnify, ""))
+        style.plane_axes(axes, style.magnified(magnify, ""))
         drawing.draw_undeformed(axes, solution, stage)
         for pose, color in zip(poses, of_time.to_rgba(kept[chosen]), strict=True):
             drawing.draw_strokes(axes, (*symbols.bodies(pose), *symbols.rods(pose)), color)
             drawing.draw_axes(axes, solution, pose.nodes, color=color, linewidth=2.2, zorder=3)
             drawing.draw_masses(axes, pose, color)
         drawing.draw_fixings(axes, poses[-1])
-        style.draw_bar(figure, axes, of_time, solution.parameter.name)
-    return figure
+        style.draw_bar(axes, of_time, solution.parameter.name)
+    return style.figure_of(axes)
+
+
+@picture_of.register(Solution)
+def picture_of_solution(solution: Solution) -> Figure:
+    """Draw shapes on the way in a notebook; displacements that can hardly be seen are magnified."""
+    moved = solution.q[:, solution.grid.dofs[:, :2]]
+    part = float(np.abs(moved).max(initial=0.0)) / solution.scene.size
+    magnify = max(factor for factor in FACTORS if factor == 1 or factor * part <= VISIBLE)
+    return plot_shapes(solution, count=SHAPES, magnify=magnify if part > 0 else 1)
 
 
 def plot_history(
-    solution: Solution, places: Anchor | Sequence[Anchor], *, component: str = "v"
+    solution: Solution,
+    places: Anchor | Sequence[Anchor],
+    *,
+    component: str = "v",
+    ax: Axes | None = None,
 ) -> Figure:
     """Draw a component of the motion of one or more places over time.
 
@@ -76,10 +101,11 @@ def plot_history(
         solution: Solution to draw.
         places: The places.
         component: "u", "v", "psi", "du/dt", "dv/dt" or "dpsi/dt".
+        ax: Axes to draw in; by default those of a new figure.
 
     Raises:
-        SceneError: Unknown ``component``, a place that is not in the scene, or the velocity of a
-            static run.
+        SceneError: Unknown ``component``, a place that is not in the scene, the velocity of a
+            static run, or ``ax`` is no axes.
 
     Example:
         >>> ub.plot_history(solution, beam.end, component="v").savefig("history.png")
@@ -89,16 +115,15 @@ def plot_history(
     number = list(COMPONENTS).index(component)
     motion = solution.displacement if number < 3 else solution.velocity
     quantity, unit = COMPONENTS[component]
-    with style.picture((8.0, 4.2)) as figure:
-        axes = style.time_axes(figure.add_subplot())
+    with style.panel(ax, (8.0, 4.2)) as axes:
+        style.time_axes(axes)
         axes.axhline(0.0, color=style.GREY, linewidth=1.0, zorder=1)
-        for place, color in zip(followed, cycle(style.COLORS), strict=False):
-            values = motion(place)[:, number % 3]
-            axes.plot(solution.times, values, color=color, label=str(place))
+        for place in followed:
+            axes.plot(solution.times, motion(place)[:, number % 3], label=str(place))
         axes.set_ylabel(f"{quantity} {component.replace('psi', 'ψ')} ({unit})")
         axes.set_xlabel(solution.parameter.name)
-        figure.legend(loc="outside upper left", ncols=2)
-    return figure
+        style.draw_legend(axes, ax, loc="outside upper left", ncols=2)
+    return style.figure_of(axes)
 
 
 def plot_energy(solution: Solution) -> Figure:
@@ -118,18 +143,19 @@ def plot_energy(solution: Solution) -> Figure:
         ledger, check = map(
             style.time_axes, figure.subplots(2, 1, sharex=True, height_ratios=(2.4, 1))
         )
-        for (name, values, line), color in zip(entries, cycle(style.COLORS), strict=False):
-            ledger.plot(along, values, line, color=color, label=name)
+        for name, values, line in entries:
+            ledger.plot(along, values, line, label=name)
         ledger.set_ylabel("energy (J)")
-        ledger.plot(along, energy.total, color=style.INK, linewidth=1.2, label="in the scene")
+        ledger.plot(along, energy.total, color=shade(INK), linewidth=1.2, label="in the scene")
         figure.legend(loc="outside upper left", ncols=5)
         part = np.abs(energy.imbalance) / (energy.throughput or 1.0)
         # Where the balance is exact, the logarithm is not: such points stand at the lower edge.
         check.semilogy(along, np.maximum(part, 1e-2 * precision), color=style.RED, linewidth=1.2)
         check.axhline(precision, color=style.GREY, linewidth=1.0, zorder=1)
         check.annotate(
-            "machine precision", (1.0, precision), (0, -3), va="top", ha="right", fontsize=11,
-            xycoords=check.get_yaxis_transform(), textcoords="offset points", color="#777777",
+            "machine precision", (1.0, precision), (0, -3), va="top", ha="right",
+            fontsize=style.font_size(11.0),
+            xycoords=check.get_yaxis_transform(), textcoords="offset points", color=style.FRAME,
         )  # fmt: skip
         check.set_ylim(1e-2 * precision, 10 * max(float(part.max()), 10 * precision))
         check.set_ylabel("imbalance\nper throughput")

@@ -1,32 +1,28 @@
 # SPDX-License-Identifier: MIT
-"""Solid pictures and films of a solution, by PyVista, and a screen where VTK needs one."""
+"""Solid pictures and films of a solution, by PyVista."""
 
 from __future__ import annotations
 
 import gc
-import importlib
-import os
-import shutil
-import subprocess
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Collection, Generator
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ufl_beam.arrays import Array
-from ufl_beam.errors import SceneError, require_number
+from ufl_beam.errors import SceneError, require_kind, require_number, require_switch
 from ufl_beam.parallel import active_comm
+from ufl_beam.plotting.camera import Camera
 from ufl_beam.plotting.drawing import evenly
+from ufl_beam.plotting.films import WRITERS, Film
+from ufl_beam.plotting.screen import screen
 from ufl_beam.plotting.solids import QUANTITIES, Solids
 from ufl_beam.plotting.style import decimal_prefix, magnified
+from ufl_beam.progress_bar import progress_bar
 from ufl_beam.simulation.solution import Solution
 
-# Where the camera looks from, and what is up in the picture; the frame is in the plane of x and y.
-_TOWARDS = np.array([-0.20, -0.28, -1.0])
-_UP = np.array([0.0, 1.0, 0.0])
+CAMERA = Camera()  # stands still and sees the whole motion
 
 
 def render(
@@ -37,6 +33,7 @@ def render(
     color: str = "M",
     thickness: float = 1.0,
     magnify: float = 1.0,
+    camera: Camera = CAMERA,
     size: tuple[int, int] = (1600, 900),
 ) -> None:
     """Write a rendered picture of the frame at the n-th kept time.
@@ -52,6 +49,7 @@ def render(
         color: Quantity that colours the beams: "N", "V", "M" or "rotation".
         thickness: Factor on the depth of the sections.
         magnify: Factor on the displacements.
+        camera: Where the camera looks, and the place that it follows.
         size: Width and height; pixels.
 
     Raises:
@@ -66,11 +64,11 @@ def render(
 
     solids = Solids(solution, color, thickness, magnify, size)
     path = _require_suffix(path, (".png",))
-    solids.stage([n]).pose(n)
+    require_kind(camera, Camera, "render: camera")
+    camera.origin(solids.stage([n]).pose(n))
     if active_comm().rank == 0:
-        with _film(solids, [n]) as frames:
-            for frame in frames:
-                imsave(path, frame)
+        with closing(_film(solids, [n], camera)) as frames:
+            imsave(path, next(frames))
 
 
 def animate(
@@ -82,50 +80,67 @@ def animate(
     color: str = "M",
     thickness: float = 1.0,
     magnify: float = 1.0,
+    camera: Camera = CAMERA,
     size: tuple[int, int] = (960, 544),
-) -> None:
-    """Write an animation of the whole motion as GIF or MP4.
+    progress: bool = True,
+) -> Film:
+    """Write an animation of the whole motion as GIF or MP4, and return it as a film to show.
 
-    The camera is fixed and sees the whole motion; colours have the same meaning in all frames.  No
-    screen is needed: for VTK before 9.4 an Xvfb is started for the time being.
+    Colours have the same meaning in all frames.  No screen is needed: for VTK before 9.4 an Xvfb is
+    started for the time being.
 
     Args:
         solution: Solution to draw.
-        path: File, ending in ``.gif``, or in ``.mp4`` if imageio-ffmpeg is installed.
-        fps: Frames per second.
+        path: File, ending in ``.gif``, or in ``.mp4`` if there is ffmpeg, as in imageio-ffmpeg.
+        fps: Frames per second; browsers show at most 50 of a GIF.
         seconds: Duration of the film, whatever the duration of the motion; s.
         color: Quantity that colours the beams: "N", "V", "M" or "rotation".
         thickness: Factor on the depth of the sections.
         magnify: Factor on the displacements.
+        camera: Where the camera looks, and the place that it follows.
         size: Width and height; pixels.
+        progress: Show a progress bar in a terminal or notebook.
+
+    Returns:
+        The film: a path that a notebook plays.
 
     Raises:
         SceneError: A wrong argument; the message says which.
-        ImportError: PyVista, imageio or imageio-ffmpeg is missing.
-        RuntimeError: There is neither a screen nor Xvfb.
+        ImportError: PyVista is missing, or ffmpeg for MP4; the message says how to install it.
+        RuntimeError: There is neither a screen nor Xvfb, or ffmpeg failed.
 
     Example:
         >>> ub.animate(solution, "beam.gif", fps=5, seconds=0.4, size=(320, 192))
+        Film('beam.gif')
     """
     solids = Solids(solution, color, thickness, magnify, size)
-    path = _require_suffix(path, (".gif", ".mp4"))
+    path = _require_suffix(path, WRITERS)
+    require_kind(camera, Camera, "animate: camera")
+    require_switch(progress, "animate: progress")
     require_number(fps, "animate: fps", positive=True)
     require_number(seconds, "animate: seconds", positive=True)
     shown = evenly(solution, max(1, round(fps * seconds)))
+    camera.origin(solids.stage(shown).undeformed)
     if active_comm().rank == 0:
-        with _film(solids, shown) as frames, _film_writer(path, fps) as film:
-            for frame in frames:
-                film.append_data(frame)
+        with closing(_film(solids, shown, camera)) as frames:
+            about = {"iterable": frames, "total": len(shown), "unit": "frame"}
+            bar = progress_bar(progress, active_comm(), **about)
+            WRITERS[path.suffix.lower()](path, iter(bar), fps)
+    return Film(path)
 
 
-@contextmanager
-def _film(solids: Solids, shown: list[int]) -> Iterator[Iterator[Any]]:
-    """The frames of these states, one after the other, as images (height, width, 3)."""
-    pyvista = _optional("pyvista", "ufl_beam[view]", "pictures of solid bodies need PyVista")
-    with _screen(pyvista):
+def _film(solids: Solids, shown: list[int], camera: Camera) -> Generator[Any, None, None]:
+    """Images (height, width, 3) of these states, one after the other."""
+    try:
+        import pyvista
+    except ImportError as error:
+        raise ImportError(
+            "pictures of solid bodies need PyVista; install it by: pip install ufl_beam[view]"
+        ) from error
+    with screen(pyvista):
         plotter = pyvista.Plotter(off_screen=True, window_size=list(solids.size))
         try:
-            yield _frames(pyvista.merge, plotter, solids, shown)
+            yield from _frames(pyvista.merge, plotter, solids, shown, camera)
         finally:
             plotter.close()
             del plotter
@@ -133,7 +148,9 @@ def _film(solids: Solids, shown: list[int]) -> Iterator[Iterator[Any]]:
             gc.collect()
 
 
-def _frames(merge: Any, plotter: Any, solids: Solids, shown: list[int]) -> Iterator[Any]:
+def _frames(
+    merge: Any, plotter: Any, solids: Solids, shown: list[int], camera: Camera
+) -> Generator[Any, None, None]:
     solution, stage = solids.solution, solids.stage(shown)
     largest = max(float(np.abs(solids.values(n)).max(initial=0.0)) for n in set(shown))
     factor, prefix = decimal_prefix(largest)
@@ -144,7 +161,7 @@ def _frames(merge: Any, plotter: Any, solids: Solids, shown: list[int]) -> Itera
         "title": "values", "color": "black", "n_labels": 5, "fmt": "%.3g", "width": 0.48,
         "height": 0.09, "position_x": 0.46, "position_y": 0.01, "label_font_size": height // 36,
     }  # fmt: skip
-    _set_camera(plotter, solids.bounds(stage), solids.size)
+    box = solids.bounds([pose.points() - camera.origin(pose) for pose in stage.poses()])
     plotter.set_background("white")
     plotter.enable_anti_aliasing("msaa")
     if solution.scene.beams:
@@ -153,6 +170,7 @@ def _frames(merge: Any, plotter: Any, solids: Solids, shown: list[int]) -> Itera
     for n in shown:
         plotter.suppress_rendering = True
         pose = stage.pose(n)
+        camera.aim(plotter, box, camera.origin(pose), solids.size)
         # Meshes and texts replace those of the same name.
         if solution.scene.beams:
             plotter.add_mesh(
@@ -172,33 +190,7 @@ def _frames(merge: Any, plotter: Any, solids: Solids, shown: list[int]) -> Itera
         yield plotter.screenshot(return_img=True)
 
 
-def _set_camera(plotter: Any, bounds: Array, size: tuple[int, int]) -> None:
-    """Fit the box into the middle of the picture, above the colour bar and below the time."""
-    towards = _TOWARDS / np.linalg.norm(_TOWARDS)
-    right = np.cross(towards, _UP)
-    right /= np.linalg.norm(right)
-    up = np.cross(right, towards)
-    corners = np.stack(np.meshgrid(*bounds.T), axis=-1).reshape(-1, 3)
-    width, height = np.ptp(corners @ right), np.ptp(corners @ up)
-    scale = max(height / 0.76, width / 0.96 * size[1] / size[0]) / 2
-    focus = bounds.mean(axis=0) - 0.08 * scale * up
-    plotter.camera.parallel_projection = True
-    plotter.camera.parallel_scale = scale
-    plotter.camera.focal_point = focus
-    plotter.camera.position = focus - 4 * np.linalg.norm(np.ptp(bounds, axis=0)) * towards
-    plotter.camera.up = up
-    plotter.camera_set = True
-
-
-def _optional(module: str, package: str, why: str) -> Any:
-    """Import a module that need not be installed, or say how to install it."""
-    try:
-        return importlib.import_module(module)
-    except ImportError as error:
-        raise ImportError(f"{why}; install it by: pip install {package}") from error
-
-
-def _require_suffix(path: str | Path, suffixes: tuple[str, ...]) -> Path:
+def _require_suffix(path: str | Path, suffixes: Collection[str]) -> Path:
     """Return the path of a picture, or raise :class:`SceneError`."""
     path = Path(path)
     if path.suffix.lower() not in suffixes:
@@ -206,47 +198,3 @@ def _require_suffix(path: str | Path, suffixes: tuple[str, ...]) -> Path:
     if not path.parent.is_dir():
         raise SceneError(f"{path}: there is no directory {path.parent}; make it first")
     return path
-
-
-def _film_writer(path: Path, fps: float) -> Any:
-    """Open a GIF or MP4 with so many frames per second."""
-    imageio = _optional("imageio.v2", "ufl_beam[view]", "films need imageio")
-    if path.suffix.lower() == ".gif":
-        return imageio.get_writer(path, mode="I", duration=1000.0 / fps, loop=0)
-    _optional("imageio_ffmpeg", "imageio-ffmpeg", "MP4 needs imageio-ffmpeg, GIF does not")
-    return imageio.get_writer(path, fps=fps, macro_block_size=2)
-
-
-@contextmanager
-def _screen(pyvista: Any) -> Iterator[None]:
-    """Provide a screen if VTK needs one and there is none: without, it ends the interpreter."""
-    needed = sys.platform == "linux" and tuple(pyvista.vtk_version_info) < (9, 4)
-    if not needed or os.environ.get("DISPLAY"):
-        yield
-        return
-    if shutil.which("Xvfb") is None:
-        raise RuntimeError(
-            "PyVista with this VTK needs a screen, and DISPLAY is not set; install Xvfb "
-            "(apt-get install xvfb) or VTK 9.4 or newer"
-        )
-    reader, writer = os.pipe()
-    server = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(writer), "-screen", "0", "1280x1024x24", "-nolisten", "tcp"],
-        pass_fds=[writer],
-        start_new_session=True,  # Ctrl-C is for this process; it still needs its screen to end
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    os.close(writer)
-    try:
-        with os.fdopen(reader) as answer:
-            number = answer.readline().strip()
-        if not number:
-            raise RuntimeError("Xvfb did not start; try: Xvfb -displayfd 1")
-        os.environ["DISPLAY"] = f":{number}"
-        yield
-    finally:
-        os.environ.pop("DISPLAY", None)
-        server.terminate()
-        server.wait()

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -63,9 +63,14 @@ class Stage:
         nodes = grid.points + self.magnify * q[grid.dofs[:, :2]]
         return Pose(self, lambda anchor: motion_of(grid, anchor, [q])[0], nodes)
 
+    def poses(self) -> Iterator[Pose]:
+        """Iterate over the undeformed pose and all that are shown."""
+        yield self.undeformed
+        yield from map(self.pose, self._shown)
+
     def points(self) -> Array:
-        """Return all points of the undeformed pose and of all that are shown; (n, 2); m."""
-        return np.concatenate([p.points() for p in (self.undeformed, *map(self.pose, self._shown))])
+        """Return all points of all poses; (n, 2); m."""
+        return np.concatenate([pose.points() for pose in self.poses()])
 
     @cached_property
     def travels(self) -> dict[Connector, Range]:

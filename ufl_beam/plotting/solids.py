@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import require_number
 from ufl_beam.model.bodies import Anchor, Member, Place
 from ufl_beam.plotting import style, symbols
-from ufl_beam.plotting.drawing import open_hinges
+from ufl_beam.plotting.damage_marks import open_hinges
 from ufl_beam.plotting.geometry import directions, left_of, unit_vectors
 from ufl_beam.plotting.scene_layout import Pose, Stage
 from ufl_beam.plotting.style import RESULTANTS
@@ -46,13 +47,13 @@ class Solids:
         for pixels in self.size:
             require_number(pixels, "size", at_least=16)
 
-    @property
+    @cached_property
     def symbol(self) -> float:
         """Half the size of the symbols of supports and masses; m."""
         scene = self.solution.scene
         return max(0.022 * scene.size, 0.7 * self._thickest(scene.beams)[0])
 
-    @property
+    @cached_property
     def least_width(self) -> float:
         """Width across the plane of slender beams and of bodies; m."""
         return 0.04 * self.solution.scene.size
@@ -69,9 +70,9 @@ class Solids:
         """Return the stage of bodies, joints, connectors and supports."""
         return Stage(self.solution, self.magnify, self.symbol, sorted(set(shown)))
 
-    def bounds(self, stage: Stage) -> Array:
-        """Compute lower and upper corner of the box around a stage; (2, 3); m."""
-        margin, xy = 2.2 * self.symbol, stage.points()
+    def bounds(self, points: Sequence[Array]) -> Array:
+        """Compute lower and upper corner of the box around points and symbols; (2, 3); m."""
+        margin, xy = 2.2 * self.symbol, np.concatenate(points)
         half = self._thickest(self.solution.scene.beams)[1] / 2
         low, high = xy.min(axis=0) - margin, xy.max(axis=0) + margin
         return np.array([[*low, -half], [*high, half]])
@@ -89,10 +90,10 @@ class Solids:
         """Make a hexahedron for each cell of the beams, with values that are the colours."""
         from pyvista import CellType, UnstructuredGrid
 
-        grid, beams = self.solution.grid, self.solution.scene.beams
-        corners = np.concatenate([self._corners(beam, n, pose.nodes) for beam in beams])
-        first = 4 * np.delete(np.arange(len(corners) // 4), grid.first_vertices[1:] - 1)
-        mesh = UnstructuredGrid({CellType.HEXAHEDRON: first[:, None] + np.arange(8)}, corners)
+        first = 4 * self.solution.grid.cells[:, :1]
+        mesh = UnstructuredGrid(
+            {CellType.HEXAHEDRON: first + np.arange(8)}, self._corners(n, pose.nodes)
+        )
         values = self.values(n) / factor
         if self.color == "rotation":
             mesh.point_data["values"] = np.repeat(values, 4)
@@ -100,17 +101,22 @@ class Solids:
             mesh.cell_data["values"] = values
         return mesh
 
-    def _corners(self, beam: Member, n: int, nodes: Array) -> Array:
+    def _corners(self, n: int, nodes: Array) -> Array:
         """Corners of cross-sections, which turn with ψ and halve angles; (4 num_vertices, 3); m."""
         grid = self.solution.grid
-        vertices = grid.vertices_of(beam)
-        along = unit_vectors(np.diff(grid.points[vertices], axis=0))
-        mean = np.concatenate([along[:1], along[1:] + along[:-1], along[-1:]])
+        vertices, counts = np.arange(grid.first_vertices[-1]), np.diff(grid.first_vertices)
+        along = unit_vectors(np.diff(grid.points[grid.cells], axis=1)[:, 0])
+        mean = np.zeros((len(vertices), 2))
+        for end in grid.cells.T:
+            mean[end] += along  # no vertex is the same end of two cells
         angle = np.arctan2(mean[:, 1], mean[:, 0]) + self.solution.q[n][grid.dofs[vertices, 2]]
-        depth, width = self._thickest([beam])
-        left, half = depth / 2 * left_of(directions(angle)), width / 2
-        sides = ((1, half), (-1, half), (-1, -half), (1, -half))
-        planes = [np.insert(nodes[vertices] + sign * left, 2, z, axis=1) for sign, z in sides]
+        sizes = np.array([self._thickest([beam]) for beam in self.solution.scene.beams])
+        depth, width = np.repeat(sizes / 2, counts, axis=0).T
+        left = depth[:, None] * left_of(directions(angle))
+        planes = [
+            np.column_stack([nodes[vertices] + sign * left, side * width])
+            for sign, side in ((1, 1), (-1, 1), (-1, -1), (1, -1))
+        ]
         return np.stack(planes, axis=1).reshape(-1, 3)
 
     def axes(self) -> Any:
@@ -151,15 +157,21 @@ class Solids:
 
     def _add_fittings(self, found: Meshes, n: int, pose: Pose) -> None:
         """Joints as pins across the plane, open hinges as orange ones, masses, supports."""
-        from pyvista import Sphere
+        from pyvista import Cylinder, Sphere
 
-        for pin in symbols.pins(pose):
-            found[PIN].append(self._cylinder(pin))
+        pins = [(pin, PIN) for pin in symbols.pins(pose)]
         for hinge in open_hinges(self.solution, n, pose.nodes):
-            found[style.ORANGE].append(self._cylinder(Pin(hinge.at, True, (hinge.beam.start,))))
-        for mass in self.solution.scene.masses:
-            center = (*pose.at(mass.place), 0.0)
-            found[style.INK].append(Sphere(radius=1.1 * self.symbol, center=center))
+            pins.append((Pin(hinge.at, True, (hinge.beam.start,)), style.ORANGE))
+        cylinders: defaultdict[tuple[float, float, str], list[Array]] = defaultdict(list)
+        for pin, color in pins:
+            cylinders[(*self._size(pin), color)].append(pin.at)
+        for (radius, height, color), places in cylinders.items():
+            cylinder = Cylinder(
+                direction=(0, 0, 1), radius=radius, height=height, resolution=32
+            ).triangulate()
+            found[color].append(_copies(cylinder, places))
+        if masses := [pose.at(mass.place) for mass in self.solution.scene.masses]:
+            found[style.INK].append(_copies(Sphere(radius=1.1 * self.symbol), masses))
         for at, angle, outlines, color, place in symbols.footings(pose):
             half = 0.6 * self._around([place])[1]
             for outline in outlines:
@@ -167,16 +179,19 @@ class Solids:
                 block = block.rotate_z(math.degrees(angle)).translate((*at, 0.0))
                 found[color].append(block)
 
-    def _cylinder(self, pin: Pin) -> Any:
-        """A pin across the plane, as thick as the beams that it joins."""
-        from pyvista import Cylinder
-
+    def _size(self, pin: Pin) -> tuple[float, float]:
+        """Radius and height of a pin across the plane, as thick as the beams that it joins; m."""
         depth, width = self._around(pin.places)
         least = 0.4 * self.symbol if pin.turns or not depth else 0.0
-        return Cylinder(
-            center=(*pin.at, 0.0), direction=(0, 0, 1), radius=max(depth / 2, least),
-            height=width * (1.25 if pin.turns else 1.02), resolution=32,
-        )  # fmt: skip
+        return max(depth / 2, least), width * (1.25 if pin.turns else 1.02)
+
+
+def _copies(mesh: Any, places: list[Array]) -> Any:
+    """Copies of a mesh at places of the plane, in one mesh."""
+    from pyvista import PolyData
+
+    points = PolyData(np.insert(np.array(places), 2, 0.0, axis=1))
+    return points.glyph(geom=mesh, orient=False, scale=False)
 
 
 def _polyline(lines: list[Array]) -> Any:

@@ -7,17 +7,17 @@ Figures belong to no window, need no screen, and are gone when they are no longe
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.errors import SceneError
-from ufl_beam.parallel import active_comm
+from ufl_beam.errors import SceneError, shorten
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -26,7 +26,7 @@ BLUE, RED, GREEN, PINK, ORANGE, SKY = (
     "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9",
 )  # fmt: skip
 COLORS = (BLUE, RED, GREEN, PINK, ORANGE, SKY)  # of lines in one picture
-INK, GREY, WHITE = "#222222", "#B5B5B5", "#FFFFFF"
+INK, TEXT, GREY, WHITE = "#222222", "#444444", "#B5B5B5", "#FFFFFF"
 
 # Layers: beneath the beams, over them, upon the areas there, and over the pins of joints
 BACK, MIDDLE, UPON, FRONT = 2.5, 4.2, 4.3, 5.5
@@ -34,11 +34,22 @@ RESULTANTS = {"N": ("axial force", "N"), "V": ("shear force", "N"), "M": ("bendi
 
 POINTS = 72.0  # points of an inch
 
-STYLE = {
-    "font.size": 13.0, "axes.titlesize": 14.0, "axes.labelsize": 13.0, "axes.edgecolor": "#888888",
-    "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False,
-    "legend.fontsize": 12.0, "lines.linewidth": 2.0, "lines.solid_capstyle": "round",
+FONT = 13.0  # of numbers at axes and words beside them; points
+FRAME = "#888888"  # of axes and their ticks
+
+SIZES = {
+    "axes.titlesize": 14.0, "axes.labelsize": 13.0, "legend.fontsize": 12.0,
+    "xtick.labelsize": 12.0, "ytick.labelsize": 12.0,
 }  # fmt: skip
+"""Sizes of fonts where that of texts is :data:`FONT`; points."""
+
+STYLE: dict[str, Any] = {
+    "text.color": INK, "figure.dpi": 150.0, "lines.linewidth": 2.0,
+    "axes.edgecolor": FRAME, "axes.spines.top": False, "axes.spines.right": False,
+    "xtick.color": FRAME, "ytick.color": FRAME, "grid.color": "#E8E8E8",
+    "legend.frameon": False, "lines.solid_capstyle": "round",
+}  # fmt: skip
+"""Settings of Matplotlib."""
 
 
 class Stroke(NamedTuple):
@@ -61,7 +72,12 @@ def decimal_prefix(value: float) -> tuple[float, str]:
 def with_unit(value: float, unit: str) -> str:
     """Write a value with three digits and a decimal prefix: "−12.3 kN m"."""
     factor, prefix = decimal_prefix(value)
-    return f"{value / factor:.3g} {prefix}{unit}".replace("-", "−")
+    return f"{number(value / factor)} {prefix}{unit}"
+
+
+def number(value: float) -> str:
+    """Write a number with three digits and a minus sign that is one: "−12.3"."""
+    return f"{value:.3g}".replace("-", "−")
 
 
 def magnified(factor: float, before: str = ", ") -> str:
@@ -80,7 +96,9 @@ def require_choice(choice: str, choices: Iterable[str], what: str) -> None:
 def picture(size: tuple[float, float]) -> Iterator[Figure]:
     """Open a new figure in the style of this module, for pictures of your own.
 
-    Only the first process saves it, as all of them run the same script.
+    Only the first process saves it, as all of them run the same script.  Settings and styles of
+    Matplotlib that you have chosen, such as ``plt.style.use("dark_background")``, stay.  A cell of
+    a notebook that ends with the figure shows it.
 
     Args:
         size: Width and height; inch.
@@ -91,32 +109,102 @@ def picture(size: tuple[float, float]) -> Iterator[Figure]:
         >>> figure.savefig("drop.png")
     """
     import matplotlib as mpl
-    from matplotlib.figure import Figure
 
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=size, dpi=150, layout="constrained")
-        if active_comm().rank > 0:
-            figure.savefig = lambda *args, **options: None  # type: ignore[method-assign]
-        yield figure
+    from ufl_beam.plotting.figures import Picture
+
+    with mpl.rc_context(_unless_chosen({**STYLE, **_sizes()})):
+        yield Picture(figsize=size, layout="constrained")
 
 
-def plane_axes(figure: Figure, title: str) -> Axes:
-    """Add axes of the plane of motion, both to one scale."""
-    axes = figure.add_subplot(aspect="equal")
+@contextmanager
+def panel(ax: Axes | None, size: tuple[float, float]) -> Iterator[Axes]:
+    """Open those of a new :func:`picture` of a size, or axes of the user, whose sizes stay."""
+    import matplotlib as mpl
+    from matplotlib.axes import Axes
+
+    if ax is None:
+        with picture(size) as figure:
+            yield figure.add_subplot()
+        return
+    if not isinstance(ax, Axes):
+        raise SceneError(f"ax = {shorten(ax)} must be axes of Matplotlib, as plt.subplots() makes")
+    with mpl.rc_context(_unless_chosen(STYLE)):
+        yield ax
+
+
+def _sizes() -> dict[str, float]:
+    """Sizes of fonts, in proportion to that of texts if the user has chosen it; points."""
+    import matplotlib as mpl
+
+    now, default = mpl.rcParams["font.size"], mpl.rcParamsDefault["font.size"]
+    font = FONT if now == default else now
+    return {"font.size": font, **{name: size / FONT * font for name, size in SIZES.items()}}
+
+
+def _unless_chosen(ours: dict[str, Any]) -> dict[str, Any]:
+    """Our settings and colours of lines, where the user has left those of Matplotlib."""
+    import matplotlib as mpl
+    from cycler import cycler
+
+    now, default = mpl.rcParams, mpl.rcParamsDefault
+    labels = {f"{x}tick.labelcolor": now["axes.labelcolor"] for x in "xy"}
+    ours = {**ours, **labels, "axes.prop_cycle": cycler(color=COLORS)}
+    return {name: value for name, value in ours.items() if now[name] == default[name]}
+
+
+def font_size(size: float) -> float:
+    """Scale a size of a font in proportion to that of texts; points."""
+    import matplotlib as mpl
+
+    return float(size / FONT * mpl.rcParams["font.size"])
+
+
+def shade(color: str) -> str:
+    """Return the colour of texts for ink, that of the axes for white, and other colours as is."""
+    import matplotlib as mpl
+
+    now = mpl.rcParams
+    chosen = {WHITE: now["axes.facecolor"]}
+    if now["text.color"] != INK:
+        chosen |= dict.fromkeys((INK, TEXT), now["text.color"])
+    return str(chosen.get(color, color))
+
+
+def plane_axes(axes: Axes, title: str) -> Axes:
+    """Set axes of the plane of motion up, both to one scale."""
+    axes.set(aspect="equal", xlabel="x (m)", ylabel="y (m)")
     axes.margins(0.06, 0.10)
-    axes.set(xlabel="x (m)", ylabel="y (m)")
-    axes.set_title(title, loc="left", color=INK)
-    axes.tick_params(labelsize=12, color="#888888")
+    axes.set_title(title, loc="left", wrap=True)
     return axes
 
 
 def time_axes(axes: Axes) -> Axes:
     """Set axes up for histories over time."""
     axes.margins(x=0.0)
-    axes.grid(axis="y", color="#E8E8E8", linewidth=0.8)
+    axes.grid(axis="y", linewidth=0.8)
     axes.set_axisbelow(True)
-    axes.tick_params(labelsize=12, color="#888888")
     return axes
+
+
+def figure_of(axes: Axes) -> Figure:
+    """Return the figure that axes are in."""
+    return axes.figure.figure
+
+
+def draw_legend(
+    axes: Axes,
+    ax: Axes | None,
+    handles: Sequence[Artist] | None = None,
+    *,
+    fontsize: float | None = None,
+    **outside: Any,
+) -> None:
+    """Draw a legend outside of the axes of a picture, or within axes ``ax`` that were given."""
+    if ax is None:
+        figure_of(axes).legend(handles=handles, fontsize=fontsize, **outside)
+    else:
+        where = "best" if handles is None else "lower left"
+        axes.legend(handles=handles, fontsize=fontsize, loc=where)
 
 
 def scale(name: str, first: float, last: float, low: float, high: float) -> Any:
@@ -129,16 +217,35 @@ def scale(name: str, first: float, last: float, low: float, high: float) -> Any:
     return ScalarMappable(Normalize(low, high), colors)
 
 
-def draw_bar(figure: Figure, axes: Axes, colors: Any, label: str) -> None:
+def draw_bar(axes: Axes, colors: Any, label: str) -> None:
     """Draw the colour bar of a :func:`scale`."""
-    bar = figure.colorbar(colors, ax=axes, shrink=0.85, aspect=25, pad=0.02)
+    bar = axes.figure.colorbar(colors, ax=axes, shrink=0.85, aspect=25, pad=0.02)
     bar.set_label(label)
     bar.ax.spines["outline"].set_visible(False)
 
 
-def half_size(figure: Figure, axes: Axes, text: str, size: float, **style: Any) -> Array:
+def make_room(axes: Axes) -> None:
+    """Extend the limits such that texts and symbols stay off the edge, and off a legend below."""
+    figure = figure_of(axes)
+    figure.draw_without_rendering()
+    boxes = [text.get_window_extent().get_points() for text in axes.texts]
+    for line in axes.lines:
+        at = axes.transData.transform(line.get_xydata())
+        if line.get_linestyle() == "None" and len(at):  # symbols
+            half = line.get_markersize() / 2 * figure.dpi / POINTS
+            boxes.append(np.array([at.min(axis=0) - half, at.max(axis=0) + half]))
+    for box in boxes:
+        axes.update_datalim(axes.transData.inverted().transform(box))
+    if legend := axes.get_legend():
+        x, y = axes.transData.transform(axes.dataLim.min)
+        below = x, y - legend.get_window_extent().height
+        axes.update_datalim([axes.transData.inverted().transform(below)])
+    axes.autoscale_view()
+
+
+def half_size(axes: Axes, text: str, size: float, **style: Any) -> Array:
     """Measure half of the width and height of a text; (2,); points."""
     probe = axes.text(0.0, 0.0, text, fontsize=size, **style)
     box = probe.get_window_extent()
     probe.remove()
-    return np.asarray(np.array([box.width, box.height]) / 2 * POINTS / figure.dpi)
+    return np.asarray(np.array([box.width, box.height]) / 2 * POINTS / figure_of(axes).dpi)

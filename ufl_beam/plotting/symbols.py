@@ -35,14 +35,17 @@ from ufl_beam.plotting.style import BACK, FRONT, GREY, INK, ORANGE, WHITE, Strok
 FILLED, EDGE = "#D6E2ED", "#5F7A94"  # colours of bodies
 STEEL, DARK, GROUND_GREY = "#6E6E6E", "#4A4A4A", "#808080"  # of rails, rods and still supports
 
+LEAST_SLIDE = 4.0  # least length of a connector that slides; half a symbol is 1
+
 # Outlines of the symbols of supports; half a symbol is 1, the place is the origin, the beam comes
 # from above.
-Outline = list[tuple[float, float]]
-_TRIANGLE = [(0.0, 0.0), (-0.6, -0.8), (0.6, -0.8), (0.0, 0.0)]
-_CLAMP = [(-1.0, 0.0), (1.0, 0.0), (1.0, -0.5), (-1.0, -0.5), (-1.0, 0.0)]
-_PLATE = [(-1.0, -0.8), (1.0, -0.8), (1.0, -0.9), (-1.0, -0.9), (-1.0, -0.8)]
-_TRACK = [(-1.0, -1.0), (1.0, -1.0), (1.0, -1.1), (-1.0, -1.1), (-1.0, -1.0)]
-_DIAMOND = [(-0.6, 0.0), (0.0, 0.6), (0.6, 0.0), (0.0, -0.6), (-0.6, 0.0)]
+Outline = tuple[tuple[float, float], ...]
+Outlines = tuple[Outline, ...]
+_TRIANGLE = ((0.0, 0.0), (-0.6, -0.8), (0.6, -0.8), (0.0, 0.0))
+_CLAMP = ((-1.0, 0.0), (1.0, 0.0), (1.0, -0.5), (-1.0, -0.5), (-1.0, 0.0))
+_PLATE = ((-1.0, -0.8), (1.0, -0.8), (1.0, -0.9), (-1.0, -0.9), (-1.0, -0.8))
+_TRACK = ((-1.0, -1.0), (1.0, -1.0), (1.0, -1.1), (-1.0, -1.1), (-1.0, -1.0))
+_DIAMOND = ((-0.6, 0.0), (0.0, 0.6), (0.6, 0.0), (0.0, -0.6), (-0.6, 0.0))
 
 
 class Pin(NamedTuple):
@@ -58,7 +61,7 @@ class Footing(NamedTuple):
 
     at: Array  # (2,); m
     angle: float  # by which it is turned; rad
-    outlines: list[Outline]  # half a symbol is 1, the place is the origin
+    outlines: Outlines  # half a symbol is 1, the place is the origin
     color: str  # orange ones move
     place: Anchor
 
@@ -119,9 +122,29 @@ def connectors(pose: Pose) -> Iterator[Stroke]:
         yield from draw(pose, connector)
 
 
-def _straight(pose: Pose, connector: Connector) -> Iterator[Stroke]:
+def ends_of(pose: Pose, connector: Connector) -> tuple[Array, Array]:
+    """Return the points from which and to which a straight connector is drawn; (2,) each; m.
+
+    One that slides is drawn along its axis and ends where its place b is seen across the axis.  It
+    begins before a if it would be too short in the undeformed scene.
+    """
     a, b = pose.at(connector.a), pose.at(connector.b)
+    if not connector.follows_a:
+        return a, b
+    ahead = pose.turned(connector.axis, connector.a)
+    start = float(np.dot(connector.apart, connector.axis))
+    least = math.copysign(max(LEAST_SLIDE * pose.stage.unit, abs(start)), start)
+    return a - (least - start) * ahead, a + ((b - a) @ ahead) * ahead
+
+
+def _straight(pose: Pose, connector: Connector) -> Iterator[Stroke]:
+    a, b = ends_of(pose, connector)
     unit, offset = pose.stage.unit, pose.stage.offsets[connector]
+    length = math.hypot(*connector.apart)
+    if connector.follows_a:
+        yield Stroke(np.array([b, pose.at(connector.b)]), STEEL, 1.0)
+        along_axis = abs(float(np.dot(connector.apart, connector.axis)))
+        length = max(along_axis, LEAST_SLIDE * unit)
     apart = np.linalg.norm(b - a) > 0.1 * unit
     axis = unit_vectors(b - a) if apart else pose.turned(connector.axis, connector.a)
     across = unit * left_of(axis)
@@ -132,7 +155,7 @@ def _straight(pose: Pose, connector: Connector) -> Iterator[Stroke]:
         inwards = 0.06 * (b - a)
         a, b = a + inwards + offset * across, b - inwards + offset * across
     # It takes the same part of the way at all times, so it stretches with the motion.
-    body = min(0.66, 6.0 * unit / max(math.hypot(*connector.apart), unit))
+    body = min(0.66, 6.0 * unit / max(length, unit))
     for stroke in STRAIGHT[type(connector.law)]:
         yield along(stroke, a, b, across, body)
 
@@ -158,10 +181,10 @@ def footings(pose: Pose) -> Iterator[Footing]:
         angle = support_direction(support, pose.turn(support.place))
         color = ORANGE if support.moving else GROUND_GREY
         held = 3 if len(support.held) == 3 else len({0, 1} & set(support.held))
-        symbol = [[_DIAMOND], [_TRIANGLE, _TRACK], [_TRIANGLE, _PLATE], [_CLAMP]][held]
+        symbol = ((_DIAMOND,), (_TRIANGLE, _TRACK), (_TRIANGLE, _PLATE), (_CLAMP,))[held]
         yield Footing(pose.at(support.place), angle, symbol, color, support.place)
     for spot, (inward, turns) in _grounds(pose.stage.scene).items():
-        symbol = [_TRIANGLE, _PLATE] if turns else [_CLAMP]
+        symbol = (_TRIANGLE, _PLATE) if turns else (_CLAMP,)
         angle = _upright(inward) if turns else inward - math.pi / 2
         yield Footing(np.array(spot.point), angle, symbol, GROUND_GREY, spot)
 

@@ -25,6 +25,7 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import Place
+from ufl_beam.one_line import one_line
 from ufl_beam.output.archive import above, below
 
 LEDGER = ("state", "supplied", "lost")
@@ -46,6 +47,9 @@ class Material(NamedTuple):
     plastic: Array
     hinge: Array
 
+    def __repr__(self) -> str:
+        return one_line(self)
+
 
 class KeptStates(list[Snapshot]):
     """States that were kept; methods with a number ``n`` give results of all cells in the n-th."""
@@ -53,6 +57,7 @@ class KeptStates(list[Snapshot]):
     def __init__(self, grid: Grid) -> None:
         super().__init__()
         self._grid = grid
+        self._computed: tuple[Snapshot, Array] | None = None  # forces in the last state asked for
 
     @property
     def q(self) -> list[Array]:
@@ -120,10 +125,24 @@ class KeptStates(list[Snapshot]):
 
     def forces(self, n: int) -> Array:
         """(N, V, M), kept where history decides, else computed from the motion; (num_cells, 3)."""
-        forces = np.empty((len(self._grid.cells), 3))
-        self._section_forces.write(self[n].q, forces)
-        cells, rows = cells_of(self[n])
-        forces[cells] = rows[:, :3]
+        state = self[n]
+        if self._computed is None or self._computed[0] is not state:
+            forces = np.empty((len(self._grid.cells), 3))
+            self._section_forces.write(state.q, forces)
+            cells, rows = cells_of(state)
+            forces[cells] = rows[:, :3]
+            forces.flags.writeable = False
+            self._computed = state, forces
+        return self._computed[1]
+
+    def forces_in_points(self, state: Snapshot) -> Array:
+        """(N, V, M) in the Gauss points, as :meth:`forces`; (num_cells, degree, 3)."""
+        fields = self._fields
+        forces = np.empty((len(fields.order), self._grid.mesh.degree, 3))
+        C = fields.of_sections(fields.element.stiffness)
+        forces[fields.order] = self._strains(state.q).reshape(forces.shape) * C[:, None]
+        cells, rows = cells_of(state)
+        forces[cells] = rows[:, None, :3]
         return forces
 
     def strains(self, n: int) -> Array:

@@ -52,6 +52,8 @@ class Opened:
     def __init__(self, grid: Grid, kept: Sequence[Snapshot]) -> None:
         self._grid = grid
         self.first, self.shear = np.full(len(grid.cells), -1), np.zeros(len(grid.cells))
+        if not kept:
+            return
         open_now = kept[-1].material[:, 6] > 0
         if not open_now.any():
             return
@@ -78,17 +80,21 @@ class Opened:
             found.append(OpenedHinges(beam, len(cells), float(errors[worst]), place))
         return found
 
-    def summary(self) -> str:
+    def __repr__(self) -> str:
+        number = np.count_nonzero(self.first >= 0)
+        return f"<Opened: hinges or cracks in {number} of {len(self.first)} cells>"
+
+    def summary(self) -> list[str]:
         """A line about embedded hinges that opened, if there are any."""
         hinges = self.hinges()
         if not hinges:
-            return ""
+            return []
         number, worst = sum(one.number for one in hinges), max(hinges, key=lambda one: one.error)
-        return (
+        return [
             f"embedded hinges opened in {_cells_in_words(number)}; their place within the cell "
             f"shifts the limit by at most {_percent(worst.error)} ({worst.beam.name}, cell at "
-            f"s = {worst.place.s:.3g})\n"
-        )
+            f"s = {worst.place.s:.3g})"
+        ]
 
     def warn(self, scheme: Scheme, times: Array) -> None:
         """Issue a :class:`ModelWarning` for each beam where much depends on the mesh."""

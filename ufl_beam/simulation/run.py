@@ -12,8 +12,6 @@ from typing import Any
 
 from mpi4py import MPI
 
-from tqdm import tqdm
-
 from ufl_beam.errors import (
     SceneError,
     require_count,
@@ -28,7 +26,8 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.output.archive import above, below
 from ufl_beam.output.output_files import Output, take
 from ufl_beam.output.recorders import Recorder, close_all, recorders_of
-from ufl_beam.parallel import communicator, in_study, say
+from ufl_beam.parallel import communicator, say
+from ufl_beam.progress_bar import progress_bar
 from ufl_beam.simulation.checkpoint import Checkpoint, Keeper, end_of
 from ufl_beam.simulation.diagnosis import open_ledger
 from ufl_beam.simulation.fingerprint import kind_of
@@ -77,7 +76,7 @@ def simulate(
         newton: Tolerances and PETSc options.
         mesh: Discretization; as ``start``, or with the cells of the beams.
         checkpoint: Checkpoint file from which the run goes on if the script is run again.
-        progress: Show a progress bar if the output is a terminal.
+        progress: Show a progress bar in a terminal or notebook.
         comm: Processes that share the scene; all of them, or in a :func:`study` this one alone.  A
             small scene is computed by each of them.
 
@@ -171,8 +170,7 @@ def simulate(
             for recorder in recorders:
                 simulation.together(recorder.open, simulation)
             simulation.keep()
-        quiet = None if progress and comm.rank == 0 and not in_study() else True
-        with tqdm(total=1.0, bar_format=BAR, disable=quiet, mininterval=0.5) as bar:
+        with progress_bar(progress, comm, total=1.0, bar_format=BAR) as bar:
             while not pace.finished:
                 pace.advance()
                 simulation.together(after_step)

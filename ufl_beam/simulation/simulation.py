@@ -78,6 +78,10 @@ class Simulation(StateView):
         >>> simulation.close()
     """
 
+    def __repr__(self) -> str:
+        at = self.solution.parameter.at(self.t)
+        return f"<Simulation at {at}: {self.grid}, {self.scheme!r}>"
+
     def __init__(
         self,
         scene: Scene,

@@ -13,7 +13,7 @@ from ufl_beam.arrays import Array, Snapshot
 from ufl_beam.collective_errors import on_first
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.state_io import State
-from ufl_beam.errors import SceneError
+from ufl_beam.errors import SceneError, require_number
 from ufl_beam.model.bodies import Anchor, Member, Place
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
@@ -32,13 +32,15 @@ from ufl_beam.output.joint_histories import (
 from ufl_beam.output.output_files import require_path
 from ufl_beam.parallel import active_comm
 from ufl_beam.parameter import TIME
+from ufl_beam.rich_display import Rich
+from ufl_beam.simulation.force_diagrams import Diagram, ForcesAlongCells
 from ufl_beam.simulation.kept_states import KeptStates, Material
 from ufl_beam.simulation.opened_hinges import Opened
-from ufl_beam.simulation.solution_files import FORMAT, NAMED, grid_of, made_of_file, text_of
+from ufl_beam.simulation.solution_files import FORMAT, NAMED, grid_of, text_of
 from ufl_beam.terms.energy_ledger import Energy
 
 
-class Solution:
+class Solution(Rich):
     """Results of a run: motions and forces at the kept times; the same on every process.
 
     It can be saved, see :meth:`save`, and pickled, with what a file has.
@@ -74,6 +76,7 @@ class Solution:
         self.every, self.open_ledger = 1, ""
         self.internal: State = {}
         self._kept = KeptStates(grid)
+        self._along = ForcesAlongCells(grid, self._kept.forces_in_points)
 
     def keep(self, state: Snapshot) -> None:
         """Append a state of a run."""
@@ -238,6 +241,22 @@ class Solution:
         """
         return self._kept.at(place, self._kept.forces)
 
+    def diagram(self, beam: Member, n: int = -1, *, points: int = 9) -> Diagram:
+        """Section forces along a beam, by equilibrium of its cells, at the n-th kept time.
+
+        Between the vertices V is linear and M parabolic under a uniform load in statics; in
+        dynamics loads and inertia act on the nodes.  ``points`` are those of each cell, equally
+        spaced, both ends included.
+
+        Raises:
+            SceneError: The beam is not in the scene, or ``points`` is less than 2.
+        """
+        require_number(points, "diagram: points", at_least=2)
+        s, cells = self.grid.parameters(beam), self.grid.cells_of(beam)
+        at = s[:-1, None] + np.linspace(0.0, 1.0, int(points)) * np.diff(s)[:, None]
+        forces = self._along(self._kept[n], int(points))[cells]
+        return Diagram(at.ravel(), *forces.reshape(-1, 3).T)
+
     def strains(self, beam: Member, n: int = -1) -> Array:
         """(Σ, Γ, K) in the cells of a beam at the n-th kept time; (num_cells, 3); 1, 1, 1/m.
 
@@ -303,39 +322,22 @@ class Solution:
         """
         return self._kept.momentum()
 
-    def __str__(self) -> str:
-        scene = self.scene
-        counts = (
-            (len(scene.beams), "beam", "beams"), (len(self.grid.cells), "cell", "cells"),
-            (len(scene.bodies), "body", "bodies"), (len(scene.links), "link", "links"),
-        )  # fmt: skip
-        span = f"{self._kept[0].t:g} to {self._kept[-1].t:g}"
-        parts = [f"{n} {one if n == 1 else many}" for n, one, many in counts if n]
-        return (
-            f"{', '.join(parts)}, {self.grid.size} degrees of freedom\n"
-            f"{self.parameter.value.format(span)} in {self.parts} steps, "
+    def summary(self) -> list[str]:
+        """Return lines on the model, the run, and embedded hinges that opened."""
+        ends = " to ".join(f"{state.t:g}" for state in self._kept[:1] + self._kept[-1:])
+        return [
+            str(self.grid),
+            f"{self.parameter.value.format(ends)} in {self.parts} steps, "
             f"{self.iterations / max(self.parts, 1):.2f} Newton iterations each, "
-            f"{self.seconds:.2f} s of wall time\n{self.opened.summary()}{self.energy}"
-            + (f"\n{self.open_ledger}" if self.open_ledger else "")
-        )
+            f"{self.seconds:.2f} s of wall time",
+            *self.opened.summary(),
+        ]
 
+    def __str__(self) -> str:
+        return "\n".join([*self.summary(), str(self.energy), self.open_ledger]).rstrip()
 
-def load(path: str | Path) -> Solution:
-    """Read a solution that :meth:`Solution.save` wrote.
-
-    Its places are those of its own scene: ``loaded.displacement(loaded.scene["left"].end)``.
-
-    Raises:
-        SceneError: There is no such file, or it holds no solution, or is damaged, or is of a
-            version that numbers degrees of freedom otherwise.
-
-    Example:
-        >>> solution.save("beam.h5")
-        >>> loaded = ub.load("beam.h5")
-        >>> bool((loaded.q == solution.q).all())
-        True
-    """
-    return made_of_file(require_path(path, "load"), restored)
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {'; '.join(self.summary()[:2])}>"
 
 
 def restored(text: dict[str, Any], arrays: State) -> Solution:

@@ -13,6 +13,7 @@ from ufl_beam.errors import (
     require_switch,
     require_text,
 )
+from ufl_beam.one_line import one_line
 
 PREFIX = "ub_"
 """Prefix of the PETSc options of the solver, as in ``-ub_snes_monitor``."""
@@ -45,6 +46,8 @@ class Newton:
     modified: bool = False
     petsc: dict[str, Any] = field(default_factory=dict)
     reference: bool = False
+
+    __repr__ = one_line
 
     def __post_init__(self) -> None:
         require_number(self.rtol, "Newton: rtol", positive=True)

@@ -13,6 +13,7 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.model.works import ENTRIES
+from ufl_beam.rich_display import Rich
 
 EXPLAINED = 0.1
 """Part of an imbalance from which on an estimate of round-off explains it."""
@@ -65,7 +66,7 @@ class Entries(dict[str, Array]):
 
 
 @dataclass(frozen=True)
-class Energy:
+class Energy(Rich):
     """Energy ledger of a run: energy in the scene, work supplied, losses.
 
     Attributes:
@@ -155,14 +156,25 @@ class Energy:
             f"the scheme claims {claimed:.0e}: round-off is estimated at {part:.1e}{reason}"
         )
 
-    def __str__(self) -> str:
-        lines = [
-            f"  {kind:9s} {name:12s} {values[-1]: .6e} J"
+    def entries(self) -> list[tuple[str, str, float]]:
+        """Return part ("in scene", "supplied" or "lost"), name and value of all entries; J."""
+        return [
+            (kind, name, float(values[-1]))
             for kind, entries in zip(("in scene", "supplied", "lost"), self._parts, strict=True)
             for name, values in entries.items()
         ]
-        lines.append(f"  imbalance at most {self.worst:.1e} of {self.throughput:.6e} J throughput")
-        return "\n".join(["energy at the end", *lines])
+
+    def balance(self) -> str:
+        """Return the largest imbalance and the throughput in words."""
+        return f"imbalance at most {self.worst:.1e} of {self.throughput:.6e} J throughput"
+
+    def __str__(self) -> str:
+        entries = [f"{kind:9s} {name:12s} {value: .6e} J" for kind, name, value in self.entries()]
+        return "\n  ".join(["energy at the end", *entries, self.balance()])
+
+    def __repr__(self) -> str:
+        entries = "".join(f"{name} {value:.4g} J, " for _, name, value in self.entries())
+        return f"<Energy at the end: {entries}imbalance {self.worst:.1e}>"
 
 
 def _sum(entries: dict[str, Array]) -> Array:

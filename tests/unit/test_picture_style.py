@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: MIT
+"""Axes that the user gives, and settings and styles of Matplotlib that stay."""
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib import pyplot as plt
+from matplotlib.colors import same_color
+from matplotlib.figure import Figure
+
+import ufl_beam as ub
+from ufl_beam.plotting.style import BLUE, INK
+
+
+@pytest.fixture(scope="module")
+def bent():
+    """A cantilever that yields, with a hinge at the clamp that opens, and its extremes."""
+    section = ub.Section(EA=1e6, GA=1e6, EI=100.0, bending=ub.Hardening(8.0, modulus=30.0))
+    hinges = {0.0: ub.Softening(10.0, 3.0)}
+    beam = ub.Beam((0, 0), (1, 0), section, cells=4, name="arm", hinges=hinges)
+    held = [ub.Clamped(beam.start), ub.Prescribed(beam.end, v=lambda t: 0.3 * t)]
+    extremes = ub.Extremes()
+    scene = ub.Scene([beam], supports=held)
+    run = ub.simulate(scene, ub.ExactStatic(), t=(0, 1), dt=0.02, record=extremes, progress=False)
+    return run, extremes
+
+
+ONE_PANEL = {
+    "scene": lambda s, e, **ax: ub.plot(s.scene, **ax),
+    "shape": lambda s, e, **ax: ub.plot(s, **ax),
+    "moments": lambda s, e, **ax: ub.plot(s, "M", **ax),
+    "shapes": lambda s, e, **ax: ub.plot_shapes(s, **ax),
+    "history": lambda s, e, **ax: ub.plot_history(s, s.scene.beams[0].end, **ax),
+    "curvature": lambda s, e, **ax: ub.plot_moment_curvature(s, s.scene.beams[0].end, **ax),
+    "hinge": lambda s, e, **ax: ub.plot_hinge(s, s.scene.beams[0].start, **ax),
+    "damage": lambda s, e, **ax: ub.plot_damage(s, **ax),
+    "dissipation": lambda s, e, **ax: ub.plot_dissipation(s, **ax),
+    "extremes": lambda s, e, **ax: ub.plot_extremes(s, e, **ax),
+}
+
+
+@pytest.mark.parametrize("draw", ONE_PANEL.values(), ids=ONE_PANEL)
+def test_axes_of_the_user(bent, draw):
+    """The picture is in them alone, and neither size nor other axes of the figure change."""
+    figure = Figure(figsize=(10, 4), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    assert draw(*bent, ax=right) is figure
+    figure.draw_without_rendering()
+    assert right.has_data() or right.collections
+    assert not left.has_data()
+    assert not figure.legends
+    np.testing.assert_array_equal(figure.get_size_inches(), (10, 4))
+
+
+def test_axes_of_a_part_of_a_figure(bent):
+    whole = Figure(figsize=(14, 5), layout="constrained")
+    axes = whole.subfigures(1, 2)[1].subplots()
+    assert ub.plot_damage(bent[0], ax=axes) is whole
+    whole.draw_without_rendering()
+
+
+@pytest.mark.parametrize("draw", ONE_PANEL.values(), ids=ONE_PANEL)
+def test_what_is_no_axes_is_refused(bent, draw):
+    with pytest.raises(ub.SceneError, match=r"ax = .* must be axes of Matplotlib"):
+        draw(*bent, ax=Figure())
+
+
+def test_what_is_drawn_fits_into_the_axes_of_the_user(bent):
+    """Labels and the legend of a diagram are inside, and the legend covers no label."""
+    axes = Figure(figsize=(6, 5), layout="constrained").subplots()
+    figure = ub.plot(bent[0], "M", ax=axes)
+    figure.draw_without_rendering()
+    frame, legend = axes.get_window_extent(), axes.get_legend().get_window_extent()
+    assert axes.get_legend().get_texts()[0].get_text() == "M > 0: tension right of the arrow"
+    for text in axes.texts:
+        box = text.get_window_extent()
+        assert frame.x0 <= box.x0 < box.x1 <= frame.x1
+        assert frame.y0 <= box.y0 < box.y1 <= frame.y1
+        assert not box.overlaps(legend)
+
+
+def beam_of(figure):
+    """Line of the deformed beam."""
+    return max(figure.axes[0].lines, key=lambda line: line.get_zorder() == 4)
+
+
+def test_dark_background(bent):
+    with plt.style.context("dark_background"):
+        dark, model = ub.plot(bent[0]), ub.plot(bent[0].scene)
+    for figure in (dark, model):
+        assert same_color(figure.get_facecolor(), "black")
+        assert same_color(figure.axes[0].get_facecolor(), "black")
+        assert same_color(figure.axes[0].title.get_color(), "white")
+        labels = figure.axes[0].get_xticklabels()
+        assert all(same_color(label.get_color(), "white") for label in labels)
+    assert same_color(beam_of(dark).get_color(), "white")
+    assert same_color(beam_of(ub.plot(bent[0])).get_color(), INK)
+    edges = [c.get_edgecolor() for c in model.axes[0].collections if c.get_gid() == "beams"]
+    assert all(same_color(edge[0], "white") for edge in edges)
+
+
+def test_sizes_of_fonts_follow_that_of_texts(bent):
+    """Sizes of titles, ticks and labels keep their proportions."""
+
+    def sizes(figure):
+        axes = figure.axes[0]
+        return np.array([
+            axes.title.get_fontsize(), axes.xaxis.label.get_fontsize(),
+            axes.get_xticklabels()[0].get_fontsize(), axes.texts[0].get_fontsize(),
+        ])  # fmt: skip
+
+    for shown in ((bent[0], "M"), (bent[0].scene,)):
+        ours = sizes(ub.plot(*shown))
+        with mpl.rc_context({"font.size": 26.0}):
+            np.testing.assert_allclose(sizes(ub.plot(*shown)), 2.0 * ours)
+
+
+def test_other_settings_of_the_user(bent):
+    run, end = bent[0], bent[0].scene.beams[0].end
+    settings = {"axes.edgecolor": "red", "figure.dpi": 80, "axes.prop_cycle": mpl.cycler(color="k")}
+    with mpl.rc_context(settings):
+        figure = ub.plot_history(run, end)
+    assert same_color(figure.axes[0].spines["left"].get_edgecolor(), "red")
+    assert figure.dpi == 80
+    assert same_color(figure.axes[0].lines[-1].get_color(), "k")
+    figure = ub.plot_history(run, end)
+    assert not same_color(figure.axes[0].spines["left"].get_edgecolor(), "red")
+    assert same_color(figure.axes[0].lines[-1].get_color(), BLUE)
+    assert mpl.rcParams["font.size"] == mpl.rcParamsDefault["font.size"]  # left as they were

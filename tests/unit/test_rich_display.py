@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: MIT
+"""Models and results in notebooks: text, tables, and pictures that are drawn when shown."""
+
+import re
+import subprocess
+import sys
+from base64 import b64decode
+from io import BytesIO
+
+import numpy as np
+import pytest
+
+import ufl_beam as ub
+from ufl_beam.plotting import plots
+from ufl_beam.rich_display import html_of, picture_of
+
+SECTION = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
+BEAM = ub.Beam((0, 0), (2, 0), SECTION, cells=4)
+FORCE = ub.PointLoad(BEAM.end, force=(0, -1e5), time=lambda t: t)
+SCENE = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)], loads=[FORCE])
+
+
+@pytest.fixture(scope="module")
+def solution():
+    return ub.simulate(SCENE, ub.Midpoint(), t=(0, 1), dt=0.05)
+
+
+def cells(page):
+    """Rows of the tables of a page."""
+    rows = re.findall("<tr>(.*?)</tr>", page)
+    return [re.findall("<t[hd]>(.*?)</t[hd]>", row) for row in rows]
+
+
+def picture(page):
+    """The picture of a page; (height, width, 4)."""
+    from matplotlib.image import imread
+
+    (data,) = re.findall('src="data:image/png;base64,(.*?)"', page)
+    return imread(BytesIO(b64decode(data)))
+
+
+@pytest.mark.serial
+def test_a_scene_is_drawn():
+    page = SCENE._repr_html_()
+    assert "1 beam, 1 support, 1 load" in page
+    pixels = picture(page)
+    assert pixels.shape[1] > 600
+    assert np.ptp(pixels) > 0.5
+    assert len(page) < 200_000
+
+
+@pytest.mark.serial
+def test_a_solution_has_its_text_ledger_and_shapes(solution):
+    page = solution._repr_html_()
+    for line in solution.summary():
+        assert line in page
+    ledger = {(part, name): float(value) for part, name, value in cells(page)[1:]}
+    assert ledger.keys() == {("in scene", "stored"), ("in scene", "kinetic"), ("supplied", "loads")}
+    for (_, name), value in ledger.items():
+        assert value == pytest.approx(solution.energy[name][-1], rel=1e-5)  # six digits
+    picture(page)
+
+
+def test_small_displacements_are_magnified(solution, monkeypatch):
+    """[closed] The deflection of 0.019 m, 1 % of the length, ten times; of 1 m as it is."""
+    factors, draw = [], plots.plot_shapes
+
+    def shapes(solution, count, magnify):
+        factors.append(magnify)
+        return draw(solution, count=count, magnify=magnify)
+
+    monkeypatch.setattr(plots, "plot_shapes", shapes)
+    solution._repr_html_()
+    sink = ub.Prescribed(BEAM.start, v=lambda t: -t, u=0, psi=0)
+    ub.simulate(ub.Scene([BEAM], supports=[sink]), ub.Static(), t=(0, 1), dt=1)._repr_html_()
+    still = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)])
+    ub.simulate(still, ub.Static(), t=(0, 1), dt=1)._repr_html_()
+    assert factors == [10, 1, 1]
+
+
+@pytest.mark.serial
+def test_modes_have_a_table(solution):
+    modes = ub.modes(SCENE, 8, mesh=ub.Mesh(refine=2))
+    page = modes._repr_html_()
+    assert cells(page)[1:] == [[str(k), title] for k, title in enumerate(modes.titles)]
+    picture(page)
+    assert repr(modes) == f"<Modes: {'; '.join(modes.titles[:4])}; ...>"
+    # A period of a mode has no ledger
+    page = modes.motion(0)._repr_html_()
+    assert cells(page) == []
+    picture(page)
+
+
+def test_a_path_names_its_critical_points():
+    push = ub.PointLoad(BEAM.end, force=(-2e7, 0), time=lambda t: t)
+    column = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)], loads=[push])
+    path = ub.follow(column, ub.LoadControl(0.05), steps=10)
+    assert "bifurcation point at factor 0.441" in path._repr_html_()
+    assert path.summary()[-1] in str(path).splitlines()
+    path.critical = [*path.critical] * 7
+    assert path.summary()[-1].count("bifurcation") == 5
+    assert path.summary()[-1].endswith(" and 2 more")
+
+
+@pytest.mark.serial
+def test_a_tradeoff_has_its_runs():
+    tip = {"tip": lambda run: run.position(BEAM.end)[-1]}
+    found = ub.tradeoff(SCENE, tip, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance=0.01)
+    page = found._repr_html_()
+    assert cells(page)[0] == ["", "seconds", "steps", "cells", "iterations", "tip", "dials"]
+    chosen = next(row for row in cells(page) if row[0] == "=&gt;")
+    assert chosen[-1] == str(found.best.dials)
+    for line in found.remarks():
+        assert line.splitlines()[0] in page
+    picture(page)
+
+
+def test_a_study_has_its_first_cases():
+    def member(n):
+        return {"square": n**2, "both": [n, -n], "inverse": 1 / (n - 1)}
+
+    page = ub.study(member, [{"n": n} for n in range(15)])._repr_html_()
+    head, *rows = cells(page)
+    assert head == ["n", "inverse", "square"]
+    assert rows[:3] == [["0", "-1", "0"], ["1", "nan", "nan"], ["2", "1", "4"]]
+    assert len(rows) == 12
+    for line in ("and 3 more cases", "both: (15, 2)", "ZeroDivisionError", "15 members, 1 failed"):
+        assert line in page
+
+
+def test_errors_of_pictures_leave_the_text(solution, monkeypatch):
+    def fail(*args, **options):
+        raise RuntimeError("<no> ink")
+
+    monkeypatch.setattr(plots, "plot_shapes", fail)
+    page = solution._repr_html_()
+    assert "no picture: RuntimeError: &lt;no&gt; ink" in page
+    assert solution.summary()[0] in page
+    # Constraints that repeat are found when the scene is drawn
+    joints = [ub.Revolute(BEAM.end, ub.ground(2, 0)), ub.Revolute(BEAM.start, ub.ground(0, 0))]
+    over = ub.Scene([BEAM], joints=[*joints, ub.Link(BEAM.start, BEAM.end)])
+    assert "no picture: SceneError" in over._repr_html_()
+    assert "1 beam, 3 joints" in over._repr_html_()
+
+
+def test_other_objects_are_shown_by_their_text():
+    assert html_of("<b>") == "<pre>&lt;b&gt;</pre>"
+    with pytest.raises(TypeError, match="a str has no picture"):
+        picture_of("<b>")
+
+
+@pytest.mark.serial
+def test_figures_are_pictures_at_the_end_of_a_cell():
+    data, look = ub.plot(SCENE)._repr_png_()
+    assert data.startswith(b"\x89PNG")
+    assert 300 < look["width"] < 900  # pixels of a page
+
+
+@pytest.mark.serial
+def test_matplotlib_is_not_imported_before_something_is_drawn():
+    script = "\n".join([
+        "import sys",
+        "import ufl_beam as ub",
+        "beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1, GA=1, EI=1))",
+        "print(repr(ub.Scene([beam])), 'matplotlib' in sys.modules, 'IPython' in sys.modules)",
+    ])  # fmt: skip
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.stdout == "<Scene: 1 beam> False False\n", done.stderr

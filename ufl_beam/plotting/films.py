@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: MIT
+"""Films: sequences of images in GIF and MP4 files, which notebooks play."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+import subprocess
+import tempfile
+from base64 import b64encode
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+Frames = Iterator[Any]  # images (height, width, 3) of one size; np.uint8
+
+
+@dataclass(frozen=True)
+class Film(os.PathLike[str]):
+    """Film in a file, as :func:`animate` returns it.
+
+    It is played where a notebook shows it, and stands for its path everywhere else.  The notebook
+    contains a copy of the film.
+
+    Attributes:
+        path: GIF or MP4 file.
+
+    Example:
+        >>> film = ub.animate(solution, "beam.gif", fps=5, seconds=0.4, size=(320, 192))
+        >>> film
+        Film('beam.gif')
+        >>> with open(film, "rb") as file:
+        ...     file.read(3)
+        b'GIF'
+    """
+
+    path: Path
+
+    def __fspath__(self) -> str:
+        return str(self.path)
+
+    def __repr__(self) -> str:
+        return f"Film({str(self.path)!r})"
+
+    def _repr_html_(self) -> str:
+        data, style = b64encode(self.path.read_bytes()).decode(), 'style="max-width: 100%"'
+        if self.path.suffix.lower() == ".gif":
+            return f'<img alt="{self.path.stem}" {style} src="data:image/gif;base64,{data}">'
+        return f'<video controls loop {style} src="data:video/mp4;base64,{data}"></video>'
+
+
+def write_gif(path: Path, frames: Frames, fps: float) -> None:
+    """Write a GIF, which counts its time in hundredths of a second."""
+    from PIL import Image
+
+    images = [Image.fromarray(frame).quantize(256) for frame in frames]
+    # Frames begin at the nearest hundredth, so that the film has its length.
+    durations = 10.0 * np.diff(np.rint(100.0 * np.arange(len(images) + 1) / fps))
+    first, *others = images
+    first.save(path, save_all=True, append_images=others, duration=durations.tolist(), loop=0)
+
+
+def write_mp4(path: Path, frames: Frames, fps: float) -> None:
+    """Write an MP4 file that browsers play (H.264), by ffmpeg."""
+    program, first = _ffmpeg(), next(frames)
+    height, width = first.shape[:2]
+    command = [
+        program, "-y", "-loglevel", "error",
+        "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", str(fps), "-i", "-",
+        # H.264 needs even sizes.
+        "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white", "-pix_fmt", "yuv420p",
+        str(path.absolute()),
+    ]  # fmt: skip
+    # Not a pipe: PETSc ends the interpreter at the signal of a broken one.
+    ours, theirs = socket.socketpair()
+    with ours, theirs, tempfile.TemporaryFile() as messages:
+        # Ctrl-C is for this process.
+        writer = subprocess.Popen(
+            command, stdin=theirs.fileno(), stderr=messages, start_new_session=True
+        )
+        theirs.close()
+        try:
+            for frame in chain([first], frames):
+                ours.sendall(np.ascontiguousarray(frame), socket.MSG_NOSIGNAL)
+        except ConnectionError:
+            pass  # it has ended, and said why
+        except BaseException:
+            writer.kill()
+            writer.wait()
+            path.unlink(missing_ok=True)
+            raise
+        ours.close()
+        if writer.wait():
+            messages.seek(0)
+            raise RuntimeError(f"{program}: {messages.read().decode(errors='replace').strip()}")
+
+
+def _ffmpeg() -> str:
+    """Find the program ffmpeg: that of the package imageio-ffmpeg, or the system's."""
+    try:
+        from imageio_ffmpeg import get_ffmpeg_exe
+
+        return str(get_ffmpeg_exe())
+    except (ImportError, RuntimeError) as error:  # there is no package, or no program in it
+        program = shutil.which("ffmpeg")
+        if program is None:
+            raise ImportError(
+                "MP4 needs ffmpeg, GIF does not; install it by: pip install imageio-ffmpeg, or: "
+                "apt-get install ffmpeg"
+            ) from error
+        return program
+
+
+WRITERS = {".gif": write_gif, ".mp4": write_mp4}
+"""Functions that write films, by the endings of their files."""

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: MIT
+"""Pages of models and results in notebooks: tables, and a picture, drawn when a cell shows it."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Sequence
+from html import escape
+
+from ufl_beam.analysis.modes import Shapes
+from ufl_beam.analysis.study_file import Study
+from ufl_beam.analysis.tradeoff_result import Tradeoff
+from ufl_beam.model.scene import Scene
+from ufl_beam.rich_display import html_of, picture_of
+from ufl_beam.simulation.solution import Solution
+from ufl_beam.terms.energy_ledger import Energy
+
+ROWS = 12  # cases of a study that are shown
+
+
+@html_of.register
+def of_scene(scene: Scene) -> str:
+    """Write a scene: its parts, and the picture of :func:`plot`."""
+    return lines(str(scene)) + image("model", scene)
+
+
+@html_of.register
+def of_solution(solution: Solution) -> str:
+    """Write a solution: the lines of its text, the energy ledger, and shapes on the way."""
+    text = lines(*solution.summary()) + of_energy(solution.energy) + lines(solution.open_ledger)
+    return text + image("shapes", solution)
+
+
+@html_of.register
+def of_energy(energy: Energy) -> str:
+    """Write an energy ledger as a table of its entries at the end."""
+    rows = [(kind, name, f"{value:.6g}") for kind, name, value in energy.entries()]
+    return table(("energy", "", "at the end (J)"), rows) + lines(energy.balance()) if rows else ""
+
+
+@html_of.register
+def of_shapes(shapes: Shapes) -> str:
+    """Write modes: their frequencies or load factors, and pictures of the first ones."""
+    rows = [(str(k), title) for k, title in enumerate(shapes.titles)]
+    return table((shapes.word, ""), rows) + image("modes", shapes)
+
+
+@html_of.register
+def of_tradeoff(found: Tradeoff) -> str:
+    """Write a trade-off: the runs that no other one beats, remarks, and a picture."""
+    head, *rows = found.table()
+    text = lines(found.title()) + table(head, rows) + lines(*found.remarks())
+    return text + image("errors over wall times", found)
+
+
+@html_of.register
+def of_study(results: Study) -> str:
+    """Write a study: its first cases with the results that are single numbers."""
+    title, *failed = str(results).splitlines()
+    numbers = {name: x for name, x in results.results.items() if x.ndim == 1}
+    arrays = [f"{name}: {x.shape}" for name, x in results.results.items() if x.ndim > 1]
+    names = list(dict.fromkeys(name for case in results.cases for name in case))
+    rows = [
+        (*(str(case.get(name, "")) for name in names), *(f"{x[i]:.6g}" for x in numbers.values()))
+        for i, case in enumerate(results.cases[:ROWS])
+    ]
+    more = f"and {len(results) - ROWS} more cases" if len(results) > ROWS else ""
+    return lines(title) + table((*names, *numbers), rows) + lines(more, *arrays, *failed)
+
+
+def lines(*texts: str) -> str:
+    """Write texts that are not empty as lines."""
+    shown = "<br>".join(escape(text).replace("\n", "<br>") for text in texts if text)
+    return f"<p>{shown}</p>" if shown else ""
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Write rows of texts as a table below its head."""
+    cells = [
+        "".join(f"<{tag}>{escape(text)}</{tag}>" for text in row)
+        for tag, row in (("th", head), *(("td", row) for row in rows))
+    ]
+    return f"<table>{''.join(f'<tr>{row}</tr>' for row in cells)}</table>"
+
+
+def image(name: str, shown: object) -> str:
+    """Draw the picture of an object; where that fails, the reason takes its place."""
+    try:
+        from ufl_beam.plotting.figures import png
+
+        data, width = png(picture_of(shown))
+    except Exception as error:
+        return lines(f"no picture: {type(error).__name__}: {error}")
+    look = f'width="{width}" style="max-width: 100%; height: auto"'
+    return f'<img alt="{name}" src="data:image/png;base64,{b64encode(data).decode()}" {look}>'
