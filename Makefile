@@ -80,7 +80,9 @@ check-docs: ## the built site in Chromium, on a desk and on a phone; builds a ro
 	@tests/browser/check
 
 docs-pictures: docs ## pictures of the site in docs/pictures/site
-	@tests/browser/check docs/pictures/site
+	@tests/browser/check
+	@mkdir -p docs/pictures/site
+	@for page in first_page gallery demo reference_page; do cp output/site/$${page}_*.png docs/pictures/site; done
 
 extremes: ## results at extreme parameters, as tables in docs/extremes.md
 	@./env python3 benchmarks/extremes

@@ -789,6 +789,26 @@ def test_render(swing, tmp_path, color):
         assert np.count_nonzero(picture[30:160, :, :3].min(axis=-1) < 0.8) > 300
 
 
+@pytest.mark.usefixtures("no_screen")
+@pytest.mark.parametrize("degree", [1, 3])
+@pytest.mark.parametrize("color", ["M", "rotation"])
+def test_hinges_and_inner_nodes_are_rendered(tmp_path, color, degree):
+    """The vertices of a beam are not one after the other then."""
+    from matplotlib.image import imread
+
+    section = ub.Section(EA=1e6, GA=1e6, EI=1e3)
+    beam = ub.Beam((0, 0), (2, 0), section, cells=4, hinges={0.5: ub.Softening(50.0, 20.0)})
+    force = ub.PointLoad(beam.end, force=(0, -40), time=ub.ramp(1.0))
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[force])
+    mesh = ub.Mesh(degree=degree)
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, mesh=mesh, progress=False)
+    path = tmp_path / "hinged.png"
+    ub.render(solution, path, color=color, size=(320, 200))
+    assert path.exists() == FIRST
+    if FIRST:
+        assert np.count_nonzero(imread(path)[30:160, :, :3].min(axis=-1) < 0.8) > 300
+
+
 def frames_of(film):
     """Images of a GIF, (n, height, width, 3), and their durations in ms."""
     from PIL import Image, ImageSequence

@@ -81,7 +81,7 @@ class Solids:
         """Values of the colours in all cells or, of rotations, at all vertices of beams."""
         solution, grid = self.solution, self.solution.grid
         if self.color == "rotation":
-            return np.asarray(solution.q[n][grid.dofs[: grid.first_vertices[-1], 2]])
+            return np.asarray(solution.q[n][grid.dofs[: grid.cells.max(initial=-1) + 1, 2]])
         index = list(RESULTANTS).index(self.color)
         forces = [solution.section_forces(beam, n)[:, index] for beam in solution.scene.beams]
         return np.concatenate([np.empty(0), *forces])
@@ -90,9 +90,9 @@ class Solids:
         """Make a hexahedron for each cell of the beams, with values that are the colours."""
         from pyvista import CellType, UnstructuredGrid
 
-        first = 4 * self.solution.grid.cells[:, :1]
+        corners = 4 * self.solution.grid.cells[:, :, None] + np.arange(4)  # of start and end
         mesh = UnstructuredGrid(
-            {CellType.HEXAHEDRON: first + np.arange(8)}, self._corners(n, pose.nodes)
+            {CellType.HEXAHEDRON: corners.reshape(-1, 8)}, self._corners(n, pose.nodes)
         )
         values = self.values(n) / factor
         if self.color == "rotation":
@@ -104,14 +104,15 @@ class Solids:
     def _corners(self, n: int, nodes: Array) -> Array:
         """Corners of cross-sections, which turn with ψ and halve angles; (4 num_vertices, 3); m."""
         grid = self.solution.grid
-        vertices, counts = np.arange(grid.first_vertices[-1]), np.diff(grid.first_vertices)
+        vertices = np.arange(grid.cells.max(initial=-1) + 1)
         along = unit_vectors(np.diff(grid.points[grid.cells], axis=1)[:, 0])
-        mean = np.zeros((len(vertices), 2))
+        sizes = np.reshape([self._thickest([beam]) for beam in self.solution.scene.beams], (-1, 2))
+        mean, halves = np.zeros((len(vertices), 2)), np.zeros((len(vertices), 2))
         for end in grid.cells.T:
             mean[end] += along  # no vertex is the same end of two cells
+            halves[end] = sizes[grid.beam_of_cell] / 2
         angle = np.arctan2(mean[:, 1], mean[:, 0]) + self.solution.q[n][grid.dofs[vertices, 2]]
-        sizes = np.array([self._thickest([beam]) for beam in self.solution.scene.beams])
-        depth, width = np.repeat(sizes / 2, counts, axis=0).T
+        depth, width = halves.T
         left = depth[:, None] * left_of(directions(angle))
         planes = [
             np.column_stack([nodes[vertices] + sign * left, side * width])
