@@ -131,6 +131,7 @@ def test_reasons_are_those_of_petsc(mine, theirs):
     assert getattr(lib, mine) == int(getattr(PETSc.SNES.ConvergedReason, theirs))
 
 
+@pytest.mark.serial  # with several processes PETSc's SNES calls Python
 @pytest.mark.parametrize(
     ("name", "reference"), [("add_in_python", False), ("missed_in_python", True)]
 )
