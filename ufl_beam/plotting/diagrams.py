@@ -37,7 +37,7 @@ SIGNS = {
     "V": ("V > 0: left of the arrow", "V < 0: right of the arrow"),
     "M": ("M > 0: tension right of the arrow", "M < 0: tension left of the arrow"),
 }
-"""What both signs mean; the arrow on a beam points from its start to its end."""
+"""Meaning of both signs; the arrow on a beam points from its start to its end."""
 
 Values = tuple[Member, Array]  # a beam, and the values in points of its cells, (num_cells, points)
 
@@ -219,7 +219,7 @@ def _draw_direction(axes: Axes, at: Array, left: Array) -> None:
 
 
 def _signs(axes: Axes, what: str) -> dict[str, Artist]:
-    """What the signs mean that are in the picture, with an area of each."""
+    """Meanings of the signs that are in the picture, with an area of each."""
     meanings = dict(zip((RED, BLUE), SIGNS.get(what, ()), strict=False))
     areas = {area.get_gid(): area for area in axes.collections}
     return {meaning: areas[color] for color, meaning in meanings.items() if color in areas}
