@@ -144,7 +144,8 @@ class StateView(ABC):
 
     def entries(self) -> tuple[dict[str, float], ...]:
         """The ledger over all processes: state, supplied, lost; J."""
-        groups = tuple(map(dict, (self.ledger.state, self.ledger.supplied, self.ledger.lost)))
+        parts = self.ledger.state, self.ledger.supplied, self.ledger.lost
+        groups = tuple(part.by_name() for part in parts)
         if self.share.alone:
             return groups
         everyone = self.share.comm.allgather(groups)

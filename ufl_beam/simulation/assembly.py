@@ -86,6 +86,7 @@ class Assembly:
     supports: Supports
     openings: Openings | None  # search for what opens; None if nothing can
     equation: StepEquation
+    search: SearchFlags | None  # None if nothing can open
 
     @property
     def remembering(self) -> list[InelasticBeams | Links]:
@@ -203,7 +204,7 @@ def assemble(
         equation.leave_to_c()
     return Assembly(
         fields, ledger, asked, rates, beams, inelastic, bool(groups), coupled, loads, inertia,
-        supports, openings, equation,
+        supports, openings, equation, search if places else None,
     )  # fmt: skip
 
 

@@ -36,7 +36,12 @@ Those that wander longer find a solution by luck: the last digits of the data wo
 
 
 class Solver:
-    """Finds the configuration in which the residual of an equation vanishes."""
+    """Finds the configuration in which the residual of an equation vanishes.
+
+    Attributes:
+        in_c: Whether C can solve steps with no Python.
+        iterations: Number of iterations so far.
+    """
 
     def __init__(
         self,
@@ -63,7 +68,8 @@ class Solver:
         self._ksp.getPC().setPythonContext(self._factors)
         self._bordered: BorderedNewton | None = None
         self._snes = self._make_snes()
-        if equation.in_c and not self._chosen():
+        self.in_c = equation.in_c and not self._chosen()
+        if self.in_c:
             self._leave_newton_to_c()
         self.iterations = self._done = 0
 
@@ -110,7 +116,8 @@ class Solver:
     @property
     def snes(self) -> PETSc.SNES:
         """SNES of the steps; from when it is asked for, their method is PETSc's ``newtonls``."""
-        if self._snes.getType() == "shell":
+        if self.in_c:
+            self.in_c = False
             self._snes.setType("newtonls")
             take_options(self._snes, FULL_STEPS)  # SNES has forgotten its line search
         return self._snes
@@ -245,6 +252,15 @@ class Solver:
         return self._q.copy()
 
     # -- what is known of it -------------------------------------------------------------------
+
+    @property
+    def unknowns(self) -> Array:
+        """The unknowns of SNES, which C writes to; local values."""
+        return self._q
+
+    def in_petsc(self) -> Any:
+        """SNES, as C has it."""
+        return opaque(self._snes)
 
     def iterate(self) -> Array:
         """Return the latest configuration, converged or not; local values, ghosts included."""

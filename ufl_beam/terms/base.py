@@ -14,6 +14,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.time_schemes import Step
+from ufl_beam.terms.phases import TimeFunctions, Phases
 
 KINDS = ("beams", "connectors", "loads", "inertia", "damping")
 """Kinds of forces."""
@@ -27,6 +28,10 @@ class Term(ABC):
 
     def loops(self) -> tuple[Loop, Loop | None] | None:
         """Return C loops of residual and tangent with data; None where Python evaluates them."""
+        return None
+
+    def phases(self, times: TimeFunctions) -> Phases | None:
+        """C loops of the methods below for steps without Python; None where a term has not all."""
         return None
 
     def begin(self, step: Step) -> None:

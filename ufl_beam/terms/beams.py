@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import NamedTuple
 
 import ufl
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop, loop, struct
+from ufl_beam.compiled.c_library import Loop, ffi, loop, struct
 from ufl_beam.compiled.csr import Csr, StepProduct
 from ufl_beam.discretization.compiled_forms import CellForm, stated
 from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
@@ -19,6 +20,8 @@ from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, Step, has_inertia
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.forms_and_matrices import OfForms, OfMatrix
+from ufl_beam.terms.phases import TimeFunctions, Phases, entering
+from ufl_beam.terms.rates_in_c import RatesInC
 from ufl_beam.terms.tangent_derivatives import Cells
 
 
@@ -80,6 +83,14 @@ class ElasticBeams(OfForms, Cells):
         """C loops over the cells, of force and tangent."""
         return loop("add_cells", self._force.cells), loop("add_first_cells", self._in_c)
 
+    def phases(self, times: TimeFunctions) -> Phases | None:
+        """Loops over the cells."""
+        begin, accept = self._loops_of_step()
+        if self._first is not None:
+            begin.append(loop("begin_first_cells", self._in_c))
+        stored = self._ledger.state.pointer("stored")
+        return Phases(begin, accept, [entering(self._stored, stored)])
+
     def add_tangent(self, q1: Array) -> None:
         """Add the stiffness, material and geometric.
 
@@ -116,7 +127,7 @@ class Inertia(OfMatrix):
     ) -> None:
         rotations = scheme.half_tangents(fields.share.rotations())
         self._times = StepProduct(mass_matrix(fields), rotations, A)
-        self._ledger = ledger
+        self.ledger = ledger
         if scheme.slips:
             ledger.lost["numerical"] += 0.0
         self.scheme = scheme
@@ -128,6 +139,24 @@ class Inertia(OfMatrix):
     def M(self) -> Csr:
         """The mass matrix; a new one."""
         return self._times.matrix()
+
+    def phases(self, times: TimeFunctions) -> Phases | None:
+        """Loops over the matrix and the velocities."""
+        rates = self.in_c
+        if rates is None:
+            return None
+        lost = self.ledger.lost.pointer("numerical") if self.scheme.slips else ffi.NULL
+        kinetic = self.ledger.state.pointer("kinetic")
+        of = rates.times(self._times, kept=kinetic, lost=lost)
+        begin, accept, state = (
+            [loop(name, of)] for name in ("begin_inertia", "accept_inertia", "add_kinetic_energy")
+        )
+        return Phases(begin, accept, state, rates.enter, rates.leave)
+
+    @cached_property
+    def in_c(self) -> RatesInC | None:
+        """The velocities in C; none if the scheme makes something else of them than multiples."""
+        return RatesInC.of(self)
 
     def begin(self, step: Step) -> None:
         """Prepare what stays constant in the step."""
@@ -160,12 +189,12 @@ class Inertia(OfMatrix):
             change = v - self.v
             momentum = self._times.A(change)
             lost = self.scheme.slip(self._dt, change, self) @ momentum
-            self._ledger.lost["numerical"] += float(lost)
+            self.ledger.lost["numerical"] += float(lost)
         self.v_before, self.v, self.more, self.last_dt = self.v, v, tuple(more), self._dt
 
     def add_state(self, q: Array) -> None:
         """Add the kinetic energy to the ledger."""
-        self._ledger.state["kinetic"] += self._times.A.square(self.v) / 2
+        self.ledger.state["kinetic"] += self._times.A.square(self.v) / 2
 
     def remember(self, memory: Memory, q: Array) -> None:
         """Save or restore velocities and the last step."""

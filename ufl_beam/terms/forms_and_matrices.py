@@ -14,6 +14,7 @@ from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.phases import TimeFunctions, Phases, beginning, entering
 
 
 class OfForms(Term):
@@ -31,6 +32,16 @@ class OfForms(Term):
         self._A, self._ledger = A, ledger
         if losses:
             ledger.lost[self._entry] += 0.0
+
+    def phases(self, times: TimeFunctions) -> Phases | None:
+        """Loops over the cells."""
+        return Phases(*self._loops_of_step())
+
+    def _loops_of_step(self) -> tuple[list[Loop], list[Loop]]:
+        """Those of :meth:`begin` and :meth:`accept`."""
+        lost = self._ledger.lost
+        accept = [entering(loss, lost.pointer(self._entry)) for loss in self._losses]
+        return beginning(self._of_step, self._q0), accept
 
     def begin(self, step: Step) -> None:
         """Remember the configuration at the beginning."""

@@ -25,6 +25,7 @@ from ufl_beam.model.fibres import Layout
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.material_points import Points
 from ufl_beam.terms.openings import SearchFlags
+from ufl_beam.terms.phases import TimeFunctions, Phases, beginning
 from ufl_beam.terms.point_equations import inputs
 from ufl_beam.terms.tangent_derivatives import Cells
 
@@ -123,11 +124,15 @@ class InelasticBeams(Cells, ABC):
         """Remember the strains at the beginning."""
         self._force.set(self._q0, step.q0)
         self._tangent.set(self._q0, step.q0)
-        if step.q0 is not self._q:
-            self._q = step.q0
-            self.points.start(self._strains(step.q0))
+        self._start_at(step.q0)
         self.points.begin(step.dt)
         self._begin()
+
+    def _start_at(self, q0: Array) -> None:
+        """Let the points begin at the strains of a configuration, if they are not there."""
+        if q0 is not self._q:
+            self._q = q0
+            self.points.start(self._strains(q0))
 
     @abstractmethod
     def _prepare(self, forms: InelasticForms) -> None:
@@ -258,6 +263,20 @@ class CompiledInelasticBeams(InelasticBeams):
         """The points, and two forms."""
         functions = ("add_inelastic_force", "add_inelastic_tangent")
         return loop(functions[0], self._in_c), loop(functions[1], self._in_c)
+
+    def phases(self, times: TimeFunctions) -> Phases | None:
+        """Loops over the points."""
+        c = struct(
+            "inelastic_term", cells=self._in_c, begins=self._static, dt=self.points.dt,
+            **self.points.entries(self._ledger),
+        )  # fmt: skip
+        begin = [*beginning((self._force, self._tangent), self._q0), loop("begin_inelastic", c)]
+
+        def leave(q: Array) -> None:
+            self._q = q
+
+        ends = [loop("accept_inelastic", c)], [loop("add_energy_of_points", c)]
+        return Phases(begin, *ends, self._start_at, leave)
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the internal forces."""

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Sequence
 from functools import singledispatch
@@ -13,7 +14,7 @@ import numpy.typing as npt
 import ufl
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop, doubles, loop, struct
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, loop, struct
 from ufl_beam.compiled.csr import Csr, Product
 from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
@@ -26,6 +27,7 @@ from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoa
 from ufl_beam.model.time_functions import value_at
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.phases import TimeFunctions, Phases, weight_of_before
 
 
 class LoadTerm(Term):
@@ -91,6 +93,30 @@ class DeadLoads(LoadTerm):
     def loops(self) -> tuple[Loop, Loop | None]:
         """C loop that subtracts the load vector; no tangent."""
         return loop("subtract_vector", self._in_c), None
+
+    def phases(self, times: TimeFunctions) -> Phases | None:
+        """Loops over the vectors."""
+        owners = [(load.time, load) for load, _ in self._vectors]
+        forces = np.zeros((3, len(self.force)))  # now, at the end of the step, before
+        c = self.steps_in_c = struct(
+            "dead_loads", size=len(self.force), vectors=len(owners), force=forces[0], end=forces[1],
+            before=forces[2], factors=np.empty(len(owners)), factor=times.in_c(owners),
+            vector=ffi.new("double *[]", [doubles(vector) for _, vector in self._vectors]),
+            work=self._ledger.supplied.pointer("loads"),
+            weight_of_before=weight_of_before(self._acting),
+        )  # fmt: skip
+
+        def enter(q: Array) -> None:
+            forces[2] = self._before
+            for k in range(len(owners)):
+                c.factors[k] = math.nan
+            self._in_c.values = doubles(forces[0])
+
+        def leave(q: Array) -> None:
+            self.force, self._end, self._before = forces.copy()
+            self._factors = []
+
+        return Phases([loop("begin_dead_loads", c)], [loop("accept_dead_loads", c)], (), enter, leave)
 
     def carry_on(self, t: float, q: Array) -> Array:
         """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them."""

@@ -92,6 +92,15 @@ void find_last_digits(const equation *e, const double *q, double *digits)
   }
 }
 
+/* Before the first iterate; `like_last` says that a modified tangent may be that of the last step. */
+void begin_newton(equation *e, int patience, int like_last)
+{
+  e->last = e->best = INFINITY;
+  e->near = e->slow = 0;
+  e->patience = patience;
+  if (!like_last) e->rate = INFINITY;
+}
+
 petsc_functions petsc;
 
 #define TRY(call) do { int error = (call); if (error) return error; } while (0)
@@ -200,6 +209,7 @@ int snes_newton(void *snes, void *x)
     residual(e, q, e->residual);
     ++iteration;
   }
+  e->iterations = iteration, e->reason = reason;
   TRY(petsc.VecRestoreArray(x, &q));
   TRY(petsc.SNESSetIterationNumber(snes, iteration));
   return petsc.SNESSetConvergedReason(snes, reason);
