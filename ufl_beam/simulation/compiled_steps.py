@@ -4,17 +4,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from typing import Any, Protocol
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Index
+from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, integers, lib
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.simulation.branch_check import StaticPath
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.terms.beams import Inertia
+from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.loads import DeadLoads
 from ufl_beam.terms.openings import SearchFlags
 from ufl_beam.terms.phases import Phases, TimeFunctions
@@ -45,14 +48,16 @@ class CompiledSteps:
     """
 
     def __init__(
-        self, equation: StepEquation, solver: Solver, inertia: Inertia, search: SearchFlags | None,
-        largest_turn: float, phases: list[Phases], times: TimeFunctions,
-        whole: tuple[float, float, float], turns: tuple[Index, Index],
+        self, equation: StepEquation, solver: Solver, ledger: Ledger, inertia: Inertia | None,
+        path: StaticPath | None, search: SearchFlags | None, largest_turn: float,
+        phases: list[Phases], times: TimeFunctions, whole: tuple[float, float, float],
+        turns: tuple[bool, bool],
     ) -> None:  # fmt: skip
-        self._equation, self._solver, self._inertia = equation, solver, inertia
+        self._equation, self._solver, self._inertia, self._path = equation, solver, inertia, path
         self._phases, self._times, self.ahead = phases, times, False
-        share, state = equation.share, inertia.ledger.state
-        self._space, (rotations, half_tangents) = np.zeros((3, share.size)), turns
+        share = equation.share
+        self._space, rotations = np.zeros((3, share.size)), share.rotations()
+        limited, half_tangents = (rotations[: len(rotations) * has] for has in turns)
         self._bytes, self._end = 8 * share.size, np.zeros(1)
         loads = [term.steps_in_c for term in equation.terms if isinstance(term, DeadLoads)]
         multipliers = share.multipliers().astype(np.int32)
@@ -61,14 +66,19 @@ class CompiledSteps:
             ffi.new("march *"),
             equation=equation.c, snes=solver.in_petsc(), size=share.size, x=solver.unknowns,
             s=self._space[2], load_weight=load_weight, motion_weight=motion_weight, at=at,
-            largest_turn=largest_turn, rotations=len(rotations), rotation=rotations,
+            largest_turn=largest_turn, rotations=len(limited), rotation=limited,
             half_tangents=len(half_tangents), half_tangent=half_tangents,
             multipliers=len(multipliers), multiplier=multipliers,
-            rates=inertia.in_c.c, loads=loads[0] if loads else ffi.NULL,
+            loads=loads[0] if loads else ffi.NULL,
             supports=equation.supports.in_c(times),
             search=ffi.NULL if search is None else integers(search.flags),
-            states=len(state), state=state.numbers,
+            states=len(ledger.state), state=ledger.state.numbers,
         )  # fmt: skip
+        if inertia is not None and inertia.in_c is not None:
+            fill(self.c, rates=inertia.in_c.c)
+        if path is not None:
+            changes = [one.change for one in phases if one.change is not None]
+            fill(self.c, path=path.in_c(changes))
         self._alive: list[Any] = []
         for name in ("begin", "accept", "add_state"):
             self._list(getattr(self.c, name), [x for one in phases for x in getattr(one, name)])
@@ -90,7 +100,9 @@ class CompiledSteps:
         taken = int(lib.take_steps(c, len(ends), doubles(ends)))
         if taken:
             state.t, state.last_dt, state.parts = c.t, c.last_dt, state.parts + taken
-            state.q, self._inertia.v = self._copy(c.q), self._copy(c.rates.rate[V])
+            state.q = self._copy(c.q)
+            if self._inertia is not None:
+                self._inertia.v = self._copy(c.rates.rate[V])
             self._solver.iterations += c.iterations
             c.iterations = 0
         if taken < len(ends):
@@ -106,6 +118,8 @@ class CompiledSteps:
         q[:], before[:] = state.q, state.q_before
         c.q, c.q_before = doubles(q), doubles(before)
         c.t, c.last_dt, c.iterations = state.t, state.last_dt, 0
+        if self._path is not None:
+            ffi.memmove(c.path.force, doubles(self._path.force), self._bytes)
         for one in self._phases:
             one.enter(state.q)
         self.ahead = True
@@ -115,6 +129,8 @@ class CompiledSteps:
         if self.ahead:
             self.ahead = False
             state.q_before = self._copy(self.c.q_before)
+            if self._path is not None:
+                self._path.force = self._copy(self.c.path.force)
             for one in self._phases:
                 one.leave(state.q)
 
@@ -127,12 +143,12 @@ class CompiledSteps:
 
 
 def compiled_steps(
-    scheme: Scheme, equation: StepEquation, solver: Solver, inertia: Inertia,
-    search: SearchFlags | None, largest_turn: float,
+    scheme: Scheme, equation: StepEquation, solver: Solver, ledger: Ledger,
+    inertia: Inertia | None, path: StaticPath | None, search: SearchFlags | None,
+    largest_turn: float,
 ) -> CompiledSteps | None:  # fmt: skip
     """Make the steps of a scene in C, if all that takes part in them has loops there."""
-    rotations = equation.share.rotations()
-    whole, turns = _whole_steps(scheme), _half_tangents(scheme, rotations)
+    whole, turns = _whole_steps(scheme), _nodal_step(scheme)
     if not (solver.in_c and whole and turns):
         return None
     times, phases = TimeFunctions(), list[Phases]()
@@ -142,10 +158,11 @@ def compiled_steps(
             return None
         phases.append(of_term)
     return CompiledSteps(
-        equation, solver, inertia, search, largest_turn, phases, times, whole, turns
+        equation, solver, ledger, inertia, path, search, largest_turn, phases, times, whole, turns
     )
 
 
+@cache
 def _whole_steps(scheme: Scheme) -> tuple[float, float, float] | None:
     """Parts of a step at which loads and motions are taken, and its ``at``, if always the same."""
     q = np.zeros(0)
@@ -161,16 +178,15 @@ def _whole_steps(scheme: Scheme) -> tuple[float, float, float] | None:
     return *weights, unit.at
 
 
-def _half_tangents(scheme: Any, rotations: Index) -> tuple[Index, Index] | None:
-    """Rotations that a step may not turn far, and those whose nodal step is 2 tan(Δψ/2)."""
+@cache
+def _nodal_step(scheme: Any) -> tuple[bool, bool] | None:
+    """Whether turns of a step are limited, and are 2 tan(Δψ/2) in it; None if neither is known."""
     if not hasattr(scheme, "half_tangents"):
         return None
-    turned: Index = scheme.half_tangents(rotations)
-    q0, q1 = np.random.default_rng(0).uniform(-0.7, 0.7, (2, int(rotations.max(initial=-1)) + 1))
+    q0, q1, rotations = np.zeros(3), np.array([0.3, -0.7, 0.5]), np.array([1, 2], dtype=np.int32)
+    tangents = len(scheme.half_tangents(rotations)) > 0
     s, turn = scheme.nodal_step(q0, q1, rotations)
-    expected = q1 - q0
-    largest = float(np.abs(expected[rotations]).max(initial=0.0))
-    expected[turned] = 2 * np.tan(expected[turned] / 2)
-    if not np.allclose(s, expected, rtol=LAST_DIGITS, atol=0) or turn not in (0.0, largest):
+    turned = 2 * np.tan(q1[1:] / 2) if tangents else q1[1:]
+    if not np.allclose(s, [0.3, *turned], rtol=LAST_DIGITS, atol=0.0) or turn not in (0.0, 0.7):
         return None
-    return rotations if turn else rotations[:0], turned
+    return turn > 0, tangents

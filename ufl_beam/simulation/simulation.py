@@ -165,25 +165,33 @@ class Simulation(StateView):
 
     def _take_in_c(self, ends: Array) -> int:
         """Take steps without Python as far as that goes; return how many."""
-        # The first step is not like those that follow.
-        if self.parts == 0 or not self.solver.in_c or (of := self._in_c) is None:
+        of = self._in_c
+        if of is None or not self.solver.in_c or not (of.ahead or self._may_enter_c()):
             return 0
-        return of.take(self, ends) if of.ahead or self.inertia.ready else 0
+        return of.take(self, ends)
+
+    def _may_enter_c(self) -> bool:
+        """Return whether the next step is like those that follow."""
+        if self._dynamic:
+            return len(self.inertia.more) == len(self.inertia.scheme.kept)
+        fresh = self.parts == 0 and not self._continues
+        return not (fresh and begins_loaded(self.scene, self.scheme, self.t))
 
     @cached_property
     def _in_c(self) -> CompiledSteps | None:
         """Steps without Python; none where something in the scene needs it."""
-        if not self.share.alone or self._copies or self.asked or not self._dynamic:
+        if not self.share.alone or self._copies or self.asked:
             return None
-        search = self._assembly.search
+        parts = self._assembly
         return compiled_steps(
-            self.scheme, self.equation, self.solver, self.inertia, search, LARGEST_TURN
-        )
+            self.scheme, self.equation, self.solver, self.ledger, parts.inertia, self._branch,
+            parts.search, LARGEST_TURN,
+        )  # fmt: skip
 
     def _in_python(self) -> None:
         """Take the state back from C: what follows is in Python."""
-        if self.parts and self._in_c is not None:
-            self._in_c.hand_back(self)
+        if (of := self.__dict__.get("_in_c")) is not None:
+            of.hand_back(self)
 
     def _attempt_loads(self, t1: float, begin: float, end: float) -> Trial:
         """Solve a part of the application of the loads of the time ``begin``, up to ``end``."""

@@ -88,8 +88,16 @@ class ElasticBeams(OfForms, Cells):
         begin, accept = self._loops_of_step()
         if self._first is not None:
             begin.append(loop("begin_first_cells", self._in_c))
-        stored = self._ledger.state.pointer("stored")
-        return Phases(begin, accept, [entering(self._stored, stored)])
+        state = entering(self._stored, self._ledger.state.pointer("stored"))
+        _, c = state
+
+        def enter(q: Array) -> None:
+            c.held = self._held
+
+        def leave(q: Array) -> None:
+            self._held = c.held
+
+        return Phases(begin, accept, [state], loop("change_of_form", c), enter, leave)
 
     def add_tangent(self, q1: Array) -> None:
         """Add the stiffness, material and geometric.
@@ -151,7 +159,7 @@ class Inertia(OfMatrix):
         begin, accept, state = (
             [loop(name, of)] for name in ("begin_inertia", "accept_inertia", "add_kinetic_energy")
         )
-        return Phases(begin, accept, state, rates.enter, rates.leave)
+        return Phases(begin, accept, state, None, rates.enter, rates.leave)
 
     @cached_property
     def in_c(self) -> RatesInC | None:

@@ -16,7 +16,7 @@ from ufl.conditional import Condition
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import doubles, ffi, in_order, lib, struct
+from ufl_beam.compiled.c_library import doubles, ffi, fill, in_order, lib, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.time_schemes import Scheme
@@ -159,12 +159,14 @@ class CompiledPoints(Points):
 
     def _sums_to_come(self) -> Array:
         """Return :attr:`sums` as :meth:`accept` would leave them."""
-        copy = ffi.new("points *", self.points[0])
-        sums = np.empty_like(self.sums)
-        state = (self._e0, self._storage, self.kept)
-        copy.e0, copy.w, copy.kept, copy.sum = alive = [doubles(x.copy()) for x in state] + [
-            doubles(sums)
-        ]
+        copy = self.copy()
         lib.commit(copy)
-        del alive
-        return sums
+        return np.frombuffer(ffi.buffer(copy.sum, self.sums.nbytes)).copy()
+
+    def copy(self) -> Any:
+        """Points with a copy of the state, which loops may change, and the same response."""
+        copy = ffi.new("points *", self.points[0])
+        return fill(
+            copy, e0=self._e0.copy(), w=self._storage.copy(), kept=self.kept.copy(),
+            sum=self.sums.copy(),
+        )  # fmt: skip

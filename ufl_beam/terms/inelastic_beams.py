@@ -10,7 +10,7 @@ import numpy as np
 import ufl
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import Loop, doubles, lib, loop, struct
+from ufl_beam.compiled.c_library import Loop, doubles, fill, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import Kernel, stated
 from ufl_beam.discretization.function_spaces import Element, Fields, Strains
@@ -275,8 +275,10 @@ class CompiledInelasticBeams(InelasticBeams):
         def leave(q: Array) -> None:
             self._q = q
 
+        if self._static:
+            fill(c, copy=self.points.copy())
         ends = [loop("accept_inelastic", c)], [loop("add_energy_of_points", c)]
-        return Phases(begin, *ends, self._start_at, leave)
+        return Phases(begin, *ends, loop("change_of_points", c), self._start_at, leave)
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the internal forces."""

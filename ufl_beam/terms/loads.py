@@ -116,7 +116,8 @@ class DeadLoads(LoadTerm):
             self.force, self._end, self._before = forces.copy()
             self._factors = []
 
-        return Phases([loop("begin_dead_loads", c)], [loop("accept_dead_loads", c)], (), enter, leave)
+        begin, accept = [loop("begin_dead_loads", c)], [loop("accept_dead_loads", c)]
+        return Phases(begin, accept, enter=enter, leave=leave)
 
     def carry_on(self, t: float, q: Array) -> Array:
         """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them."""

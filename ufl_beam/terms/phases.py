@@ -18,6 +18,7 @@ from ufl_beam.model.time_functions import Table, TimeFunction, value_at
 class Phases(NamedTuple):
     """Loops of the type ``phase`` of loops.h, each with its data.
 
+    ``change`` is the method of that name of internal forces, of the type ``change_of_energy``.
     Between calls of C the term is what its attributes say: ``enter`` hands them over before C takes
     steps from the accepted configuration that it is called with, ``leave`` takes them back at the
     one that C has come to.
@@ -26,6 +27,7 @@ class Phases(NamedTuple):
     begin: Sequence[Loop] = ()
     accept: Sequence[Loop] = ()
     add_state: Sequence[Loop] = ()
+    change: Loop | None = None
     enter: Callable[[Array], None] = lambda q: None
     leave: Callable[[Array], None] = lambda q: None
 

@@ -8,6 +8,7 @@ found by asking the scheme what it makes of unit vectors, once for each length o
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -61,38 +62,13 @@ class RatesInC:
         """The rates, if the scheme makes sums of multiples of them."""
         if MORE + len(moving.scheme.kept) > lib.MOST_RATES:
             return None
-        rates = cls(moving)
-        return rates if rates._sums_of_multiples() else None
-
-    def _ask(self, dt: float, columns: Array, last_dt: float) -> Sequence[Array]:
-        """What the scheme makes of columns; forces of inertia, velocity, rates, then slip."""
-        change, v, before, *more = columns
-        asked, scheme = Asked(v, before, tuple(more), last_dt), self._scheme
-        factor, back, of_inertia = scheme.inertia(dt, asked)
-        of_velocity = scheme.velocity(dt, asked) if scheme.has_mean_velocity else (0.0, 0.0, 0 * v)
-        ends = np.array([factor, back, *of_velocity[:2]])
-        slip = scheme.slip(dt, change, asked)
-        return (ends, of_inertia, of_velocity[2], *scheme.rates(dt, change, asked), slip)
-
-    def _sums_of_multiples(self) -> bool:
-        """Return whether the scheme does to any rates what it does to unit vectors."""
-        some = np.random.default_rng(0)
-        columns = some.standard_normal((self.c.number, 5))
-        for dt, last_dt in ((0.1, 0.1), (0.1, 0.07)):
-            ends, *vectors = self._ask(dt, np.eye(self.c.number), last_dt)
-            same_ends, *found = self._ask(dt, columns, last_dt)
-            if len(vectors) != self.c.number - 3 + 4 or not np.array_equal(ends, same_ends):
-                return False
-            for numbers, vector in zip(vectors, found, strict=True):
-                size = np.abs(numbers)[:, None] * np.abs(columns)
-                if not np.all(np.abs(numbers @ columns - vector) <= SAME * size.sum(axis=0)):
-                    return False
-        return True
+        return cls(moving) if _sums_of_multiples(moving.scheme) else None
 
     def find(self, numbers: Any) -> None:
         """Write the numbers of the steps that ``scheme_numbers`` of loops.h is about."""
         n = self.c.number
-        ends, inertia, velocity, *rates, slip = self._ask(numbers.dt, np.eye(n), numbers.last_dt)
+        dt, last_dt = numbers.dt, numbers.last_dt
+        ends, inertia, velocity, *rates, slip = _ask(self._scheme, dt, np.eye(n), last_dt)
         numbers.factor, numbers.back, numbers.factor_of_velocity, numbers.back_of_velocity = ends
         for place, row in ((numbers.inertia, inertia), (numbers.velocity, velocity)):
             place[0:n] = row.tolist()
@@ -126,6 +102,34 @@ class RatesInC:
         ]
         moving.v, moving.v_before, moving.more = rates[0], rates[1], tuple(rates[2:])
         moving.last_dt = self.c.last_dt
+
+
+def _ask(scheme: DynamicScheme, dt: float, columns: Array, last_dt: float) -> Sequence[Array]:
+    """What a scheme makes of rates: factors, then forces of inertia, velocity, rates and slip."""
+    change, v, before, *more = columns
+    asked = Asked(v, before, tuple(more), last_dt)
+    factor, back, of_inertia = scheme.inertia(dt, asked)
+    factor_of_velocity, back_of_velocity, velocity = scheme.velocity(dt, asked)
+    factors = np.array([factor, back, factor_of_velocity, back_of_velocity])
+    slip = scheme.slip(dt, change, asked)
+    return (factors, of_inertia, velocity, *scheme.rates(dt, change, asked), slip)
+
+
+@cache
+def _sums_of_multiples(scheme: DynamicScheme) -> bool:
+    """Return whether a scheme does to any rates what it does to unit vectors."""
+    n = MORE + len(scheme.kept)
+    columns = np.cos(np.arange(4.0 * n).reshape(n, 4))  # any numbers
+    for dt, last_dt in ((0.1, 0.1), (0.1, 0.07)):
+        factors, *vectors = _ask(scheme, dt, np.eye(n), last_dt)
+        same_factors, *found = _ask(scheme, dt, columns, last_dt)
+        if len(vectors) != n + 1 or not np.array_equal(factors, same_factors):
+            return False
+        for numbers, vector in zip(vectors, found, strict=True):
+            size = np.abs(numbers) @ np.abs(columns)
+            if not np.all(np.abs(numbers @ columns - vector) <= SAME * size):
+                return False
+    return True
 
 
 @ffi.def_extern(error=0)  # type: ignore[misc, untyped-decorator, unused-ignore]

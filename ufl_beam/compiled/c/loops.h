@@ -356,10 +356,10 @@ typedef struct {
   int at;
 } form_of_step;
 
-/* The value of a form, added to an entry of the ledger. */
+/* The value of a form, added to an entry of the ledger, and as it was when it was added last. */
 typedef struct {
   const cells *form;
-  double *entry;
+  double *entry, held;
 } form_value;
 
 /* Vectors times functions of time, see DeadLoads. */
@@ -419,8 +419,28 @@ typedef struct {
   inelastic *cells;
   int begins; /* in statics; see InelasticBeams */
   double alpha, *dt;
+  points *copy; /* space for the points as the end of a step would leave them; in statics */
   double *plastic, *hinges, *numerical, *released, *stored, *hardening;
 } inelastic_term;
+
+/* Energy that a term would store and dissipate in a step to q1. */
+typedef double (change_of_energy)(void *self, const double *q1);
+typedef struct {
+  change_of_energy *of;
+  void *self;
+} change_call;
+
+/* Checks of static steps, see StaticPath. */
+typedef struct {
+  double slack, far, kink;
+  const double *per_far; /* one over the size of the scene for displacements, one for rotations */
+  double *force, weight_of_before; /* internal forces before the step */
+  int terms;
+  const change_call *change;
+  int accounts; /* parts of the ledger */
+  double *const *account;
+  const int32_t *entries;
+} static_path;
 
 /* Steps of a scene. */
 typedef struct {
@@ -432,8 +452,9 @@ typedef struct {
   double load_weight, motion_weight, at; /* parts of the step; see step */
   int rotations, half_tangents, multipliers;
   const int32_t *rotation, *half_tangent, *multiplier;
-  double largest_turn;
-  rates *rates;       /* or none */
+  double largest_turn; /* of a step; or infinite */
+  rates *rates;       /* in dynamics */
+  static_path *path;  /* in statics */
   dead_loads *loads;  /* or none */
   moving_supports *supports;
   int32_t *search;    /* flags of points that may open; or none */
@@ -457,5 +478,7 @@ void accept_rayleigh(void *self, const step *step, const double *q1, const doubl
 void begin_inelastic(void *self, const step *step, const double *q1, const double *s);
 void accept_inelastic(void *self, const step *step, const double *q1, const double *s);
 void add_energy_of_points(void *self, const step *step, const double *q1, const double *s);
+double change_of_form(void *self, const double *q1);
+double change_of_points(void *self, const double *q1);
 double value_at(const time_function *f, double t);
 int take_steps(march *m, int steps, const double *ends);

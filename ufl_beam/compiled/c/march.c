@@ -43,8 +43,14 @@ void begin_forms(void *self, const step *step, const double *q1, const double *s
 
 void add_values(void *self, const step *step, const double *q1, const double *s)
 {
+  form_value *f = self;
+  *f->entry += f->held = value_of_cells(f->form, q1);
+}
+
+double change_of_form(void *self, const double *q1)
+{
   const form_value *f = self;
-  *f->entry += value_of_cells(f->form, q1);
+  return value_of_cells(f->form, q1) - f->held;
 }
 
 void begin_first_cells(void *self, const step *step, const double *q1, const double *s)
@@ -212,6 +218,21 @@ void add_energy_of_points(void *self, const step *step, const double *q1, const 
   if (t->hardening) *t->hardening += sum[4];
 }
 
+/* What the end of the step would add to what points have stored and dissipated; see Points.change. */
+double change_of_points(void *self, const double *q1)
+{
+  const inelastic_term *t = self;
+  const points *p = t->cells->points;
+  points *copy = t->copy;
+  respond_at(t->cells, q1);
+  memcpy(copy->w, p->w, (size_t)p->cells * p->of_cell * p->width * sizeof *p->w);
+  memcpy(copy->e0, p->e0, 3 * (size_t)p->cells * sizeof *p->e0);
+  memcpy(copy->kept, p->kept, POINT_KEPT * (size_t)p->cells * sizeof *p->kept);
+  commit(copy);
+  const double *after = copy->sum, *before = p->sum;
+  return after[0] + after[1] + (after[3] - before[3]) + (after[4] - before[4]) + after[5] + after[6];
+}
+
 /* -- the step ------------------------------------------------------------------------------------ */
 
 /* A guess of the end of the step: as the last one went on, and what supports give. */
@@ -260,6 +281,30 @@ static int measure(march *m)
   return 1;
 }
 
+/* Whether the internal forces account for what the step stores and dissipates; see StaticPath. */
+static int followed(const march *m)
+{
+  const static_path *p = m->path;
+  equation *e = m->equation;
+  const double a = p->weight_of_before;
+  double far = 0, work = 0, change = 0, through = 0, round_off = 0;
+  for (int i = 0; i < m->size; ++i)
+    if (!(fabs(m->s[i]) * p->per_far[i] <= far)) far = fabs(m->s[i]) * p->per_far[i];
+  if (!(far <= p->far)) return 0;
+  if (isinf(p->slack)) return 1;
+  for (int k = 0; k < p->terms; ++k) change += p->change[k].of(p->change[k].self, m->x);
+  for (int i = 0; i < m->size; ++i)
+    work += (a * p->force[i] + (1 - a) * e->inner_force[i]) * m->s[i];
+  e->moved = fmin(largest_motion(e->size, e->weight, m->x), e->scene);
+  find_last_digits(e, m->x, e->space);
+  for (int i = 0; i < m->size; ++i)
+    round_off += fabs(e->tangent[e->diagonal[i]] * e->space[i] * m->s[i]);
+  for (int k = 0; k < p->accounts; ++k)
+    for (int i = 0; i < p->entries[k]; ++i) through += fabs(p->account[k][i]);
+  const double slack = p->slack * (fabs(work) + fabs(change)) + round_off + DBL_MIN;
+  return fabs(work - change) <= slack + p->kink * through;
+}
+
 static void accept_supports(march *m)
 {
   const moving_supports *p = m->supports;
@@ -281,6 +326,10 @@ static int take_step(march *m, double t1)
   run(&m->begin, &m->step, 0, 0);
   guess(m);
   if (!solve(m) || !measure(m)) return 0;
+  if (m->path) {
+    if (!followed(m)) return 0;
+    memcpy(m->path->force, m->equation->inner_force, m->size * sizeof *m->path->force);
+  }
   run(&m->accept, &m->step, m->x, m->s);
   accept_supports(m);
   memset(m->state, 0, m->states * sizeof *m->state);
