@@ -23,7 +23,15 @@ from ufl_beam.dolfinx_compat import VERSIONS
 
 T = TypeVar("T")
 
-SOURCES = ("loops", "material_points", "rigid_plastic", "connectors", "elimination", "newton", "march")
+SOURCES = (
+    "loops",
+    "material_points",
+    "rigid_plastic",
+    "connectors",
+    "elimination",
+    "newton",
+    "march",
+)
 """Files of C beside this one; they are one translation unit."""
 
 _CALLBACKS = """

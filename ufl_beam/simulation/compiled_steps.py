@@ -135,7 +135,7 @@ class CompiledSteps:
                 one.leave(state.q)
 
     def _raise(self) -> None:
-        """Raise what a function of a user has raised; a failed step is tried once more in Python."""
+        """Raise what a function of a user has raised; Python tries a failed step once more."""
         error, self._times.error = self._times.error or self._equation.error, None
         self._equation.error = None
         if error is not None and not isinstance(error, StepFailed):
@@ -148,7 +148,8 @@ def compiled_steps(
     largest_turn: float,
 ) -> CompiledSteps | None:  # fmt: skip
     """Make the steps of a scene in C, if all that takes part in them has loops there."""
-    whole, turns = _whole_steps(scheme), _nodal_step(scheme)
+    known: Any = scheme
+    whole, turns = _whole_steps(known), _nodal_step(known)
     if not (solver.in_c and whole and turns):
         return None
     times, phases = TimeFunctions(), list[Phases]()
@@ -163,7 +164,7 @@ def compiled_steps(
 
 
 @cache
-def _whole_steps(scheme: Scheme) -> tuple[float, float, float] | None:
+def _whole_steps(scheme: Any) -> tuple[float, float, float] | None:
     """Parts of a step at which loads and motions are taken, and its ``at``, if always the same."""
     q = np.zeros(0)
     unit = scheme.step(0.0, 1.0, 1.0, q)

@@ -103,6 +103,11 @@ class StepEquation(Equation):
             failed = 1.0
         return self.share.largest(failed) == 0.0
 
+    def restart(self) -> None:
+        """Begin to iterate anew."""
+        for inner in self._inner:
+            inner.restart()
+
     def stiffen(self, stiff: bool) -> bool:
         """Begin again with stiff points, or end that; return whether it makes a difference."""
         opened = bool(self.share.largest(float(self._search.opened)))

@@ -55,6 +55,10 @@ class Equation(ABC):
         """Fill the matrix with the derivative at ``x``."""
 
     @abstractmethod
+    def restart(self) -> None:
+        """Begin to iterate anew: forget what iterates of this step have predicted."""
+
+    @abstractmethod
     def missed(self, x: Array, r: Array, scale: float, moved: float) -> float:
         """Return how far the laws of connectors are missed by ``x`` with residual ``r``, relative.
 

@@ -213,6 +213,7 @@ class Solver:
     def _go_to(self, q: Array) -> None:
         self._q[:] = q
         self._x.stateIncrease()
+        self._equation.restart()
 
     def _iterate(
         self, snes: PETSc.SNES | SearchingNewton, patience: int, *, like_last: bool = False

@@ -14,7 +14,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.time_schemes import Step
-from ufl_beam.terms.phases import TimeFunctions, Phases
+from ufl_beam.terms.phases import Phases, TimeFunctions
 
 KINDS = ("beams", "connectors", "loads", "inertia", "damping")
 """Kinds of forces."""
@@ -62,6 +62,9 @@ class Term(ABC):
 
 class InternalForces(Term):
     """Forces inside a scene: those of its cells and connectors."""
+
+    def restart(self) -> None:
+        """Begin to iterate anew: forget what iterates of this step have predicted."""
 
     @abstractmethod
     def change(self, q1: Array) -> float:

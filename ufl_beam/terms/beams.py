@@ -5,36 +5,33 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import ufl
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop, ffi, loop, struct
+from ufl_beam.compiled.c_library import Loop, ffi, loop
 from ufl_beam.compiled.csr import Csr, StepProduct
-from ufl_beam.discretization.compiled_forms import CellForm, stated
+from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
 from ufl_beam.discretization.state_io import Memory
-from ufl_beam.mechanics.functional import elastic_energy, resultants, virtual_work
+from ufl_beam.mechanics.functional import elastic_energy, virtual_work
 from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, Step, has_inertia
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.forms_and_matrices import OfForms, OfMatrix
-from ufl_beam.terms.phases import TimeFunctions, Phases, entering
+from ufl_beam.terms.phases import Phases, TimeFunctions, entering
 from ufl_beam.terms.rates_in_c import RatesInC
+from ufl_beam.terms.static_tangents import StaticTangent
 from ufl_beam.terms.tangent_derivatives import Cells
 
 
 class ElasticForms(NamedTuple):
-    """Forms of elastic beams: virtual work, stored energy, and what a scheme loses of it.
-
-    ``first`` is the tangent of the first iteration of a static step.
-    """
+    """Forms of elastic beams: virtual work, stored energy, and what a scheme loses of it."""
 
     work: ufl.Form
     stored: ufl.Form
     losses: list[ufl.Form]
-    first: ufl.Form | None
 
 
 @stated
@@ -46,13 +43,7 @@ def elastic_forms(of: Element, scheme: Scheme) -> ElasticForms:
     w_e = scheme.virtual_strain(q0, q1, w, of.axis)
     stored = elastic_energy(e1, C) * dx
     lost = 2 * of.constant(scheme.alpha) * elastic_energy(e1 - e0, C) * dx  # P(90)
-    losses, first = [lost] if scheme.alpha else [], None
-    if not has_inertia(scheme):
-        dq = ufl.TrialFunction(of.space)
-        geometric = virtual_work(resultants(e0, C), ufl.derivative(w_e, q1, dq))
-        material = virtual_work(ufl.derivative(r, q1, dq), w_e)
-        first = (geometric + material) * dx
-    return ElasticForms(virtual_work(r, w_e) * dx, stored, losses, first)
+    return ElasticForms(virtual_work(r, w_e) * dx, stored, [lost] if scheme.alpha else [])
 
 
 class ElasticBeams(OfForms, Cells):
@@ -63,33 +54,36 @@ class ElasticBeams(OfForms, Cells):
     def __init__(self, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger) -> None:
         forms = elastic_forms(fields.element, scheme)
         super().__init__(forms.work, forms.losses, fields, A, ledger)
-        self._fields, self._work_form = fields, forms.work
+        self._fields, self._work_form, self._held = fields, forms.work, 0.0
         self._stored = fields.hot_kernel(forms.stored, self._q1)
-        self._begins, self._in_c = False, struct("first_cells", then=self._tangent.cells)
-        self._first: CellForm | None = None
-        if forms.first is not None:
-            self._first = fields.kernel(forms.first, self._q1)
-            self._first.place(A)
-            self._in_c.first = self._first.cells
-            self._of_step.append(self._first)
+        self._static: StaticTangent | None = None
+        if not has_inertia(scheme):
+            self._static = StaticTangent(fields, scheme, A)
+            self._of_step.append(self._static.kernel)
 
     def begin(self, step: Step) -> None:
         """Remember the configuration at the beginning."""
-        for kernel in self._of_step:
-            kernel.set(self._q0, step.q0)
-        self._begins = self._in_c.begins = self._first is not None
+        super().begin(step)
+        if self._static is not None:
+            self._static.begin(step.q0)
+
+    def restart(self) -> None:
+        """Begin to iterate anew."""
+        if self._static is not None:
+            self._static.restart()
 
     def loops(self) -> tuple[Loop, Loop | None]:
         """C loops over the cells, of force and tangent."""
-        return loop("add_cells", self._force.cells), loop("add_first_cells", self._in_c)
+        force, tangent = super().loops()
+        return force, self._static.loop() if self._static else tangent
 
     def phases(self, times: TimeFunctions) -> Phases | None:
         """Loops over the cells."""
         begin, accept = self._loops_of_step()
-        if self._first is not None:
-            begin.append(loop("begin_first_cells", self._in_c))
+        if self._static is not None:
+            begin.append(self._static.beginning())
         state = entering(self._stored, self._ledger.state.pointer("stored"))
-        _, c = state
+        c: Any = state[1]
 
         def enter(q: Array) -> None:
             c.held = self._held
@@ -100,20 +94,11 @@ class ElasticBeams(OfForms, Cells):
         return Phases(begin, accept, [state], loop("change_of_form", c), enter, leave)
 
     def add_tangent(self, q1: Array) -> None:
-        """Add the stiffness, material and geometric.
-
-        Extrapolated displacements strain slender beams by nothing but error; forces from that would
-        send the first iteration of a static step astray, so it takes those before the step.
-        """
-        form = self._first if self._begins and self._first else self._tangent
-        form.add(q1, self._A.data)
-        self._begins = False
-
-    def accept(self, q1: Array, s: Array) -> None:
-        """Enter the energy that the scheme lost."""
-        self._begins = self._in_c.begins = False
-        if self._losses:
-            super().accept(q1, s)
+        """Add the stiffness, material and geometric."""
+        if self._static is None:
+            super().add_tangent(q1)
+        else:
+            self._static.add(q1)
 
     def add_state(self, q: Array) -> None:
         """Add the stored energy to the ledger."""

@@ -16,7 +16,7 @@ from ufl.conditional import Condition
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import doubles, ffi, fill, in_order, lib, struct
+from ufl_beam.compiled.c_library import ffi, fill, in_order, lib, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.time_schemes import Scheme

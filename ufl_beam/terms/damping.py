@@ -26,7 +26,7 @@ from ufl_beam.model.damping import KelvinVoigt, Rayleigh
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.forms_and_matrices import OfForms, OfMatrix
-from ufl_beam.terms.phases import TimeFunctions, Phases
+from ufl_beam.terms.phases import Phases, TimeFunctions
 from ufl_beam.terms.rates_in_c import RatesInC
 
 
@@ -34,7 +34,10 @@ class Inertia(Rates, Protocol):
     """Velocities of a scene in motion, and its scheme."""
 
     scheme: DynamicScheme
-    in_c: RatesInC | None  # where C takes steps
+
+    @property
+    def in_c(self) -> RatesInC | None:
+        """The velocities where C takes steps; none if it cannot."""
 
 
 def _work_and_loss(

@@ -56,7 +56,8 @@ class Account(MutableMapping[str, float]):
 
     def by_name(self) -> dict[str, float]:
         """Return the entries as they are now."""
-        return dict(zip(self._at, self.numbers.tolist(), strict=False))
+        numbers: Any = self.numbers.tolist()
+        return dict(zip(self._at, numbers, strict=False))
 
     def pointer(self, name: str) -> Any:
         """An entry as C has it; no name may come after."""

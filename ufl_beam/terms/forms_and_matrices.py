@@ -14,7 +14,7 @@ from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.phases import TimeFunctions, Phases, beginning, entering
+from ufl_beam.terms.phases import Phases, TimeFunctions, beginning, entering
 
 
 class OfForms(Term):

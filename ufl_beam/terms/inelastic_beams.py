@@ -22,10 +22,11 @@ from ufl_beam.mechanics.functional import virtual_work
 from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.fibres import Layout
+from ufl_beam.terms.compiled_points import CompiledPoints
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.material_points import Points
 from ufl_beam.terms.openings import SearchFlags
-from ufl_beam.terms.phases import TimeFunctions, Phases, beginning
+from ufl_beam.terms.phases import Phases, TimeFunctions, beginning
 from ufl_beam.terms.point_equations import inputs
 from ufl_beam.terms.tangent_derivatives import Cells
 
@@ -239,6 +240,7 @@ class CompiledInelasticBeams(InelasticBeams):
 
     _force: Kernel
     _tangent: Kernel
+    points: CompiledPoints
 
     def _prepare(self, forms: InelasticForms) -> None:
         self._latest: Array = np.full(self._fields.share.size, np.nan)

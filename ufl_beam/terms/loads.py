@@ -27,7 +27,7 @@ from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoa
 from ufl_beam.model.time_functions import value_at
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.phases import TimeFunctions, Phases, weight_of_before
+from ufl_beam.terms.phases import Phases, TimeFunctions, weight_of_before
 
 
 class LoadTerm(Term):

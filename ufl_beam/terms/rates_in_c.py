@@ -8,8 +8,9 @@ found by asking the scheme what it makes of unit vectors, once for each length o
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -25,7 +26,8 @@ SAME = 1e-12
 """Difference of two results of the same numbers, relative, that is nothing but round-off."""
 
 
-class Asked(NamedTuple):
+@dataclass
+class Asked:
     """Rates that a scheme is asked about."""
 
     v: Array
@@ -62,7 +64,8 @@ class RatesInC:
         """The rates, if the scheme makes sums of multiples of them."""
         if MORE + len(moving.scheme.kept) > lib.MOST_RATES:
             return None
-        return cls(moving) if _sums_of_multiples(moving.scheme) else None
+        scheme: Any = moving.scheme
+        return cls(moving) if _sums_of_multiples(scheme) else None
 
     def find(self, numbers: Any) -> None:
         """Write the numbers of the steps that ``scheme_numbers`` of loops.h is about."""
@@ -97,8 +100,7 @@ class RatesInC:
         """Give them back."""
         moving, size = self._moving, 8 * self.c.size
         rates = [
-            np.frombuffer(ffi.buffer(self.c.rate[k], size)).copy()
-            for k in range(V, self.c.number)
+            np.frombuffer(ffi.buffer(self.c.rate[k], size)).copy() for k in range(V, self.c.number)
         ]
         moving.v, moving.v_before, moving.more = rates[0], rates[1], tuple(rates[2:])
         moving.last_dt = self.c.last_dt
@@ -116,7 +118,7 @@ def _ask(scheme: DynamicScheme, dt: float, columns: Array, last_dt: float) -> Se
 
 
 @cache
-def _sums_of_multiples(scheme: DynamicScheme) -> bool:
+def _sums_of_multiples(scheme: Any) -> bool:
     """Return whether a scheme does to any rates what it does to unit vectors."""
     n = MORE + len(scheme.kept)
     columns = np.cos(np.arange(4.0 * n).reshape(n, 4))  # any numbers

@@ -43,10 +43,15 @@ struct cells {
   const int32_t *row;
 };
 
+/* Tangent of a static step, see static_tangents.py. */
 typedef struct {
-  const cells *first, *then;
+  const cells *strains, *tangent; /* strains linear about a configuration; tangent that takes them */
+  int at_about, at_e;             /* where they have the configuration, and the strains */
+  int size, of_cell;              /* of_cell: strains of a cell */
+  const double *weight, *q0;      /* of each strain of a cell; beginning of the step */
   int begins;
-} first_cells;
+  double *about, *change, *e;     /* configuration of the latest tangent; space */
+} static_tangent;
 
 typedef struct {
   int size;
@@ -68,7 +73,7 @@ void add_cells(void *self, const double *q, double *b);
 double value_of_cells(const cells *c, const double *q);
 void combine(int size, double a, const double *x, double b, const double *y, double *out);
 void extrapolate(int size, const double *x, const double *y, double ratio, double *out);
-void add_first_cells(void *self, const double *q, double *b);
+void add_static_tangent(void *self, const double *q, double *tangent);
 void subtract_vector(void *self, const double *q, double *b);
 void add_step_force(void *self, const double *q, double *r);
 void add_step_tangent(void *self, const double *q, double *tangent);
@@ -467,7 +472,7 @@ typedef struct {
 
 void begin_forms(void *self, const step *step, const double *q1, const double *s);
 void add_values(void *self, const step *step, const double *q1, const double *s);
-void begin_first_cells(void *self, const step *step, const double *q1, const double *s);
+void begin_static_tangent(void *self, const step *step, const double *q1, const double *s);
 void begin_dead_loads(void *self, const step *step, const double *q1, const double *s);
 void accept_dead_loads(void *self, const step *step, const double *q1, const double *s);
 void begin_inertia(void *self, const step *step, const double *q1, const double *s);

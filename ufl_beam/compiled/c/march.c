@@ -53,9 +53,10 @@ double change_of_form(void *self, const double *q1)
   return value_of_cells(f->form, q1) - f->held;
 }
 
-void begin_first_cells(void *self, const step *step, const double *q1, const double *s)
+void begin_static_tangent(void *self, const step *step, const double *q1, const double *s)
 {
-  ((first_cells *)self)->begins = 1;
+  static_tangent *t = self;
+  t->q0 = step->q0, t->begins = 1;
 }
 
 void begin_dead_loads(void *self, const step *step, const double *q1, const double *s)
