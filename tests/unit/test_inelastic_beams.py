@@ -28,7 +28,10 @@ def cantilever(kind, tip=0.4, cells=5):
 class CutSteps(ub.Simulation):
     """A simulation in which the first attempts at a step fail, after their last iteration."""
 
-    fails, _in_c = 0, None  # steps in C cannot fail on purpose
+    fails = 0
+
+    def _steps_in_c(self, parts):
+        return None  # C does not fail on purpose
 
     def attempt(self, t1, end=None):
         trial = super().attempt(t1, end)

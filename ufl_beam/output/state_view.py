@@ -133,6 +133,11 @@ class StateView(ABC):
             self.share.comm.Allreduce(MPI.IN_PLACE, here)
         return here
 
+    @property
+    def support_dofs(self) -> Index:
+        """Local degrees of freedom of the supports; (num_supports, 3)."""
+        return self._support_dofs[0] if self.scene.supports else np.zeros((0, 3), dtype=np.int64)
+
     @cached_property
     def _support_dofs(self) -> tuple[Index, Index]:
         """Local degrees of freedom of the supports, and which of them this process owns."""

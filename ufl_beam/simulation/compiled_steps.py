@@ -14,6 +14,7 @@ from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, integers, lib
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.simulation.branch_check import StaticPath
+from ufl_beam.simulation.kept_rows import KeptRows
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.terms.beams import Inertia
@@ -22,6 +23,9 @@ from ufl_beam.terms.loads import DeadLoads
 from ufl_beam.terms.openings import SearchFlags
 from ufl_beam.terms.phases import Phases, TimeFunctions
 from ufl_beam.terms.rates_in_c import V
+
+LONGEST = 0.05
+"""Time after which C returns, so that a run can be interrupted and shows its progress; s."""
 
 LAST_DIGITS = 1e-14
 """Difference of two numbers from the same formula, relative, that is nothing but round-off."""
@@ -88,8 +92,11 @@ class CompiledSteps:
         self._alive += [calls, loops]
         place.number, place.call = len(loops), calls
 
-    def take(self, state: Stepping, ends: Array) -> int:
-        """Take steps to these times, up to the first that fails; return how many were taken.
+    def take(self, state: Stepping, ends: Array, rows: Array | None = None) -> int:
+        """Take steps to these times, up to the first that fails, for :data:`LONGEST` at most.
+
+        Returns:
+            How many were taken.  What is kept of each is in a row of ``rows``, if they are given.
 
         Raises:
             BaseException: What a time function of a user has raised; the steps before are taken.
@@ -97,7 +104,8 @@ class CompiledSteps:
         c = self.c
         if not self.ahead:
             self._hand_over(state)
-        taken = int(lib.take_steps(c, len(ends), doubles(ends)))
+        kept = ffi.NULL if rows is None else doubles(rows)
+        taken = int(lib.take_steps(c, len(ends), doubles(ends), LONGEST, kept))
         if taken:
             state.t, state.last_dt, state.parts = c.t, c.last_dt, state.parts + taken
             state.q = self._copy(c.q)
@@ -109,6 +117,10 @@ class CompiledSteps:
             self.hand_back(state)
             self._raise()
         return taken
+
+    def keep(self, rows: KeptRows) -> None:
+        """Keep these rows from now on, where there is room for them."""
+        fill(self.c, kinds=len(rows.kinds), kept=rows.kinds)
 
     def _copy(self, values: Any) -> Array:
         return np.frombuffer(ffi.buffer(values, self._bytes)).copy()

@@ -25,11 +25,12 @@ from ufl_beam.output.dolfinx_view import DolfinxView
 from ufl_beam.output.state_view import StateView
 from ufl_beam.parallel import communicator
 from ufl_beam.parameter import Parameter
-from ufl_beam.simulation.assembly import assemble
+from ufl_beam.simulation.assembly import Assembly, assemble
 from ufl_beam.simulation.compiled_steps import CompiledSteps, compiled_steps
 from ufl_beam.simulation.diagnosis import no_equilibrium
 from ufl_beam.simulation.evaluation import COMPILED, REFERENCE
 from ufl_beam.simulation.initial_state import checked_grid, initial_state, mesh_of
+from ufl_beam.simulation.kept_rows import KeptRows
 from ufl_beam.simulation.replicas import Copies, sharing
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_solver import (
@@ -45,6 +46,9 @@ from ufl_beam.simulation.step_solver import (
 from ufl_beam.solvers.equation import Border
 from ufl_beam.solvers.newton_options import Newton
 from ufl_beam.solvers.petsc_options import checked_newton
+
+ROOM = 2**20
+"""Numbers that C keeps of steps before Python takes them."""
 
 
 class Simulation(StateView):
@@ -143,7 +147,8 @@ class Simulation(StateView):
             scheme, self.equation, parts.openings, self._branch, newton, factors, together
         )
         self.solver = self._steps.newton
-        self.solution = kind(scene, grid)
+        self.solution, self._end = kind(scene, grid), np.zeros(1)
+        self._in_c = self._steps_in_c(parts)
 
     # -- stepping ------------------------------------------------------------------------------
 
@@ -154,7 +159,8 @@ class Simulation(StateView):
             ConvergenceError: Even the smallest part failed; the state is that of the last part that
                 was accepted, which the solution of the error ends with.
         """
-        if self._take_in_c(np.array([t1])):
+        self._end[0] = t1
+        if self._take_in_c(self._end):
             return
         fresh = self.parts == 0 and not self._continues
         if fresh and begins_loaded(self.scene, self.scheme, self.t):
@@ -163,12 +169,57 @@ class Simulation(StateView):
             go_in_parts(begin, end, attempt, self.accept, self.give_up)
         go_in_parts(self.t, t1, partial(self.attempt, end=t1), self.accept, self.give_up)
 
-    def _take_in_c(self, ends: Array) -> int:
+    def steps_to(self, ends: Array, *, keep: bool = False) -> int:
+        """Go to the first of these times, and on to others as far as that needs no Python.
+
+        Args:
+            ends: Ends of steps; (n,); s.
+            keep: Append the state at the end of each step to the solution.
+
+        Returns:
+            How many steps were taken: at least one, and no more than take a moment.
+
+        Raises:
+            ConvergenceError: See :meth:`step_to`.
+
+        Example:
+            >>> simulation, ends = ub.Simulation(scene, ub.Midpoint()), np.linspace(0, 1, 21)[1:]
+            >>> while len(ends):
+            ...     ends = ends[simulation.steps_to(ends) :]
+            >>> print((1e3 * simulation.displacement(beam.end)).round(1))  # mm, mm, mrad
+            [ -0.1 -18.9 -14.3]
+            >>> simulation.close()
+        """
+        ends = np.ascontiguousarray(ends, dtype=np.float64)
+        rows, before = None, (self.parts, self.iterations)
+        if keep and self._in_c is not None:
+            rows = np.empty((min(len(ends), 1 + ROOM // self._rows.width), self._rows.width))
+            ends = ends[: len(rows)]
+        taken = self._take_in_c(ends, rows)
+        if not taken:
+            self.step_to(ends[0])
+            if keep:
+                self.keep()
+            return 1
+        if rows is not None:
+            for state in self._rows.states(ends[:taken], rows[:taken], *before):
+                self.solution.keep(state)
+        return taken
+
+    @cached_property
+    def _rows(self) -> KeptRows:
+        """What C keeps of steps."""
+        assert self._in_c is not None
+        rows = KeptRows(self, self._in_c.c)
+        self._in_c.keep(rows)
+        return rows
+
+    def _take_in_c(self, ends: Array, rows: Array | None = None) -> int:
         """Take steps without Python as far as that goes; return how many."""
         of = self._in_c
         if of is None or not self.solver.in_c or not (of.ahead or self._may_enter_c()):
             return 0
-        return of.take(self, ends)
+        return of.take(self, ends, rows)
 
     def _may_enter_c(self) -> bool:
         """Return whether the next step is like those that follow."""
@@ -177,12 +228,10 @@ class Simulation(StateView):
         fresh = self.parts == 0 and not self._continues
         return not (fresh and begins_loaded(self.scene, self.scheme, self.t))
 
-    @cached_property
-    def _in_c(self) -> CompiledSteps | None:
+    def _steps_in_c(self, parts: Assembly) -> CompiledSteps | None:
         """Steps without Python; none where something in the scene needs it."""
         if not self.share.alone or self._copies or self.asked:
             return None
-        parts = self._assembly
         return compiled_steps(
             self.scheme, self.equation, self.solver, self.ledger, parts.inertia, self._branch,
             parts.search, LARGEST_TURN,
@@ -190,8 +239,8 @@ class Simulation(StateView):
 
     def _in_python(self) -> None:
         """Take the state back from C: what follows is in Python."""
-        if (of := self.__dict__.get("_in_c")) is not None:
-            of.hand_back(self)
+        if self._in_c is not None:
+            self._in_c.hand_back(self)
 
     def _attempt_loads(self, t1: float, begin: float, end: float) -> Trial:
         """Solve a part of the application of the loads of the time ``begin``, up to ``end``."""

@@ -48,6 +48,9 @@ class Account(MutableMapping[str, float]):
     def __delitem__(self, name: str) -> None:
         raise TypeError(f"the entry {name!r} of a ledger stays")
 
+    def __contains__(self, name: object) -> bool:
+        return name in self._at
+
     def __iter__(self) -> Iterator[str]:
         return iter(self._at)
 

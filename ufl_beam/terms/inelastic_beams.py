@@ -222,7 +222,12 @@ class InelasticBeams(Cells, ABC):
     def kept(self) -> tuple[Index, Array]:
         """Cells (numbers of the grid), and :attr:`Points.kept` of them; (num_cells, 6); a view."""
         kept = self.points.kept
-        return self._cells, kept if self._hinges else kept * KEPT_WITHOUT_JUMP
+        return self._cells, kept if self._hinges else kept * self.kept_factors
+
+    @property
+    def kept_factors(self) -> Array:
+        """Factors of :attr:`Points.kept` in what :meth:`kept` returns; (6,)."""
+        return np.ones(6) if self._hinges else KEPT_WITHOUT_JUMP
 
     def state(self) -> tuple[Index, Array]:
         """Cells (numbers of the grid), and their internal variables; (num_cells, k)."""

@@ -80,7 +80,7 @@ class RatesInC:
             place[0:n] = row.tolist()
 
     def times(self, product: StepProduct, **entries: Any) -> Any:
-        """``matrix_of_rates`` of loops.h."""
+        """Return ``matrix_of_rates`` of loops.h for a matrix, with entries of the ledger."""
         v, momentum = np.zeros((2, self.c.size))
         of = struct("matrix_of_rates", product=product.c, v=v, momentum=momentum, **entries)
         return fill(of, rates=self.c)
@@ -97,7 +97,7 @@ class RatesInC:
         self.c.last_dt = moving.last_dt
 
     def leave(self, q: Array) -> None:
-        """Give them back."""
+        """Give the rates back to Python."""
         moving, size = self._moving, 8 * self.c.size
         rates = [
             np.frombuffer(ffi.buffer(self.c.rate[k], size)).copy() for k in range(V, self.c.number)

@@ -333,11 +333,11 @@ int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int
 typedef struct {
   double t0, t1, dt, load_time, motion_time, fraction, at;
   const double *q0;
-} step;
+} time_step;
 
 /* What a term does when a step begins, or is accepted: q1 is its end, s the step of the nodes. When it
  * begins both are none. */
-typedef void (phase)(void *self, const step *step, const double *q1, const double *s);
+typedef void (phase)(void *self, const time_step *step, const double *q1, const double *s);
 typedef struct {
   phase *run;
   void *self;
@@ -447,6 +447,12 @@ typedef struct {
   const int32_t *entries;
 } static_path;
 
+/* Numbers that are kept of each step: from where, and how many. */
+typedef struct {
+  double *const *from;
+  int number;
+} kept_numbers;
+
 /* Steps of a scene. */
 typedef struct {
   equation *equation;
@@ -467,23 +473,25 @@ typedef struct {
   int states;
   double *state;      /* entries of the ledger that a state has, one after the other */
   int iterations;
-  step step;
+  time_step step;
+  int kinds; /* of numbers that are kept */
+  const kept_numbers *kept;
 } march;
 
-void begin_forms(void *self, const step *step, const double *q1, const double *s);
-void add_values(void *self, const step *step, const double *q1, const double *s);
-void begin_static_tangent(void *self, const step *step, const double *q1, const double *s);
-void begin_dead_loads(void *self, const step *step, const double *q1, const double *s);
-void accept_dead_loads(void *self, const step *step, const double *q1, const double *s);
-void begin_inertia(void *self, const step *step, const double *q1, const double *s);
-void accept_inertia(void *self, const step *step, const double *q1, const double *s);
-void add_kinetic_energy(void *self, const step *step, const double *q1, const double *s);
-void begin_rayleigh(void *self, const step *step, const double *q1, const double *s);
-void accept_rayleigh(void *self, const step *step, const double *q1, const double *s);
-void begin_inelastic(void *self, const step *step, const double *q1, const double *s);
-void accept_inelastic(void *self, const step *step, const double *q1, const double *s);
-void add_energy_of_points(void *self, const step *step, const double *q1, const double *s);
+void begin_forms(void *self, const time_step *step, const double *q1, const double *s);
+void add_values(void *self, const time_step *step, const double *q1, const double *s);
+void begin_static_tangent(void *self, const time_step *step, const double *q1, const double *s);
+void begin_dead_loads(void *self, const time_step *step, const double *q1, const double *s);
+void accept_dead_loads(void *self, const time_step *step, const double *q1, const double *s);
+void begin_inertia(void *self, const time_step *step, const double *q1, const double *s);
+void accept_inertia(void *self, const time_step *step, const double *q1, const double *s);
+void add_kinetic_energy(void *self, const time_step *step, const double *q1, const double *s);
+void begin_rayleigh(void *self, const time_step *step, const double *q1, const double *s);
+void accept_rayleigh(void *self, const time_step *step, const double *q1, const double *s);
+void begin_inelastic(void *self, const time_step *step, const double *q1, const double *s);
+void accept_inelastic(void *self, const time_step *step, const double *q1, const double *s);
+void add_energy_of_points(void *self, const time_step *step, const double *q1, const double *s);
 double change_of_form(void *self, const double *q1);
 double change_of_points(void *self, const double *q1);
 double value_at(const time_function *f, double t);
-int take_steps(march *m, int steps, const double *ends);
+int take_steps(march *m, int steps, const double *ends, double seconds, double *rows);

@@ -21,7 +21,7 @@ double value_at(const time_function *f, double t)
   return (f->y[high] - f->y[low]) / (f->t[high] - f->t[low]) * (t - f->t[low]) + f->y[low];
 }
 
-static void run(const phases *p, const step *step, const double *q1, const double *s)
+static void run(const phases *p, const time_step *step, const double *q1, const double *s)
 {
   for (int k = 0; k < p->number; ++k) p->call[k].run(p->call[k].self, step, q1, s);
 }
@@ -35,13 +35,13 @@ static double dot(int size, const double *x, const double *y)
 
 /* -- phases of terms ---------------------------------------------------------------------------- */
 
-void begin_forms(void *self, const step *step, const double *q1, const double *s)
+void begin_forms(void *self, const time_step *step, const double *q1, const double *s)
 {
   const form_of_step *f = self;
   set_cells(f->form, step->q0, f->at);
 }
 
-void add_values(void *self, const step *step, const double *q1, const double *s)
+void add_values(void *self, const time_step *step, const double *q1, const double *s)
 {
   form_value *f = self;
   *f->entry += f->held = value_of_cells(f->form, q1);
@@ -53,13 +53,13 @@ double change_of_form(void *self, const double *q1)
   return value_of_cells(f->form, q1) - f->held;
 }
 
-void begin_static_tangent(void *self, const step *step, const double *q1, const double *s)
+void begin_static_tangent(void *self, const time_step *step, const double *q1, const double *s)
 {
   static_tangent *t = self;
   t->q0 = step->q0, t->begins = 1;
 }
 
-void begin_dead_loads(void *self, const step *step, const double *q1, const double *s)
+void begin_dead_loads(void *self, const time_step *step, const double *q1, const double *s)
 {
   dead_loads *l = self;
   const int whole = step->fraction == 1 && step->at == 1;
@@ -84,7 +84,7 @@ void begin_dead_loads(void *self, const step *step, const double *q1, const doub
   }
 }
 
-void accept_dead_loads(void *self, const step *step, const double *q1, const double *s)
+void accept_dead_loads(void *self, const time_step *step, const double *q1, const double *s)
 {
   dead_loads *l = self;
   if (!l->acts) return;
@@ -129,7 +129,7 @@ static int find_numbers(rates *r, double dt)
   return 1;
 }
 
-void begin_inertia(void *self, const step *step, const double *q1, const double *s)
+void begin_inertia(void *self, const time_step *step, const double *q1, const double *s)
 {
   const matrix_of_rates *m = self;
   combine_rates(m->rates, m->rates->now->inertia, 1, m->v);
@@ -137,7 +137,7 @@ void begin_inertia(void *self, const step *step, const double *q1, const double 
   m->product->v = m->v, m->product->q0 = step->q0;
 }
 
-void accept_inertia(void *self, const step *step, const double *q1, const double *s)
+void accept_inertia(void *self, const time_step *step, const double *q1, const double *s)
 {
   const matrix_of_rates *m = self;
   rates *r = m->rates;
@@ -163,14 +163,14 @@ void accept_inertia(void *self, const step *step, const double *q1, const double
   r->last_dt = step->dt;
 }
 
-void add_kinetic_energy(void *self, const step *step, const double *q1, const double *s)
+void add_kinetic_energy(void *self, const time_step *step, const double *q1, const double *s)
 {
   const matrix_of_rates *m = self;
   const step_product *p = m->product;
   *m->kept += quadratic_form(p->size, p->indptr, p->indices, p->data, m->rates->rate[1]) / 2;
 }
 
-void begin_rayleigh(void *self, const step *step, const double *q1, const double *s)
+void begin_rayleigh(void *self, const time_step *step, const double *q1, const double *s)
 {
   const matrix_of_rates *m = self;
   combine_rates(m->rates, m->rates->now->velocity, 1, m->v);
@@ -179,14 +179,14 @@ void begin_rayleigh(void *self, const step *step, const double *q1, const double
   m->product->v = m->v, m->product->q0 = step->q0;
 }
 
-void accept_rayleigh(void *self, const step *step, const double *q1, const double *s)
+void accept_rayleigh(void *self, const time_step *step, const double *q1, const double *s)
 {
   const matrix_of_rates *m = self;
   const step_product *p = m->product;
   *m->lost += quadratic_form(p->size, p->indptr, p->indices, p->data, s) / step->dt;
 }
 
-void begin_inelastic(void *self, const step *step, const double *q1, const double *s)
+void begin_inelastic(void *self, const time_step *step, const double *q1, const double *s)
 {
   const inelastic_term *t = self;
   points *p = t->cells->points;
@@ -199,7 +199,7 @@ void begin_inelastic(void *self, const step *step, const double *q1, const doubl
   t->cells->begins = t->begins;
 }
 
-void accept_inelastic(void *self, const step *step, const double *q1, const double *s)
+void accept_inelastic(void *self, const time_step *step, const double *q1, const double *s)
 {
   const inelastic_term *t = self;
   const double *sum = t->cells->points->sum;
@@ -211,7 +211,7 @@ void accept_inelastic(void *self, const step *step, const double *q1, const doub
   if (t->released) *t->released += sum[5];
 }
 
-void add_energy_of_points(void *self, const step *step, const double *q1, const double *s)
+void add_energy_of_points(void *self, const time_step *step, const double *q1, const double *s)
 {
   const inelastic_term *t = self;
   const double *sum = t->cells->points->sum;
@@ -343,10 +343,31 @@ static int take_step(march *m, double t1)
   return 1;
 }
 
-/* Steps to the times `ends`, up to the first that fails; how many were taken. */
-int take_steps(march *m, int steps, const double *ends)
+static double seconds_now(void)
 {
-  for (int k = 0; k < steps; ++k)
+  struct timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+/* What is kept of the state: number of iterations so far, then numbers of all kinds; where it ends. */
+static double *keep(const march *m, double *row)
+{
+  *row++ = m->iterations;
+  for (int k = 0; k < m->kinds; row += m->kept[k++].number)
+    memcpy(row, *m->kept[k].from, m->kept[k].number * sizeof *row);
+  return row;
+}
+
+/* Steps to the times `ends`, up to the first that fails, or that ends so many seconds later; how many
+ * were taken. Each is kept in a row, if there are any. */
+int take_steps(march *m, int steps, const double *ends, double seconds, double *rows)
+{
+  const double end = steps > 1 ? seconds_now() + seconds : 0;
+  for (int k = 0; k < steps; ++k) {
     if (!take_step(m, ends[k])) return k;
+    if (rows) rows = keep(m, rows);
+    if (steps > 1 && seconds_now() > end) return k + 1;
+  }
   return steps;
 }
