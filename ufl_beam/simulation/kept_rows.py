@@ -76,7 +76,8 @@ class KeptRows:
         if not self._held.size:
             return repeat(NO_REACTIONS)
         padded: Array = np.hstack([rows[:, self._reactions], np.zeros((len(rows), 1))])
-        return iter(padded[:, self._held])
+        forces: Iterable[Array] = padded[:, self._held]
+        return forces
 
     def _of_material(self, rows: Array) -> Iterable[Array]:
         """Numbers of cells and rows of their material; (num_rows, m, 7)."""
@@ -86,4 +87,5 @@ class KeptRows:
         kept = np.hstack([rows[:, at].reshape(n, -1) for at in self._material])
         kept = (kept.reshape(n, -1, 6) * self._factors)[:, self._order]
         cells = np.broadcast_to(self._cells[:, None], (n, len(self._cells), 1))
-        return iter(np.concatenate([cells, kept], axis=2))
+        table: Iterable[Array] = np.concatenate([cells, kept], axis=2)
+        return table
