@@ -45,7 +45,11 @@ extern "Python" int numbers_in_python(void *handle, scheme_numbers *numbers);
 
 _SOURCE = "\n".join([HEADERS, DECLARATIONS, *(text(f"{name}.c") for name in SOURCES)])
 module = compiled(
-    "ufl_beam_loops", DECLARATIONS + _CALLBACKS, lambda: _SOURCE, made_of=[_SOURCE], flags=["-O3"]
+    "ufl_beam_loops",
+    DECLARATIONS + _CALLBACKS,
+    lambda: _SOURCE,
+    made_of=[_SOURCE],
+    flags=["-O3", "-fopenmp-simd"],
 )
 ffi: Any = module.ffi
 lib: Any = module.lib

@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, cached_property
 from typing import Any, Protocol
 
 import numpy as np
 
-from ufl_beam.arrays import Array
+from ufl_beam.arrays import Array, Index, Snapshot
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, integers, lib
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme
@@ -18,17 +18,28 @@ from ufl_beam.simulation.kept_rows import KeptRows
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.terms.beams import Inertia
+from ufl_beam.terms.dead_loads import DeadLoads
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.loads import DeadLoads
+from ufl_beam.terms.inelastic_beams import InelasticBeams
 from ufl_beam.terms.openings import SearchFlags
 from ufl_beam.terms.phases import Phases, TimeFunctions
 from ufl_beam.terms.rates_in_c import V
+
+ROOM = 2**20
+"""Numbers that C keeps of steps before Python takes them."""
 
 LONGEST = 0.05
 """Time after which C returns, so that a run can be interrupted and shows its progress; s."""
 
 LAST_DIGITS = 1e-14
 """Difference of two numbers from the same formula, relative, that is nothing but round-off."""
+
+
+class Keeping(Protocol):
+    """Solution that states are appended to."""
+
+    def keep(self, state: Snapshot) -> None:
+        """Append a state."""
 
 
 class Stepping(Protocol):
@@ -39,6 +50,10 @@ class Stepping(Protocol):
     q_before: Array
     last_dt: float
     parts: int
+
+    @property
+    def solution(self) -> Keeping:
+        """States that were kept."""
 
 
 class CompiledSteps:
@@ -55,10 +70,11 @@ class CompiledSteps:
         self, equation: StepEquation, solver: Solver, ledger: Ledger, inertia: Inertia | None,
         path: StaticPath | None, search: SearchFlags | None, largest_turn: float,
         phases: list[Phases], times: TimeFunctions, whole: tuple[float, float, float],
-        turns: tuple[bool, bool],
+        turns: tuple[bool, bool], applies_loads: bool, support_dofs: Index,
     ) -> None:  # fmt: skip
         self._equation, self._solver, self._inertia, self._path = equation, solver, inertia, path
         self._phases, self._times, self.ahead = phases, times, False
+        self._applies_loads = applies_loads
         share = equation.share
         self._space, rotations = np.zeros((3, share.size)), share.rotations()
         limited, half_tangents = (rotations[: len(rotations) * has] for has in turns)
@@ -78,6 +94,8 @@ class CompiledSteps:
             search=ffi.NULL if search is None else integers(search.flags),
             states=len(ledger.state), state=ledger.state.numbers,
         )  # fmt: skip
+        over = [doubles(one.over) for one in phases if one.over is not None]
+        fill(self.c, places=len(over), over=ffi.new("double *[]", over))
         if inertia is not None and inertia.in_c is not None:
             fill(self.c, rates=inertia.in_c.c)
         if path is not None:
@@ -86,41 +104,59 @@ class CompiledSteps:
         self._alive: list[Any] = []
         for name in ("begin", "accept", "add_state"):
             self._list(getattr(self.c, name), [x for one in phases for x in getattr(one, name)])
+        inelastic = [one for one in equation.terms if isinstance(one, InelasticBeams)]
+        self._of_rows = ledger, equation.supports, inelastic, support_dofs
+
+    @cached_property
+    def _kept(self) -> KeptRows:
+        """What C keeps of steps."""
+        rows = KeptRows(self.c, *self._of_rows)
+        fill(self.c, kinds=len(rows.kinds), kept=rows.kinds)
+        return rows
 
     def _list(self, place: Any, loops: Sequence[Loop]) -> None:
         calls = ffi.new("phase_call[]", list(loops))
         self._alive += [calls, loops]
         place.number, place.call = len(loops), calls
 
-    def take(self, state: Stepping, ends: Array, rows: Array | None = None) -> int:
+    def take(self, state: Stepping, ends: Array, *, keep: bool = False) -> int:
         """Take steps to these times, up to the first that fails, for :data:`LONGEST` at most.
 
         Returns:
-            How many were taken.  What is kept of each is in a row of ``rows``, if they are given.
+            How many were taken.  With ``keep`` the state after each of them is in the solution.
 
         Raises:
             BaseException: What a time function of a user has raised; the steps before are taken.
         """
-        c = self.c
+        if not (self._solver.in_c and (self.ahead or self._begins(state))):
+            return 0
+        c, kept = self.c, self._kept
+        parts, iterations = state.parts, self._solver.iterations
+        rows = np.empty((min(len(ends), 1 + ROOM // kept.width) if keep else 0, kept.width))
+        steps = len(rows) if keep else len(ends)
         if not self.ahead:
             self._hand_over(state)
-        kept = ffi.NULL if rows is None else doubles(rows)
-        taken = int(lib.take_steps(c, len(ends), doubles(ends), LONGEST, kept))
+        taken = int(lib.take_steps(c, steps, doubles(ends), LONGEST, keep, doubles(rows)))
         if taken:
-            state.t, state.last_dt, state.parts = c.t, c.last_dt, state.parts + taken
+            state.t, state.last_dt, state.parts = c.t, c.last_dt, parts + taken
             state.q = self._copy(c.q)
             if self._inertia is not None:
                 self._inertia.v = self._copy(c.rates.rate[V])
             self._solver.iterations += c.iterations
             c.iterations = 0
-        if taken < len(ends):
+            if keep:
+                for one in kept.states(ends, rows[:taken], parts, iterations):
+                    state.solution.keep(one)
+        if taken < steps:
             self.hand_back(state)
             self._raise()
         return taken
 
-    def keep(self, rows: KeptRows) -> None:
-        """Keep these rows from now on, where there is room for them."""
-        fill(self.c, kinds=len(rows.kinds), kept=rows.kinds)
+    def _begins(self, state: Stepping) -> bool:
+        """Return whether the next step is like those that follow."""
+        if self._inertia is not None:
+            return len(self._inertia.more) == len(self._inertia.scheme.kept)
+        return not (self._applies_loads and state.parts == 0)
 
     def _copy(self, values: Any) -> Array:
         return np.frombuffer(ffi.buffer(values, self._bytes)).copy()
@@ -157,7 +193,7 @@ class CompiledSteps:
 def compiled_steps(
     scheme: Scheme, equation: StepEquation, solver: Solver, ledger: Ledger,
     inertia: Inertia | None, path: StaticPath | None, search: SearchFlags | None,
-    largest_turn: float,
+    largest_turn: float, applies_loads: bool, support_dofs: Index,
 ) -> CompiledSteps | None:  # fmt: skip
     """Make the steps of a scene in C, if all that takes part in them has loops there."""
     known: Any = scheme
@@ -171,8 +207,9 @@ def compiled_steps(
             return None
         phases.append(of_term)
     return CompiledSteps(
-        equation, solver, ledger, inertia, path, search, largest_turn, phases, times, whole, turns
-    )
+        equation, solver, ledger, inertia, path, search, largest_turn, phases, times, whole, turns,
+        applies_loads, support_dofs,
+    )  # fmt: skip
 
 
 @cache

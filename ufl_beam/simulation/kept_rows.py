@@ -3,16 +3,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import accumulate, pairwise, repeat
 from typing import Any
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Snapshot
+from ufl_beam.arrays import Array, Index, Snapshot
 from ufl_beam.compiled.c_library import doubles, ffi
-from ufl_beam.output.state_view import NO_CONNECTIONS, NO_MATERIAL, NO_REACTIONS, StateView
+from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.rates_in_c import V
+from ufl_beam.terms.supports import Supports
+
+CONNECTION = 5
+"""Numbers of a connector in a state."""
 
 
 class KeptRows:
@@ -23,15 +27,17 @@ class KeptRows:
         kinds: List of ``kept_numbers`` of loops.h.
     """
 
-    def __init__(self, view: StateView, march: Any) -> None:
-        ledger, inelastic = view.ledger, view.inelastic
+    def __init__(
+        self, march: Any, ledger: Ledger, supports: Supports, inelastic: Sequence[Any],
+        support_dofs: Index,
+    ) -> None:  # fmt: skip
         self._names = [list(part) for part in (ledger.state, ledger.supplied, ledger.lost)]
         moving = march.rates != ffi.NULL
         now = [ffi.addressof(march, "q")]
         now += [ffi.addressof(march.rates, "rate", V)] if moving else []
         parts = (ledger.state, ledger.supplied, ledger.lost)
         fixed = [part.numbers[: len(part)] for part in parts]
-        fixed += [view.supports.reactions, *(one.points.kept.reshape(-1) for one in inelastic)]
+        fixed += [supports.reactions, *(one.points.kept.reshape(-1) for one in inelastic)]
         self._places = [ffi.new("double *[1]", [doubles(x)]) for x in fixed]
         sizes = [march.size] * len(now) + [x.size for x in fixed]
         self.kinds = ffi.new("kept_numbers[]", list(zip([*now, *self._places], sizes, strict=True)))
@@ -40,7 +46,7 @@ class KeptRows:
         self._v = columns.pop(0) if moving else None
         self._entries, self._reactions, self._material = columns[:3], columns[3], columns[4:]
         # Components of supports that are not held have the column after the last one.
-        dofs, held = view.support_dofs, np.append(view.supports.dofs, -1)
+        dofs, held = support_dofs, np.append(supports.dofs, -1)
         at = np.searchsorted(held[:-1], dofs)
         self._held = np.where(held[at] == dofs, at, len(held) - 1)
         factors = [one.kept_factors for one in inelastic]
@@ -59,9 +65,10 @@ class KeptRows:
         count = range(parts + 1, parts + 1 + len(rows))
         done: Any = (rows[:, 0].astype(np.int64) + iterations).tolist()
         at: Any = times.tolist()
+        connections = repeat(np.zeros((0, CONNECTION)))
         return map(
-            Snapshot, at, rows[:, self._q], v, self._of_supports(rows),
-            self._of_ledger(rows), self._of_material(rows), repeat(NO_CONNECTIONS), count, done,
+            Snapshot, at, rows[:, self._q], v, self._of_supports(rows), self._of_ledger(rows),
+            self._of_material(rows), connections, count, done,
         )  # fmt: skip
 
     def _of_ledger(self, rows: Array) -> Iterator[tuple[dict[str, float], ...]]:
@@ -74,7 +81,7 @@ class KeptRows:
     def _of_supports(self, rows: Array) -> Iterable[Array]:
         """Forces of all supports; (num_rows, num_supports, 3)."""
         if not self._held.size:
-            return repeat(NO_REACTIONS)
+            return repeat(np.zeros((0, 3)))
         padded: Array = np.hstack([rows[:, self._reactions], np.zeros((len(rows), 1))])
         forces: Iterable[Array] = padded[:, self._held]
         return forces
@@ -82,7 +89,7 @@ class KeptRows:
     def _of_material(self, rows: Array) -> Iterable[Array]:
         """Numbers of cells and rows of their material; (num_rows, m, 7)."""
         if not len(self._cells):
-            return repeat(NO_MATERIAL)
+            return repeat(np.zeros((0, 7)))
         n = len(rows)
         kept = np.hstack([rows[:, at].reshape(n, -1) for at in self._material])
         kept = (kept.reshape(n, -1, 6) * self._factors)[:, self._order]

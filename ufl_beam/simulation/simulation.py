@@ -30,7 +30,6 @@ from ufl_beam.simulation.compiled_steps import CompiledSteps, compiled_steps
 from ufl_beam.simulation.diagnosis import no_equilibrium
 from ufl_beam.simulation.evaluation import COMPILED, REFERENCE
 from ufl_beam.simulation.initial_state import checked_grid, initial_state, mesh_of
-from ufl_beam.simulation.kept_rows import KeptRows
 from ufl_beam.simulation.replicas import Copies, sharing
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_solver import (
@@ -46,9 +45,6 @@ from ufl_beam.simulation.step_solver import (
 from ufl_beam.solvers.equation import Border
 from ufl_beam.solvers.newton_options import Newton
 from ufl_beam.solvers.petsc_options import checked_newton
-
-ROOM = 2**20
-"""Numbers that C keeps of steps before Python takes them."""
 
 
 class Simulation(StateView):
@@ -148,7 +144,7 @@ class Simulation(StateView):
         )
         self.solver = self._steps.newton
         self.solution, self._end = kind(scene, grid), np.zeros(1)
-        self._in_c = self._steps_in_c(parts)
+        self._in_c = None if self._copies or self.asked else self._steps_in_c(parts)
 
     # -- stepping ------------------------------------------------------------------------------
 
@@ -160,7 +156,7 @@ class Simulation(StateView):
                 was accepted, which the solution of the error ends with.
         """
         self._end[0] = t1
-        if self._take_in_c(self._end):
+        if self._in_c is not None and self._in_c.take(self, self._end):
             return
         fresh = self.parts == 0 and not self._continues
         if fresh and begins_loaded(self.scene, self.scheme, self.t):
@@ -191,50 +187,21 @@ class Simulation(StateView):
             >>> simulation.close()
         """
         ends = np.ascontiguousarray(ends, dtype=np.float64)
-        rows, before = None, (self.parts, self.iterations)
-        if keep and self._in_c is not None:
-            rows = np.empty((min(len(ends), 1 + ROOM // self._rows.width), self._rows.width))
-            ends = ends[: len(rows)]
-        taken = self._take_in_c(ends, rows)
-        if not taken:
-            self.step_to(ends[0])
-            if keep:
-                self.keep()
-            return 1
-        if rows is not None:
-            for state in self._rows.states(ends[:taken], rows[:taken], *before):
-                self.solution.keep(state)
-        return taken
-
-    @cached_property
-    def _rows(self) -> KeptRows:
-        """What C keeps of steps."""
-        assert self._in_c is not None
-        rows = KeptRows(self, self._in_c.c)
-        self._in_c.keep(rows)
-        return rows
-
-    def _take_in_c(self, ends: Array, rows: Array | None = None) -> int:
-        """Take steps without Python as far as that goes; return how many."""
-        of = self._in_c
-        if of is None or not self.solver.in_c or not (of.ahead or self._may_enter_c()):
-            return 0
-        return of.take(self, ends, rows)
-
-    def _may_enter_c(self) -> bool:
-        """Return whether the next step is like those that follow."""
-        if self._dynamic:
-            return len(self.inertia.more) == len(self.inertia.scheme.kept)
-        fresh = self.parts == 0 and not self._continues
-        return not (fresh and begins_loaded(self.scene, self.scheme, self.t))
+        if self._in_c is not None and (taken := self._in_c.take(self, ends, keep=keep)):
+            return taken
+        self.step_to(float(ends[0]))
+        if keep:
+            self.keep()
+        return 1
 
     def _steps_in_c(self, parts: Assembly) -> CompiledSteps | None:
-        """Steps without Python; none where something in the scene needs it."""
-        if not self.share.alone or self._copies or self.asked:
+        """Steps without Python; None where something in the scene needs it."""
+        if not self.share.alone:
             return None
+        fresh = not self._continues and begins_loaded(self.scene, self.scheme, self.t)
         return compiled_steps(
             self.scheme, self.equation, self.solver, self.ledger, parts.inertia, self._branch,
-            parts.search, LARGEST_TURN,
+            parts.search, LARGEST_TURN, fresh, self.support_dofs,
         )  # fmt: skip
 
     def _in_python(self) -> None:

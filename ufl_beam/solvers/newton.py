@@ -14,6 +14,7 @@ from ufl_beam.compiled.c_library import ffi, fill, lib, loop, opaque, petsc
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
+from ufl_beam.mechanics.tangents import Tangents
 from ufl_beam.solvers.bordered import BorderedNewton
 from ufl_beam.solvers.convergence import Convergence
 from ufl_beam.solvers.direct_solver import DirectSolver
@@ -157,6 +158,7 @@ class Solver:
         if reason == lib.SINGULAR and self._may_go_on():
             reason = self._hold_idle(guess)
         if reason == lib.STALLED:
+            self._equation.restart(Tangents.EXACT)
             reason = self._iterate(self._careful, PATIENCE)
         if reason <= 0 and self._may_go_on() and self._equation.stiffen(True):
             self._go_to(guess)
@@ -167,6 +169,7 @@ class Solver:
         """Find the configuration as :meth:`solve` does, together with the unknown of a border."""
         self.convergence.take_loads(loads)
         self._go_to(guess)
+        self._equation.restart(Tangents.FIRST)
         return self._solution(self._iterate(self._along(border), 12))
 
     @cached_property
@@ -213,7 +216,7 @@ class Solver:
     def _go_to(self, q: Array) -> None:
         self._q[:] = q
         self._x.stateIncrease()
-        self._equation.restart()
+        self._equation.restart(Tangents.PREDICTED)
 
     def _iterate(
         self, snes: PETSc.SNES | SearchingNewton, patience: int, *, like_last: bool = False

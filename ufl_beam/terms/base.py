@@ -13,6 +13,7 @@ from abc import ABC, abstractmethod
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop
 from ufl_beam.discretization.state_io import Memory
+from ufl_beam.mechanics.tangents import Tangents
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.terms.phases import Phases, TimeFunctions
 
@@ -63,8 +64,8 @@ class Term(ABC):
 class InternalForces(Term):
     """Forces inside a scene: those of its cells and connectors."""
 
-    def restart(self) -> None:
-        """Begin to iterate anew: forget what iterates of this step have predicted."""
+    def restart(self, tangents: Tangents) -> None:
+        """Begin to iterate anew, with tangents of this kind."""
 
     @abstractmethod
     def change(self, q1: Array) -> float:

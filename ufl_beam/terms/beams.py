@@ -17,6 +17,7 @@ from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.functional import elastic_energy, virtual_work
 from ufl_beam.mechanics.kinematics import strain
+from ufl_beam.mechanics.tangents import Tangents
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, Step, has_inertia
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.forms_and_matrices import OfForms, OfMatrix
@@ -53,13 +54,13 @@ class ElasticBeams(OfForms, Cells):
 
     def __init__(self, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger) -> None:
         forms = elastic_forms(fields.element, scheme)
-        super().__init__(forms.work, forms.losses, fields, A, ledger)
+        self._static = None if has_inertia(scheme) else StaticTangent(fields, scheme, A)
+        tangent = None if self._static is None else self._static.kernel
+        super().__init__(forms.work, forms.losses, fields, A, ledger, tangent)
         self._fields, self._work_form, self._held = fields, forms.work, 0.0
         self._stored = fields.hot_kernel(forms.stored, self._q1)
-        self._static: StaticTangent | None = None
-        if not has_inertia(scheme):
-            self._static = StaticTangent(fields, scheme, A)
-            self._of_step.append(self._static.kernel)
+        if tangent is not None:
+            self._of_step.append(tangent)
 
     def begin(self, step: Step) -> None:
         """Remember the configuration at the beginning."""
@@ -67,10 +68,10 @@ class ElasticBeams(OfForms, Cells):
         if self._static is not None:
             self._static.begin(step.q0)
 
-    def restart(self) -> None:
-        """Begin to iterate anew."""
+    def restart(self, tangents: Tangents) -> None:
+        """Begin to iterate anew, with tangents of this kind."""
         if self._static is not None:
-            self._static.restart()
+            self._static.restart(tangents)
 
     def loops(self) -> tuple[Loop, Loop | None]:
         """C loops over the cells, of force and tangent."""

@@ -103,13 +103,14 @@ class CompiledPoints(Points):
 
     Attributes:
         points: What the loops take, see loops.h.
+        over: The :attr:`excess`; (1,).
     """
 
     def _prepare(self, scheme: Scheme, length: Array) -> None:
         layout, law = self._layout, self._layout.kind.law
         softening = layout.softening and layout.softening.of(1.0, 1.0)
         self._forms = forms = _point_forms(inputs(layout), layout.kind, softening, scheme)
-        self._over, self._solves = np.zeros(1), law.solves
+        self.over, self._solves = np.zeros(1), law.solves
         arrays = {"B": layout.strains, "weight": layout.weights, "rest": layout.rest}
         arrays = {k: np.ascontiguousarray(x, np.float64) for k, x in arrays.items()}
         cells, of_cell, width = self._storage.shape
@@ -120,7 +121,7 @@ class CompiledPoints(Points):
             components=self._components, variables=len(law.variables),
             strain=inputs(layout).index(rows(law, "strain")[0]),
             e0=self._e0, e1=self.strains, r=self.r, D=self.D, kept=self.kept, sum=self.sums,
-            over=self._over, search=self._search.flags,
+            over=self.over, search=self._search.flags,
         )  # fmt: skip
 
     @property
@@ -143,7 +144,7 @@ class CompiledPoints(Points):
     @property
     def excess(self) -> float:
         """Largest ``|stress| / limit - 1`` of a point that was held closed, or zero."""
-        return float(self._over[0])
+        return float(self.over[0])
 
     def release(self, least: float) -> None:
         """Let held points open from now on whose excess was so large in the latest response."""

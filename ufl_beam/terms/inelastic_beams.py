@@ -285,7 +285,8 @@ class CompiledInelasticBeams(InelasticBeams):
         if self._static:
             fill(c, copy=self.points.copy())
         ends = [loop("accept_inelastic", c)], [loop("add_energy_of_points", c)]
-        return Phases(begin, *ends, loop("change_of_points", c), self._start_at, leave)
+        over = self.points.over if self.points.softens else None
+        return Phases(begin, *ends, loop("change_of_points", c), self._start_at, leave, over)
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the internal forces."""

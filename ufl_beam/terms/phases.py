@@ -21,7 +21,7 @@ class Phases(NamedTuple):
     ``change`` is the method of that name of internal forces, of the type ``change_of_energy``.
     Between calls of C the term is what its attributes say: ``enter`` hands them over before C takes
     steps from the accepted configuration that it is called with, ``leave`` takes them back at the
-    one that C has come to.
+    one that C has come to.  ``over`` is :attr:`Openable.excess` of what may open; (1,).
     """
 
     begin: Sequence[Loop] = ()
@@ -30,6 +30,7 @@ class Phases(NamedTuple):
     change: Loop | None = None
     enter: Callable[[Array], None] = lambda q: None
     leave: Callable[[Array], None] = lambda q: None
+    over: Array | None = None
 
 
 class TimeFunctions:

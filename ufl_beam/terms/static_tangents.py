@@ -27,6 +27,7 @@ from ufl_beam.discretization.function_spaces import Element, Fields
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.mechanics.functional import virtual_work
 from ufl_beam.mechanics.kinematics import strain
+from ufl_beam.mechanics.tangents import Tangents
 from ufl_beam.mechanics.time_schemes import Scheme
 
 
@@ -62,21 +63,25 @@ class StaticTangent:
         self._predicted: Array = np.zeros((len(fields.order), len(self._weights)))
         self._q0: Array = np.zeros(size)
         self._last: Array = self._q0
-        self._begins = False
+        self._begins = self._exact = False
 
     def begin(self, q0: Array) -> None:
         """Begin a step: the first forces are those at its beginning."""
-        self._q0, self._begins = q0, True
-        if self.kernel.cells is not None:
-            fill(self._in_c, q0=q0, begins=1)
+        self._q0 = q0
+        if self.kernel.cells:
+            fill(self._in_c, q0=q0)
+        self.restart(Tangents.PREDICTED)
 
-    def restart(self) -> None:
-        """Begin to iterate anew."""
-        self.begin(self._q0)
+    def restart(self, tangents: Tangents) -> None:
+        """Begin to iterate anew, with tangents of this kind."""
+        self._begins = tangents is not Tangents.EXACT
+        self._exact = exact = tangents is not Tangents.PREDICTED
+        if self.kernel.cells:
+            self._in_c.begins, self._in_c.exact = self._begins, exact
 
     def add(self, q: Array) -> None:
         """Add the tangent at an iterate to the matrix."""
-        about = self._q0 if self._begins else self._last
+        about = self._q0 if self._begins else q if self._exact else self._last
         self._strains.set(self._about, about)
         self._predicted.fill(0.0)
         self._strains.add(q - about if not self._begins else np.zeros_like(q), self._predicted)

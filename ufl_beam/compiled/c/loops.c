@@ -51,7 +51,7 @@ void add_static_tangent(void *self, const double *q, double *tangent)
 {
   static_tangent *t = self;
   double *e = t->e;
-  if (t->begins) memcpy(t->about, t->q0, t->size * sizeof *q);
+  if (t->begins || t->exact) memcpy(t->about, t->begins ? t->q0 : q, t->size * sizeof *q);
   for (int i = 0; i < t->size; ++i) t->change[i] = t->begins ? 0 : q[i] - t->about[i];
   memset(e, 0, (size_t)t->strains->number * t->of_cell * sizeof *e);
   set_cells(t->strains, t->about, t->at_about);
@@ -180,6 +180,7 @@ void add_step_tangent(void *self, const double *q, double *tangent)
 double norm(int rows, const double *w, const double *f)
 {
   double sum = 0, largest = 0, scaled = 0;
+#pragma omp simd reduction(+ : sum)
   for (int i = 0; i < rows; ++i) sum += w[i] * f[i] * (w[i] * f[i]);
   if (isnan(sum) || (1e-250 < sum && sum < 1e250)) return sqrt(sum);
   for (int i = 0; i < rows; ++i) largest = fmax(largest, w[i] * fabs(f[i]));

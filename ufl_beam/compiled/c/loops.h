@@ -49,7 +49,7 @@ typedef struct {
   int at_about, at_e;             /* where they have the configuration, and the strains */
   int size, of_cell;              /* of_cell: strains of a cell */
   const double *weight, *q0;      /* of each strain of a cell; beginning of the step */
-  int begins;
+  int begins, exact;              /* the first forces are those at q0; all are those at the iterate */
   double *about, *change, *e;     /* configuration of the latest tangent; space */
 } static_tangent;
 
@@ -224,7 +224,7 @@ typedef struct {
   const int32_t *ends;           /* chains x 6: numbers of the ends among those left */
 } chains;
 
-void eliminate(const chains *c);
+void eliminate(const chains *c, const double *b);
 void reduce(const chains *c, const double *b);
 void expand(const chains *c, const double *left, double *x);
 int all_finite(int size, const double *values);
@@ -317,7 +317,7 @@ void residual(equation *e, const double *q, double *r);
 void assemble(equation *e, const double *q);
 void begin_newton(equation *e, int patience, int like_last);
 int factor_tangent(const equation *e, int *failed);
-int solve_tangent(const equation *e);
+int solve_tangent(const equation *e, int reduced);
 void find_last_digits(const equation *e, const double *q, double *digits);
 int judge(equation *e, const double *q, int iteration, double residual, double scale,
           double floor);
@@ -469,6 +469,8 @@ typedef struct {
   dead_loads *loads;  /* or none */
   moving_supports *supports;
   int32_t *search;    /* flags of points that may open; or none */
+  int places;         /* that may open, and their largest excess, see points */
+  double *const *over;
   phases begin, accept, add_state;
   int states;
   double *state;      /* entries of the ledger that a state has, one after the other */
@@ -494,4 +496,4 @@ void add_energy_of_points(void *self, const time_step *step, const double *q1, c
 double change_of_form(void *self, const double *q1);
 double change_of_points(void *self, const double *q1);
 double value_at(const time_function *f, double t);
-int take_steps(march *m, int steps, const double *ends, double seconds, double *rows);
+int take_steps(march *m, int steps, const double *ends, double seconds, int keeps, double *rows);

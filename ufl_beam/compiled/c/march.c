@@ -29,6 +29,7 @@ static void run(const phases *p, const time_step *step, const double *q1, const 
 static double dot(int size, const double *x, const double *y)
 {
   double sum = 0;
+#pragma omp simd reduction(+ : sum)
   for (int i = 0; i < size; ++i) sum += x[i] * y[i];
   return sum;
 }
@@ -56,7 +57,7 @@ double change_of_form(void *self, const double *q1)
 void begin_static_tangent(void *self, const time_step *step, const double *q1, const double *s)
 {
   static_tangent *t = self;
-  t->q0 = step->q0, t->begins = 1;
+  t->q0 = step->q0, t->begins = 1, t->exact = 0;
 }
 
 void begin_dead_loads(void *self, const time_step *step, const double *q1, const double *s)
@@ -263,7 +264,9 @@ static int solve(march *m)
     m->search[HOLD] = 1;
   }
   const int error = petsc.SNESSolve(m->snes, 0, e->x);
-  const int found = !error && e->reason > 0 && !(m->search && m->search[OVER]);
+  int found = !error && e->reason > 0;
+  if (m->search && m->search[OVER])
+    for (int k = 0; k < m->places; ++k) found &= *m->over[k] == 0; /* none that must open */
   if (m->search) memset(m->search, 0, SEARCH_FLAGS * sizeof *m->search);
   return found;
 }
@@ -360,13 +363,13 @@ static double *keep(const march *m, double *row)
 }
 
 /* Steps to the times `ends`, up to the first that fails, or that ends so many seconds later; how many
- * were taken. Each is kept in a row, if there are any. */
-int take_steps(march *m, int steps, const double *ends, double seconds, double *rows)
+ * were taken. Each is kept in a row if `keeps`. */
+int take_steps(march *m, int steps, const double *ends, double seconds, int keeps, double *rows)
 {
   const double end = steps > 1 ? seconds_now() + seconds : 0;
   for (int k = 0; k < steps; ++k) {
     if (!take_step(m, ends[k])) return k;
-    if (rows) rows = keep(m, rows);
+    if (keeps) rows = keep(m, rows);
     if (steps > 1 && seconds_now() > end) return k + 1;
   }
   return steps;
