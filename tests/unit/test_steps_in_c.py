@@ -78,7 +78,8 @@ def everything(state):
 def test_the_same_as_in_python(make, scheme):
     """To the last digit but for sums in another order; a step that C leaves to Python included."""
     in_c, in_python = ub.Simulation(make(), scheme), InPython(make(), scheme)
-    assert in_c._in_c is not None
+    # In statics the works of connectors are checked in Python.
+    assert (in_c._in_c is None) == bool(in_c.scene.links and not scheme.dynamic)
     end(in_c, 30), end(in_python, 30)
     assert (in_c.parts, in_c.t) == (in_python.parts, in_python.t)
     for one, other in zip(everything(in_c.gather()), everything(in_python.gather()), strict=True):

@@ -17,6 +17,7 @@ from ufl_beam.simulation.branch_check import StaticPath
 from ufl_beam.simulation.kept_rows import KeptRows
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.newton import Solver
+from ufl_beam.terms.base import InternalForces
 from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.dead_loads import DeadLoads
 from ufl_beam.terms.energy_ledger import Ledger
@@ -94,7 +95,10 @@ class CompiledSteps:
             search=ffi.NULL if search is None else integers(search.flags),
             states=len(ledger.state), state=ledger.state.numbers,
         )  # fmt: skip
-        over = [doubles(one.over) for one in phases if one.over is not None]
+        over = [
+            doubles(one.over) + i
+            for one in phases if one.over is not None for i in range(len(one.over))
+        ]  # fmt: skip
         fill(self.c, places=len(over), over=ffi.new("double *[]", over))
         if inertia is not None and inertia.in_c is not None:
             fill(self.c, rates=inertia.in_c.c)
@@ -204,6 +208,8 @@ def compiled_steps(
     for term in equation.terms:
         of_term = term.phases(times)
         if of_term is None:
+            return None
+        if path is not None and of_term.change is None and isinstance(term, InternalForces):
             return None
         phases.append(of_term)
     return CompiledSteps(

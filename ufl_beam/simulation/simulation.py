@@ -187,7 +187,9 @@ class Simulation(StateView):
             >>> simulation.close()
         """
         ends = np.ascontiguousarray(ends, dtype=np.float64)
-        if self._in_c is not None and (taken := self._in_c.take(self, ends, keep=keep)):
+        of_c = keep and not self.scene.links
+        in_c = self._in_c if of_c or not keep else None
+        if in_c is not None and (taken := in_c.take(self, ends, keep=of_c)):
             return taken
         self.step_to(float(ends[0]))
         if keep:

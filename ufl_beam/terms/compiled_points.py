@@ -103,14 +103,13 @@ class CompiledPoints(Points):
 
     Attributes:
         points: What the loops take, see loops.h.
-        over: The :attr:`excess`; (1,).
     """
 
     def _prepare(self, scheme: Scheme, length: Array) -> None:
         layout, law = self._layout, self._layout.kind.law
         softening = layout.softening and layout.softening.of(1.0, 1.0)
         self._forms = forms = _point_forms(inputs(layout), layout.kind, softening, scheme)
-        self.over, self._solves = np.zeros(1), law.solves
+        self._solves = law.solves
         arrays = {"B": layout.strains, "weight": layout.weights, "rest": layout.rest}
         arrays = {k: np.ascontiguousarray(x, np.float64) for k, x in arrays.items()}
         cells, of_cell, width = self._storage.shape
@@ -140,11 +139,6 @@ class CompiledPoints(Points):
         self.strains[:] = strains
         lib.respond(self.points)
         return self.r, self.D
-
-    @property
-    def excess(self) -> float:
-        """Largest ``|stress| / limit - 1`` of a point that was held closed, or zero."""
-        return float(self.over[0])
 
     def release(self, least: float) -> None:
         """Let held points open from now on whose excess was so large in the latest response."""

@@ -181,6 +181,11 @@ class InelasticBeams(Cells, ABC):
     # -- see openings.py -----------------------------------------------------------------------
 
     @property
+    def over(self) -> Array:
+        """The :attr:`excess`; (1,)."""
+        return self.points.over
+
+    @property
     def excess(self) -> float:
         """Largest excess of a held point over its limit, as a part of it."""
         return self.points.excess
@@ -285,7 +290,7 @@ class CompiledInelasticBeams(InelasticBeams):
         if self._static:
             fill(c, copy=self.points.copy())
         ends = [loop("accept_inelastic", c)], [loop("add_energy_of_points", c)]
-        over = self.points.over if self.points.softens else None
+        over = self.over if self.points.softens else None
         return Phases(begin, *ends, loop("change_of_points", c), self._start_at, leave, over)
 
     def add_residual(self, q1: Array, r: Array) -> None:

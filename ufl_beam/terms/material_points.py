@@ -55,6 +55,7 @@ class Points(ABC):
         strains: Of the cells at the latest response; (cells, 3); may be written to.
         r, D: The latest response, see :meth:`respond`.
         dt: Length of the step; (1,); s.
+        over: The :attr:`excess`; (1,).
         kept: By cell: (N, V, M) in the accepted state, the jump of the last point, and the energy
             dissipated by plastic strains and by discontinuities; (cells, 6); N, N m, rad or m, J.
         sums: Of all cells: dissipated in the last step by plastic strains, by discontinuities,
@@ -107,6 +108,7 @@ class Points(ABC):
         self.sums = np.zeros(int(lib.POINT_SUMS))
         self.r, self.D = np.zeros((cells, 3)), np.zeros((cells, 9))
         self._e0, self.strains = np.zeros((cells, 3)), np.zeros((cells, 3))
+        self.over = np.zeros(1)
         self._prepare(scheme, length)
 
     @abstractmethod
@@ -159,9 +161,9 @@ class Points(ABC):
         """
 
     @property
-    @abstractmethod
     def excess(self) -> float:
         """Largest ``|stress| / limit - 1`` of a point that was held closed, or zero."""
+        return float(self.over[0])
 
     @abstractmethod
     def release(self, least: float) -> None:

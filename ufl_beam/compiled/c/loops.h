@@ -428,6 +428,15 @@ typedef struct {
   double *plastic, *hinges, *numerical, *released, *stored, *hardening;
 } inelastic_term;
 
+/* Connectors of one motion: springs, rigid-plastic ones, or such as are held; entries or none. */
+typedef struct {
+  couplings *links;
+  int dt_of_law;       /* where a rigid-plastic law has the step */
+  int32_t *way_before; /* of rigid-plastic ones, after the last step */
+  double stored, loss; /* by rigid-plastic ones; part of what backward Euler loses */
+  inelastic_term points; /* of springs: entries of the ledger */
+} coupling_term;
+
 /* Energy that a term would store and dissipate in a step to q1. */
 typedef double (change_of_energy)(void *self, const double *q1);
 typedef struct {
@@ -493,6 +502,9 @@ void accept_rayleigh(void *self, const time_step *step, const double *q1, const 
 void begin_inelastic(void *self, const time_step *step, const double *q1, const double *s);
 void accept_inelastic(void *self, const time_step *step, const double *q1, const double *s);
 void add_energy_of_points(void *self, const time_step *step, const double *q1, const double *s);
+void begin_couplings(void *self, const time_step *step, const double *q1, const double *s);
+void accept_couplings(void *self, const time_step *step, const double *q1, const double *s);
+void add_energy_of_couplings(void *self, const time_step *step, const double *q1, const double *s);
 double change_of_form(void *self, const double *q1);
 double change_of_points(void *self, const double *q1);
 double value_at(const time_function *f, double t);

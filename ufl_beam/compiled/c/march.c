@@ -187,15 +187,34 @@ void accept_rayleigh(void *self, const time_step *step, const double *q1, const 
   *m->lost += quadratic_form(p->size, p->indptr, p->indices, p->data, s) / step->dt;
 }
 
+static void begin_points(points *p, double *dt, double new_dt)
+{
+  if (new_dt != *dt) {
+    *dt = new_dt;
+    for (int k = 0; k < p->cells * p->of_cell; ++k) p->w[k * p->width + DT] = new_dt;
+  }
+  p->tried = 0;
+}
+
+/* What points dissipated in the step, into the ledger. */
+static void enter_losses(const inelastic_term *t, const double *sum)
+{
+  if (t->plastic) *t->plastic += sum[0];
+  if (t->hinges) *t->hinges += sum[1];
+  if (t->numerical) *t->numerical += 2 * t->alpha * sum[2];
+  if (t->released) *t->released += sum[5];
+}
+
+static void enter_stored(const inelastic_term *t, const double *sum)
+{
+  *t->stored += sum[3];
+  if (t->hardening) *t->hardening += sum[4];
+}
+
 void begin_inelastic(void *self, const time_step *step, const double *q1, const double *s)
 {
   const inelastic_term *t = self;
-  points *p = t->cells->points;
-  if (step->dt != *t->dt) {
-    *t->dt = step->dt;
-    for (int k = 0; k < p->cells * p->of_cell; ++k) p->w[k * p->width + DT] = step->dt;
-  }
-  p->tried = 0;
+  begin_points(t->cells->points, t->dt, step->dt);
   for (int i = 0; i < t->cells->size; ++i) t->cells->latest[i] = NAN;
   t->cells->begins = t->begins;
 }
@@ -203,21 +222,56 @@ void begin_inelastic(void *self, const time_step *step, const double *q1, const 
 void accept_inelastic(void *self, const time_step *step, const double *q1, const double *s)
 {
   const inelastic_term *t = self;
-  const double *sum = t->cells->points->sum;
   respond_at(t->cells, q1);
   commit(t->cells->points);
-  if (t->plastic) *t->plastic += sum[0];
-  if (t->hinges) *t->hinges += sum[1];
-  if (t->numerical) *t->numerical += 2 * t->alpha * sum[2];
-  if (t->released) *t->released += sum[5];
+  enter_losses(t, t->cells->points->sum);
 }
 
 void add_energy_of_points(void *self, const time_step *step, const double *q1, const double *s)
 {
   const inelastic_term *t = self;
-  const double *sum = t->cells->points->sum;
-  *t->stored += sum[3];
-  if (t->hardening) *t->hardening += sum[4];
+  enter_stored(t, t->cells->points->sum);
+}
+
+void begin_couplings(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const coupling_term *t = self;
+  const couplings *c = t->links;
+  const rigid_plastic *p = c->rigid_plastic;
+  if (c->points) begin_points(c->points, t->points.dt, step->dt);
+  for (int i = 0; p && i < p->number; ++i) {
+    p->w[i * p->width + t->dt_of_law] = step->dt;
+    p->way[i] = t->way_before[i];
+  }
+}
+
+void accept_couplings(void *self, const time_step *step, const double *q1, const double *s)
+{
+  coupling_term *t = self;
+  const couplings *c = t->links;
+  commit_couplings(c, q1, step->dt);
+  if (c->points) {
+    for (int i = 0; i < c->number; ++i) c->points->e1[3 * i] = c->e1[i];
+    respond(c->points);
+    commit(c->points);
+    enter_losses(&t->points, c->points->sum);
+  }
+  if (c->rigid_plastic) {
+    double sums[3];
+    const rigid_plastic *p = c->rigid_plastic;
+    commit_rigid_plastic(p, c->e1, sums);
+    for (int i = 0; i < p->number; ++i) t->way_before[i] = p->way[i] * p->slipped[i];
+    *t->points.hinges += sums[0];
+    if (t->points.numerical) *t->points.numerical += t->loss * sums[1];
+    t->stored = sums[2];
+  }
+}
+
+void add_energy_of_couplings(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const coupling_term *t = self;
+  if (t->links->points) enter_stored(&t->points, t->links->points->sum);
+  if (t->links->rigid_plastic && t->points.hardening) *t->points.hardening += t->stored;
 }
 
 /* What the end of the step would add to what points have stored and dissipated; see Points.change. */
