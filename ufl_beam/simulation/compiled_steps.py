@@ -40,7 +40,7 @@ class Keeping(Protocol):
     """Solution that states are appended to."""
 
     def keep(self, state: Snapshot) -> None:
-        """Append a state."""
+        """Append a state of a run."""
 
 
 class Stepping(Protocol):

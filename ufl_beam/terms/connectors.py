@@ -242,10 +242,10 @@ class CompiledCouplings(Couplings):
                 self._q, self._e[:] = q, self.motion(q)
             if response.steady:
                 self._put(*response.rows(self._e, self._before))
-            c.stored = response.stored
+            c.hardened = response.stored
 
         def leave(q: Array) -> None:
-            self._q, response.stored = q, c.stored
+            self._q, response.stored = q, c.hardened
 
         begin = beginning((self._work, self._tangent), self._forms.q0)
         phases = ("begin_couplings", "accept_couplings", "add_energy_of_couplings")

@@ -182,7 +182,7 @@ class InelasticBeams(Cells, ABC):
 
     @property
     def over(self) -> Array:
-        """The :attr:`excess`; (1,)."""
+        """The :attr:`excess` in an array; (1,)."""
         return self.points.over
 
     @property

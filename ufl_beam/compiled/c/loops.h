@@ -433,7 +433,7 @@ typedef struct {
   couplings *links;
   int dt_of_law;       /* where a rigid-plastic law has the step */
   int32_t *way_before; /* of rigid-plastic ones, after the last step */
-  double stored, loss; /* by rigid-plastic ones; part of what backward Euler loses */
+  double hardened, loss; /* stored by rigid-plastic ones; part of what backward Euler loses */
   inelastic_term points; /* of springs: entries of the ledger */
 } coupling_term;
 
