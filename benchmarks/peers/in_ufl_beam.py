@@ -34,10 +34,10 @@ def run(scene, discretised, end, steps, sample=None, every=None):
     every = every or steps
     samples, stopwatch = [], Stopwatch()
     for first in range(1, steps + 1, every):
-        last = min(first + every, steps + 1)
+        ends = end * np.arange(first, min(first + every, steps + 1)) / steps
         with stopwatch:
-            for n in range(first, last):
-                simulation.step_to(end * n / steps)
+            while len(ends):
+                ends = ends[simulation.steps_to(ends) :]
         if sample:
             samples.append(sample(simulation))
     result = {"steps": steps, "newton": simulation.iterations, **stopwatch.read()}

@@ -22,6 +22,7 @@ WARNINGS = [
     "-Werror",
     # PETSc and the table of terms prescribe the arguments of functions that they call.
     "-Wno-unused-parameter",
+    "-fopenmp-simd",  # a flag of the loops
     # Sizes are int in loops.h and size_t in memset.
     "-Wno-sign-conversion",
 ]

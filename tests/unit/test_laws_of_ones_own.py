@@ -147,17 +147,17 @@ def test_a_run_that_goes_on_is_the_whole_one(name):
 
 def test_checkpoints_carry_the_variables(tmp_path, monkeypatch):
     """A run that was interrupted and goes on from its file is the whole one, bit by bit."""
-    attempt = ub.Simulation.attempt
+    steps_to = ub.Simulation.steps_to
 
-    def interrupted(simulation, t1, end=None):
-        if t1 > 0.65:
+    def interrupted(simulation, ends, **options):
+        if ends[0] > 0.65:
             raise InterruptedError
-        return attempt(simulation, t1, end)
+        return steps_to(simulation, ends, **options)
 
     whole = ub.simulate(bent(LAW), ub.Static(), t=(0, 1), dt=0.1)
     checkpoint = ub.Checkpoint(tmp_path / "run.h5", every=2)
     of = {"t": (0, 1), "dt": 0.1, "checkpoint": checkpoint}
-    monkeypatch.setattr(ub.Simulation, "attempt", interrupted)
+    monkeypatch.setattr(ub.Simulation, "steps_to", interrupted)
     with pytest.raises(InterruptedError):
         ub.simulate(bent(LAW), ub.Static(), **of)
     monkeypatch.undo()

@@ -148,7 +148,7 @@ def test_only_what_must_open_does():
 @jumps
 @pytest.mark.parametrize("law", [None, ub.Softening(FOREVER, FOREVER), ub.Softening(10.0, 1e-3)])
 def test_only_steps_in_which_something_opens_are_solved_again(law, monkeypatch):
-    """Steps without an opening are solved once, with hinges and without."""
+    """Steps without an opening are solved once, in C, with hinges and without."""
     solved, solve = [], ub.solvers.newton.Solver.solve
 
     def counted(self, *args, **keywords):
@@ -158,14 +158,13 @@ def test_only_steps_in_which_something_opens_are_solved_again(law, monkeypatch):
     monkeypatch.setattr(ub.solvers.newton.Solver, "solve", counted)
     beam, scene = pushed(law)
     solution = run(scene, ub.Midpoint(), 0.01)
-    once = solution.parts
     if law is None or law.limit == FOREVER:
-        assert len(solved) == once
+        assert not solved
     else:
         energies = [solution.material(beam, n).hinge for n in range(len(solution))]
         newly = np.sum((np.diff(energies, axis=0) > 0).any(axis=1))
         assert newly > 0
-        assert once < len(solved) <= once + 2 * newly
+        assert 0 < len(solved) <= 3 * newly
 
 
 @jumps

@@ -23,19 +23,33 @@ from ufl_beam.dolfinx_compat import VERSIONS
 
 T = TypeVar("T")
 
-SOURCES = ("loops", "material_points", "rigid_plastic", "connectors", "elimination", "newton")
+SOURCES = (
+    "loops",
+    "material_points",
+    "rigid_plastic",
+    "connectors",
+    "elimination",
+    "newton",
+    "march",
+)
 """Files of C beside this one; they are one translation unit."""
 
 _CALLBACKS = """
 extern "Python" void add_in_python(void *self, const double *q, double *out);
 extern "Python" double missed_in_python(void *self, const double *q, const double *r, double scale,
                                         double moved);
+extern "Python" double time_in_python(void *handle, double t);
+extern "Python" int numbers_in_python(void *handle, scheme_numbers *numbers);
 """
 
 
 _SOURCE = "\n".join([HEADERS, DECLARATIONS, *(text(f"{name}.c") for name in SOURCES)])
 module = compiled(
-    "ufl_beam_loops", DECLARATIONS + _CALLBACKS, lambda: _SOURCE, made_of=[_SOURCE], flags=["-O3"]
+    "ufl_beam_loops",
+    DECLARATIONS + _CALLBACKS,
+    lambda: _SOURCE,
+    made_of=[_SOURCE],
+    flags=["-O3", "-fopenmp-simd"],
 )
 ffi: Any = module.ffi
 lib: Any = module.lib

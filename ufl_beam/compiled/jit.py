@@ -31,6 +31,7 @@ HEADERS = f"""\
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
+#include <time.h>
 #define CALL(f, e, w, c, x) f(e, w, c, x, 0, 0{TABULATE[1]})"""
 """Head of all files of C; CALL calls a kernel of FFCx."""
 

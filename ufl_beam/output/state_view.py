@@ -133,6 +133,11 @@ class StateView(ABC):
             self.share.comm.Allreduce(MPI.IN_PLACE, here)
         return here
 
+    @property
+    def support_dofs(self) -> Index:
+        """Local degrees of freedom of the supports; (num_supports, 3)."""
+        return self._support_dofs[0] if self.scene.supports else np.zeros((0, 3), dtype=np.int64)
+
     @cached_property
     def _support_dofs(self) -> tuple[Index, Index]:
         """Local degrees of freedom of the supports, and which of them this process owns."""
@@ -144,7 +149,8 @@ class StateView(ABC):
 
     def entries(self) -> tuple[dict[str, float], ...]:
         """The ledger over all processes: state, supplied, lost; J."""
-        groups = tuple(map(dict, (self.ledger.state, self.ledger.supplied, self.ledger.lost)))
+        parts = self.ledger.state, self.ledger.supplied, self.ledger.lost
+        groups = tuple(part.by_name() for part in parts)
         if self.share.alone:
             return groups
         everyone = self.share.comm.allgather(groups)

@@ -28,11 +28,12 @@ from ufl_beam.terms.beams import ElasticBeams, Inertia
 from ufl_beam.terms.connector_responses import Setting
 from ufl_beam.terms.connectors import Couplings, couplings
 from ufl_beam.terms.damping import SecondDifferences, damping_forces
+from ufl_beam.terms.dead_loads import DeadLoads
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.guide_curves import guides
 from ufl_beam.terms.inelastic_beams import InelasticBeams, inelastic_cells
 from ufl_beam.terms.links import Links
-from ufl_beam.terms.loads import DeadLoads, FollowerLoads, FrameForces, LoadTerm
+from ufl_beam.terms.loads import FollowerLoads, FrameForces, LoadTerm
 from ufl_beam.terms.material_points import Points, expect_entries
 from ufl_beam.terms.openings import Openable, Openings, SearchFlags
 from ufl_beam.terms.rigid_plastic import RigidPlasticResponse
@@ -86,6 +87,7 @@ class Assembly:
     supports: Supports
     openings: Openings | None  # search for what opens; None if nothing can
     equation: StepEquation
+    search: SearchFlags | None  # None if nothing can open
 
     @property
     def remembering(self) -> list[InelasticBeams | Links]:
@@ -203,7 +205,7 @@ def assemble(
         equation.leave_to_c()
     return Assembly(
         fields, ledger, asked, rates, beams, inelastic, bool(groups), coupled, loads, inertia,
-        supports, openings, equation,
+        supports, openings, equation, search if places else None,
     )  # fmt: skip
 
 

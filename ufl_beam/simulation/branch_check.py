@@ -6,10 +6,12 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from ufl_beam.arrays import Array
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, struct
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
@@ -17,6 +19,7 @@ from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.terms.base import InternalForces
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.links import Links
+from ufl_beam.terms.phases import weight_of_before
 
 FAR = 1e3
 """Largest motion of a node in a static step that is no mechanism; sizes of the scene or radians."""
@@ -92,6 +95,20 @@ class StaticPath:
                 f"{work:.3e} J of work: it leaps to another branch of equilibria, or is too long "
                 "to tell"
             )
+
+    def in_c(self, changes: Sequence[Loop]) -> Any:
+        """``static_path`` of loops.h; ``changes`` are those of the terms."""
+        parts = self._ledger.state, self._ledger.supplied, self._ledger.lost
+        per_far = np.full(self._share.size, 1 / self._share.grid.scene.size)
+        per_far[self._rotations] = 1.0
+        return struct(
+            "static_path", slack=self._scheme.slack, far=FAR, kink=KINK, per_far=per_far,
+            force=np.zeros(self._share.size), terms=len(changes),
+            weight_of_before=weight_of_before(self._scheme.acting),
+            change=ffi.new("change_call[]", list(changes)), accounts=len(parts),
+            account=ffi.new("double *[]", [doubles(part.numbers) for part in parts]),
+            entries=np.array([len(part) for part in parts], dtype=np.int32),
+        )  # fmt: skip
 
     def accept(self, force: Array) -> None:
         """Take the internal forces of a step as those before the next."""

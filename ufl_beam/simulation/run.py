@@ -171,9 +171,15 @@ def simulate(
                 simulation.together(recorder.open, simulation)
             simulation.keep()
         with progress_bar(progress, comm, total=1.0, bar_format=BAR) as bar:
+            quiet = not recorders and keeper is None
             while not pace.finished:
-                pace.advance()
-                simulation.together(after_step)
+                if quiet and solution.every == 1 and most == sys.maxsize:
+                    pace.advance(sys.maxsize, keep=True)
+                    solution.time_error = pace.error
+                else:
+                    left = solution.every - pace.steps % solution.every
+                    pace.advance(left if quiet else 1)
+                    simulation.together(after_step)
                 bar.update(pace.progress - bar.n)
         simulation.end()
         check_ledger(simulation)

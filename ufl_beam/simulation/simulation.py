@@ -9,6 +9,8 @@ from typing import NoReturn
 
 from mpi4py import MPI
 
+import numpy as np
+
 from ufl_beam.arrays import Array
 from ufl_beam.collective_errors import Agreement
 from ufl_beam.compiled.c_library import extrapolated
@@ -23,7 +25,8 @@ from ufl_beam.output.dolfinx_view import DolfinxView
 from ufl_beam.output.state_view import StateView
 from ufl_beam.parallel import communicator
 from ufl_beam.parameter import Parameter
-from ufl_beam.simulation.assembly import assemble
+from ufl_beam.simulation.assembly import Assembly, assemble
+from ufl_beam.simulation.compiled_steps import CompiledSteps, compiled_steps
 from ufl_beam.simulation.diagnosis import no_equilibrium
 from ufl_beam.simulation.evaluation import COMPILED, REFERENCE
 from ufl_beam.simulation.initial_state import checked_grid, initial_state, mesh_of
@@ -32,6 +35,7 @@ from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_solver import (
     APPLYING,
     FIRST,
+    LARGEST_TURN,
     StepSolver,
     Trial,
     begins_loaded,
@@ -116,7 +120,7 @@ class Simulation(StateView):
 
         self.t, self.parts, self.last_dt = t0, 0, math.inf
         self.q: Array = q[share.dofs]
-        self._q_before: Array = self.q
+        self.q_before: Array = self.q
         self._continues, self._dynamic = start is not None, has_inertia(scheme)
         loaded: list[Array] = []
         if self._continues or (has_inertia(scheme) and scheme.kept):
@@ -139,7 +143,8 @@ class Simulation(StateView):
             scheme, self.equation, parts.openings, self._branch, newton, factors, together
         )
         self.solver = self._steps.newton
-        self.solution = kind(scene, grid)
+        self.solution, self._end = kind(scene, grid), np.zeros(1)
+        self._in_c = None if self._copies or self.asked else self._steps_in_c(parts)
 
     # -- stepping ------------------------------------------------------------------------------
 
@@ -150,6 +155,9 @@ class Simulation(StateView):
             ConvergenceError: Even the smallest part failed; the state is that of the last part that
                 was accepted, which the solution of the error ends with.
         """
+        self._end[0] = t1
+        if self._in_c is not None and self._in_c.take(self, self._end):
+            return
         fresh = self.parts == 0 and not self._continues
         if fresh and begins_loaded(self.scene, self.scheme, self.t):
             begin, end = self.t, self.t + APPLYING * (t1 - self.t)
@@ -157,8 +165,55 @@ class Simulation(StateView):
             go_in_parts(begin, end, attempt, self.accept, self.give_up)
         go_in_parts(self.t, t1, partial(self.attempt, end=t1), self.accept, self.give_up)
 
+    def steps_to(self, ends: Array, *, keep: bool = False) -> int:
+        """Go to the first of these times, and on to others as far as that needs no Python.
+
+        Args:
+            ends: Ends of steps; (n,); s.
+            keep: Append the state at the end of each step to the solution.
+
+        Returns:
+            How many steps were taken: at least one, and no more than take a moment.
+
+        Raises:
+            ConvergenceError: See :meth:`step_to`.
+
+        Example:
+            >>> simulation, ends = ub.Simulation(scene, ub.Midpoint()), np.linspace(0, 1, 21)[1:]
+            >>> while len(ends):
+            ...     ends = ends[simulation.steps_to(ends) :]
+            >>> print((1e3 * simulation.displacement(beam.end)).round(1))  # mm, mm, mrad
+            [ -0.1 -18.9 -14.3]
+            >>> simulation.close()
+        """
+        ends = np.ascontiguousarray(ends, dtype=np.float64)
+        of_c = keep and not self.scene.links
+        in_c = self._in_c if of_c or not keep else None
+        if in_c is not None and (taken := in_c.take(self, ends, keep=of_c)):
+            return taken
+        self.step_to(float(ends[0]))
+        if keep:
+            self.keep()
+        return 1
+
+    def _steps_in_c(self, parts: Assembly) -> CompiledSteps | None:
+        """Steps without Python; None where something in the scene needs it."""
+        if not self.share.alone:
+            return None
+        fresh = not self._continues and begins_loaded(self.scene, self.scheme, self.t)
+        return compiled_steps(
+            self.scheme, self.equation, self.solver, self.ledger, parts.inertia, self._branch,
+            parts.search, LARGEST_TURN, fresh, self.support_dofs,
+        )  # fmt: skip
+
+    def _in_python(self) -> None:
+        """Take the state back from C: what follows is in Python."""
+        if self._in_c is not None:
+            self._in_c.hand_back(self)
+
     def _attempt_loads(self, t1: float, begin: float, end: float) -> Trial:
         """Solve a part of the application of the loads of the time ``begin``, up to ``end``."""
+        self._in_python()
         step = self.scheme.step(self.t, t1, end, self.q)
         trial = self._attempt(step._replace(load_time=begin, motion_time=begin))
         require_small_turn(self.share, trial.q1 - self.q, trial.step.dt, end - begin)
@@ -174,6 +229,7 @@ class Simulation(StateView):
         Raises:
             StepFailed: There is no equilibrium, or it is too far away.
         """
+        self._in_python()
         if self._dynamic and not self.inertia.ready:
             t = self.t + FIRST * (t1 - self.t)
             first = self._attempt(self.scheme.step(self.t, t, t1, self.q))
@@ -192,7 +248,7 @@ class Simulation(StateView):
     def _begin(self, step: Step) -> Array:
         """Begin a step; return a guess of its end, in the axes of the supports."""
         self._ask_and_begin(step)
-        guess = extrapolated(self.q, self._q_before, step.dt / self.last_dt)
+        guess = extrapolated(self.q, self.q_before, step.dt / self.last_dt)
         self.supports.enter(guess)
         self.supports.move(guess, self.supports.in_axes(self.q), step)
         return guess
@@ -205,6 +261,7 @@ class Simulation(StateView):
         self, step: Step, guess: Array, border: Border, *, hold: bool = True
     ) -> Trial:
         """Solve the next step together with the load factor; see :meth:`StepSolver.solve_along`."""
+        self._in_python()
         self.together(self._ask_and_begin, step)
         return self._steps.solve_along(step, guess, border, hold=hold)
 
@@ -222,7 +279,7 @@ class Simulation(StateView):
             term.accept(q1, s)
         self.supports.enter(s)
         self.supports.accept(s)
-        self._q_before, self.last_dt = self.q, step.dt
+        self.q_before, self.last_dt = self.q, step.dt
         self.q, self.t = q1, step.t1
         self.parts += 1
         self.ledger.begin()
@@ -242,6 +299,7 @@ class Simulation(StateView):
 
         Nothing yields or opens any further, now and later: no step may follow.
         """
+        self._in_python()
         self.ask()
         for cells in self.inelastic:
             cells.points.freeze()
@@ -299,6 +357,7 @@ class Simulation(StateView):
         self.settle()
         if self.t not in self.solution.times[-1:]:
             self.keep()
+        self._in_python()
         self.solution.internal = self._assembly.internal_variables(self.q)
 
     def snapshot(self) -> Solution:
@@ -306,6 +365,7 @@ class Simulation(StateView):
         self.settle()
         now = Solution(self.scene, self.grid)
         now.keep(self.gather())
+        self._in_python()
         now.internal = self._assembly.internal_variables(self.q)
         return now
 
@@ -323,12 +383,13 @@ class Simulation(StateView):
             term.add_state(self.q)
 
     def _pass_on(self, memory: Memory) -> None:
+        self._in_python()
         self.t = memory.number("t", self.t)
         self.last_dt = memory.number("last dt", self.last_dt)
         self.parts = int(memory.number("parts", self.parts))
         self.solver.remember(memory)
         self.q = memory.at_dofs("q", self.q)
-        self._q_before = memory.at_dofs("q before", self._q_before)
+        self.q_before = memory.at_dofs("q before", self.q_before)
         self.ledger.remember(memory)
         for term in self.terms:
             term.remember(memory, self.q)

@@ -18,6 +18,9 @@ from ufl_beam.simulation.step_solver import Trial
 GROWTH = 1.5
 """Largest ratio of the length of a step to that of the one before it."""
 
+MOST = 2**14
+"""Steps that are asked for at once; they end much sooner if they take long."""
+
 SAMPLES = (0.01, 0.5, 0.99)
 """Parts of a step at which loads are asked for."""
 
@@ -45,10 +48,11 @@ class EqualSteps:
         """Part of the steps that are done."""
         return self.steps / self._all
 
-    def advance(self) -> None:
-        """Take one step, in parts if it fails."""
-        self._simulation.step_to(self._t0 + self._time * (self.steps + 1) / self._all)
-        self.steps += 1
+    def advance(self, most: int = 1, *, keep: bool = False) -> None:
+        """Take steps, up to ``most``, and keep each of them; those that fail in parts."""
+        steps = np.arange(self.steps, min(self.steps + min(most, MOST), self._all)) + 1
+        ends = self._t0 + self._time * steps / self._all
+        self.steps += self._simulation.steps_to(ends, keep=keep)
 
     def state(self) -> dict[str, float]:
         """The number of steps."""
@@ -143,8 +147,8 @@ class AdaptiveSteps:
         """Part of the time that is over."""
         return (self._simulation.t - self._t0) / (self._t1 - self._t0)
 
-    def advance(self) -> None:
-        """Take one step that is accurate, after rejected ones."""
+    def advance(self, most: int = 1, *, keep: bool = False) -> None:
+        """Take one step that is accurate, after rejected ones; and keep it."""
         simulation = self._simulation
         stop = next(t for t in self._stops if t > simulation.t)
         while True:
@@ -169,6 +173,8 @@ class AdaptiveSteps:
         self._dt = min(dt * min(change, GROWTH), self._longest)
         # The acceleration may jump at a stop, so what was before tells nothing about what comes.
         self._fresh = simulation.t == stop
+        if keep:
+            simulation.keep()
 
     def _attempt(self, stop: float) -> tuple[Trial, float]:
         """Solve the next step; also its error."""

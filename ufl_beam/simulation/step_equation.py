@@ -12,6 +12,7 @@ from ufl_beam.compiled.c_library import Loop, ffi, fill
 from ufl_beam.compiled.csr import Csr, Product
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
+from ufl_beam.mechanics.tangents import Tangents
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.solvers.equation import Equation
 from ufl_beam.terms.base import InternalForces, Term
@@ -96,12 +97,18 @@ class StepEquation(Equation):
     def respond_at(self, q1: Array) -> bool:
         """Evaluate forces and tangent of the present step at ``q1``; false if a process cannot."""
         x, failed = self.supports.in_axes(q1), 0.0
+        self.restart(Tangents.EXACT)
         try:
             self.residual(x, np.zeros(self.share.size))
             self.tangent(x)
         except StepFailed:
             failed = 1.0
         return self.share.largest(failed) == 0.0
+
+    def restart(self, tangents: Tangents) -> None:
+        """Begin to iterate anew, with tangents of this kind."""
+        for inner in self._inner:
+            inner.restart(tangents)
 
     def stiffen(self, stiff: bool) -> bool:
         """Begin again with stiff points, or end that; return whether it makes a difference."""
@@ -170,6 +177,8 @@ class StepEquation(Equation):
         for term in self.terms:
             if term.kind != "inertia":
                 term.begin(step)
+                if isinstance(term, InternalForces):
+                    term.restart(Tangents.EXACT)
                 term.add_residual(q, r)
                 term.add_tangent(q)
         return r, self.A.data.copy()

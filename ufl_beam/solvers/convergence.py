@@ -95,11 +95,7 @@ class Convergence:
 
     def begin(self, patience: int, *, like_last: bool) -> None:
         """Begin an iteration that ends after so many residuals in a row without half the least."""
-        c = self.c
-        c.last = c.best = math.inf
-        c.near, c.slow, c.patience = 0, 0, patience
-        if not like_last:
-            c.rate = math.inf
+        lib.begin_newton(self.c, patience, like_last)
 
     def test(self, iteration: int) -> int:
         """Return why to stop after an iteration, or zero."""

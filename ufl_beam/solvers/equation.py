@@ -14,6 +14,7 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import Loop, ffi, lib
 from ufl_beam.compiled.csr import Csr
+from ufl_beam.mechanics.tangents import Tangents
 from ufl_beam.solvers.vectors import Vectors
 
 
@@ -53,6 +54,10 @@ class Equation(ABC):
     @abstractmethod
     def tangent(self, x: Array) -> None:
         """Fill the matrix with the derivative at ``x``."""
+
+    @abstractmethod
+    def restart(self, tangents: Tangents) -> None:
+        """Begin to iterate anew, with tangents of this kind."""
 
     @abstractmethod
     def missed(self, x: Array, r: Array, scale: float, moved: float) -> float:

@@ -14,6 +14,7 @@ from ufl_beam.compiled.c_library import ffi, fill, lib, loop, opaque, petsc
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
+from ufl_beam.mechanics.tangents import Tangents
 from ufl_beam.solvers.bordered import BorderedNewton
 from ufl_beam.solvers.convergence import Convergence
 from ufl_beam.solvers.direct_solver import DirectSolver
@@ -36,7 +37,12 @@ Those that wander longer find a solution by luck: the last digits of the data wo
 
 
 class Solver:
-    """Finds the configuration in which the residual of an equation vanishes."""
+    """Finds the configuration in which the residual of an equation vanishes.
+
+    Attributes:
+        in_c: Whether C can solve steps with no Python.
+        iterations: Number of iterations so far.
+    """
 
     def __init__(
         self,
@@ -63,7 +69,8 @@ class Solver:
         self._ksp.getPC().setPythonContext(self._factors)
         self._bordered: BorderedNewton | None = None
         self._snes = self._make_snes()
-        if equation.in_c and not self._chosen():
+        self.in_c = equation.in_c and not self._chosen()
+        if self.in_c:
             self._leave_newton_to_c()
         self.iterations = self._done = 0
 
@@ -110,7 +117,8 @@ class Solver:
     @property
     def snes(self) -> PETSc.SNES:
         """SNES of the steps; from when it is asked for, their method is PETSc's ``newtonls``."""
-        if self._snes.getType() == "shell":
+        if self.in_c:
+            self.in_c = False
             self._snes.setType("newtonls")
             take_options(self._snes, FULL_STEPS)  # SNES has forgotten its line search
         return self._snes
@@ -150,6 +158,7 @@ class Solver:
         if reason == lib.SINGULAR and self._may_go_on():
             reason = self._hold_idle(guess)
         if reason == lib.STALLED:
+            self._equation.restart(Tangents.EXACT)
             reason = self._iterate(self._careful, PATIENCE)
         if reason <= 0 and self._may_go_on() and self._equation.stiffen(True):
             self._go_to(guess)
@@ -160,6 +169,7 @@ class Solver:
         """Find the configuration as :meth:`solve` does, together with the unknown of a border."""
         self.convergence.take_loads(loads)
         self._go_to(guess)
+        self._equation.restart(Tangents.FIRST)
         return self._solution(self._iterate(self._along(border), 12))
 
     @cached_property
@@ -206,6 +216,7 @@ class Solver:
     def _go_to(self, q: Array) -> None:
         self._q[:] = q
         self._x.stateIncrease()
+        self._equation.restart(Tangents.PREDICTED)
 
     def _iterate(
         self, snes: PETSc.SNES | SearchingNewton, patience: int, *, like_last: bool = False
@@ -245,6 +256,15 @@ class Solver:
         return self._q.copy()
 
     # -- what is known of it -------------------------------------------------------------------
+
+    @property
+    def unknowns(self) -> Array:
+        """The unknowns of SNES, which C writes to; local values."""
+        return self._q
+
+    def in_petsc(self) -> Any:
+        """SNES, as C has it."""
+        return opaque(self._snes)
 
     def iterate(self) -> Array:
         """Return the latest configuration, converged or not; local values, ghosts included."""

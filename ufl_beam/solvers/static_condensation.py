@@ -61,12 +61,18 @@ class Chains:
         ends = np.hstack([start[:-1][first], end[1:][last]])
         inside[inside] = ~middle[ends].any(axis=1)[chain]
 
+        # A chain with one neighbour at both ends is eliminated from both, up to its middle.
+        narrow = alone & (np.diff(A.indptr) == 6)
+        narrow &= np.bincount(A.indices, minlength=A.size) == 6
+        _, first, last = _runs(inside)
+        free = narrow[start[:-1][first]].all(axis=1) & narrow[end[1:][last]].all(axis=1)
+        free &= last - first > 1
+        inside[(first + last)[free] // 2] = False
+
         chain, first, last = _runs(inside)
         left, middle_, right = start[:-1][first], end[:-1][inside], end[1:][last]
         before, after = start[:-1][inside], end[1:][inside]
         # A vertex with six entries has no neighbour but the first or last of its chain.
-        narrow = alone & (np.diff(A.indptr) == 6)
-        narrow &= np.bincount(A.indices, minlength=A.size) == 6
         dead_left, dead_right = (narrow[dofs].all(axis=1) for dofs in (left, right))
         backward = dead_right & ~dead_left
         dead = dead_left | dead_right
@@ -122,7 +128,7 @@ class Elimination:
         number[here] = np.searchsorted(numbers, share.dofs[here])
         ends, owned = number[chains.ends], here[here < share.num_owned]
         entry, place, places = self._make_matrix(A, number, ends, len(numbers))
-        self.f = np.zeros(len(numbers))
+        self.f, self._zero = np.zeros(len(numbers)), np.zeros(share.size)
         first, last = (chains.dofs[k] for k in (chains.first[:-1], chains.first[1:] - 1))
         next_to = np.stack([np.where(chains.spikes[:, None], first, last), last], axis=1)
         of_ends = np.broadcast_arrays(chains.ends.reshape(-1, 2, 3, 1), next_to[:, :, None, :])
@@ -167,7 +173,7 @@ class Elimination:
 
     def factor(self) -> bool:
         """Eliminate the chains and fill :attr:`left`; whether all of it is finite."""
-        lib.eliminate(self.c)
+        lib.eliminate(self.c, doubles(self._zero))
         self._sum(self.left.data)
         return bool(lib.all_finite(len(self.left.data), doubles(self.left.data)))
 

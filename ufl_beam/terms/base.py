@@ -13,7 +13,9 @@ from abc import ABC, abstractmethod
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop
 from ufl_beam.discretization.state_io import Memory
+from ufl_beam.mechanics.tangents import Tangents
 from ufl_beam.mechanics.time_schemes import Step
+from ufl_beam.terms.phases import Phases, TimeFunctions
 
 KINDS = ("beams", "connectors", "loads", "inertia", "damping")
 """Kinds of forces."""
@@ -27,6 +29,10 @@ class Term(ABC):
 
     def loops(self) -> tuple[Loop, Loop | None] | None:
         """Return C loops of residual and tangent with data; None where Python evaluates them."""
+        return None
+
+    def phases(self, times: TimeFunctions) -> Phases | None:
+        """C loops of the methods below for steps without Python; None where a term has not all."""
         return None
 
     def begin(self, step: Step) -> None:
@@ -57,6 +63,9 @@ class Term(ABC):
 
 class InternalForces(Term):
     """Forces inside a scene: those of its cells and connectors."""
+
+    def restart(self, tangents: Tangents) -> None:
+        """Begin to iterate anew, with tangents of this kind."""
 
     @abstractmethod
     def change(self, q1: Array) -> float:

@@ -4,34 +4,35 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import ufl
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop, loop, struct
+from ufl_beam.compiled.c_library import Loop, ffi, loop
 from ufl_beam.compiled.csr import Csr, StepProduct
-from ufl_beam.discretization.compiled_forms import CellForm, stated
+from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
 from ufl_beam.discretization.state_io import Memory
-from ufl_beam.mechanics.functional import elastic_energy, resultants, virtual_work
+from ufl_beam.mechanics.functional import elastic_energy, virtual_work
 from ufl_beam.mechanics.kinematics import strain
+from ufl_beam.mechanics.tangents import Tangents
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, Step, has_inertia
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.forms_and_matrices import OfForms, OfMatrix
+from ufl_beam.terms.phases import Phases, TimeFunctions, entering
+from ufl_beam.terms.rates_in_c import RatesInC
+from ufl_beam.terms.static_tangents import StaticTangent
 from ufl_beam.terms.tangent_derivatives import Cells
 
 
 class ElasticForms(NamedTuple):
-    """Forms of elastic beams: virtual work, stored energy, and what a scheme loses of it.
-
-    ``first`` is the tangent of the first iteration of a static step.
-    """
+    """Forms of elastic beams: virtual work, stored energy, and what a scheme loses of it."""
 
     work: ufl.Form
     stored: ufl.Form
     losses: list[ufl.Form]
-    first: ufl.Form | None
 
 
 @stated
@@ -43,13 +44,7 @@ def elastic_forms(of: Element, scheme: Scheme) -> ElasticForms:
     w_e = scheme.virtual_strain(q0, q1, w, of.axis)
     stored = elastic_energy(e1, C) * dx
     lost = 2 * of.constant(scheme.alpha) * elastic_energy(e1 - e0, C) * dx  # P(90)
-    losses, first = [lost] if scheme.alpha else [], None
-    if not has_inertia(scheme):
-        dq = ufl.TrialFunction(of.space)
-        geometric = virtual_work(resultants(e0, C), ufl.derivative(w_e, q1, dq))
-        material = virtual_work(ufl.derivative(r, q1, dq), w_e)
-        first = (geometric + material) * dx
-    return ElasticForms(virtual_work(r, w_e) * dx, stored, losses, first)
+    return ElasticForms(virtual_work(r, w_e) * dx, stored, [lost] if scheme.alpha else [])
 
 
 class ElasticBeams(OfForms, Cells):
@@ -59,42 +54,52 @@ class ElasticBeams(OfForms, Cells):
 
     def __init__(self, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger) -> None:
         forms = elastic_forms(fields.element, scheme)
-        super().__init__(forms.work, forms.losses, fields, A, ledger)
-        self._fields, self._work_form = fields, forms.work
+        self._static = None if has_inertia(scheme) else StaticTangent(fields, scheme, A)
+        tangent = None if self._static is None else self._static.kernel
+        super().__init__(forms.work, forms.losses, fields, A, ledger, tangent)
+        self._fields, self._work_form, self._held = fields, forms.work, 0.0
         self._stored = fields.hot_kernel(forms.stored, self._q1)
-        self._begins, self._in_c = False, struct("first_cells", then=self._tangent.cells)
-        self._first: CellForm | None = None
-        if forms.first is not None:
-            self._first = fields.kernel(forms.first, self._q1)
-            self._first.place(A)
-            self._in_c.first = self._first.cells
-            self._of_step.append(self._first)
+        if tangent is not None:
+            self._of_step.append(tangent)
 
     def begin(self, step: Step) -> None:
         """Remember the configuration at the beginning."""
-        for kernel in self._of_step:
-            kernel.set(self._q0, step.q0)
-        self._begins = self._in_c.begins = self._first is not None
+        super().begin(step)
+        if self._static is not None:
+            self._static.begin(step.q0)
+
+    def restart(self, tangents: Tangents) -> None:
+        """Begin to iterate anew, with tangents of this kind."""
+        if self._static is not None:
+            self._static.restart(tangents)
 
     def loops(self) -> tuple[Loop, Loop | None]:
         """C loops over the cells, of force and tangent."""
-        return loop("add_cells", self._force.cells), loop("add_first_cells", self._in_c)
+        force, tangent = super().loops()
+        return force, self._static.loop() if self._static else tangent
+
+    def phases(self, times: TimeFunctions) -> Phases | None:
+        """Loops over the cells."""
+        begin, accept = self._loops_of_step()
+        if self._static is not None:
+            begin.append(self._static.beginning())
+        state = entering(self._stored, self._ledger.state.pointer("stored"))
+        c: Any = state[1]
+
+        def enter(q: Array) -> None:
+            c.held = self._held
+
+        def leave(q: Array) -> None:
+            self._held = c.held
+
+        return Phases(begin, accept, [state], loop("change_of_form", c), enter, leave)
 
     def add_tangent(self, q1: Array) -> None:
-        """Add the stiffness, material and geometric.
-
-        Extrapolated displacements strain slender beams by nothing but error; forces from that would
-        send the first iteration of a static step astray, so it takes those before the step.
-        """
-        form = self._first if self._begins and self._first else self._tangent
-        form.add(q1, self._A.data)
-        self._begins = False
-
-    def accept(self, q1: Array, s: Array) -> None:
-        """Enter the energy that the scheme lost."""
-        self._begins = self._in_c.begins = False
-        if self._losses:
-            super().accept(q1, s)
+        """Add the stiffness, material and geometric."""
+        if self._static is None:
+            super().add_tangent(q1)
+        else:
+            self._static.add(q1)
 
     def add_state(self, q: Array) -> None:
         """Add the stored energy to the ledger."""
@@ -116,7 +121,7 @@ class Inertia(OfMatrix):
     ) -> None:
         rotations = scheme.half_tangents(fields.share.rotations())
         self._times = StepProduct(mass_matrix(fields), rotations, A)
-        self._ledger = ledger
+        self.ledger = ledger
         if scheme.slips:
             ledger.lost["numerical"] += 0.0
         self.scheme = scheme
@@ -128,6 +133,24 @@ class Inertia(OfMatrix):
     def M(self) -> Csr:
         """The mass matrix; a new one."""
         return self._times.matrix()
+
+    def phases(self, times: TimeFunctions) -> Phases | None:
+        """Loops over the matrix and the velocities."""
+        rates = self.in_c
+        if rates is None:
+            return None
+        lost = self.ledger.lost.pointer("numerical") if self.scheme.slips else ffi.NULL
+        kinetic = self.ledger.state.pointer("kinetic")
+        of = rates.times(self._times, kept=kinetic, lost=lost)
+        begin, accept, state = (
+            [loop(name, of)] for name in ("begin_inertia", "accept_inertia", "add_kinetic_energy")
+        )
+        return Phases(begin, accept, state, None, rates.enter, rates.leave)
+
+    @cached_property
+    def in_c(self) -> RatesInC | None:
+        """The velocities in C; none if the scheme makes something else of them than multiples."""
+        return RatesInC.of(self)
 
     def begin(self, step: Step) -> None:
         """Prepare what stays constant in the step."""
@@ -160,12 +183,12 @@ class Inertia(OfMatrix):
             change = v - self.v
             momentum = self._times.A(change)
             lost = self.scheme.slip(self._dt, change, self) @ momentum
-            self._ledger.lost["numerical"] += float(lost)
+            self.ledger.lost["numerical"] += float(lost)
         self.v_before, self.v, self.more, self.last_dt = self.v, v, tuple(more), self._dt
 
     def add_state(self, q: Array) -> None:
         """Add the kinetic energy to the ledger."""
-        self._ledger.state["kinetic"] += self._times.A.square(self.v) / 2
+        self.ledger.state["kinetic"] += self._times.A.square(self.v) / 2
 
     def remember(self, memory: Memory, q: Array) -> None:
         """Save or restore velocities and the last step."""

@@ -16,7 +16,7 @@ from ufl.conditional import Condition
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import doubles, ffi, in_order, lib, struct
+from ufl_beam.compiled.c_library import ffi, fill, in_order, lib, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.time_schemes import Scheme
@@ -109,7 +109,7 @@ class CompiledPoints(Points):
         layout, law = self._layout, self._layout.kind.law
         softening = layout.softening and layout.softening.of(1.0, 1.0)
         self._forms = forms = _point_forms(inputs(layout), layout.kind, softening, scheme)
-        self._over, self._solves = np.zeros(1), law.solves
+        self._solves = law.solves
         arrays = {"B": layout.strains, "weight": layout.weights, "rest": layout.rest}
         arrays = {k: np.ascontiguousarray(x, np.float64) for k, x in arrays.items()}
         cells, of_cell, width = self._storage.shape
@@ -120,7 +120,7 @@ class CompiledPoints(Points):
             components=self._components, variables=len(law.variables),
             strain=inputs(layout).index(rows(law, "strain")[0]),
             e0=self._e0, e1=self.strains, r=self.r, D=self.D, kept=self.kept, sum=self.sums,
-            over=self._over, search=self._search.flags,
+            over=self.over, search=self._search.flags,
         )  # fmt: skip
 
     @property
@@ -140,11 +140,6 @@ class CompiledPoints(Points):
         lib.respond(self.points)
         return self.r, self.D
 
-    @property
-    def excess(self) -> float:
-        """Largest ``|stress| / limit - 1`` of a point that was held closed, or zero."""
-        return float(self._over[0])
-
     def release(self, least: float) -> None:
         """Let held points open from now on whose excess was so large in the latest response."""
         lib.release(self.points, least)
@@ -159,12 +154,14 @@ class CompiledPoints(Points):
 
     def _sums_to_come(self) -> Array:
         """Return :attr:`sums` as :meth:`accept` would leave them."""
-        copy = ffi.new("points *", self.points[0])
-        sums = np.empty_like(self.sums)
-        state = (self._e0, self._storage, self.kept)
-        copy.e0, copy.w, copy.kept, copy.sum = alive = [doubles(x.copy()) for x in state] + [
-            doubles(sums)
-        ]
+        copy = self.copy()
         lib.commit(copy)
-        del alive
-        return sums
+        return np.frombuffer(ffi.buffer(copy.sum, self.sums.nbytes)).copy()
+
+    def copy(self) -> Any:
+        """Points with a copy of the state, which loops may change, and the same response."""
+        copy = ffi.new("points *", self.points[0])
+        return fill(
+            copy, e0=self._e0.copy(), w=self._storage.copy(), kept=self.kept.copy(),
+            sum=self.sums.copy(),
+        )  # fmt: skip

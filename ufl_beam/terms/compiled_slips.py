@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import ufl
 
@@ -46,6 +48,17 @@ class CompiledSlips(RigidPlasticResponse):
             rows=self._rows,
         )  # fmt: skip
         self.in_c = {"rigid_plastic": self._c}
+
+    def in_steps(self) -> dict[str, Any] | None:
+        """The laws, and what they enter."""
+        ledger = self._ledger
+        entries = {"hinges": ledger.lost.pointer("hinges")}
+        if self._hardens:
+            entries["hardening"] = ledger.state.pointer("hardening")
+        if self._loss:
+            entries["numerical"] = ledger.lost.pointer("numerical")
+        of_law = {"dt_of_law": INPUTS.index("dt"), "way_before": self._way_before}
+        return {**of_law, "loss": self._loss, **entries}
 
     def rows(self, e1: Array, λ: Array) -> Rows:
         """Rows of the latest iterate, which C has set."""

@@ -37,6 +37,9 @@ class _Held(Response):
 
     steady = True
 
+    def in_steps(self) -> dict[str, Any] | None:
+        return {}
+
     def rows(self, e1: Array, λ: Array) -> Rows:
         return 1.0, 0.0, 0.0
 

@@ -47,6 +47,7 @@ class Response(ABC):
 
     steady = False  # True if the rows stay the same during a step
     in_c: Mapping[str, Any] = {}  # data of laws evaluated in C, by names in ``couplings``, loops.h
+    stored = 0.0  # by rigid-plastic connectors; J
     openable: Openable | None = None  # connectors that open beyond a limit, if there are any
     _part, _entry, _sign = "lost", "", 1.0
 
@@ -61,6 +62,13 @@ class Response(ABC):
 
     def _prepare(self, law: Any) -> None:
         """Prepare the response; called once."""
+
+    def in_steps(self) -> dict[str, Any] | None:
+        """Fields of ``coupling_term`` of loops.h for steps without Python; None where they need it.
+
+        Names of entries of the ledger are those of ``inelastic_term``.
+        """
+        return None
 
     def _numbers(self, name: str) -> Array:
         """A number of the laws."""

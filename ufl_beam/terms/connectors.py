@@ -10,7 +10,7 @@ import numpy as np
 import ufl
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import Loop, doubles, lib, loop, struct
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import CellForm, Kernel, stated
 from ufl_beam.discretization.dolfinx_forms import DolfinxForm
@@ -25,6 +25,7 @@ from ufl_beam.terms import connector_laws, force_laws, rigid_plastic, springs
 from ufl_beam.terms.connector_forms import connector_forms
 from ufl_beam.terms.connector_responses import Setting, respond
 from ufl_beam.terms.links import Links
+from ufl_beam.terms.phases import Phases, TimeFunctions, beginning
 
 LAWS = (connector_laws, force_laws, rigid_plastic, springs)
 """Modules with the responses of laws, which register them with :func:`respond`."""
@@ -225,6 +226,32 @@ class CompiledCouplings(Couplings):
         if self._asks_python:
             return None
         return loop("add_couplings_force", self._in_c), loop("add_cells", self._tangent.cells)
+
+    def phases(self, times: TimeFunctions) -> Phases | None:
+        """Loops over what is held, springs and rigid-plastic connectors."""
+        response = self.response
+        if (of_law := response.in_steps()) is None:
+            return None
+        fields = {name for name, _ in ffi.typeof("coupling_term").fields}
+        mine = {name: x for name, x in of_law.items() if name in fields}
+        c = struct("coupling_term", links=self._in_c, **mine)
+        fill(c.points, **{name: x for name, x in of_law.items() if name not in fields})
+
+        def enter(q: Array) -> None:
+            if q is not self._q:
+                self._q, self._e[:] = q, self.motion(q)
+            if response.steady:
+                self._put(*response.rows(self._e, self._before))
+            c.hardened = response.stored
+
+        def leave(q: Array) -> None:
+            self._q, response.stored = q, c.hardened
+
+        begin = beginning((self._work, self._tangent), self._forms.q0)
+        phases = ("begin_couplings", "accept_couplings", "add_energy_of_couplings")
+        first, accept, state = ([loop(name, c)] for name in phases)
+        over = None if response.openable is None else response.openable.over
+        return Phases([*begin, *first], accept, state, None, enter, leave, over)
 
     def demand(self) -> Loop:
         """The loop of :meth:`excess`."""

@@ -11,6 +11,7 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
+from ufl_beam.compiled.c_library import loop
 from ufl_beam.compiled.csr import Csr, StepProduct
 from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.function_spaces import Element, Fields, Strains, mass_matrix
@@ -25,12 +26,18 @@ from ufl_beam.model.damping import KelvinVoigt, Rayleigh
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.forms_and_matrices import OfForms, OfMatrix
+from ufl_beam.terms.phases import Phases, TimeFunctions
+from ufl_beam.terms.rates_in_c import RatesInC
 
 
 class Inertia(Rates, Protocol):
     """Velocities of a scene in motion, and its scheme."""
 
     scheme: DynamicScheme
+
+    @property
+    def in_c(self) -> RatesInC | None:
+        """The velocities where C takes steps; none if it cannot."""
 
 
 def _work_and_loss(
@@ -62,6 +69,10 @@ class KelvinVoigtForces(OfForms):
         super().__init__(work, [lost], fields, A, ledger)
         self._time, self._dt = damping.time, 0.0
 
+    def phases(self, times: TimeFunctions) -> Phases | None:
+        """None: the step is a number of the forms."""
+        return None
+
     def begin(self, step: Step) -> None:
         """Remember the configuration at the beginning."""
         super().begin(step)
@@ -91,6 +102,14 @@ class RayleighForces(OfMatrix):
         rotations = inertia.scheme.half_tangents(fields.share.rotations())
         self._times = StepProduct(C, rotations, A)
         self._ledger, self._inertia = ledger, inertia
+
+    def phases(self, times: TimeFunctions) -> Phases | None:
+        """Loops over the matrix and the velocities."""
+        rates = self._inertia.in_c
+        if rates is None:
+            return None
+        of = rates.times(self._times, lost=self._ledger.lost.pointer("damping"))
+        return Phases([loop("begin_rayleigh", of)], [loop("accept_rayleigh", of)])
 
     def begin(self, step: Step) -> None:
         """Prepare what stays constant in the step."""
@@ -145,6 +164,10 @@ class SecondDifferences(OfForms):
         self._q: Array = np.empty(0)
         self._e, self._change = np.zeros((2, *self._strains.shape))
         self._dt = self._last_dt = math.inf
+
+    def phases(self, times: TimeFunctions) -> Phases | None:
+        """None: strains are kept in Python."""
+        return None
 
     def begin(self, step: Step) -> None:
         """Remember the configuration at the beginning, and the changes in the step before."""

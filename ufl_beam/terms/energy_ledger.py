@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import sys
-from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, MutableMapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from ufl_beam.arrays import Array
+from ufl_beam.compiled.c_library import doubles
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.model.works import ENTRIES
 from ufl_beam.rich_display import Rich
@@ -22,6 +23,50 @@ NOTHING_HELD = 1e-3
 """Part of the works up to which what the scene held and lost shows that they were round-off."""
 
 
+class Account(MutableMapping[str, float]):
+    """Entries of one part of the ledger by name; those that were never written are zero.
+
+    Their numbers are in one array, in the order in which the names came, so that C may add to them.
+
+    Attributes:
+        numbers: The entries, and room for more.
+    """
+
+    def __init__(self) -> None:
+        self._at: dict[str, int] = {}
+        self.numbers: Array = np.zeros(16)
+
+    def __getitem__(self, name: str) -> float:
+        return float(self.numbers[self._at[name]]) if name in self._at else 0.0
+
+    def __setitem__(self, name: str, value: float) -> None:
+        at = self._at.setdefault(name, len(self._at))
+        if at == len(self.numbers):
+            self.numbers = np.append(self.numbers, np.zeros(at))
+        self.numbers[at] = value
+
+    def __delitem__(self, name: str) -> None:
+        raise TypeError(f"the entry {name!r} of a ledger stays")
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._at
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._at)
+
+    def __len__(self) -> int:
+        return len(self._at)
+
+    def by_name(self) -> dict[str, float]:
+        """Return the entries as they are now."""
+        numbers: Any = self.numbers.tolist()
+        return dict(zip(self._at, numbers, strict=False))
+
+    def pointer(self, name: str) -> Any:
+        """An entry as C has it; no name may come after."""
+        return doubles(self.numbers) + self._at[name]
+
+
 @dataclass
 class Ledger:
     """Energies of one process at one time; terms write into it when a step is accepted.
@@ -30,14 +75,14 @@ class Ledger:
     :class:`Energy` for the three parts.
     """
 
-    state: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
-    supplied: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
-    lost: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
+    state: Account = field(default_factory=Account)
+    supplied: Account = field(default_factory=Account)
+    lost: Account = field(default_factory=Account)
 
     def size(self) -> float:
         """Sum of the sizes of all entries; J."""
-        entries = (*self.state.values(), *self.supplied.values(), *self.lost.values())
-        return sum(map(abs, entries))
+        parts = self.state, self.supplied, self.lost
+        return float(sum(np.abs(part.numbers).sum() for part in parts))
 
     def remember(self, memory: Memory) -> None:
         """Pass on the works and losses since the beginning."""
@@ -47,8 +92,7 @@ class Ledger:
 
     def begin(self) -> None:
         """Forget the state; what was supplied and lost remains."""
-        for name in self.state:
-            self.state[name] = 0.0
+        self.state.numbers.fill(0.0)
 
 
 class Entries(dict[str, Array]):

@@ -10,10 +10,12 @@ import ufl
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, loop
 from ufl_beam.compiled.csr import Csr, StepProduct
+from ufl_beam.discretization.compiled_forms import CellForm
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.phases import Phases, TimeFunctions, beginning, entering
 
 
 class OfForms(Term):
@@ -22,15 +24,29 @@ class OfForms(Term):
     _entry: str  # of the losses in the ledger
 
     def __init__(
-        self, work: ufl.Form, losses: Sequence[ufl.Form], fields: Fields, A: Csr, ledger: Ledger
-    ) -> None:
+        self, work: ufl.Form, losses: Sequence[ufl.Form], fields: Fields, A: Csr, ledger: Ledger,
+        tangent: CellForm | None = None,
+    ) -> None:  # fmt: skip
         self._q0, self._q1 = fields.element.q0, fields.element.q1
-        self._force, self._tangent = fields.force_and_tangent(work, self._q1, A)
+        if tangent is None:
+            self._force, self._tangent = fields.force_and_tangent(work, self._q1, A)
+        else:
+            self._force, self._tangent = fields.hot_kernel(work, self._q1), tangent
         self._losses = [fields.hot_kernel(form, self._q1) for form in losses]
         self._of_step = [self._force, *self._losses]
         self._A, self._ledger = A, ledger
         if losses:
             ledger.lost[self._entry] += 0.0
+
+    def phases(self, times: TimeFunctions) -> Phases | None:
+        """Loops over the cells."""
+        return Phases(*self._loops_of_step())
+
+    def _loops_of_step(self) -> tuple[list[Loop], list[Loop]]:
+        """Those of :meth:`begin` and :meth:`accept`."""
+        lost = self._ledger.lost
+        accept = [entering(loss, lost.pointer(self._entry)) for loss in self._losses]
+        return beginning(self._of_step, self._q0), accept
 
     def begin(self, step: Step) -> None:
         """Remember the configuration at the beginning."""

@@ -10,7 +10,7 @@ import numpy as np
 import ufl
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import Loop, doubles, lib, loop, struct
+from ufl_beam.compiled.c_library import Loop, doubles, fill, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import Kernel, stated
 from ufl_beam.discretization.function_spaces import Element, Fields, Strains
@@ -22,9 +22,11 @@ from ufl_beam.mechanics.functional import virtual_work
 from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.fibres import Layout
+from ufl_beam.terms.compiled_points import CompiledPoints
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.material_points import Points
 from ufl_beam.terms.openings import SearchFlags
+from ufl_beam.terms.phases import Phases, TimeFunctions, beginning
 from ufl_beam.terms.point_equations import inputs
 from ufl_beam.terms.tangent_derivatives import Cells
 
@@ -123,11 +125,15 @@ class InelasticBeams(Cells, ABC):
         """Remember the strains at the beginning."""
         self._force.set(self._q0, step.q0)
         self._tangent.set(self._q0, step.q0)
-        if step.q0 is not self._q:
-            self._q = step.q0
-            self.points.start(self._strains(step.q0))
+        self._start_at(step.q0)
         self.points.begin(step.dt)
         self._begin()
+
+    def _start_at(self, q0: Array) -> None:
+        """Let the points begin at the strains of a configuration, if they are not there."""
+        if q0 is not self._q:
+            self._q = q0
+            self.points.start(self._strains(q0))
 
     @abstractmethod
     def _prepare(self, forms: InelasticForms) -> None:
@@ -175,6 +181,11 @@ class InelasticBeams(Cells, ABC):
     # -- see openings.py -----------------------------------------------------------------------
 
     @property
+    def over(self) -> Array:
+        """The :attr:`excess` in an array; (1,)."""
+        return self.points.over
+
+    @property
     def excess(self) -> float:
         """Largest excess of a held point over its limit, as a part of it."""
         return self.points.excess
@@ -216,7 +227,12 @@ class InelasticBeams(Cells, ABC):
     def kept(self) -> tuple[Index, Array]:
         """Cells (numbers of the grid), and :attr:`Points.kept` of them; (num_cells, 6); a view."""
         kept = self.points.kept
-        return self._cells, kept if self._hinges else kept * KEPT_WITHOUT_JUMP
+        return self._cells, kept if self._hinges else kept * self.kept_factors
+
+    @property
+    def kept_factors(self) -> Array:
+        """Factors of :attr:`Points.kept` in what :meth:`kept` returns; (6,)."""
+        return np.ones(6) if self._hinges else KEPT_WITHOUT_JUMP
 
     def state(self) -> tuple[Index, Array]:
         """Cells (numbers of the grid), and their internal variables; (num_cells, k)."""
@@ -234,6 +250,7 @@ class CompiledInelasticBeams(InelasticBeams):
 
     _force: Kernel
     _tangent: Kernel
+    points: CompiledPoints
 
     def _prepare(self, forms: InelasticForms) -> None:
         self._latest: Array = np.full(self._fields.share.size, np.nan)
@@ -258,6 +275,23 @@ class CompiledInelasticBeams(InelasticBeams):
         """The points, and two forms."""
         functions = ("add_inelastic_force", "add_inelastic_tangent")
         return loop(functions[0], self._in_c), loop(functions[1], self._in_c)
+
+    def phases(self, times: TimeFunctions) -> Phases | None:
+        """Loops over the points."""
+        c = struct(
+            "inelastic_term", cells=self._in_c, begins=self._static, dt=self.points.dt,
+            **self.points.entries(self._ledger),
+        )  # fmt: skip
+        begin = [*beginning((self._force, self._tangent), self._q0), loop("begin_inelastic", c)]
+
+        def leave(q: Array) -> None:
+            self._q = q
+
+        if self._static:
+            fill(c, copy=self.points.copy())
+        ends = [loop("accept_inelastic", c)], [loop("add_energy_of_points", c)]
+        over = self.over if self.points.softens else None
+        return Phases(begin, *ends, loop("change_of_points", c), self._start_at, leave, over)
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the internal forces."""

@@ -54,6 +54,8 @@ class Points(ABC):
         names: Names of the inputs.
         strains: Of the cells at the latest response; (cells, 3); may be written to.
         r, D: The latest response, see :meth:`respond`.
+        dt: Length of the step; (1,); s.
+        over: The :attr:`excess`; (1,).
         kept: By cell: (N, V, M) in the accepted state, the jump of the last point, and the energy
             dissipated by plastic strains and by discontinuities; (cells, 6); N, N m, rad or m, J.
         sums: Of all cells: dissipated in the last step by plastic strains, by discontinuities,
@@ -91,7 +93,8 @@ class Points(ABC):
             self._at[f"state {name}"][:] = initial
         self._at["length"][:] = length[:, None]
         self._at["theta"][:] = scheme.theta
-        self._at["dt"][:] = self._dt = 1.0
+        self.dt: Array = np.ones(1)
+        self._at["dt"][:] = self.dt
         self._at["softening energy"][:] = 1.0
         self._at["traction"][:] = np.inf
         if layout.softening is not None:
@@ -105,6 +108,7 @@ class Points(ABC):
         self.sums = np.zeros(int(lib.POINT_SUMS))
         self.r, self.D = np.zeros((cells, 3)), np.zeros((cells, 9))
         self._e0, self.strains = np.zeros((cells, 3)), np.zeros((cells, 3))
+        self.over = np.zeros(1)
         self._prepare(scheme, length)
 
     @abstractmethod
@@ -146,8 +150,8 @@ class Points(ABC):
 
     def begin(self, dt: float) -> None:
         """Begin a step of this length; s."""
-        if dt != self._dt:
-            self["dt"][:] = self._dt = dt
+        if dt != self.dt[0]:
+            self["dt"][:] = self.dt[0] = dt
 
     @abstractmethod
     def respond(self, strains: Array) -> tuple[Array, Array]:
@@ -157,9 +161,9 @@ class Points(ABC):
         """
 
     @property
-    @abstractmethod
     def excess(self) -> float:
         """Largest ``|stress| / limit - 1`` of a point that was held closed, or zero."""
+        return float(self.over[0])
 
     @abstractmethod
     def release(self, least: float) -> None:
@@ -250,6 +254,18 @@ class Points(ABC):
         ledger.state["stored"] += elastic
         if self._yields:
             ledger.state["hardening"] += hardening
+
+    def entries(self, ledger: Ledger) -> dict[str, Any]:
+        """The entries of both methods above, by name in ``inelastic_term`` of loops.h."""
+        state, lost = ledger.state, ledger.lost
+        kinds = {
+            "stored": (True, state, "stored"), "hardening": (self._yields, state, "hardening"),
+            "plastic": (self._yields, lost, "plastic"), "hinges": (self.softens, lost, "hinges"),
+            "numerical": (bool(self._alpha), lost, "numerical"),
+            "released": (self._releases, lost, "numerical"),
+        }  # fmt: skip
+        entries = {k: part.pointer(name) for k, (has, part, name) in kinds.items() if has}
+        return {"alpha": self._alpha, **entries}
 
     # -- the state -----------------------------------------------------------------------------
 

@@ -81,6 +81,10 @@ class Openable(Protocol):
     """Places of one kind that open beyond a limit, and are held closed while HOLD is set."""
 
     @property
+    def over(self) -> Array:
+        """The :attr:`excess` of each place, or the largest one."""
+
+    @property
     def excess(self) -> float:
         """Largest ``|stress| / limit - 1`` of a held place in the latest residual, or zero."""
 

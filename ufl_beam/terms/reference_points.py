@@ -22,7 +22,7 @@ class ReferencePoints(Points):
     """Points whose laws are called on arrays."""
 
     def _prepare(self, scheme: Scheme, length: Array) -> None:
-        self._scheme, self._excess, self._frozen = scheme, 0.0, False
+        self._scheme, self._frozen = scheme, False
 
     # -- the laws --------------------------------------------------------------------------------
 
@@ -100,7 +100,7 @@ class ReferencePoints(Points):
         first = stress[0]  # of points that can open the only one
         over = np.abs(first) > at["traction"]  # P(51)
         held = over & (flags[HOLD] == 1) & (at["flows"] == lib.CLOSED) & (at["traction"] > 0)
-        self._excess = float(np.max(np.abs(first[held]) / at["traction"][held] - 1, initial=0.0))
+        self.over[0] = float(np.max(np.abs(first[held]) / at["traction"][held] - 1, initial=0.0))
         opens = over & ~held
         if held.any():
             flags[OVER] = 1
@@ -170,11 +170,6 @@ class ReferencePoints(Points):
                 within, last = (better > low) & (better < high) & ~wanders, step
                 a = np.where(within, better, halved)
         return np.where(none, 0.0, found)
-
-    @property
-    def excess(self) -> float:
-        """Largest ``|stress| / limit - 1`` of a point that was held closed, or zero."""
-        return self._excess
 
     def release(self, least: float) -> None:
         """Let held points open from now on whose excess was so large in the latest response."""

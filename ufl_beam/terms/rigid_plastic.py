@@ -129,7 +129,7 @@ class RigidPlasticResponse(Response):
         self._limit = self._at["limit"].copy()
         self._back_force, self._dissipated, self._excess = np.zeros((3, n))
         self._slipped, self._way, self._way_before = np.zeros((3, n), dtype=np.int32)
-        self._rows, self._stored = np.zeros((n, 3)), 0.0
+        self._rows = np.zeros((n, 3))
         self._slope = np.array([_slope(link, self._setting.size) for link in self._links])
         self.openable = self
 
@@ -158,7 +158,7 @@ class RigidPlasticResponse(Response):
 
     def accept(self, e1: Array, work: float) -> None:
         """Commit the slips of the step."""
-        dissipated, lost, self._stored = self._commit(e1)
+        dissipated, lost, self.stored = self._commit(e1)
         self._way_before[:] = self._way * self._slipped
         self._ledger.lost["hinges"] += dissipated
         if self._loss:
@@ -167,9 +167,14 @@ class RigidPlasticResponse(Response):
     def add_state(self, e: Array) -> None:
         """Enter the energy that hardening stores."""
         if self._hardens:
-            self._ledger.state["hardening"] += self._stored
+            self._ledger.state["hardening"] += self.stored
 
     # -- openings, see openings.py -------------------------------------------------------------
+
+    @property
+    def over(self) -> Array:
+        """The same of each connector."""
+        return self._excess
 
     @property
     def excess(self) -> float:
@@ -216,7 +221,7 @@ class RigidPlasticResponse(Response):
     def state(self) -> Array:
         """Internal variables; (num_links, 7)."""
         stored = np.zeros(len(self._rows))
-        stored[:1] = self._stored  # of all together; to whom it belongs does not matter
+        stored[:1] = self.stored  # of all together; to whom it belongs does not matter
         return np.column_stack([*self._variables, stored])
 
     def restore(self, rows: Array) -> None:
@@ -225,7 +230,7 @@ class RigidPlasticResponse(Response):
         for mine, values in zip(self._variables, variables, strict=True):
             mine[:] = values
         self.hold()
-        self._stored = float(stored.sum())
+        self.stored = float(stored.sum())
 
     def start(self, e: Array) -> None:
         """Begin at motions that no step has led to."""

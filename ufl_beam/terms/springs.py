@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ufl_beam.arrays import Array
@@ -38,6 +40,9 @@ class _Sprung(Response):
         self._strains = np.zeros((number, 3))
         self.in_c = self.points.in_c
         self.openable = self.points if self.points.softens else None
+
+    def in_steps(self) -> dict[str, Any] | None:
+        return {"dt": self.points.dt, **self.points.entries(self._setting.ledger)}
 
     def _at(self, e: Array) -> Array:
         self._strains[:, 0] = e

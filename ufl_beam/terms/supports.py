@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
+from ufl_beam.compiled.c_library import ffi, struct
 from ufl_beam.compiled.csr import Csr, as_slice
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
@@ -16,6 +18,7 @@ from ufl_beam.model.bodies import GROUND
 from ufl_beam.model.supports import Support
 from ufl_beam.model.time_functions import TimeFunction, value_at
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.phases import TimeFunctions, weight_of_before
 
 
 class TurnedAxes:
@@ -118,6 +121,17 @@ class Supports:
         for dof, motion, support in self._motions:
             target = value_at(motion, step.motion_time, support)
             x[dof] = x0[dof] + step.fraction * (target - x0[dof])
+
+    def in_c(self, times: TimeFunctions) -> Any:
+        """``moving_supports`` of loops.h: what they prescribe in steps without Python."""
+        moves = [(motion, support) for _, motion, support in self._motions]
+        entry = self._ledger.supplied.pointer("supports") if self.work else ffi.NULL
+        return struct(
+            "moving_supports", held=len(self.dofs), hold=self.dofs.astype(np.int32),
+            moving=len(moves), dof=self.moving.astype(np.int32), motion=times.in_c(moves),
+            reactions=self.reactions, before=self._before, work=entry,
+            weight_of_before=weight_of_before(self._acting),
+        )  # fmt: skip
 
     def hold(self, r: Array) -> None:
         """Note the reactions in a residual that is complete, and remove them from it."""

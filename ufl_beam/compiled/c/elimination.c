@@ -98,65 +98,120 @@ static inline void drop_faded(double *block, double faded)
     if (fabs(block[k]) < faded) block[k] = 0;
 }
 
-/* A chain; without a spike nothing couples to a left end. */
-static inline void eliminate_chain(const chains *c, int chain, const int spike, double *ends)
+/* A chain on the way: what the vertices so far make of the next one, and of the ends. */
+typedef struct {
+  int chain, vertex;
+  double pivot[9], to[9], from[9], faded;
+  double ends[36], f[3], end_f[6];
+} front;
+
+static inline void begin_chain(const chains *c, int chain, front *at)
 {
-  double pivot[9], to[9], from[9], below[9], after[9], faded = 0;
-  read_block(c, c->first[chain], 1, pivot);
-  if (spike) {
-    read_block(c, c->first[chain], 0, to);
-    for (int k = 0; k < 9; ++k) from[k] = c->data[c->from_ends[18 * chain + k]];
-    faded = 0x1p-511 * fmin(largest_entry(to), largest_entry(from));
-  }
-  for (int v = c->first[chain]; v < c->first[chain + 1]; ++v) {
-    double *sides = c->sides + SIDES * v, *to_next = c->to_next + BLOCK * v;
-    int32_t *swap = c->swaps + 3 * v;
-    factor_block(pivot, swap);
-    memcpy(c->pivots + BLOCK * v, pivot, sizeof pivot);
-    read_block(c, v, 2, after);
-    read_below(c, chain, v, below);
-    solve_block(pivot, swap, 3, after, to_next);
-    if (spike) {
-      memcpy(sides + FROM_LEFT, from, sizeof from);
-      solve_block(pivot, swap, 3, to, sides + TO_LEFT);
-    }
-    if (v + 1 < c->first[chain + 1]) read_block(c, v + 1, 1, pivot);
-    else memset(pivot, 0, sizeof pivot);
-    subtract_product(below, to_next, pivot);
-    if (spike) {
-      double next_to[9] = {0}, next_from[9] = {0};
-      subtract_product(from, sides + TO_LEFT, ends);
-      subtract_product(below, sides + TO_LEFT, next_to);
-      subtract_product(from, to_next, next_from);
-      memcpy(to, next_to, sizeof to);
-      memcpy(from, next_from, sizeof from);
-      drop_faded(to, faded);
-      drop_faded(from, faded);
-    }
-  }
-  if (spike) {
-    memcpy(ends + 9, from, sizeof from);
-    memcpy(ends + 18, to, sizeof to);
-  }
-  memcpy(ends + 27, pivot, sizeof pivot);
+  memset(at, 0, sizeof *at);
+  at->chain = chain, at->vertex = c->first[chain];
+  read_block(c, at->vertex, 1, at->pivot);
+  if (!c->spike[chain]) return;
+  read_block(c, at->vertex, 0, at->to);
+  for (int k = 0; k < 9; ++k) at->from[k] = c->data[c->from_ends[18 * chain + k]];
+  at->faded = 0x1p-511 * fmin(largest_entry(at->to), largest_entry(at->from));
 }
 
-/* Eliminate all vertices: what is left is what stays as it is, and what the chains make of the
- * blocks of their ends, left-left, left-right, right-left and right-right. */
-void eliminate(const chains *c)
+/* The next vertex of a chain, and its part of the right-hand side b; without a spike nothing couples
+ * to a left end. */
+static inline void eliminate_vertex(const chains *c, front *at, const double *b, const int spike)
 {
+  const int v = at->vertex++;
+  double below[9], after[9], *pivot = at->pivot, *to_next = c->to_next + BLOCK * v, *f = c->f + 3 * v;
+  int32_t *swap = c->swaps + 3 * v;
+  factor_block(pivot, swap);
+  memcpy(c->pivots + BLOCK * v, pivot, sizeof at->pivot);
+  read_block(c, v, 2, after);
+  read_below(c, at->chain, v, below);
+  solve_block(pivot, swap, 3, after, to_next);
+  for (int r = 0; r < 3; ++r) at->f[r] += b[c->row[3 * v + r]];
+  solve_block(pivot, swap, 1, at->f, f);
+  memset(at->f, 0, sizeof at->f);
+  subtract(below, f, at->f);
+  if (spike) {
+    double *sides = c->sides + SIDES * v, next_to[9] = {0}, next_from[9] = {0};
+    memcpy(sides + FROM_LEFT, at->from, sizeof at->from);
+    solve_block(pivot, swap, 3, at->to, sides + TO_LEFT);
+    subtract(at->from, f, at->end_f);
+    subtract_product(at->from, sides + TO_LEFT, at->ends);
+    subtract_product(below, sides + TO_LEFT, next_to);
+    subtract_product(at->from, to_next, next_from);
+    memcpy(at->to, next_to, sizeof at->to);
+    memcpy(at->from, next_from, sizeof at->from);
+    drop_faded(at->to, at->faded);
+    drop_faded(at->from, at->faded);
+  }
+  if (v + 1 < c->first[at->chain + 1]) read_block(c, v + 1, 1, pivot);
+  else memset(pivot, 0, sizeof at->pivot);
+  subtract_product(below, to_next, pivot);
+}
+
+/* What a chain makes of the blocks of its ends, left-left, left-right, right-left and right-right, and
+ * of the right-hand side there. */
+static inline void end_chain(const chains *c, front *at)
+{
+  const int32_t *places = c->places + 36 * at->chain, *numbers = c->ends + 6 * at->chain;
+  if (c->spike[at->chain]) {
+    memcpy(at->ends + 9, at->from, sizeof at->from);
+    memcpy(at->ends + 18, at->to, sizeof at->to);
+  }
+  memcpy(at->ends + 27, at->pivot, sizeof at->pivot);
+  memcpy(at->end_f + 3, at->f, sizeof at->f);
+  for (int k = 0; k < 36; ++k) c->left_data[places[k]] += at->ends[k];
+  for (int k = 0; k < 6; ++k) c->left_f[numbers[k]] += at->end_f[k];
+}
+
+static inline int to_go(const chains *c, const front *at)
+{
+  return c->first[at->chain + 1] - at->vertex;
+}
+
+/* Two chains at once: each vertex waits for the one before it, but not for those of the other chain. */
+static inline void eliminate_pair(const chains *c, front *one, front *other, const double *b,
+                                  const int spike)
+{
+  int both = to_go(c, one) < to_go(c, other) ? to_go(c, one) : to_go(c, other);
+  for (; both > 0; --both) {
+    eliminate_vertex(c, one, b, spike);
+    eliminate_vertex(c, other, b, spike);
+  }
+}
+
+static void eliminate_rest(const chains *c, front *at, const double *b)
+{
+  if (c->spike[at->chain])
+    while (to_go(c, at)) eliminate_vertex(c, at, b, 1);
+  else
+    while (to_go(c, at)) eliminate_vertex(c, at, b, 0);
+  end_chain(c, at);
+}
+
+/* Eliminate all vertices from the matrix, and from the right-hand side b: what is left is what stays
+ * as it is, and what the chains make of their ends. */
+void eliminate(const chains *c, const double *b)
+{
+  front one, other;
   memset(c->left_data, 0, c->left * sizeof *c->left_data);
+  memset(c->left_f, 0, c->left_size * sizeof *c->left_f);
   for (int k = 0; k < c->stay; ++k) c->left_data[c->place[k]] = c->data[c->entry[k]];
-  const int32_t *places = c->places;
-  for (int chain = 0; chain < c->chains; ++chain, places += 36) {
-    double ends[36] = {0};
-    if (c->spike[chain]) eliminate_chain(c, chain, 1, ends);
-    else eliminate_chain(c, chain, 0, ends);
-    for (int k = 0; k < 36; ++k) c->left_data[places[k]] += ends[k];
+  for (int k = 0; k < c->rows; ++k) c->left_f[c->number[k]] = b[c->dof[k]];
+  for (int chain = 0; chain < c->chains; chain += 2) {
+    begin_chain(c, chain, &one);
+    if (chain + 1 < c->chains) {
+      begin_chain(c, chain + 1, &other);
+      if (c->spike[chain] && c->spike[chain + 1]) eliminate_pair(c, &one, &other, b, 1);
+      else if (!c->spike[chain] && !c->spike[chain + 1]) eliminate_pair(c, &one, &other, b, 0);
+    }
+    eliminate_rest(c, &one, b);
+    if (chain + 1 < c->chains) eliminate_rest(c, &other, b);
   }
 }
 
-/* The same for a right-hand side b; f takes what pivots make of it. */
+/* The same for another right-hand side; f takes what pivots make of it. */
 void reduce(const chains *c, const double *b)
 {
   memset(c->left_f, 0, c->left_size * sizeof *c->left_f);

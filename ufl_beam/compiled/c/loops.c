@@ -46,12 +46,23 @@ void add_cells(void *self, const double *q, double *b)
   }
 }
 
-/* The same of one form at the first call of a step, and of another one then. */
-void add_first_cells(void *self, const double *q, double *b)
+/* The tangent of a static step at q, with the forces that the latest one has predicted. */
+void add_static_tangent(void *self, const double *q, double *tangent)
 {
-  first_cells *f = self;
-  add_cells((void *)(f->begins ? f->first : f->then), q, b);
-  f->begins = 0;
+  static_tangent *t = self;
+  double *e = t->e;
+  if (t->begins || t->exact) memcpy(t->about, t->begins ? t->q0 : q, t->size * sizeof *q);
+  for (int i = 0; i < t->size; ++i) t->change[i] = t->begins ? 0 : q[i] - t->about[i];
+  memset(e, 0, (size_t)t->strains->number * t->of_cell * sizeof *e);
+  set_cells(t->strains, t->about, t->at_about);
+  add_cells((void *)t->strains, t->change, e);
+  for (int cell = 0; cell < t->tangent->number; ++cell, e += t->of_cell) {
+    for (int i = 0; i < t->of_cell; ++i) e[i] /= t->weight[i];
+    put_in_cell(t->tangent, cell, t->at_e, t->of_cell, e);
+  }
+  add_cells((void *)t->tangent, q, tangent);
+  memcpy(t->about, q, t->size * sizeof *q);
+  t->begins = 0;
 }
 
 /* Value of a functional at the unknowns q. */
@@ -169,6 +180,7 @@ void add_step_tangent(void *self, const double *q, double *tangent)
 double norm(int rows, const double *w, const double *f)
 {
   double sum = 0, largest = 0, scaled = 0;
+#pragma omp simd reduction(+ : sum)
   for (int i = 0; i < rows; ++i) sum += w[i] * f[i] * (w[i] * f[i]);
   if (isnan(sum) || (1e-250 < sum && sum < 1e250)) return sqrt(sum);
   for (int i = 0; i < rows; ++i) largest = fmax(largest, w[i] * fabs(f[i]));

@@ -43,10 +43,15 @@ struct cells {
   const int32_t *row;
 };
 
+/* Tangent of a static step, see static_tangents.py. */
 typedef struct {
-  const cells *first, *then;
-  int begins;
-} first_cells;
+  const cells *strains, *tangent; /* strains linear about a configuration; tangent that takes them */
+  int at_about, at_e;             /* where they have the configuration, and the strains */
+  int size, of_cell;              /* of_cell: strains of a cell */
+  const double *weight, *q0;      /* of each strain of a cell; beginning of the step */
+  int begins, exact;              /* the first forces are those at q0; all are those at the iterate */
+  double *about, *change, *e;     /* configuration of the latest tangent; space */
+} static_tangent;
 
 typedef struct {
   int size;
@@ -68,7 +73,7 @@ void add_cells(void *self, const double *q, double *b);
 double value_of_cells(const cells *c, const double *q);
 void combine(int size, double a, const double *x, double b, const double *y, double *out);
 void extrapolate(int size, const double *x, const double *y, double ratio, double *out);
-void add_first_cells(void *self, const double *q, double *b);
+void add_static_tangent(void *self, const double *q, double *tangent);
 void subtract_vector(void *self, const double *q, double *b);
 void add_step_force(void *self, const double *q, double *r);
 void add_step_tangent(void *self, const double *q, double *tangent);
@@ -219,7 +224,7 @@ typedef struct {
   const int32_t *ends;           /* chains x 6: numbers of the ends among those left */
 } chains;
 
-void eliminate(const chains *c);
+void eliminate(const chains *c, const double *b);
 void reduce(const chains *c, const double *b);
 void expand(const chains *c, const double *left, double *x);
 int all_finite(int size, const double *values);
@@ -253,6 +258,7 @@ typedef struct {
   int (*SNESShellGetContext)(void *snes, void *context);
   int (*SNESShellSetSolve)(void *snes, int (*solve)(void *, void *));
   int (*SNESSetIterationNumber)(void *snes, petsc_int number);
+  int (*SNESSolve)(void *snes, void *b, void *x);
   int (*SNESSetConvergedReason)(void *snes, int reason);
 } petsc_functions;
 
@@ -298,6 +304,7 @@ typedef struct {
   double last, best;
   int near, slow, patience, modified; /* near: the tangent is kept in the next iteration */
   double rate;                        /* of a modified Newton's method, by which residuals fall */
+  int iterations, reason;             /* of snes_newton, the latest */
 } equation;
 
 /* Values of SNESConvergedReason. */
@@ -308,8 +315,9 @@ enum {
 
 void residual(equation *e, const double *q, double *r);
 void assemble(equation *e, const double *q);
+void begin_newton(equation *e, int patience, int like_last);
 int factor_tangent(const equation *e, int *failed);
-int solve_tangent(const equation *e);
+int solve_tangent(const equation *e, int reduced);
 void find_last_digits(const equation *e, const double *q, double *digits);
 int judge(equation *e, const double *q, int iteration, double residual, double scale,
           double floor);
@@ -318,3 +326,186 @@ int snes_jacobian(void *snes, void *x, void *A, void *P, void *self);
 int snes_newton(void *snes, void *x);
 int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int *reason,
               void *self);
+
+/* -- steps one after the other, see march.c ----------------------------------------------------- */
+
+/* A step, see Step in time_schemes.py. */
+typedef struct {
+  double t0, t1, dt, load_time, motion_time, fraction, at;
+  const double *q0;
+} time_step;
+
+/* What a term does when a step begins, or is accepted: q1 is its end, s the step of the nodes. When it
+ * begins both are none. */
+typedef void (phase)(void *self, const time_step *step, const double *q1, const double *s);
+typedef struct {
+  phase *run;
+  void *self;
+} phase_call;
+typedef struct {
+  int number;
+  const phase_call *call;
+} phases;
+
+/* A function of time: linear between points and constant outside, or one of Python. */
+typedef struct {
+  int points;
+  const double *t, *y;
+  double (*ask)(void *handle, double t);
+  void *handle;
+} time_function;
+
+/* Forms that know the configuration q0 at the beginning of a step, which they have from `at` on. */
+typedef struct {
+  const cells *form;
+  int at;
+} form_of_step;
+
+/* The value of a form, added to an entry of the ledger, and as it was when it was added last. */
+typedef struct {
+  const cells *form;
+  double *entry, held;
+} form_value;
+
+/* Vectors times functions of time, see DeadLoads. */
+typedef struct {
+  int size, vectors, changed; /* changed: since norm was computed */
+  const double *const *vector;
+  const time_function *factor;
+  double *factors; /* of the latest step; not numbers before the first */
+  double *force, *end, *before;
+  double norm, weight_of_before;
+  int acts; /* whether a force, now or before, is not zero */
+  double *work; /* entry of the ledger */
+} dead_loads;
+
+/* What a scheme makes of a step or a change of velocities, of the velocities, of those before, and of
+ * what else it keeps, in this order: numbers that each of these is multiplied by. */
+enum { MOST_RATES = 6, MOST_KNOWN = 16 };
+typedef struct {
+  double dt, last_dt;
+  double factor, back, inertia[MOST_RATES], factor_of_velocity, back_of_velocity, velocity[MOST_RATES];
+  double rates[MOST_RATES][MOST_RATES], slip[MOST_RATES];
+} scheme_numbers;
+
+/* Velocities, and what else a scheme keeps. */
+typedef struct {
+  int size, number;            /* of the rates, that first of which is a step or a change */
+  double *rate[MOST_RATES];
+  double *new_rate[MOST_RATES]; /* space, as many */
+  double last_dt;
+  int known, oldest;
+  scheme_numbers numbers[MOST_KNOWN];
+  const scheme_numbers *now;   /* those of the step */
+  int (*find)(void *handle, scheme_numbers *numbers);
+  void *handle;
+} rates;
+
+/* A constant matrix that works on rates: inertia, or Rayleigh damping. */
+typedef struct {
+  step_product *product;
+  rates *rates;
+  double *v, *momentum; /* space */
+  double *kept, *lost; /* entries of the ledger; or none */
+} matrix_of_rates;
+
+/* Motions that supports give, and their work. */
+typedef struct {
+  int held, moving;
+  const int32_t *hold, *dof; /* of what is held; of what moves */
+  const time_function *motion;
+  const double *reactions;
+  double *before, *work; /* work: entry of the ledger */
+  double weight_of_before;
+} moving_supports;
+
+/* Cells with material points, and entries of the ledger or none. */
+typedef struct {
+  inelastic *cells;
+  int begins; /* in statics; see InelasticBeams */
+  double alpha, *dt;
+  points *copy; /* space for the points as the end of a step would leave them; in statics */
+  double *plastic, *hinges, *numerical, *released, *stored, *hardening;
+} inelastic_term;
+
+/* Connectors of one motion: springs, rigid-plastic ones, or such as are held; entries or none. */
+typedef struct {
+  couplings *links;
+  int dt_of_law;       /* where a rigid-plastic law has the step */
+  int32_t *way_before; /* of rigid-plastic ones, after the last step */
+  double hardened, loss; /* stored by rigid-plastic ones; part of what backward Euler loses */
+  inelastic_term points; /* of springs: entries of the ledger */
+} coupling_term;
+
+/* Energy that a term would store and dissipate in a step to q1. */
+typedef double (change_of_energy)(void *self, const double *q1);
+typedef struct {
+  change_of_energy *of;
+  void *self;
+} change_call;
+
+/* Checks of static steps, see StaticPath. */
+typedef struct {
+  double slack, far, kink;
+  const double *per_far; /* one over the size of the scene for displacements, one for rotations */
+  double *force, weight_of_before; /* internal forces before the step */
+  int terms;
+  const change_call *change;
+  int accounts; /* parts of the ledger */
+  double *const *account;
+  const int32_t *entries;
+} static_path;
+
+/* Numbers that are kept of each step: from where, and how many. */
+typedef struct {
+  double *const *from;
+  int number;
+} kept_numbers;
+
+/* Steps of a scene. */
+typedef struct {
+  equation *equation;
+  void *snes;
+  int size;
+  double t, last_dt;
+  double *q, *q_before, *x, *s; /* x: the unknowns of Newton's method */
+  double load_weight, motion_weight, at; /* parts of the step; see step */
+  int rotations, half_tangents, multipliers;
+  const int32_t *rotation, *half_tangent, *multiplier;
+  double largest_turn; /* of a step; or infinite */
+  rates *rates;       /* in dynamics */
+  static_path *path;  /* in statics */
+  dead_loads *loads;  /* or none */
+  moving_supports *supports;
+  int32_t *search;    /* flags of points that may open; or none */
+  int places;         /* that may open, and their largest excess, see points */
+  double *const *over;
+  phases begin, accept, add_state;
+  int states;
+  double *state;      /* entries of the ledger that a state has, one after the other */
+  int iterations;
+  time_step step;
+  int kinds; /* of numbers that are kept */
+  const kept_numbers *kept;
+} march;
+
+void begin_forms(void *self, const time_step *step, const double *q1, const double *s);
+void add_values(void *self, const time_step *step, const double *q1, const double *s);
+void begin_static_tangent(void *self, const time_step *step, const double *q1, const double *s);
+void begin_dead_loads(void *self, const time_step *step, const double *q1, const double *s);
+void accept_dead_loads(void *self, const time_step *step, const double *q1, const double *s);
+void begin_inertia(void *self, const time_step *step, const double *q1, const double *s);
+void accept_inertia(void *self, const time_step *step, const double *q1, const double *s);
+void add_kinetic_energy(void *self, const time_step *step, const double *q1, const double *s);
+void begin_rayleigh(void *self, const time_step *step, const double *q1, const double *s);
+void accept_rayleigh(void *self, const time_step *step, const double *q1, const double *s);
+void begin_inelastic(void *self, const time_step *step, const double *q1, const double *s);
+void accept_inelastic(void *self, const time_step *step, const double *q1, const double *s);
+void add_energy_of_points(void *self, const time_step *step, const double *q1, const double *s);
+void begin_couplings(void *self, const time_step *step, const double *q1, const double *s);
+void accept_couplings(void *self, const time_step *step, const double *q1, const double *s);
+void add_energy_of_couplings(void *self, const time_step *step, const double *q1, const double *s);
+double change_of_form(void *self, const double *q1);
+double change_of_points(void *self, const double *q1);
+double value_at(const time_function *f, double t);
+int take_steps(march *m, int steps, const double *ends, double seconds, int keeps, double *rows);

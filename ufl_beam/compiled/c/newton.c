@@ -92,6 +92,15 @@ void find_last_digits(const equation *e, const double *q, double *digits)
   }
 }
 
+/* Before the first iterate; `like_last` says that a modified tangent may be that of the last step. */
+void begin_newton(equation *e, int patience, int like_last)
+{
+  e->last = e->best = INFINITY;
+  e->near = e->slow = 0;
+  e->patience = patience;
+  if (!like_last) e->rate = INFINITY;
+}
+
 petsc_functions petsc;
 
 #define TRY(call) do { int error = (call); if (error) return error; } while (0)
@@ -148,12 +157,12 @@ int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int
   return petsc.VecRestoreArrayRead(e->x, &q);
 }
 
-/* Factors of the tangent; *failed if it is singular. */
+/* Factors of the tangent, and what they make of the residual on the way; *failed if it is singular. */
 int factor_tangent(const equation *e, int *failed)
 {
   double *entries; /* asking for them tells PETSc that they change */
   TRY(petsc.MatSeqAIJGetArray(e->left, &entries));
-  eliminate(e->chains);
+  eliminate(e->chains, e->residual);
   TRY(petsc.MatSeqAIJRestoreArray(e->left, &entries));
   if ((*failed = !all_finite(e->chains->left, e->chains->left_data))) return 0;
   const int error = petsc.PCSetUp(e->factors);
@@ -162,10 +171,10 @@ int factor_tangent(const equation *e, int *failed)
   return error == OF_LIBRARY ? 0 : error;
 }
 
-/* What Newton's method subtracts from the iterate. */
-int solve_tangent(const equation *e)
+/* What Newton's method subtracts from the iterate; `reduced` says that the residual is eliminated. */
+int solve_tangent(const equation *e, int reduced)
 {
-  reduce(e->chains, e->residual);
+  if (!reduced) reduce(e->chains, e->residual);
   TRY(petsc.PCApply(e->factors, e->left_f, e->left_x));
   expand(e->chains, e->found, e->change);
   return 0;
@@ -186,7 +195,8 @@ int snes_newton(void *snes, void *x)
       reason = TOO_MANY;
       break;
     }
-    if (!e->near) {
+    const int anew = !e->near;
+    if (anew) {
       int failed = 0;
       assemble(e, q);
       TRY(factor_tangent(e, &failed));
@@ -195,11 +205,12 @@ int snes_newton(void *snes, void *x)
         break;
       }
     }
-    TRY(solve_tangent(e));
+    TRY(solve_tangent(e, anew));
     for (int i = 0; i < e->size; ++i) q[i] -= e->change[i];
     residual(e, q, e->residual);
     ++iteration;
   }
+  e->iterations = iteration, e->reason = reason;
   TRY(petsc.VecRestoreArray(x, &q));
   TRY(petsc.SNESSetIterationNumber(snes, iteration));
   return petsc.SNESSetConvergedReason(snes, reason);

@@ -1,0 +1,430 @@
+/* SPDX-License-Identifier: MIT */
+/* Steps one after the other with no Python between them; see compiled_steps.py.
+ *
+ * A step that fails leaves the state as it was, and Python takes it: it knows what else may help.
+ */
+
+/* As numpy.interp has it. */
+double value_at(const time_function *f, double t)
+{
+  const int last = f->points - 1;
+  if (last < 0) return f->ask(f->handle, t);
+  if (t <= f->t[0] || last == 0) return f->y[0];
+  if (t >= f->t[last]) return f->y[last];
+  int low = 0, high = last;
+  while (high - low > 1) {
+    const int middle = (low + high) / 2;
+    if (f->t[middle] <= t) low = middle;
+    else high = middle;
+  }
+  if (t == f->t[low]) return f->y[low];
+  return (f->y[high] - f->y[low]) / (f->t[high] - f->t[low]) * (t - f->t[low]) + f->y[low];
+}
+
+static void run(const phases *p, const time_step *step, const double *q1, const double *s)
+{
+  for (int k = 0; k < p->number; ++k) p->call[k].run(p->call[k].self, step, q1, s);
+}
+
+static double dot(int size, const double *x, const double *y)
+{
+  double sum = 0;
+#pragma omp simd reduction(+ : sum)
+  for (int i = 0; i < size; ++i) sum += x[i] * y[i];
+  return sum;
+}
+
+/* -- phases of terms ---------------------------------------------------------------------------- */
+
+void begin_forms(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const form_of_step *f = self;
+  set_cells(f->form, step->q0, f->at);
+}
+
+void add_values(void *self, const time_step *step, const double *q1, const double *s)
+{
+  form_value *f = self;
+  *f->entry += f->held = value_of_cells(f->form, q1);
+}
+
+double change_of_form(void *self, const double *q1)
+{
+  const form_value *f = self;
+  return value_of_cells(f->form, q1) - f->held;
+}
+
+void begin_static_tangent(void *self, const time_step *step, const double *q1, const double *s)
+{
+  static_tangent *t = self;
+  t->q0 = step->q0, t->begins = 1, t->exact = 0;
+}
+
+void begin_dead_loads(void *self, const time_step *step, const double *q1, const double *s)
+{
+  dead_loads *l = self;
+  const int whole = step->fraction == 1 && step->at == 1;
+  int same = whole;
+  for (int k = 0; k < l->vectors; ++k) {
+    const double factor = value_at(l->factor + k, step->load_time);
+    if (factor != l->factors[k]) l->factors[k] = factor, same = 0;
+  }
+  if (same) return;
+  l->changed = 1, l->acts = 0;
+  for (int i = 0; i < l->size; ++i) l->end[i] = l->factors[0] * l->vector[0][i];
+  for (int k = 1; k < l->vectors; ++k)
+    for (int i = 0; i < l->size; ++i) l->end[i] += l->factors[k] * l->vector[k][i];
+  for (int i = 0; i < l->size; ++i) {
+    if (!whole) {
+      const double change = step->fraction * (l->end[i] - l->before[i]);
+      l->end[i] = l->before[i] + change;
+      l->force[i] = step->at == 1 ? l->end[i] : l->before[i] + step->at * change;
+    } else
+      l->force[i] = l->end[i];
+    l->acts |= l->force[i] != 0 || l->end[i] != 0 || l->before[i] != 0;
+  }
+}
+
+void accept_dead_loads(void *self, const time_step *step, const double *q1, const double *s)
+{
+  dead_loads *l = self;
+  if (!l->acts) return;
+  const double a = l->weight_of_before;
+  double work = 0;
+  for (int i = 0; i < l->size; ++i) work += (a * l->before[i] + (1 - a) * l->force[i]) * s[i];
+  *l->work += work;
+  memcpy(l->before, l->end, l->size * sizeof *l->end);
+}
+
+/* out = sum of numbers times rates, from the one with number `first` on */
+static void combine_rates(const rates *r, const double *numbers, int first, double *out)
+{
+  int begun = 0;
+  for (int j = first; j < r->number; ++j) {
+    const double c = numbers[j], *x = r->rate[j];
+    if (c == 0) continue;
+    if (begun)
+      for (int i = 0; i < r->size; ++i) out[i] += c * x[i];
+    else
+      for (int i = 0; i < r->size; ++i) out[i] = c * x[i];
+    begun = 1;
+  }
+  if (!begun) memset(out, 0, r->size * sizeof *out);
+}
+
+static int find_numbers(rates *r, double dt)
+{
+  for (int k = 0; k < r->known; ++k) {
+    r->now = r->numbers + k;
+    if (r->now->dt == dt && r->now->last_dt == r->last_dt) return 1;
+  }
+  scheme_numbers *n = r->numbers + r->oldest;
+  n->dt = dt, n->last_dt = r->last_dt;
+  if (!r->find(r->handle, n)) {
+    n->dt = NAN;
+    return 0;
+  }
+  r->now = n;
+  r->oldest = (r->oldest + 1) % MOST_KNOWN;
+  if (r->known < MOST_KNOWN) ++r->known;
+  return 1;
+}
+
+void begin_inertia(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const matrix_of_rates *m = self;
+  combine_rates(m->rates, m->rates->now->inertia, 1, m->v);
+  m->product->factor = m->rates->now->factor, m->product->back = m->rates->now->back;
+  m->product->v = m->v, m->product->q0 = step->q0;
+}
+
+void accept_inertia(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const matrix_of_rates *m = self;
+  rates *r = m->rates;
+  const step_product *p = m->product;
+  r->rate[0] = (double *)s;
+  combine_rates(r, r->now->rates[0], 0, r->new_rate[1]);
+  for (int j = 3; j < r->number; ++j) combine_rates(r, r->now->rates[j - 2], 0, r->new_rate[j]);
+  if (m->lost) {
+    double *change = m->v;
+    for (int i = 0; i < r->size; ++i) change[i] = r->new_rate[1][i] - r->rate[1][i];
+    memset(m->momentum, 0, r->size * sizeof *m->momentum);
+    add_product(p->size, p->indptr, p->indices, p->data, change, m->momentum);
+    r->rate[0] = change;
+    combine_rates(r, r->now->slip, 0, r->new_rate[2]);
+    *m->lost += dot(r->size, r->new_rate[2], m->momentum);
+  }
+  double *last = r->rate[2]; /* v becomes that before */
+  r->rate[2] = r->rate[1], r->rate[1] = r->new_rate[1], r->new_rate[1] = last;
+  for (int j = 3; j < r->number; ++j) {
+    last = r->rate[j];
+    r->rate[j] = r->new_rate[j], r->new_rate[j] = last;
+  }
+  r->last_dt = step->dt;
+}
+
+void add_kinetic_energy(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const matrix_of_rates *m = self;
+  const step_product *p = m->product;
+  *m->kept += quadratic_form(p->size, p->indptr, p->indices, p->data, m->rates->rate[1]) / 2;
+}
+
+void begin_rayleigh(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const matrix_of_rates *m = self;
+  combine_rates(m->rates, m->rates->now->velocity, 1, m->v);
+  m->product->factor = m->rates->now->factor_of_velocity;
+  m->product->back = m->rates->now->back_of_velocity;
+  m->product->v = m->v, m->product->q0 = step->q0;
+}
+
+void accept_rayleigh(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const matrix_of_rates *m = self;
+  const step_product *p = m->product;
+  *m->lost += quadratic_form(p->size, p->indptr, p->indices, p->data, s) / step->dt;
+}
+
+static void begin_points(points *p, double *dt, double new_dt)
+{
+  if (new_dt != *dt) {
+    *dt = new_dt;
+    for (int k = 0; k < p->cells * p->of_cell; ++k) p->w[k * p->width + DT] = new_dt;
+  }
+  p->tried = 0;
+}
+
+/* What points dissipated in the step, into the ledger. */
+static void enter_losses(const inelastic_term *t, const double *sum)
+{
+  if (t->plastic) *t->plastic += sum[0];
+  if (t->hinges) *t->hinges += sum[1];
+  if (t->numerical) *t->numerical += 2 * t->alpha * sum[2];
+  if (t->released) *t->released += sum[5];
+}
+
+static void enter_stored(const inelastic_term *t, const double *sum)
+{
+  *t->stored += sum[3];
+  if (t->hardening) *t->hardening += sum[4];
+}
+
+void begin_inelastic(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const inelastic_term *t = self;
+  begin_points(t->cells->points, t->dt, step->dt);
+  for (int i = 0; i < t->cells->size; ++i) t->cells->latest[i] = NAN;
+  t->cells->begins = t->begins;
+}
+
+void accept_inelastic(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const inelastic_term *t = self;
+  respond_at(t->cells, q1);
+  commit(t->cells->points);
+  enter_losses(t, t->cells->points->sum);
+}
+
+void add_energy_of_points(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const inelastic_term *t = self;
+  enter_stored(t, t->cells->points->sum);
+}
+
+void begin_couplings(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const coupling_term *t = self;
+  const couplings *c = t->links;
+  const rigid_plastic *p = c->rigid_plastic;
+  if (c->points) begin_points(c->points, t->points.dt, step->dt);
+  for (int i = 0; p && i < p->number; ++i) {
+    p->w[i * p->width + t->dt_of_law] = step->dt;
+    p->way[i] = t->way_before[i];
+  }
+}
+
+void accept_couplings(void *self, const time_step *step, const double *q1, const double *s)
+{
+  coupling_term *t = self;
+  const couplings *c = t->links;
+  commit_couplings(c, q1, step->dt);
+  if (c->points) {
+    for (int i = 0; i < c->number; ++i) c->points->e1[3 * i] = c->e1[i];
+    respond(c->points);
+    commit(c->points);
+    enter_losses(&t->points, c->points->sum);
+  }
+  if (c->rigid_plastic) {
+    double sums[3];
+    const rigid_plastic *p = c->rigid_plastic;
+    commit_rigid_plastic(p, c->e1, sums);
+    for (int i = 0; i < p->number; ++i) t->way_before[i] = p->way[i] * p->slipped[i];
+    *t->points.hinges += sums[0];
+    if (t->points.numerical) *t->points.numerical += t->loss * sums[1];
+    t->hardened = sums[2];
+  }
+}
+
+void add_energy_of_couplings(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const coupling_term *t = self;
+  if (t->links->points) enter_stored(&t->points, t->links->points->sum);
+  if (t->links->rigid_plastic && t->points.hardening) *t->points.hardening += t->hardened;
+}
+
+/* What the end of the step would add to what points have stored and dissipated; see Points.change. */
+double change_of_points(void *self, const double *q1)
+{
+  const inelastic_term *t = self;
+  const points *p = t->cells->points;
+  points *copy = t->copy;
+  respond_at(t->cells, q1);
+  memcpy(copy->w, p->w, (size_t)p->cells * p->of_cell * p->width * sizeof *p->w);
+  memcpy(copy->e0, p->e0, 3 * (size_t)p->cells * sizeof *p->e0);
+  memcpy(copy->kept, p->kept, POINT_KEPT * (size_t)p->cells * sizeof *p->kept);
+  commit(copy);
+  const double *after = copy->sum, *before = p->sum;
+  return after[0] + after[1] + (after[3] - before[3]) + (after[4] - before[4]) + after[5] + after[6];
+}
+
+/* -- the step ------------------------------------------------------------------------------------ */
+
+/* A guess of the end of the step: as the last one went on, and what supports give. */
+static void guess(march *m)
+{
+  const moving_supports *p = m->supports;
+  extrapolate(m->size, m->q, m->q_before, m->step.dt / m->last_dt, m->x);
+  for (int k = 0; k < p->moving; ++k) {
+    const double from = m->q[p->dof[k]], to = value_at(p->motion + k, m->step.motion_time);
+    m->x[p->dof[k]] = from + m->step.fraction * (to - from);
+  }
+}
+
+/* Whether Newton's method finds the end of the step, with what does not flow held closed. */
+static int solve(march *m)
+{
+  equation *e = m->equation;
+  const double longer = fmax(m->step.dt, m->last_dt);
+  if (m->loads && m->loads->changed) {
+    m->loads->norm = norm(e->size, e->weight, m->loads->force);
+    m->loads->changed = 0;
+  }
+  e->loads = m->loads ? m->loads->norm : 0;
+  begin_newton(e, 2, fabs(m->step.dt - m->last_dt) <= 1e-6 * longer);
+  if (m->search) {
+    memset(m->search, 0, SEARCH_FLAGS * sizeof *m->search);
+    m->search[HOLD] = 1;
+  }
+  const int error = petsc.SNESSolve(m->snes, 0, e->x);
+  int found = !error && e->reason > 0;
+  if (m->search && m->search[OVER])
+    for (int k = 0; k < m->places; ++k) found &= *m->over[k] == 0; /* none that must open */
+  if (m->search) memset(m->search, 0, SEARCH_FLAGS * sizeof *m->search);
+  return found;
+}
+
+/* The step of the nodes, and whether no node turns further than it may. */
+static int measure(march *m)
+{
+  for (int i = 0; i < m->size; ++i) m->s[i] = m->x[i] - m->q[i];
+  for (int k = 0; k < m->rotations; ++k)
+    if (!(fabs(m->s[m->rotation[k]]) <= m->largest_turn)) return 0;
+  for (int k = 0; k < m->half_tangents; ++k) {
+    double *turn = m->s + m->half_tangent[k];
+    *turn = 2 * tan(*turn / 2);
+  }
+  for (int k = 0; k < m->multipliers; ++k) m->s[m->multiplier[k]] = 0;
+  return 1;
+}
+
+/* Whether the internal forces account for what the step stores and dissipates; see StaticPath. */
+static int followed(const march *m)
+{
+  const static_path *p = m->path;
+  equation *e = m->equation;
+  const double a = p->weight_of_before;
+  double far = 0, work = 0, change = 0, through = 0, round_off = 0;
+  for (int i = 0; i < m->size; ++i)
+    if (!(fabs(m->s[i]) * p->per_far[i] <= far)) far = fabs(m->s[i]) * p->per_far[i];
+  if (!(far <= p->far)) return 0;
+  if (isinf(p->slack)) return 1;
+  for (int k = 0; k < p->terms; ++k) change += p->change[k].of(p->change[k].self, m->x);
+  for (int i = 0; i < m->size; ++i)
+    work += (a * p->force[i] + (1 - a) * e->inner_force[i]) * m->s[i];
+  e->moved = fmin(largest_motion(e->size, e->weight, m->x), e->scene);
+  find_last_digits(e, m->x, e->space);
+  for (int i = 0; i < m->size; ++i)
+    round_off += fabs(e->tangent[e->diagonal[i]] * e->space[i] * m->s[i]);
+  for (int k = 0; k < p->accounts; ++k)
+    for (int i = 0; i < p->entries[k]; ++i) through += fabs(p->account[k][i]);
+  const double slack = p->slack * (fabs(work) + fabs(change)) + round_off + DBL_MIN;
+  return fabs(work - change) <= slack + p->kink * through;
+}
+
+static void accept_supports(march *m)
+{
+  const moving_supports *p = m->supports;
+  const double a = p->weight_of_before;
+  if (p->moving)
+    for (int k = 0; k < p->held; ++k)
+      *p->work += (a * p->before[k] + (1 - a) * p->reactions[k]) * m->s[p->hold[k]];
+  memcpy(p->before, p->reactions, p->held * sizeof *p->before);
+}
+
+static int take_step(march *m, double t1)
+{
+  const double t0 = m->t;
+  m->step.t0 = t0, m->step.t1 = t1, m->step.dt = t1 - t0, m->step.fraction = 1, m->step.at = m->at;
+  m->step.load_time = (1 - m->load_weight) * t0 + m->load_weight * t1;
+  m->step.motion_time = (1 - m->motion_weight) * t0 + m->motion_weight * t1;
+  m->step.q0 = m->q;
+  if (m->rates && !find_numbers(m->rates, m->step.dt)) return 0;
+  run(&m->begin, &m->step, 0, 0);
+  guess(m);
+  if (!solve(m) || !measure(m)) return 0;
+  if (m->path) {
+    if (!followed(m)) return 0;
+    memcpy(m->path->force, m->equation->inner_force, m->size * sizeof *m->path->force);
+  }
+  run(&m->accept, &m->step, m->x, m->s);
+  accept_supports(m);
+  memset(m->state, 0, m->states * sizeof *m->state);
+  run(&m->add_state, &m->step, m->x, m->s);
+  double *spare = m->q_before;
+  m->q_before = m->q, m->q = spare;
+  memcpy(m->q, m->x, m->size * sizeof *m->q);
+  m->t = t1, m->last_dt = m->step.dt;
+  m->iterations += m->equation->iterations;
+  return 1;
+}
+
+static double seconds_now(void)
+{
+  struct timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+/* What is kept of the state: number of iterations so far, then numbers of all kinds; where it ends. */
+static double *keep(const march *m, double *row)
+{
+  *row++ = m->iterations;
+  for (int k = 0; k < m->kinds; row += m->kept[k++].number)
+    memcpy(row, *m->kept[k].from, m->kept[k].number * sizeof *row);
+  return row;
+}
+
+/* Steps to the times `ends`, up to the first that fails, or that ends so many seconds later; how many
+ * were taken. Each is kept in a row if `keeps`. */
+int take_steps(march *m, int steps, const double *ends, double seconds, int keeps, double *rows)
+{
+  const double end = steps > 1 ? seconds_now() + seconds : 0;
+  for (int k = 0; k < steps; ++k) {
+    if (!take_step(m, ends[k])) return k;
+    if (keeps) rows = keep(m, rows);
+    if (steps > 1 && seconds_now() > end) return k + 1;
+  }
+  return steps;
+}

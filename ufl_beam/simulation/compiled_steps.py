@@ -1,0 +1,248 @@
+# SPDX-License-Identifier: MIT
+"""Steps without Python: what a scene needs for them, and how the state is handed over and back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache, cached_property
+from typing import Any, Protocol
+
+import numpy as np
+
+from ufl_beam.arrays import Array, Index, Snapshot
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, integers, lib
+from ufl_beam.errors import StepFailed
+from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.simulation.branch_check import StaticPath
+from ufl_beam.simulation.kept_rows import KeptRows
+from ufl_beam.simulation.step_equation import StepEquation
+from ufl_beam.solvers.newton import Solver
+from ufl_beam.terms.base import InternalForces
+from ufl_beam.terms.beams import Inertia
+from ufl_beam.terms.dead_loads import DeadLoads
+from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.inelastic_beams import InelasticBeams
+from ufl_beam.terms.openings import SearchFlags
+from ufl_beam.terms.phases import Phases, TimeFunctions
+from ufl_beam.terms.rates_in_c import V
+
+ROOM = 2**20
+"""Numbers that C keeps of steps before Python takes them."""
+
+LONGEST = 0.05
+"""Time after which C returns, so that a run can be interrupted and shows its progress; s."""
+
+LAST_DIGITS = 1e-14
+"""Difference of two numbers from the same formula, relative, that is nothing but round-off."""
+
+
+class Keeping(Protocol):
+    """Solution that states are appended to."""
+
+    def keep(self, state: Snapshot) -> None:
+        """Append a state of a run."""
+
+
+class Stepping(Protocol):
+    """The state that steps lead from and to; see :class:`Simulation`."""
+
+    t: float
+    q: Array
+    q_before: Array
+    last_dt: float
+    parts: int
+
+    @property
+    def solution(self) -> Keeping:
+        """States that were kept."""
+
+
+class CompiledSteps:
+    """Steps of a scene in C; see march.c.
+
+    From the first step until :meth:`hand_back` the state is that of C.  What there is to see of it
+    is in Python after each call: time, configuration, velocities, reactions and ledger.
+
+    Attributes:
+        ahead: Whether steps have been taken since the state was handed over or back.
+    """
+
+    def __init__(
+        self, equation: StepEquation, solver: Solver, ledger: Ledger, inertia: Inertia | None,
+        path: StaticPath | None, search: SearchFlags | None, largest_turn: float,
+        phases: list[Phases], times: TimeFunctions, whole: tuple[float, float, float],
+        turns: tuple[bool, bool], applies_loads: bool, support_dofs: Index,
+    ) -> None:  # fmt: skip
+        self._equation, self._solver, self._inertia, self._path = equation, solver, inertia, path
+        self._phases, self._times, self.ahead = phases, times, False
+        self._applies_loads = applies_loads
+        share = equation.share
+        self._space, rotations = np.zeros((3, share.size)), share.rotations()
+        limited, half_tangents = (rotations[: len(rotations) * has] for has in turns)
+        self._bytes, self._end = 8 * share.size, np.zeros(1)
+        loads = [term.steps_in_c for term in equation.terms if isinstance(term, DeadLoads)]
+        multipliers = share.multipliers().astype(np.int32)
+        load_weight, motion_weight, at = whole
+        self.c = fill(
+            ffi.new("march *"),
+            equation=equation.c, snes=solver.in_petsc(), size=share.size, x=solver.unknowns,
+            s=self._space[2], load_weight=load_weight, motion_weight=motion_weight, at=at,
+            largest_turn=largest_turn, rotations=len(limited), rotation=limited,
+            half_tangents=len(half_tangents), half_tangent=half_tangents,
+            multipliers=len(multipliers), multiplier=multipliers,
+            loads=loads[0] if loads else ffi.NULL,
+            supports=equation.supports.in_c(times),
+            search=ffi.NULL if search is None else integers(search.flags),
+            states=len(ledger.state), state=ledger.state.numbers,
+        )  # fmt: skip
+        over = [
+            doubles(one.over) + i
+            for one in phases if one.over is not None for i in range(len(one.over))
+        ]  # fmt: skip
+        fill(self.c, places=len(over), over=ffi.new("double *[]", over))
+        if inertia is not None and inertia.in_c is not None:
+            fill(self.c, rates=inertia.in_c.c)
+        if path is not None:
+            changes = [one.change for one in phases if one.change is not None]
+            fill(self.c, path=path.in_c(changes))
+        self._alive: list[Any] = []
+        for name in ("begin", "accept", "add_state"):
+            self._list(getattr(self.c, name), [x for one in phases for x in getattr(one, name)])
+        inelastic = [one for one in equation.terms if isinstance(one, InelasticBeams)]
+        self._of_rows = ledger, equation.supports, inelastic, support_dofs
+
+    @cached_property
+    def _kept(self) -> KeptRows:
+        """What C keeps of steps."""
+        rows = KeptRows(self.c, *self._of_rows)
+        fill(self.c, kinds=len(rows.kinds), kept=rows.kinds)
+        return rows
+
+    def _list(self, place: Any, loops: Sequence[Loop]) -> None:
+        calls = ffi.new("phase_call[]", list(loops))
+        self._alive += [calls, loops]
+        place.number, place.call = len(loops), calls
+
+    def take(self, state: Stepping, ends: Array, *, keep: bool = False) -> int:
+        """Take steps to these times, up to the first that fails, for :data:`LONGEST` at most.
+
+        Returns:
+            How many were taken.  With ``keep`` the state after each of them is in the solution.
+
+        Raises:
+            BaseException: What a time function of a user has raised; the steps before are taken.
+        """
+        if not (self._solver.in_c and (self.ahead or self._begins(state))):
+            return 0
+        c, kept = self.c, self._kept
+        parts, iterations = state.parts, self._solver.iterations
+        rows = np.empty((min(len(ends), 1 + ROOM // kept.width) if keep else 0, kept.width))
+        steps = len(rows) if keep else len(ends)
+        if not self.ahead:
+            self._hand_over(state)
+        taken = int(lib.take_steps(c, steps, doubles(ends), LONGEST, keep, doubles(rows)))
+        if taken:
+            state.t, state.last_dt, state.parts = c.t, c.last_dt, parts + taken
+            state.q = self._copy(c.q)
+            if self._inertia is not None:
+                self._inertia.v = self._copy(c.rates.rate[V])
+            self._solver.iterations += c.iterations
+            c.iterations = 0
+            if keep:
+                for one in kept.states(ends, rows[:taken], parts, iterations):
+                    state.solution.keep(one)
+        if taken < steps:
+            self.hand_back(state)
+            self._raise()
+        return taken
+
+    def _begins(self, state: Stepping) -> bool:
+        """Return whether the next step is like those that follow."""
+        if self._inertia is not None:
+            return len(self._inertia.more) == len(self._inertia.scheme.kept)
+        return not (self._applies_loads and state.parts == 0)
+
+    def _copy(self, values: Any) -> Array:
+        return np.frombuffer(ffi.buffer(values, self._bytes)).copy()
+
+    def _hand_over(self, state: Stepping) -> None:
+        c, (q, before, _) = self.c, self._space
+        q[:], before[:] = state.q, state.q_before
+        c.q, c.q_before = doubles(q), doubles(before)
+        c.t, c.last_dt, c.iterations = state.t, state.last_dt, 0
+        if self._path is not None:
+            ffi.memmove(c.path.force, doubles(self._path.force), self._bytes)
+        for one in self._phases:
+            one.enter(state.q)
+        self.ahead = True
+
+    def hand_back(self, state: Stepping) -> None:
+        """Let all of Python know the state, so that it may take a step."""
+        if self.ahead:
+            self.ahead = False
+            state.q_before = self._copy(self.c.q_before)
+            if self._path is not None:
+                self._path.force = self._copy(self.c.path.force)
+            for one in self._phases:
+                one.leave(state.q)
+
+    def _raise(self) -> None:
+        """Raise what a function of a user has raised; Python tries a failed step once more."""
+        error, self._times.error = self._times.error or self._equation.error, None
+        self._equation.error = None
+        if error is not None and not isinstance(error, StepFailed):
+            raise error
+
+
+def compiled_steps(
+    scheme: Scheme, equation: StepEquation, solver: Solver, ledger: Ledger,
+    inertia: Inertia | None, path: StaticPath | None, search: SearchFlags | None,
+    largest_turn: float, applies_loads: bool, support_dofs: Index,
+) -> CompiledSteps | None:  # fmt: skip
+    """Make the steps of a scene in C, if all that takes part in them has loops there."""
+    known: Any = scheme
+    whole, turns = _whole_steps(known), _nodal_step(known)
+    if not (solver.in_c and whole and turns):
+        return None
+    times, phases = TimeFunctions(), list[Phases]()
+    for term in equation.terms:
+        of_term = term.phases(times)
+        if of_term is None:
+            return None
+        if path is not None and of_term.change is None and isinstance(term, InternalForces):
+            return None
+        phases.append(of_term)
+    return CompiledSteps(
+        equation, solver, ledger, inertia, path, search, largest_turn, phases, times, whole, turns,
+        applies_loads, support_dofs,
+    )  # fmt: skip
+
+
+@cache
+def _whole_steps(scheme: Any) -> tuple[float, float, float] | None:
+    """Parts of a step at which loads and motions are taken, and its ``at``, if always the same."""
+    q = np.zeros(0)
+    unit = scheme.step(0.0, 1.0, 1.0, q)
+    weights = unit.load_time, unit.motion_time
+    for t0, t1 in ((0.0, 1.0), (2.0, 2.25), (-1e3, 7.0)):
+        step = scheme.step(t0, t1, t1, q)
+        for w, t in zip(weights, (step.load_time, step.motion_time), strict=True):
+            if abs((1 - w) * t0 + w * t1 - t) > LAST_DIGITS * max(abs(t0), abs(t1)):
+                return None
+        if (step.fraction, step.at) != (1.0, unit.at):
+            return None
+    return *weights, unit.at
+
+
+@cache
+def _nodal_step(scheme: Any) -> tuple[bool, bool] | None:
+    """Whether turns of a step are limited, and are 2 tan(Δψ/2) in it; None if neither is known."""
+    if not hasattr(scheme, "half_tangents"):
+        return None
+    q0, q1, rotations = np.zeros(3), np.array([0.3, -0.7, 0.5]), np.array([1, 2], dtype=np.int32)
+    tangents = len(scheme.half_tangents(rotations)) > 0
+    s, turn = scheme.nodal_step(q0, q1, rotations)
+    turned = 2 * np.tan(q1[1:] / 2) if tangents else q1[1:]
+    if not np.allclose(s, [0.3, *turned], rtol=LAST_DIGITS, atol=0.0) or turn not in (0.0, 0.7):
+        return None
+    return turn > 0, tangents

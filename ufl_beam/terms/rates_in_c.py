@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: MIT
+"""Velocities, and what else a scheme keeps, where C takes steps without Python.
+
+A scheme states what becomes of them in Python.  All of that is a sum of multiples; the numbers are
+found by asking the scheme what it makes of unit vectors, once for each length of a step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, Protocol
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
+from ufl_beam.compiled.csr import StepProduct
+from ufl_beam.mechanics.time_schemes import DynamicScheme, Rates
+
+CHANGE, V, V_BEFORE, MORE = range(4)
+"""Places of the rates in C: the step or a change of velocities, velocities, ..."""
+
+SAME = 1e-12
+"""Difference of two results of the same numbers, relative, that is nothing but round-off."""
+
+
+@dataclass
+class Asked:
+    """Rates that a scheme is asked about."""
+
+    v: Array
+    v_before: Array
+    more: tuple[Array, ...]
+    last_dt: float
+
+
+class Moving(Rates, Protocol):
+    """Velocities of a scene in motion, and its scheme."""
+
+    scheme: DynamicScheme
+
+
+class RatesInC:
+    """The rates of a scene as C has them; attributes of ``moving`` are handed over and back.
+
+    Attributes:
+        c: ``rates`` of loops.h.
+    """
+
+    def __init__(self, moving: Moving) -> None:
+        self._moving, self._scheme = moving, moving.scheme
+        size, number = len(moving.v), MORE + len(self._scheme.kept)
+        self._space = np.zeros((2, number, size))
+        self._handle = ffi.new_handle(self)
+        self.c = fill(
+            ffi.new("rates *"), size=size, number=number, find=lib.numbers_in_python,
+            handle=self._handle,
+        )  # fmt: skip
+
+    @classmethod
+    def of(cls, moving: Moving) -> RatesInC | None:
+        """The rates, if the scheme makes sums of multiples of them."""
+        if MORE + len(moving.scheme.kept) > lib.MOST_RATES:
+            return None
+        scheme: Any = moving.scheme
+        return cls(moving) if _sums_of_multiples(scheme) else None
+
+    def find(self, numbers: Any) -> None:
+        """Write the numbers of the steps that ``scheme_numbers`` of loops.h is about."""
+        n = self.c.number
+        dt, last_dt = numbers.dt, numbers.last_dt
+        ends, inertia, velocity, *rates, slip = _ask(self._scheme, dt, np.eye(n), last_dt)
+        numbers.factor, numbers.back, numbers.factor_of_velocity, numbers.back_of_velocity = ends
+        for place, row in ((numbers.inertia, inertia), (numbers.velocity, velocity)):
+            place[0:n] = row.tolist()
+        numbers.slip[0:n] = slip.tolist()
+        for place, row in zip(numbers.rates, rates, strict=False):
+            place[0:n] = row.tolist()
+
+    def times(self, product: StepProduct, **entries: Any) -> Any:
+        """Return ``matrix_of_rates`` of loops.h for a matrix, with entries of the ledger."""
+        v, momentum = np.zeros((2, self.c.size))
+        of = struct("matrix_of_rates", product=product.c, v=v, momentum=momentum, **entries)
+        return fill(of, rates=self.c)
+
+    # -- handing over --------------------------------------------------------------------------
+
+    def enter(self, q: Array) -> None:
+        """Take the rates from Python."""
+        moving, now, space = self._moving, *self._space
+        for k, rate in enumerate((moving.v, moving.v_before, *moving.more), start=V):
+            now[k] = rate
+        for k in range(self.c.number):
+            self.c.rate[k], self.c.new_rate[k] = doubles(now[k]), doubles(space[k])
+        self.c.last_dt = moving.last_dt
+
+    def leave(self, q: Array) -> None:
+        """Give the rates back to Python."""
+        moving, size = self._moving, 8 * self.c.size
+        rates = [
+            np.frombuffer(ffi.buffer(self.c.rate[k], size)).copy() for k in range(V, self.c.number)
+        ]
+        moving.v, moving.v_before, moving.more = rates[0], rates[1], tuple(rates[2:])
+        moving.last_dt = self.c.last_dt
+
+
+def _ask(scheme: DynamicScheme, dt: float, columns: Array, last_dt: float) -> Sequence[Array]:
+    """What a scheme makes of rates: factors, then forces of inertia, velocity, rates and slip."""
+    change, v, before, *more = columns
+    asked = Asked(v, before, tuple(more), last_dt)
+    factor, back, of_inertia = scheme.inertia(dt, asked)
+    factor_of_velocity, back_of_velocity, velocity = scheme.velocity(dt, asked)
+    factors = np.array([factor, back, factor_of_velocity, back_of_velocity])
+    slip = scheme.slip(dt, change, asked)
+    return (factors, of_inertia, velocity, *scheme.rates(dt, change, asked), slip)
+
+
+@cache
+def _sums_of_multiples(scheme: Any) -> bool:
+    """Return whether a scheme does to any rates what it does to unit vectors."""
+    n = MORE + len(scheme.kept)
+    columns = np.cos(np.arange(4.0 * n).reshape(n, 4))  # any numbers
+    for dt, last_dt in ((0.1, 0.1), (0.1, 0.07)):
+        factors, *vectors = _ask(scheme, dt, np.eye(n), last_dt)
+        same_factors, *found = _ask(scheme, dt, columns, last_dt)
+        if len(vectors) != n + 1 or not np.array_equal(factors, same_factors):
+            return False
+        for numbers, vector in zip(vectors, found, strict=True):
+            size = np.abs(numbers) @ np.abs(columns)
+            if not np.all(np.abs(numbers @ columns - vector) <= SAME * size):
+                return False
+    return True
+
+
+@ffi.def_extern(error=0)  # type: ignore[misc, untyped-decorator, unused-ignore]
+def numbers_in_python(handle: Any, numbers: Any) -> int:
+    """Callback of C, declared in c_library.py."""
+    ffi.from_handle(handle).find(numbers)
+    return 1
