@@ -16,7 +16,7 @@ from ufl.conditional import Condition
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import doubles, ffi, in_order, lib, struct
+from ufl_beam.compiled.c_library import doubles, ffi, fill, in_order, lib, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.time_schemes import Scheme
@@ -134,8 +134,15 @@ class CompiledPoints(Points):
         if self._solves:
             self.points.tried = 0
 
+    def predict(self) -> None:
+        """Let tangents predict stresses for the next iterate, see follow_prediction in C."""
+        d = self._components
+        lines = np.zeros((2, self._storage[:, :, 0].size * (d + d * d)))
+        fill(self.points, lines=lines.shape[1], line=lines[0], predicted=lines[1])
+
     def respond(self, strains: Array) -> tuple[Array, Array]:
-        """Answer the strains of an iterate."""
+        """Answer strains, whatever the last tangent predicts."""
+        self.points.predicts = 0
         self.strains[:] = strains
         lib.respond(self.points)
         return self.r, self.D

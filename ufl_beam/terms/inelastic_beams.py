@@ -237,6 +237,7 @@ class CompiledInelasticBeams(InelasticBeams):
 
     def _prepare(self, forms: InelasticForms) -> None:
         self._latest: Array = np.full(self._fields.share.size, np.nan)
+        self.points.predict()
         self._in_c = struct(
             "inelastic", size=len(self._latest), latest=self._latest, **self.points.in_c,
             strains=self._strains.kernel.cells, force=self._force.cells,
@@ -247,12 +248,22 @@ class CompiledInelasticBeams(InelasticBeams):
     def _begin(self) -> None:
         self._latest.fill(np.nan)
         self._in_c.begins = self._static
+        self._in_c.points.predicts = 0
 
     def _forget(self) -> None:
         self._latest.fill(np.nan)
 
     def _respond(self, q1: Array) -> None:
         lib.respond_at(self._in_c, doubles(q1))
+
+    @property
+    def unlike(self) -> float:
+        """Largest stress of a point in the latest response that is not that of its strains."""
+        return float(self._in_c.points.unlike)
+
+    def demand(self) -> Loop:
+        """C function of :attr:`unlike`, as a part of the forces in the scene."""
+        return loop("missed_by_points", self._in_c)
 
     def loops(self) -> tuple[Loop, Loop | None]:
         """The points, and two forms."""

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import ufl
 
 from ufl_beam.arrays import Array
+from ufl_beam.compiled.c_library import Loop
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import CellForm, stated
 from ufl_beam.discretization.function_spaces import Fields
@@ -43,10 +44,17 @@ class Cells(InternalForces):
     round-off of axial and shear stiffness, in which the bending of slender cells would be lost.
     """
 
+    unlike: float = 0.0
+    """Largest force in the latest residual that is not that of the configuration; N or N m."""
+
     _work_form: ufl.Form
     _q1: fem.Function
     _fields: Fields
     _A: Csr
+
+    def demand(self) -> Loop | None:
+        """Return the C function of :attr:`unlike` with its data, if it is ever more than zero."""
+        return None
 
     def _coefficients(self, q1: Array) -> dict[fem.Function, Array]:
         """Values in the cells, at ``q1``, of what the virtual work depends on besides."""

@@ -125,6 +125,11 @@ typedef struct {
   double *e0, *e1, *w, *r, *D, *kept, *sum;
   double *over; /* largest excess of a closed point over its limit in the latest response */
   int tried;    /* whether an iterate of the step was answered */
+  /* Stresses of each point as lines in the strains, at zero strain and their slopes: those of the
+   * latest response and, if it `predicts`, of the last tangent of the step; `lines` numbers. */
+  int predicts, lines;
+  double *line, *predicted;
+  double unlike; /* largest stress that is not yet that of the strains, see follow_prediction */
 } points;
 
 /* Cells with points: forms of the strains, of the forces, which know the resultants r, and of their
@@ -187,6 +192,7 @@ void release(const points *p, double least);
 void respond_at(const inelastic *m, const double *q);
 void add_inelastic_force(void *self, const double *q, double *r);
 void add_inelastic_tangent(void *self, const double *q, double *tangent);
+double missed_by_points(void *self, const double *q, const double *r, double scale, double moved);
 void commit(points *p);
 
 /* -- elimination along chains ------------------------------------------------------------------ */

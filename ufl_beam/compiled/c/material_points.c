@@ -220,6 +220,84 @@ static inline void add_answer(int d, const double *b, double weight, const doubl
     }
 }
 
+/* Resistance of a point to a change of its branch beside the stress that was predicted, as a part of
+ * the elastic stiffness: without any, material that flows freely had no strain for a stress. */
+static const double BESIDE_STRESS = 0.01;
+
+/* Difference of stresses, as a part of the elastic ones, that means no other branch. */
+static const double ALIKE = 1e-6;
+
+/* Stress a of the law of a point, less the one that the last tangent predicts at its strains. */
+static inline double gap(int d, const double *line, const double *strain, const double *s, int a)
+{
+  double gap = s[a] - line[a];
+  for (int g = 0; g < d; ++g) gap -= line[d + d * a + g] * strain[g];
+  return gap;
+}
+
+/* Let a point answer as on the branch on which it bears the stress that the last tangent predicts.
+ *
+ * A tangent is a line for each point. Where the point leaves it, as one that begins to flow or to
+ * unload, the strains of the iterate are wrong by as much as the line was: the softer it is, the
+ * further. Stresses are right by equilibrium, and smooth along a beam, however fine its cells. So the
+ * line of the next tangent is that at strains which go with these stresses, and the iterate has the
+ * residual of this line: Newton's method for strains and stresses as unknowns, stresses condensed.
+ * The two agree where the point stays on its branch.
+ *
+ * s, stresses and their derivatives, changes; returns how far the stresses are from the law.
+ */
+static double follow_prediction(const points *p, double *w, const double *line, double *s)
+{
+  enum { M = MOST_VARIABLES };
+  const int d = p->components, m = p->variables;
+  double *strain = w + p->strain, *z = strain + 3 * d + m;
+  const double *stiffness = strain + 2 * d;
+  double f[3], start[3], from[3], now[3 + 9], J[9], change[3], kept[M];
+  double first = 0, before, after;
+  int alike = 1;
+  for (int a = 0; a < d; ++a) {
+    const double elastic = stiffness[a] * strain[a];
+    f[a] = gap(d, line, strain, s, a);
+    alike = alike && !(f[a] * f[a] > ALIKE * ALIKE * (elastic * elastic + s[a] * s[a]));
+    first += f[a] * f[a] / stiffness[a];
+  }
+  if (alike) return 0;
+  memcpy(start, strain, d * sizeof *strain);
+  if (p->solves) memcpy(kept, z, m * sizeof *z);
+  memcpy(now, s, (d + d * d) * sizeof *s);
+  before = after = first;
+  for (int corrections = 0; corrections < 20 && after > ALIKE * first; ++corrections, before = after) {
+    for (int a = 0; a < d; ++a) {
+      for (int g = 0; g < d; ++g) J[d * a + g] = now[d + d * a + g];
+      J[(d + 1) * a] += BESIDE_STRESS * p->theta * stiffness[a];
+      change[a] = f[a], from[a] = strain[a];
+    }
+    if (!solve_dense(d, J, 1, change)) break;
+    for (double way = 1; way > 1e-3; way /= 2) {
+      for (int a = 0; a < d; ++a) strain[a] = from[a] - way * change[a];
+      answer(p, w, now);
+      after = 0;
+      for (int a = 0; a < d; ++a) {
+        f[a] = gap(d, line, start, now, a);
+        f[a] += BESIDE_STRESS * p->theta * stiffness[a] * (strain[a] - start[a]);
+        after += f[a] * f[a] / stiffness[a];
+      }
+      if (after <= (1 - way / 10) * before) break;
+    }
+  }
+  double far = 0;
+  for (int a = 0; a < d && after <= ALIKE * first; ++a) {
+    double stress = now[a];
+    for (int g = 0; g < d; ++g) stress += now[d + d * a + g] * (start[g] - strain[g]);
+    far = fmax(far, fabs(stress - s[a]));
+    s[a] = stress;
+    memcpy(s + d + d * a, now + d + d * a, d * sizeof *s);
+  }
+  memcpy(strain, start, d * sizeof *strain);
+  if (p->solves) memcpy(z, kept, m * sizeof *z);
+  return far;
+}
+
 /* Resultants r of cells whose strains grow from e0 to e1, and their derivatives D.
  *
  * `search` notes that a point opens, and may ask for stiff points: those that do not open answer
@@ -231,10 +309,10 @@ static inline void add_answer(int d, const double *b, double weight, const doubl
  */
 void respond(points *p)
 {
-  double s[3 + 9], *w = p->w, *r = p->r, *D = p->D;
-  const double *e0 = p->e0, *e1 = p->e1;
+  double s[3 + 9], *w = p->w, *r = p->r, *D = p->D, *line = p->line;
+  const double *e0 = p->e0, *e1 = p->e1, *predicted = p->predicted;
   const int d = p->components;
-  *p->over = 0;
+  *p->over = p->unlike = 0;
   for (int c = 0; c < p->cells; ++c, e0 += 3, e1 += 3, r += 3, D += 9) {
     memset(D, 0, 9 * sizeof *D);
     for (int k = 0; k < 3; ++k) {
@@ -257,6 +335,16 @@ void respond(points *p)
       } else if (p->search[STIFF]) {
         for (int a = 0; a < d * d; ++a)
           s[d + a] = a % (d + 1) ? 0 : p->theta * strain[2 * d + a / (d + 1)];
+      } else if (p->predicts && !(w[TRACTION] < INFINITY)) {
+        p->unlike = fmax(p->unlike, p->weight[i] * follow_prediction(p, w, predicted, s));
+      }
+      if (line) {
+        memcpy(line + d, s + d, d * d * sizeof *s);
+        for (int a = 0; a < d; ++a) {
+          line[a] = s[a];
+          for (int g = 0; g < d; ++g) line[a] -= s[d + d * a + g] * strain[g];
+        }
+        line += d + d * d, predicted += d + d * d;
       }
       if (d == 1) add_answer(1, p->B + 3 * i, p->weight[i], s, r, D);
       else add_answer(d, p->B + 3 * d * i, p->weight[i], s, r, D);
@@ -325,6 +413,16 @@ void add_inelastic_tangent(void *self, const double *q, double *tangent)
   linearise(m);
   add_cells((void *)m->tangent, q, tangent);
   m->begins = 0;
+  memcpy(p->predicted, p->line, p->lines * sizeof *p->line);
+  p->predicts = 1;
+}
+
+/* Largest stress of points, as a part of the forces, that is not yet that of their strains. */
+double missed_by_points(void *self, const double *q, const double *r, double scale, double moved)
+{
+  const inelastic *m = self;
+  respond_at(m, q);
+  return m->points->unlike > 0 ? m->points->unlike / scale : 0;
 }
 
 /* Take the end of the step as the new state.
@@ -384,5 +482,5 @@ void commit(points *p)
     sum[0] += plastic;
     sum[1] += broken;
   }
-  p->tried = 0;
+  p->tried = p->predicts = 0;
 }
