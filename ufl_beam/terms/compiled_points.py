@@ -136,9 +136,9 @@ class CompiledPoints(Points):
 
     def predict(self) -> None:
         """Let tangents predict stresses for the next iterate, see follow_prediction in C."""
-        d = self._components
-        lines = np.zeros((2, self._storage[:, :, 0].size * (d + d * d)))
-        fill(self.points, lines=lines.shape[1], line=lines[0], predicted=lines[1])
+        if self._components == 1:
+            lines = np.zeros((2, *self._storage.shape[:2], int(lib.LINE)))
+            fill(self.points, line=lines[0], predicted=lines[1])
 
     def respond(self, strains: Array) -> tuple[Array, Array]:
         """Answer strains, whatever the last tangent predicts."""

@@ -109,6 +109,8 @@ enum { MOST_VARIABLES = 16, MOST_CORRECTIONS = 100 }; /* of a law */
 
 enum { POINT_KEPT = 6, POINT_SUMS = 7 }; /* numbers of a cell, and of all: `kept` and `sum` of points */
 
+enum { LINE = 3 }; /* strain, stress and slope: what a tangent knows of a point */
+
 /* Flags that all points of a scene share in a step; see SearchFlags in material_points.py. */
 enum search { OPENED, STIFF, HOLD, OVER, SEARCH_FLAGS };
 
@@ -125,10 +127,10 @@ typedef struct {
   double *e0, *e1, *w, *r, *D, *kept, *sum;
   double *over; /* largest excess of a closed point over its limit in the latest response */
   int tried;    /* whether an iterate of the step was answered */
-  /* Stresses of each point as lines in the strains, at zero strain and their slopes: those of the
-   * latest response and, if it `predicts`, of the last tangent of the step; `lines` numbers. */
-  int predicts, lines;
+  /* Lines of points of one strain: of the latest response, and of the last tangent if it `predicts`;
+   * see follow_prediction. */
   double *line, *predicted;
+  int predicts;
   double unlike; /* largest stress that is not yet that of the strains, see follow_prediction */
 } points;
 

@@ -224,78 +224,45 @@ static inline void add_answer(int d, const double *b, double weight, const doubl
  * the elastic stiffness: without any, material that flows freely had no strain for a stress. */
 static const double BESIDE_STRESS = 0.01;
 
-/* Difference of stresses, as a part of the elastic ones, that means no other branch. */
-static const double ALIKE = 1e-6;
+/* Deviation from the prediction up to which a point answers as it does, as a part of what an elastic
+ * one would bear for the change of its strain; and digits of strains. */
+static const double ALIKE = 0.01, DIGITS = 1e-9;
 
-/* Stress a of the law of a point, less the one that the last tangent predicts at its strains. */
-static inline double gap(int d, const double *line, const double *strain, const double *s, int a)
-{
-  double gap = s[a] - line[a];
-  for (int g = 0; g < d; ++g) gap -= line[d + d * a + g] * strain[g];
-  return gap;
-}
-
-/* Let a point answer as on the branch on which it bears the stress that the last tangent predicts.
+/* Let a point of one strain answer as on the branch on which it bears what the last tangent predicts.
  *
- * A tangent is a line for each point. Where the point leaves it, as one that begins to flow or to
- * unload, the strains of the iterate are wrong by as much as the line was: the softer it is, the
- * further. Stresses are right by equilibrium, and smooth along a beam, however fine its cells. So the
- * line of the next tangent is that at strains which go with these stresses, and the iterate has the
- * residual of this line: Newton's method for strains and stresses as unknowns, stresses condensed.
- * The two agree where the point stays on its branch.
+ * Tangents are lines, (strain, stress, slope) of each point. Where a point leaves its line, as one that
+ * begins to flow or to unload, the strain of the iterate is wrong by as much as the line was, and the
+ * more the softer it is. Its stress is right by equilibrium, and smooth along a beam, however fine the
+ * cells. So the next line is the tangent at the strain that goes with this stress, and the residual is
+ * that of this line: Newton's method for strains and stresses as unknowns, the stresses condensed.
  *
- * s, stresses and their derivatives, changes; returns how far the stresses are from the law.
+ * s, the stress and its derivative, changes; returns how far the stress is from that of the strain.
  */
 static double follow_prediction(const points *p, double *w, const double *line, double *s)
 {
-  enum { M = MOST_VARIABLES };
-  const int d = p->components, m = p->variables;
-  double *strain = w + p->strain, *z = strain + 3 * d + m;
-  const double *stiffness = strain + 2 * d;
-  double f[3], start[3], from[3], now[3 + 9], J[9], change[3], kept[M];
-  double first = 0, before, after;
-  int alike = 1;
-  for (int a = 0; a < d; ++a) {
-    const double elastic = stiffness[a] * strain[a];
-    f[a] = gap(d, line, strain, s, a);
-    alike = alike && !(f[a] * f[a] > ALIKE * ALIKE * (elastic * elastic + s[a] * s[a]));
-    first += f[a] * f[a] / stiffness[a];
-  }
-  if (alike) return 0;
-  memcpy(start, strain, d * sizeof *strain);
-  if (p->solves) memcpy(kept, z, m * sizeof *z);
-  memcpy(now, s, (d + d * d) * sizeof *s);
-  before = after = first;
-  for (int corrections = 0; corrections < 20 && after > ALIKE * first; ++corrections, before = after) {
-    for (int a = 0; a < d; ++a) {
-      for (int g = 0; g < d; ++g) J[d * a + g] = now[d + d * a + g];
-      J[(d + 1) * a] += BESIDE_STRESS * p->theta * stiffness[a];
-      change[a] = f[a], from[a] = strain[a];
-    }
-    if (!solve_dense(d, J, 1, change)) break;
+  double *strain = w + p->strain, *z = strain + 3 + p->variables, now[2], kept[MOST_VARIABLES];
+  const double start = *strain, elastic = strain[2], predicted = line[1] + line[2] * (start - line[0]);
+  const double beside = BESIDE_STRESS * p->theta * elastic, first = s[0] - predicted;
+  if (!(fabs(first) > elastic * (ALIKE * fabs(start - line[0]) + DIGITS * fabs(start)))) return 0;
+  if (p->solves) memcpy(kept, z, p->variables * sizeof *z);
+  double excess = first;
+  memcpy(now, s, sizeof now);
+  for (int i = 0; i < 20 && fabs(excess) > 1e-3 * fabs(first); ++i) {
+    const double from = *strain, change = excess / (now[1] + beside), before = fabs(excess);
     for (double way = 1; way > 1e-3; way /= 2) {
-      for (int a = 0; a < d; ++a) strain[a] = from[a] - way * change[a];
+      *strain = from - way * change;
       answer(p, w, now);
-      after = 0;
-      for (int a = 0; a < d; ++a) {
-        f[a] = gap(d, line, start, now, a);
-        f[a] += BESIDE_STRESS * p->theta * stiffness[a] * (strain[a] - start[a]);
-        after += f[a] * f[a] / stiffness[a];
-      }
-      if (after <= (1 - way / 10) * before) break;
+      excess = now[0] - predicted + beside * (*strain - start);
+      if (fabs(excess) <= (1 - way / 10) * before) break;
     }
   }
-  double far = 0;
-  for (int a = 0; a < d && after <= ALIKE * first; ++a) {
-    double stress = now[a];
-    for (int g = 0; g < d; ++g) stress += now[d + d * a + g] * (start[g] - strain[g]);
-    far = fmax(far, fabs(stress - s[a]));
-    s[a] = stress;
-    memcpy(s + d + d * a, now + d + d * a, d * sizeof *s);
-  }
-  memcpy(strain, start, d * sizeof *strain);
-  if (p->solves) memcpy(z, kept, m * sizeof *z);
-  return far;
+  const double line_at_start = now[0] + now[1] * (start - *strain), unlike = line_at_start - s[0];
+  const int found = fabs(excess) <= 1e-3 * fabs(first);
+  *strain = start;
+  if (p->solves) memcpy(z, kept, p->variables * sizeof *z);
+  if (!found) return 0;
+  s[0] = line_at_start, s[1] = now[1];
+  return fabs(unlike);
 }
 
 /* Resultants r of cells whose strains grow from e0 to e1, and their derivatives D.
@@ -339,12 +306,8 @@ void respond(points *p)
         p->unlike = fmax(p->unlike, p->weight[i] * follow_prediction(p, w, predicted, s));
       }
       if (line) {
-        memcpy(line + d, s + d, d * d * sizeof *s);
-        for (int a = 0; a < d; ++a) {
-          line[a] = s[a];
-          for (int g = 0; g < d; ++g) line[a] -= s[d + d * a + g] * strain[g];
-        }
-        line += d + d * d, predicted += d + d * d;
+        line[0] = *strain, line[1] = s[0], line[2] = s[1];
+        line += LINE, predicted += LINE;
       }
       if (d == 1) add_answer(1, p->B + 3 * i, p->weight[i], s, r, D);
       else add_answer(d, p->B + 3 * d * i, p->weight[i], s, r, D);
@@ -413,8 +376,10 @@ void add_inelastic_tangent(void *self, const double *q, double *tangent)
   linearise(m);
   add_cells((void *)m->tangent, q, tangent);
   m->begins = 0;
-  memcpy(p->predicted, p->line, p->lines * sizeof *p->line);
-  p->predicts = 1;
+  if (p->line) {
+    memcpy(p->predicted, p->line, LINE * p->cells * p->of_cell * sizeof *p->line);
+    p->predicts = 1;
+  }
 }
 
 /* Largest stress of points, as a part of the forces, that is not yet that of their strains. */
