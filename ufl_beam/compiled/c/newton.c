@@ -73,7 +73,9 @@ int judge(equation *e, const double *q, int iteration, double residual, double s
     e->near |= residual * pow(e->rate, MORE) <= wanted;
   }
   e->slow += 1;
-  if (residual <= e->best / 2) e->best = residual, e->slow = 0;
+  /* Where laws are yet to be met, as when a connector has just been released, forces in balance are
+   * no measure of what follows. */
+  if (residual <= e->best / 2 && residual > wanted) e->best = residual, e->slow = 0;
   e->last = residual;
   return e->slow == e->patience ? STALLED : ITERATING;
 }
