@@ -41,7 +41,8 @@ def run_of(scene, steps, dt):
 def test_iterations_where_all_cells_yield(cells):
     """No step is cut, and no more than one iteration in three finds what yields; cf. elastic.
 
-    Branches chosen by strains take twice the elastic iterations in 1024 cells, and cut steps in 4096.
+    Branches chosen by strains take twice the elastic iterations in 1024 cells, and with 4096 cells
+    steps are cut.
     """
     steps, law = 15, ub.Hardening(limit=1.0, kinematic=10.0)
     elastic = run_of(thrown_beam(cells), steps, 0.01)

@@ -116,8 +116,7 @@ class StepEquation(Equation):
         """Return the largest residual of the laws of connectors and points, without dimension."""
         q1 = self.supports.in_plane(x)
         here = max((c.excess(q1, r, scale, moved) for c in self._couplings), default=0.0)
-        unlike = max((one.unlike for one in self._beams), default=0.0)
-        return self.share.largest(max(here, unlike / scale) if unlike else here)
+        return self.share.largest(max([here, *(one.missed(q1, scale) for one in self._beams)]))
 
     def working(self, x: Array, y: Array) -> Array:
         """Return the conjugates of residuals in the step ``y`` from ``x``."""

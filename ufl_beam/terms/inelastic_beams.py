@@ -22,6 +22,7 @@ from ufl_beam.mechanics.functional import virtual_work
 from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.fibres import Layout
+from ufl_beam.terms.compiled_points import CompiledPoints
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.material_points import Points
 from ufl_beam.terms.openings import SearchFlags
@@ -232,14 +233,17 @@ class InelasticBeams(Cells, ABC):
 class CompiledInelasticBeams(InelasticBeams):
     """Cells whose points answer, and whose forms are evaluated, in one loop in C."""
 
+    points: CompiledPoints
     _force: Kernel
     _tangent: Kernel
 
     def _prepare(self, forms: InelasticForms) -> None:
-        self._latest: Array = np.full(self._fields.share.size, np.nan)
+        share = self._fields.share
+        self._latest: Array = np.full(share.size, np.nan)
         self.points.predict()
         self._in_c = struct(
-            "inelastic", size=len(self._latest), latest=self._latest, **self.points.in_c,
+            "inelastic", size=share.size, latest=self._latest, points=self.points.points,
+            scene=share.grid.scene.size,
             strains=self._strains.kernel.cells, force=self._force.cells,
             tangent=self._tangent.cells, at_r=self._force.position(forms.r),
             at_b=self._tangent.position(forms.b), at_D=self._tangent.position(forms.D),
@@ -248,7 +252,7 @@ class CompiledInelasticBeams(InelasticBeams):
     def _begin(self) -> None:
         self._latest.fill(np.nan)
         self._in_c.begins = self._static
-        self._in_c.points.predicts = 0
+        self.points.points.predicts = 0
 
     def _forget(self) -> None:
         self._latest.fill(np.nan)
@@ -256,14 +260,14 @@ class CompiledInelasticBeams(InelasticBeams):
     def _respond(self, q1: Array) -> None:
         lib.respond_at(self._in_c, doubles(q1))
 
-    @property
-    def unlike(self) -> float:
-        """Largest stress of a point in the latest response that is not that of its strains."""
-        return float(self._in_c.points.unlike)
+    def demand(self) -> Loop | None:
+        """C function of :meth:`missed`."""
+        return loop("missed_by_points", self._in_c) if self.points.points.line else None
 
-    def demand(self) -> Loop:
-        """C function of :attr:`unlike`, as a part of the forces in the scene."""
-        return loop("missed_by_points", self._in_c)
+    def missed(self, q1: Array, scale: float) -> float:
+        """Largest force of a point at ``q1`` that is not that of its strain, over ``scale``."""
+        q = doubles(q1)
+        return float(lib.missed_by_points(self._in_c, q, q, scale, 0.0))
 
     def loops(self) -> tuple[Loop, Loop | None]:
         """The points, and two forms."""

@@ -44,17 +44,18 @@ class Cells(InternalForces):
     round-off of axial and shear stiffness, in which the bending of slender cells would be lost.
     """
 
-    unlike: float = 0.0
-    """Largest force in the latest residual that is not that of the configuration; N or N m."""
-
     _work_form: ufl.Form
     _q1: fem.Function
     _fields: Fields
     _A: Csr
 
     def demand(self) -> Loop | None:
-        """Return the C function of :attr:`unlike` with its data, if it is ever more than zero."""
+        """Return the C function of :meth:`missed` with its data, if it is ever more than zero."""
         return None
+
+    def missed(self, q1: Array, scale: float) -> float:
+        """Return how far the forces at ``q1`` are from those of its strains, over ``scale`` (N)."""
+        return 0.0
 
     def _coefficients(self, q1: Array) -> dict[fem.Function, Array]:
         """Values in the cells, at ``q1``, of what the virtual work depends on besides."""

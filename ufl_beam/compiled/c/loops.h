@@ -131,7 +131,7 @@ typedef struct {
    * see follow_prediction. */
   double *line, *predicted;
   int predicts;
-  double unlike; /* largest stress that is not yet that of the strains, see follow_prediction */
+  double *unlike; /* largest (N, V, M) of a point in the latest response that its strain has not */
 } points;
 
 /* Cells with points: forms of the strains, of the forces, which know the resultants r, and of their
@@ -141,6 +141,7 @@ typedef struct {
   const cells *strains, *force, *tangent;
   int at_r, at_b, at_D; /* where the coefficients of `force` and `tangent` have r, b and D */
   int size, begins;
+  double scene;   /* size */
   double *latest; /* the unknowns that the points responded to */
 } inelastic;
 

@@ -279,7 +279,8 @@ void respond(points *p)
   double s[3 + 9], *w = p->w, *r = p->r, *D = p->D, *line = p->line;
   const double *e0 = p->e0, *e1 = p->e1, *predicted = p->predicted;
   const int d = p->components;
-  *p->over = p->unlike = 0;
+  *p->over = 0;
+  memset(p->unlike, 0, 3 * sizeof *p->unlike);
   for (int c = 0; c < p->cells; ++c, e0 += 3, e1 += 3, r += 3, D += 9) {
     memset(D, 0, 9 * sizeof *D);
     for (int k = 0; k < 3; ++k) {
@@ -303,7 +304,9 @@ void respond(points *p)
         for (int a = 0; a < d * d; ++a)
           s[d + a] = a % (d + 1) ? 0 : p->theta * strain[2 * d + a / (d + 1)];
       } else if (p->predicts && !(w[TRACTION] < INFINITY)) {
-        p->unlike = fmax(p->unlike, p->weight[i] * follow_prediction(p, w, predicted, s));
+        const double unlike = p->weight[i] * follow_prediction(p, w, predicted, s);
+        for (int k = 0; k < 3 && unlike > 0; ++k)
+          p->unlike[k] = fmax(p->unlike[k], unlike * fabs(p->B[3 * i + k]));
       }
       if (line) {
         line[0] = *strain, line[1] = s[0], line[2] = s[1];
@@ -382,12 +385,14 @@ void add_inelastic_tangent(void *self, const double *q, double *tangent)
   }
 }
 
-/* Largest stress of points, as a part of the forces, that is not yet that of their strains. */
+/* Largest force of a point at q that is not that of its strain, as a part of the forces. */
 double missed_by_points(void *self, const double *q, const double *r, double scale, double moved)
 {
   const inelastic *m = self;
+  const double *unlike = m->points->unlike;
   respond_at(m, q);
-  return m->points->unlike > 0 ? m->points->unlike / scale : 0;
+  const double largest = fmax(fmax(unlike[0], unlike[1]), unlike[2] / m->scene);
+  return largest > 0 ? largest / scale : 0;
 }
 
 /* Take the end of the step as the new state.
