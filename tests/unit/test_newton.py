@@ -52,6 +52,28 @@ def test_iterations_where_all_cells_yield(cells):
     assert yields.iterations <= 1.5 * elastic.iterations
 
 
+@pytest.mark.parametrize("kinematic", [100.0, 1.0])
+def test_a_cantilever_that_yields_in_many_cells(kinematic):
+    """Deflection in closed form; forces are small, so that nothing else is nonlinear.
+
+    Beyond the yield moment the curvature has the plastic part (M - My)/K, from the clamp to where
+    M = P y is My.  The deflection is the integral of curvature times y, and P L/GA.
+    """
+    EI, GA, My, cells = 1e3, 1e6, 1e-3, 512
+    section = ub.Section(EA=1e6, GA=GA, EI=EI, bending=ub.Hardening(My, kinematic=kinematic))
+    beam = ub.Beam((0, 0), (1, 0), section, cells=cells)
+    load = ub.PointLoad(beam.end, force=(0, 2 * My), time=lambda t: t)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, progress=False)
+    P, b = 2 * My, 0.5
+    plastic = (P * (1 - b**3) / 3 - My * (1 - b**2) / 2) / kinematic
+    exact = P / 3 / EI + P / GA + plastic
+    # Moments are those of the middles of cells: of order h².
+    assert run.displacement(beam.end)[-1, 1] == pytest.approx(exact, rel=2 / cells**2)
+    assert run.parts == 4
+    assert run.iterations <= 4 * 5
+
+
 def test_a_hinge_that_flows_to_and_fro():
     """No step is cut."""
     assert run_of(hinged_frame(), 100, 1e-3).iterations <= 5 * 100
