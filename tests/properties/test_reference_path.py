@@ -19,8 +19,12 @@ from ufl_beam.terms.connectors import ReferenceCouplings
 from ufl_beam.terms.reference_points import ReferencePoints
 from ufl_beam.terms.reference_slips import ReferenceSlips
 
-WANDERING = (19, 25, 26, 32, 36, 38)
-"""Scenes in whose steps Newton's method wanders, so that round-off decides where a step is cut."""
+WANDERING = (1, 19, 25, 26, 32, 36, 38, 45)
+"""Scenes in whose steps Newton's method wanders, so that round-off decides where a step is cut.
+
+In 1 and 45 that of the reference path needs more cuts: its points choose between flow and elastic
+response by strains.
+"""
 
 SEEDS = [seed for seed in range(48) if seed not in WANDERING]
 """Scenes that have, between them, every object, law and scheme that `any_scene` draws."""

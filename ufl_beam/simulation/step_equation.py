@@ -120,10 +120,10 @@ class StepEquation(Equation):
         return opened
 
     def missed(self, x: Array, r: Array, scale: float, moved: float) -> float:
-        """Return the largest residual of the laws of connectors, without dimension."""
+        """Return the largest residual of the laws of connectors and points, without dimension."""
         q1 = self.supports.in_plane(x)
         here = max((c.excess(q1, r, scale, moved) for c in self._couplings), default=0.0)
-        return self.share.largest(here) if self.share.grid.scene.links else 0.0
+        return self.share.largest(max([here, *(one.missed(q1, scale) for one in self._beams)]))
 
     def working(self, x: Array, y: Array) -> Array:
         """Return the conjugates of residuals in the step ``y`` from ``x``."""
@@ -155,7 +155,8 @@ class StepEquation(Equation):
             held=len(supports.dofs), hold=supports.dofs.astype(np.int32),
             reactions=supports.reactions, pivots=supports.pivots,
         )  # fmt: skip
-        self.demand([one.demand() or self.demand_in_python(one.excess) for one in self._couplings])
+        demands = [one.demand() or self.demand_in_python(one.excess) for one in self._couplings]
+        self.demand([*demands, *filter(None, (one.demand() for one in self._beams))])
         self.in_c = True
 
     def _in_python(self, term: Term) -> tuple[Loop, Loop]:

@@ -120,7 +120,7 @@ class CompiledPoints(Points):
             components=self._components, variables=len(law.variables),
             strain=inputs(layout).index(rows(law, "strain")[0]),
             e0=self._e0, e1=self.strains, r=self.r, D=self.D, kept=self.kept, sum=self.sums,
-            over=self.over, search=self._search.flags,
+            over=self.over, unlike=np.zeros(3), search=self._search.flags,
         )  # fmt: skip
 
     @property
@@ -134,8 +134,15 @@ class CompiledPoints(Points):
         if self._solves:
             self.points.tried = 0
 
+    def predict(self) -> None:
+        """Let tangents predict stresses where points yield, see follow_prediction in C."""
+        if self._components == 1 and self._yields:
+            lines = np.zeros((2, *self._storage.shape[:2], int(lib.LINE)))
+            fill(self.points, line=lines[0], predicted=lines[1])
+
     def respond(self, strains: Array) -> tuple[Array, Array]:
-        """Answer the strains of an iterate."""
+        """Answer strains, whatever the last tangent predicts."""
+        self.points.predicts = 0
         self.strains[:] = strains
         lib.respond(self.points)
         return self.r, self.D

@@ -248,14 +248,17 @@ class InelasticBeams(Cells, ABC):
 class CompiledInelasticBeams(InelasticBeams):
     """Cells whose points answer, and whose forms are evaluated, in one loop in C."""
 
+    points: CompiledPoints
     _force: Kernel
     _tangent: Kernel
-    points: CompiledPoints
 
     def _prepare(self, forms: InelasticForms) -> None:
-        self._latest: Array = np.full(self._fields.share.size, np.nan)
+        share = self._fields.share
+        self._latest: Array = np.full(share.size, np.nan)
+        self.points.predict()
         self._in_c = struct(
-            "inelastic", size=len(self._latest), latest=self._latest, **self.points.in_c,
+            "inelastic", size=share.size, latest=self._latest, points=self.points.points,
+            scene=share.grid.scene.size,
             strains=self._strains.kernel.cells, force=self._force.cells,
             tangent=self._tangent.cells, at_r=self._force.position(forms.r),
             at_b=self._tangent.position(forms.b), at_D=self._tangent.position(forms.D),
@@ -264,12 +267,22 @@ class CompiledInelasticBeams(InelasticBeams):
     def _begin(self) -> None:
         self._latest.fill(np.nan)
         self._in_c.begins = self._static
+        self.points.points.predicts = 0
 
     def _forget(self) -> None:
         self._latest.fill(np.nan)
 
     def _respond(self, q1: Array) -> None:
         lib.respond_at(self._in_c, doubles(q1))
+
+    def demand(self) -> Loop | None:
+        """C function of :meth:`missed`."""
+        return loop("missed_by_points", self._in_c) if self.points.points.line else None
+
+    def missed(self, q1: Array, scale: float) -> float:
+        """Largest force of a point at ``q1`` that is not that of its strain, over ``scale``."""
+        q = doubles(q1)
+        return float(lib.missed_by_points(self._in_c, q, q, scale, 0.0))
 
     def loops(self) -> tuple[Loop, Loop | None]:
         """The points, and two forms."""

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import ufl
 
 from ufl_beam.arrays import Array
+from ufl_beam.compiled.c_library import Loop
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import CellForm, stated
 from ufl_beam.discretization.function_spaces import Fields
@@ -47,6 +48,14 @@ class Cells(InternalForces):
     _q1: fem.Function
     _fields: Fields
     _A: Csr
+
+    def demand(self) -> Loop | None:
+        """Return the C function of :meth:`missed` with its data, if it is ever more than zero."""
+        return None
+
+    def missed(self, q1: Array, scale: float) -> float:
+        """Return how far the forces at ``q1`` are from those of its strains, over ``scale`` (N)."""
+        return 0.0
 
     def _coefficients(self, q1: Array) -> dict[fem.Function, Array]:
         """Values in the cells, at ``q1``, of what the virtual work depends on besides."""

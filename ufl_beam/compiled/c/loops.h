@@ -114,6 +114,8 @@ enum { MOST_VARIABLES = 16, MOST_CORRECTIONS = 100 }; /* of a law */
 
 enum { POINT_KEPT = 6, POINT_SUMS = 7 }; /* numbers of a cell, and of all: `kept` and `sum` of points */
 
+enum { LINE = 3 }; /* strain, stress and slope: what a tangent knows of a point */
+
 /* Flags that all points of a scene share in a step; see SearchFlags in material_points.py. */
 enum search { OPENED, STIFF, HOLD, OVER, SEARCH_FLAGS };
 
@@ -130,6 +132,11 @@ typedef struct {
   double *e0, *e1, *w, *r, *D, *kept, *sum;
   double *over; /* largest excess of a closed point over its limit in the latest response */
   int tried;    /* whether an iterate of the step was answered */
+  /* Lines of points of one strain: of the latest response, and of the last tangent if it `predicts`;
+   * see follow_prediction. */
+  double *line, *predicted;
+  int predicts;
+  double *unlike; /* largest (N, V, M) of a point in the latest response that its strain has not */
 } points;
 
 /* Cells with points: forms of the strains, of the forces, which know the resultants r, and of their
@@ -139,6 +146,7 @@ typedef struct {
   const cells *strains, *force, *tangent;
   int at_r, at_b, at_D; /* where the coefficients of `force` and `tangent` have r, b and D */
   int size, begins;
+  double scene;   /* size */
   double *latest; /* the unknowns that the points responded to */
 } inelastic;
 
@@ -192,6 +200,7 @@ void release(const points *p, double least);
 void respond_at(const inelastic *m, const double *q);
 void add_inelastic_force(void *self, const double *q, double *r);
 void add_inelastic_tangent(void *self, const double *q, double *tangent);
+double missed_by_points(void *self, const double *q, const double *r, double scale, double moved);
 void commit(points *p);
 
 /* -- elimination along chains ------------------------------------------------------------------ */

@@ -193,7 +193,7 @@ static void begin_points(points *p, double *dt, double new_dt)
     *dt = new_dt;
     for (int k = 0; k < p->cells * p->of_cell; ++k) p->w[k * p->width + DT] = new_dt;
   }
-  p->tried = 0;
+  p->tried = p->predicts = 0;
 }
 
 /* What points dissipated in the step, into the ledger. */

@@ -220,6 +220,51 @@ static inline void add_answer(int d, const double *b, double weight, const doubl
     }
 }
 
+/* Resistance of a point to a change of its branch beside the stress that was predicted, as a part of
+ * the elastic stiffness: without any, material that flows freely had no strain for a stress. */
+static const double BESIDE_STRESS = 0.01;
+
+/* Deviation from the prediction up to which a point answers as it does, as a part of what an elastic
+ * one would bear for the change of its strain; and digits of strains. */
+static const double ALIKE = 0.01, DIGITS = 1e-9;
+
+/* Let a point of one strain answer as on the branch on which it bears what the last tangent predicts.
+ *
+ * Tangents are lines, (strain, stress, slope) of each point. Where a point leaves its line, as one that
+ * begins to flow or to unload, the strain of the iterate is wrong by as much as the line was, and the
+ * more the softer it is. Its stress is right by equilibrium, and smooth along a beam, however fine the
+ * cells. So the next line is the tangent at the strain that goes with this stress, and the residual is
+ * that of this line: Newton's method for strains and stresses as unknowns, the stresses condensed.
+ *
+ * s, the stress and its derivative, changes; returns how far the stress is from that of the strain.
+ */
+static double follow_prediction(const points *p, double *w, const double *line, double *s)
+{
+  double *strain = w + p->strain, *z = strain + 3 + p->variables, now[2], kept[MOST_VARIABLES];
+  const double start = *strain, elastic = strain[2], predicted = line[1] + line[2] * (start - line[0]);
+  const double beside = BESIDE_STRESS * p->theta * elastic, first = s[0] - predicted;
+  if (!(fabs(first) > elastic * (ALIKE * fabs(start - line[0]) + DIGITS * fabs(start)))) return 0;
+  if (p->solves) memcpy(kept, z, p->variables * sizeof *z);
+  double excess = first;
+  memcpy(now, s, sizeof now);
+  for (int i = 0; i < 20 && fabs(excess) > 1e-3 * fabs(first); ++i) {
+    const double from = *strain, change = excess / (now[1] + beside), before = fabs(excess);
+    for (double way = 1; way > 1e-3; way /= 2) {
+      *strain = from - way * change;
+      answer(p, w, now);
+      excess = now[0] - predicted + beside * (*strain - start);
+      if (fabs(excess) <= (1 - way / 10) * before) break;
+    }
+  }
+  const double line_at_start = now[0] + now[1] * (start - *strain), unlike = line_at_start - s[0];
+  const int found = fabs(excess) <= 1e-3 * fabs(first);
+  *strain = start;
+  if (p->solves) memcpy(z, kept, p->variables * sizeof *z);
+  if (!found) return 0;
+  s[0] = line_at_start, s[1] = now[1];
+  return fabs(unlike);
+}
+
 /* Resultants r of cells whose strains grow from e0 to e1, and their derivatives D.
  *
  * `search` notes that a point opens, and may ask for stiff points: those that do not open answer
@@ -231,10 +276,11 @@ static inline void add_answer(int d, const double *b, double weight, const doubl
  */
 void respond(points *p)
 {
-  double s[3 + 9], *w = p->w, *r = p->r, *D = p->D;
-  const double *e0 = p->e0, *e1 = p->e1;
+  double s[3 + 9], *w = p->w, *r = p->r, *D = p->D, *line = p->line;
+  const double *e0 = p->e0, *e1 = p->e1, *predicted = p->predicted;
   const int d = p->components;
   *p->over = 0;
+  memset(p->unlike, 0, 3 * sizeof *p->unlike);
   for (int c = 0; c < p->cells; ++c, e0 += 3, e1 += 3, r += 3, D += 9) {
     memset(D, 0, 9 * sizeof *D);
     for (int k = 0; k < 3; ++k) {
@@ -257,6 +303,14 @@ void respond(points *p)
       } else if (p->search[STIFF]) {
         for (int a = 0; a < d * d; ++a)
           s[d + a] = a % (d + 1) ? 0 : p->theta * strain[2 * d + a / (d + 1)];
+      } else if (p->predicts && !(w[TRACTION] < INFINITY)) {
+        const double unlike = p->weight[i] * follow_prediction(p, w, predicted, s);
+        for (int k = 0; k < 3 && unlike > 0; ++k)
+          p->unlike[k] = fmax(p->unlike[k], unlike * fabs(p->B[3 * i + k]));
+      }
+      if (line) {
+        line[0] = *strain, line[1] = s[0], line[2] = s[1];
+        line += LINE, predicted += LINE;
       }
       if (d == 1) add_answer(1, p->B + 3 * i, p->weight[i], s, r, D);
       else add_answer(d, p->B + 3 * d * i, p->weight[i], s, r, D);
@@ -325,6 +379,20 @@ void add_inelastic_tangent(void *self, const double *q, double *tangent)
   linearise(m);
   add_cells((void *)m->tangent, q, tangent);
   m->begins = 0;
+  if (p->line) {
+    memcpy(p->predicted, p->line, LINE * p->cells * p->of_cell * sizeof *p->line);
+    p->predicts = 1;
+  }
+}
+
+/* Largest force of a point at q that is not that of its strain, as a part of the forces. */
+double missed_by_points(void *self, const double *q, const double *r, double scale, double moved)
+{
+  const inelastic *m = self;
+  const double *unlike = m->points->unlike;
+  respond_at(m, q);
+  const double largest = fmax(fmax(unlike[0], unlike[1]), unlike[2] / m->scene);
+  return largest > 0 ? largest / scale : 0;
 }
 
 /* Take the end of the step as the new state.
@@ -384,5 +452,5 @@ void commit(points *p)
     sum[0] += plastic;
     sum[1] += broken;
   }
-  p->tried = 0;
+  p->tried = p->predicts = 0;
 }

@@ -55,7 +55,8 @@ int judge(equation *e, const double *q, int iteration, double residual, double s
   /* Small loads beside large ones, such as those that make columns buckle, are lost in a guess that
    * just meets the tolerance; the residual of an iterate is about the square of the one before. */
   const double enough = iteration < e->least ? SURE * wanted : wanted;
-  if (residual <= enough && demands_met(e, q, scale)) return CONVERGED;
+  const int met = residual > wanted || demands_met(e, q, scale);
+  if (residual <= enough && met) return CONVERGED;
   const int kept = e->near;
   e->near = 0;
   if (iteration > 1) {
@@ -73,7 +74,10 @@ int judge(equation *e, const double *q, int iteration, double residual, double s
     e->near |= residual * pow(e->rate, MORE) <= wanted;
   }
   e->slow += 1;
-  if (residual <= e->best / 2) e->best = residual, e->slow = 0;
+  /* Where laws are yet to be met, as when a connector has just been released, it is no measure for
+   * what follows that forces are in balance. */
+  const double size = met ? residual : scale;
+  if (size <= e->best / 2) e->best = size, e->slow = 0;
   e->last = residual;
   return e->slow == e->patience ? STALLED : ITERATING;
 }
