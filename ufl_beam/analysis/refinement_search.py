@@ -5,9 +5,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from statistics import geometric_mean
 
 import numpy as np
 
@@ -19,8 +18,13 @@ from ufl_beam.errors import SceneError, TradeoffError
 
 MOST_DOUBTS, MOST_TRIALS = 4, 3  # refinements without self-convergence; settings tried
 MOST_EFFORT = 10.0  # steps of all runs take at most so many times those of the recommended one
+PILOT_EFFORT = 5.0  # the same of the runs before the first choice is tried
+LIMIT_SHARE = 0.2  # part of a tolerance up to which a limit may be uncertain
+LEAST_PART = 0.1  # part of the error below which a dial is not refined to check it
+LEAST_LARGER = 0.1  # errors of one run may be smaller than predicted by chance
 LAST_RUNS = 2.0  # the choice itself, and once more with other options of Newton's method
 MOST_LEVELS = 2  # levels by which a dial is refined at once: the estimates of coarse runs err
+REACH = 3  # levels from a base to the finest choice by its runs, which is extrapolated by one
 ROUNDING = 1e-9  # part of a quantity up to which changes are of rounding or Newton's method
 STEP_ORDER = 2.0  # order of the schemes, at most; that of cells is twice their degree
 
@@ -60,15 +64,43 @@ class RefinementSearch:
         self.family = families[0]
         self.notes: list[str] = []
         self._runs, self._families, self._target = runs, families, target
-        # Times of settings over the cost that was fitted: machines are noisy
-        self._slower: list[float] = []
-        self._larger: list[float] = []  # the same for errors
 
     def find(self, others: Sequence[Found]) -> Found:
         """Find the setting; TradeoffError if none serves, or ``others`` are better."""
+        prediction = self._approach(others)
+        tried: list[Found] = []
+        while True:
+            choice = self._target.choose(prediction)
+            if not self._target.serves(choice):
+                raise TradeoffError(
+                    f"no setting serves; the nearest takes {choice.seconds:.3g} s and has errors "
+                    f"of {choice.ratio:.2g} {self._target.measure}; steps and cells as they are "
+                    "given are the coarsest, and the last digits of a quantity are not known"
+                )
+            known = Refinement(self.family, choice.refine, choice.level)
+            if known in (one.run.refinement for one in tried):
+                break
+            found = self._try(known, prediction)
+            if not tried:
+                found = self._checked(found)
+            tried = [Found(one.run, found.prediction) for one in tried] + [found]
+            last = found.run.stepping
+            spent = self._stepping(prediction) + LAST_RUNS * last > MOST_EFFORT * last
+            accepted = self._target.accepts(found.run.seconds, found.ratio)
+            if accepted or spent or len(tried) == MOST_TRIALS:
+                break
+            slower = found.run.seconds / prediction.seconds(*_parts(choice))
+            larger = found.ratio / found.choice.likely if found.choice.likely > 0 else 1.0
+            prediction = replace(
+                found.prediction, larger=max(larger, LEAST_LARGER) * found.prediction.larger,
+                cost=prediction.cost.slower(slower),
+            )  # fmt: skip
+        return min(tried, key=lambda one: one.rank(self._target))
+
+    def _approach(self, others: Sequence[Found]) -> Prediction:
+        """Run finer and finer settings until they predict the one that serves."""
         target, doubts = self._target, list[str]()
         base, whole = self._begin(doubts), False
-        tried: list[Found] = []
         while True:
             prediction, doubt, moved = self._predict(self.family, base, whole=whole)
             if prediction is None:
@@ -76,42 +108,49 @@ class RefinementSearch:
                 continue
             choice = target.choose(prediction)
             # Of what is doubtful only half of the effort is spent: the choice may become cheaper.
-            if doubt and self._affords(prediction, choice, moved, whole=whole, part=0.35):
+            if doubt and self._affords(prediction, choice, moved, whole=whole, part=0.5):
                 base = self._doubt(doubts, doubt, moved)
                 continue
             aim = target.objective(choice)
             if any(aim > 2 * target.objective(one.choice) for one in others):
                 raise TradeoffError("given up, others are better")
-            serves = target.serves(choice)
-            goal = self._home(base, choice)
+            goal, serves = self._home(base, choice), target.serves(choice)
             if not serves and goal == base and choice.seconds <= BUDGET_AIM * target.bounds[0]:
                 more = prediction.bottleneck(choice)
                 goal = base[0] + more[0], base[1] + more[1]
             if goal != base and self._affords(prediction, choice, goal, whole=whole):
                 base = goal
-                continue
-            if not serves:
-                raise TradeoffError(
-                    f"no setting serves; the nearest takes {choice.seconds:.3g} s and has errors "
-                    f"of {choice.ratio:.2g} {target.measure}; steps and cells as they are "
-                    "given are the coarsest, and the last digits of a quantity are not known"
-                )
-            if not whole and self._affords(prediction, choice, base, whole=True):
+            elif serves and not whole and self._affords(prediction, choice, base, whole=True):
                 whole = True
-                continue
-            found = self._try(choice, prediction)
-            if doubt:
-                self.notes.append(f"the order of convergence is not seen:{doubt}")
-            known = found.run.refinement in (one.run.refinement for one in tried)
-            tried.append(found)
-            if target.accepts(found.run.seconds, found.ratio):
-                return found
-            spent = self._stepping(prediction) + LAST_RUNS * found.run.stepping
-            if known or len(tried) == MOST_TRIALS or spent > MOST_EFFORT * found.run.stepping:
-                return min(tried, key=lambda one: one.rank(target))
-            self._slower.append(found.run.seconds / prediction.seconds(*_parts(choice)))
-            if choice.likely > 0 and found.ratio > 0:
-                self._larger.append(found.ratio / choice.likely * _mean(self._larger))
+            else:
+                if doubt:
+                    self.notes.append(f"the order of convergence is not seen:{doubt}")
+                return prediction
+
+    def _checked(self, found: Found) -> Found:
+        """Sharpen the limits, if they are not known well, by a run that is twice as fine."""
+        allowed = self._target.bounds[1]
+        prediction, (family, refine, level, _) = found.prediction, found.run.refinement
+        crosses, units = prediction.crosses, prediction.units
+        unsure = max(cross.uncertainty / units[name] for name, cross in crosses.items())
+        if unsure <= LIMIT_SHARE * allowed:
+            return found
+        i = math.log2(refine)
+        parts = [
+            max(getattr(cross, dial).at(at) / units[name] for name, cross in crosses.items())
+            for dial, at in (("cells", i), ("steps", level))
+        ]
+        cells, steps = (part > LEAST_PART * sum(parts) for part in parts)
+        finer = Refinement(family, refine * (1 + cells), level + steps)
+        self._runs.run([finer])
+        if finer in self._runs.failed:
+            return found
+        fine = self._runs.runs[finer].values
+        better = {
+            name: cross.sharpened(found.run.values[name], fine[name], (i, level), (i + cells, level + steps))
+            for name, cross in crosses.items()
+        }
+        return Found(found.run, replace(prediction, crosses=better))
 
     def _begin(self, doubts: list[str]) -> Level:
         """Choose the family by coarse runs; return their base."""
@@ -140,18 +179,17 @@ class RefinementSearch:
         """Return the base from which three levels reach the choice, or one on the way there."""
         wanted = math.log2(choice.refine), choice.level
         i, j = (
-            min(max(old, math.ceil(level - 1e-9) - 2), old + MOST_LEVELS)
+            min(max(old, math.ceil(level - 1e-9) - REACH), old + MOST_LEVELS)
             for old, level in zip(base, wanted, strict=True)
         )
         return i, j
 
-    def _try(self, choice: Choice, prediction: Prediction) -> Found:
+    def _try(self, one: Refinement, prediction: Prediction) -> Found:
         """Run a choice."""
-        one, runs = Refinement(self.family, choice.refine, choice.level), self._runs
-        runs.run([one])
-        if one in runs.failed:
-            raise TradeoffError(f"the chosen setting failed: {runs.failed[one]}")
-        return Found(runs.runs[one], prediction)
+        self._runs.run([one])
+        if one in self._runs.failed:
+            raise TradeoffError(f"the chosen setting failed: {self._runs.failed[one]}")
+        return Found(self._runs.runs[one], prediction)
 
     def _stepping(self, prediction: Prediction) -> float:
         """Wall time of all steps so far, but for the noise that a fit smooths; s."""
@@ -162,7 +200,7 @@ class RefinementSearch:
         )
 
     def _affords(
-        self, prediction: Prediction, choice: Choice, base: Level, *, whole: bool, part: float = 0.7
+        self, prediction: Prediction, choice: Choice, base: Level, *, whole: bool, part: float = 1.0
     ) -> bool:
         """Return whether the runs around a base may be done on the way to a choice."""
         more = sum(
@@ -171,7 +209,7 @@ class RefinementSearch:
             if self._at(self.family, one) not in self._runs.runs
         )
         last = prediction.stepping(*_parts(choice))
-        return self._stepping(prediction) + more <= part * (MOST_EFFORT - LAST_RUNS) * last
+        return self._stepping(prediction) + more <= part * PILOT_EFFORT * last
 
     @staticmethod
     def _at(family: int, level: Level) -> Refinement:
@@ -226,19 +264,15 @@ class RefinementSearch:
         """Return a prediction by the run of a base and the cost of all runs of its family."""
         done = [run for run in self._runs.of(family) if run.refinement.newton == 0]
         rows = [(run.steps, run.cells, run.building, run.stepping) for run in done]
-        cost = Cost.of(*np.array(rows).T).slower(_mean(self._slower))
+        cost = Cost.of(*np.array(rows).T)
         steps, cells = first.steps / 2**first.refinement.level, first.cells
         return Prediction(
             crosses, cost, steps, cells / float(first.refinement.refine), units,
             divisor=self._runs.divisor(family), coarsest=Fraction(1, first.dials.mesh.degree),
-            whole_steps=isinstance(first.dials.dt, float | int), larger=_mean(self._larger),
+            whole_steps=isinstance(first.dials.dt, float | int),
         )  # fmt: skip
 
 
 def _parts(choice: Choice) -> tuple[float, float]:
     """Return the parts of cells and steps."""
     return float(choice.refine), 2**choice.level
-
-
-def _mean(factors: Sequence[float]) -> float:
-    return geometric_mean(factors or [1.0])

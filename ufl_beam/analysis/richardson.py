@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy  # its parts are loaded when they are used
@@ -18,7 +18,10 @@ from ufl_beam.arrays import Array
 from ufl_beam.one_line import one_line
 
 Level = tuple[int, int]  # of the cells and of the steps
+Fineness = tuple[float, float]  # the same, not necessarily whole
+FASTEST, SLOWEST = 1 / 16, 1 / 2  # parts of an error that half as long cells and steps leave
 LEAST_ORDER = 0.5  # differences that fall more slowly than with this power show no convergence
+FIRST_ORDER = 1.0  # least power of predictions on levels finer than all: methods are consistent
 ORDER_TOLERANCE = 0.25  # an order so near to a whole one, up to that of the method, is trusted
 SURE, UNSURE = 1.25, 2.0  # safety factors on errors by a trusted order, and on others
 LEAST_COSINE = 0.5  # between successive changes; those that turn more are of no trusted order
@@ -85,8 +88,10 @@ class Convergence:
 
     def growth(self, level: float) -> float:
         """Predict the error at a level, not necessarily whole, over that of the finest."""
-        coarser = max(0.0, self.coarsest - level)
-        return float(2 ** (self.used * (self.finest - level - coarser) + self.method * coarser))
+        inside = self._seen(level)
+        fallen = self.used * (self.finest - inside) + self.method * (inside - min(inside, level))
+        finer = max(self.used, FIRST_ORDER) if self.used else 0.0
+        return float(2 ** (fallen - finer * (max(inside, level) - inside)))
 
     def lack(self, level: float) -> Array:
         """Predict what a level lacks of the limit, with its sign; unit of the quantity."""
@@ -121,6 +126,7 @@ class Cross:
     steps: Convergence  # with the steps
     limit: Array  # extrapolated value
     mixed: Array  # what refining both changes that refining each does not, extrapolated
+    uncertainty: float  # of the limit; unit of the quantity
 
     __repr__ = one_line
 
@@ -151,7 +157,8 @@ class Cross:
             mixed = values[i + 1, j + 1] - values[i + 1, j] - values[i, j + 1] + q
             mixed = mixed / math.prod(parts)
         limit = along[0][-1] + cells.rest + along[1][-1] + steps.rest - q + mixed
-        return cls(cells, steps, np.asarray(limit), np.asarray(mixed))
+        unsure = cells.doubt + steps.doubt + (size(mixed) + size(cells.rest) + size(steps.rest)) / 4
+        return cls(cells, steps, np.asarray(limit), np.asarray(mixed), unsure)
 
     @property
     def separate(self) -> bool:
@@ -175,11 +182,13 @@ class Cross:
         """Bound the error at levels that need not be whole; unit of the quantity."""
         return self.cells.at(i) + self.steps.at(j)
 
-    @property
-    def uncertainty(self) -> float:
-        """Uncertainty of the limit; unit of the quantity."""
-        doubts = self.cells.doubt + self.steps.doubt + size(self.mixed) / 4
-        return doubts + size(self.cells.rest) / 4 + size(self.steps.rest) / 4
+    def sharpened(self, value: Array, finer: Array, at: Fineness, finer_at: Fineness) -> Cross:
+        """Return it with the limit of two runs of which one is finer, by the predicted orders."""
+        change = finer - value
+        left = size(self.lack(*finer_at)) / max(size(self.lack(*at)), np.finfo(float).tiny)
+        left = min(max(left, FASTEST), SLOWEST)
+        rest = change * left / (1 - left)
+        return replace(self, limit=np.asarray(finer + rest), uncertainty=size(rest))
 
     def __str__(self) -> str:
         more = f"\n    together: {size(self.mixed):.1e} more than one by one"
