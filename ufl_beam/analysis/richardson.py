@@ -21,7 +21,6 @@ Level = tuple[int, int]  # of the cells and of the steps
 Fineness = tuple[float, float]  # the same, not necessarily whole
 FASTEST, SLOWEST = 1 / 16, 1 / 2  # parts of an error that half as long cells and steps leave
 LEAST_ORDER = 0.5  # differences that fall more slowly than with this power show no convergence
-FIRST_ORDER = 1.0  # least power of predictions on levels finer than all: methods are consistent
 ORDER_TOLERANCE = 0.25  # an order so near to a whole one, up to that of the method, is trusted
 SURE, UNSURE = 1.25, 2.0  # safety factors on errors by a trusted order, and on others
 LEAST_COSINE = 0.5  # between successive changes; those that turn more are of no trusted order
@@ -41,6 +40,7 @@ class Convergence:
     differences: tuple[float, ...]  # sizes of the changes from level to level
     order: float  # observed; NaN from two levels, where that of the method is taken
     aligned: bool  # whether the changes are of one direction
+    trusted: bool  # whether they fall with a whole order; else finer levels are of that in theory
     used: float  # order for predictions, at most that of the method; 0: no changes
     method: float  # order of the method; with it errors grow towards levels coarser than all
     rest: Array  # what the finest level lacks of the limit, with its sign
@@ -59,11 +59,11 @@ class Convergence:
         last = np.asarray(changes[-1])
         if max(sizes) <= floor:
             doubt = UNSURE * max(sizes)
-            return cls(finest, sizes, math.nan, False, 0.0, method, 0 * last, doubt)
+            return cls(finest, sizes, math.nan, False, True, 0.0, method, 0 * last, doubt)
         if len(sizes) == 1:
             rest = last / (2**method - 1)
             doubt = (UNSURE - 1) * size(rest)
-            return cls(finest, sizes, math.nan, True, method, method, rest, doubt)
+            return cls(finest, sizes, math.nan, True, False, method, method, rest, doubt)
         a, b = sizes
         order = math.log2(a / b) if min(a, b) > 0 else math.copysign(math.inf, a - b)
         lengths = math.prod(np.linalg.norm(change) for change in changes)
@@ -73,8 +73,9 @@ class Convergence:
         # What fell faster than the method can explain may have passed through zero.
         most = max(b, a / 2**method) / (2**used - 1)
         whole = any(abs(order - k) <= ORDER_TOLERANCE for k in range(1, round(method) + 1))
-        doubt = (SURE if aligned and whole else UNSURE) * most - size(rest)
-        return cls(finest, sizes, order, aligned, used, method, rest, doubt)
+        trusted = aligned and whole
+        doubt = (SURE if trusted else UNSURE) * most - size(rest)
+        return cls(finest, sizes, order, aligned, trusted, used, method, rest, doubt)
 
     @property
     def coarsest(self) -> int:
@@ -90,7 +91,7 @@ class Convergence:
         """Predict the error at a level, not necessarily whole, over that of the finest."""
         inside = self._seen(level)
         fallen = self.used * (self.finest - inside) + self.method * (inside - min(inside, level))
-        finer = max(self.used, FIRST_ORDER) if self.used else 0.0
+        finer = self.used if self.trusted else self.method
         return float(2 ** (fallen - finer * (max(inside, level) - inside)))
 
     def lack(self, level: float) -> Array:

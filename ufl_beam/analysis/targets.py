@@ -23,7 +23,9 @@ NEARLY_BEST = 2.0  # if nothing serves, the cheapest up to so many times the lea
 NEGLIGIBLE = 0.1  # changes up to this part of a tolerance need not converge
 WORST_USED = 0.3  # part of a tolerance that errors of a recommended setting use up, if they can
 LEAST_USED = 0.45  # the same of predicted errors, which may be wrong by a third
+HALVES = 1.5, 2.5, 3.5  # parts of a step besides the whole numbers
 MOST_TRIED = 2000  # settings whose errors are looked at with their signs
+MOST_USED = 0.85
 CANCELLED = 1.3  # times the cost of a setting whose errors may cancel that another one may cost
 
 
@@ -105,7 +107,8 @@ class Prediction:
         i, j = (level + EXTRAPOLATED_LEVELS for level in self.finest)
         least = math.ceil(self.coarsest * self.divisor)
         refine = [Fraction(k, self.divisor) for k in _spread(least, self.divisor * 2**i)]
-        parts = _spread(1, 2**j)
+        # Where the steps as given end, others end as well, but for the coarsest.
+        parts = sorted({*_spread(1, 2**j), *HALVES})
         if not self.whole_steps:
             parts = list(2 ** np.arange(0.0, j + 1e-9, 1 / CHOICES_PER_LEVEL))
         level = [math.log2(part) for part in parts]
@@ -124,16 +127,18 @@ class Prediction:
         What cancels is chance: such a run is more accurate than it must be.
         """
         order = np.argsort(np.where(allowed, choices.seconds, np.inf), axis=None, kind="stable")
-        first = None
-        for row, column in zip(*np.unravel_index(order[:MOST_TRIED], allowed.shape), strict=True):
+        rows, columns = np.unravel_index(order[: min(MOST_TRIED, allowed.sum())], allowed.shape)
+        accurate = None
+        for row, column in zip(rows, columns, strict=True):
             one = self.choice(choices.refine[row], choices.level[column])
-            first = first or one
-            if not allowed[row, column] or one.seconds > CANCELLED * first.seconds:
+            if one.likely > MOST_USED:
+                continue
+            accurate = accurate or one
+            if one.seconds > CANCELLED * accurate.seconds:
                 break
             if one.likely >= LEAST_USED:
                 return one
-        assert first is not None
-        return first
+        return accurate or self.choice(choices.refine[rows[0]], choices.level[columns[0]])
 
 
 def _spread(first: int, last: int) -> list[int]:
