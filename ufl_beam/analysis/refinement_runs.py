@@ -160,7 +160,9 @@ class RefinementRuns:
     def _take(self, one: Refinement, found: Mapping[str, Any]) -> None:
         """Keep a run, as the first process has measured it."""
         found = self.comm.bcast(found)
-        values = {name: np.asarray(found[f"quantity {n}"]) for n, name in enumerate(self.quantities)}
+        values = {
+            name: np.asarray(found[f"quantity {n}"]) for n, name in enumerate(self.quantities)
+        }
         self._shapes |= {name: value.shape for name, value in values.items()}
         measured = ("seconds", "building", "steps", "cells", "iterations")
         took = {name: float(found[name]) for name in measured}

@@ -19,6 +19,7 @@ from ufl_beam.errors import SceneError, TradeoffError
 MOST_DOUBTS, MOST_TRIALS = 4, 3  # refinements without self-convergence; settings tried
 MOST_EFFORT = 10.0  # steps of all runs take at most so many times those of the recommended one
 PILOT_EFFORT = 5.0  # the same of the runs before the first choice is tried
+DOUBTFUL = 0.5  # part of that effort on the way to a choice by orders that are not trusted
 LIMIT_SHARE = 0.2  # part of a tolerance up to which a limit may be uncertain
 LEAST_PART = 0.1  # part of the error below which a dial is not refined to check it
 LEAST_LARGER = 0.1  # errors of one run may be smaller than predicted by chance
@@ -77,7 +78,7 @@ class RefinementSearch:
                     f"of {choice.ratio:.2g} {self._target.measure}; steps and cells as they are "
                     "given are the coarsest, and the last digits of a quantity are not known"
                 )
-            known = Refinement(self.family, choice.refine, choice.level)
+            known = Refinement(self.family, *prediction.within_reach(choice))
             if known in (one.run.refinement for one in tried):
                 break
             found = self._try(known, prediction)
@@ -107,18 +108,20 @@ class RefinementSearch:
                 base = self._doubt(doubts, doubt, moved)
                 continue
             choice = target.choose(prediction)
-            # Of what is doubtful only half of the effort is spent: the choice may become cheaper.
-            if doubt and self._affords(prediction, choice, moved, whole=whole, part=0.5):
+            # On the way to what is doubtful less is spent: the choice may become cheaper.
+            part = DOUBTFUL if whole and not prediction.trusted else 1.0
+            if doubt and self._affords(prediction, choice, moved, whole=whole, part=part):
                 base = self._doubt(doubts, doubt, moved)
                 continue
             aim = target.objective(choice)
             if any(aim > 2 * target.objective(one.choice) for one in others):
                 raise TradeoffError("given up, others are better")
-            goal, serves = self._home(base, choice), target.serves(choice)
+            most = 1 if whole and not prediction.trusted else MOST_LEVELS
+            goal, serves = self._home(base, choice, most), target.serves(choice)
             if not serves and goal == base and choice.seconds <= BUDGET_AIM * target.bounds[0]:
                 more = prediction.bottleneck(choice)
                 goal = base[0] + more[0], base[1] + more[1]
-            if goal != base and self._affords(prediction, choice, goal, whole=whole):
+            if goal != base and self._affords(prediction, choice, goal, whole=whole, part=part):
                 base = goal
             elif serves and not whole and self._affords(prediction, choice, base, whole=True):
                 whole = True
@@ -147,7 +150,9 @@ class RefinementSearch:
             return found
         fine = self._runs.runs[finer].values
         better = {
-            name: cross.sharpened(found.run.values[name], fine[name], (i, level), (i + cells, level + steps))
+            name: cross.sharpened(
+                found.run.values[name], fine[name], (i, level), (i + cells, level + steps)
+            )
             for name, cross in crosses.items()
         }
         return Found(found.run, replace(prediction, crosses=better))
@@ -175,11 +180,11 @@ class RefinementSearch:
             raise TradeoffError("self-convergence is not seen" + "".join(doubts))
         return moved
 
-    def _home(self, base: Level, choice: Choice) -> Level:
+    def _home(self, base: Level, choice: Choice, most: int) -> Level:
         """Return the base from which three levels reach the choice, or one on the way there."""
         wanted = math.log2(choice.refine), choice.level
         i, j = (
-            min(max(old, math.ceil(level - 1e-9) - REACH), old + MOST_LEVELS)
+            min(max(old, math.ceil(level - 1e-9) - REACH), old + most)
             for old, level in zip(base, wanted, strict=True)
         )
         return i, j

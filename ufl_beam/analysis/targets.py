@@ -69,9 +69,16 @@ class Prediction:
         return cross.cells.finest, cross.steps.finest
 
     @property
-    def seen(self) -> bool:
-        """True if self-convergence of all quantities is seen."""
-        return all(cross.seen for cross in self.crosses.values())
+    def trusted(self) -> bool:
+        """True if all orders are those of theory, or nearly so."""
+        return all(cross.cells.trusted and cross.steps.trusted for cross in self.crosses.values())
+
+    def within_reach(self, choice: Choice) -> tuple[Fraction, float]:
+        """Return a choice, or what is nearest to it where orders can be relied on."""
+        i, j = (level + 1 for level in self.finest)
+        if self.trusted:
+            return choice.refine, choice.level
+        return min(choice.refine, Fraction(2**i)), min(choice.level, float(j))
 
     def choice(self, refine: Fraction, level: float) -> Choice:
         """Predict the time and the largest error, in its unit."""
