@@ -14,7 +14,7 @@ one JSON line per question to ``benchmarks/results/bench_tradeoff.jsonl``.
 import argparse
 import sys
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np

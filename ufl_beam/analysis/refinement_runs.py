@@ -121,7 +121,7 @@ class RefinementRuns:
         times = (
             run.seconds
             * 2 ** max(0.0, level - run.refinement.level)
-            * max(1.0, refine / run.refinement.refine)
+            * max(1.0, float(refine / run.refinement.refine))
             for run in self.of(refinement.family)
         )
         return min(times, default=0.0)

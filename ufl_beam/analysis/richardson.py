@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 import scipy  # its parts are loaded when they are used
@@ -17,6 +18,7 @@ import scipy  # its parts are loaded when they are used
 from ufl_beam.arrays import Array
 from ufl_beam.one_line import one_line
 
+Numbers = TypeVar("Numbers", float, Array)
 Level = tuple[int, int]  # of the cells and of the steps
 Fineness = tuple[float, float]  # the same, not necessarily whole
 FASTEST, SLOWEST = 1 / 16, 1 / 2  # parts of an error that half as long cells and steps leave
@@ -152,14 +154,14 @@ class Cross:
         along = [q, *(values[i + k, j] for k in more)], [q, *(values[i, j + k] for k in more)]
         cells = Convergence.of(along[0], i + more[-1], methods[0], floor)
         steps = Convergence.of(along[1], j + more[-1], methods[1], floor)
-        mixed = 0 * q
+        mixed = np.zeros_like(q)
         parts = [1 - 2**-dial.used for dial in (cells, steps)]
         if (i + 1, j + 1) in values and all(parts):
             mixed = values[i + 1, j + 1] - values[i + 1, j] - values[i, j + 1] + q
-            mixed = mixed / math.prod(parts)
+            mixed = np.asarray(mixed / math.prod(parts))
         limit = along[0][-1] + cells.rest + along[1][-1] + steps.rest - q + mixed
         unsure = cells.doubt + steps.doubt + (size(mixed) + size(cells.rest) + size(steps.rest)) / 4
-        return cls(cells, steps, np.asarray(limit), np.asarray(mixed), unsure)
+        return cls(cells, steps, np.asarray(limit), mixed, unsure)
 
     @property
     def separate(self) -> bool:
@@ -188,7 +190,7 @@ class Cross:
         change = finer - value
         left = size(self.lack(*finer_at)) / max(size(self.lack(*at)), np.finfo(float).tiny)
         left = min(max(left, FASTEST), SLOWEST)
-        rest = change * left / (1 - left)
+        rest = np.asarray(change * left / (1 - left))
         return replace(self, limit=np.asarray(finer + rest), uncertainty=size(rest))
 
     def __str__(self) -> str:
@@ -217,11 +219,11 @@ class Cost:
         times = (self.begin, self.begin_cell, self.step, self.cell)
         return Cost(*(factor * time for time in times))
 
-    def stepping(self, steps: Array, cells: Array) -> Array:
+    def stepping(self, steps: Numbers, cells: Numbers) -> Numbers:
         """Predict the wall time of the steps of runs; s."""
         return steps * (self.step + self.cell * cells)
 
-    def seconds(self, steps: Array, cells: Array) -> Array:
+    def seconds(self, steps: Numbers, cells: Numbers) -> Numbers:
         """Predict the wall time of runs; s."""
         return self.begin + self.begin_cell * cells + self.stepping(steps, cells)
 

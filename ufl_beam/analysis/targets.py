@@ -10,6 +10,7 @@ from fractions import Fraction
 from typing import NamedTuple, cast
 
 import numpy as np
+import numpy.typing as npt
 
 from ufl_beam.analysis.richardson import Cost, Cross, size
 from ufl_beam.arrays import Array
@@ -90,11 +91,11 @@ class Prediction:
 
     def seconds(self, refine: float, parts: float) -> float:
         """Predict the wall time; s."""
-        return float(self.cost.seconds(self.steps * parts, self.cells * refine))
+        return self.cost.seconds(self.steps * parts, self.cells * refine)
 
     def stepping(self, refine: float, parts: float) -> float:
         """Predict the wall time of the steps alone; s."""
-        return float(self.cost.stepping(self.steps * parts, self.cells * refine))
+        return self.cost.stepping(self.steps * parts, self.cells * refine)
 
     def bottleneck(self, choice: Choice) -> tuple[int, int]:
         """Refine by a level what has the larger part of the error, if that is not negligible."""
@@ -128,7 +129,7 @@ class Prediction:
         cells = self.cells * np.array([float(r) for r in refine])[:, None]
         return Choices(refine, level, self.cost.seconds(self.steps * np.array(parts), cells), ratio)
 
-    def cheapest(self, choices: Choices, allowed: Array) -> Choice:
+    def cheapest(self, choices: Choices, allowed: npt.NDArray[np.bool_]) -> Choice:
         """Choose the cheapest of some, or one that is hardly dearer if its errors may cancel.
 
         What cancels is chance: such a run is more accurate than it must be.
