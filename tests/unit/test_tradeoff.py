@@ -16,7 +16,8 @@ from ufl_beam.analysis import tradeoff
 
 COMM = MPI.COMM_WORLD
 SCENE = scenes.cantilever(cells=4)
-CELLS, STEP, SECONDS = 1e-2, 1e-1, 1e-4
+CELLS, STEP, SECONDS, BUILDING = 1e-2, 1e-1, 1e-4, 0.1
+LINEAR, STRICT = ub.Mesh(), ub.Newton()  # nothing else is tried
 
 
 def raises(*parts, kind=ub.SceneError):
@@ -31,8 +32,10 @@ def law(monkeypatch):
         def simulate(scene, *, scheme, t, dt, mesh, newton, progress):
             length = dt.tolerance ** (1 / 3) if isinstance(dt, ub.Adaptive) else dt
             steps, cells = round((t[1] - t[0]) / length), int(4 * mesh.refine)
+            whole = seconds(cells, steps)
             return SimpleNamespace(
-                seconds=seconds(cells, steps), parts=steps, iterations=2 * steps,
+                seconds=whole, building=BUILDING,
+                parts=steps, iterations=2 * steps,
                 grid=SimpleNamespace(cells=range(cells)),
                 value=1.0 + error(4 / cells, length, scheme, newton),
             )  # fmt: skip
@@ -47,10 +50,10 @@ def smooth(h, dt, scheme, newton):
     return CELLS * h**2 - STEP * dt**2
 
 
-def ask(*, scheme=None, dt=0.1, **goal):
+def ask(*, scheme=None, dt=0.1, mesh=LINEAR, newton=STRICT, **goal):
     return ub.tradeoff(
         SCENE, {"value": lambda s: s.value}, scheme=scheme or ub.Midpoint(), t=(0.0, 10.0), dt=dt,
-        **goal,
+        mesh=mesh, newton=newton, **goal,
     )  # fmt: skip
 
 
@@ -63,8 +66,10 @@ def test_a_tolerance_is_met_and_hardly_more(law, tolerance):
     found = ask(tolerance={"value": tolerance})
     best = found.best
     error = abs(best.values["value"] - 1.0)
-    assert error <= tolerance
-    assert abs(found.limit["value"] - 1.0) < 1e-9  # the laws are exact powers
+    assert 0.3 * tolerance <= error <= tolerance
+    assert found.effort <= 10
+    # The laws are exact powers; only the part of the error that a finer run leaves is estimated.
+    assert abs(found.limit["value"] - 1.0) < 0.01 * tolerance
     # The cheapest of all settings whose errors, not cancelling, are below the tolerance
     settings = ((r, 100 * 2 ** (k / 16)) for r in range(1, 256) for k in range(16 * 10))
     cheapest = min(
@@ -72,8 +77,9 @@ def test_a_tolerance_is_met_and_hardly_more(law, tolerance):
         for r, n in settings
         if CELLS / r**2 + STEP * (10 / n) ** 2 <= tolerance
     )
-    # A safety factor of 1.25 on errors of second order is 1.12 times as many cells and steps.
-    assert best.seconds <= 1.3 * cheapest
+    # A safety factor of 1.25 on errors of second order is 1.12 times as many cells and steps; and
+    # a setting may cost 1.3 times as much so that errors do not cancel.
+    assert best.seconds <= 1.3**2 * cheapest
     assert found.ratio(best) == pytest.approx(error / tolerance, rel=1e-3)
     assert found.spent >= sum(run.seconds for run in found.runs)
 
@@ -304,7 +310,8 @@ def test_a_vibration():
     )
     size = np.abs(history(fine)).max()
     assert np.abs(found.best.values["tip"] - history(fine)).max() < 0.02 * size
-    assert found.crosses["tip"].cells.order == pytest.approx(2.0, abs=0.3)
+    order = 2 * found.best.dials.mesh.degree
+    assert found.crosses["tip"].cells.method == order
     assert len({run.refinement for run in found.runs}) == len(found.runs)
     texts = COMM.allgather(str(found))
     assert len(set(texts)) == 1

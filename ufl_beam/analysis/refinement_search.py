@@ -24,6 +24,7 @@ LIMIT_SHARE = 0.2  # part of a tolerance up to which a limit may be uncertain
 LEAST_PART = 0.1  # part of the error below which a dial is not refined to check it
 LEAST_LARGER = 0.1  # errors of one run may be smaller than predicted by chance
 LAST_RUNS = 2.0  # the choice itself, and once more with other options of Newton's method
+RECEDING = 1.5  # a choice that grows by this factor shows that orders are not those of theory
 MOST_LEVELS = 2  # levels by which a dial is refined at once: the estimates of coarse runs err
 REACH = 3  # levels from a base to the finest choice by its runs, which is extrapolated by one
 ROUNDING = 1e-9  # part of a quantity up to which changes are of rounding or Newton's method
@@ -101,7 +102,7 @@ class RefinementSearch:
     def _approach(self, others: Sequence[Found]) -> Prediction:
         """Run finer and finer settings until they predict the one that serves."""
         target, doubts = self._target, list[str]()
-        base, whole = self._begin(doubts), False
+        base, whole, before = self._begin(doubts), False, math.inf
         while True:
             prediction, doubt, moved = self._predict(self.family, base, whole=whole)
             if prediction is None:
@@ -121,11 +122,16 @@ class RefinementSearch:
             if not serves and goal == base and choice.seconds <= BUDGET_AIM * target.bounds[0]:
                 more = prediction.bottleneck(choice)
                 goal = base[0] + more[0], base[1] + more[1]
-            if goal != base and self._affords(prediction, choice, goal, whole=whole, part=part):
+            recedes, before = choice.seconds > RECEDING * before, choice.seconds
+            if recedes and not whole:
+                whole = True  # changes do not fall as in theory
+            elif goal != base and self._affords(prediction, choice, goal, whole=whole, part=part):
                 base = goal
             elif serves and not whole and self._affords(prediction, choice, base, whole=True):
                 whole = True
             else:
+                if doubt and not serves:
+                    raise TradeoffError("self-convergence is not seen" + "".join([*doubts, doubt]))
                 if doubt:
                     self.notes.append(f"the order of convergence is not seen:{doubt}")
                 return prediction

@@ -119,7 +119,8 @@ def tradeoff(
     steps: tuple[float | Adaptive, ...] = _several(dt, object, "dt")
     for i, step in enumerate(steps):
         if not isinstance(step, Adaptive):
-            require_number(step, f"tradeoff: dt[{i}]" if len(steps) > 1 else "tradeoff: dt")
+            what = f"tradeoff: dt[{i}]" if len(steps) > 1 else "tradeoff: dt"
+            require_number(step, what, positive=True)
     families = [Dials(*one, newtons[0]) for one in product(schemes, steps, meshes)]
     with progress_bar(progress, comm, unit="run", bar_format=BAR) as bar:
         runs = RefinementRuns(
