@@ -88,8 +88,9 @@ class RefinementSearch:
             tried = [Found(one.run, found.prediction) for one in tried] + [found]
             last = found.run.stepping
             spent = self._stepping(prediction) + LAST_RUNS * last > MOST_EFFORT * last
-            accepted = self._target.accepts(found.run.seconds, found.ratio)
-            if accepted or spent or len(tried) == MOST_TRIALS:
+            if self._target.accepts(found.run.seconds, found.ratio):
+                return found
+            if spent or len(tried) == MOST_TRIALS:
                 break
             slower = found.run.seconds / prediction.seconds(*_parts(choice))
             larger = found.ratio / found.choice.likely if found.choice.likely > 0 else 1.0

@@ -79,6 +79,10 @@ class Convergence:
         doubt = (SURE if trusted else UNSURE) * most - size(rest)
         return cls(finest, sizes, order, aligned, trusted, used, method, rest, doubt)
 
+    def confirmed(self) -> Convergence:
+        """Return it with the doubts of a trusted order."""
+        return replace(self, doubt=min(self.doubt, (SURE - 1) * size(self.rest)))
+
     @property
     def coarsest(self) -> int:
         """The coarsest of the levels."""
@@ -186,12 +190,17 @@ class Cross:
         return self.cells.at(i) + self.steps.at(j)
 
     def sharpened(self, value: Array, finer: Array, at: Fineness, finer_at: Fineness) -> Cross:
-        """Return it with the limit of two runs of which one is finer, by the predicted orders."""
+        """Return it with the limit of two runs of which one is finer, by the predicted orders.
+
+        Now that the sum of the errors is measured, both are trusted up to a factor.
+        """
         change = finer - value
         left = size(self.lack(*finer_at)) / max(size(self.lack(*at)), np.finfo(float).tiny)
         left = min(max(left, FASTEST), SLOWEST)
         rest = np.asarray(change * left / (1 - left))
-        return replace(self, limit=np.asarray(finer + rest), uncertainty=size(rest))
+        cells, steps = self.cells.confirmed(), self.steps.confirmed()
+        limit = np.asarray(finer + rest)
+        return Cross(cells, steps, limit, self.mixed, uncertainty=size(rest))
 
     def __str__(self) -> str:
         more = f"\n    together: {size(self.mixed):.1e} more than one by one"
