@@ -24,6 +24,7 @@ LIMIT_SHARE = 0.2  # part of a tolerance up to which a limit may be uncertain
 LEAST_PART = 0.1  # part of the error below which a dial is not refined to check it
 LEAST_LARGER = 0.1  # errors of one run may be smaller than predicted by chance
 LAST_RUNS = 2.0  # the choice itself, and once more with other options of Newton's method
+GIVEN_UP = 2.0  # times the cost of another kind of settings, or its error, that is too much
 RECEDING = 1.5  # a choice that grows by this factor shows that orders are not those of theory
 MOST_LEVELS = 2  # levels by which a dial is refined at once: the estimates of coarse runs err
 REACH = 3  # levels from a base to the finest choice by its runs, which is extrapolated by one
@@ -116,7 +117,7 @@ class RefinementSearch:
                 base = self._doubt(doubts, doubt, moved)
                 continue
             aim = target.objective(choice)
-            if any(aim > 2 * target.objective(one.choice) for one in others):
+            if any(aim > GIVEN_UP * target.objective(one.choice) for one in others):
                 raise TradeoffError("given up, others are better")
             most = 1 if whole and not prediction.trusted else MOST_LEVELS
             goal, serves = self._home(base, choice, most), target.serves(choice)

@@ -89,6 +89,11 @@ class Convergence:
         return self.finest - len(self.differences)
 
     @property
+    def unknown(self) -> bool:
+        """True if there are changes, but only two levels."""
+        return self.used > 0 and math.isnan(self.order)
+
+    @property
     def seen(self) -> bool:
         """True if changes fall or are negligible, or a third level is missing."""
         return not self.order < LEAST_ORDER
@@ -196,7 +201,7 @@ class Cross:
         """
         change = finer - value
         left = size(self.lack(*finer_at)) / max(size(self.lack(*at)), np.finfo(float).tiny)
-        left = min(max(left, FASTEST), SLOWEST)
+        left = min(max(left, SLOWEST if self.steps.unknown else FASTEST), SLOWEST)
         rest = np.asarray(change * left / (1 - left))
         cells, steps = self.cells.confirmed(), self.steps.confirmed()
         limit = np.asarray(finer + rest)
