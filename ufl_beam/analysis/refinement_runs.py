@@ -55,6 +55,7 @@ class RefinementRuns:
             try:
                 self._simulate(first, until)
                 self._take(first, self._member(**first.case))
+                self.bar.update(1)
             except ConvergenceError as error:
                 self.failed[first] = f"{type(error).__name__}: {error}"  # finer steps may do
 

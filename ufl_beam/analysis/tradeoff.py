@@ -30,7 +30,7 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.parallel import communicator
 from ufl_beam.progress_bar import progress_bar
 from ufl_beam.simulation.initial_state import require_scheme
-from ufl_beam.simulation.run import simulate
+from ufl_beam.simulation.run import require_times, simulate
 from ufl_beam.simulation.step_control import Adaptive
 from ufl_beam.solvers.newton_options import Newton
 
@@ -115,6 +115,7 @@ def tradeoff(
     require_number(most, "tradeoff: most", positive=True)
     require_switch(progress, "tradeoff: progress")
     comm = communicator(comm, "tradeoff: comm")
+    t = require_times(t)
     meshes = _several(MESHES if mesh is None else mesh, Mesh, "mesh")
     newtons = _several(NEWTONS if newton is None else newton, Newton, "newton")
     schemes: tuple[Scheme, ...] = _several(scheme, object, "scheme")

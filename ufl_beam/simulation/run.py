@@ -94,7 +94,7 @@ def simulate(
     """
     comm = communicator(comm, "simulate: comm")
     require_switch(progress, "simulate: progress")
-    t0, t1 = _require_times(t)
+    t0, t1 = require_times(t)
     _require_step(dt, scheme, (t0, t1))
     require_count(every, "simulate: every")
     require_count(most, "simulate: most")
@@ -222,7 +222,8 @@ def running(
             simulation.solution.seconds += time.perf_counter() - begin
 
 
-def _require_times(t: tuple[float, float]) -> tuple[float, float]:
+def require_times(t: tuple[float, float]) -> tuple[float, float]:
+    """Return the beginning and the end of a run, checked."""
     try:
         t0, t1 = t
     except (TypeError, ValueError):
