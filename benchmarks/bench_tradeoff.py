@@ -114,7 +114,7 @@ def answer(question, reference, tolerance):
     return found, {
         "case": question.case.name, "asked": tolerance, "error": error, "ratio": error / tolerance,
         "estimated": found.ratio(best), "runs": len(found.runs), "spent_s": found.spent,
-        "best_s": best.seconds, "cost": found.spent / best.seconds, "wall_s": wall,
+        "best_s": best.seconds, "effort": found.effort, "wall_s": wall,
         "steps": best.steps, "cells": best.cells, "dials": str(best.dials),
         "notes": list(found.notes),
     }  # fmt: skip
@@ -125,7 +125,7 @@ def main():
     parser.add_argument("--only", default="", help="cases whose names contain this")
     parser.add_argument("--say", action="store_true", help="print each trade-off")
     options = parser.parse_args()
-    print(f"{'':20s} {'asked':>6} {'error/asked':>11} {'estimate':>8} {'cost':>6} {'runs':>4}")
+    print(f"{'':20s} {'asked':>6} {'error/asked':>11} {'estimate':>8} {'effort':>6} {'runs':>4}")
     for question in QUESTIONS:
         if options.only not in question.case.name:
             continue
@@ -141,7 +141,7 @@ def main():
             keep("bench_tradeoff", one)
             print(
                 f"{one['case']:20s} {tolerance:6.0e} {one['ratio']:11.2f} {one['estimated']:8.2f} "
-                f"{one['cost']:6.1f} {one['runs']:4d}  {one['dials']}",
+                f"{one['effort']:6.1f} {one['runs']:4d}  {one['dials']}",
                 flush=True,
             )
 

@@ -24,7 +24,6 @@ NEARLY_BEST = 2.0  # if nothing serves, the cheapest up to so many times the lea
 NEGLIGIBLE = 0.1  # changes up to this part of a tolerance need not converge
 WORST_USED = 0.3  # part of a tolerance that errors of a recommended setting use up, if they can
 LEAST_USED = 0.45  # the same of predicted errors, which may be wrong by a third
-HALVES = 1.5, 2.5, 3.5  # parts of a step besides the whole numbers
 MOST_TRIED = 2000  # settings whose errors are looked at with their signs
 MOST_USED = 0.85
 CANCELLED = 1.3  # times the cost of a setting whose errors may cancel that another one may cost
@@ -115,8 +114,7 @@ class Prediction:
         i, j = (level + EXTRAPOLATED_LEVELS for level in self.finest)
         least = math.ceil(self.coarsest * self.divisor)
         refine = [Fraction(k, self.divisor) for k in _spread(least, self.divisor * 2**i)]
-        # Where the steps as given end, others end as well, but for the coarsest.
-        parts = sorted({*_spread(1, 2**j), *HALVES})
+        parts = _spread(1, 2**j)  # whole: where the steps as given end, all others end as well
         if not self.whole_steps:
             parts = list(2 ** np.arange(0.0, j + 1e-9, 1 / CHOICES_PER_LEVEL))
         level = [math.log2(part) for part in parts]
