@@ -297,6 +297,15 @@ def test_what_would_take_too_long_is_refused(law):
     assert info.value.runs
 
 
+def test_what_there_is_no_time_for_is_left_out(law):
+    """The recommended setting is known before other options of Newton's method are tried."""
+    law(smooth)
+    spent = ask(tolerance=1e-4).spent
+    found = ask(tolerance=1e-4, newton=None, most=1.05 * spent)
+    assert found.ratio(found.best) <= 1
+    assert not any(run.dials.newton.modified for run in found.runs)
+
+
 def test_a_budget_below_the_coarsest_run_is_refused(law):
     law(smooth)
     with raises("no setting serves", "the nearest takes", kind=ub.TradeoffError):

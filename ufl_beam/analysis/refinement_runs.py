@@ -59,13 +59,17 @@ class RefinementRuns:
             except ConvergenceError as error:
                 self.failed[first] = f"{type(error).__name__}: {error}"  # finer steps may do
 
+    def allowed(self, refinements: Sequence[Refinement]) -> bool:
+        """Return whether there is time for runs."""
+        return self.spent + sum(map(self._longest, refinements)) <= self.most
+
     def run(self, refinements: Sequence[Refinement]) -> None:
         """Run what is missing, several at a time where there are processes."""
         missing = [r for r in refinements if r not in self.runs and r not in self.failed]
         if not missing:
             return
-        needed = sum(map(self._longest, missing))
-        if self.spent + needed > self.most:
+        if not self.allowed(missing):
+            needed = sum(map(self._longest, missing))
             raise TradeoffError(
                 f"the next {len(missing)} runs would take about {needed:.3g} s after "
                 f"{self.spent:.3g} s of runs, more than most = {self.most:g} s; the finest is "

@@ -74,7 +74,10 @@ class RefinementSearch:
         tried: list[Found] = []
         while True:
             choice = self._target.choose(prediction)
-            if not self._target.serves(choice):
+            serves = self._target.serves(choice)
+            if tried and not serves:
+                break
+            if not serves:
                 raise TradeoffError(
                     f"no setting serves; the nearest takes {choice.seconds:.3g} s and has errors "
                     f"of {choice.ratio:.2g} {self._target.measure}; steps and cells as they are "
@@ -82,6 +85,8 @@ class RefinementSearch:
                 )
             known = Refinement(self.family, *prediction.within_reach(choice))
             if known in (one.run.refinement for one in tried):
+                break
+            if tried and not self._runs.allowed([known]):
                 break
             found = self._try(known, prediction)
             if not tried:
@@ -153,8 +158,9 @@ class RefinementSearch:
         ]
         cells, steps = (part > LEAST_PART * sum(parts) for part in parts)
         finer = Refinement(family, refine * (1 + cells), level + steps)
-        self._runs.run([finer])
-        if finer in self._runs.failed:
+        if self._runs.allowed([finer]):
+            self._runs.run([finer])
+        if finer not in self._runs.runs:
             return found
         fine = self._runs.runs[finer].values
         better = {

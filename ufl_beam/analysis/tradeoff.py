@@ -199,7 +199,8 @@ def _other_newton(runs: RefinementRuns, best: Found) -> Run:
     chosen = best.run
     for number in range(1, len(runs.newtons)):
         one = best.run.refinement._replace(newton=number)
-        runs.run([one])
+        if runs.allowed([one]):
+            runs.run([one])
         if one in runs.runs:
             run = runs.runs[one]
             changes = {name: run.values[name] - value for name, value in best.run.values.items()}
