@@ -133,7 +133,9 @@ def test_a_tolerance_is_used_up_at_a_limited_cost(make, part):
     )
     error = np.abs(found.best.values["path"] - path(fine)).max() / np.abs(path(fine)).max()
     print(f"{make.__name__}: asked {part:.2e}, got {error:.2e}, effort {found.effort:.1f}")
-    assert 0.3 * part <= error <= part
+    # Of 0.3, if another trial would not exceed the effort, which is planned by times.
+    assert 0.2 * part <= error <= part
+    assert error >= 0.3 * part or any("no setting was found" in note for note in found.notes)
     # Steps of all runs, by their numbers of iterations and cells: times of milliseconds are noise.
     # A step of few cells costs as much as 50 to 100 cells.
     work = {run: run.steps * run.iterations * (50 + run.cells) for run in found.runs}
