@@ -25,7 +25,7 @@ NEGLIGIBLE = 0.1  # changes up to this part of a tolerance need not converge
 WORST_USED = 0.3  # part of a tolerance that errors of a recommended setting use up, if they can
 LEAST_USED = 0.45  # the same of predicted errors, which may be wrong by a third
 MOST_TRIED = 2000  # settings whose errors are looked at with their signs
-MOST_USED = 0.85
+MOST_USED = 0.85  # the largest predicted errors that are aimed at, for the same reason
 CANCELLED = 1.3  # times the cost of a setting whose errors may cancel that another one may cost
 
 
