@@ -1,6 +1,6 @@
 # Every target runs through ./env, which brings DOLFINx where it is missing. `make` lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-mpi test-sid verify sanitize long demos demos-cheap check check-paraview docs docs-cheap docs-links test-notebook check-docs docs-pictures accelerations bench bench-peers extremes schemes study
+.PHONY: help demo test test-mpi test-sid verify sanitize long demos demos-cheap check check-paraview docs docs-cheap docs-links test-notebook check-docs docs-pictures accelerations bench bench-compare bench-peers extremes schemes study
 
 # Natively as root Open MPI refuses to start; with more ranks than cores, too (the last two lines: versions 5 and 6).
 # ./env sets the same in its root.
@@ -102,6 +102,9 @@ bench: ## time per step
 	@./env python3 benchmarks/bench_nothing.py
 	@./env python3 benchmarks/bench_budget.py
 	@./env python3 benchmarks/bench_scaling.py
+
+bench-compare: ## benchmarks of two commits in turn: `make bench-compare with=COMMIT only="bench_step"`
+	@./env python3 benchmarks/compare.py $(with) $(if $(only),--only $(only))
 
 bench-peers: ## time, memory and error beside Exudyn, OpenSees and a C loop, as docs/peers.md
 	@./env python3 benchmarks/peers

@@ -2,11 +2,20 @@
 """Orders, limits, errors, costs and fronts of manufactured runs, whose answers are known."""
 
 import math
+from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
 
-from ufl_beam.analysis.richardson import SURE, UNSURE, Convergence, Cost, Cross, pareto
+from ufl_beam.analysis.richardson import (
+    SURE,
+    UNSURE,
+    Convergence,
+    Cost,
+    Cross,
+    pareto,
+    size,
+)
 
 SHAPE = np.array([1.0, -2.0, 0.5])
 """Of the error of an array; its largest entry is 2."""
@@ -26,11 +35,30 @@ def test_a_power_is_recognised(order, finest):
     assert seen.aligned
     assert seen.order == pytest.approx(order, abs=1e-9)
     # Whole orders are trusted, others get the larger factor.
-    assert seen.safety == (SURE if order in (1.0, 2.0) else UNSURE)
+    assert seen.trusted == (order in (1.0, 2.0))
+    safety = SURE if seen.trusted else UNSURE
     assert np.abs(three(order, finest=finest)[2] + seen.rest - 7.0).max() < 1e-12
     for level in (finest - 2, finest - 0.5, finest):
-        true = 2.0 * 2.0 ** (-order * level)
-        assert seen.at(level) == pytest.approx(seen.safety * true, rel=1e-9)
+        true = -(2.0 ** (-order * level)) * SHAPE
+        assert np.allclose(seen.lack(level), true, rtol=1e-9)
+        # Of coarser levels the changes to the finest are known.
+        doubt = (safety - 1) * 2.0 * 2.0 ** (-order * finest)
+        assert seen.at(level) == pytest.approx(size(true) + doubt, rel=1e-9)
+    # Levels finer than all: by the order that was seen, or by that in theory if it is not whole
+    used = order if seen.trusted else 2.0
+    finer = safety * 2.0 * 2.0 ** (-order * finest - used)
+    assert seen.at(finest + 1) == pytest.approx(finer, rel=1e-9)
+
+
+def test_two_levels_have_the_order_of_the_method():
+    first, second = three(4.0)[:2]
+    seen = Convergence.of((first, second), 1, 4.0, 1e-12)
+    assert seen.seen
+    assert math.isnan(seen.order)
+    assert not seen.trusted
+    assert np.abs(second + seen.rest - 7.0).max() < 1e-12
+    assert seen.doubt == pytest.approx((UNSURE - 1) * size(seen.rest))
+    assert "in theory" in str(seen)
 
 
 def test_what_is_faster_than_the_method_is_not_believed():
@@ -41,15 +69,15 @@ def test_what_is_faster_than_the_method_is_not_believed():
     assert seen.at(2) > 2.0 * 2.0**-8
     # A change that happens to be nothing leaves what the one before it would have become.
     passing = Convergence.of((np.array(1.0), np.array(0.0), np.array(0.0)), 2, 2.0, 1e-12)
-    assert passing.error == pytest.approx(1.0 / 4 / 3)
+    assert passing.at(2) == pytest.approx(UNSURE * 1.0 / 4 / 3)
 
 
-def test_to_and_fro_is_not_extrapolated():
+def test_to_and_fro_is_not_trusted():
     seen = Convergence.of((np.array(1.0), np.array(0.0), np.array(0.25)), 2, 2.0, 1e-12)
     assert seen.seen
     assert not seen.aligned
-    assert seen.rest == 0.0
-    assert seen.safety == UNSURE
+    assert not seen.trusted
+    assert seen.at(2) == pytest.approx(UNSURE * 0.25 / 3)
     assert "to and fro" in str(seen)
 
 
@@ -77,8 +105,8 @@ def manufactured(level, cells=(0.3, 2.0), steps=(0.1, 1.0), mixed=0.0):
     return 7.0 + (cells[0] * h + steps[0] * dt + mixed * h * dt) * SHAPE
 
 
-def cross(base, **law):
-    values = {level: manufactured(level, **law) for level in Cross.levels(base)}
+def cross(base, *, whole=True, **law):
+    values = {level: manufactured(level, **law) for level in Cross.levels(base, whole=whole)}
     return Cross.of(values, base, (2.0, 2.0), 1e-12)
 
 
@@ -90,9 +118,32 @@ def test_both_dials_together(base, mixed):
     # Round-off of differences of numbers of size 20
     assert np.abs(one.limit - 7.0).max() < 1e-12
     for level in ((base[0] + 1, base[1] + 2), (base[0] + 0.5, base[1] + 1.7)):
-        true = np.abs(manufactured(level, mixed=mixed) - 7.0).max()
+        true = 7.0 - manufactured(level, mixed=mixed)
+        assert np.allclose(one.lack(*level), true, rtol=1e-9)
         # Both have a whole order; the bound adds what may cancel.
-        assert true <= one.error(*level) <= 2 * SURE * true + 2 * abs(mixed)
+        assert one.error(*level) <= 2 * SURE * size(true) + 2 * abs(mixed)
+
+
+def test_half_a_cross_has_the_limit_of_theory():
+    one = cross((1, 2), whole=False, steps=(0.1, 2.0))
+    assert one.seen
+    assert np.abs(one.limit - 7.0).max() < 1e-12
+
+
+def test_a_finer_run_sharpens_a_limit():
+    """Both dials are of the same order, so that the part of the error that is left is known."""
+    law = {"cells": (0.3, 1.0), "steps": (0.1, 1.0)}
+    one = cross((0, 0), **law)
+    coarse, fine = (2.5, 3.0), (3.5, 4.0)
+    values = [manufactured(level, **law) for level in (coarse, fine)]
+    off = replace(one, limit=one.limit + 1.0)
+    sharp = off.sharpened(*values, coarse, fine)
+    assert np.abs(sharp.limit - 7.0).max() < 1e-12
+    assert sharp.uncertainty == pytest.approx(size(values[1] - 7.0))
+    # An order that is not believed: at most a half of the error is left by half of the steps.
+    slow = cross((0, 0), cells=(0.3, 0.55), steps=(0.1, 0.55))
+    values = np.array(8.0), np.array(7.6)
+    assert slow.sharpened(*values, (0, 0), (0.1, 0.1)).limit == pytest.approx(7.2)
 
 
 def test_dials_that_depend_on_each_other_are_not_seen():
@@ -105,14 +156,13 @@ def test_dials_that_depend_on_each_other_are_not_seen():
 
 
 def test_the_cost_of_a_run_is_recognised():
-    law = Cost(0.05, 2e-5, 1e-6)
+    law = Cost(0.05, 1e-4, 2e-5, 1e-6)
     steps, cells = (x.ravel() for x in np.meshgrid([10.0, 100, 1000], [4.0, 32, 256]))
-    seconds = np.array([law.seconds(n, c) for n, c in zip(steps, cells, strict=True)])
-    found = Cost.of(steps, cells, seconds)
+    stepping = law.stepping(steps, cells)
+    building = law.seconds(steps, cells) - stepping
+    found = Cost.of(steps, cells, building, stepping)
     # Of least squares in double precision, conditioned by 1e5
-    assert (found.begin, found.step, found.cell) == pytest.approx(
-        (law.begin, law.step, law.cell), rel=1e-8
-    )
+    assert astuple(found) == pytest.approx(astuple(law), rel=1e-8)
     assert found.slower(3).seconds(50, 10) == pytest.approx(3 * law.seconds(50, 10), rel=1e-8)
 
 

@@ -16,7 +16,8 @@ from ufl_beam.analysis import tradeoff
 
 COMM = MPI.COMM_WORLD
 SCENE = scenes.cantilever(cells=4)
-CELLS, STEP, SECONDS = 1e-2, 1e-1, 1e-4
+CELLS, STEP, SECONDS, BUILDING = 1e-2, 1e-1, 1e-4, 0.1
+LINEAR, STRICT = ub.Mesh(), ub.Newton()  # nothing else is tried
 
 
 def raises(*parts, kind=ub.SceneError):
@@ -31,8 +32,10 @@ def law(monkeypatch):
         def simulate(scene, *, scheme, t, dt, mesh, newton, progress):
             length = dt.tolerance ** (1 / 3) if isinstance(dt, ub.Adaptive) else dt
             steps, cells = round((t[1] - t[0]) / length), int(4 * mesh.refine)
+            whole = seconds(cells, steps)
             return SimpleNamespace(
-                seconds=seconds(cells, steps), parts=steps, iterations=2 * steps,
+                seconds=whole, building=BUILDING,
+                parts=steps, iterations=2 * steps,
                 grid=SimpleNamespace(cells=range(cells)),
                 value=1.0 + error(4 / cells, length, scheme, newton),
             )  # fmt: skip
@@ -47,10 +50,10 @@ def smooth(h, dt, scheme, newton):
     return CELLS * h**2 - STEP * dt**2
 
 
-def ask(*, scheme=None, dt=0.1, **goal):
+def ask(*, scheme=None, dt=0.1, mesh=LINEAR, newton=STRICT, **goal):
     return ub.tradeoff(
         SCENE, {"value": lambda s: s.value}, scheme=scheme or ub.Midpoint(), t=(0.0, 10.0), dt=dt,
-        **goal,
+        mesh=mesh, newton=newton, **goal,
     )  # fmt: skip
 
 
@@ -63,8 +66,11 @@ def test_a_tolerance_is_met_and_hardly_more(law, tolerance):
     found = ask(tolerance={"value": tolerance})
     best = found.best
     error = abs(best.values["value"] - 1.0)
-    assert error <= tolerance
-    assert abs(found.limit["value"] - 1.0) < 1e-9  # the laws are exact powers
+    assert 0.3 * tolerance <= error <= tolerance
+    assert found.effort <= 10
+    # The laws are exact powers; where only two levels are run, their order is not known.
+    assert abs(found.limit["value"] - 1.0) <= 1.01 * found.uncertainty["value"]
+    assert found.uncertainty["value"] < 0.3 * tolerance
     # The cheapest of all settings whose errors, not cancelling, are below the tolerance
     settings = ((r, 100 * 2 ** (k / 16)) for r in range(1, 256) for k in range(16 * 10))
     cheapest = min(
@@ -72,10 +78,98 @@ def test_a_tolerance_is_met_and_hardly_more(law, tolerance):
         for r, n in settings
         if CELLS / r**2 + STEP * (10 / n) ** 2 <= tolerance
     )
-    # A safety factor of 1.25 on errors of second order is 1.12 times as many cells and steps.
-    assert best.seconds <= 1.3 * cheapest
-    assert found.ratio(best) == pytest.approx(error / tolerance, rel=1e-3)
+    # A safety factor of 1.25 on errors of second order is 1.12 times as many cells and steps; and
+    # a setting may cost 1.3 times as much so that errors do not cancel.
+    assert best.seconds <= 1.3**2 * cheapest
+    unsure = found.uncertainty["value"] / tolerance
+    assert found.ratio(best) == pytest.approx(error / tolerance, abs=1.01 * unsure)
     assert found.spent >= sum(run.seconds for run in found.runs)
+
+
+@pytest.mark.parametrize("order", [1.0, 1.5])
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
+def test_orders_that_are_not_those_of_theory(law, order, tolerance):
+    law(lambda h, dt, scheme, newton: CELLS * h**2 + STEP * dt**order)
+    found = ask(tolerance={"value": tolerance})
+    error = abs(found.best.values["value"] - 1.0)
+    assert 0.3 * tolerance <= error <= tolerance
+    assert found.effort <= 10
+
+
+def test_noise_below_the_tolerance_does_no_harm(law):
+    """A quantity that jumps to and fro by a tenth of what is asked."""
+
+    def error(h, dt, scheme, newton):
+        return smooth(h, dt, scheme, newton) + 2e-5 * math.sin(1e4 * h + 1e5 * dt)
+
+    law(error)
+    found = ask(tolerance={"value": 2e-4})
+    assert abs(found.best.values["value"] - 1.0) <= 2e-4
+    # The effort is planned by a dearer choice: one that such changes seem to require.
+    assert found.effort <= 20
+
+
+def test_a_scene_that_is_accurate_enough_stays_as_it_is(law):
+    """Nothing coarser is run, and the result says so."""
+    law(smooth)
+    found = ask(tolerance={"value": 0.5})
+    assert (found.best.dials.dt, found.best.dials.mesh) == (0.1, LINEAR)
+    assert any("begin with coarser steps and cells" in note for note in found.notes)
+    assert found.effort <= 10
+
+
+@pytest.mark.parametrize(("slower", "degree"), [(1, 2), (1000, 1)])
+def test_degree_two_is_proposed_where_it_helps(law, slower, degree):
+    """Errors of fourth order; cells that take as long as those of degree 1, or much longer."""
+
+    def error(h, dt, scheme, newton):
+        return CELLS * h ** (2 * law.degree) + STEP * dt**2
+
+    law(error)
+    simulate = tradeoff.simulate
+
+    def with_degree(scene, *, mesh, **others):
+        law.degree = mesh.degree
+        one = simulate(scene, mesh=mesh, **others)
+        one.seconds *= slower ** (mesh.degree - 1)
+        return one
+
+    tradeoff.simulate = with_degree  # the fixture restores it
+    found = ask(mesh=None, tolerance={"value": 1e-5})
+    assert found.best.dials.mesh.degree == degree
+    assert 0.3e-5 <= abs(found.best.values["value"] - 1.0) <= 1e-5
+    if degree == 2:
+        assert found.effort <= 10
+
+
+def test_degree_two_is_left_where_the_scene_has_none(law):
+    law(smooth)
+    simulate = tradeoff.simulate
+
+    def refuse(scene, *, mesh, **others):
+        if mesh.degree > 1:
+            raise ub.SceneError("Mesh: degree 2 is not for this scene")
+        return simulate(scene, mesh=mesh, **others)
+
+    tradeoff.simulate = refuse  # the fixture restores it
+    found = ask(mesh=None, tolerance={"value": 1e-4})
+    assert found.best.dials.mesh.degree == 1
+    assert 0.3e-4 <= abs(found.best.values["value"] - 1.0) <= 1e-4
+
+
+def test_modified_newton_is_proposed_where_it_helps(law):
+    law(smooth)
+    simulate = tradeoff.simulate
+
+    def with_newton(scene, *, newton, **others):
+        one = simulate(scene, newton=newton, **others)
+        one.seconds = BUILDING + (one.seconds - BUILDING) * (law.part if newton.modified else 1.0)
+        return one
+
+    tradeoff.simulate = with_newton  # the fixture restores it
+    for law.part in (0.5, 1.5):
+        found = ask(newton=None, tolerance={"value": 1e-4})
+        assert found.best.dials.newton.modified == (law.part < 1)
 
 
 @pytest.mark.parametrize("budget", [0.3, 1.0, 10.0])
@@ -203,6 +297,16 @@ def test_what_would_take_too_long_is_refused(law):
     assert info.value.runs
 
 
+def test_what_there_is_no_time_for_is_left_out(law):
+    """Checks and other options of Newton's method, once there is a setting that serves."""
+    law(smooth)
+    whole = ask(tolerance=1e-4, newton=None)
+    found = ask(tolerance=1e-4, newton=None, most=0.99 * whole.spent)
+    assert len(found.runs) < len(whole.runs)
+    assert found.spent < whole.spent
+    assert abs(found.best.values["value"] - 1.0) <= 1e-4
+
+
 def test_a_budget_below_the_coarsest_run_is_refused(law):
     law(smooth)
     with raises("no setting serves", "the nearest takes", kind=ub.TradeoffError):
@@ -304,7 +408,8 @@ def test_a_vibration():
     )
     size = np.abs(history(fine)).max()
     assert np.abs(found.best.values["tip"] - history(fine)).max() < 0.02 * size
-    assert found.crosses["tip"].cells.order == pytest.approx(2.0, abs=0.3)
+    order = 2 * found.best.dials.mesh.degree
+    assert found.crosses["tip"].cells.method == order
     assert len({run.refinement for run in found.runs}) == len(found.runs)
     texts = COMM.allgather(str(found))
     assert len(set(texts)) == 1

@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-import statistics
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from typing import Any
 
 from mpi4py import MPI
@@ -24,7 +24,8 @@ from ufl_beam.solvers.newton_options import Newton
 
 Quantity = Callable[[Solution], npt.ArrayLike]
 
-SHORT_RUN = 0.1  # runs below are done three times, and the median counts; s
+MOST_DIVISOR = 8  # cells of a beam are not taken in smaller parts than one by so many
+WRONG = "SceneError: "  # how failures of runs begin that finer dials do not help
 
 
 @dataclass(eq=False)
@@ -46,35 +47,29 @@ class RefinementRuns:
     _shapes: dict[str, tuple[int, ...]] = field(default_factory=dict, init=False)
 
     def begin(self, family: int) -> None:
-        """Compile, and require quantities of one shape in all runs, on every process."""
-        seconds = 0.0
+        """Compile by a single step, and do the coarsest run on every process."""
+        first = Refinement(family, Fraction(1), 0.0)
+        dt = self.families[family].dt
+        until = min(self.t[1], self.t[0] + dt) if isinstance(dt, float | int) else self.t[1]
         with alone():
-            for level in (0.0, 1.0):
-                try:
-                    solution = self._simulate(Refinement(family, 1, level))
-                except ConvergenceError:
-                    continue  # finer steps may do
-                seconds += solution.seconds
-                for name, value in self._quantities_of(solution):
-                    before = self._shapes.setdefault(name, value.shape)
-                    if before != value.shape:
-                        raise SceneError(
-                            f"tradeoff: quantity {name!r} has shape {before} in a run and "
-                            f"{value.shape} in another with other steps or cells; give a number, "
-                            "or an array at times and places of your own (np.interp)"
-                        )
-        self.spent += float(self.comm.bcast(seconds))
+            try:
+                self._simulate(first, until)
+                self._take(first, self._member(**first.case))
+                self.bar.update(1)
+            except ConvergenceError as error:
+                self.failed[first] = f"{type(error).__name__}: {error}"  # finer steps may do
 
-    def run(self, refinements: Sequence[Refinement], *, short: float = SHORT_RUN) -> None:
-        """Run what is missing, several at a time where there are processes.
+    def allowed(self, refinements: Sequence[Refinement]) -> bool:
+        """Return whether there is time for runs."""
+        return self.spent + sum(map(self._longest, refinements)) <= self.most
 
-        Runs that take less than ``short`` seconds are done three times; all may take ``most`` (s).
-        """
+    def run(self, refinements: Sequence[Refinement]) -> None:
+        """Run what is missing, several at a time where there are processes."""
         missing = [r for r in refinements if r not in self.runs and r not in self.failed]
         if not missing:
             return
-        needed = sum(map(self._longest, missing))
-        if self.spent + needed > self.most:
+        if not self.allowed(missing):
+            needed = sum(map(self._longest, missing))
             raise TradeoffError(
                 f"the next {len(missing)} runs would take about {needed:.3g} s after "
                 f"{self.spent:.3g} s of runs, more than most = {self.most:g} s; the finest is "
@@ -82,24 +77,25 @@ class RefinementRuns:
                 tuple(self.runs.values()),
             )
         self.bar.set_postfix_str(f"{len(missing)} more up to {self.dials(missing[-1])}")
-        cases = [one._asdict() | {"short": short} for one in missing]
         try:
+            cases = [one.case for one in missing]
             done = study(self._member, cases, progress=False, comm=self.comm)
         except RuntimeError as error:  # all of them failed
-            self.failed |= dict.fromkeys(missing, str(error))
+            text = str(error)
+            if WRONG in text:
+                raise SceneError(text.partition(WRONG)[2]) from None
+            self.failed |= dict.fromkeys(missing, text)
             return
         finally:
             self.bar.set_postfix_str("", refresh=False)
             self.bar.update(len(missing))
         for k, one in enumerate(missing):
-            if k in done.failed:
-                self.failed[one] = done.failed[k]
+            if k not in done.failed:
+                self._take(one, {name: done[name][k] for name in done.results})
                 continue
-            values = {name: done[f"quantity {n}"][k] for n, name in enumerate(self.quantities)}
-            measured = ("seconds", "steps", "cells", "iterations", "spent")
-            took = {name: float(done[name][k]) for name in measured}
-            self.runs[one] = Run(one, self.dials(one), values, **took)
-            self.spent += took["spent"]
+            if done.failed[k].startswith(WRONG):
+                raise SceneError(done.failed[k].removeprefix(WRONG))
+            self.failed[one] = done.failed[k]
 
     def dials(self, refinement: Refinement) -> Dials:
         """Return the dials of a refinement."""
@@ -111,40 +107,69 @@ class RefinementRuns:
         """Return the runs of a family."""
         return [run for one, run in self.runs.items() if one.family == family]
 
+    def divisor(self, family: int) -> int:
+        """Return the parts of a cell that make a whole number of cells between all places."""
+        mesh, scene = self.families[family].mesh, self.scene
+        for q in range(MOST_DIVISOR, 1, -1):
+            finer = replace(mesh, refine=mesh.refine * Fraction(q + 1, q))
+            try:
+                for beam in scene.beams:
+                    finer.vertices(beam, scene.attached[beam])
+            except SceneError:
+                continue
+            return q
+        return 1
+
     def _longest(self, refinement: Refinement) -> float:
         """Wall time at most, by the nearest run; s; 0 if there is none."""
         _, refine, level, _ = refinement
         times = (
-            run.spent
+            run.seconds
             * 2 ** max(0.0, level - run.refinement.level)
-            * max(1.0, refine / run.refinement.refine)
+            * max(1.0, float(refine / run.refinement.refine))
             for run in self.of(refinement.family)
         )
         return min(times, default=0.0)
 
-    def _simulate(self, refinement: Refinement) -> Solution:
-        dials = self.dials(refinement)
-        return self.simulate(self.scene, t=self.t, progress=False, **dials.arguments)
+    def _simulate(self, refinement: Refinement, until: float) -> Solution:
+        dials, t = self.dials(refinement), (self.t[0], until)
+        return self.simulate(self.scene, t=t, progress=False, **dials.arguments)
 
     def _quantities_of(self, solution: Solution) -> Iterator[tuple[str, Array]]:
         for name, quantity in self.quantities.items():
             value = np.asarray(quantity(solution), dtype=float)
             if not np.isfinite(value).all():
                 raise SceneError(f"tradeoff: quantity {name!r} is not finite")
+            before = self._shapes.get(name, value.shape)
+            if before != value.shape:
+                raise SceneError(
+                    f"tradeoff: quantity {name!r} has shape {before} in a run and {value.shape} "
+                    "in another with other steps or cells; give a number, or an array at times "
+                    "and places of your own (np.interp)"
+                )
             yield name, value
 
-    def _member(self, short: float, **case: Any) -> dict[str, Any]:
+    def _member(self, **case: Any) -> dict[str, Any]:
         """Compute one run, as a member of a study."""
-        refinement = Refinement(**case)
-        solution = self._simulate(refinement)
-        seconds = [solution.seconds]
-        if solution.seconds < short:
-            seconds += [self._simulate(refinement).seconds for _ in range(2)]
+        refinement = Refinement(**case | {"refine": Fraction(case["refine"])})
+        solution = self._simulate(refinement, self.t[1])
         values = {f"quantity {n}": v for n, (_, v) in enumerate(self._quantities_of(solution))}
         return values | {
-            "seconds": statistics.median(seconds),
-            "spent": sum(seconds),
+            "seconds": solution.seconds,
+            "building": solution.building,
             "steps": solution.parts,
             "cells": len(solution.grid.cells),
             "iterations": solution.iterations / solution.parts,
         }
+
+    def _take(self, one: Refinement, found: Mapping[str, Any]) -> None:
+        """Keep a run, as the first process has measured it."""
+        found = self.comm.bcast(found)
+        values = {
+            name: np.asarray(found[f"quantity {n}"]) for n, name in enumerate(self.quantities)
+        }
+        self._shapes |= {name: value.shape for name, value in values.items()}
+        measured = ("seconds", "building", "steps", "cells", "iterations")
+        took = {name: float(found[name]) for name in measured}
+        self.runs[one] = Run(one, self.dials(one), values, **took)
+        self.spent += took["seconds"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Richardson extrapolation of runs on three levels: order, limit and uncertainty.
+"""Richardson extrapolation of runs on two or three levels: order, limit and uncertainty.
 
 Level k of a dial is 2**k times as fine as level 0.  Richardson's extrapolation, with the safety
 factors of Roache's grid convergence index (J. Fluids Eng. 116 (1994) 405).
@@ -8,8 +8,9 @@ factors of Roache's grid convergence index (J. Fluids Eng. 116 (1994) 405).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 import scipy  # its parts are loaded when they are used
@@ -17,11 +18,14 @@ import scipy  # its parts are loaded when they are used
 from ufl_beam.arrays import Array
 from ufl_beam.one_line import one_line
 
+Numbers = TypeVar("Numbers", float, Array)
 Level = tuple[int, int]  # of the cells and of the steps
+Fineness = tuple[float, float]  # the same, not necessarily whole
+FASTEST, SLOWEST = 1 / 16, 1 / 2  # parts of an error that half as long cells and steps leave
 LEAST_ORDER = 0.5  # differences that fall more slowly than with this power show no convergence
 ORDER_TOLERANCE = 0.25  # an order so near to a whole one, up to that of the method, is trusted
-SURE, UNSURE = 1.25, 3.0  # safety factors on errors by a trusted order, and on others
-LEAST_COSINE = 0.5  # between successive changes; those that turn more are not extrapolated
+SURE, UNSURE = 1.25, 2.0  # safety factors on errors by a trusted order, and on others
+LEAST_COSINE = 0.5  # between successive changes; those that turn more are of no trusted order
 MOST_MIXED = 0.5  # part of the errors of two dials that may depend on both
 
 
@@ -32,58 +36,98 @@ def size(values: Array) -> float:
 
 @dataclass(frozen=True)
 class Convergence:
-    """Convergence of a quantity with one dial, from three levels."""
+    """Convergence of a quantity with one dial, from two or three levels."""
 
-    finest: int  # the finest of the three levels
-    differences: tuple[float, float]  # sizes of the changes from level to level
-    order: float  # observed
-    aligned: bool  # whether both changes are of one direction; if not, nothing is extrapolated
+    finest: int  # the finest of the levels
+    differences: tuple[float, ...]  # sizes of the changes from level to level
+    order: float  # observed; NaN from two levels, where that of the method is taken
+    aligned: bool  # whether the changes are of one direction
+    trusted: bool  # whether they fall with a whole order; else finer levels are of that in theory
     used: float  # order for predictions, at most that of the method; 0: no changes
-    method: float  # order of the method; with it errors grow towards levels coarser than the three
-    error: float  # of the finest level; where changes are negligible, of every level
+    method: float  # order of the method; with it errors grow towards levels coarser than all
     rest: Array  # what the finest level lacks of the limit, with its sign
-    safety: float  # factor by which ``error`` may be wrong
+    doubt: float  # by how much ``rest`` may be wrong; its unit
 
     __repr__ = one_line
 
     @classmethod
-    def of(
-        cls, values: tuple[Array, Array, Array], finest: int, method: float, floor: float
-    ) -> Convergence:
-        """Judge values on three levels; ``method`` is the order in theory, ``floor`` negligible."""
-        first, second = values[1] - values[0], values[2] - values[1]
-        a, b = size(first), size(second)
-        if max(a, b) <= floor:
-            nothing = np.asarray(0 * second)
-            return cls(finest, (a, b), 0.0, False, 0.0, method, max(a, b), nothing, UNSURE)
+    def of(cls, values: Sequence[Array], finest: int, method: float, floor: float) -> Convergence:
+        """Judge values on two or three levels.
+
+        ``method`` is the order in theory, changes up to ``floor`` are negligible.
+        """
+        changes = np.diff(np.stack(values), axis=0)
+        sizes = tuple(map(size, changes))
+        last = np.asarray(changes[-1])
+        if max(sizes) <= floor:
+            doubt = UNSURE * max(sizes)
+            return cls(finest, sizes, math.nan, False, True, 0.0, method, 0 * last, doubt)
+        if len(sizes) == 1:
+            rest = last / (2**method - 1)
+            doubt = (UNSURE - 1) * size(rest)
+            return cls(finest, sizes, math.nan, True, False, method, method, rest, doubt)
+        a, b = sizes
         order = math.log2(a / b) if min(a, b) > 0 else math.copysign(math.inf, a - b)
-        lengths = np.linalg.norm(first) * np.linalg.norm(second)
-        aligned = bool(np.vdot(first, second) >= LEAST_COSINE * lengths)
+        lengths = math.prod(np.linalg.norm(change) for change in changes)
+        aligned = bool(np.vdot(*changes) >= LEAST_COSINE * lengths)
         used = min(max(order, LEAST_ORDER), method)
+        rest = last / (2**used - 1)
         # What fell faster than the method can explain may have passed through zero.
-        error = max(b, a / 2**method) / (2**used - 1)
+        most = max(b, a / 2**method) / (2**used - 1)
         whole = any(abs(order - k) <= ORDER_TOLERANCE for k in range(1, round(method) + 1))
-        safety = SURE if aligned and whole else UNSURE
-        rest = np.asarray(aligned * second / (2**used - 1))
-        return cls(finest, (a, b), order, aligned, used, method, error, rest, safety)
+        trusted = aligned and whole
+        doubt = (SURE if trusted else UNSURE) * most - size(rest)
+        return cls(finest, sizes, order, aligned, trusted, used, method, rest, doubt)
+
+    def confirmed(self) -> Convergence:
+        """Return it with the doubts of a trusted order."""
+        return replace(self, doubt=min(self.doubt, (SURE - 1) * size(self.rest)))
+
+    @property
+    def coarsest(self) -> int:
+        """The coarsest of the levels."""
+        return self.finest - len(self.differences)
+
+    @property
+    def unknown(self) -> bool:
+        """True if there are changes, but only two levels."""
+        return self.used > 0 and math.isnan(self.order)
 
     @property
     def seen(self) -> bool:
-        """True if changes fall, or are negligible."""
-        return self.used == 0 or self.order >= LEAST_ORDER
+        """True if changes fall or are negligible, or a third level is missing."""
+        return not self.order < LEAST_ORDER
+
+    def growth(self, level: float) -> float:
+        """Predict the error at a level, not necessarily whole, over that of the finest."""
+        inside = self._seen(level)
+        fallen = self.used * (self.finest - inside) + self.method * (inside - min(inside, level))
+        finer = self.used if self.trusted else self.method
+        return float(2 ** (fallen - finer * (max(inside, level) - inside)))
+
+    def lack(self, level: float) -> Array:
+        """Predict what a level lacks of the limit, with its sign; unit of the quantity."""
+        return self.rest * self.growth(level)
+
+    def unsure(self, level: float) -> float:
+        """Bound the error of :meth:`lack`: changes that were seen are known."""
+        return self.doubt * (self.growth(level) / self.growth(self._seen(level)))
+
+    def _seen(self, level: float) -> float:
+        return min(max(level, self.coarsest), self.finest)
 
     def at(self, level: float) -> float:
-        """Predict the error at a level, not necessarily whole, with its safety factor."""
-        coarser = max(0.0, self.finest - 2 - level)
-        growth = self.used * (self.finest - level - coarser) + self.method * coarser
-        return self.safety * self.error * 2**growth
+        """Bound the error at a level; unit of the quantity."""
+        return size(self.lack(level)) + self.unsure(level)
 
     def __str__(self) -> str:
-        a, b = self.differences
         if self.used == 0:
-            return f"changes by {max(a, b):.1e} at most: negligible"
+            return f"changes by {max(self.differences):.1e} at most: negligible"
+        changes = ", then ".join(f"{change:.1e}" for change in self.differences)
+        if math.isnan(self.order):
+            return f"changes by {changes}: order {self.method:g} in theory"
         turns = "" if self.aligned else ", to and fro"
-        return f"changes by {a:.1e}, then {b:.1e}: order {self.order:.2f}{turns}"
+        return f"changes by {changes}: order {self.order:.2f}{turns}"
 
 
 @dataclass(frozen=True)
@@ -93,15 +137,20 @@ class Cross:
     cells: Convergence  # with the cells
     steps: Convergence  # with the steps
     limit: Array  # extrapolated value
-    mixed: float  # what refining both changes that refining each does not, extrapolated
+    mixed: Array  # what refining both changes that refining each does not, extrapolated
+    uncertainty: float  # of the limit; unit of the quantity
 
     __repr__ = one_line
 
     @staticmethod
-    def levels(base: Level) -> list[Level]:
-        """Return the levels of the runs that it takes, the cheap ones first."""
+    def levels(base: Level, *, whole: bool) -> list[Level]:
+        """Return the levels of the runs that it takes, the cheap ones first.
+
+        Two levels of each dial, or, for the ``whole`` cross, three and one of both together.
+        """
         i, j = base
-        return [(i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1), (i + 2, j), (i, j + 2)]
+        first = [(i, j), (i + 1, j), (i, j + 1)]
+        return [*first, (i + 1, j + 1), (i + 2, j), (i, j + 2)] if whole else first
 
     @classmethod
     def of(
@@ -110,62 +159,94 @@ class Cross:
         """Judge the values at :meth:`levels`; ``methods`` are the orders in theory."""
         i, j = base
         q = values[base]
-        cells = Convergence.of((q, values[i + 1, j], values[i + 2, j]), i + 2, methods[0], floor)
-        steps = Convergence.of((q, values[i, j + 1], values[i, j + 2]), j + 2, methods[1], floor)
-        mixed = values[i + 1, j + 1] - values[i + 1, j] - values[i, j + 1] + q
+        more = range(1, 3 if len(values) > 3 else 2)
+        along = [q, *(values[i + k, j] for k in more)], [q, *(values[i, j + k] for k in more)]
+        cells = Convergence.of(along[0], i + more[-1], methods[0], floor)
+        steps = Convergence.of(along[1], j + more[-1], methods[1], floor)
+        mixed = np.zeros_like(q)
         parts = [1 - 2**-dial.used for dial in (cells, steps)]
-        mixed = np.asarray(mixed / math.prod(parts) if all(parts) else 0 * q)
-        limit = values[i + 2, j] + cells.rest + values[i, j + 2] + steps.rest - q + mixed
-        return cls(cells, steps, limit, size(mixed))
+        if (i + 1, j + 1) in values and all(parts):
+            mixed = values[i + 1, j + 1] - values[i + 1, j] - values[i, j + 1] + q
+            mixed = np.asarray(mixed / math.prod(parts))
+        limit = along[0][-1] + cells.rest + along[1][-1] + steps.rest - q + mixed
+        unsure = cells.doubt + steps.doubt + (size(mixed) + size(cells.rest) + size(steps.rest)) / 4
+        return cls(cells, steps, np.asarray(limit), mixed, unsure)
 
     @property
     def separate(self) -> bool:
         """True if the errors of both dials add up."""
-        i, j = self.cells.finest - 2, self.steps.finest - 2
-        return self.mixed <= MOST_MIXED * (self.cells.at(i) + self.steps.at(j))
+        i, j = self.cells.coarsest, self.steps.coarsest
+        return size(self.mixed) <= MOST_MIXED * (self.cells.at(i) + self.steps.at(j))
 
     @property
     def seen(self) -> bool:
         """True if self-convergence is seen."""
         return self.cells.seen and self.steps.seen and self.separate
 
+    def lack(self, i: float, j: float) -> Array:
+        """Predict what levels lack of the limit, with its sign; unit of the quantity."""
+        fallen = 2 ** -(self.cells.used * (i - self.cells.coarsest))
+        also = 2 ** -(self.steps.used * (j - self.steps.coarsest))
+        both = self.mixed * (fallen + also - fallen * also)
+        return np.asarray(self.cells.lack(i) + self.steps.lack(j) + both)
+
     def error(self, i: float, j: float) -> float:
         """Bound the error at levels that need not be whole; unit of the quantity."""
-        fallen = self.cells.used * (i - self.cells.finest + 2)
-        fallen += self.steps.used * (j - self.steps.finest + 2)
-        return self.cells.at(i) + self.steps.at(j) + self.mixed * 2**-fallen
+        return self.cells.at(i) + self.steps.at(j)
 
-    @property
-    def uncertainty(self) -> float:
-        """Uncertainty of the limit; unit of the quantity."""
-        return self.error(self.cells.finest, self.steps.finest) + self.mixed / 4
+    def sharpened(self, value: Array, finer: Array, at: Fineness, finer_at: Fineness) -> Cross:
+        """Return it with the limit of two runs of which one is finer, by the predicted orders.
+
+        Now that the sum of the errors is measured, both are trusted up to a factor.
+        """
+        change = finer - value
+        left = size(self.lack(*finer_at)) / max(size(self.lack(*at)), np.finfo(float).tiny)
+        left = min(max(left, SLOWEST if self.steps.unknown else FASTEST), SLOWEST)
+        rest = np.asarray(change * left / (1 - left))
+        cells, steps = self.cells.confirmed(), self.steps.confirmed()
+        limit = np.asarray(finer + rest)
+        return Cross(cells, steps, limit, self.mixed, uncertainty=size(rest))
 
     def __str__(self) -> str:
-        together = "" if self.separate else f"\n    together: {self.mixed:.1e} more than one by one"
-        return f"\n    cells: {self.cells}\n    steps: {self.steps}{together}"
+        more = f"\n    together: {size(self.mixed):.1e} more than one by one"
+        return f"\n    cells: {self.cells}\n    steps: {self.steps}{'' if self.separate else more}"
 
 
 @dataclass(frozen=True)
 class Cost:
-    """Wall time of a run: ``begin + steps (step + cell cells)``; s."""
+    """Wall time of a run: that of building the scene, and that of its steps; s."""
 
     begin: float
+    begin_cell: float  # of building, for each cell
     step: float
-    cell: float
+    cell: float  # of a step, for each cell
 
     @classmethod
-    def of(cls, steps: Array, cells: Array, seconds: Array) -> Cost:
+    def of(cls, steps: Array, cells: Array, building: Array, stepping: Array) -> Cost:
         """Fit to runs, relative differences by least squares; no coefficient is negative."""
-        rows = np.stack([np.ones_like(steps), steps, steps * cells], axis=1)
-        return cls(*scipy.optimize.nnls(rows / seconds[:, None], np.ones_like(seconds))[0].tolist())
+        ones = np.ones_like(steps)
+        begin = _fit(np.stack([ones, cells], axis=1), building)
+        return cls(*begin, *_fit(np.stack([steps, steps * cells], axis=1), stepping))
 
     def slower(self, factor: float) -> Cost:
         """Return the cost on a machine that is so many times as slow."""
-        return Cost(factor * self.begin, factor * self.step, factor * self.cell)
+        times = (self.begin, self.begin_cell, self.step, self.cell)
+        return Cost(*(factor * time for time in times))
 
-    def seconds(self, steps: float, cells: float) -> float:
-        """Predict the wall time of a run; s."""
-        return self.begin + steps * (self.step + self.cell * cells)
+    def stepping(self, steps: Numbers, cells: Numbers) -> Numbers:
+        """Predict the wall time of the steps of runs; s."""
+        return steps * (self.step + self.cell * cells)
+
+    def seconds(self, steps: Numbers, cells: Numbers) -> Numbers:
+        """Predict the wall time of runs; s."""
+        return self.begin + self.begin_cell * cells + self.stepping(steps, cells)
+
+
+def _fit(rows: Array, seconds: Array) -> list[float]:
+    """Return the coefficients, none negative, that fit wall times best, as parts of them."""
+    least = np.maximum(seconds, np.finfo(float).tiny)
+    found = scipy.optimize.nnls(rows / least[:, None], np.ones_like(seconds))[0].tolist()
+    return [float(one) for one in found]
 
 
 def pareto(seconds: Array, errors: Array) -> list[int]:

@@ -4,30 +4,48 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from itertools import product
+from fractions import Fraction
 from typing import NamedTuple, cast
+
+import numpy as np
+import numpy.typing as npt
 
 from ufl_beam.analysis.richardson import Cost, Cross, size
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_number
 
-STEPS_PER_LEVEL = 16  # choices of steps from one level of refinement to the next
-EXTRAPOLATED_LEVELS = 2  # levels beyond those that were run which a choice may ask for
+EXTRAPOLATED_LEVELS = 8  # levels beyond those that were run which a choice may ask for
+CHOICES_PER_LEVEL = 24  # largest number of choices from one level of a dial to the next
 BUDGET_AIM, BUDGET_SLACK = 0.9, 0.2  # part that is aimed at; part that a run may fall short by
 LARGEST_ERROR = 0.3  # settings of larger errors, as parts of a quantity, are not recommended
 NEARLY_BEST = 2.0  # if nothing serves, the cheapest up to so many times the least error is next
 NEGLIGIBLE = 0.1  # changes up to this part of a tolerance need not converge
+WORST_USED = 0.3  # part of a tolerance that errors of a recommended setting use up, if they can
+LEAST_USED = 0.45  # the same of predicted errors, which may be wrong by a third
+MOST_TRIED = 2000  # settings whose errors are looked at with their signs
+MOST_USED = 0.85  # the largest predicted errors that are aimed at, for the same reason
+CANCELLED = 1.3  # times the cost of a setting whose errors may cancel that another one may cost
 
 
 class Choice(NamedTuple):
     """Setting of a run with its predicted time and error."""
 
-    refine: int  # parts of each cell
+    refine: Fraction  # parts of each cell
     level: float  # steps are about 2**level times as many
     seconds: float  # wall time
-    ratio: float  # largest error, as a part of what is allowed, or of the quantity
+    ratio: float  # bound of the largest error, as a part of what is allowed, or of the quantity
+    likely: float  # the largest error itself
+
+
+class Choices(NamedTuple):
+    """All settings that may be chosen, as tables over cells and steps."""
+
+    refine: list[Fraction]  # the rows
+    level: list[float]  # the columns
+    seconds: Array
+    ratio: Array
 
 
 @dataclass(frozen=True)
@@ -39,6 +57,10 @@ class Prediction:
     steps: float  # at level 0
     cells: float  # of the scene as it is
     units: Mapping[str, float]  # that errors are measured in, by quantity
+    divisor: int  # all cells of a beam make a whole number in parts of one by so many
+    coarsest: Fraction  # parts of each cell with as many nodes as the cells that were given
+    whole_steps: bool  # whether steps are those of level 0, divided by whole numbers
+    larger: float = 1.0  # factor by which errors of runs were larger than predicted
 
     @property
     def finest(self) -> tuple[int, int]:
@@ -46,10 +68,33 @@ class Prediction:
         cross = next(iter(self.crosses.values()))
         return cross.cells.finest, cross.steps.finest
 
-    def ratio(self, refine: int, level: float) -> float:
-        """Predict the largest error, in its unit."""
-        i = math.log2(refine)
-        return max(cross.error(i, level) / self.units[name] for name, cross in self.crosses.items())
+    @property
+    def trusted(self) -> bool:
+        """True if all orders are those of theory, or nearly so."""
+        return all(cross.cells.trusted and cross.steps.trusted for cross in self.crosses.values())
+
+    def within_reach(self, choice: Choice) -> tuple[Fraction, float]:
+        """Return a choice, or what is nearest to it where orders can be relied on."""
+        i, j = (level + 1 for level in self.finest)
+        if self.trusted:
+            return choice.refine, choice.level
+        return min(choice.refine, Fraction(2**i)), min(choice.level, float(j))
+
+    def choice(self, refine: Fraction, level: float) -> Choice:
+        """Predict the time and the largest error, in its unit."""
+        i, each = math.log2(refine), self.crosses.items()
+        bound = max(cross.error(i, level) / self.units[name] for name, cross in each)
+        likely = max(size(cross.lack(i, level)) / self.units[name] for name, cross in each)
+        seconds = self.seconds(float(refine), 2**level)
+        return Choice(refine, level, seconds, self.larger * bound, self.larger * likely)
+
+    def seconds(self, refine: float, parts: float) -> float:
+        """Predict the wall time; s."""
+        return self.cost.seconds(self.steps * parts, self.cells * refine)
+
+    def stepping(self, refine: float, parts: float) -> float:
+        """Predict the wall time of the steps alone; s."""
+        return self.cost.stepping(self.steps * parts, self.cells * refine)
 
     def bottleneck(self, choice: Choice) -> tuple[int, int]:
         """Refine by a level what has the larger part of the error, if that is not negligible."""
@@ -64,17 +109,49 @@ class Prediction:
         """Return the largest of differences of the quantities, in its unit."""
         return max(size(d) / self.units[name] for name, d in differences.items())
 
-    def choices(self) -> list[Choice]:
+    def choices(self) -> Choices:
         """List all settings that may be chosen."""
-        i, j = self.finest
-        refinements = range(1, 2 ** (i + EXTRAPOLATED_LEVELS) + 1)
-        levels = range(STEPS_PER_LEVEL * (j + EXTRAPOLATED_LEVELS) + 1)
-        choices = []
-        for refine, k in product(refinements, levels):
-            level = k / STEPS_PER_LEVEL
-            seconds = self.cost.seconds(self.steps * 2**level, self.cells * refine)
-            choices.append(Choice(refine, level, seconds, self.ratio(refine, level)))
-        return choices
+        i, j = (level + EXTRAPOLATED_LEVELS for level in self.finest)
+        least = math.ceil(self.coarsest * self.divisor)
+        refine = [Fraction(k, self.divisor) for k in _spread(least, self.divisor * 2**i)]
+        parts = _spread(1, 2**j)  # whole: where the steps as given end, all others end as well
+        if not self.whole_steps:
+            parts = list(2 ** np.arange(0.0, j + 1e-9, 1 / CHOICES_PER_LEVEL))
+        level = [math.log2(part) for part in parts]
+        along = np.array([math.log2(r) for r in refine])
+        each = [(cross, self.larger / self.units[n]) for n, cross in self.crosses.items()]
+        ratio = np.max([
+            scale * np.add.outer([*map(cross.cells.at, along)], [*map(cross.steps.at, level)])
+            for cross, scale in each
+        ], axis=0)  # fmt: skip
+        cells = self.cells * np.array([float(r) for r in refine])[:, None]
+        return Choices(refine, level, self.cost.seconds(self.steps * np.array(parts), cells), ratio)
+
+    def cheapest(self, choices: Choices, allowed: npt.NDArray[np.bool_]) -> Choice:
+        """Choose the cheapest of some, or one that is hardly dearer if its errors may cancel.
+
+        What cancels is chance: such a run is more accurate than it must be.
+        """
+        order = np.argsort(np.where(allowed, choices.seconds, np.inf), axis=None, kind="stable")
+        rows, columns = np.unravel_index(order[: min(MOST_TRIED, allowed.sum())], allowed.shape)
+        accurate = None
+        for row, column in zip(rows, columns, strict=True):
+            one = self.choice(choices.refine[row], choices.level[column])
+            if one.likely > MOST_USED:
+                continue
+            accurate = accurate or one
+            if one.seconds > CANCELLED * accurate.seconds:
+                break
+            if one.likely >= LEAST_USED:
+                return one
+        return accurate or self.choice(choices.refine[rows[0]], choices.level[columns[0]])
+
+
+def _spread(first: int, last: int) -> list[int]:
+    """Return whole numbers, all the small ones, and fewer of the large ones."""
+    levels = math.log2(last / first)
+    spread = first * 2 ** np.linspace(0.0, levels, 1 + round(levels * CHOICES_PER_LEVEL))
+    return [int(one) for one in np.unique(np.round(spread))]
 
 
 @dataclass(frozen=True)
@@ -96,10 +173,11 @@ class Tolerance:
         """Return the tolerance of each quantity, in its unit."""
         return {n: self.absolute.get(n, self.relative * scale) for n, scale in scales.items()}
 
-    def choose(self, choices: Sequence[Choice]) -> Choice:
+    def choose(self, prediction: Prediction) -> Choice:
         """Choose the cheapest that is accurate enough, or else nearly as accurate as any."""
-        most = max(1.0, NEARLY_BEST * min(one.ratio for one in choices))
-        return min((one for one in choices if one.ratio <= most), key=self.objective)
+        choices = prediction.choices()
+        most = max(1.0, NEARLY_BEST * float(choices.ratio.min()))
+        return prediction.cheapest(choices, choices.ratio <= most)
 
     def serves(self, choice: Choice) -> bool:
         """Return whether a choice is accurate enough."""
@@ -110,8 +188,8 @@ class Tolerance:
         return choice.seconds
 
     def accepts(self, seconds: float, ratio: float) -> bool:
-        """Return whether it is accurate enough."""
-        return ratio <= 1.0
+        """Return whether it is accurate enough, and not much more."""
+        return WORST_USED <= ratio <= 1.0
 
     def rank(self, seconds: float, ratio: float, expected: float) -> tuple[bool, float]:
         """Rank by time where accurate enough, else by error."""
@@ -138,11 +216,13 @@ class Budget:
         """Return the sizes of the quantities."""
         return dict(scales)
 
-    def choose(self, choices: Sequence[Choice]) -> Choice:
+    def choose(self, prediction: Prediction) -> Choice:
         """Choose the most accurate that is fast enough, or the fastest."""
-        fast = (one for one in choices if one.seconds <= BUDGET_AIM * self.seconds)
-        fastest = min(choices, key=lambda one: one.seconds)
-        return min(fast, key=self.objective, default=fastest)
+        refine, level, seconds, ratio = prediction.choices()
+        fast = seconds <= BUDGET_AIM * self.seconds
+        best = np.where(fast, ratio, np.inf).argmin() if fast.any() else seconds.argmin()
+        row, column = np.unravel_index(best, ratio.shape)
+        return prediction.choice(refine[row], level[column])
 
     def serves(self, choice: Choice) -> bool:
         """Return whether a choice is fast enough, and accurate enough to be recommended."""

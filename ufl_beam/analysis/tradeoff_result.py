@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,7 +30,7 @@ class Dials:
     mesh: Mesh  # the cells
     newton: Newton  # how exactly equilibria are found
 
-    def finer(self, refine: int, level: float, t: tuple[float, float]) -> Dials:
+    def finer(self, refine: Fraction, level: float, t: tuple[float, float]) -> Dials:
         """Refine each cell into ``refine`` parts and take about ``2**level`` times as many steps.
 
         The error of an adaptive step is of third order: their number is as the cube root of 1/tol.
@@ -42,6 +43,11 @@ class Dials:
         else:
             dt = replace(self.dt, tolerance=self.dt.tolerance / 8**level)
         return replace(self, dt=dt, mesh=replace(self.mesh, refine=self.mesh.refine * refine))
+
+    @property
+    def steps(self) -> tuple[Scheme, Any]:
+        """Scheme and steps, which settings with other cells share."""
+        return self.scheme, self.dt
 
     @property
     def arguments(self) -> dict[str, Any]:
@@ -59,9 +65,14 @@ class Refinement(NamedTuple):
     """Family of dials and how much finer than its coarsest setting a run is."""
 
     family: int  # number of the dials that it begins with
-    refine: int  # parts of each cell
+    refine: Fraction  # parts of each cell
     level: float  # steps are about 2**level times as many
     newton: int = 0  # number of the tolerances
+
+    @property
+    def case(self) -> dict[str, Any]:
+        """Return it as arguments of a member of a study."""
+        return self._asdict() | {"refine": str(self.refine)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,11 +82,16 @@ class Run:
     refinement: Refinement  # how fine it is
     dials: Dials  # with which dials
     values: dict[str, Array]  # the quantities
-    seconds: float  # wall time without compiling; s; the median of three if it is short
+    seconds: float  # wall time without compiling; s
+    building: float  # part of it before the first step; s
     steps: float  # steps that were taken
     cells: float  # number of cells
     iterations: float  # newton iterations per step
-    spent: float  # wall time of all repetitions; s
+
+    @property
+    def stepping(self) -> float:
+        """Wall time of the steps alone; s."""
+        return self.seconds - self.building
 
     def __repr__(self) -> str:
         return f"<Run: {self.dials}: {self.seconds:.3g} s>"
@@ -95,7 +111,7 @@ class Tradeoff(Rich):
         target: What was asked.
         families: The kinds of dials, in words.
         notes: Further remarks on the result.
-        spent: Wall time of all runs, repetitions and compiling included; s.
+        spent: Wall time of all runs; s.
 
     Example:
         >>> tip = {"tip": lambda run: run.position(beam.end)[-1]}
@@ -138,6 +154,11 @@ class Tradeoff(Rich):
         return max(error / self.units[name] for name, error in self.errors(run).items())
 
     @property
+    def effort(self) -> float:
+        """Wall time of the steps of all runs over that of the recommended one."""
+        return sum(run.stepping for run in self.runs) / self.best.stepping
+
+    @property
     def front(self) -> list[Run]:
         """Runs that no other one beats in time and in accuracy, the fastest first."""
         seconds = np.array([run.seconds for run in self.runs])
@@ -168,7 +189,8 @@ class Tradeoff(Rich):
             lines.append(f"{name}: limit {value} ± {cross.uncertainty:.1g}{cross}")
         lines.append(
             f"{len(self.runs)} runs took {self.spent:.3g} s, "
-            f"{self.spent / self.best.seconds:.2g} times the recommended one"
+            f"{self.spent / self.best.seconds:.2g} times the recommended one; their steps "
+            f"{self.effort:.2g} times"
         )
         return [*lines, *self.notes, f"recommended: {self._recommended}"]
 

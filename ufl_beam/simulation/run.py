@@ -94,7 +94,7 @@ def simulate(
     """
     comm = communicator(comm, "simulate: comm")
     require_switch(progress, "simulate: progress")
-    t0, t1 = _require_times(t)
+    t0, t1 = require_times(t)
     _require_step(dt, scheme, (t0, t1))
     require_count(every, "simulate: every")
     require_count(most, "simulate: most")
@@ -124,7 +124,7 @@ def simulate(
             scene, scheme, t0=t0, start=start, newton=newton, mesh=mesh, comm=comm
         )
         solution = simulation.solution
-        solution.every = every
+        solution.every, solution.building = every, time.perf_counter() - begin
         stack.enter_context(running(simulation, recorders, outputs, begin))
         pace = steps_of(simulation, t1, dt)
 
@@ -228,7 +228,8 @@ def running(
             simulation.solution.seconds += time.perf_counter() - begin
 
 
-def _require_times(t: tuple[float, float]) -> tuple[float, float]:
+def require_times(t: tuple[float, float]) -> tuple[float, float]:
+    """Return the beginning and the end of a run, checked."""
     try:
         t0, t1 = t
     except (TypeError, ValueError):

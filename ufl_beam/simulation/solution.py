@@ -53,6 +53,7 @@ class Solution(Rich):
         time_error: Sum of the estimated errors of :class:`Adaptive` steps, relative to the size of
             the scene, or in rad; NaN with equal steps.
         seconds: Wall time of the run, building the scene included; s.
+        building: Wall time of building the scene in :func:`simulate`, which is not saved; s.
         every: Steps from one that was kept to the next.
         parameter: Words for :attr:`times`, which are load factors in a path.
         open_ledger: How far the energy ledger is open, in words; empty if it closes as claimed.
@@ -72,7 +73,7 @@ class Solution(Rich):
     def __init__(self, scene: Scene, grid: Grid) -> None:
         self.scene, self.grid = scene, grid
         self.parts = self.iterations = 0
-        self.time_error, self.seconds = math.nan, 0.0
+        self.time_error, self.seconds, self.building = math.nan, 0.0, 0.0
         self.every, self.open_ledger = 1, ""
         self.internal: State = {}
         self._kept = KeptStates(grid)

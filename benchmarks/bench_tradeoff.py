@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: MIT
+"""Errors and cost of what ``tradeoff`` recommends, against fine references, on six scenes.
+
+Run on an idle machine, one core::
+
+    ./env python3 benchmarks/bench_tradeoff.py
+
+The scenes are those of the study and of the other benchmarks, with their coarsest cells and steps.
+Each is asked for errors of 1e-2, 1e-3 and 1e-4 of its largest displacement.  The error is that of
+the recommended run against a reference with much finer cells and steps.  Prints a table and writes
+one JSON line per question to ``benchmarks/results/bench_tradeoff.jsonl``.
+"""
+
+import argparse
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from records import keep
+
+import ufl_beam as ub
+
+sys.path.append(str(Path(__file__).parent / "study"))
+
+from cases import CASES, Case
+
+STEEL = {"E": 210e9, "nu": 0.3, "rho": 7850.0}  # Pa, -, kg/m^3
+STUDY = {case.name: case for case in CASES}
+
+
+@dataclass(frozen=True)
+class Question:
+    """A case, and how fine its reference is: parts of its cells and steps."""
+
+    case: Case
+    refine: int
+    parts: int
+    degree: int = 3
+
+    @property
+    def scheme(self):
+        return ub.Midpoint() if self.case.dynamic else ub.Static()
+
+    def ask(self):
+        """The scene, its quantity and the arguments of a run."""
+        case = self.case
+        scene, place = case.make()
+
+        def path(solution):
+            """Displacements of the place at ten instants; m."""
+            moved = solution.displacement(place)[:, :2]
+            return np.stack([np.interp(case.instants, solution.times, x) for x in moved.T])
+
+        run = {"scheme": self.scheme, "t": (0.0, case.end), "dt": case.end / case.steps}
+        return scene, path, run
+
+    def reference(self):
+        """The path with fine cells and steps; m."""
+        scene, path, run = self.ask()
+        mesh = ub.Mesh(refine=self.refine, degree=self.degree)
+        run |= {"dt": run["dt"] / self.parts, "mesh": mesh, "every": max(1, self.parts // 8)}
+        return path(ub.simulate(scene, **run))
+
+
+def frame(hinges):
+    """A steel portal under a blow of half a sine at its corner; 10 cells."""
+    section = ub.Section.rectangle(b=0.1, h=0.2, **STEEL)
+    left = ub.Beam((0, 0), (0, 3), section, cells=3, hinges=hinges)
+    roof = ub.Beam((0, 3), (4, 3), section, cells=4)
+    right = ub.Beam((4, 3), (4, 0), section, cells=3)
+    blow = ub.Table([0, 0.01, 0.02], [0, 1, 0])
+    scene = ub.Scene(
+        [left, roof, right],
+        joints=[ub.Rigid(left.end, roof.start), ub.Rigid(roof.end, right.start)],
+        supports=[ub.Clamped(left.start), ub.Clamped(right.end)],
+        loads=[ub.PointLoad(left.end, force=(200e3, 0), time=blow)],
+    )
+    return scene, left.end
+
+
+def elastic_frame():
+    return frame({})
+
+
+def yielding_frame():
+    """A hinge at the foot that is struck, which flows at 50 kN m and hardens."""
+    return frame({0.0: ub.Hardening(limit=50e3, modulus=2e5)})
+
+
+def frame_case(name, make, *, elastic):
+    return Case(name, "smooth", "", make, 0.1, 50, elastic=elastic)
+
+
+QUESTIONS = (
+    Question(frame_case("elastic frame", elastic_frame, elastic=True), 8, 512),
+    Question(STUDY["flying beam"], 8, 128),
+    Question(frame_case("frame with a hinge", yielding_frame, elastic=False), 8, 512),
+    Question(STUDY["swing"], 8, 128),
+    Question(STUDY["bent cantilever"], 16, 1),
+    Question(STUDY["breaking arm"], 64, 64),
+)
+
+
+def answer(question, reference, tolerance):
+    """What is recommended for a tolerance, how far it errs, and what the search took."""
+    scene, path, run = question.ask()
+    begin = time.perf_counter()
+    found = ub.tradeoff(scene, {"path": path}, tolerance=tolerance, **run)
+    wall = time.perf_counter() - begin
+    best = found.best
+    error = np.abs(best.values["path"] - reference).max() / np.abs(reference).max()
+    return found, {
+        "case": question.case.name, "asked": tolerance, "error": error, "ratio": error / tolerance,
+        "estimated": found.ratio(best), "runs": len(found.runs), "spent_s": found.spent,
+        "best_s": best.seconds, "effort": found.effort, "wall_s": wall,
+        "steps": best.steps, "cells": best.cells, "dials": str(best.dials),
+        "notes": list(found.notes),
+    }  # fmt: skip
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--only", default="", help="cases whose names contain this")
+    parser.add_argument("--say", action="store_true", help="print each trade-off")
+    options = parser.parse_args()
+    print(f"{'':20s} {'asked':>6} {'error/asked':>11} {'estimate':>8} {'effort':>6} {'runs':>4}")
+    for question in QUESTIONS:
+        if options.only not in question.case.name:
+            continue
+        reference = question.reference()
+        for tolerance in (1e-2, 1e-3, 1e-4):
+            try:
+                found, one = answer(question, reference, tolerance)
+            except ub.TradeoffError as error:
+                print(f"{question.case.name:20s} {tolerance:6.0e} refused: {error}")
+                continue
+            if options.say:
+                print(found)
+            keep("bench_tradeoff", one)
+            print(
+                f"{one['case']:20s} {tolerance:6.0e} {one['ratio']:11.2f} {one['estimated']:8.2f} "
+                f"{one['effort']:6.1f} {one['runs']:4d}  {one['dials']}",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main()
