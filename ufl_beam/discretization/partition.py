@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import Any, Protocol
 
 from mpi4py import MPI
@@ -125,6 +126,10 @@ class Share:
 
     def rotations(self) -> Index:
         """Local numbers of all rotations; int32."""
+        return self._rotations
+
+    @cached_property
+    def _rotations(self) -> Index:
         return np.sort(self.local(self.grid.rotations)).astype(np.int32)
 
     def translations(self) -> tuple[Index, Index]:

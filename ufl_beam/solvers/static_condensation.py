@@ -10,7 +10,7 @@ entries are summed over the processes.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -22,16 +22,14 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, opaque
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Share
+from ufl_beam.structure_cache import of_structure
 
 GOOD = int(PETSc.PC.FailedReason.NOERROR)
 BAD_PIVOT = int(PETSc.PC.FailedReason.FACTOR_NUMERIC_ZEROPIVOT)
 
 
-class Chains:
+class Chains(NamedTuple):
     """Vertices of the cells of one process that couple to their two neighbours and to nothing else.
-
-    They are found in the structure of the matrix, so they remain right whatever comes to couple.
-    ``alone`` marks local degrees of freedom that no other process has.
 
     Attributes:
         dofs: Degrees of freedom of the vertices, chain after chain; (num_vertices, 3).
@@ -43,51 +41,66 @@ class Chains:
             vertex after stand; (num_vertices, 9).
     """
 
-    def __init__(self, cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -> None:
-        nodes = cell_dofs.shape[1] // 3
-        start, end = cell_dofs[:, 0::nodes], cell_dofs[:, 1::nodes]
-        # Vertex number k is the one between the cells k and k + 1.
-        around = np.hstack([start[:-1], end[:-1], end[1:]])
-        inside = (end[:-1] == start[1:]).all(axis=1) & (np.diff(np.sort(around)) > 0).all(axis=1)
-        # With nine entries in rows and columns, these nine are all.
-        plain = alone & (np.diff(A.indptr) == 9)
-        plain &= np.bincount(A.indices, minlength=A.size) == 9
-        inside &= plain[end[:-1]].all(axis=1)
-        inside &= np.isin(np.arange(len(inside)), np.unique(end[:-1, 0], return_index=True)[1])
-        # Beams side by side may make an end of a chain the middle of another.
-        middle = np.zeros(A.size, dtype=bool)
-        middle[end[:-1][inside]] = True
-        chain, first, last = _runs(inside)
-        ends = np.hstack([start[:-1][first], end[1:][last]])
-        inside[inside] = ~middle[ends].any(axis=1)[chain]
+    dofs: Index
+    first: Index
+    ends: Index
+    spikes: npt.NDArray[np.bool_]
+    order: Index
 
-        chain, first, last = _runs(inside)
-        left, middle_, right = start[:-1][first], end[:-1][inside], end[1:][last]
-        before, after = start[:-1][inside], end[1:][inside]
-        # A vertex with six entries has no neighbour but the first or last of its chain.
-        narrow = alone & (np.diff(A.indptr) == 6)
-        narrow &= np.bincount(A.indices, minlength=A.size) == 6
-        dead_left, dead_right = (narrow[dofs].all(axis=1) for dofs in (left, right))
-        backward = dead_right & ~dead_left
-        dead = dead_left | dead_right
-        long = last - first + 1
-        self.first = np.append(0, np.cumsum(long + dead))
-        begin = self.first[:-1]
-        here = np.arange(len(chain)) - np.append(0, np.cumsum(long))[chain]
-        here = np.where(backward[chain], long[chain] - 1 - here, here)
-        place = begin[chain] + dead[chain] + here
-        around = np.empty((self.first[-1], 3, 3), dtype=np.int32)
-        around[place, 1] = middle_
-        around[place, 0] = np.where(backward[chain, None], after, before)
-        around[place, 2] = np.where(backward[chain, None], before, after)
-        around[begin[dead], 0] = A.size + np.arange(3)
-        around[begin[dead], 1] = np.where(backward[:, None], right, left)[dead]
-        around[begin[dead], 2] = around[begin[dead] + 1, 1]
-        right = np.where(backward[:, None], left, right)
-        self.ends = np.hstack([np.where(dead[:, None], right, left), right])
-        self.dofs, self.spikes = around[:, 1], ~dead
-        around = around.reshape(-1, 9)
-        self.order = np.argsort(np.argsort(around, axis=1), axis=1).astype(np.int32)
+
+@of_structure
+def find_chains(
+    cell_dofs: Index, indptr: Index, indices: Index, alone: npt.NDArray[np.bool_]
+) -> Chains:
+    """Find the chains in the structure of a matrix, so that they are right whatever couples.
+
+    ``alone`` marks local degrees of freedom that no other process has.
+    """
+    size, widths = len(indptr) - 1, np.diff(indptr)
+    heights = np.bincount(indices, minlength=size)
+    nodes = cell_dofs.shape[1] // 3
+    start, end = cell_dofs[:, 0::nodes], cell_dofs[:, 1::nodes]
+    # Vertex number k is the one between the cells k and k + 1.
+    around = np.hstack([start[:-1], end[:-1], end[1:]])
+    inside = (end[:-1] == start[1:]).all(axis=1) & (np.diff(np.sort(around)) > 0).all(axis=1)
+    # With nine entries in rows and columns, these nine are all.
+    plain = alone & (widths == 9)
+    plain &= heights == 9
+    inside &= plain[end[:-1]].all(axis=1)
+    inside &= np.isin(np.arange(len(inside)), np.unique(end[:-1, 0], return_index=True)[1])
+    # Beams side by side may make an end of a chain the middle of another.
+    middle = np.zeros(size, dtype=bool)
+    middle[end[:-1][inside]] = True
+    chain, first, last = _runs(inside)
+    ends = np.hstack([start[:-1][first], end[1:][last]])
+    inside[inside] = ~middle[ends].any(axis=1)[chain]
+
+    chain, first, last = _runs(inside)
+    left, middle_, right = start[:-1][first], end[:-1][inside], end[1:][last]
+    before, after = start[:-1][inside], end[1:][inside]
+    # A vertex with six entries has no neighbour but the first or last of its chain.
+    narrow = alone & (widths == 6)
+    narrow &= heights == 6
+    dead_left, dead_right = (narrow[dofs].all(axis=1) for dofs in (left, right))
+    backward = dead_right & ~dead_left
+    dead = dead_left | dead_right
+    long = last - first + 1
+    first_of_chain = np.append(0, np.cumsum(long + dead))
+    begin = first_of_chain[:-1]
+    here = np.arange(len(chain)) - np.append(0, np.cumsum(long))[chain]
+    here = np.where(backward[chain], long[chain] - 1 - here, here)
+    place = begin[chain] + dead[chain] + here
+    around = np.empty((first_of_chain[-1], 3, 3), dtype=np.int32)
+    around[place, 1] = middle_
+    around[place, 0] = np.where(backward[chain, None], after, before)
+    around[place, 2] = np.where(backward[chain, None], before, after)
+    around[begin[dead], 0] = size + np.arange(3)
+    around[begin[dead], 1] = np.where(backward[:, None], right, left)[dead]
+    around[begin[dead], 2] = around[begin[dead] + 1, 1]
+    right = np.where(backward[:, None], left, right)
+    ends = np.hstack([np.where(dead[:, None], right, left), right])
+    order = np.argsort(np.argsort(around.reshape(-1, 9), axis=1), axis=1).astype(np.int32)
+    return Chains(around[:, 1], first_of_chain, ends, ~dead, order)
 
 
 def _runs(mask: npt.NDArray[np.bool_]) -> tuple[Index, Index, Index]:
@@ -113,7 +126,8 @@ class Elimination:
     def __init__(self, share: Share, A: Csr) -> None:
         self._comm = share.comm
         ghosts = np.concatenate(self._comm.allgather(share.dofs[share.num_owned :]))
-        chains = Chains(share.cell_dofs, A, ~np.isin(share.dofs, ghosts))
+        alone = ~np.isin(share.dofs, ghosts)
+        chains = find_chains(share.cell_dofs, A.indptr, A.indices, alone)
         stays = np.ones(share.size, dtype=bool)
         stays[chains.dofs] = False
         here = np.flatnonzero(stays)
