@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import accumulate
 from pathlib import Path
 from typing import Any, NamedTuple, ParamSpec, Protocol, TypeVar, cast
@@ -135,10 +135,6 @@ class Kernel:
         unknown: The configuration that most calls change; it need not appear in the form.
         cell_dofs: Its degrees of freedom; shape (num_cells, 6).
         coordinates: Vertices of the cells; shape (num_cells, 2, 3); m.
-
-    Attributes:
-        cells: Argument of ``add_cells`` of loops.c; a new one after :meth:`share`, :meth:`place`,
-            :meth:`compute_in_lanes`.
     """
 
     def __init__(
@@ -168,18 +164,22 @@ class Kernel:
         self._at, self._unknowns = 0, 0
         if self.uses(unknown):
             self._at, self._unknowns = self.position(unknown), self._dofs.shape[1]
-        self._prepare()
 
-    def _prepare(self) -> None:
-        """Make the data of the loop over the cells."""
+    @cached_property
+    def cells(self) -> Any:
+        """Argument of ``add_cells`` of loops.h; another one once a method changes its arrays."""
         number, of_cell = self._dofs.shape
-        self.cells = fill(
+        return fill(
             ffi.new("cells *"),
             tabulate=self._form.tabulate, several=self._in_lanes, lanes=self._lanes,
             number=number, of_cell=of_cell, dofs=self._dofs, unknowns=self._unknowns, at=self._at,
             width=self._packed.shape[1], w=self._packed, constants=self._form.constants,
             coordinates=self._coordinates, rows=self._entries, row=self._rows,
         )  # fmt: skip
+
+    def _change(self) -> None:
+        """Let :attr:`cells` be made anew of the arrays."""
+        vars(self).pop("cells", None)
 
     def uses(self, function: fem.Function) -> bool:
         """Return whether a function appears in the form."""
@@ -205,7 +205,7 @@ class Kernel:
         if self._columns != other._columns or self._lanes != other._lanes:
             raise ValueError("the forms do not have the same coefficients")
         self._packed = other._packed
-        self._prepare()
+        self._change()
 
     def place(self, A: Csr) -> None:
         """Let a bilinear form on the degrees of freedom of the cells add to ``A``."""
@@ -215,7 +215,7 @@ class Kernel:
         rows = np.repeat(self._dofs, per_cell, axis=1)
         positions = A.positions(rows.ravel(), np.tile(self._dofs, per_cell).ravel())
         self._rows = in_batches(positions.reshape(rows.shape), self._lanes)
-        self._prepare()
+        self._change()
 
     def address_in_lanes(self) -> int | None:
         """Return the address of the SIMD loop, or None."""
@@ -229,7 +229,7 @@ class Kernel:
         )
         self._in_lanes = ffi.cast("in_lanes *", address)
         self._lanes, self._coordinates = LANES, coordinates
-        self._prepare()
+        self._change()
 
     def add(self, q: Array, b: Array) -> None:
         """Add the form at the unknown ``q`` to a vector, or to the entries of the matrix."""

@@ -62,11 +62,13 @@ class Grid:
             [b.curve(s) for b, p in zip(beams, self._parameters, strict=True) for s in p],
             dtype=np.float64,
         ).reshape(-1, 2)
-        begin = np.setdiff1d(np.arange(len(vertices)), self.first_vertices[1:] - 1)
+        begins = np.ones(len(vertices), dtype=bool)
+        begins[self.first_vertices[1:] - 1] = False
+        begin = np.flatnonzero(begins)
         self.cells = np.column_stack([begin, begin + 1])
         self.beam_of_cell = np.repeat(np.arange(len(beams)), counts - 1)
-        inner, begins, ends = mesh.nodes[1:-1], vertices[begin], vertices[begin + 1]
-        between = begins[:, None] + inner[:, None] * (ends - begins)[:, None]
+        inner, starts, ends = mesh.nodes[1:-1], vertices[begin], vertices[begin + 1]
+        between = starts[:, None] + inner[:, None] * (ends - starts)[:, None]
         self.points = np.concatenate([vertices, between.reshape(-1, 2)])
         numbers = len(vertices) + np.arange(between[..., 0].size).reshape(between.shape[:2])
         self._require_length()
