@@ -102,6 +102,7 @@ bench: ## time per step
 	@./env python3 benchmarks/bench_nothing.py
 	@./env python3 benchmarks/bench_budget.py
 	@./env python3 benchmarks/bench_scaling.py
+	@./env python3 benchmarks/bench_ensemble.py
 
 bench-peers: ## time, memory and error beside Exudyn, OpenSees and a C loop, as docs/peers.md
 	@./env python3 benchmarks/peers
