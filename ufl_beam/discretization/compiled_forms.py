@@ -102,7 +102,9 @@ class CellForm(Protocol):
     else each to entries of its own.
     """
 
-    cells: Any  # argument of ``add_cells`` of loops.h; None of a form that C does not evaluate
+    @property
+    def cells(self) -> Any:
+        """Argument of ``add_cells`` of loops.h; null of a form that C does not evaluate."""
 
     def uses(self, function: fem.Function) -> bool:
         """Return whether a function appears in the form."""
