@@ -99,7 +99,8 @@ ACCELERATIONS = {
         by.SHIPPED, by.WHOLE,
         (
             "compiled/c/elimination.c", "solvers/static_condensation.py:Chains",
-            "solvers/static_condensation.py:_runs", "solvers/static_condensation.py:Elimination",
+            "solvers/static_condensation.py:_chains", "solvers/static_condensation.py:_runs",
+            "solvers/static_condensation.py:Elimination",
         ),
     ),
     "elimination beside `DirectSolver`": Acceleration(
@@ -108,7 +109,8 @@ ACCELERATIONS = {
         by.PETSC, by.KLU,
         (
             "compiled/c/elimination.c", "solvers/static_condensation.py:Chains",
-            "solvers/static_condensation.py:_runs", "solvers/static_condensation.py:Elimination",
+            "solvers/static_condensation.py:_chains", "solvers/static_condensation.py:_runs",
+            "solvers/static_condensation.py:Elimination",
         ),
     ),
     "tangent kept in the last iteration": Acceleration(

@@ -10,7 +10,7 @@ entries are summed over the processes.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -28,8 +28,11 @@ GOOD = int(PETSc.PC.FailedReason.NOERROR)
 BAD_PIVOT = int(PETSc.PC.FailedReason.FACTOR_NUMERIC_ZEROPIVOT)
 
 
-class Chains(NamedTuple):
+class Chains:
     """Vertices of the cells of one process that couple to their two neighbours and to nothing else.
+
+    They are found in the structure of the matrix, so they remain right whatever comes to couple.
+    ``alone`` marks local degrees of freedom that no other process has.
 
     Attributes:
         dofs: Degrees of freedom of the vertices, chain after chain; (num_vertices, 3).
@@ -41,21 +44,16 @@ class Chains(NamedTuple):
             vertex after stand; (num_vertices, 9).
     """
 
-    dofs: Index
-    first: Index
-    ends: Index
-    spikes: npt.NDArray[np.bool_]
-    order: Index
+    def __init__(self, cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -> None:
+        found = _chains(cell_dofs, A.indptr, A.indices, alone)
+        self.dofs, self.first, self.ends, self.spikes, self.order = found
 
 
 @of_structure
-def find_chains(
+def _chains(
     cell_dofs: Index, indptr: Index, indices: Index, alone: npt.NDArray[np.bool_]
-) -> Chains:
-    """Find the chains in the structure of a matrix, so that they are right whatever couples.
-
-    ``alone`` marks local degrees of freedom that no other process has.
-    """
+) -> tuple[Index, ...]:
+    """Find the attributes of :class:`Chains`."""
     size, widths = len(indptr) - 1, np.diff(indptr)
     heights = np.bincount(indices, minlength=size)
     nodes = cell_dofs.shape[1] // 3
@@ -100,7 +98,7 @@ def find_chains(
     right = np.where(backward[:, None], left, right)
     ends = np.hstack([np.where(dead[:, None], right, left), right])
     order = np.argsort(np.argsort(around.reshape(-1, 9), axis=1), axis=1).astype(np.int32)
-    return Chains(around[:, 1], first_of_chain, ends, ~dead, order)
+    return around[:, 1], first_of_chain, ends, ~dead, order
 
 
 def _runs(mask: npt.NDArray[np.bool_]) -> tuple[Index, Index, Index]:
@@ -126,8 +124,7 @@ class Elimination:
     def __init__(self, share: Share, A: Csr) -> None:
         self._comm = share.comm
         ghosts = np.concatenate(self._comm.allgather(share.dofs[share.num_owned :]))
-        alone = ~np.isin(share.dofs, ghosts)
-        chains = find_chains(share.cell_dofs, A.indptr, A.indices, alone)
+        chains = Chains(share.cell_dofs, A, ~np.isin(share.dofs, ghosts))
         stays = np.ones(share.size, dtype=bool)
         stays[chains.dofs] = False
         here = np.flatnonzero(stays)
