@@ -3,8 +3,7 @@
 
 A beam of many cells is a chain of vertices that couple to their two neighbours only.  Each process
 eliminates them from its chains, by blocks, and leaves a small matrix of what remains: joints, ends,
-vertices at the border between processes, whatever else couples to more than two neighbours.  Its
-entries are summed over the processes.
+vertices at the border between processes, whatever else couples to more than two neighbours.
 """
 
 from __future__ import annotations
@@ -12,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from mpi4py import MPI
 from petsc4py import PETSc
 
 import numpy as np
@@ -22,6 +20,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, opaque
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Share
+from ufl_beam.solvers.substructuring import Condensed, Substructure, Summed
 
 GOOD = int(PETSc.PC.FailedReason.NOERROR)
 BAD_PIVOT = int(PETSc.PC.FailedReason.FACTOR_NUMERIC_ZEROPIVOT)
@@ -100,29 +99,31 @@ def _runs(mask: npt.NDArray[np.bool_]) -> tuple[Index, Index, Index]:
 class Elimination:
     """Solves with a matrix but for a small one of what cannot be eliminated in chains.
 
-    The call is :meth:`factor`, and for each right-hand side :meth:`reduce`, the solution of the
-    small system by the caller, and :meth:`expand`.  The entries of ``A`` must not change meanwhile.
-    On one process C does the same with :attr:`c`, see newton.c.
+    Satisfies :class:`Condensed`.  The entries of ``A`` must not change between its calls.  On one
+    process C does the same with :attr:`c`, see newton.c.
 
     Attributes:
-        left: The small matrix, which all processes have; its entries are summed over them.
+        numbers: Degrees of freedom that are left here, in numbers of the grid, ascending.
+        shared: Which of them other processes have too.
+        left: The small matrix, of the cells of this process.
         f: Right-hand side of the small system, of :meth:`reduce`.
         c: All of it in C, see loops.h.
     """
 
     def __init__(self, share: Share, A: Csr) -> None:
-        self._comm = share.comm
-        ghosts = np.concatenate(self._comm.allgather(share.dofs[share.num_owned :]))
-        chains = Chains(share.cell_dofs, A, ~np.isin(share.dofs, ghosts))
+        ghosts = np.concatenate(share.comm.allgather(share.dofs[share.num_owned :]))
+        alone = ~np.isin(share.dofs, ghosts)
+        chains = Chains(share.cell_dofs, A, alone)
         stays = np.ones(share.size, dtype=bool)
         stays[chains.dofs] = False
         here = np.flatnonzero(stays)
-        numbers = np.unique(np.concatenate(self._comm.allgather(share.dofs[here])))
+        here = here[np.argsort(share.dofs[here])]
+        self.numbers, self.shared = share.dofs[here], ~alone[here]
         number = np.full(share.size, -1, dtype=np.int32)
-        number[here] = np.searchsorted(numbers, share.dofs[here])
+        number[here] = np.arange(len(here))
         ends, owned = number[chains.ends], here[here < share.num_owned]
-        entry, place, places = self._make_matrix(A, number, ends, len(numbers))
-        self.f = np.zeros(len(numbers))
+        entry, place, places = self._make_matrix(A, number, ends, len(here))
+        self.f = np.zeros(len(here))
         first, last = (chains.dofs[k] for k in (chains.first[:-1], chains.first[1:] - 1))
         next_to = np.stack([np.where(chains.spikes[:, None], first, last), last], axis=1)
         of_ends = np.broadcast_arrays(chains.ends.reshape(-1, 2, 3, 1), next_to[:, :, None, :])
@@ -136,7 +137,7 @@ class Elimination:
         self.c = fill(
             ffi.new("chains *"),
             chains=len(ends), left=len(self.left.data), stay=len(entry), rows=len(owned),
-            left_size=len(numbers), left_data=self.left.data, left_f=self.f,
+            left_size=len(here), left_data=self.left.data, left_f=self.f,
             data=A.data, indptr=A.indptr, swaps=np.empty(3 * vertices, np.int32),
             pivots=np.empty(lib.BLOCK * vertices), to_next=np.empty(lib.BLOCK * vertices),
             sides=np.empty(lib.SIDES * vertices if chains.spikes.any() else 0),
@@ -158,31 +159,23 @@ class Elimination:
         keys = number[rows[entries]].astype(np.int64) * size + number[columns[entries]]
         of_ends = ends.astype(np.int64).reshape(-1, 2, 3)
         of_chains = (of_ends[:, :, None, :, None] * size + of_ends[:, None, :, None, :]).ravel()
-        mine = np.unique(np.concatenate([keys, of_chains]))
-        if self._comm.size > 1:
-            mine = np.unique(np.concatenate(self._comm.allgather(mine)))
-        indptr = np.searchsorted(mine, np.arange(size + 1) * size)
-        self.left = Csr(np.zeros(len(mine)), mine % size, indptr)
-        return entries, np.searchsorted(mine, keys), np.searchsorted(mine, of_chains)
+        all_ = np.unique(np.concatenate([keys, of_chains]))
+        indptr = np.searchsorted(all_, np.arange(size + 1) * size)
+        self.left = Csr(np.zeros(len(all_)), all_ % max(size, 1), indptr)
+        return entries, np.searchsorted(all_, keys), np.searchsorted(all_, of_chains)
 
     def factor(self) -> bool:
         """Eliminate the chains and fill :attr:`left`; whether all of it is finite."""
         lib.eliminate(self.c)
-        self._sum(self.left.data)
         return bool(lib.all_finite(len(self.left.data), doubles(self.left.data)))
 
     def reduce(self, b: Array) -> None:
         """Fill :attr:`f`; ``b`` at the degrees of freedom owned here."""
         lib.reduce(self.c, doubles(b))
-        self._sum(self.f)
 
     def expand(self, small: Array, x: Array) -> None:
         """The solution at the degrees of freedom owned here, after that of the small system."""
         lib.expand(self.c, doubles(small), doubles(x))
-
-    def _sum(self, values: Array) -> None:
-        if self._comm.size > 1:
-            self._comm.Allreduce(MPI.IN_PLACE, values)
 
 
 def succeeds(function: Callable[..., None], *vectors: PETSc.Vec) -> bool:
@@ -199,7 +192,8 @@ def succeeds(function: Callable[..., None], *vectors: PETSc.Vec) -> bool:
 class ChainsFirst:
     """Direct solver: condensation along the beams, then factorization of the rest.
 
-    Every process factors what is left, which is small, instead of waiting for another.
+    Where processes share a scene, each eliminates the rest of its own part; what several of them
+    have is small, and factored by each instead of waiting for another.
     """
 
     def __init__(self, share: Share, A: Csr) -> None:
@@ -207,7 +201,12 @@ class ChainsFirst:
         # round-off, on the diagonal; PETSc's factorisation does not exchange rows, KLU's does.
         package = "klu" if len(share.grid.multipliers) else "petsc"
         self._elimination, self._good = Elimination(share, A), False
-        self._matrix = self._elimination.left.petsc()
+        self._rest: Condensed = self._elimination
+        if not share.alone:
+            if package == "petsc":
+                self._rest = Substructure(self._rest, self._elimination.shared)
+            self._rest = Summed(self._rest, share.comm)
+        self._matrix = self._rest.left.petsc()
         self._factors = PETSc.PC().create(PETSc.COMM_SELF)
         self._factors.setOperators(self._matrix)
         self._factors.setType("lu")
@@ -216,7 +215,7 @@ class ChainsFirst:
         if package == "petsc":
             # Of narrow and wide lattices it fills in least: 0.55 and 0.9 of the time of "nd".
             self._factors.setFactorOrdering("amd")
-        self._rhs = PETSc.Vec().createWithArray(self._elimination.f, comm=PETSc.COMM_SELF)
+        self._rhs = PETSc.Vec().createWithArray(self._rest.f, comm=PETSc.COMM_SELF)
         self._solution = self._rhs.duplicate()
         self._found = doubles(self._solution.array_r)
 
@@ -230,18 +229,18 @@ class ChainsFirst:
     def setUp(self, pc: PETSc.PC) -> None:
         """Factor; PETSc asks for it where the matrix has changed."""
         self._matrix.stateIncrease()
-        self._good = self._elimination.factor() and succeeds(self._factors.setUp)
+        self._good = self._rest.factor() and succeeds(self._factors.setUp)
         self._good = self._good and int(self._factors.getFailedReason()) == GOOD
         pc.setFailedReason(GOOD if self._good else BAD_PIVOT)
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, x: PETSc.Vec) -> None:
         """Solve; zero after a failure, where an error would leave objects of PETSc half done."""
         if self._good:
-            self._elimination.reduce(b.array_r)
+            self._rest.reduce(b.array_r)
             self._rhs.stateIncrease()
             self._good = succeeds(self._factors.apply, self._rhs, self._solution)
         if self._good:
-            self._elimination.expand(self._solution.array_r, x.array_w)
+            self._rest.expand(self._solution.array_r, x.array_w)
         else:
             x.array_w[:] = 0.0
             pc.setFailedReason(BAD_PIVOT)
