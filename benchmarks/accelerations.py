@@ -99,7 +99,8 @@ ACCELERATIONS = {
         by.SHIPPED, by.WHOLE,
         (
             "compiled/c/elimination.c", "solvers/static_condensation.py:Chains",
-            "solvers/static_condensation.py:_chains", "solvers/static_condensation.py:_runs",
+            "solvers/static_condensation.py:_runs", "solvers/static_condensation.py:_plan",
+            "solvers/static_condensation.py:_what_is_left",
             "solvers/static_condensation.py:Elimination",
         ),
     ),
@@ -109,7 +110,8 @@ ACCELERATIONS = {
         by.PETSC, by.KLU,
         (
             "compiled/c/elimination.c", "solvers/static_condensation.py:Chains",
-            "solvers/static_condensation.py:_chains", "solvers/static_condensation.py:_runs",
+            "solvers/static_condensation.py:_runs", "solvers/static_condensation.py:_plan",
+            "solvers/static_condensation.py:_what_is_left",
             "solvers/static_condensation.py:Elimination",
         ),
     ),

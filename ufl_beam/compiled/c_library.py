@@ -23,7 +23,9 @@ from ufl_beam.dolfinx_compat import VERSIONS
 
 T = TypeVar("T")
 
-SOURCES = ("loops", "material_points", "rigid_plastic", "connectors", "elimination", "newton")
+SOURCES = (
+    "loops", "material_points", "rigid_plastic", "connectors", "elimination", "fronts", "newton",
+)  # fmt: skip
 """Files of C beside this one; they are one translation unit."""
 
 _CALLBACKS = """
