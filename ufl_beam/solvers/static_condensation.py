@@ -86,7 +86,7 @@ class Chains:
         self.ends = np.hstack([np.where(dead[:, None], right, left), right])
         self.dofs, self.spikes = around[:, 1], ~dead
         around = around.reshape(-1, 9)
-        self.order = np.argsort(np.argsort(around, axis=1), axis=1).astype(np.int32)
+        self.order = np.argsort(np.argsort(around, axis=1), axis=1).astype(np.uint8)
 
 
 def _runs(mask: npt.NDArray[np.bool_]) -> tuple[Index, Index, Index]:
@@ -123,14 +123,14 @@ class Elimination:
         number[here] = np.arange(len(here))
         ends, owned = number[chains.ends], here[here < share.num_owned]
         entry, place, places = self._make_matrix(A, number, ends, len(here))
-        self.f = np.zeros(len(here))
+        self.f: Array = np.zeros(len(here))
         first, last = (chains.dofs[k] for k in (chains.first[:-1], chains.first[1:] - 1))
         next_to = np.stack([np.where(chains.spikes[:, None], first, last), last], axis=1)
         of_ends = np.broadcast_arrays(chains.ends.reshape(-1, 2, 3, 1), next_to[:, :, None, :])
         vertices = len(chains.dofs)
         indices = {
             "first": chains.first, "spike": chains.spikes, "row": chains.dofs,
-            "order": chains.order, "from_ends": A.positions(*map(np.ravel, of_ends)),
+            "from_ends": A.positions(*map(np.ravel, of_ends)),
             "entry": entry, "place": place, "places": places,
             "dof": owned, "number": number[owned], "ends": ends,
         }  # fmt: skip
@@ -138,6 +138,7 @@ class Elimination:
             ffi.new("chains *"),
             chains=len(ends), left=len(self.left.data), stay=len(entry), rows=len(owned),
             left_size=len(here), left_data=self.left.data, left_f=self.f,
+            order=ffi.from_buffer("uint8_t[]", chains.order),
             data=A.data, indptr=A.indptr, swaps=np.empty(3 * vertices, np.int32),
             pivots=np.empty(lib.BLOCK * vertices), to_next=np.empty(lib.BLOCK * vertices),
             sides=np.empty(lib.SIDES * vertices if chains.spikes.any() else 0),
