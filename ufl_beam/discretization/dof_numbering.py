@@ -129,7 +129,7 @@ class Grid:
         position[inner] = position[self.cells[:, :1]] + self.mesh.nodes[1:-1]
         ordered = (3 * np.argsort(position)[:, None] + np.arange(3)).ravel()
         order = np.concatenate([ordered[(kept & of)[ordered]] for of in (~shared, shared)])
-        number = np.empty(len(slots), dtype=np.int64)
+        number = np.empty(len(slots), dtype=np.int32)
         number[order] = np.arange(len(order))
         dofs = number[slots].reshape(-1, 3)
         self.dofs, self.dofs_of_bodies = dofs[:nodes], dofs[nodes:]

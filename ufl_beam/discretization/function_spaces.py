@@ -183,7 +183,7 @@ class CompiledFields(Fields):
 
     def kernel(self, form: ufl.Form, unknown: fem.Function) -> Kernel:
         """A form on the cells, compiled."""
-        kernel = Kernel(form, unknown, self.cell_dofs, self._coordinates)
+        kernel = Kernel(form, unknown, self.cell_dofs, self._coordinates())
         for function in (self.element.stiffness, self.element.inertia):
             if kernel.uses(function):
                 kernel.put(function, self.of_sections(function))
@@ -203,7 +203,6 @@ class CompiledFields(Fields):
         tangent.place(A)
         return force, tangent
 
-    @cached_property
     def _coordinates(self) -> Array:
         """Vertices of the cells; (num_cells, 2, 3); m."""
         grid, coordinates = self.share.grid, np.zeros((len(self.order), 2, 3))
@@ -212,7 +211,7 @@ class CompiledFields(Fields):
 
     @cached_property
     def _coordinates_in_lanes(self) -> Array:
-        return in_batches(self._coordinates, LANES)
+        return in_batches(self._coordinates(), LANES)
 
 
 @stated

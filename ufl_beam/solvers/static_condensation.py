@@ -98,8 +98,7 @@ def _runs(mask: npt.NDArray[np.bool_]) -> tuple[Index, Index, Index]:
 
 
 INDICES = (
-    "first", "spike", "row", "order", "from_ends", "entry", "place", "places", "dof", "number",
-    "ends",
+    "first", "spike", "row", "from_ends", "entry", "place", "places", "dof", "number", "ends",
 )  # fmt: skip
 """Arrays of ``chains`` of loops.h that follow from the structure of a matrix."""
 
@@ -111,8 +110,8 @@ def _plan(
     """Find what can be eliminated, and where entries go.
 
     Returns:
-        Degrees of freedom that are left, in the order of the grid; ``indptr`` and ``indices`` of
-        their matrix; :data:`INDICES`.
+        Degrees of freedom that are left, in the order of the grid; :attr:`Chains.order`;
+        ``indptr`` and ``indices`` of the matrix of what is left; :data:`INDICES`.
     """
     A = Csr(np.empty(0), indices, indptr)
     chains = Chains(cell_dofs, A, alone)
@@ -128,10 +127,10 @@ def _plan(
     of_ends = np.broadcast_arrays(chains.ends.reshape(-1, 2, 3, 1), next_to[:, :, None, :])
     *structure, entry, place, places = _what_is_left(A, number, ends, len(here))
     found = (
-        chains.first, chains.spikes, chains.dofs, chains.order,
-        A.positions(*map(np.ravel, of_ends)), entry, place, places, owned, number[owned], ends,
+        chains.first, chains.spikes, chains.dofs, A.positions(*map(np.ravel, of_ends)),
+        entry, place, places, owned, number[owned], ends,
     )  # fmt: skip
-    return here, *structure, *(np.ascontiguousarray(x, np.int32) for x in found)
+    return here, chains.order, *structure, *(np.ascontiguousarray(x, np.int32) for x in found)
 
 
 def _what_is_left(A: Csr, number: Index, ends: Index, size: int) -> tuple[Index, ...]:
@@ -170,7 +169,7 @@ class Elimination:
         ghosts = np.concatenate(share.comm.allgather(share.dofs[share.num_owned :]))
         alone = ~np.isin(share.dofs, ghosts)
         of = share.cell_dofs, A.indptr, A.indices, alone, share.dofs, share.num_owned
-        here, indptr, columns, *found = _plan(*of)
+        here, order, indptr, columns, *found = _plan(*of)
         self.numbers, self.shared = share.dofs[here], ~alone[here]
         self.left = Csr(np.zeros(len(columns)), columns, indptr)
         self.f: Array = np.zeros(len(here))
@@ -183,7 +182,7 @@ class Elimination:
             left_f=self.f, data=A.data, indptr=A.indptr, swaps=np.empty(3 * vertices, np.int32),
             pivots=np.empty(lib.BLOCK * vertices), to_next=np.empty(lib.BLOCK * vertices),
             sides=np.empty(lib.SIDES * vertices if spikes.any() else 0),
-            f=np.zeros(3 * vertices), **indices,
+            f=np.zeros(3 * vertices), order=ffi.from_buffer("uint8_t[]", order), **indices,
         )  # fmt: skip
 
     def factor(self) -> bool:

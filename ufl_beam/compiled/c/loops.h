@@ -200,7 +200,7 @@ typedef struct {
   const int32_t *first;     /* first vertex of each chain, and their number */
   const int32_t *spike;     /* whether a chain has a left end */
   const int32_t *row;       /* vertices x 3 */
-  const int32_t *order;     /* vertices x 9 */
+  const uint8_t *order;     /* vertices x 9 */
   const int32_t *from_ends; /* chains x 18: entries of the ends' rows, left and right */
   const int32_t *indptr;
   const double *data;
