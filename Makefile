@@ -18,7 +18,7 @@ pytest_mpi = python3 -m pytest -q --color=no -p no:cacheprovider
 # With 3 ranks one of them has neighbours on both sides, and sums depend on their order. This matters for shared data:
 # random scenes and their invariance, elimination, gathering, files, agreement. All other units run on 2 ranks only;
 # whole suites on 2 and 3 ranks took half an hour.
-sharing = tests/properties $(addprefix tests/unit/test_,$(addsuffix .py,archive checkpoint collective_errors csr factorization file_locks mesh modes output_files parameter_study recorders replicas solution static_condensation))
+sharing = tests/properties $(addprefix tests/unit/test_,$(addsuffix .py,archive checkpoint collective_errors csr factorization file_locks mesh modes output_files parameter_study recorders replicas solution static_condensation substructuring))
 # Tests of code that depends on the version of DOLFINx: forms, kernels of FFCx, calls of PETSc.
 versions = $(addprefix tests/unit/test_,$(addsuffix .py,c_equation c_interface compiled_forms factorization jit modes newton simd_kernels static_condensation))
 cheap_demos = $(addprefix demos/demo_,$(addsuffix .py,four_beam_swing roll_up emergency_stop fibre_damping monte_carlo adaptive_steps lee_frame hinge_snapback rotating_beam))
@@ -102,6 +102,7 @@ bench: ## time per step
 	@./env python3 benchmarks/bench_nothing.py
 	@./env python3 benchmarks/bench_budget.py
 	@./env python3 benchmarks/bench_scaling.py
+	@./env python3 benchmarks/bench_ensemble.py
 
 bench-compare: ## benchmarks of two commits in turn: `make bench-compare with=COMMIT only="bench_step"`
 	@./env python3 benchmarks/compare.py $(with) $(if $(only),--only $(only))

@@ -99,7 +99,9 @@ ACCELERATIONS = {
         by.SHIPPED, by.WHOLE,
         (
             "compiled/c/elimination.c", "solvers/static_condensation.py:Chains",
-            "solvers/static_condensation.py:_runs", "solvers/static_condensation.py:Elimination",
+            "solvers/static_condensation.py:_runs", "solvers/static_condensation.py:_plan",
+            "solvers/static_condensation.py:_what_is_left",
+            "solvers/static_condensation.py:Elimination",
         ),
     ),
     "elimination beside `DirectSolver`": Acceleration(
@@ -108,7 +110,9 @@ ACCELERATIONS = {
         by.PETSC, by.KLU,
         (
             "compiled/c/elimination.c", "solvers/static_condensation.py:Chains",
-            "solvers/static_condensation.py:_runs", "solvers/static_condensation.py:Elimination",
+            "solvers/static_condensation.py:_runs", "solvers/static_condensation.py:_plan",
+            "solvers/static_condensation.py:_what_is_left",
+            "solvers/static_condensation.py:Elimination",
         ),
     ),
     "tangent kept in the last iteration": Acceleration(

@@ -27,16 +27,16 @@ from ufl_beam.terms.inelastic_beams import ReferenceInelasticBeams
 from ufl_beam.terms.reference_points import ReferencePoints
 from ufl_beam.terms.reference_slips import ReferenceSlips
 
-Chains = static_condensation.Chains
+plan = static_condensation._plan
 
 
 def nothing(*_):
     """Do nothing, in the place of a function that switches an acceleration on."""
 
 
-def without_chains(cell_dofs, A, alone):
+def without_chains(cell_dofs, indptr, indices, alone, *more):
     """Chains of no vertices: the whole tangent remains for PETSc."""
-    return Chains(cell_dofs, A, np.zeros_like(alone))
+    return plan(cell_dofs, indptr, indices, np.zeros_like(alone), *more)
 
 
 class EachStepAnew(StepSolver):
@@ -102,7 +102,7 @@ def classes(**others):
 NEWTON_OF_PETSC = (newton.Solver, "_leave_newton_to_c", nothing)
 EQUATION_IN_PYTHON = (StepEquation, "leave_to_c", nothing)
 CELL_BY_CELL = (function_spaces, "vectorise", nothing)
-NO_CHAINS = (static_condensation, "Chains", without_chains)
+NO_CHAINS = (static_condensation, "_plan", without_chains)
 ALL_TANGENTS = (newton, "loop", loop_without_kept_tangents)
 EACH_STEP_ANEW = (stepping, "StepSolver", EachStepAnew)
 

@@ -232,7 +232,7 @@ ub.say("drift uncertain, dissipated energy larger than that of the frame of mean
 # %% [markdown]
 # ## Try this
 #
-# * `mpirun -n 3 python3 demo_monte_carlo.py`: the first process hands out, two compute,
+# * `mpirun -n 3 python3 demo_monte_carlo.py`: three members at a time,
 # * `anew=True` left out: interrupt it and start it again, or raise 49 to 97; only what is missing
 #   is computed,
 # * `ub.Fibres(law, number=40)`: do frames of more fibres differ less from each other?

@@ -13,6 +13,7 @@ import ufl
 import ufl_beam as ub
 from ufl_beam.discretization import compiled_forms
 from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.dolfinx_forms import DolfinxFields
 from ufl_beam.discretization.function_spaces import CompiledFields
 from ufl_beam.discretization.partition import Share
 from ufl_beam.dolfinx_compat import VERSION, cpp, fem, line_mesh
@@ -293,12 +294,12 @@ def test_kernels_give_what_dolfinx_assembles():
     kernel.add(q, matrix.data)
     value = fields.kernel(energy, element.q1).value(q)
 
-    of_three = element.space.ufl_element()
-    space = space_with_dofs(fields.mesh, of_three, fields.cell_dofs, fields.share.size)
+    of_three, meshed = element.space.ufl_element(), DolfinxFields(fields.share)
+    space = space_with_dofs(meshed.mesh, of_three, meshed.cell_dofs, fields.share.size)
     function = fem.Function(space)
     function.x.array[:] = q
-    dx = ufl.Measure("dx", domain=fields.mesh, metadata={"quadrature_degree": 1})
-    of_all = [fem.form(form) for form in forms_of(function, Axis(fields.mesh), dx)]
+    dx = ufl.Measure("dx", domain=meshed.mesh, metadata={"quadrature_degree": 1})
+    of_all = [fem.form(form) for form in forms_of(function, Axis(meshed.mesh), dx)]
     expected = fem.assemble_matrix(of_all[2])
     assert np.array_equal(expected.indices, matrix.indices)
     scale = np.abs(expected.data).max()

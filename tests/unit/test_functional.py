@@ -10,7 +10,7 @@ import pytest
 import ufl
 
 import ufl_beam as ub
-from ufl_beam.discretization.dolfinx_forms import DolfinxForm, dofs_of_cells
+from ufl_beam.discretization.dolfinx_forms import DolfinxFields, DolfinxForm, dofs_of_cells
 from ufl_beam.discretization.function_spaces import Element
 from ufl_beam.dolfinx_compat import fem, line_mesh
 from ufl_beam.mechanics import functional
@@ -131,19 +131,19 @@ def pushed(section, turn=0.3):
 
 def on_cells(simulation):
     """The element on the cells of a scene, and its configuration."""
-    fields = simulation.fields
-    of = Element(fields.share.grid.mesh, fields.mesh)
-    of.q1.x.array[dofs_of_cells(of.space)] = simulation.q[fields.cell_dofs]
-    return of
+    fields = DolfinxFields(simulation.share)
+    fields.element.q1.x.array[dofs_of_cells(fields.element.space)] = simulation.q[fields.cell_dofs]
+    return fields
 
 
 def test_forces_are_the_derivative_of_the_potential():
     """Internal forces of a static step, elastic, are P(34), its first equation."""
     simulation = pushed(ub.Section(EA=6e3, GA=4e3, EI=300.0))
-    of, share = on_cells(simulation), simulation.share
+    fields, share = on_cells(simulation), simulation.share
+    of = fields.element
     W = functional.elastic_energy(strain(of.q1, of.axis), ufl.as_vector((6e3, 4e3, 300.0)))
     order = np.arange(len(share.cells))
-    form = DolfinxForm(derivative(W, of.q1, of.dx(1)), of.q1, simulation.fields.cell_dofs, order)
+    form = DolfinxForm(derivative(W, of.q1, of.dx(1)), of.q1, fields.cell_dofs, order)
     expected, found = np.zeros((2, share.size))
     form.add(simulation.q, expected)
     for one in simulation.beams:
@@ -154,10 +154,11 @@ def test_forces_are_the_derivative_of_the_potential():
 def test_an_open_hinge_is_a_stationary_jump():
     """The jumps that the return map finds make the potential stationary, P(34) and P(49)."""
     simulation = pushed(SECTION)
-    of = on_cells(simulation)
+    fields = on_cells(simulation)
+    of = fields.element
     cells, kept = simulation.inelastic[0].kept()
-    α = fem.Function(fem.functionspace(simulation.fields.mesh, ("DG", 0)))
-    α.x.array[np.argsort(simulation.fields.order)[cells]] = kept[:, 3]
+    α = fem.Function(fem.functionspace(fields.mesh, ("DG", 0)))
+    α.x.array[np.argsort(fields.order)[cells]] = kept[:, 3]
     assert np.count_nonzero(α.x.array) == 3  # a uniform moment opens all
     C = ufl.as_vector((6e3, 4e3, 300.0))
     # The energy that a growing jump dissipates, whose derivative is the traction P(52)

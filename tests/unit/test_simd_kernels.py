@@ -219,7 +219,7 @@ def cell_by_cell(kernel):
         batches = getattr(kernel, name).transpose(0, 2, 1)
         setattr(one, name, in_batches(batches.reshape(-1, batches.shape[2])[:n], 1))
     one._lanes, one._in_lanes = 1, ffi.NULL
-    one._prepare()
+    one._change()
     return one
 
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Generator, Sequence
-from concurrent.futures import as_completed
 from contextlib import closing
 from contextvars import ContextVar
 from pathlib import Path
+from queue import SimpleQueue
 from typing import Any
 
 from mpi4py import MPI
@@ -43,8 +43,7 @@ def study(
     """Run a parameter study: call ``member(**case)`` for each case, in parallel under ``mpirun``.
 
     Each member is computed by one process alone, to the same last bit on any number of them.  The
-    first process hands cases out and writes the file at once; it computes nothing and hardly takes
-    time, so ``mpirun -n 9`` occupies eight cores.  Alone, it calls one after the other.
+    first process also hands cases out and, between its own members, writes the file.
 
     A member that raises an exception has failed: it is reported, and the others are computed.
 
@@ -164,15 +163,42 @@ def _outcomes(
         with MPICommExecutor(comm, root=0) as executor:
             pool: Any = executor
             if pool is not None:
-                futures = {pool.submit(_run, case): key for key, case in cases.items()}
-                try:
-                    for future in as_completed(futures):
-                        yield futures[future], *future.result()
-                finally:
-                    for future in futures:
-                        future.cancel()
+                yield from _shared_out(pool, cases)
     finally:
         _MEMBER.reset(before)
+
+
+def _shared_out(
+    pool: Any, cases: dict[str, Case]
+) -> Generator[tuple[str, Outcome, float], None, None]:
+    """Case, outcome and seconds; others take cases from the front, this process from the back."""
+    futures = {pool.submit(_run, case): key for key, case in cases.items()}
+    ended: SimpleQueue[Any] = SimpleQueue()
+
+    def note(future: Any) -> None:
+        if not future.cancelled():
+            ended.put(future)
+
+    for future in futures:
+        future.add_done_callback(note)
+    # A thread of the pool talks to the others meanwhile, which not every MPI allows.
+    left = [*futures] if MPI.Query_thread() == MPI.THREAD_MULTIPLE else []
+    given = 0
+    try:
+        while given < len(futures):
+            if left and ended.empty():
+                future = left.pop()
+                if not future.cancel():
+                    continue  # another process has begun it
+                outcome = _run(cases[futures[future]])
+            else:
+                future = ended.get()
+                outcome = future.result()
+            given += 1
+            yield futures[future], *outcome
+    finally:
+        for future in futures:
+            future.cancel()
 
 
 def _run(case: Case) -> tuple[Outcome, float]:

@@ -24,14 +24,9 @@ from ufl_beam.dolfinx_compat import VERSIONS
 T = TypeVar("T")
 
 SOURCES = (
-    "loops",
-    "material_points",
-    "rigid_plastic",
-    "connectors",
-    "elimination",
-    "newton",
+    "loops", "material_points", "rigid_plastic", "connectors", "elimination", "fronts", "newton",
     "march",
-)
+)  # fmt: skip
 """Files of C beside this one; they are one translation unit."""
 
 _CALLBACKS = """

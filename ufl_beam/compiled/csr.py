@@ -12,6 +12,7 @@ from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, integers, lib, loop
+from ufl_beam.structure_cache import of_structure
 
 
 class Csr:
@@ -57,6 +58,13 @@ class Csr:
 
 def coupling(size: int, *coupled: Index) -> Csr:
     """Return a matrix of zeros whose pattern has the diagonal and all pairs of coupled dofs."""
+    indices, indptr = _pattern(size, *coupled)
+    return Csr(np.zeros(len(indices)), indices, indptr)
+
+
+@of_structure
+def _pattern(size: int, *coupled: Index) -> tuple[Index, Index]:
+    """Column indices and first entries of the rows of :func:`coupling`."""
     groups = [np.arange(size, dtype=np.int32)[:, None], *coupled]
     lengths = np.concatenate([np.full(len(rows), rows.shape[1]) for rows in groups])
     columns = np.concatenate([rows.ravel() for rows in groups]).astype(np.int32)
@@ -64,7 +72,7 @@ def coupling(size: int, *coupled: Index) -> Csr:
     parts = csr_array((np.ones(len(columns), np.bool_), columns, ends), shape=(len(lengths), size))
     matrix = parts.T.tocsr() @ parts
     matrix.sort_indices()
-    return Csr(np.zeros(matrix.nnz), matrix.indices, matrix.indptr)
+    return matrix.indices.astype(np.int32), matrix.indptr.astype(np.int32)
 
 
 def as_slice(index: Index) -> Index | slice:

@@ -30,6 +30,7 @@ HEADERS = f"""\
 #include <float.h>
 #include <math.h>
 #include <stdint.h>
+#include <stdlib.h>
 #include <string.h>
 #include <time.h>
 #define CALL(f, e, w, c, x) f(e, w, c, x, 0, 0{TABULATE[1]})"""

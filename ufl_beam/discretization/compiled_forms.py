@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import accumulate
 from pathlib import Path
 from typing import Any, NamedTuple, ParamSpec, Protocol, TypeVar, cast
@@ -27,6 +27,9 @@ from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.jit import compiled_form
 from ufl_beam.compiled.simd_kernels import LANES, in_batches, in_lanes
 from ufl_beam.dolfinx_compat import VERSIONS, fem, line_mesh, pack
+
+SOME = 1024 * LANES
+"""Cells whose entries in a matrix are looked up together."""
 
 
 def vectorise(kernels: Sequence[Kernel], coordinates: Array) -> None:
@@ -102,7 +105,9 @@ class CellForm(Protocol):
     else each to entries of its own.
     """
 
-    cells: Any  # argument of ``add_cells`` of loops.h; None of a form that C does not evaluate
+    @property
+    def cells(self) -> Any:
+        """Argument of ``add_cells`` of loops.h; null of a form that C does not evaluate."""
 
     def uses(self, function: fem.Function) -> bool:
         """Return whether a function appears in the form."""
@@ -135,10 +140,6 @@ class Kernel:
         unknown: The configuration that most calls change; it need not appear in the form.
         cell_dofs: Its degrees of freedom; shape (num_cells, 6).
         coordinates: Vertices of the cells; shape (num_cells, 2, 3); m.
-
-    Attributes:
-        cells: Argument of ``add_cells`` of loops.c; a new one after :meth:`share`, :meth:`place`,
-            :meth:`compute_in_lanes`.
     """
 
     def __init__(
@@ -168,18 +169,22 @@ class Kernel:
         self._at, self._unknowns = 0, 0
         if self.uses(unknown):
             self._at, self._unknowns = self.position(unknown), self._dofs.shape[1]
-        self._prepare()
 
-    def _prepare(self) -> None:
-        """Make the data of the loop over the cells."""
+    @cached_property
+    def cells(self) -> Any:
+        """Argument of ``add_cells`` of loops.h; another one once a method changes its arrays."""
         number, of_cell = self._dofs.shape
-        self.cells = fill(
+        return fill(
             ffi.new("cells *"),
             tabulate=self._form.tabulate, several=self._in_lanes, lanes=self._lanes,
             number=number, of_cell=of_cell, dofs=self._dofs, unknowns=self._unknowns, at=self._at,
             width=self._packed.shape[1], w=self._packed, constants=self._form.constants,
             coordinates=self._coordinates, rows=self._entries, row=self._rows,
         )  # fmt: skip
+
+    def _change(self) -> None:
+        """Let :attr:`cells` be made anew of the arrays."""
+        vars(self).pop("cells", None)
 
     def uses(self, function: fem.Function) -> bool:
         """Return whether a function appears in the form."""
@@ -205,17 +210,22 @@ class Kernel:
         if self._columns != other._columns or self._lanes != other._lanes:
             raise ValueError("the forms do not have the same coefficients")
         self._packed = other._packed
-        self._prepare()
+        self._change()
 
     def place(self, A: Csr) -> None:
         """Let a bilinear form on the degrees of freedom of the cells add to ``A``."""
         per_cell = self._dofs.shape[1]
         if self._entries != per_cell**2:
             raise ValueError(f"a form of {self._entries} entries on {per_cell} degrees of freedom")
-        rows = np.repeat(self._dofs, per_cell, axis=1)
-        positions = A.positions(rows.ravel(), np.tile(self._dofs, per_cell).ravel())
-        self._rows = in_batches(positions.reshape(rows.shape), self._lanes)
-        self._prepare()
+        lanes, cells = self._lanes, len(self._dofs)
+        self._rows = np.empty((-(-cells // lanes), self._entries, lanes), dtype=np.int32)
+        for begin in range(0, cells, SOME):  # lists of all pairs take more than the matrix
+            dofs = self._dofs[begin : begin + SOME]
+            rows, columns = np.repeat(dofs, per_cell, axis=1), np.tile(dofs, per_cell)
+            positions = A.positions(rows.ravel(), columns.ravel()).reshape(rows.shape)
+            in_order = in_batches(positions, lanes)
+            self._rows[begin // lanes :][: len(in_order)] = in_order
+        self._change()
 
     def address_in_lanes(self) -> int | None:
         """Return the address of the SIMD loop, or None."""
@@ -229,7 +239,7 @@ class Kernel:
         )
         self._in_lanes = ffi.cast("in_lanes *", address)
         self._lanes, self._coordinates = LANES, coordinates
-        self._prepare()
+        self._change()
 
     def add(self, q: Array, b: Array) -> None:
         """Add the form at the unknown ``q`` to a vector, or to the entries of the matrix."""

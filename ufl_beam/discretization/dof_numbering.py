@@ -62,11 +62,13 @@ class Grid:
             [b.curve(s) for b, p in zip(beams, self._parameters, strict=True) for s in p],
             dtype=np.float64,
         ).reshape(-1, 2)
-        begin = np.setdiff1d(np.arange(len(vertices)), self.first_vertices[1:] - 1)
+        begins = np.ones(len(vertices), dtype=bool)
+        begins[self.first_vertices[1:] - 1] = False
+        begin = np.flatnonzero(begins)
         self.cells = np.column_stack([begin, begin + 1])
         self.beam_of_cell = np.repeat(np.arange(len(beams)), counts - 1)
-        inner, begins, ends = mesh.nodes[1:-1], vertices[begin], vertices[begin + 1]
-        between = begins[:, None] + inner[:, None] * (ends - begins)[:, None]
+        inner, starts, ends = mesh.nodes[1:-1], vertices[begin], vertices[begin + 1]
+        between = starts[:, None] + inner[:, None] * (ends - starts)[:, None]
         self.points = np.concatenate([vertices, between.reshape(-1, 2)])
         numbers = len(vertices) + np.arange(between[..., 0].size).reshape(between.shape[:2])
         self._require_length()
@@ -127,7 +129,7 @@ class Grid:
         position[inner] = position[self.cells[:, :1]] + self.mesh.nodes[1:-1]
         ordered = (3 * np.argsort(position)[:, None] + np.arange(3)).ravel()
         order = np.concatenate([ordered[(kept & of)[ordered]] for of in (~shared, shared)])
-        number = np.empty(len(slots), dtype=np.int64)
+        number = np.empty(len(slots), dtype=np.int32)
         number[order] = np.arange(len(order))
         dofs = number[slots].reshape(-1, 3)
         self.dofs, self.dofs_of_bodies = dofs[:nodes], dofs[nodes:]

@@ -13,7 +13,8 @@ from ufl_beam.compiled.c_library import ffi
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.jit import compiled_form
 from ufl_beam.discretization.function_spaces import Element, Fields, derivative
-from ufl_beam.dolfinx_compat import fem
+from ufl_beam.discretization.partition import Share
+from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
 
 
 def dofs_of_cells(space: fem.FunctionSpace) -> Index:
@@ -92,7 +93,22 @@ class DolfinxForm:
 
 
 class DolfinxFields(Fields):
-    """Cells whose forms are stated on their own mesh, and assembled by DOLFINx."""
+    """Cells whose forms are stated on their own mesh, and assembled by DOLFINx.
+
+    Attributes:
+        mesh: Mesh of the cells, which DOLFINx puts in an order of its own.
+    """
+
+    def __init__(self, share: Share, part: Index | None = None) -> None:
+        grid, cells = share.grid, share.cells if part is None else share.cells[part]
+        vertices, numbers = np.unique(grid.cells[cells], return_inverse=True)
+        self.mesh = line_mesh(grid.points[vertices], numbers.reshape(-1, 2))
+        order: Index = np.asarray(self.mesh.topology.original_cell_index)
+        # The order of the vertices of a cell orients the beam.
+        expected = grid.points[grid.cells[cells[order]]]
+        if not np.array_equal(cell_coordinates(self.mesh)[:, :, :2], expected):
+            raise RuntimeError("this version of DOLFINx turns cells around; please report it")
+        super().__init__(share, order if part is None else part[order])
 
     def _element(self) -> Element:
         element = Element(self.share.grid.mesh, self.mesh)

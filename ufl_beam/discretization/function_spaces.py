@@ -18,7 +18,7 @@ from ufl_beam.compiled.csr import Csr, coupling
 from ufl_beam.compiled.simd_kernels import LANES, in_batches
 from ufl_beam.discretization.compiled_forms import CellForm, Kernel, stated, vectorise
 from ufl_beam.discretization.partition import Share
-from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
+from ufl_beam.dolfinx_compat import fem, line_mesh
 from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.mechanics.functional import kinetic_energy, resultants
 from ufl_beam.mechanics.kinematics import Axis, strain
@@ -115,26 +115,15 @@ class Fields(ABC):
     """Cells of one process, or some of them: what forms of the element are evaluated on.
 
     Attributes:
-        cell_dofs: Local degrees of freedom in the order of the cells of the mesh;
-            (num_cells, 3 (degree + 1)).
-        order: Position in ``share.cells`` of each cell of the mesh.
+        cell_dofs: Local degrees of freedom of the cells; (num_cells, 3 (degree + 1)).
+        order: Position in ``share.cells`` of each cell.
     """
 
     def __init__(self, share: Share, part: Index | None = None) -> None:
         self.share = share
-        grid = share.grid
-        if part is None:
-            part = np.arange(len(share.cells))
-        vertices, cells = np.unique(grid.cells[share.cells[part]], return_inverse=True)
-        self.mesh = line_mesh(grid.points[vertices], cells.reshape(-1, 2))
-        self.order: Index = part[np.asarray(self.mesh.topology.original_cell_index)]
-        self._coordinates = cell_coordinates(self.mesh)
-        # The order of the vertices of a cell orients the beam.
-        if not np.array_equal(
-            self._coordinates[:, :, :2], grid.points[grid.cells[share.cells[self.order]]]
-        ):
-            raise RuntimeError("this version of DOLFINx turns cells around; please report it")
-        self.cell_dofs = share.cell_dofs[self.order]
+        whole = part is None or np.array_equal(part, np.arange(len(share.cells)))
+        self.order: Index = np.arange(len(share.cells)) if part is None else part
+        self.cell_dofs = share.cell_dofs if whole else share.cell_dofs[self.order]
         self._matrix: Csr | None = None
         self.element = self._element()
 
@@ -185,11 +174,6 @@ class Fields(ABC):
         beams = grid.beam_of_cell[self.share.cells[self.order]]
         return np.array(of_beam).reshape(-1, len(names))[beams]
 
-    def variables(self, number: int) -> fem.Function:
-        """A function with so many numbers in each point of the cells."""
-        element = basix.ufl.quadrature_element("interval", value_shape=(number,), degree=1)
-        return fem.Function(fem.functionspace(self.mesh, element))
-
 
 class CompiledFields(Fields):
     """Cells on which loops in C evaluate forms that are compiled once for all scenes."""
@@ -199,7 +183,7 @@ class CompiledFields(Fields):
 
     def kernel(self, form: ufl.Form, unknown: fem.Function) -> Kernel:
         """A form on the cells, compiled."""
-        kernel = Kernel(form, unknown, self.cell_dofs, self._coordinates)
+        kernel = Kernel(form, unknown, self.cell_dofs, self._coordinates())
         for function in (self.element.stiffness, self.element.inertia):
             if kernel.uses(function):
                 kernel.put(function, self.of_sections(function))
@@ -219,9 +203,15 @@ class CompiledFields(Fields):
         tangent.place(A)
         return force, tangent
 
+    def _coordinates(self) -> Array:
+        """Vertices of the cells; (num_cells, 2, 3); m."""
+        grid, coordinates = self.share.grid, np.zeros((len(self.order), 2, 3))
+        coordinates[:, :, :2] = grid.points[grid.cells[self.share.cells[self.order]]]
+        return coordinates
+
     @cached_property
     def _coordinates_in_lanes(self) -> Array:
-        return in_batches(self._coordinates, LANES)
+        return in_batches(self._coordinates(), LANES)
 
 
 @stated

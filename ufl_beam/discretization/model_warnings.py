@@ -20,6 +20,7 @@ from ufl_beam.model.plastic_hinges import place_of
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.model.time_functions import value_at
+from ufl_beam.structure_cache import of_structure
 
 TOUCHING = 1e-3
 """Distance of places that touch, as a part of the length of the shorter beam."""
@@ -96,6 +97,8 @@ def _touching(grid: Grid) -> Index:
     apart = (beam_of[end] != beam_of[other]) | (np.isin(other, ends) & (end < other))
     gap = np.linalg.norm(points[end] - points[other], axis=1)
     kept = apart & (gap <= np.minimum(reach[end], reach[other]))
+    if not kept.any():
+        return np.empty((0, 2), dtype=np.int64)
     end, other, gap = end[kept], other[kept], gap[kept]
     group = _groups(grid)[: first[-1]]
     joined = group[end] == group[other]
@@ -117,11 +120,17 @@ def _groups(grid: Grid) -> Index:
     has_ground = GROUND in grid.scene.rigid_bodies
     ground = int(grid.node(GROUND.middle)[0]) if has_ground else grid.size
     to_ground = np.array([(grid.node(place)[0], ground) for place in fixed], dtype=np.int64)
-    rows, columns = np.concatenate([links, to_ground.reshape(-1, 2)]).T
-    size = grid.size + 1
-    graph = coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(size, size))
-    _, group = connected_components(graph, directed=False)
+    pairs = np.concatenate([links, to_ground.reshape(-1, 2)])
+    (group,) = _connected(grid.size + 1, pairs)
     return np.asarray(group[grid.dofs[:, 0]])
+
+
+@of_structure
+def _connected(size: int, pairs: Index) -> tuple[Index]:
+    """Number of the group of each of so many degrees of freedom, of which pairs are connected."""
+    rows, columns = pairs.T
+    graph = coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(size, size))
+    return (connected_components(graph, directed=False)[1],)
 
 
 def warn_of_far_points(scene: Scene) -> None:

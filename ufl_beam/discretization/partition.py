@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import Any, Protocol
 
 from mpi4py import MPI
@@ -45,6 +46,29 @@ class _Numbering(Protocol):
     def worst(self, sizes: Array) -> dict[str, float]: ...
 
 
+def bisected(points: Array, number: int) -> Index:
+    """Divide points into parts of equal size that border on few others; the part of each.
+
+    Recursive coordinate bisection: across the longer side of their bounding box, again and again.
+    """
+    part = np.zeros(len(points), dtype=np.int64)
+
+    def divide(these: Index, first: int, number: int) -> None:
+        if number == 1 or not len(these):
+            part[these] = first
+            return
+        longer = np.ptp(points[these], axis=0).argmax()
+        half = number // 2
+        before, after = np.split(
+            these[np.argsort(points[these, longer], kind="stable")], [len(these) * half // number]
+        )
+        divide(before, first, half)
+        divide(after, first + half, number - half)
+
+    divide(np.arange(len(points)), 0, number)
+    return part
+
+
 class Share:
     """The part of a grid that one process computes: its cells, and their degrees of freedom.
 
@@ -53,7 +77,7 @@ class Share:
 
     Attributes:
         alone: True if there is only one process; asking MPI takes longer.
-        cells: Numbers of the cells of this process; contiguous.
+        cells: Numbers of the cells of this process, ascending.
         dofs: Degrees of freedom, in numbers of the grid, by local number.
         num_owned: How many of them this process owns.
         ghosts: Global numbers of the others.
@@ -69,13 +93,13 @@ class Share:
         self.grid = grid
         self.comm, self.alone = comm, comm.size == 1
         num_cells = len(grid.cells)
-        limits = np.arange(comm.size + 1) * num_cells // comm.size
-        self.cells = np.arange(limits[comm.rank], limits[comm.rank + 1])
+        rank_of_cell = bisected(grid.points[grid.cells].mean(axis=1), comm.size)
+        self.cells = np.flatnonzero(rank_of_cell == comm.rank)
+        self._cells_by_rank = np.argsort(rank_of_cell, kind="stable")
 
         of_cell = grid.dofs[grid.nodes_of_cells].transpose(0, 2, 1)
         of_cell = of_cell.reshape(num_cells, 3 * (grid.mesh.degree + 1))
-        owner = np.full(grid.size, comm.size)
-        rank_of_cell = np.searchsorted(limits, np.arange(num_cells), side="right") - 1
+        owner = np.full(grid.size, comm.size, dtype=np.int32)
         np.minimum.at(owner, of_cell, rank_of_cell[:, None])
         of_hinge, cell_of_hinge = grid.dofs[grid.vertices_at_hinges], grid.cells_at_hinges
         np.minimum.at(owner, of_hinge, rank_of_cell[cell_of_hinge][:, None])
@@ -84,9 +108,9 @@ class Share:
         np.minimum.at(owner, of_link, rank_of_link[:, None])
         owner[owner == comm.size] = 0  # bodies that nothing is attached to
         self.links = np.flatnonzero(rank_of_link == comm.rank)
-        order = np.argsort(owner, kind="stable")
-        self._global = np.empty(grid.size, dtype=np.int64)
-        self._global[order] = np.arange(grid.size)
+        order = np.argsort(owner, kind="stable").astype(np.int32)
+        self._global = np.empty(grid.size, dtype=np.int32)
+        self._global[order] = np.arange(grid.size, dtype=np.int32)
 
         own = np.flatnonzero(owner == comm.rank)
         at_hinges = of_hinge[rank_of_cell[cell_of_hinge] == comm.rank].ravel()
@@ -95,7 +119,7 @@ class Share:
         mine = owner[touched] == comm.rank
         self.dofs = np.concatenate([touched[mine], touched[~mine]])
         self.num_owned = int(mine.sum())
-        self.ghosts = self._global[self.dofs[self.num_owned :]].astype(np.int32)
+        self.ghosts = self._global[self.dofs[self.num_owned :]]
         self._local = np.full(grid.size, -1, dtype=np.int32)
         self._local[self.dofs] = np.arange(len(self.dofs))
         self.cell_dofs = self._local[of_cell[self.cells]]
@@ -121,10 +145,15 @@ class Share:
         """
         if isinstance(anchor, Spot):
             return bool(self.owns(self.at(anchor)).all())
-        return bool(self.cells[0] <= self.grid.cell(anchor) <= self.cells[-1])
+        place = np.searchsorted(self.cells, cell := self.grid.cell(anchor))
+        return bool(np.any(self.cells[place : place + 1] == cell))
 
     def rotations(self) -> Index:
         """Local numbers of all rotations; int32."""
+        return self._rotations
+
+    @cached_property
+    def _rotations(self) -> Index:
         return np.sort(self.local(self.grid.rotations)).astype(np.int32)
 
     def translations(self) -> tuple[Index, Index]:
@@ -195,7 +224,10 @@ class Share:
         """Values of all cells, in the order of the grid, on every process."""
         if self.alone:
             return values.copy()
-        return np.concatenate(self.comm.allgather(values))
+        parts = np.concatenate(self.comm.allgather(values))
+        result = np.empty_like(parts)
+        result[self._cells_by_rank] = parts
+        return np.asarray(result)
 
     def total(self, value: float) -> float:
         """Sum over the processes."""

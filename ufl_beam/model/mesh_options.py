@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import pairwise
 from numbers import Rational, Real
 
@@ -60,16 +60,15 @@ class Mesh:
             raise SceneError(f"Mesh: degree = {shorten(self.degree)} must be 1, 2 or 3")
         object.__setattr__(self, "degree", int(self.degree))
 
-    @cached_property
+    @property
     def nodes(self) -> npt.NDArray[np.float64]:
         """Places of the nodes in a cell, from 0 to 1, ascending: Gauss-Lobatto points."""
-        inner = np.polynomial.legendre.Legendre.basis(self.degree).deriv().roots()
-        return np.array([0.0, *((1 + x) / 2 for x in inner.tolist()), 1.0])
+        return _nodes(self.degree)
 
-    @cached_property
+    @property
     def point_weights(self) -> npt.NDArray[np.float64]:
         """Parts of a cell that its Gauss points stand for."""
-        return np.polynomial.legendre.leggauss(self.degree)[1] / 2
+        return _point_weights(self.degree)
 
     @cached_property
     def parts(self) -> npt.NDArray[np.float64]:
@@ -116,6 +115,17 @@ class Mesh:
         number = int((len(given) - 1) * self.refine)
         require_memory(number, f"Mesh: refine = {self.refine} of {beam.name}, {number} cells,")
         return [_between(given, i / Fraction(self.refine)) for i in range(number + 1)]
+
+
+@cache
+def _nodes(degree: int) -> npt.NDArray[np.float64]:
+    inner = np.polynomial.legendre.Legendre.basis(degree).deriv().roots()
+    return np.array([0.0, *((1 + x) / 2 for x in inner.tolist()), 1.0])
+
+
+@cache
+def _point_weights(degree: int) -> npt.NDArray[np.float64]:
+    return np.asarray(np.polynomial.legendre.leggauss(degree)[1] / 2)
 
 
 def _between(values: Sequence[float], position: Fraction) -> float:

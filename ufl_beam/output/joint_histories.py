@@ -114,7 +114,7 @@ def _of_node(grid: Grid, place: Anchor, states: Sequence[Array]) -> Array:
         return np.array([x[dofs] for x in states])
     nodes, weights = grid.weights(place)
     dofs = grid.dofs[nodes]
-    return np.array([weights @ x[dofs] for x in states])
+    return np.asarray(weights @ np.array([x[dofs] for x in states]).reshape(-1, *dofs.shape))
 
 
 def position_of(grid: Grid, place: Anchor, states: Sequence[Array]) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
+from itertools import chain
 from typing import NamedTuple
 
 from mpi4py import MPI
@@ -74,7 +75,7 @@ class KeptStates(list[Snapshot]):
         parts = []
         for k in range(len(LEDGER)):
             part = [state.entries[k] for state in self]
-            names = dict.fromkeys(name for entries in part for name in entries)
+            names = dict.fromkeys(chain.from_iterable(part))
             parts.append({n: np.array([e.get(n, 0.0) for e in part]) for n in names})
         return parts
 

@@ -3,8 +3,7 @@
 
 A beam of many cells is a chain of vertices that couple to their two neighbours only.  Each process
 eliminates them from its chains, by blocks, and leaves a small matrix of what remains: joints, ends,
-vertices at the border between processes, whatever else couples to more than two neighbours.  Its
-entries are summed over the processes.
+vertices at the border between processes, whatever else couples to more than two neighbours.
 """
 
 from __future__ import annotations
@@ -12,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from mpi4py import MPI
 from petsc4py import PETSc
 
 import numpy as np
@@ -22,6 +20,8 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, opaque
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Share
+from ufl_beam.solvers.substructuring import Condensed, Substructure, Summed
+from ufl_beam.structure_cache import of_structure
 
 GOOD = int(PETSc.PC.FailedReason.NOERROR)
 BAD_PIVOT = int(PETSc.PC.FailedReason.FACTOR_NUMERIC_ZEROPIVOT)
@@ -93,7 +93,7 @@ class Chains:
         self.ends = np.hstack([np.where(dead[:, None], right, left), right])
         self.dofs, self.spikes = around[:, 1], ~dead
         around = around.reshape(-1, 9)
-        self.order = np.argsort(np.argsort(around, axis=1), axis=1).astype(np.int32)
+        self.order = np.argsort(np.argsort(around, axis=1), axis=1).astype(np.uint8)
 
 
 def _runs(mask: npt.NDArray[np.bool_]) -> tuple[Index, Index, Index]:
@@ -103,92 +103,107 @@ def _runs(mask: npt.NDArray[np.bool_]) -> tuple[Index, Index, Index]:
     return np.repeat(np.arange(len(first)), last - first + 1), first, last
 
 
+INDICES = (
+    "first", "spike", "row", "from_ends", "entry", "place", "places", "dof", "number", "ends",
+)  # fmt: skip
+"""Arrays of ``chains`` of loops.h that follow from the structure of a matrix."""
+
+
+@of_structure
+def _plan(
+    cell_dofs: Index, indptr: Index, indices: Index, alone: Index, dofs: Index, num_owned: int
+) -> tuple[Index, ...]:
+    """Find what can be eliminated, and where entries go.
+
+    Returns:
+        Degrees of freedom that are left, in the order of the grid; :attr:`Chains.order`;
+        ``indptr`` and ``indices`` of the matrix of what is left; :data:`INDICES`.
+    """
+    A = Csr(np.empty(0), indices, indptr)
+    chains = Chains(cell_dofs, A, alone)
+    stays = np.ones(A.size, dtype=bool)
+    stays[chains.dofs] = False
+    here = np.flatnonzero(stays)
+    here = here[np.argsort(dofs[here])]
+    number = np.full(A.size, -1, dtype=np.int32)
+    number[here] = np.arange(len(here))
+    ends, owned = number[chains.ends], here[here < num_owned]
+    first, last = (chains.dofs[k] for k in (chains.first[:-1], chains.first[1:] - 1))
+    next_to = np.stack([np.where(chains.spikes[:, None], first, last), last], axis=1)
+    of_ends = np.broadcast_arrays(chains.ends.reshape(-1, 2, 3, 1), next_to[:, :, None, :])
+    *structure, entry, place, places = _what_is_left(A, number, ends, len(here))
+    found = (
+        chains.first, chains.spikes, chains.dofs, A.positions(*map(np.ravel, of_ends)),
+        entry, place, places, owned, number[owned], ends,
+    )  # fmt: skip
+    return here, chains.order, *structure, *(np.ascontiguousarray(x, np.int32) for x in found)
+
+
+def _what_is_left(A: Csr, number: Index, ends: Index, size: int) -> tuple[Index, ...]:
+    """Find the matrix of what is left; ``number`` in it is -1 of what is eliminated.
+
+    Returns:
+        Its ``indptr`` and ``indices``; entries of ``A`` that stay, where they are in it, and where
+        the blocks of the ``ends`` (num_chains, 6) of the chains are.
+    """
+    rows, columns, left = A.rows(), A.indices, number >= 0
+    entries = np.flatnonzero(left[rows] & left[columns])
+    keys = number[rows[entries]].astype(np.int64) * size + number[columns[entries]]
+    of_ends = ends.astype(np.int64).reshape(-1, 2, 3)
+    of_chains = (of_ends[:, :, None, :, None] * size + of_ends[:, None, :, None, :]).ravel()
+    all_ = np.unique(np.concatenate([keys, of_chains]))
+    indptr = np.searchsorted(all_, np.arange(size + 1) * size)
+    positions = (np.searchsorted(all_, of) for of in (keys, of_chains))
+    return indptr, all_ % max(size, 1), entries, *positions
+
+
 class Elimination:
     """Solves with a matrix but for a small one of what cannot be eliminated in chains.
 
-    The call is :meth:`factor`, and for each right-hand side :meth:`reduce`, the solution of the
-    small system by the caller, and :meth:`expand`.  The entries of ``A`` must not change meanwhile.
-    On one process C does the same with :attr:`c`, see newton.c.
+    Satisfies :class:`Condensed`.  The entries of ``A`` must not change between its calls.  On one
+    process C does the same with :attr:`c`, see newton.c.
 
     Attributes:
-        left: The small matrix, which all processes have; its entries are summed over them.
+        numbers: Degrees of freedom that are left here, in numbers of the grid, ascending.
+        shared: Which of them other processes have too.
+        left: The small matrix, of the cells of this process.
         f: Right-hand side of the small system, of :meth:`reduce`.
         c: All of it in C, see loops.h.
     """
 
     def __init__(self, share: Share, A: Csr) -> None:
-        self._comm = share.comm
-        ghosts = np.concatenate(self._comm.allgather(share.dofs[share.num_owned :]))
-        chains = Chains(share.cell_dofs, A, ~np.isin(share.dofs, ghosts))
-        stays = np.ones(share.size, dtype=bool)
-        stays[chains.dofs] = False
-        here = np.flatnonzero(stays)
-        numbers = np.unique(np.concatenate(self._comm.allgather(share.dofs[here])))
-        number = np.full(share.size, -1, dtype=np.int32)
-        number[here] = np.searchsorted(numbers, share.dofs[here])
-        ends, owned = number[chains.ends], here[here < share.num_owned]
-        entry, place, places = self._make_matrix(A, number, ends, len(numbers))
-        self.f, self._zero = np.zeros(len(numbers)), np.zeros(share.size)
-        first, last = (chains.dofs[k] for k in (chains.first[:-1], chains.first[1:] - 1))
-        next_to = np.stack([np.where(chains.spikes[:, None], first, last), last], axis=1)
-        of_ends = np.broadcast_arrays(chains.ends.reshape(-1, 2, 3, 1), next_to[:, :, None, :])
-        vertices = len(chains.dofs)
-        indices = {
-            "first": chains.first, "spike": chains.spikes, "row": chains.dofs,
-            "order": chains.order, "from_ends": A.positions(*map(np.ravel, of_ends)),
-            "entry": entry, "place": place, "places": places,
-            "dof": owned, "number": number[owned], "ends": ends,
-        }  # fmt: skip
+        ghosts = np.concatenate(share.comm.allgather(share.dofs[share.num_owned :]))
+        alone = ~np.isin(share.dofs, ghosts)
+        of = share.cell_dofs, A.indptr, A.indices, alone, share.dofs, share.num_owned
+        here, order, indptr, columns, *found = _plan(*of)
+        self.numbers, self.shared = share.dofs[here], ~alone[here]
+        self.left = Csr(np.zeros(len(columns)), columns, indptr)
+        self.f: Array = np.zeros(len(here))
+        self._zero: Array = np.zeros(share.size)
+        indices = dict(zip(INDICES, found, strict=True))
+        vertices, spikes = len(indices["row"]), indices["spike"]
         self.c = fill(
             ffi.new("chains *"),
-            chains=len(ends), left=len(self.left.data), stay=len(entry), rows=len(owned),
-            left_size=len(numbers), left_data=self.left.data, left_f=self.f,
-            data=A.data, indptr=A.indptr, swaps=np.empty(3 * vertices, np.int32),
+            chains=len(spikes), left=len(columns), stay=len(indices["entry"]),
+            rows=len(indices["dof"]), left_size=len(here), left_data=self.left.data,
+            left_f=self.f, data=A.data, indptr=A.indptr, swaps=np.empty(3 * vertices, np.int32),
             pivots=np.empty(lib.BLOCK * vertices), to_next=np.empty(lib.BLOCK * vertices),
-            sides=np.empty(lib.SIDES * vertices if chains.spikes.any() else 0),
-            f=np.zeros(3 * vertices),
-            **{name: np.ascontiguousarray(x, np.int32) for name, x in indices.items()},
+            sides=np.empty(lib.SIDES * vertices if spikes.any() else 0),
+            f=np.zeros(3 * vertices), order=ffi.from_buffer("uint8_t[]", order), **indices,
         )  # fmt: skip
-
-    def _make_matrix(
-        self, A: Csr, number: Index, ends: Index, size: int
-    ) -> tuple[Index, Index, Index]:
-        """Make the small matrix; ``number`` in it is -1 of what is eliminated.
-
-        Returns:
-            Entries of ``A`` that stay, where they are in the small matrix, and where the blocks of
-            the ``ends`` (num_chains, 6) of the chains are.
-        """
-        rows, columns, left = A.rows(), A.indices, number >= 0
-        entries = np.flatnonzero(left[rows] & left[columns])
-        keys = number[rows[entries]].astype(np.int64) * size + number[columns[entries]]
-        of_ends = ends.astype(np.int64).reshape(-1, 2, 3)
-        of_chains = (of_ends[:, :, None, :, None] * size + of_ends[:, None, :, None, :]).ravel()
-        mine = np.unique(np.concatenate([keys, of_chains]))
-        if self._comm.size > 1:
-            mine = np.unique(np.concatenate(self._comm.allgather(mine)))
-        indptr = np.searchsorted(mine, np.arange(size + 1) * size)
-        self.left = Csr(np.zeros(len(mine)), mine % size, indptr)
-        return entries, np.searchsorted(mine, keys), np.searchsorted(mine, of_chains)
 
     def factor(self) -> bool:
         """Eliminate the chains and fill :attr:`left`; whether all of it is finite."""
         lib.eliminate(self.c, doubles(self._zero))
-        self._sum(self.left.data)
         return bool(lib.all_finite(len(self.left.data), doubles(self.left.data)))
 
     def reduce(self, b: Array) -> None:
         """Fill :attr:`f`; ``b`` at the degrees of freedom owned here."""
         lib.reduce(self.c, doubles(b))
-        self._sum(self.f)
 
     def expand(self, small: Array, x: Array) -> None:
         """The solution at the degrees of freedom owned here, after that of the small system."""
         lib.expand(self.c, doubles(small), doubles(x))
-
-    def _sum(self, values: Array) -> None:
-        if self._comm.size > 1:
-            self._comm.Allreduce(MPI.IN_PLACE, values)
 
 
 def succeeds(function: Callable[..., None], *vectors: PETSc.Vec) -> bool:
@@ -205,7 +220,8 @@ def succeeds(function: Callable[..., None], *vectors: PETSc.Vec) -> bool:
 class ChainsFirst:
     """Direct solver: condensation along the beams, then factorization of the rest.
 
-    Every process factors what is left, which is small, instead of waiting for another.
+    Where processes share a scene, each eliminates the rest of its own part; what several of them
+    have is small, and factored by each instead of waiting for another.
     """
 
     def __init__(self, share: Share, A: Csr) -> None:
@@ -213,7 +229,12 @@ class ChainsFirst:
         # round-off, on the diagonal; PETSc's factorisation does not exchange rows, KLU's does.
         package = "klu" if len(share.grid.multipliers) else "petsc"
         self._elimination, self._good = Elimination(share, A), False
-        self._matrix = self._elimination.left.petsc()
+        self._rest: Condensed = self._elimination
+        if not share.alone:
+            if package == "petsc":
+                self._rest = Substructure(self._rest, self._elimination.shared)
+            self._rest = Summed(self._rest, share.comm)
+        self._matrix = self._rest.left.petsc()
         self._factors = PETSc.PC().create(PETSc.COMM_SELF)
         self._factors.setOperators(self._matrix)
         self._factors.setType("lu")
@@ -222,7 +243,7 @@ class ChainsFirst:
         if package == "petsc":
             # Of narrow and wide lattices it fills in least: 0.55 and 0.9 of the time of "nd".
             self._factors.setFactorOrdering("amd")
-        self._rhs = PETSc.Vec().createWithArray(self._elimination.f, comm=PETSc.COMM_SELF)
+        self._rhs = PETSc.Vec().createWithArray(self._rest.f, comm=PETSc.COMM_SELF)
         self._solution = self._rhs.duplicate()
         self._found = doubles(self._solution.array_r)
 
@@ -236,18 +257,18 @@ class ChainsFirst:
     def setUp(self, pc: PETSc.PC) -> None:
         """Factor; PETSc asks for it where the matrix has changed."""
         self._matrix.stateIncrease()
-        self._good = self._elimination.factor() and succeeds(self._factors.setUp)
+        self._good = self._rest.factor() and succeeds(self._factors.setUp)
         self._good = self._good and int(self._factors.getFailedReason()) == GOOD
         pc.setFailedReason(GOOD if self._good else BAD_PIVOT)
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, x: PETSc.Vec) -> None:
         """Solve; zero after a failure, where an error would leave objects of PETSc half done."""
         if self._good:
-            self._elimination.reduce(b.array_r)
+            self._rest.reduce(b.array_r)
             self._rhs.stateIncrease()
             self._good = succeeds(self._factors.apply, self._rhs, self._solution)
         if self._good:
-            self._elimination.expand(self._solution.array_r, x.array_w)
+            self._rest.expand(self._solution.array_r, x.array_w)
         else:
             x.array_w[:] = 0.0
             pc.setFailedReason(BAD_PIVOT)

@@ -97,15 +97,13 @@ class InelasticBeams(Cells, ABC):
         self._cells = fields.share.cells[fields.order]
         self._strains = Strains(fields)
         cells, n = len(fields.order), len(layout.weights)
-        # Internal variables and numbers of the points: one function in their quadrature space.
-        width = len(inputs(layout))
-        self._variables = fields.variables(n * width)
+        self._variables = np.zeros((cells, n, len(inputs(layout))))
         self.points = points(
             layout,
             fields.share.grid.keys(self._cells),
             fields.share.cell_lengths()[fields.order],
             scheme,
-            self._variables.x.array.reshape(cells, n, width),
+            self._variables,
             search,
         )
 
@@ -316,23 +314,16 @@ class CompiledInelasticBeams(InelasticBeams):
 
 
 class ReferenceInelasticBeams(InelasticBeams):
-    """The same equations as :class:`CompiledInelasticBeams`, line by line.
-
-    Attributes:
-        jump: Jump α of the rotation in the hinges of the cells at the latest iterate, DG0; rad.
-    """
+    """The same equations as :class:`CompiledInelasticBeams`, line by line."""
 
     def _prepare(self, forms: InelasticForms) -> None:
         self._forms, self._first = forms, False
-        self.jump = fem.Function(fem.functionspace(self._fields.mesh, ("DG", 0)))
 
     def _begin(self) -> None:
         self._first = self._static
 
     def _respond(self, q1: Array) -> None:
-        points = self.points
-        points.respond(self._strains(q1))
-        self.jump.x.array[:] = (points["jump"] + points["direction"] * points["growth"])[:, -1]
+        self.points.respond(self._strains(q1))
 
     def _forget(self) -> None:
         """Nothing is kept."""

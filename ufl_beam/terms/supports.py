@@ -76,8 +76,9 @@ class Supports:
         self.dofs = np.array(sorted(held), dtype=np.int64)
         self.moving = np.array([dof for dof, *_ in self._motions], dtype=np.int64)
         self._held = as_slice(self.dofs)
-        rows, columns = A.rows(), A.indices
-        zero = np.isin(rows, self.dofs) | np.isin(columns, self.dofs)
+        rows, columns, is_held = A.rows(), A.indices, np.zeros(A.size, dtype=bool)
+        is_held[self.dofs] = True
+        zero = is_held[rows] | is_held[columns]
         self.entries = np.flatnonzero(zero), np.flatnonzero(zero & (rows == columns))
         self.pivots: Array = np.ones(len(self.dofs))
         self._owned = self.dofs < share.num_owned
@@ -163,7 +164,9 @@ class Supports:
     def stop(self, v: Array) -> None:
         """Set velocities of what does not move to zero, in place; else they would ring."""
         self.enter(v)
-        v[np.setdiff1d(self.dofs, self.moving)] = 0.0
+        moving = v[self.moving]
+        v[self._held] = 0.0
+        v[self.moving] = moving
         self.leave(v)
 
     def take(self) -> None:

@@ -66,7 +66,7 @@ static inline void subtract(const double *A, const double *x, double *y)
 /* The block of a vertex with the one before (0), itself (1) or the one after (2) */
 static inline void read_block(const chains *c, int vertex, int neighbour, double *block)
 {
-  const int32_t *order = c->order + 9 * vertex + 3 * neighbour;
+  const uint8_t *order = c->order + 9 * vertex + 3 * neighbour;
   for (int r = 0; r < 3; ++r) {
     const double *row = c->data + c->indptr[c->row[3 * vertex + r]];
     for (int k = 0; k < 3; ++k) block[3 * r + k] = row[order[k]];

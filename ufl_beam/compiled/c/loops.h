@@ -214,7 +214,7 @@ typedef struct {
   const int32_t *first;     /* first vertex of each chain, and their number */
   const int32_t *spike;     /* whether a chain has a left end */
   const int32_t *row;       /* vertices x 3 */
-  const int32_t *order;     /* vertices x 9 */
+  const uint8_t *order;     /* vertices x 9 */
   const int32_t *from_ends; /* chains x 18: entries of the ends' rows, left and right */
   const int32_t *indptr;
   const double *data;
@@ -237,6 +237,31 @@ void eliminate(const chains *c, const double *b);
 void reduce(const chains *c, const double *b);
 void expand(const chains *c, const double *left, double *x);
 int all_finite(int size, const double *values);
+
+/* -- multifrontal elimination, see fronts.c ------------------------------------------------------ */
+
+typedef struct {
+  int fronts;
+  const int32_t *first, *begin; /* of each front, and of one more: pivot, other unknown */
+  const int32_t *rest;          /* unknowns of a front that are not its pivots */
+  const int32_t *parent, *up;   /* front that the rest is in; where it is there */
+  const int32_t *order, *before, *children; /* see order_fronts */
+  const int32_t *entries, *entry, *place;   /* of the fronts: in the data, and in the front */
+  const int64_t *at;            /* where the factors of each front begin in values */
+  double *values;               /* rows of the pivots, then columns of the rest */
+  double *schur, *stack, *space; /* space: for the largest front */
+  int32_t *swap;                /* of the pivots: row that each is exchanged with */
+} fronts;
+
+int find_fronts(int unknowns, int eliminated, const int32_t *indptr, const int32_t *indices,
+                int room, int32_t *first, int32_t *begin, int32_t *rest, int32_t *mark,
+                int32_t *next);
+void place_in_fronts(const fronts *c, int entries, const int32_t *row, const int32_t *column,
+                     const int32_t *front_of, int32_t *place, int32_t *parent, int32_t *up);
+int64_t order_fronts(const fronts *c, int32_t *order, int32_t *before, int32_t *children);
+int factor_fronts(const fronts *c, const double *data);
+void reduce_fronts(const fronts *c, double *b);
+void expand_fronts(const fronts *c, double *b);
 
 /* -- Newton's method, see newton.c ------------------------------------------------------------- */
 

@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: MIT
+"""Dense fronts and their Schur complements against dense solutions; the parts of processes."""
+
+from mpi4py import MPI
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array, eye_array, kron, random_array
+
+from ufl_beam.arrays import Array
+from ufl_beam.compiled.csr import Csr
+from ufl_beam.discretization.partition import bisected
+from ufl_beam.solvers.substructuring import Substructure, Summed
+
+
+class Whole:
+    """A system of which nothing is eliminated."""
+
+    def __init__(self, matrix, numbers):
+        matrix = csr_array(matrix)
+        matrix.sort_indices()
+        self.left = Csr(matrix.data.copy(), matrix.indices, matrix.indptr)
+        self.numbers, self.f = numbers, np.zeros(matrix.shape[0])
+        self.good = True
+
+    def factor(self):
+        return self.good
+
+    def reduce(self, b):
+        self.f[:] = b
+
+    def expand(self, small, x):
+        x[:] = small
+
+
+def dense(A):
+    return csr_array((A.data, A.indices, A.indptr), shape=[A.size] * 2).toarray()
+
+
+def solve(condensed, b) -> Array:
+    """Solution by a dense one of what is left."""
+    assert condensed.factor()
+    x = np.empty(len(b))
+    condensed.reduce(b)
+    condensed.expand(np.linalg.solve(dense(condensed.left), condensed.f), x)
+    return x
+
+
+def matrix_of(name, n, seed=0):
+    """An unsymmetric matrix with a symmetric pattern, whose entries are at random."""
+    random = np.random.default_rng(seed)
+    chain = eye_array(n, k=1) + eye_array(n, k=-1)
+    side = round(n**0.5)
+    line = eye_array(side, k=1) + eye_array(side, k=-1)
+    scattered = random_array((n, n), density=min(1.0, 3 / n), rng=random)
+    pattern = {
+        "nothing coupled": csr_array((n, n)),
+        "a chain": chain,
+        "a square": kron(line, eye_array(side)) + kron(eye_array(side), line),
+        "at random": scattered + scattered.T,
+        "all coupled": csr_array(np.ones((n, n))),
+    }[name]
+    pattern = csr_array(pattern + eye_array(n))
+    blocks = csr_array(kron(pattern, np.ones((2, 2))))
+    blocks.data[:] = random.uniform(-1, 1, blocks.nnz)
+    # Large pairs off the diagonal: rows must be exchanged in the fronts.
+    pivots = kron(eye_array(pattern.shape[0]), [[1e-6, 9.0 + n], [-9.0 - n, 1e-6]])
+    return csr_array(blocks + pivots)
+
+
+@pytest.mark.parametrize("n", [1, 4, 49, 225])
+@pytest.mark.parametrize(
+    "name", ["nothing coupled", "a chain", "a square", "at random", "all coupled"]
+)
+@pytest.mark.parametrize("part", [0.0, 0.1, 1.0])
+def test_solutions_are_those_of_the_whole(name, n, part):
+    """Also of a second matrix with the same pattern, and a second right-hand side."""
+    if name == "all coupled" and n > 49:
+        n = 49
+    matrix = matrix_of(name, n)
+    size = matrix.shape[0]
+    random = np.random.default_rng(1)
+    stays = np.repeat(random.uniform(size=size // 2) < part, 2)
+    whole = Whole(matrix, np.arange(size))
+    condensed = Substructure(whole, stays)
+    assert condensed.left.size == np.count_nonzero(stays)
+    for factor in (1.0, -3.0):
+        whole.left.data[:] = factor * csr_array(matrix).data
+        for b in random.uniform(-1, 1, (2, size)):
+            expected = np.linalg.solve(dense(whole.left), b)
+            # Pivots of some 10 and less than n entries of 1: few digits of sixteen are lost.
+            assert np.allclose(solve(condensed, b), expected, rtol=0, atol=1e-13)
+
+
+def test_the_schur_complement():
+    """Of the unknowns that stay, in their order."""
+    matrix, stays = matrix_of("a square", 49), np.zeros(98, dtype=bool)
+    stays[[2, 3, 50, 51]] = True
+    condensed = Substructure(Whole(matrix, np.arange(98)), stays)
+    assert condensed.factor()
+    K = matrix.toarray()
+    cut = (K[np.ix_(a, b)] for a in (stays, ~stays) for b in (stays, ~stays))
+    kk, ki, ik, ii = cut
+    expected = kk - ki @ np.linalg.solve(ii, ik)
+    assert np.allclose(dense(condensed.left), expected, rtol=0, atol=1e-12 * np.abs(kk).max())
+    assert condensed.numbers.tolist() == [2, 3, 50, 51]
+
+
+@pytest.mark.parametrize("value", [0.0, np.nan])
+def test_a_singular_part_is_said(value):
+    """Even where nothing that stays couples to it."""
+    matrix = matrix_of("nothing coupled", 9)
+    whole, stays = Whole(matrix, np.arange(18)), np.arange(18) < 4
+    condensed = Substructure(whole, stays)
+    assert condensed.factor()
+    whole.left.data[-4:] = value
+    assert not condensed.factor()
+
+
+def test_sums_over_processes():
+    """Each process has a chain of three unknowns, whose ends it shares with its neighbours."""
+    comm = MPI.COMM_WORLD
+    size, here = 2 * comm.size + 1, 2 * comm.rank + np.arange(3)
+    part = np.array([[2.0, -1.0, 0.0], [-1.0, 3.0, -1.0], [0.0, -1.0, 2.0]])
+    whole = Whole(part, here)
+    stays = np.array([comm.rank > 0, False, comm.rank < comm.size - 1])
+    summed = Summed(Substructure(whole, stays), comm)
+    K, b = np.zeros((size, size)), np.arange(1.0, size + 1)
+    for rank in range(comm.size):
+        K[2 * rank :, 2 * rank :][:3, :3] += part
+    owned = b[here] * np.array([comm.rank == 0, 1, 1])  # the end before is another's
+    assert np.allclose(solve(summed, owned), np.linalg.solve(K, b)[here], rtol=1e-13)
+    assert summed.numbers.tolist() == list(range(2, size - 1, 2))
+    whole.good = comm.rank < comm.size - 1
+    assert not summed.factor()
+
+
+@pytest.mark.parametrize("number", [1, 2, 3, 8, 64])
+def test_parts_have_equal_sizes_and_short_borders(number):
+    """In a square of 64 points a side, numbered at random."""
+    points = np.random.default_rng(0).permutation(np.indices((64, 64)).reshape(2, -1).T)
+    part = bisected(points.astype(float), number)
+    counts = np.bincount(part, minlength=number)
+    assert counts.min() >= counts.max() - number
+    at = np.empty((64, 64), dtype=int)
+    at[tuple(points.T)] = part
+    cut = np.count_nonzero(np.diff(at, axis=0)) + np.count_nonzero(np.diff(at, axis=1))
+    # Squares cut 2 (sqrt(number) - 1) lines; thirds, and rectangles, half as much again at most
+    assert cut <= 1.5 * 2 * 64 * (number**0.5 - 1) + 8
+
+
+def test_more_parts_than_points():
+    assert sorted(bisected(np.zeros((3, 2)), 5)) == sorted(set(bisected(np.zeros((3, 2)), 5)))

@@ -1,0 +1,288 @@
+/* SPDX-License-Identifier: MIT */
+/* Multifrontal elimination of the first unknowns of a sparse system; see subdomains.py.
+ *
+ * A front is a dense matrix: the rows and columns of some pivots, which are eliminated in it, and of
+ * the later unknowns that these couple to. What elimination makes of the latter is added to the front
+ * of the first of them. The last front has no pivots: it is the Schur complement of the unknowns that
+ * stay. Rows are exchanged among the pivots of a front.
+ */
+
+enum { FEW = 64 }; /* entries by which a front may grow for each pivot, so that it takes one more */
+
+static int compare(const void *a, const void *b)
+{
+  const int32_t x = *(const int32_t *)a, y = *(const int32_t *)b;
+  return (x > y) - (x < y);
+}
+
+/* Find the fronts of a matrix with a symmetric pattern whose first `eliminated` unknowns are to be.
+ *
+ * Front k has the pivots first[k]... to those of the next; its other unknowns, in order, are
+ * rest[begin[k]...]. The arrays have room for as many fronts as unknowns are eliminated, and two;
+ * rest has `room`. `mark` and `next` are space for as many as there are unknowns. Returns the number of
+ * fronts, or -1 if there is too little room.
+ */
+int find_fronts(int unknowns, int eliminated, const int32_t *indptr, const int32_t *indices,
+                int room, int32_t *first, int32_t *begin, int32_t *rest, int32_t *mark,
+                int32_t *next)
+{
+  /* Fronts whose first other unknown is j are a list: next[j], then next[unknowns + front]. */
+  int fronts = 0;
+  for (int j = 0; j < 2 * unknowns; ++j) next[j] = -1;
+  for (int j = 0; j < unknowns; ++j) mark[j] = -1;
+  begin[0] = 0;
+  for (int j = 0; j < eliminated; ++j) {
+    int32_t *found = rest + begin[fronts];
+    int number = 0;
+    if (room - begin[fronts] < unknowns) return -1;
+    mark[j] = j;
+    for (int k = indptr[j]; k < indptr[j + 1]; ++k)
+      if (indices[k] > j && mark[indices[k]] != j) mark[indices[k]] = j, found[number++] = indices[k];
+    int last = 0;
+    for (int s = next[j]; s >= 0; s = next[unknowns + s]) {
+      last |= s == fronts - 1;
+      for (int k = begin[s]; k < begin[s + 1]; ++k)
+        if (mark[rest[k]] != j) mark[rest[k]] = j, found[number++] = rest[k];
+    }
+    qsort(found, number, sizeof *found, compare);
+    const int pivots = fronts ? j - first[fronts - 1] : 0;
+    const int before = fronts ? begin[fronts] - begin[fronts - 1] : 0;
+    if (last && (number + 1 - before) * pivots <= FEW) {
+      memmove(rest + begin[fronts - 1], found, number * sizeof *found);
+      begin[fronts] = begin[fronts - 1] + number;
+    } else {
+      first[fronts++] = j;
+      begin[fronts] = begin[fronts - 1] + number;
+    }
+    if (number) {
+      const int parent = rest[begin[fronts - 1]];
+      next[unknowns + fronts - 1] = next[parent];
+      next[parent] = fronts - 1;
+    }
+  }
+  if (room - begin[fronts] < unknowns - eliminated) return -1;
+  first[fronts++] = eliminated;
+  begin[fronts] = begin[fronts - 1];
+  for (int j = eliminated; j < unknowns; ++j) rest[begin[fronts]++] = j;
+  first[fronts] = eliminated;
+  return fronts;
+}
+
+/* Row or column of an unknown in a front */
+static int where(const fronts *c, int front, int unknown)
+{
+  const int pivots = c->first[front + 1] - c->first[front];
+  if (unknown < c->first[front + 1]) return unknown - c->first[front];
+  const int32_t *rest = c->rest + c->begin[front];
+  int low = 0, high = c->begin[front + 1] - c->begin[front] - 1;
+  while (low < high) {
+    const int middle = (low + high) / 2;
+    if (rest[middle] < unknown) low = middle + 1;
+    else high = middle;
+  }
+  return pivots + low;
+}
+
+static inline int front_size(const fronts *c, int front)
+{
+  return c->first[front + 1] - c->first[front] + c->begin[front + 1] - c->begin[front];
+}
+
+/* Where entries (row, column) are in the fronts that they belong to; parent and up of all fronts;
+ * front_of: of the unknowns. */
+void place_in_fronts(const fronts *c, int entries, const int32_t *row, const int32_t *column,
+                     const int32_t *front_of, int32_t *place, int32_t *parent, int32_t *up)
+{
+  for (int k = 0; k < entries; ++k) {
+    const int s = front_of[row[k] < column[k] ? row[k] : column[k]];
+    place[k] = where(c, s, row[k]) * front_size(c, s) + where(c, s, column[k]);
+  }
+  for (int s = 0; s < c->fronts - 1; ++s) {
+    parent[s] = c->begin[s + 1] > c->begin[s] ? front_of[c->rest[c->begin[s]]] : c->fronts - 1;
+    for (int k = c->begin[s]; k < c->begin[s + 1]; ++k) up[k] = where(c, parent[s], c->rest[k]);
+  }
+}
+
+/* Put the fronts in an order in which the children of a front are together before it: order; before:
+ * the place before the first front that one place depends on; children: of each front, but for those of
+ * the last. Returns how many numbers the stack has at most. */
+int64_t order_fronts(const fronts *c, int32_t *order, int32_t *before, int32_t *children)
+{
+  const int last = c->fronts - 1;
+  int place = last;
+  int64_t most = 0, stack = 0;
+  int32_t *below = before, *end = order; /* what a front depends on; where that ends, for now */
+  for (int s = 0; s < last; ++s) below[s] = 1, children[s] = 0;
+  for (int s = 0; s < last; ++s)
+    if (c->parent[s] < last) below[c->parent[s]] += below[s], ++children[c->parent[s]];
+  int32_t *found = malloc(2 * (size_t)last * sizeof *found + 1);
+  if (!found) return -1;
+  for (int s = last - 1; s >= 0; --s) {
+    int32_t *free_end = c->parent[s] < last ? end + c->parent[s] : &place;
+    const int here = *free_end - 1;
+    *free_end -= below[s];
+    end[s] = here;
+    found[here] = s, found[last + here] = here - below[s];
+  }
+  memcpy(order, found, last * sizeof *found);
+  memcpy(before, found + last, last * sizeof *found);
+  free(found);
+  for (int k = 0; k < last; ++k) {
+    for (int child = k - 1, left = children[order[k]]; left; --left, child = before[child]) {
+      const int64_t rest = c->begin[order[child] + 1] - c->begin[order[child]];
+      stack -= rest * rest;
+    }
+    const int64_t rest = c->begin[order[k] + 1] - c->begin[order[k]];
+    if (c->parent[order[k]] < last) stack += rest * rest;
+    most = stack > most ? stack : most;
+  }
+  return most;
+}
+
+/* row -= a X, of four rows of X */
+static inline void subtract_rows(int size, const double *a, const double *X, int stride, double *row)
+{
+  const double a0 = a[0], a1 = a[1], a2 = a[2], a3 = a[3];
+  const double *x1 = X + stride, *x2 = x1 + stride, *x3 = x2 + stride;
+  for (int j = 0; j < size; ++j) row[j] -= a0 * X[j] + a1 * x1[j] + a2 * x2[j] + a3 * x3[j];
+}
+
+/* Eliminate the first k pivots from a row: multipliers in their place */
+static inline void eliminate_row(int size, int pivots, const double *F, double *row)
+{
+  int k = 0;
+  for (; k + 4 <= pivots; k += 4) {
+    const double *X = F + (int64_t)k * size;
+    for (int i = k; i < k + 4; ++i) {
+      row[i] *= F[(int64_t)i * size + i];
+      for (int j = i + 1; j < k + 4; ++j) row[j] -= row[i] * F[(int64_t)i * size + j];
+    }
+    subtract_rows(size - k - 4, row + k, X + k + 4, size, row + k + 4);
+  }
+  for (; k < pivots; ++k) {
+    const double *X = F + (int64_t)k * size, a = row[k] *= X[k];
+    for (int j = k + 1; j < size; ++j) row[j] -= a * X[j];
+  }
+}
+
+/* Factor the pivots of a front, rows exchanged; reciprocals of the pivots on the diagonal; whether
+ * they are finite */
+static int factor_pivots(int size, int pivots, double *F, int32_t *swap)
+{
+  int finite = 1;
+  for (int k = 0; k < pivots; ++k) {
+    int best = k;
+    for (int i = k + 1; i < pivots; ++i)
+      if (fabs(F[(int64_t)i * size + k]) > fabs(F[(int64_t)best * size + k])) best = i;
+    double *pivot = F + (int64_t)k * size, *other = F + (int64_t)best * size;
+    swap[k] = best;
+    if (best != k)
+      for (int j = 0; j < size; ++j) {
+        const double x = pivot[j];
+        pivot[j] = other[j], other[j] = x;
+      }
+    pivot[k] = 1 / pivot[k];
+    finite &= isfinite(pivot[k]) != 0;
+    for (int i = k + 1; i < pivots; ++i) {
+      double *row = F + (int64_t)i * size, a = row[k] *= pivot[k];
+      for (int j = k + 1; j < size; ++j) row[j] -= a * pivot[j];
+    }
+  }
+  return finite;
+}
+
+/* Add what a front makes of the rest of its unknowns, a matrix with rows of `stride`, to the parent. */
+static void add_to_parent(const fronts *c, int front, const double *made, int stride, double *to)
+{
+  const int rest = c->begin[front + 1] - c->begin[front], size = front_size(c, c->parent[front]);
+  const int32_t *up = c->up + c->begin[front];
+  for (int i = 0; i < rest; ++i) {
+    double *row = to + (int64_t)up[i] * size;
+    for (int j = 0; j < rest; ++j) row[up[j]] += made[(int64_t)i * stride + j];
+  }
+}
+
+static void add_entries(const fronts *c, int front, const double *data, double *F)
+{
+  for (int k = c->entries[front]; k < c->entries[front + 1]; ++k) F[c->place[k]] += data[c->entry[k]];
+}
+
+/* Factors of the system whose entries are `data`, and the Schur complement of what stays. Returns
+ * whether all pivots are finite.
+ *
+ * Parents come after their children: what these make of the rest is at the end of the stack. */
+int factor_fronts(const fronts *c, const double *data)
+{
+  const int last = c->fronts - 1, stay = front_size(c, last);
+  double *F = c->space, *top = c->stack;
+  int finite = 1;
+  memset(c->schur, 0, (int64_t)stay * stay * sizeof *F);
+  add_entries(c, last, data, c->schur);
+  for (int k = 0; k < last; ++k) {
+    const int s = c->order[k], pivots = c->first[s + 1] - c->first[s], size = front_size(c, s);
+    const int rest = size - pivots;
+    double *rows = c->values + c->at[s], *columns = rows + (int64_t)pivots * size;
+    memset(F, 0, (int64_t)size * size * sizeof *F);
+    add_entries(c, s, data, F);
+    for (int child = k - 1, left = c->children[s]; left; --left) {
+      const int of = c->order[child], made = c->begin[of + 1] - c->begin[of];
+      add_to_parent(c, of, top -= (int64_t)made * made, made, F);
+      child = c->before[child];
+    }
+    finite &= factor_pivots(size, pivots, F, c->swap + c->first[s]);
+    memcpy(rows, F, (int64_t)pivots * size * sizeof *F);
+    for (int i = pivots; i < size; ++i) {
+      double *row = F + (int64_t)i * size;
+      eliminate_row(size, pivots, F, row);
+      memcpy(columns + (int64_t)(i - pivots) * pivots, row, pivots * sizeof *F);
+    }
+    const double *made = F + (int64_t)pivots * size + pivots;
+    if (c->parent[s] == last) add_to_parent(c, s, made, size, c->schur);
+    else
+      for (int i = 0; i < rest; ++i, top += rest)
+        memcpy(top, made + (int64_t)i * size, rest * sizeof *F);
+  }
+  return finite;
+}
+
+/* The right-hand side b, in the order of elimination: what pivots make of it, then that of the Schur
+ * complement. */
+void reduce_fronts(const fronts *c, double *b)
+{
+  for (int k = 0; k < c->fronts - 1; ++k) {
+    const int s = c->order[k], pivots = c->first[s + 1] - c->first[s], size = front_size(c, s);
+    const int32_t *rest = c->rest + c->begin[s] - pivots, *swap = c->swap + c->first[s];
+    const double *F = c->values + c->at[s];
+    double *x = b + c->first[s];
+    for (int i = 0; i < pivots; ++i) {
+      const double y = x[swap[i]];
+      x[swap[i]] = x[i], x[i] = y;
+    }
+    for (int i = 1; i < pivots; ++i)
+      for (int j = 0; j < i; ++j) x[i] -= F[(int64_t)i * size + j] * x[j];
+    const double *row = F + (int64_t)pivots * size;
+    for (int i = pivots; i < size; ++i, row += pivots) {
+      double y = 0;
+      for (int j = 0; j < pivots; ++j) y += row[j] * x[j];
+      b[rest[i]] -= y;
+    }
+  }
+}
+
+/* The solution, from that of what stays at the end of b. */
+void expand_fronts(const fronts *c, double *b)
+{
+  for (int k = c->fronts - 2; k >= 0; --k) {
+    const int s = c->order[k], pivots = c->first[s + 1] - c->first[s], size = front_size(c, s);
+    const int32_t *rest = c->rest + c->begin[s] - pivots;
+    const double *F = c->values + c->at[s];
+    double *x = b + c->first[s];
+    for (int i = pivots - 1; i >= 0; --i) {
+      const double *row = F + (int64_t)i * size;
+      double y = x[i];
+      for (int j = i + 1; j < pivots; ++j) y -= row[j] * x[j];
+      for (int j = pivots; j < size; ++j) y -= row[j] * b[rest[j]];
+      x[i] = y * row[i];
+    }
+  }
+}
