@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array, eye_array, kron, random_array
 
+import ufl_beam as ub
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import bisected
@@ -151,3 +152,24 @@ def test_parts_have_equal_sizes_and_short_borders(number):
 
 def test_more_parts_than_points():
     assert sorted(bisected(np.zeros((3, 2)), 5)) == sorted(set(bisected(np.zeros((3, 2)), 5)))
+
+
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.Midpoint()], ids=["statics", "dynamics"])
+@pytest.mark.parametrize("number", [1, 2, 5])
+def test_beams_that_share_nothing(number, scheme):
+    """Under mpirun: parts without a border, processes with one cell, a force that holds a joint."""
+    section = ub.Section(EA=1e4, GA=4e3, EI=10.0, rhoA=1.0, rhoI=0.01)
+    beams = [ub.Beam((10 * i, 0), (10 * i + 1, 0.5), section, cells=3) for i in range(number)]
+    tip = ub.Beam(beams[0].b, (2, 0), section, cells=2)
+    scene = ub.Scene(
+        [*beams, tip],
+        joints=[ub.Revolute(beams[0].end, tip.start, measured=True)],
+        supports=[*(ub.Clamped(beam.start) for beam in beams), ub.Pinned(tip.end)],
+        loads=[ub.PointLoad(beam.end, force=(0, -1.0)) for beam in beams],
+    )
+    alone, together = (
+        ub.simulate(scene, scheme, t=(0, 1), dt=0.25, progress=False, comm=comm).q
+        for comm in (MPI.COMM_SELF, MPI.COMM_WORLD)
+    )
+    # Residuals of 1e-10 of the forces, 1 N, on stiffnesses of some 10 N/m
+    assert np.abs(alone - together).max() < 1e-9

@@ -20,6 +20,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.errors import SceneError, require_kind, shorten
 from ufl_beam.model.bodies import Anchor, Body, Member, Node, Place, node
 from ufl_beam.model.connectors import Connector
+from ufl_beam.model.curves import Straight
 from ufl_beam.model.material_laws import AnySoftening
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.plastic_hinges import place_of
@@ -58,10 +59,7 @@ class Grid:
         counts = np.array([len(p) for p in self._parameters], dtype=np.int64)
         self.first_vertices = np.concatenate([[0], np.cumsum(counts)])
         self._first_cells = self.first_vertices - np.arange(len(beams) + 1)
-        vertices = np.array(
-            [b.curve(s) for b, p in zip(beams, self._parameters, strict=True) for s in p],
-            dtype=np.float64,
-        ).reshape(-1, 2)
+        vertices = self._vertices(counts)
         begins = np.ones(len(vertices), dtype=bool)
         begins[self.first_vertices[1:] - 1] = False
         begin = np.flatnonzero(begins)
@@ -75,6 +73,18 @@ class Grid:
         self._add_hinges([place_of(hinge) for hinge in scene.hinges])
         self.nodes_of_cells = np.hstack([self.cells, numbers])
         self._number()
+
+    def _vertices(self, counts: Index) -> Array:
+        """Points of the vertices of all beams, ``counts`` of each; (num_vertices, 2); m."""
+        lines = [b.curve if isinstance(b.curve, Straight) else None for b in self.scene.beams]
+        ends = [(*line.a, *line.b) if line else (0.0,) * 4 for line in lines]
+        of_vertices = np.repeat(np.reshape(ends, (-1, 4)), counts, axis=0).T
+        s = np.concatenate([np.empty(0), *self._parameters])
+        points: Array = np.ascontiguousarray((of_vertices[:2] * (1 - s) + of_vertices[2:] * s).T)
+        for i in (i for i, line in enumerate(lines) if line is None):
+            at = slice(*self.first_vertices[i : i + 2])
+            points[at] = [self.scene.beams[i].curve(x) for x in self._parameters[i]]
+        return points
 
     def __str__(self) -> str:
         scene = self.scene

@@ -73,14 +73,13 @@ class Beam(Member):
         require_kind(self.section, Section, f"{self.name}: section")
         object.__setattr__(self, "cells", require_count(self.cells, f"{self.name}: cells"))
         require_memory(self.cells, f"{self.name}: cells = {self.cells}")
-        if self.curve is None:
+        straight = self.curve is None
+        if straight:
             if a == b:
                 raise SceneError(f"{self.name}: zero length, both ends are at {a}")
             object.__setattr__(self, "curve", Straight(a, b))
-        for s, end in ((0.0, a), (1.0, b)):
-            there = point_of(self.curve, s, f"{self.name}: curve")
-            if math.dist(there, end) > 1e-9 * max(math.hypot(*there), math.hypot(*end)):
-                raise SceneError(f"{self.name}: curve({s:g}) = {there} is not the end {end}")
+        else:
+            self._require_ends()
         corners = require_sequence(self.corners, f"{self.name}: corners")
         object.__setattr__(self, "corners", corners)
         for s in corners:
@@ -103,9 +102,20 @@ class Beam(Member):
             raise SceneError(
                 f"{self.name}: hinges are for resultants; here the fibres of the section soften"
             )
+        self._warn_of_thickness(math.dist(a, b) if straight else self._length())
+
+    def _require_ends(self) -> None:
+        """Raise :class:`SceneError` unless the curve leads from one end to the other."""
+        for s, end in ((0.0, self.a), (1.0, self.b)):
+            there = point_of(self.curve, s, f"{self.name}: curve")
+            if math.dist(there, end) > 1e-9 * max(math.hypot(*there), math.hypot(*end)):
+                raise SceneError(f"{self.name}: curve({s:g}) = {there} is not the end {end}")
+
+    def _length(self) -> float:
+        """Length of the polygon through the ends of the cells, all of which must be points; m."""
         at = sorted({*self.corners, *(i / self.cells for i in range(self.cells + 1))})
         points = [point_of(self.curve, s, f"{self.name}: curve") for s in at]
-        self._warn_of_thickness(sum(math.dist(p, q) for p, q in pairwise(points)))
+        return sum(math.dist(p, q) for p, q in pairwise(points))
 
     def _warn_of_thickness(self, length: float) -> None:
         """Warn if the radius of gyration of a section is larger than the beam is long."""

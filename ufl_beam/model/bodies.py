@@ -64,6 +64,8 @@ class Member(ABC):
         A place nearer to a regular vertex than :data:`TOGETHER` is that vertex.
         """
         regular = [i / self.cells for i in range(self.cells + 1)]
+        if not {*self.corners, *attached} - {0.0, 1.0}:
+            return regular
         vertices = sorted({*regular, *self.corners, *attached})
         kept = [0.0]
         for s in vertices[1:]:
@@ -271,7 +273,7 @@ def arm(anchor: Anchor, point: Point | None = None) -> Point:
 
 def carries(anchor: Anchor) -> bool:
     """Return whether the displacement of an anchor is that of its node."""
-    return math.hypot(*arm(anchor)) == 0.0
+    return isinstance(anchor, Place) or math.hypot(*arm(anchor)) == 0.0
 
 
 def require_anchors(owner: str, *anchors: object) -> None:

@@ -28,6 +28,8 @@ DENSE = 90
 
 def require_masses(scene: Scene) -> None:
     """Raise :class:`SceneError` if a body that may move has no mass, unless a beam carries it."""
+    if not scene.bodies:
+        return
     same, moved = scene.representatives, _fixed(scene)
     for alike in scene.shared_by_joints:
         moved |= {same[dof] for dof in alike if not isinstance(dof[0], Body)}

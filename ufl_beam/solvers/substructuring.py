@@ -117,20 +117,24 @@ def _wide(array: Index) -> object:
     return ffi.from_buffer("int64_t[]", array)
 
 
+def _pattern(A: Csr) -> csr_array:
+    ones = np.ones(len(A.indices), np.bool_)
+    return csr_array((ones, A.indices, A.indptr), shape=(A.size, A.size))
+
+
 def _minimum_degree(A: Csr, of: npt.NDArray[np.bool_]) -> Index:
     """Return some unknowns in the order of approximate minimum degree."""
     these = np.flatnonzero(of)
     if not len(these):
         return these
-    part = csr_array((np.ones(len(A.indices)), A.indices, A.indptr))[these][:, these]
+    part = _pattern(A)[these][:, these].astype(np.float64)
     _, order = Csr(part.data, part.indices, part.indptr).petsc().getOrdering("amd")
     return np.asarray(these[order.indices])
 
 
 def _fronts(A: Csr, order: Index, eliminated: int) -> tuple[Index, Index, Index]:
     """Return ``first``, ``begin`` and ``rest`` of the fronts, see loops.h."""
-    pattern = csr_array((np.ones(len(A.indices), np.bool_), A.indices, A.indptr))
-    pattern = csr_array(pattern[order][:, order])
+    pattern = csr_array(_pattern(A)[order][:, order])
     first, begin = np.empty((2, eliminated + 2), dtype=np.int32)
     room, space = 2 * len(A.indices) + 2 * A.size, np.empty(3 * A.size, dtype=np.int32)
     while True:
