@@ -74,9 +74,9 @@ int judge(equation *e, const double *q, int iteration, double residual, double s
     e->near |= residual * pow(e->rate, MORE) <= wanted;
   }
   e->slow += 1;
-  /* Where laws are yet to be met, as when a connector has just been released, it is no measure for
-   * what follows that forces are in balance. */
-  const double size = met ? residual : scale;
+  /* Where a connector has just been released, it is no measure for what follows that forces are in
+   * balance, as long as its law is not met. */
+  const double size = iteration > 0 || met ? residual : scale;
   if (size <= e->best / 2) e->best = size, e->slow = 0;
   e->last = residual;
   return e->slow == e->patience ? STALLED : ITERATING;
