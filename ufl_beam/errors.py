@@ -130,9 +130,9 @@ class TradeoffError(RuntimeError):
         runs: Runs so far, as in :attr:`Tradeoff.runs`.
 
     Example:
-        >>> jumps = {"jumps": lambda run: 1.0 + len(run.times) % 3}
+        >>> grows = {"grows": lambda run: float(len(run.times))}  # with the number of steps
         >>> try:
-        ...     ub.tradeoff(scene, jumps, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance=0.1)
+        ...     ub.tradeoff(scene, grows, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance=0.1)
         ... except ub.TradeoffError as error:
         ...     print(len(error.runs) > 0)
         True

@@ -54,10 +54,8 @@ class RatesInC:
         size, number = len(moving.v), MORE + len(self._scheme.kept)
         self._space = np.zeros((2, number, size))
         self._handle = ffi.new_handle(self)
-        self.c = fill(
-            ffi.new("rates *"), size=size, number=number, find=lib.numbers_in_python,
-            handle=self._handle,
-        )  # fmt: skip
+        self.c = fill(ffi.new("rates *"), size=size, number=number, find=lib.numbers_in_python)
+        self.c.handle = self._handle  # what `fill` keeps must not keep this object
 
     @classmethod
     def of(cls, moving: Moving) -> RatesInC | None:

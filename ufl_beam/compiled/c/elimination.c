@@ -103,9 +103,9 @@ typedef struct {
   int chain, vertex;
   double pivot[9], to[9], from[9], faded;
   double ends[36], f[3], end_f[6];
-} front;
+} chain_front;
 
-static inline void begin_chain(const chains *c, int chain, front *at)
+static inline void begin_chain(const chains *c, int chain, chain_front *at)
 {
   memset(at, 0, sizeof *at);
   at->chain = chain, at->vertex = c->first[chain];
@@ -118,7 +118,7 @@ static inline void begin_chain(const chains *c, int chain, front *at)
 
 /* The next vertex of a chain, and its part of the right-hand side b; without a spike nothing couples
  * to a left end. */
-static inline void eliminate_vertex(const chains *c, front *at, const double *b, const int spike)
+static inline void eliminate_vertex(const chains *c, chain_front *at, const double *b, const int spike)
 {
   const int v = at->vertex++;
   double below[9], after[9], *pivot = at->pivot, *to_next = c->to_next + BLOCK * v, *f = c->f + 3 * v;
@@ -152,7 +152,7 @@ static inline void eliminate_vertex(const chains *c, front *at, const double *b,
 
 /* What a chain makes of the blocks of its ends, left-left, left-right, right-left and right-right, and
  * of the right-hand side there. */
-static inline void end_chain(const chains *c, front *at)
+static inline void end_chain(const chains *c, chain_front *at)
 {
   const int32_t *places = c->places + 36 * at->chain, *numbers = c->ends + 6 * at->chain;
   if (c->spike[at->chain]) {
@@ -165,13 +165,13 @@ static inline void end_chain(const chains *c, front *at)
   for (int k = 0; k < 6; ++k) c->left_f[numbers[k]] += at->end_f[k];
 }
 
-static inline int to_go(const chains *c, const front *at)
+static inline int to_go(const chains *c, const chain_front *at)
 {
   return c->first[at->chain + 1] - at->vertex;
 }
 
 /* Two chains at once: each vertex waits for the one before it, but not for those of the other chain. */
-static inline void eliminate_pair(const chains *c, front *one, front *other, const double *b,
+static inline void eliminate_pair(const chains *c, chain_front *one, chain_front *other, const double *b,
                                   const int spike)
 {
   int both = to_go(c, one) < to_go(c, other) ? to_go(c, one) : to_go(c, other);
@@ -181,7 +181,7 @@ static inline void eliminate_pair(const chains *c, front *one, front *other, con
   }
 }
 
-static void eliminate_rest(const chains *c, front *at, const double *b)
+static void eliminate_rest(const chains *c, chain_front *at, const double *b)
 {
   if (c->spike[at->chain])
     while (to_go(c, at)) eliminate_vertex(c, at, b, 1);
@@ -194,7 +194,7 @@ static void eliminate_rest(const chains *c, front *at, const double *b)
  * as it is, and what the chains make of their ends. */
 void eliminate(const chains *c, const double *b)
 {
-  front one, other;
+  chain_front one, other;
   memset(c->left_data, 0, c->left * sizeof *c->left_data);
   memset(c->left_f, 0, c->left_size * sizeof *c->left_f);
   for (int k = 0; k < c->stay; ++k) c->left_data[c->place[k]] = c->data[c->entry[k]];

@@ -27,45 +27,45 @@ int find_fronts(int unknowns, int eliminated, const int32_t *indptr, const int32
                 int32_t *next)
 {
   /* Fronts whose first other unknown is j are a list: next[j], then next[unknowns + front]. */
-  int fronts = 0;
+  int count = 0;
   for (int j = 0; j < 2 * unknowns; ++j) next[j] = -1;
   for (int j = 0; j < unknowns; ++j) mark[j] = -1;
   begin[0] = 0;
   for (int j = 0; j < eliminated; ++j) {
-    int32_t *found = rest + begin[fronts];
+    int32_t *found = rest + begin[count];
     int number = 0;
-    if (room - begin[fronts] < unknowns) return -1;
+    if (room - begin[count] < unknowns) return -1;
     mark[j] = j;
     for (int k = indptr[j]; k < indptr[j + 1]; ++k)
       if (indices[k] > j && mark[indices[k]] != j) mark[indices[k]] = j, found[number++] = indices[k];
     int last = 0;
     for (int s = next[j]; s >= 0; s = next[unknowns + s]) {
-      last |= s == fronts - 1;
+      last |= s == count - 1;
       for (int k = begin[s]; k < begin[s + 1]; ++k)
         if (mark[rest[k]] != j) mark[rest[k]] = j, found[number++] = rest[k];
     }
     qsort(found, number, sizeof *found, compare);
-    const int pivots = fronts ? j - first[fronts - 1] : 0;
-    const int before = fronts ? begin[fronts] - begin[fronts - 1] : 0;
+    const int pivots = count ? j - first[count - 1] : 0;
+    const int before = count ? begin[count] - begin[count - 1] : 0;
     if (last && (number + 1 - before) * pivots <= FEW) {
-      memmove(rest + begin[fronts - 1], found, number * sizeof *found);
-      begin[fronts] = begin[fronts - 1] + number;
+      memmove(rest + begin[count - 1], found, number * sizeof *found);
+      begin[count] = begin[count - 1] + number;
     } else {
-      first[fronts++] = j;
-      begin[fronts] = begin[fronts - 1] + number;
+      first[count++] = j;
+      begin[count] = begin[count - 1] + number;
     }
     if (number) {
-      const int parent = rest[begin[fronts - 1]];
-      next[unknowns + fronts - 1] = next[parent];
-      next[parent] = fronts - 1;
+      const int parent = rest[begin[count - 1]];
+      next[unknowns + count - 1] = next[parent];
+      next[parent] = count - 1;
     }
   }
-  if (room - begin[fronts] < unknowns - eliminated) return -1;
-  first[fronts++] = eliminated;
-  begin[fronts] = begin[fronts - 1];
-  for (int j = eliminated; j < unknowns; ++j) rest[begin[fronts]++] = j;
-  first[fronts] = eliminated;
-  return fronts;
+  if (room - begin[count] < unknowns - eliminated) return -1;
+  first[count++] = eliminated;
+  begin[count] = begin[count - 1];
+  for (int j = eliminated; j < unknowns; ++j) rest[begin[count]++] = j;
+  first[count] = eliminated;
+  return count;
 }
 
 /* Row or column of an unknown in a front */
