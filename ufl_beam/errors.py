@@ -130,9 +130,10 @@ class TradeoffError(RuntimeError):
         runs: Runs so far, as in :attr:`Tradeoff.runs`.
 
     Example:
-        >>> grows = {"grows": lambda run: float(len(run.times))}  # with the number of steps
+        >>> chance = np.random.default_rng(0)
+        >>> noise = {"noise": lambda run: chance.uniform()}
         >>> try:
-        ...     ub.tradeoff(scene, grows, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance=0.1)
+        ...     ub.tradeoff(scene, noise, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance=1e-3)
         ... except ub.TradeoffError as error:
         ...     print(len(error.runs) > 0)
         True
