@@ -8,7 +8,7 @@ error: they belong into the tangent, while the residual remains that of the disp
 Newton's method for displacements and forces as independent unknowns, as the functional has them,
 with the forces eliminated; it converges in few iterations, whatever the slenderness.
 
-Magisano, Leonetti, Garcea (2017), doi:10.1016/j.cma.2016.10.023, for displacement elements.
+Magisano, Leonetti and Garcea, Computer Methods in Applied Mechanics and Engineering 313 (2017).
 """
 
 from __future__ import annotations
