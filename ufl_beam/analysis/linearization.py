@@ -33,6 +33,21 @@ COUPLING_TOLERANCE = 1e-9  # couplings below this part of the largest damping do
 AT_REST = 1e300  # length of a step in which all rates vanish; s
 
 
+def linearise(simulation: Simulation, q: Array, dt: float) -> tuple[Array, Array]:
+    """Return :meth:`StepEquation.linearise` at ``q`` as this state answers it, K + C / dt.
+
+    Nothing yields or opens any further, now and later: no step may follow.
+    """
+    simulation.take_back()
+    simulation.ask()
+    for cells in simulation.inelastic:
+        cells.points.freeze()
+    for coupling in simulation.couplings:
+        coupling.response.freeze()
+    step = Step(0.0, dt, simulation.q, simulation.t, simulation.t, fraction=1.0)
+    return simulation.equation.linearise(q, step)
+
+
 class _Standstill(Newmark):
     """Scheme of small motions: all terms are taken at the present state, and no step is made."""
 
@@ -80,7 +95,7 @@ class SmallMotions:
 
     def _derivative(self, q: Array, dt: float) -> csr_array:
         """K + C / dt at ``q``, of all degrees of freedom."""
-        return self._matrix(self._simulation.linearise(q, dt)[1])
+        return self._matrix(linearise(self._simulation, q, dt)[1])
 
     def _directions(self, T: csr_array, constraints: Index) -> csr_array:
         """Columns: what may move, in the axes of supports, and the forces of constraints."""
@@ -215,7 +230,7 @@ class SmallMotions:
     def _path(self) -> Array:
         """Change of the configuration by the loads and motions, as if everything were linear."""
         simulation, supports = self._simulation, self._simulation.supports
-        r, data = simulation.linearise(self.q, AT_REST)
+        r, data = linearise(simulation, self.q, AT_REST)
         T, Q = self._matrix(data), self._axes()
         before = supports.in_axes(self.q)
         given = before.copy()

@@ -206,14 +206,14 @@ class Simulation(StateView):
             parts.search, LARGEST_TURN, fresh, self.support_dofs,
         )  # fmt: skip
 
-    def _in_python(self) -> None:
+    def take_back(self) -> None:
         """Take the state back from C: what follows is in Python."""
         if self._in_c is not None:
             self._in_c.hand_back(self)
 
     def _attempt_loads(self, t1: float, begin: float, end: float) -> Trial:
         """Solve a part of the application of the loads of the time ``begin``, up to ``end``."""
-        self._in_python()
+        self.take_back()
         step = self.scheme.step(self.t, t1, end, self.q)
         trial = self._attempt(step._replace(load_time=begin, motion_time=begin))
         require_small_turn(self.share, trial.q1 - self.q, trial.step.dt, end - begin)
@@ -229,7 +229,7 @@ class Simulation(StateView):
         Raises:
             StepFailed: There is no equilibrium, or it is too far away.
         """
-        self._in_python()
+        self.take_back()
         if self._dynamic and not self.inertia.ready:
             t = self.t + FIRST * (t1 - self.t)
             first = self._attempt(self.scheme.step(self.t, t, t1, self.q))
@@ -261,7 +261,7 @@ class Simulation(StateView):
         self, step: Step, guess: Array, border: Border, *, hold: bool = True
     ) -> Trial:
         """Solve the next step together with the load factor; see :meth:`StepSolver.solve_along`."""
-        self._in_python()
+        self.take_back()
         self.together(self._ask_and_begin, step)
         return self._steps.solve_along(step, guess, border, hold=hold)
 
@@ -293,20 +293,6 @@ class Simulation(StateView):
         """
         if self.asked:
             self._assembly.ask(self, self.q)
-
-    def linearise(self, q: Array, dt: float) -> tuple[Array, Array]:
-        """Return :meth:`StepEquation.linearise` at ``q`` as this state answers it, K + C / dt.
-
-        Nothing yields or opens any further, now and later: no step may follow.
-        """
-        self._in_python()
-        self.ask()
-        for cells in self.inelastic:
-            cells.points.freeze()
-        for coupling in self.couplings:
-            coupling.response.freeze()
-        step = Step(0.0, dt, self.q, self.t, self.t, fraction=1.0)
-        return self.equation.linearise(q, step)
 
     def give_up(self, failure: StepFailed, end: float, advice: str = "") -> NoReturn:
         """End the run where it is, because even the smallest step, to ``end``, failed.
@@ -357,7 +343,7 @@ class Simulation(StateView):
         self.settle()
         if self.t not in self.solution.times[-1:]:
             self.keep()
-        self._in_python()
+        self.take_back()
         self.solution.internal = self._assembly.internal_variables(self.q)
 
     def snapshot(self) -> Solution:
@@ -365,7 +351,7 @@ class Simulation(StateView):
         self.settle()
         now = Solution(self.scene, self.grid)
         now.keep(self.gather())
-        self._in_python()
+        self.take_back()
         now.internal = self._assembly.internal_variables(self.q)
         return now
 
@@ -383,7 +369,7 @@ class Simulation(StateView):
             term.add_state(self.q)
 
     def _pass_on(self, memory: Memory) -> None:
-        self._in_python()
+        self.take_back()
         self.t = memory.number("t", self.t)
         self.last_dt = memory.number("last dt", self.last_dt)
         self.parts = int(memory.number("parts", self.parts))
