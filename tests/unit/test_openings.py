@@ -145,6 +145,7 @@ def test_only_what_must_open_does():
     assert (solution.material(beam, n).hinge > 0).sum() == 1
 
 
+@pytest.mark.serial  # several processes take steps in Python
 @jumps
 @pytest.mark.parametrize("law", [None, ub.Softening(FOREVER, FOREVER), ub.Softening(10.0, 1e-3)])
 def test_only_steps_in_which_something_opens_are_solved_again(law, monkeypatch):
