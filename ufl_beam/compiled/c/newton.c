@@ -34,9 +34,6 @@ void assemble(equation *e, const double *q)
 /* Iterations that a tangent may still cost if it is kept: making one costs as much as two. */
 enum { MORE = 3 };
 
-/* Why a tangent is kept: the next residual meets the tolerance by far, or some that follow do. */
-enum { AT_ONCE = 1, SLOWLY = 2 };
-
 /* Part of the tolerance that is met by no luck, before the least number of iterations. */
 static const double SURE = 1e-4;
 
@@ -65,16 +62,16 @@ int judge(equation *e, const double *q, int iteration, double residual, double s
   if (iteration > 1) {
     /* A fraction of the last digit is luck; a few of them that Newton's method no longer halves are
      * all that can be had: it may go round between two such states for ever. */
-    const int stays = kept != SLOWLY && e->last / 2 < residual && residual <= floor;
+    const int stays = !kept && e->last / 2 < residual && residual <= floor;
     if ((stays || residual <= floor / 80) && demands_met(e, q, scale)) return AT_ROUND_OFF;
     /* With the tangent of the iterate before, the residual falls by twice the last factor; works are
      * to come out as with a new one, so it must be far enough. */
-    if (!kept && 2000 * residual * (residual / e->last) <= wanted) e->near = AT_ONCE;
+    e->near = !kept && residual > floor && 2000 * residual * (residual / e->last) <= wanted;
   }
   if (e->modified) {
     /* The residual goes on to fall as it did, if the tangent is kept; from step to step too. */
     if (iteration > 0) e->rate = residual / e->last;
-    if (!e->near && residual * pow(e->rate, MORE) <= wanted) e->near = SLOWLY;
+    e->near |= residual * pow(e->rate, MORE) <= wanted;
   }
   e->slow += 1;
   /* Where a connector has just been released, it is no measure for what follows that forces are in
