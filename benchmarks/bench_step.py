@@ -72,7 +72,7 @@ def parts(simulation):
         "tangent": microseconds(lambda: lib.assemble(equation, at_x)),
         "of it beams ": microseconds(lambda: simulation.beams[0].add_tangent(x)),
         "factor": microseconds(lambda: lib.factor_tangent(equation, failed)),
-        "solve": microseconds(lambda: lib.solve_tangent(equation)),
+        "solve": microseconds(lambda: lib.solve_tangent(equation, 0)),
         "sizes of forces": microseconds(lambda: lib.norm(len(r), equation.weight, at_r)),
     }
 

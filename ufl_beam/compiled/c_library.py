@@ -29,6 +29,9 @@ SOURCES = (
 )  # fmt: skip
 """Files of C beside this one; they are one translation unit."""
 
+FLAGS = ["-O3", "-fopenmp-simd"]
+"""Flags for the compiler; sums may be in the order of vectors."""
+
 _CALLBACKS = """
 extern "Python" void add_in_python(void *self, const double *q, double *out);
 extern "Python" double missed_in_python(void *self, const double *q, const double *r, double scale,
@@ -44,7 +47,7 @@ module = compiled(
     DECLARATIONS + _CALLBACKS,
     lambda: _SOURCE,
     made_of=[_SOURCE],
-    flags=["-O3", "-fopenmp-simd"],
+    flags=FLAGS,
 )
 ffi: Any = module.ffi
 lib: Any = module.lib
