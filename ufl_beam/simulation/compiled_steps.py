@@ -113,7 +113,7 @@ class CompiledSteps:
 
     @cached_property
     def _kept(self) -> KeptRows:
-        """What C keeps of steps."""
+        """Rows of numbers, one for each step that C keeps."""
         rows = KeptRows(self.c, *self._of_rows)
         fill(self.c, kinds=len(rows.kinds), kept=rows.kinds)
         return rows
@@ -236,7 +236,7 @@ def _whole_steps(scheme: Any) -> tuple[float, float, float] | None:
 
 @cache
 def _nodal_step(scheme: Any) -> tuple[bool, bool] | None:
-    """Whether turns of a step are limited, and are 2 tan(Δψ/2) in it; None if neither is known."""
+    """Flags: turns of a step are limited, and are 2 tan(Δψ/2) in it; None if that is not known."""
     if not hasattr(scheme, "half_tangents"):
         return None
     q0, q1, rotations = np.zeros(3), np.array([0.3, -0.7, 0.5]), np.array([1, 2], dtype=np.int32)

@@ -46,6 +46,8 @@ class StepEquation(Equation):
         self._inner: list[InternalForces] = [*beams, *couplings]
         self.others: list[Term] = [*loads, *others]
         self.terms: list[Term] = [*self._inner, *self.others]
+        predicted = share.largest(float(any(one.demand() is not None for one in beams)))
+        self._demanding = bool(share.grid.scene.links) or predicted > 0.0  # in any process
 
     def begin(self, step: Step) -> None:
         """Let all terms begin a step."""
@@ -121,6 +123,8 @@ class StepEquation(Equation):
 
     def missed(self, x: Array, r: Array, scale: float, moved: float) -> float:
         """Return the largest residual of the laws of connectors and points, without dimension."""
+        if not self._demanding:
+            return 0.0
         q1 = self.supports.in_plane(x)
         here = max((c.excess(q1, r, scale, moved) for c in self._couplings), default=0.0)
         return self.share.largest(max([here, *(one.missed(q1, scale) for one in self._beams)]))

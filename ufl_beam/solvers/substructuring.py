@@ -152,7 +152,7 @@ def _fronts(A: Csr, order: Index, eliminated: int) -> tuple[Index, Index, Index]
 
 
 class Summed:
-    """What is left of the parts of several processes, summed over them; all of them have it."""
+    """Condensed systems of several processes, summed over them; all of them have the sum."""
 
     def __init__(self, inner: Condensed, comm: MPI.Intracomm) -> None:
         self._inner, self._comm = inner, comm

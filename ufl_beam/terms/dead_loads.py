@@ -160,6 +160,3 @@ def _along_beams(per_beam: npt.NDArray[Any], share: Share) -> Array:
     forces = np.zeros(share.size)
     np.add.at(forces, share.cell_dofs, np.kron(loads, [first, last, *between]))
     return forces
-
-
-# -- rotating frames -----------------------------------------------------------------------------

@@ -127,6 +127,9 @@ class FollowerLoads(LoadTerm):
         self._sizes = self._sizes_before = sizes
 
 
+# -- rotating frames -----------------------------------------------------------------------------
+
+
 @stated
 def _turned_mass(of: Element) -> ufl.Form:
     (u, _), (w_u, _) = split(ufl.TrialFunction(of.space)), split(of.w)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a term does when a step begins and when it is accepted, as loops in C."""
+"""Phases of a step, its beginning and its acceptance, as loops in C."""
 
 from __future__ import annotations
 

@@ -105,7 +105,7 @@ class RatesInC:
 
 
 def _ask(scheme: DynamicScheme, dt: float, columns: Array, last_dt: float) -> Sequence[Array]:
-    """What a scheme makes of rates: factors, then forces of inertia, velocity, rates and slip."""
+    """Answers of a scheme for given rates: factors, forces of inertia, velocity, rates and slip."""
     change, v, before, *more = columns
     asked = Asked(v, before, tuple(more), last_dt)
     factor, back, of_inertia = scheme.inertia(dt, asked)
