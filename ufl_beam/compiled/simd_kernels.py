@@ -23,7 +23,7 @@ from ufl_beam.dolfinx_compat import VERSIONS
 
 LOGGER = logging.getLogger("ufl_beam")
 
-LANES = 4
+LANES = 8
 """Cells that are computed at once, as many as AVX has room for; compilers split vectors for less.
 Eight (AVX-512) are hardly faster."""
 
