@@ -150,8 +150,8 @@ static void end_chain(const chains *c, const chain_fronts *at, int lane)
   const int chain = at->chain[lane];
   const int32_t *places = c->places + 36 * chain, *numbers = c->ends + 6 * chain;
   const pair *blocks[] = {at->left, at->from, at->to, at->pivot};
-  for (int part = 0; part < 4; ++part)
-    for (int k = 0; k < 9; ++k) c->left_data[*places++] += blocks[part][k][lane];
+  for (int i = 0; i < 4; ++i)
+    for (int k = 0; k < 9; ++k) c->left_data[*places++] += blocks[i][k][lane];
   for (int k = 0; k < 3; ++k) {
     c->left_f[numbers[k]] += at->left_f[k][lane];
     c->left_f[numbers[3 + k]] += at->f[k][lane];

@@ -26,7 +26,7 @@ static void begin_rows(const equation *e, int first, int last)
 }
 
 /* Cells whose rows the processor still has at hand when the cells add to them. */
-enum { SOME = 100000 };
+enum { SOME = 128 };
 
 /* The cells from `first` on */
 static cells some_cells(const cells *c, int first)
