@@ -180,9 +180,10 @@ static int verdict(equation *e, const double *q, int iteration)
   const double now = norm(e->size, e->weight, e->residual);
   if (!isfinite(now)) return DIVERGED;
   const double scale = e->loads + norm(e->size, e->weight, e->inner_force);
+  const int nearly = iteration > 1 && now > e->rtol * scale;
   double floor = 0;
-  if (iteration > 1 || e->demands) e->moved = fmin(largest_motion(e->size, e->weight, q), e->scene);
-  if (iteration > 1 && (now > e->rtol * scale || e->demands)) {
+  if (nearly || e->demands) e->moved = fmin(largest_motion(e->size, e->weight, q), e->scene);
+  if (nearly || (iteration > 1 && e->demands)) {
     find_last_digits(e, q, e->space);
     for (int i = 0; i < e->size; ++i) e->space[i] *= e->tangent[e->diagonal[i]];
     floor = 8 * norm(e->size, e->weight, e->space);
