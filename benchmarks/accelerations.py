@@ -80,8 +80,8 @@ ACCELERATIONS = {
     ),
     "SIMD kernels": Acceleration(
         "Kernels of FFCx compiled a second time with vectors instead of numbers, for the "
-        "processor of the machine: four or eight cells at once. Without it, cells are computed one by one "
-        "by FFCx's own kernels.",
+        "processor of the machine: four or eight cells at once. Without it, cells are computed one "
+        "by one by FFCx's own kernels.",
         by.SHIPPED, by.SCALAR,
         (
             "compiled/simd_kernels.py", "compiled/c/lanes.c", "compiled/c/lanes.h",
