@@ -79,7 +79,7 @@ ACCELERATIONS = {
         ),
     ),
     "steps in C": Acceleration(
-        "The whole step is in C: what terms do before and after it, the guess, SNES, the ledger and "
+        "The whole step is in C: what terms do before and after it, guess, SNES, ledger, and "
         "the row that is kept, for many steps in a call. Without it, Python does so around SNES.",
         by.SHIPPED, by.STEPS,
         (
