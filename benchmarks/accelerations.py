@@ -70,7 +70,7 @@ ACCELERATIONS = {
     "Newton's method in C": Acceleration(
         "Newton's method with full steps as a SNES of the type \"shell\". Without it, PETSc's "
         "`newtonls` calls the same residual and tangent in C, and the factorization by Python.",
-        by.SHIPPED, by.PETSC,
+        by.STEPS, by.PETSC,
         (
             "solvers/newton.py:Solver._leave_newton_to_c",
             "solvers/static_condensation.py:ChainsFirst.drive",
@@ -78,10 +78,20 @@ ACCELERATIONS = {
             "compiled/c/newton.c:solve_tangent", "compiled/c/newton.c:snes_newton",
         ),
     ),
+    "steps in C": Acceleration(
+        "The whole step is in C: what terms do before and after it, guess, SNES, ledger, and "
+        "the row that is kept, for many steps in a call. Without it, Python does so around SNES.",
+        by.SHIPPED, by.STEPS,
+        (
+            "compiled/c/march.c", "simulation/compiled_steps.py", "simulation/kept_rows.py",
+            "terms/phases.py", "terms/rates_in_c.py",
+        ),
+        (ELASTIC, LARGE, HINGED, JOINTED),
+    ),
     "SIMD kernels": Acceleration(
         "Kernels of FFCx compiled a second time with vectors instead of numbers, for the "
-        "processor of the machine: four or eight cells at once. Without it, cells are computed one by one "
-        "by FFCx's own kernels.",
+        "processor of the machine: four or eight cells at once. Without it, cells are computed one "
+        "by one by FFCx's own kernels.",
         by.SHIPPED, by.SCALAR,
         (
             "compiled/simd_kernels.py", "compiled/c/lanes.c", "compiled/c/lanes.h",
@@ -135,7 +145,7 @@ ACCELERATIONS = {
     ),
     "tangent of the last step (`like_last`)": Acceleration(
         "The part of this option that keeps a tangent from one step to the next.",
-        by.MODIFIED, by.ANEW,
+        by.MODIFIED_STEPS, by.ANEW,
         (
             "solvers/convergence.py~like_last|rate", "solvers/newton.py~like_last",
             "simulation/step_solver.py~like_last", "simulation/simulation.py~like_last|alike =",

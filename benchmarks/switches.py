@@ -105,8 +105,10 @@ CELL_BY_CELL = (function_spaces, "vectorise", nothing)
 NO_CHAINS = (static_condensation, "_plan", without_chains)
 ALL_TANGENTS = (newton, "loop", loop_without_kept_tangents)
 EACH_STEP_ANEW = (stepping, "StepSolver", EachStepAnew)
+STEPS_IN_PYTHON = (stepping, "compiled_steps", nothing)
 
-SHIPPED, MODIFIED, REFERENCE = "as shipped", "`modified=True`", "`reference=True`"
+SHIPPED, STEPS, REFERENCE = "as shipped", "steps in Python", "`reference=True`"
+MODIFIED, MODIFIED_STEPS = "`modified=True`", "`modified=True`, steps in Python"
 PETSC, PYTHON = "PETSc's `newtonls`", "`newtonls`, equation in Python"
 ASSEMBLERS = "`newtonls`, equation in Python, assemblers of DOLFINx"
 SCALAR, WHOLE, KLU = (
@@ -114,23 +116,26 @@ SCALAR, WHOLE, KLU = (
     "LU of the whole tangent",
     "`newtonls`, KLU of the whole tangent",
 )
-TANGENTS, ANEW = "a tangent in each iteration", "`modified=True`, a tangent in each step"
+TANGENTS = "a tangent in each iteration"
+ANEW = "`modified=True`, steps in Python, a tangent in each"
 POINTS, NUMPY = "cells with points in Python", "cells and return map in Python"
 CONNECTORS = "connectors in Python"
 
 VARIANTS = {
     SHIPPED: Variant(),
-    PETSC: Variant((NEWTON_OF_PETSC,)),
+    STEPS: Variant((STEPS_IN_PYTHON,)),
+    PETSC: Variant((STEPS_IN_PYTHON, NEWTON_OF_PETSC)),
     PYTHON: Variant((EQUATION_IN_PYTHON,)),
     ASSEMBLERS: Variant(
         (classes(fields=DolfinxFields, inelastic=ReferenceInelasticBeams, in_c=False),)
     ),
     SCALAR: Variant((CELL_BY_CELL,)),
     WHOLE: Variant((NO_CHAINS,)),
-    KLU: Variant((NEWTON_OF_PETSC, classes(factors=DirectSolver))),
+    KLU: Variant((STEPS_IN_PYTHON, NEWTON_OF_PETSC, classes(factors=DirectSolver))),
     TANGENTS: Variant((ALL_TANGENTS,)),
     MODIFIED: Variant((), {"modified": True}),
-    ANEW: Variant((EACH_STEP_ANEW,), {"modified": True}),
+    MODIFIED_STEPS: Variant((STEPS_IN_PYTHON,), {"modified": True}),
+    ANEW: Variant((STEPS_IN_PYTHON, EACH_STEP_ANEW), {"modified": True}),
     POINTS: Variant((classes(inelastic=ReferenceInelasticBeams),)),
     NUMPY: Variant((classes(inelastic=ReferenceInelasticBeams, points=ReferencePoints),)),
     CONNECTORS: Variant((classes(couplings=ReferenceCouplings, slips=ReferenceSlips),)),

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop, ffi, fill, lib
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, lib
 from ufl_beam.compiled.csr import Csr, Product
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
@@ -48,6 +48,7 @@ class StepEquation(Equation):
         self.others: list[Term] = [*loads, *others]
         self.terms: list[Term] = [*self._inner, *self.others]
         predicted = share.largest(float(any(one.demand() is not None for one in beams)))
+        self._adds_up = False  # in C
         self._demanding = bool(share.grid.scene.links) or predicted > 0.0  # in any process
 
     def begin(self, step: Step) -> None:
@@ -80,6 +81,9 @@ class StepEquation(Equation):
         self.supports.hold_matrix(self.A.data)
 
     def _assemble(self, q1: Array) -> None:
+        if self._adds_up:
+            lib.add_up(self.c, doubles(q1))
+            return
         self.A.data.fill(0.0)
         for term in self.terms:
             term.add_tangent(q1)
@@ -143,11 +147,11 @@ class StepEquation(Equation):
         """Let SNES call the loops of the terms in C, with no Python between them.
 
         What has no loop takes part by a call of Python.  Where several processes share a scene, and
-        where supports are at an angle, SNES calls Python: the same terms, in the same order.
+        where supports are at an angle, SNES calls Python: the same terms, in the same order; the
+        tangent is added up in C if all terms have loops.
         """
-        if not self.share.alone or self.supports.turned:
-            return
         supports, entries = self.supports, self.A.data
+        self._adds_up = all(term.loops() for term in self.terms)
         loops = [term.loops() or self._in_python(term) for term in self.terms]
         stiffnesses = [stiffness for _, stiffness in loops if stiffness is not None]
 
@@ -171,9 +175,10 @@ class StepEquation(Equation):
             held=len(supports.dofs), hold=supports.dofs.astype(np.int32),
             reactions=supports.reactions, pivots=supports.pivots,
         )  # fmt: skip
-        demands = [one.demand() or self.demand_in_python(one.excess) for one in self._couplings]
-        self.demand([*demands, *filter(None, (one.demand() for one in self._beams))])
-        self.in_c = True
+        if self.share.alone and not supports.turned:
+            demands = [one.demand() or self.demand_in_python(one.excess) for one in self._couplings]
+            self.demand([*demands, *filter(None, (one.demand() for one in self._beams))])
+            self.in_c = True
 
     def _in_python(self, term: Term) -> tuple[Loop, Loop]:
         def add_tangent(q1: Array, _: Array) -> None:

@@ -38,8 +38,8 @@ static cells some_cells(const cells *c, int first)
   return some;
 }
 
-/* The product and the cells; rows are begun shortly before cells need them. */
-static void begin_tangent(const equation *e, const double *q)
+/* All parts of the tangent at q; rows are begun shortly before cells need them. */
+void add_up(const equation *e, const double *q)
 {
   int begun = 0;
   if (e->product) find_growth(e->product, q);
@@ -53,15 +53,15 @@ static void begin_tangent(const equation *e, const double *q)
     add_cells(&some, q, e->tangent);
   }
   begin_rows(e, begun, e->size);
+  for (int k = 0; k < e->stiffnesses; ++k)
+    e->stiffness[k].add(e->stiffness[k].self, q, e->tangent);
 }
 
 /* The tangent at q. What stands on the diagonal has the right dimension and size for what is held;
  * where material that flows freely leaves nothing, what stood there before does as well. */
 void assemble(equation *e, const double *q)
 {
-  begin_tangent(e, q);
-  for (int k = 0; k < e->stiffnesses; ++k)
-    e->stiffness[k].add(e->stiffness[k].self, q, e->tangent);
+  add_up(e, q);
   for (int k = 0; k < e->held; ++k)
     if (e->tangent[e->pivot[k]] != 0) e->pivots[k] = e->tangent[e->pivot[k]];
   for (int k = 0; k < e->zeros; ++k) e->tangent[e->zero[k]] = 0;
