@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.arrays import Array
+from ufl_beam.arrays import Array, Snapshots
 from ufl_beam.collective_errors import Agreement
 from ufl_beam.compiled.c_library import extrapolated
 from ufl_beam.discretization.model_warnings import warn_of_jumps
@@ -187,9 +187,7 @@ class Simulation(StateView):
             >>> simulation.close()
         """
         ends = np.ascontiguousarray(ends, dtype=np.float64)
-        of_c = keep and not self.scene.links
-        in_c = self._in_c if of_c or not keep else None
-        if in_c is not None and (taken := in_c.take(self, ends, keep=of_c)):
+        if self._in_c is not None and (taken := self._in_c.take(self, ends, keep=keep)):
             return taken
         self.step_to(float(ends[0]))
         if keep:
@@ -336,7 +334,7 @@ class Simulation(StateView):
 
     def keep(self) -> None:
         """Append the state to the solution; all processes call it together."""
-        self.solution.keep(self.gather())
+        self.solution.keep(Snapshots.of(self.gather()), self.parts, self.iterations)
 
     def end(self) -> None:
         """Let the solution have the last state, and what another run that starts there needs."""
@@ -350,7 +348,7 @@ class Simulation(StateView):
         """The state now, as a solution that other runs may start with; all processes call it."""
         self.settle()
         now = Solution(self.scene, self.grid)
-        now.keep(self.gather())
+        now.keep(Snapshots.of(self.gather()), self.parts, self.iterations)
         self.take_back()
         now.internal = self._assembly.internal_variables(self.q)
         return now

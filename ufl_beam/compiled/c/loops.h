@@ -490,10 +490,12 @@ typedef struct {
   const int32_t *entries;
 } static_path;
 
-/* Numbers that are kept of each step: from where, and how many. */
+/* Numbers that are kept of each step: how many, from where and to where in a row of zeros.  They are
+ * one after the other, or have places in both, where they are added. */
 typedef struct {
   double *const *from;
-  int number;
+  int number, first;     /* first: of the row, if they are one after the other */
+  const int32_t *at, *to; /* places, or none */
 } kept_numbers;
 
 /* Steps of a scene. */
@@ -519,7 +521,7 @@ typedef struct {
   double *state;      /* entries of the ledger that a state has, one after the other */
   int iterations;
   time_step step;
-  int kinds; /* of numbers that are kept */
+  int kinds, width; /* of numbers that are kept; of a row */
   const kept_numbers *kept;
 } march;
 
