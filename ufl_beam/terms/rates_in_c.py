@@ -56,6 +56,8 @@ class RatesInC:
         self._handle = ffi.new_handle(self)
         self.c = fill(ffi.new("rates *"), size=size, number=number, find=lib.numbers_in_python)
         self.c.handle = self._handle  # what `fill` keeps must not keep this object
+        scheme: Any = self._scheme
+        self.c.after_any = _after_any(scheme)
 
     @classmethod
     def of(cls, moving: Moving) -> RatesInC | None:
@@ -117,6 +119,14 @@ def _ask(scheme: DynamicScheme, dt: float, columns: Array, last_dt: float) -> Se
 def _numbers(scheme: Any, n: int, dt: float, last_dt: float) -> Any:
     """Answers of a scheme for unit vectors; a list of numbers each."""
     return [x.tolist() for x in _ask(scheme, dt, np.eye(n), last_dt)]
+
+
+@cache
+def _after_any(scheme: Any) -> bool:
+    """Return whether the length of the last step does not matter to a scheme."""
+    n = MORE + len(scheme.kept)
+    one, *others = (_numbers(scheme, n, 0.1, last_dt) for last_dt in (0.1, 0.07, 0.4))
+    return all(other == one for other in others)
 
 
 @cache

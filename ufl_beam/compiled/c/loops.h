@@ -428,6 +428,7 @@ typedef struct {
   double *rate[MOST_RATES];
   double *new_rate[MOST_RATES]; /* space, as many */
   double last_dt;
+  int after_any; /* whether numbers are the same after steps of any length */
   int known, oldest;
   scheme_numbers numbers[MOST_KNOWN];
   const scheme_numbers *now;   /* those of the step */

@@ -116,7 +116,7 @@ static int find_numbers(rates *r, double dt)
 {
   for (int k = 0; k < r->known; ++k) {
     r->now = r->numbers + k;
-    if (r->now->dt == dt && r->now->last_dt == r->last_dt) return 1;
+    if (r->now->dt == dt && (r->after_any || r->now->last_dt == r->last_dt)) return 1;
   }
   scheme_numbers *n = r->numbers + r->oldest;
   n->dt = dt, n->last_dt = r->last_dt;
