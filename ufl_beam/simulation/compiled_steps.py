@@ -138,9 +138,12 @@ class CompiledSteps:
         """
         if not (self._solver.in_c and (self.ahead or self._begins(state))):
             return 0
-        c, kept = self.c, self._kept(state.q)
-        rows = np.zeros((min(len(ends), 1 + ROOM // kept.width) if keep else 0, kept.width))
-        steps = len(rows) if keep else len(ends)
+        c, steps = self.c, len(ends)
+        rows: Array = np.zeros((0, 0))
+        if keep:
+            kept = self._kept(state.q)
+            steps = min(steps, 1 + ROOM // kept.width)
+            rows = np.zeros((steps, kept.width))
         if not self.ahead:
             self._hand_over(state)
         taken = int(lib.take_steps(c, steps, doubles(ends), LONGEST, keep, doubles(rows)))
@@ -153,7 +156,9 @@ class CompiledSteps:
             self._solver.iterations += c.iterations
             c.iterations = 0
             if keep:
-                states = kept.states(ends[:taken], rows[:taken])
+                if taken < steps:
+                    rows = rows[:taken].copy()  # so that the rest does not stay
+                states = kept.states(ends[:taken].copy(), rows)
                 state.solution.keep(states, state.parts, self._solver.iterations)
         if taken < steps:
             self.hand_back(state)

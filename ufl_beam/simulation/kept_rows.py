@@ -72,7 +72,9 @@ class KeptRows:
             self._copy(ffi.addressof(march.rates, "rate", V), v)
         for account, entries in zip(accounts, self._entries, strict=True):
             self._copy(self._place(account.numbers), entries)
-        held, places = np.nonzero(supports.dofs[:, None] == support_dofs.ravel())
+        dofs = support_dofs.ravel()
+        places = np.flatnonzero(np.isin(dofs, supports.dofs))  # others are not held
+        held = np.searchsorted(supports.dofs, dofs[places])
         self._add(self._place(supports.reactions), held, self._reactions.start + places)
         for one, mine in zip(inelastic, kept, strict=True):
             rows = self._material.start + MATERIAL * np.searchsorted(cells, mine)
