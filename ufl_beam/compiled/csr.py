@@ -119,6 +119,7 @@ class StepProduct:
             ffi.new("step_product *"),
             size=size, indptr=indptr, indices=indices, data=data, entry=self.A.entries,
             rotations=len(rotations), rotation=rotations, space=np.empty(size),
+            turn=np.full(len(rotations), np.nan), half=np.empty(len(rotations)),
         )  # fmt: skip
 
     def matrix(self) -> Csr:
