@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Types of arrays, and the state of a scene as solutions keep it."""
+"""Types of arrays, and the states of a scene as solutions keep them."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
+from itertools import chain
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -31,5 +33,65 @@ class Snapshot(NamedTuple):
     entries: tuple[dict[str, float], ...]  # the ledger: state, supplied, lost; J
     material: Array  # numbers of the cells that can yield or break, and their material; (m, 7)
     connections: Array  # columns of ``Connection`` for all links; (num_links, 5)
-    parts: int = 0  # steps so far, parts of cut steps counted each
-    iterations: int = 0  # Newton iterations so far
+
+
+class Snapshots(NamedTuple):
+    """States at successive times: arrays as those of :class:`Snapshot`, behind an axis of times."""
+
+    t: Array
+    q: Array
+    v: Array | None
+    reactions: Array
+    entries: tuple[dict[str, Array], ...]
+    material: Array
+    connections: Array
+
+    @classmethod
+    def of(cls, one: Snapshot) -> Snapshots:
+        """Make them of a single state."""
+        return cls(
+            np.array([one.t]), one.q[None], None if one.v is None else one.v[None],
+            one.reactions[None],
+            tuple({name: np.array([x]) for name, x in part.items()} for part in one.entries),
+            one.material[None], one.connections[None],
+        )  # fmt: skip
+
+    def one(self, n: int) -> Snapshot:
+        """Return the n-th of the states."""
+        return Snapshot(*self._each(lambda x: x[n]))
+
+    def some(self, n: slice) -> Snapshots:
+        """Copies of some of the states."""
+        return Snapshots(*self._each(lambda x: x[n].copy()))
+
+    def _each(self, of: Callable[[Array], Any]) -> Iterator[Any]:
+        """Fields made of all arrays alike."""
+        for field in self:
+            if isinstance(field, tuple):
+                yield tuple({name: of(x) for name, x in part.items()} for part in field)
+            else:
+                yield None if field is None else of(field)
+
+
+class Blocks:
+    """An array in blocks, one below the other; indices select from all of it what is asked for."""
+
+    def __init__(self, blocks: Sequence[Array]) -> None:
+        self._blocks = blocks
+
+    def __len__(self) -> int:
+        return sum(map(len, self._blocks))
+
+    @property
+    def last(self) -> Array:
+        """The last row of the last block."""
+        last: Array = self._blocks[-1][-1]
+        return last
+
+    def __iter__(self) -> Iterator[Array]:
+        return chain.from_iterable(self._blocks)
+
+    def __getitem__(self, at: tuple[Any, ...]) -> Array:
+        """A new array; the first index is ``:``."""
+        chosen = [block[at] for block in self._blocks]
+        return np.concatenate(chosen) if chosen else np.empty(0)

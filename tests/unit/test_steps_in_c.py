@@ -55,6 +55,24 @@ def inelastic():
     )
 
 
+def connected():
+    """Members joined by a pin, springs that yield and break, and plastic hinges that open."""
+    left = ub.Beam((0, 0), (0, 3), SECTION, cells=3, hinges={0.0: ub.Softening(2.0, 10.0)})
+    hinges = {0.5: ub.Hardening(limit=5.0, kinematic=20.0)}
+    roof = ub.Beam((0, 3), (4, 3), SECTION, cells=4, hinges=hinges)
+    props = [
+        ub.Stretch(ub.ground(1, 0), roof.at(0.25), ub.Spring(200.0, ub.Hardening(4.0, 5.0))),
+        ub.Turn(left.end, roof.start, ub.Spring(50.0, softening=ub.Softening(0.2, 1.0))),
+    ]
+    return ub.Scene(
+        [left, roof],
+        joints=[ub.Revolute(left.end, roof.start, measured=True)],
+        supports=[ub.Clamped(left.start), ub.Prescribed(roof.end, u=0.0, v=lambda t: -0.8 * t)],
+        loads=[ub.PointLoad(left.end, force=(40.0, -10.0), time=ub.ramp(0.4))],
+        connectors=props,
+    )
+
+
 class InPython(ub.Simulation):
     """A simulation that takes all steps in Python."""
 
@@ -73,7 +91,7 @@ def everything(state):
     yield from (np.array(list(part.values())) for part in state.entries)
 
 
-@pytest.mark.parametrize("make", [elastic, inelastic])
+@pytest.mark.parametrize("make", [elastic, inelastic, connected])
 @pytest.mark.parametrize("scheme", SCHEMES, ids=str)
 def test_the_same_as_in_python(make, scheme):
     """To the last digit but for sums in another order; a step that C leaves to Python included."""
@@ -86,7 +104,7 @@ def test_the_same_as_in_python(make, scheme):
         assert np.allclose(one.astype(float), other.astype(float), rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize("make", [elastic, inelastic])
+@pytest.mark.parametrize("make", [elastic, inelastic, connected])
 @pytest.mark.parametrize(
     "scheme", [ub.Midpoint(0.1, 0.05), ub.GeneralizedAlpha(), ub.Static()], ids=str
 )
@@ -99,10 +117,47 @@ def test_kept_rows_are_states(make, scheme):
         single.keep()
     while len(ends):
         ends = ends[many.steps_to(ends, keep=True) :]
-    kept = zip(many.solution._kept, single.solution._kept, strict=True)
-    for one, other in kept:
-        for x, y in zip(everything(one), everything(other), strict=True):
+    same_states(many.solution, single.solution)
+
+
+def same_states(one, other):
+    """Whether all states are the same to the last digit, and all that they are asked for."""
+    states, others = one.history(), other.history()
+    assert [*states] == [*others]
+    for name in states:
+        assert np.array_equal(states[name], others[name]), name
+    for n in (0, len(other) // 2, -1):
+        for x, y in zip(everything(one._kept[n]), everything(other._kept[n]), strict=True):
             assert np.array_equal(x, y)
+    assert (one.parts, one.iterations) == (other.parts, other.iterations)
+
+
+@pytest.mark.parametrize("scheme", [ub.Midpoint(0.1, 0.05), ub.Newmark(0.6, 0.36)], ids=str)
+def test_connectors_are_kept_in_c(scheme):
+    """Everything yields, opens or breaks, and C, not Python, keeps most of the states."""
+    scene = connected()
+    simulation, ends = ub.Simulation(scene, scheme), np.linspace(0.0, 1.0, 101)[1:]
+    calls = 0
+    while len(ends):
+        ends, calls = ends[simulation.steps_to(ends, keep=True) :], calls + 1
+    assert calls < 20
+    for link in (*scene.connectors, *scene.hinges):
+        assert simulation.solution.connector(link).dissipated[-1] > 0
+
+
+@pytest.mark.parametrize("make", [elastic, inelastic, connected])
+def test_thinned_states(make):
+    """Every other state stays, whatever kept them."""
+    simulation, ends = ub.Simulation(make(), ub.Midpoint()), np.linspace(0.0, 0.6, 31)[1:]
+    simulation.keep()
+    while len(ends):
+        ends = ends[simulation.steps_to(ends, keep=True) :]
+    before = simulation.solution.history()
+    simulation.solution.thin()
+    after = simulation.solution.history()
+    assert len(simulation.solution) == 16
+    for name in after.keys() - {"every"}:
+        assert np.array_equal(after[name], before[name][::2], equal_nan=True)
 
 
 def test_what_a_load_raises_ends_the_run():

@@ -80,7 +80,7 @@ class Shapes(Rich, ABC):
         """
         self._require(k)
         shape: Any = self.shapes[:, k]
-        return np.asarray(velocity_of(self.grid, place, [self.q], [shape])[0])
+        return np.asarray(velocity_of(self.grid, place, self.q[None], shape[None])[0])
 
     def motion(self, k: int, *, amplitude: float = AMPLITUDE, count: int = 24) -> Solution:
         """Return one period of the k-th mode as a solution, for ``animate`` or ``plot_shapes``.

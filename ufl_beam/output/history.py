@@ -130,7 +130,7 @@ class History(Recorder):
 
     def _row(self, simulation: StateView) -> bytes:
         q = simulation.share.gather(simulation.q)
-        motion = [motion_of(simulation.grid, place, [q])[0] for place in self._places]
+        motion = [motion_of(simulation.grid, place, q[None])[0] for place in self._places]
         links = list(self._links)
         connections = simulation.connections()[links, :3] if links else ()
         energies = [energy for group in simulation.entries() for energy in group.values()]

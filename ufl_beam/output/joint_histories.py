@@ -3,12 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from ufl_beam.arrays import Array
+from ufl_beam.arrays import Array, Blocks
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import GROUND, Anchor, Spot, arm, node
@@ -18,6 +17,9 @@ from ufl_beam.model.curves import nearest, parameter_step, tangent
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.one_line import one_line
+
+Vectors: TypeAlias = Array | Blocks
+"""Configurations or velocities at some times; (n, size)."""
 
 
 class Connection(NamedTuple):
@@ -86,7 +88,7 @@ def turned(x: tuple[float, float] | Array, angle: Array) -> Array:
     return np.column_stack([cos * a - sin * b, sin * a + cos * b])
 
 
-def motion_of(grid: Grid, place: Anchor, states: Sequence[Array]) -> Array:
+def motion_of(grid: Grid, place: Anchor, states: Vectors) -> Array:
     """Displacement and rotation of a place in configurations of the grid; (n, 3); m, m, rad."""
     motion = _of_node(grid, place, states)
     if isinstance(place, Spot):
@@ -94,9 +96,7 @@ def motion_of(grid: Grid, place: Anchor, states: Sequence[Array]) -> Array:
     return motion
 
 
-def velocity_of(
-    grid: Grid, place: Anchor, states: Sequence[Array], velocities: Sequence[Array]
-) -> Array:
+def velocity_of(grid: Grid, place: Anchor, states: Vectors, velocities: Vectors) -> Array:
     """Velocity of a place; (n, 3); m/s, m/s, rad/s."""
     motion = _of_node(grid, place, velocities)
     if isinstance(place, Spot):
@@ -105,19 +105,19 @@ def velocity_of(
     return motion
 
 
-def _of_node(grid: Grid, place: Anchor, states: Sequence[Array]) -> Array:
+def _of_node(grid: Grid, place: Anchor, states: Vectors) -> Array:
     """Values at what a place moves with; interpolated in cells; (n, 3)."""
     if isinstance(place, Spot):
         if node(place) is GROUND:
             return np.zeros((len(states), 3))
         dofs = grid.node(place)
-        return np.array([x[dofs] for x in states])
+        return np.ascontiguousarray(states[:, dofs])
     nodes, weights = grid.weights(place)
     dofs = grid.dofs[nodes]
-    return np.asarray(weights @ np.array([x[dofs] for x in states]).reshape(-1, *dofs.shape))
+    return np.asarray(weights @ np.ascontiguousarray(states[:, dofs]))
 
 
-def position_of(grid: Grid, place: Anchor, states: Sequence[Array]) -> Array:
+def position_of(grid: Grid, place: Anchor, states: Vectors) -> Array:
     """Coordinates of a place in configurations of the grid; (n, 2); m."""
     if isinstance(place, Spot):
         return np.asarray(place.point + motion_of(grid, place, states)[:, :2])
@@ -125,7 +125,7 @@ def position_of(grid: Grid, place: Anchor, states: Sequence[Array]) -> Array:
     return np.asarray(weights @ grid.points[nodes] + motion_of(grid, place, states)[:, :2])
 
 
-def of_joint(grid: Grid, joint: Joint, states: Sequence[Array], forces: Array) -> JointHistory:
+def of_joint(grid: Grid, joint: Joint, states: Vectors, forces: Array) -> JointHistory:
     """History of a joint, from configurations and the forces of all links; (n+1, num_links)."""
     a, b, *_ = joint.places
     turns = [motion_of(grid, place, states)[:, 2] for place in (a, b)]
@@ -152,7 +152,7 @@ def of_joint(grid: Grid, joint: Joint, states: Sequence[Array], forces: Array) -
     return JointHistory(motion, force, turned(force, -turns[0]), turned(force, -turns[1]), moment)
 
 
-def _direction(grid: Grid, holder: Connector, states: Sequence[Array], turn: Array) -> Array:
+def _direction(grid: Grid, holder: Connector, states: Vectors, turn: Array) -> Array:
     """Unit vectors in the plane along which a motion grows; (n+1, 2)."""
     if holder.stretches:
         between = position_of(grid, holder.b, states) - position_of(grid, holder.a, states)

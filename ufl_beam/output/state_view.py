@@ -28,7 +28,7 @@ from ufl_beam.solvers.newton import Solver
 from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.inelastic_beams import InelasticBeams
-from ufl_beam.terms.links import Links
+from ufl_beam.terms.links import FORCE, Links
 from ufl_beam.terms.supports import Supports
 
 NO_REACTIONS = np.zeros((0, 3))
@@ -93,7 +93,7 @@ class StateView(ABC):
         material = self._material_table() if self._has_inelastic else NO_MATERIAL
         return Snapshot(
             self.t, self.share.gather(self.q), v[0] if v else None, self.reactions(),
-            self.entries(), material, connections, self.parts, self.iterations,
+            self.entries(), material, connections,
         )  # fmt: skip
 
     def _material_table(self) -> Array:
@@ -164,9 +164,9 @@ class StateView(ABC):
         here = np.zeros((len(self.scene.links), len(Connection._fields)))
         q = self.q
         for one in self.couplings:
-            motion, dissipated = one.response.motion(one.motion(q)), one.response.dissipated()
-            columns = motion, one.force(q), one.work, one.rate, dissipated
-            here[one.numbers] = np.column_stack(columns)
+            here[one.numbers, FORCE] = one.force(q)
+            for column, numbers in one.kept(q):
+                here[one.numbers, column] += numbers
         if not self.share.alone:
             self.share.comm.Allreduce(MPI.IN_PLACE, here)
         return here
@@ -182,12 +182,12 @@ class StateView(ABC):
 
     def displacement(self, place: Anchor) -> Array:
         """Displacement and rotation (u, v, ψ) of a place now; (3,); m, m, rad."""
-        return np.asarray(motion_of(self.grid, place, [self.share.gather(self.q)])[0])
+        return np.asarray(motion_of(self.grid, place, self.share.gather(self.q)[None])[0])
 
     def velocity(self, place: Anchor) -> Array:
         """Velocity (du/dt, dv/dt, dψ/dt) of a place now; (3,); m/s, m/s, rad/s."""
         q, v = self.share.gather(self.q), self.share.gather(self.velocities()[0])
-        return np.asarray(velocity_of(self.grid, place, [q], [v])[0])
+        return np.asarray(velocity_of(self.grid, place, q[None], v[None])[0])
 
     def press(self, joint: Joint | Support) -> float:
         """Size of the force of a joint or a support at the end of the last step; N.

@@ -61,7 +61,7 @@ class Stage:
             raise SceneError(f"n = {n}: the solution kept {kept} times; give {-kept} to {kept - 1}")
         q = self._solution.q[n]
         nodes = grid.points + self.magnify * q[grid.dofs[:, :2]]
-        return Pose(self, lambda anchor: motion_of(grid, anchor, [q])[0], nodes)
+        return Pose(self, lambda anchor: motion_of(grid, anchor, q[None])[0], nodes)
 
     def poses(self) -> Iterator[Pose]:
         """Iterate over the undeformed pose and all that are shown."""

@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache, cached_property
+from functools import cache
 from typing import Any, Protocol
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Index, Snapshot
+from ufl_beam.arrays import Array, Index, Snapshots
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, integers, lib
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme
@@ -22,6 +22,7 @@ from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.dead_loads import DeadLoads
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.inelastic_beams import InelasticBeams
+from ufl_beam.terms.links import Links
 from ufl_beam.terms.openings import SearchFlags
 from ufl_beam.terms.phases import Phases, TimeFunctions
 from ufl_beam.terms.rates_in_c import V
@@ -39,8 +40,8 @@ LAST_DIGITS = 1e-14
 class Keeping(Protocol):
     """Solution that states are appended to."""
 
-    def keep(self, state: Snapshot) -> None:
-        """Append a state of a run."""
+    def keep(self, states: Snapshots, parts: int, iterations: int) -> None:
+        """Append states of a run, up to the last of which so many were done."""
 
 
 class Stepping(Protocol):
@@ -109,14 +110,17 @@ class CompiledSteps:
         for name in ("begin", "accept", "add_state"):
             self._list(getattr(self.c, name), [x for one in phases for x in getattr(one, name)])
         inelastic = [one for one in equation.terms if isinstance(one, InelasticBeams)]
-        self._of_rows = ledger, equation.supports, inelastic, support_dofs
+        links = [one for one in equation.terms if isinstance(one, Links)]
+        scene = share.grid.scene
+        self._of_rows = ledger, equation.supports, support_dofs, inelastic, links, len(scene.links)
+        self._rows: KeptRows | None = None
 
-    @cached_property
-    def _kept(self) -> KeptRows:
+    def _kept(self, q: Array) -> KeptRows:
         """Rows of numbers, one for each step that C keeps."""
-        rows = KeptRows(self.c, *self._of_rows)
-        fill(self.c, kinds=len(rows.kinds), kept=rows.kinds)
-        return rows
+        if self._rows is None:
+            self._rows = rows = KeptRows(self.c, *self._of_rows, q)
+            fill(self.c, kinds=len(rows.kinds), width=rows.width, kept=rows.kinds)
+        return self._rows
 
     def _list(self, place: Any, loops: Sequence[Loop]) -> None:
         calls = ffi.new("phase_call[]", list(loops))
@@ -134,23 +138,28 @@ class CompiledSteps:
         """
         if not (self._solver.in_c and (self.ahead or self._begins(state))):
             return 0
-        c, kept = self.c, self._kept
-        parts, iterations = state.parts, self._solver.iterations
-        rows = np.empty((min(len(ends), 1 + ROOM // kept.width) if keep else 0, kept.width))
-        steps = len(rows) if keep else len(ends)
+        c, steps = self.c, len(ends)
+        rows: Array = np.zeros((0, 0))
+        if keep:
+            kept = self._kept(state.q)
+            steps = min(steps, 1 + ROOM // kept.width)
+            rows = np.zeros((steps, kept.width))
         if not self.ahead:
             self._hand_over(state)
         taken = int(lib.take_steps(c, steps, doubles(ends), LONGEST, keep, doubles(rows)))
         if taken:
-            state.t, state.last_dt, state.parts = c.t, c.last_dt, parts + taken
+            state.t, state.last_dt = c.t, c.last_dt
+            state.parts += taken
             state.q = self._copy(c.q)
             if self._inertia is not None:
                 self._inertia.v = self._copy(c.rates.rate[V])
             self._solver.iterations += c.iterations
             c.iterations = 0
             if keep:
-                for one in kept.states(ends, rows[:taken], parts, iterations):
-                    state.solution.keep(one)
+                if taken < steps:
+                    rows = rows[:taken].copy()  # so that the rest does not stay
+                states = kept.states(ends[:taken].copy(), rows)
+                state.solution.keep(states, state.parts, self._solver.iterations)
         if taken < steps:
             self.hand_back(state)
             self._raise()

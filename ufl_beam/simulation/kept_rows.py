@@ -3,24 +3,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from itertools import accumulate, pairwise, repeat
-from typing import Any
+from collections.abc import Sequence
+from itertools import accumulate, pairwise
+from typing import Any, Protocol
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Index, Snapshot
-from ufl_beam.compiled.c_library import doubles, ffi
+from ufl_beam.arrays import Array, Index, Snapshots
+from ufl_beam.compiled.c_library import ffi, integers
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.links import CONNECTION, FORCE, Links
+from ufl_beam.terms.material_points import Points
 from ufl_beam.terms.rates_in_c import V
 from ufl_beam.terms.supports import Supports
 
-CONNECTION = 5
-"""Numbers of a connector in a state."""
+MATERIAL = 7
+"""Numbers of a cell in a state: its number, and :attr:`Points.kept`."""
+
+
+class Inelastic(Protocol):
+    """Cells with material points; see :class:`InelasticBeams`."""
+
+    @property
+    def points(self) -> Points:
+        """The points, with what solutions keep of them."""
+
+    @property
+    def kept_factors(self) -> Array:
+        """Factors of these numbers; (6,)."""
+
+    def kept(self) -> tuple[Index, Array]:
+        """Return numbers of the cells, and what is kept of them."""
 
 
 class KeptRows:
-    """Rows of a scene without connectors: what they consist of, and the states that they are.
+    """Rows of a scene: vectors and the ledger, then the tables of a state, row by row.
+
+    ``q`` is the accepted configuration.
 
     Attributes:
         width: Numbers of a row.
@@ -28,71 +47,72 @@ class KeptRows:
     """
 
     def __init__(
-        self, march: Any, ledger: Ledger, supports: Supports, inelastic: Sequence[Any],
-        support_dofs: Index,
+        self, march: Any, ledger: Ledger, supports: Supports, support_dofs: Index,
+        inelastic: Sequence[Inelastic], couplings: Sequence[Links], num_links: int, q: Array,
     ) -> None:  # fmt: skip
-        self._names = [list(part) for part in (ledger.state, ledger.supplied, ledger.lost)]
+        self._alive, self._kinds = list[Any](), list[Any]()
         moving = march.rates != ffi.NULL
-        now = [ffi.addressof(march, "q")]
-        now += [ffi.addressof(march.rates, "rate", V)] if moving else []
-        parts = (ledger.state, ledger.supplied, ledger.lost)
-        fixed = [part.numbers[: len(part)] for part in parts]
-        fixed += [supports.reactions, *(one.points.kept.reshape(-1) for one in inelastic)]
-        self._places = [ffi.new("double *[1]", [doubles(x)]) for x in fixed]
-        sizes = [march.size] * len(now) + [x.size for x in fixed]
-        self.kinds = ffi.new("kept_numbers[]", list(zip([*now, *self._places], sizes, strict=True)))
-        ends = list(accumulate([1, *sizes]))
-        self.width, (self._q, *columns) = ends[-1], (slice(*pair) for pair in pairwise(ends))
-        self._v = columns.pop(0) if moving else None
-        self._entries, self._reactions, self._material = columns[:3], columns[3], columns[4:]
-        # Components of supports that are not held have the column after the last one.
-        dofs, held = support_dofs, np.append(supports.dofs, -1)
-        at = np.searchsorted(held[:-1], dofs)
-        self._held = np.where(held[at] == dofs, at, len(held) - 1)
-        factors = [one.kept_factors for one in inelastic]
-        cells = [one.kept()[0] for one in inelastic]
-        self._factors = np.concatenate(
-            [np.tile(f, (len(c), 1)) for f, c in zip(factors, cells, strict=True)]
-            or [np.zeros((0, 6))]
-        )
-        numbers = np.concatenate([*cells, np.zeros(0, dtype=np.int64)])
-        self._order = np.argsort(numbers)
-        self._cells = numbers[self._order]
+        accounts = ledger.state, ledger.supplied, ledger.lost
+        self._names = [list(account) for account in accounts]
+        self._num_supports = len(support_dofs)
+        kept = [one.kept()[0] for one in inelastic]
+        cells = np.sort(np.concatenate([np.zeros(0, dtype=np.int64), *kept]))
+        sizes = [
+            march.size, march.size * moving, *map(len, accounts), support_dofs.size,
+            MATERIAL * len(cells), CONNECTION * num_links,
+        ]  # fmt: skip
+        ends = list(accumulate([0, *sizes]))
+        self.width, columns = ends[-1], [slice(*pair) for pair in pairwise(ends)]
+        self._q, v, *self._entries, self._reactions, self._material, self._connections = columns
+        self._v = v if moving else None
 
-    def states(self, times: Array, rows: Array, parts: int, iterations: int) -> Iterator[Snapshot]:
-        """The states at the ends of steps, before which so many parts and iterations were done."""
-        v = repeat(None) if self._v is None else rows[:, self._v]
-        count = range(parts + 1, parts + 1 + len(rows))
-        done: Any = (rows[:, 0].astype(np.int64) + iterations).tolist()
-        at: Any = times.tolist()
-        connections = repeat(np.zeros((0, CONNECTION)))
-        return map(
-            Snapshot, at, rows[:, self._q], v, self._of_supports(rows), self._of_ledger(rows),
-            self._of_material(rows), connections, count, done,
-        )  # fmt: skip
+        now = ffi.addressof(march, "q")
+        self._copy(now, self._q)
+        if moving:
+            self._copy(ffi.addressof(march.rates, "rate", V), v)
+        for account, entries in zip(accounts, self._entries, strict=True):
+            self._copy(self._place(account.numbers), entries)
+        dofs = support_dofs.ravel()
+        places = np.flatnonzero(np.isin(dofs, supports.dofs))  # others are not held
+        held = np.searchsorted(supports.dofs, dofs[places])
+        self._add(self._place(supports.reactions), held, self._reactions.start + places)
+        for one, mine in zip(inelastic, kept, strict=True):
+            rows = self._material.start + MATERIAL * np.searchsorted(cells, mine)
+            self._add(self._place(mine.astype(np.float64)), np.arange(len(mine)), rows)
+            k, first = np.flatnonzero(one.kept_factors), (MATERIAL - 1) * np.arange(len(mine))
+            self._add(self._place(one.points.kept), first[:, None] + k, rows[:, None] + 1 + k)
+        for link in couplings:
+            rows = self._connections.start + CONNECTION * link.numbers
+            self._add(now, link.forces_at, rows + FORCE)
+            for column, numbers in link.kept(q):
+                apart = numbers.strides[0] // numbers.itemsize
+                self._add(self._place(numbers), apart * np.arange(len(rows)), rows + column)
+        self.kinds = ffi.new("kept_numbers[]", self._kinds)
 
-    def _of_ledger(self, rows: Array) -> Iterator[tuple[dict[str, float], ...]]:
-        parts = zip(*(rows[:, at].tolist() for at in self._entries), strict=True)
-        for state in parts:
-            yield tuple(
-                dict(zip(*part, strict=True)) for part in zip(self._names, state, strict=True)
-            )
+    def _place(self, numbers: Array) -> Any:
+        """A place that has the address of an array, or of the first number of a view."""
+        place = ffi.new("double *[1]", [ffi.cast("double *", numbers.ctypes.data)])
+        self._alive += [numbers, place]
+        return place
 
-    def _of_supports(self, rows: Array) -> Iterable[Array]:
-        """Forces of all supports; (num_rows, num_supports, 3)."""
-        if not self._held.size:
-            return repeat(np.zeros((0, 3)))
-        padded: Array = np.hstack([rows[:, self._reactions], np.zeros((len(rows), 1))])
-        forces: Iterable[Array] = padded[:, self._held]
-        return forces
+    def _copy(self, place: Any, to: slice) -> None:
+        """Keep numbers that stay one after the other."""
+        self._kinds.append((place, to.stop - to.start, to.start, ffi.NULL, ffi.NULL))
 
-    def _of_material(self, rows: Array) -> Iterable[Array]:
-        """Numbers of cells and rows of their material; (num_rows, m, 7)."""
-        if not len(self._cells):
-            return repeat(np.zeros((0, 7)))
+    def _add(self, place: Any, at: Index, to: Index) -> None:
+        """Keep numbers at some places, added to other places of the row."""
+        both = [np.ascontiguousarray(x.ravel(), dtype=np.int32) for x in (at, to)]
+        self._alive.append(both)
+        self._kinds.append((place, at.size, 0, *map(integers, both)))
+
+    def states(self, times: Array, rows: Array) -> Snapshots:
+        """The states at these times, as views of their rows."""
         n = len(rows)
-        kept = np.hstack([rows[:, at].reshape(n, -1) for at in self._material])
-        kept = (kept.reshape(n, -1, 6) * self._factors)[:, self._order]
-        cells = np.broadcast_to(self._cells[:, None], (n, len(self._cells), 1))
-        table: Iterable[Array] = np.concatenate([cells, kept], axis=2)
-        return table
+        names = zip(self._names, self._entries, strict=True)
+        return Snapshots(
+            times, rows[:, self._q], None if self._v is None else rows[:, self._v],
+            rows[:, self._reactions].reshape(n, self._num_supports, 3),
+            tuple(dict(zip(of, rows[:, at].T, strict=True)) for of, at in names),
+            rows[:, self._material].reshape(n, -1, MATERIAL),
+            rows[:, self._connections].reshape(n, -1, CONNECTION),
+        )  # fmt: skip

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable
 from functools import cached_property
 from itertools import chain
@@ -12,7 +13,7 @@ from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Index, Snapshot
+from ufl_beam.arrays import Array, Blocks, Index, Snapshot, Snapshots
 from ufl_beam.compiled.csr import Product
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import (
@@ -52,40 +53,88 @@ class Material(NamedTuple):
         return one_line(self)
 
 
-class KeptStates(list[Snapshot]):
+class KeptStates:
     """States that were kept; methods with a number ``n`` give results of all cells in the n-th."""
 
     def __init__(self, grid: Grid) -> None:
-        super().__init__()
         self._grid = grid
+        self._blocks: list[Snapshots] = []
+        self._ends: list[int] = []  # number of states up to the end of each block
+        self._latest: tuple[int, Snapshot] | None = None  # state that was asked for last
         self._computed: tuple[Snapshot, Array] | None = None  # forces in the last state asked for
 
-    @property
-    def q(self) -> list[Array]:
-        """Configurations, all degrees of freedom."""
-        return [state.q for state in self]
+    def append(self, states: Snapshots) -> None:
+        """Append states that come after those here."""
+        if len(states.t):
+            self._blocks.append(states)
+            self._ends.append(len(self) + len(states.t))
+
+    def thin(self) -> None:
+        """Forget every other state; the first one stays."""
+        first = [end - len(block.t) for end, block in zip(self._ends, self._blocks, strict=True)]
+        blocks = [b.some(slice(k % 2, None, 2)) for k, b in zip(first, self._blocks, strict=True)]
+        self._blocks, self._ends, self._latest = [], [], None
+        for block in blocks:
+            self.append(block)
+
+    def __len__(self) -> int:
+        return self._ends[-1] if self._ends else 0
+
+    def __getitem__(self, n: int) -> Snapshot:
+        """The n-th state; the same object if it is asked for again."""
+        number = range(len(self))[n]
+        if self._latest is None or self._latest[0] != number:
+            k = bisect_right(self._ends, number)
+            self._latest = number, self._blocks[k].one(number - self._ends[k])
+        return self._latest[1]
 
     @property
-    def v(self) -> list[Array]:
+    def times(self) -> Array:
+        """Times, or load factors of a path; (n+1,); s."""
+        return Blocks([block.t for block in self._blocks])[:,]
+
+    @property
+    def q(self) -> Blocks:
+        """Configurations, all degrees of freedom; (n+1, size)."""
+        return Blocks([block.q for block in self._blocks])
+
+    @property
+    def v(self) -> Blocks:
         """Velocities, as :attr:`q`; empty in statics."""
-        return [state.v for state in self if state.v is not None]
+        return Blocks([block.v for block in self._blocks if block.v is not None])
+
+    @property
+    def reactions(self) -> Blocks:
+        """Forces of the supports; (n+1, num_supports, 3); N, N, N m."""
+        return Blocks([block.reactions for block in self._blocks])
+
+    @property
+    def materials(self) -> Blocks:
+        """Cells that can yield or break, and their material; (n+1, m, 7)."""
+        return Blocks([block.material for block in self._blocks])
+
+    @property
+    def connections(self) -> Blocks:
+        """Columns of ``Connection`` for all links; (n+1, num_links, 5)."""
+        return Blocks([block.connections for block in self._blocks])
 
     def ledger(self) -> list[dict[str, Array]]:
         """Return the parts of the ledger, with arrays by name; each (n+1,); J."""
         parts = []
         for k in range(len(LEDGER)):
-            part = [state.entries[k] for state in self]
-            names = dict.fromkeys(chain.from_iterable(part))
-            parts.append({n: np.array([e.get(n, 0.0) for e in part]) for n in names})
+            blocks = [(block.entries[k], np.zeros(len(block.t))) for block in self._blocks]
+            names = dict.fromkeys(chain.from_iterable(entries for entries, _ in blocks))
+            parts.append({n: np.concatenate([e.get(n, zero) for e, zero in blocks]) for n in names})
         return parts
 
     # -- files ---------------------------------------------------------------------------------
 
     def arrays(self) -> State:
         """Return all states, as arrays by name."""
-        names = ("q", "reactions", "connections", "material")
-        arrays = {name: np.array([getattr(state, name) for state in self]) for name in names}
-        arrays |= {"times": np.array([state.t for state in self]), "v": np.array(self.v)}
+        arrays = {
+            "q": self.q[:,], "reactions": self.reactions[:,], "connections": self.connections[:,],
+            "material": self.materials[:,], "times": self.times, "v": self.v[:,],
+        }  # fmt: skip
         for kind, entries in zip(LEDGER, self.ledger(), strict=True):
             arrays |= above(f"{kind}: ", entries)
         return arrays
@@ -98,16 +147,15 @@ class KeptStates(list[Snapshot]):
             "material": np.zeros((n, 0, 7)),
         }  # fmt: skip
         found = {**nothing, **{name: values for name, values in arrays.items() if len(values)}}
-        ledger = [below(f"{kind}: ", found) for kind in LEDGER]
-        self[:] = [
-            Snapshot(
-                float(found["times"][k]), found["q"][k], found["v"][k] if "v" in found else None,
-                found["reactions"][k],
-                tuple({name: float(x[k]) for name, x in part.items()} for part in ledger),
-                found["material"][k], found["connections"][k],
-            )
-            for k in range(n)
-        ]  # fmt: skip
+        ledger = tuple(below(f"{kind}: ", found) for kind in LEDGER)
+        self._blocks, self._ends, self._latest = [], [], None
+        if n:
+            self.append(
+                Snapshots(
+                    found["times"], found["q"], found.get("v"), found["reactions"], ledger,
+                    found["material"], found["connections"],
+                )
+            )  # fmt: skip
 
     # -- cells ---------------------------------------------------------------------------------
 
@@ -176,7 +224,7 @@ class KeptStates(list[Snapshot]):
 
     def momentum(self) -> Array:
         """(p_x, p_y, L) at all kept times, L about the origin; (n+1, 3); N s, N s, N m s."""
-        if not self.v:
+        if not len(self.v):
             raise SceneError("momentum: the run was static; there is none")
         times, grid = Product(mass_matrix(self._fields)), self._grid
         dofs = np.vstack([grid.dofs, grid.dofs_of_bodies])

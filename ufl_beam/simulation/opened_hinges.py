@@ -7,12 +7,11 @@ of the cell the moment differs by |V| h/2, so a hinge that belongs there opens a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Snapshot
+from ufl_beam.arrays import Array, Blocks
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import warn
 from ufl_beam.mechanics.time_schemes import Scheme
@@ -49,16 +48,17 @@ class Opened:
             (num_cells,); N.
     """
 
-    def __init__(self, grid: Grid, kept: Sequence[Snapshot]) -> None:
+    def __init__(self, grid: Grid, material: Blocks) -> None:
         self._grid = grid
         self.first, self.shear = np.full(len(grid.cells), -1), np.zeros(len(grid.cells))
-        if not kept:
+        if not len(material):
             return
-        open_now = kept[-1].material[:, 6] > 0
+        last = material.last
+        open_now = last[:, 6] > 0
         if not open_now.any():
             return
-        cells = kept[-1].material[open_now, 0].astype(np.int64)
-        dissipated, V = (np.array([s.material[open_now, k] for s in kept]) for k in (6, 2))
+        cells = last[open_now, 0].astype(np.int64)
+        dissipated, V = (material[:, open_now, k] for k in (6, 2))
         self.first[cells] = first = (dissipated > 0).argmax(axis=0)
         # After an opening in a jump V is that of vibrations.
         n = np.where(first > 1, first - 1, first)

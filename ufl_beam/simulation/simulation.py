@@ -11,9 +11,8 @@ from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.arrays import Array
+from ufl_beam.arrays import Array, Snapshots
 from ufl_beam.collective_errors import Agreement
-from ufl_beam.compiled.c_library import extrapolated
 from ufl_beam.discretization.model_warnings import warn_of_jumps
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory, Restoring, Saving, State
@@ -34,13 +33,11 @@ from ufl_beam.simulation.replicas import Copies, sharing
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_solver import (
     APPLYING,
-    FIRST,
     LARGEST_TURN,
     StepSolver,
     Trial,
     begins_loaded,
     go_in_parts,
-    require_small_turn,
 )
 from ufl_beam.solvers.equation import Border
 from ufl_beam.solvers.newton_options import Newton
@@ -121,7 +118,7 @@ class Simulation(StateView):
         self.t, self.parts, self.last_dt = t0, 0, math.inf
         self.q: Array = q[share.dofs]
         self.q_before: Array = self.q
-        self._continues, self._dynamic = start is not None, has_inertia(scheme)
+        self._continues = start is not None
         loaded: list[Array] = []
         if self._continues or (has_inertia(scheme) and scheme.kept):
             # The initial state is taken as one in equilibrium with the loads.
@@ -144,7 +141,8 @@ class Simulation(StateView):
         )
         self.solver = self._steps.newton
         self.solution, self._end = kind(scene, grid), np.zeros(1)
-        self._in_c = None if self._copies or self.asked else self._steps_in_c(parts)
+        in_python = self._copies or self.asked or not share.alone
+        self._in_c = None if in_python else self._steps_in_c(parts)
 
     # -- stepping ------------------------------------------------------------------------------
 
@@ -160,8 +158,9 @@ class Simulation(StateView):
             return
         fresh = self.parts == 0 and not self._continues
         if fresh and begins_loaded(self.scene, self.scheme, self.t):
+            self.take_back()
             begin, end = self.t, self.t + APPLYING * (t1 - self.t)
-            attempt = partial(self._attempt_loads, begin=begin, end=end)
+            attempt = partial(self._steps.attempt_loads, self, begin=begin, end=end)
             go_in_parts(begin, end, attempt, self.accept, self.give_up)
         go_in_parts(self.t, t1, partial(self.attempt, end=t1), self.accept, self.give_up)
 
@@ -187,9 +186,7 @@ class Simulation(StateView):
             >>> simulation.close()
         """
         ends = np.ascontiguousarray(ends, dtype=np.float64)
-        of_c = keep and not self.scene.links
-        in_c = self._in_c if of_c or not keep else None
-        if in_c is not None and (taken := in_c.take(self, ends, keep=of_c)):
+        if self._in_c is not None and (taken := self._in_c.take(self, ends, keep=keep)):
             return taken
         self.step_to(float(ends[0]))
         if keep:
@@ -198,8 +195,6 @@ class Simulation(StateView):
 
     def _steps_in_c(self, parts: Assembly) -> CompiledSteps | None:
         """Steps without Python; None where something in the scene needs it."""
-        if not self.share.alone:
-            return None
         fresh = not self._continues and begins_loaded(self.scene, self.scheme, self.t)
         return compiled_steps(
             self.scheme, self.equation, self.solver, self.ledger, parts.inertia, self._branch,
@@ -210,14 +205,6 @@ class Simulation(StateView):
         """Take the state back from C: what follows is in Python."""
         if self._in_c is not None:
             self._in_c.hand_back(self)
-
-    def _attempt_loads(self, t1: float, begin: float, end: float) -> Trial:
-        """Solve a part of the application of the loads of the time ``begin``, up to ``end``."""
-        self.take_back()
-        step = self.scheme.step(self.t, t1, end, self.q)
-        trial = self._attempt(step._replace(load_time=begin, motion_time=begin))
-        require_small_turn(self.share, trial.q1 - self.q, trial.step.dt, end - begin)
-        return trial
 
     def attempt(self, t1: float, end: float | None = None) -> Trial:
         """Solve the next step, to ``t1``; the state changes if :meth:`accept` takes it.
@@ -230,40 +217,14 @@ class Simulation(StateView):
             StepFailed: There is no equilibrium, or it is too far away.
         """
         self.take_back()
-        if self._dynamic and not self.inertia.ready:
-            t = self.t + FIRST * (t1 - self.t)
-            first = self._attempt(self.scheme.step(self.t, t, t1, self.q))
-            self.inertia.prepare(first.s)
-            self.supports.take()
-            for coupling in self.couplings:
-                coupling.take(first.q1)
-        return self._attempt(self.scheme.step(self.t, t1, t1 if end is None else end, self.q))
-
-    def _attempt(self, step: Step) -> Trial:
-        """Solve a step; see :meth:`attempt`."""
-        guess = self.together(self._begin, step)
-        alike = self._dynamic and math.isclose(step.dt, self.last_dt, rel_tol=1e-6)
-        return self._steps.solve(step, guess, like_last=alike)
-
-    def _begin(self, step: Step) -> Array:
-        """Begin a step; return a guess of its end, in the axes of the supports."""
-        self._ask_and_begin(step)
-        guess = extrapolated(self.q, self.q_before, step.dt / self.last_dt)
-        self.supports.enter(guess)
-        self.supports.move(guess, self.supports.in_axes(self.q), step)
-        return guess
-
-    def _ask_and_begin(self, step: Step) -> None:
-        self.ask()
-        self.equation.begin(step)
+        return self._steps.attempt(self, t1, t1 if end is None else end)
 
     def attempt_along(
         self, step: Step, guess: Array, border: Border, *, hold: bool = True
     ) -> Trial:
-        """Solve the next step together with the load factor; see :meth:`StepSolver.solve_along`."""
+        """Solve the next step with the load factor; see :meth:`StepSolver.attempt_along`."""
         self.take_back()
-        self.together(self._ask_and_begin, step)
-        return self._steps.solve_along(step, guess, border, hold=hold)
+        return self._steps.attempt_along(self, step, guess, border, hold=hold)
 
     def accept(self, trial: Trial) -> None:
         """Go where the latest :meth:`attempt` went."""
@@ -287,10 +248,7 @@ class Simulation(StateView):
             term.add_state(q1)
 
     def ask(self) -> None:
-        """Ask controllers and friction for their forces and limits in the next step.
-
-        All processes ask together, whoever computes the connector.
-        """
+        """Ask controllers and friction for forces and limits in the next step, on all processes."""
         if self.asked:
             self._assembly.ask(self, self.q)
 
@@ -336,7 +294,7 @@ class Simulation(StateView):
 
     def keep(self) -> None:
         """Append the state to the solution; all processes call it together."""
-        self.solution.keep(self.gather())
+        self.solution.keep(Snapshots.of(self.gather()), self.parts, self.iterations)
 
     def end(self) -> None:
         """Let the solution have the last state, and what another run that starts there needs."""
@@ -350,7 +308,7 @@ class Simulation(StateView):
         """The state now, as a solution that other runs may start with; all processes call it."""
         self.settle()
         now = Solution(self.scene, self.grid)
-        now.keep(self.gather())
+        now.keep(Snapshots.of(self.gather()), self.parts, self.iterations)
         self.take_back()
         now.internal = self._assembly.internal_variables(self.q)
         return now

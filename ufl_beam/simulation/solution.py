@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Snapshot
+from ufl_beam.arrays import Array, Snapshots
 from ufl_beam.collective_errors import on_first
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.state_io import State
@@ -38,6 +38,7 @@ from ufl_beam.simulation.kept_states import KeptStates, Material
 from ufl_beam.simulation.opened_hinges import Opened
 from ufl_beam.simulation.solution_files import FORMAT, NAMED, grid_of, text_of
 from ufl_beam.terms.energy_ledger import Energy
+from ufl_beam.terms.links import FORCE
 
 
 class Solution(Rich):
@@ -79,10 +80,10 @@ class Solution(Rich):
         self._kept = KeptStates(grid)
         self._along = ForcesAlongCells(grid, self._kept.forces_in_points)
 
-    def keep(self, state: Snapshot) -> None:
-        """Append a state of a run."""
-        self._kept.append(state)
-        self.parts, self.iterations = state.parts, state.iterations
+    def keep(self, states: Snapshots, parts: int, iterations: int) -> None:
+        """Append states of a run, up to the last of which so many were done."""
+        self._kept.append(states)
+        self.parts, self.iterations = parts, iterations
 
     def history(self) -> State:
         """Return all kept states, as arrays by name."""
@@ -138,14 +139,14 @@ class Solution(Rich):
 
     def thin(self) -> None:
         """Forget every other kept state; the first one stays."""
-        del self._kept[1::2]
+        self._kept.thin()
 
     # -- motion --------------------------------------------------------------------------------
 
     @property
     def times(self) -> Array:
         """Times that were kept, n after the initial one; (n+1,); s."""
-        return np.array([state.t for state in self._kept])
+        return self._kept.times
 
     @property
     def progress(self) -> Array:
@@ -155,12 +156,12 @@ class Solution(Rich):
     @property
     def q(self) -> Array:
         """Configurations, all degrees of freedom in the order of the grid; (n+1, size)."""
-        return np.array(self._kept.q)
+        return self._kept.q[:,]
 
     @property
     def v(self) -> Array:
         """Velocities, as :attr:`q`; empty in statics."""
-        return np.array(self._kept.v)
+        return self._kept.v[:,]
 
     def displacement(self, place: Anchor) -> Array:
         """Displacement and rotation (u, v, ψ) of a place; (n+1, 3); m, m, rad.
@@ -178,7 +179,7 @@ class Solution(Rich):
         Raises:
             SceneError: The run was static, or the beam of the place is not in the scene.
         """
-        if not self._kept.v:
+        if not len(self._kept.v):
             raise SceneError("velocity: the run was static; there is none")
         return velocity_of(self.grid, place, self._kept.q, self._kept.v)
 
@@ -195,7 +196,7 @@ class Solution(Rich):
             SceneError: It is not in the scene.
         """
         (number,) = links_of(self.scene, connector)
-        return Connection(*np.array([state.connections[number] for state in self._kept]).T)
+        return Connection(*self._kept.connections[:, number].T)
 
     def joint(self, joint: Joint) -> JointHistory:
         """Return the relative motion and the forces of the first two places of a joint.
@@ -203,8 +204,7 @@ class Solution(Rich):
         Raises:
             SceneError: It is not in the scene.
         """
-        connections = np.array([state.connections[:, 1] for state in self._kept])
-        return of_joint(self.grid, joint, self._kept.q, connections)
+        return of_joint(self.grid, joint, self._kept.q, self._kept.connections[:, :, FORCE])
 
     def shape(self, beam: Member, n: int = -1) -> Array:
         """Coordinates of the vertices of a beam at the n-th kept time; (num_vertices, 2); m."""
@@ -226,7 +226,7 @@ class Solution(Rich):
         if support not in self.scene.supports:
             raise SceneError(f"reaction: {support} is not in the scene")
         number = self.scene.supports.index(support)
-        return np.array([state.reactions[number] for state in self._kept])
+        return self._kept.reactions[:, number]
 
     def section_forces(self, beam: Member, n: int = -1) -> Array:
         """(N, V, M) in the cells of a beam at the n-th kept time; (num_cells, 3); N, N, N m."""
@@ -296,7 +296,7 @@ class Solution(Rich):
     @property
     def opened(self) -> Opened:
         """The cells whose embedded hinge or cracks opened in the run."""
-        return Opened(self.grid, self._kept)
+        return Opened(self.grid, self._kept.materials)
 
     def hinge_place_error(self) -> dict[Member, float]:
         """Largest part of its limit by which the place of an embedded hinge shifts it, by beam.
@@ -325,7 +325,7 @@ class Solution(Rich):
 
     def summary(self) -> list[str]:
         """Return lines on the model, the run, and embedded hinges that opened."""
-        ends = " to ".join(f"{state.t:g}" for state in self._kept[:1] + self._kept[-1:])
+        ends = " to ".join(f"{t:g}" for t in (*self.times[:1], *self.times[-1:]))
         return [
             str(self.grid),
             f"{self.parameter.value.format(ends)} in {self.parts} steps, "

@@ -11,14 +11,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple, NoReturn
+from typing import NamedTuple, NoReturn, Protocol
 
 import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.collective_errors import Agreement
+from ufl_beam.compiled.c_library import extrapolated
 from ufl_beam.compiled.csr import as_slice
-from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.constraint_checks import no_number
@@ -31,7 +31,10 @@ from ufl_beam.solvers.equation import Border
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.solvers.newton_options import Newton
 from ufl_beam.solvers.static_condensation import ChainsFirst
+from ufl_beam.terms.beams import Inertia
+from ufl_beam.terms.links import Links
 from ufl_beam.terms.openings import Openings
+from ufl_beam.terms.supports import Supports
 
 LARGEST_TURN = 0.75 * math.pi
 """A step that turns a node further is cut; the algorithmic strains end at π."""
@@ -76,6 +79,21 @@ class Trial(NamedTuple):
     s: Array
 
 
+class Present(Protocol):
+    """State of a scene that a step begins with."""
+
+    t: float
+    q: Array
+    q_before: Array
+    last_dt: float
+    inertia: Inertia
+    supports: Supports
+    couplings: list[Links]
+
+    def ask(self) -> None:
+        """Ask controllers and friction for their forces and limits in the next step."""
+
+
 class StepSolver:
     """Solves steps of a scene; whoever accepts them keeps its state."""
 
@@ -94,13 +112,64 @@ class StepSolver:
         least = LEAST_IN_MOTION if has_inertia(scheme) else LEAST_AT_REST
         self.newton = Solver(share, equation, factors, newton, least, together)
         self._rotations, self._multipliers = share.rotations(), as_slice(share.multipliers())
-        self._coupled = len(share.grid.multipliers) > 0
+        self._coupled, self._dynamic = len(share.grid.multipliers) > 0, has_inertia(scheme)
 
-    def solve(self, step: Step, guess: Array, *, like_last: bool) -> Trial:
-        """Solve a step that the terms have begun, from a guess in the axes of the supports.
+    def attempt(self, now: Present, t1: float, end: float) -> Trial:
+        """Solve the step to ``t1``, which is a part of one to ``end``; see Simulation.attempt."""
+        if self._dynamic and not now.inertia.ready:
+            t = now.t + FIRST * (t1 - now.t)
+            first = self._attempt(now, self._scheme.step(now.t, t, t1, now.q))
+            now.inertia.prepare(first.s)
+            now.supports.take()
+            for coupling in now.couplings:
+                coupling.take(first.q1)
+        return self._attempt(now, self._scheme.step(now.t, t1, end, now.q))
 
-        ``like_last`` lets the tangent of the last step do for this one.
+    def attempt_loads(self, now: Present, t1: float, begin: float, end: float) -> Trial:
+        """Solve a part of the application of the loads of the time ``begin``, up to ``end``."""
+        step = self._scheme.step(now.t, t1, end, now.q)
+        trial = self._attempt(now, step._replace(load_time=begin, motion_time=begin))
+        change, share = trial.q1 - now.q, self._equation.share
+        turn = share.largest(np.abs(change)[self._rotations].max(initial=0.0))
+        if turn > APPLYING_TURN and SHORT_PART * trial.step.dt > end - begin:
+            raise StepFailed("a node turns too far while the loads at the beginning are applied")
+        return trial
+
+    def attempt_along(
+        self, now: Present, step: Step, guess: Array, border: Border, *, hold: bool
+    ) -> Trial:
+        """Solve a step, whose times are those of the guess, together with the load factor.
+
+        With ``hold`` what does not flow stays closed if it can, see openings.py.
         """
+        self._together(self._begin, now, step)
+        t = border.t
+        solve = partial(self.newton.solve_along, loads=self._equation.load_forces(), border=border)
+
+        def again() -> None:
+            self._equation.begin(step)
+            border.t = t
+
+        if self._openings is None or not hold:
+            return self._trial(step, solve(guess))
+        return self._trial(step, self._openings.solve(guess, solve, again))
+
+    def _begin(self, now: Present, step: Step) -> None:
+        now.ask()
+        self._equation.begin(step)
+
+    def _predict(self, now: Present, step: Step) -> Array:
+        """Begin a step; return a guess of its end, in the axes of the supports."""
+        self._begin(now, step)
+        guess = extrapolated(now.q, now.q_before, step.dt / now.last_dt)
+        now.supports.enter(guess)
+        now.supports.move(guess, now.supports.in_axes(now.q), step)
+        return guess
+
+    def _attempt(self, now: Present, step: Step) -> Trial:
+        """Solve a step from a guess; the tangent of the last step does if that was like it."""
+        guess = self._together(self._predict, now, step)
+        like_last = self._dynamic and math.isclose(step.dt, now.last_dt, rel_tol=1e-6)
         loads = self._equation.load_forces()
         solve = partial(self.newton.solve, loads=loads, like_last=like_last)
         try:
@@ -115,22 +184,6 @@ class StepSolver:
                 raise better from None
             raise
         return self._trial(step, q1)
-
-    def solve_along(self, step: Step, guess: Array, border: Border, *, hold: bool) -> Trial:
-        """Solve a step, whose times are those of the guess, together with the load factor.
-
-        With ``hold`` what does not flow stays closed if it can, see openings.py.
-        """
-        t = border.t
-        solve = partial(self.newton.solve_along, loads=self._equation.load_forces(), border=border)
-
-        def again() -> None:
-            self._equation.begin(step)
-            border.t = t
-
-        if self._openings is None or not hold:
-            return self._trial(step, solve(guess))
-        return self._trial(step, self._openings.solve(guess, solve, again))
 
     def _require_numbers(self, step: Step) -> None:
         """Raise :class:`StepFailed` if a time function is no finite number in a step."""
@@ -189,10 +242,3 @@ def begins_loaded(scene: Scene, scheme: Scheme, t: float) -> bool:
         return False
     frames = any(isinstance(load, RotatingFrame) for load in scene.loads)
     return frames or bool(scene.works) or any(f(t) != 0 for _, f in scene.time_functions())
-
-
-def require_small_turn(share: Share, change: Array, dt: float, whole: float) -> None:
-    """Raise if a node turns far in a part, ``dt`` long, of the application of loads, ``whole``."""
-    turn = share.largest(np.abs(change)[share.rotations()].max(initial=0.0))
-    if turn > APPLYING_TURN and SHORT_PART * dt > whole:
-        raise StepFailed("a node turns too far while the loads at the beginning are applied")

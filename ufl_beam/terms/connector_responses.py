@@ -104,7 +104,10 @@ class Response(ABC):
         return np.ones(len(self._links))
 
     def motion(self, e: Array) -> Array:
-        """Motions of the accepted state as solutions show them; ``e`` are those of the nodes."""
+        """Motions of the accepted state as solutions show them; ``e`` are those of the nodes.
+
+        A view, which later steps change.
+        """
         return e
 
     def again(self) -> None:
@@ -125,9 +128,12 @@ class Response(ABC):
         """Return whether one slips plastically in the latest iterate."""
         return False
 
-    def dissipated(self) -> Array:
-        """Energy that each connector has dissipated plastically; (num_links,); J."""
-        return np.zeros(len(self._links))
+    def dissipated(self) -> Sequence[Array]:
+        """Energies whose sum each connector has dissipated plastically; (num_links,) each; J.
+
+        Views, which later steps change.
+        """
+        return ()
 
     def remaining(self) -> Array:
         """Part of the elastic stiffness that is left in the latest iterate; (num_links,)."""

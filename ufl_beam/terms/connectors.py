@@ -123,6 +123,10 @@ class Couplings(Links, ABC):
         """Add the derivative; the rows are those of the latest residual."""
         self._tangent.add(q1, self._A.data)
 
+    def _kept_motion(self, q: Array) -> Array:
+        """Motions of the accepted state as solutions show them."""
+        return self.response.motion(self._e)
+
     def _taken(self, q1: Array) -> Array:
         weight = self._weight_of_before
         force = weight * self._before + (1 - weight) * self.force(q1)

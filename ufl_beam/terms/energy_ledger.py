@@ -169,8 +169,8 @@ class Energy(Rich):
     @property
     def worst(self) -> float:
         """Largest imbalance, as a part of the energy that went through."""
-        largest = float(np.max(np.abs(self.imbalance)))
-        return largest / self.throughput if self.throughput > 0 else largest
+        largest, throughput = float(np.max(np.abs(self.imbalance))), self.throughput
+        return largest / throughput if throughput > 0 else largest
 
     def opened(self, claimed: float, round_off: float) -> str:
         """Describe how far the ledger is open; empty if it closes as claimed.

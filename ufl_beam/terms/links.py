@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -14,6 +15,12 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.model.connectors import Connector
 from ufl_beam.terms.base import InternalForces
 from ufl_beam.terms.connector_responses import Setting, respond
+
+CONNECTION = 5
+"""Numbers of a connector in a state, the columns of :class:`Connection`."""
+
+MOTION, FORCE, WORK, RATE, DISSIPATED = range(CONNECTION)
+"""These columns."""
 
 
 class Links(InternalForces):
@@ -40,6 +47,26 @@ class Links(InternalForces):
     def force(self, q: Array) -> Array:
         """Forces that resist the growth of the motions; (num_links,); N or N m."""
         return q[self._forces_at]
+
+    @property
+    def forces_at(self) -> Index:
+        """Local degrees of freedom that are the forces; (num_links,)."""
+        return self._forces_at
+
+    def kept(self, q: Array) -> Iterator[tuple[int, Array]]:
+        """Numbers of the accepted state ``q`` that are added to columns of ``Connection``.
+
+        They are all of these columns but the forces; (num_links,) each.  Later steps change them.
+        """
+        yield MOTION, self._kept_motion(q)
+        yield WORK, self.work
+        yield RATE, self.rate
+        for energy in self.response.dissipated():
+            yield DISSIPATED, energy
+
+    def _kept_motion(self, q: Array) -> Array:
+        """Motions of the accepted state as solutions show them."""
+        return self.motion(q)
 
     @abstractmethod
     def motion(self, q: Array) -> Array:

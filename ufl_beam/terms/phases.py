@@ -12,7 +12,7 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop, struct
 from ufl_beam.dolfinx_compat import fem
-from ufl_beam.model.time_functions import Table, TimeFunction, value_at
+from ufl_beam.model.time_functions import ALWAYS, Table, TimeFunction, steady, value_at
 
 
 class Phases(NamedTuple):
@@ -49,6 +49,8 @@ class TimeFunctions:
         """``time_function`` of loops.h for functions of time with their owners, see value_at."""
         of_time = ffi.new("time_function[]", len(functions))
         for place, (function, owner) in zip(of_time, functions, strict=True):
+            if function is steady:
+                function = ALWAYS
             if isinstance(function, Table):
                 points = [np.array(x, dtype=np.float64) for x in (function.times, function.values)]
                 place.points, (place.t, place.y) = len(points[0]), map(doubles, points)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, Protocol
 
 import numpy as np
@@ -56,6 +56,8 @@ class RatesInC:
         self._handle = ffi.new_handle(self)
         self.c = fill(ffi.new("rates *"), size=size, number=number, find=lib.numbers_in_python)
         self.c.handle = self._handle  # what `fill` keeps must not keep this object
+        scheme: Any = self._scheme
+        self.c.after_any = _after_any(scheme)
 
     @classmethod
     def of(cls, moving: Moving) -> RatesInC | None:
@@ -68,14 +70,12 @@ class RatesInC:
     def find(self, numbers: Any) -> None:
         """Write the numbers of the steps that ``scheme_numbers`` of loops.h is about."""
         n = self.c.number
-        dt, last_dt = numbers.dt, numbers.last_dt
-        ends, inertia, velocity, *rates, slip = _ask(self._scheme, dt, np.eye(n), last_dt)
+        scheme: Any = self._scheme
+        ends, inertia, velocity, *rates, slip = _numbers(scheme, n, numbers.dt, numbers.last_dt)
         numbers.factor, numbers.back, numbers.factor_of_velocity, numbers.back_of_velocity = ends
-        for place, row in ((numbers.inertia, inertia), (numbers.velocity, velocity)):
-            place[0:n] = row.tolist()
-        numbers.slip[0:n] = slip.tolist()
+        numbers.inertia[0:n], numbers.velocity[0:n], numbers.slip[0:n] = inertia, velocity, slip
         for place, row in zip(numbers.rates, rates, strict=False):
-            place[0:n] = row.tolist()
+            place[0:n] = row
 
     def times(self, product: StepProduct, **entries: Any) -> Any:
         """Return ``matrix_of_rates`` of loops.h for a matrix, with entries of the ledger."""
@@ -113,6 +113,20 @@ def _ask(scheme: DynamicScheme, dt: float, columns: Array, last_dt: float) -> Se
     factors = np.array([factor, back, factor_of_velocity, back_of_velocity])
     slip = scheme.slip(dt, change, asked)
     return (factors, of_inertia, velocity, *scheme.rates(dt, change, asked), slip)
+
+
+@lru_cache(maxsize=1024)  # steps of one size have some ten lengths, as times are rounded
+def _numbers(scheme: Any, n: int, dt: float, last_dt: float) -> Any:
+    """Answers of a scheme for unit vectors; a list of numbers each."""
+    return [x.tolist() for x in _ask(scheme, dt, np.eye(n), last_dt)]
+
+
+@cache
+def _after_any(scheme: Any) -> bool:
+    """Return whether the length of the last step does not matter to a scheme."""
+    n = MORE + len(scheme.kept)
+    one, *others = (_numbers(scheme, n, 0.1, last_dt) for last_dt in (0.1, 0.07, 0.4))
+    return all(other == one for other in others)
 
 
 @cache

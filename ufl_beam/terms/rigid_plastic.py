@@ -193,15 +193,15 @@ class RigidPlasticResponse(Response):
 
     def motion(self, e: Array) -> Array:
         """Motions without the round-off of those that are held."""
-        return self._at["start"].copy()
+        return self._at["start"]
 
     @abstractmethod
     def dissipation(self, e1: Array, λ: Array) -> float:
         """Energy dissipated in a step to the motions ``e1``, positive where one would slip; J."""
 
-    def dissipated(self) -> Array:
+    def dissipated(self) -> Sequence[Array]:
         """Energy that each has dissipated; (num_links,); J."""
-        return self._dissipated
+        return (self._dissipated,)
 
     def remaining(self) -> Array:
         """All of the stiffness is left, or none where one slips."""

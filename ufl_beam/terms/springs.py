@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -71,8 +72,8 @@ class _Sprung(Response):
         self.points.respond(self._at(e1))
         return self.points.dissipation()
 
-    def dissipated(self) -> Array:
-        return np.asarray(self.points.kept[:, 4:].sum(axis=1))
+    def dissipated(self) -> Sequence[Array]:
+        return self.points.kept[:, 4], self.points.kept[:, 5]
 
     def remaining(self) -> Array:
         return self.points.remaining(np.eye(1, 3).repeat(len(self._strains), axis=0))

@@ -433,6 +433,7 @@ typedef struct {
   double *rate[MOST_RATES];
   double *new_rate[MOST_RATES]; /* space, as many */
   double last_dt;
+  int after_any; /* whether numbers are the same after steps of any length */
   int known, oldest;
   scheme_numbers numbers[MOST_KNOWN];
   const scheme_numbers *now;   /* those of the step */
@@ -495,10 +496,12 @@ typedef struct {
   const int32_t *entries;
 } static_path;
 
-/* Numbers that are kept of each step: from where, and how many. */
+/* Numbers that are kept of each step: how many, from where and to where in a row of zeros.  They are
+ * one after the other, or have places in both, where they are added. */
 typedef struct {
   double *const *from;
-  int number;
+  int number, first;     /* first: of the row, if they are one after the other */
+  const int32_t *at, *to; /* places, or none */
 } kept_numbers;
 
 /* Steps of a scene. */
@@ -524,7 +527,7 @@ typedef struct {
   double *state;      /* entries of the ledger that a state has, one after the other */
   int iterations;
   time_step step;
-  int kinds; /* of numbers that are kept */
+  int kinds, width; /* of numbers that are kept; of a row */
   const kept_numbers *kept;
 } march;
 

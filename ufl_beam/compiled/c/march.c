@@ -116,7 +116,7 @@ static int find_numbers(rates *r, double dt)
 {
   for (int k = 0; k < r->known; ++k) {
     r->now = r->numbers + k;
-    if (r->now->dt == dt && r->now->last_dt == r->last_dt) return 1;
+    if (r->now->dt == dt && (r->after_any || r->now->last_dt == r->last_dt)) return 1;
   }
   scheme_numbers *n = r->numbers + r->oldest;
   n->dt = dt, n->last_dt = r->last_dt;
@@ -407,23 +407,27 @@ static double seconds_now(void)
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-/* What is kept of the state: number of iterations so far, then numbers of all kinds; where it ends. */
-static double *keep(const march *m, double *row)
+/* What is kept of the state, into a row of zeros. */
+static void keep(const march *m, double *row)
 {
-  *row++ = m->iterations;
-  for (int k = 0; k < m->kinds; row += m->kept[k++].number)
-    memcpy(row, *m->kept[k].from, m->kept[k].number * sizeof *row);
-  return row;
+  for (int k = 0; k < m->kinds; ++k) {
+    const kept_numbers *n = m->kept + k;
+    const double *from = *n->from;
+    if (!n->to)
+      memcpy(row + n->first, from, n->number * sizeof *row);
+    else
+      for (int i = 0; i < n->number; ++i) row[n->to[i]] += from[n->at[i]];
+  }
 }
 
 /* Steps to the times `ends`, up to the first that fails, or that ends so many seconds later; how many
- * were taken. Each is kept in a row if `keeps`. */
+ * were taken. Each is kept in one of `rows`, which are zero, if `keeps`. */
 int take_steps(march *m, int steps, const double *ends, double seconds, int keeps, double *rows)
 {
   const double end = steps > 1 ? seconds_now() + seconds : 0;
   for (int k = 0; k < steps; ++k) {
     if (!take_step(m, ends[k])) return k;
-    if (keeps) rows = keep(m, rows);
+    if (keeps) keep(m, rows + (size_t)k * m->width);
     if (steps > 1 && seconds_now() > end) return k + 1;
   }
   return steps;
