@@ -149,26 +149,37 @@ class Kernel:
         self._columns, self._entries = ready.columns, ready.entries
         self._dofs = np.ascontiguousarray(cell_dofs, dtype=np.int32)
         self._lanes, self._in_lanes, num_cells = 1, ffi.NULL, len(cell_dofs)
-        packed = np.tile(ready.packed, (num_cells // len(ready.packed), 1))
         spaces = [argument.ufl_function_space() for argument in form.arguments()]
-        if len(spaces) != 1:  # a functional; a matrix until it is placed
-            rows: Index = np.zeros((num_cells, self._entries), dtype=np.int32)
-        elif spaces[0] is unknown.function_space:
-            rows = self._dofs
-        else:
-            rows = np.arange(num_cells * self._entries, dtype=np.int32).reshape(-1, self._entries)
-        expected = (len(packed), (num_cells, self._entries), (num_cells, 2, 3))
-        if expected != (num_cells, rows.shape, coordinates.shape):
+        self._is_vector = len(spaces) == 1
+        self._to_dofs = self._is_vector and spaces[0] is unknown.function_space
+        per_cell = self._dofs.shape[1] if self._to_dofs else self._entries
+        expected = (0, per_cell, (num_cells, 2, 3))
+        if expected != (num_cells % len(ready.packed), self._entries, coordinates.shape):
             raise ValueError(
                 f"a form with {self._entries} entries of a cell, stated on {len(ready.packed)} "
-                f"cells, got rows of {rows.shape} and coordinates of {coordinates.shape}"
+                f"cells, got rows of {(num_cells, per_cell)} and coordinates of "
+                f"{coordinates.shape}"
             )
-        self._packed, self._coordinates, self._rows = (
-            in_batches(x, 1) for x in (packed, coordinates, rows)
-        )
+        self._coordinates = in_batches(coordinates, 1)
         self._at, self._unknowns = 0, 0
         if self.uses(unknown):
             self._at, self._unknowns = self.position(unknown), self._dofs.shape[1]
+
+    @cached_property
+    def _packed(self) -> Array:
+        """Values of the coefficients in the cells, in batches."""
+        stated = self._form.packed
+        return in_batches(np.tile(stated, (len(self._dofs) // len(stated), 1)), self._lanes)
+
+    @cached_property
+    def _rows(self) -> Index:
+        """Places of the entries of the cells, in batches; of a matrix see :meth:`place`."""
+        if self._to_dofs:
+            return in_batches(self._dofs, self._lanes)
+        shape = len(self._dofs), self._entries
+        if self._is_vector:
+            return in_batches(np.arange(math.prod(shape), dtype=np.int32).reshape(shape), self._lanes)
+        return in_batches(np.zeros(shape, dtype=np.int32), self._lanes)
 
     @cached_property
     def cells(self) -> Any:
@@ -234,9 +245,8 @@ class Kernel:
 
     def compute_in_lanes(self, address: int | None, coordinates: Array) -> None:
         """Use the SIMD loop from now on, with coordinates in batches."""
-        self._packed, self._rows = (
-            in_batches(x[:, :, 0], LANES) for x in (self._packed, self._rows)
-        )
+        for name in {"_packed", "_rows"} & vars(self).keys():
+            setattr(self, name, in_batches(getattr(self, name)[:, :, 0], LANES))
         self._in_lanes = ffi.cast("in_lanes *", address)
         self._lanes, self._coordinates = LANES, coordinates
         self._change()

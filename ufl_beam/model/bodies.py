@@ -242,8 +242,8 @@ def merged(groups: Iterable[Sequence[NodeDof]]) -> Representatives:
     parent = Representatives()
 
     def root(dof: NodeDof) -> NodeDof:
-        while dof in parent:
-            dof = parent[dof]
+        while (other := parent.get(dof)) is not None:
+            dof = other
         return dof
 
     for group in groups:
@@ -251,7 +251,9 @@ def merged(groups: Iterable[Sequence[NodeDof]]) -> Representatives:
             a, b = root(group[0]), root(other)
             if a != b:
                 parent[b] = a
-    return Representatives((dof, root(dof)) for dof in parent)
+    for dof, other in parent.items():
+        parent[dof] = root(other)
+    return parent
 
 
 def node(anchor: Anchor) -> Node:

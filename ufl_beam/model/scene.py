@@ -29,7 +29,7 @@ from ufl_beam.model.bodies import (
 )
 from ufl_beam.model.connector_laws import Actuator, Bearing, Coulomb, Motor
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.curves import enclosing_diameter
+from ufl_beam.model.curves import enclosing_diameter, points_along
 from ufl_beam.model.damping import Damping, KelvinVoigt
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.loads import LineLoad, Load, LoadAtPlace, PointLoad, RotatingFrame
@@ -147,11 +147,13 @@ class Scene(Rich):
 
         It is the same in all axes.  A single point is as large as its radius of gyration.
         """
-        points = [b.curve(s) for b in self.beams for s in b.vertices(())]
-        points += [body.center for body in self.bodies]
-        points += [place.point for _, place in self.attachments() if isinstance(place, Spot)]
+        curves = [beam.curve for beam in self.beams]
+        on_beams = points_along(curves, [beam.vertices(()) for beam in self.beams])
+        others = [body.center for body in self.bodies]
+        others += [place.point for _, place in self.attachments() if isinstance(place, Spot)]
+        points = np.concatenate([on_beams, np.reshape(others, (-1, 2))])
         gyration = [math.sqrt(b.inertia / b.mass) for b in self.bodies if b.mass > 0]
-        return enclosing_diameter(np.array(points)) or max(gyration, default=0.0) or 1.0
+        return enclosing_diameter(points) or max(gyration, default=0.0) or 1.0
 
     @cached_property
     def links(self) -> tuple[Connector, ...]:
@@ -168,8 +170,8 @@ class Scene(Rich):
     @cached_property
     def hinges(self) -> tuple[Connector, ...]:
         """Plastic hinges of zero length: those of beams, and at ends whose section has a hinge."""
-        loaded = [load.place for load in self.moments]
-        rigid = [joint.equal(2) for joint in self.joints if 2 in joint.shared]
+        loaded = (load.place for load in self.moments)
+        rigid = (joint.equal(2) for joint in self.joints if 2 in joint.shared)
         laws = {place: law for beam in self.beams for place, law in beam.hinge_laws.items()}
         return plastic_hinges(laws, rigid, self._bearing_moments(), loaded)
 
