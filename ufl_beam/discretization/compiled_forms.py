@@ -22,7 +22,7 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import doubles, ffi, fill, kernel, lib
+from ufl_beam.compiled.c_library import doubles, ffi, fill, first_of, kernel, lib
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.jit import compiled_form
 from ufl_beam.compiled.simd_kernels import LANES, in_batches, in_lanes
@@ -118,6 +118,9 @@ class CellForm(Protocol):
     def put(self, function: fem.Function, values: Array) -> None:
         """Give ``function`` other values in the cells; shape (num_cells, dofs per cell)."""
 
+    def share(self, other: Any) -> bool:
+        """Use the values of another form's coefficients, if it can and they are the same."""
+
     def place(self, A: Csr) -> None:
         """Let a bilinear form on the degrees of freedom of the cells add to ``A``."""
 
@@ -185,12 +188,14 @@ class Kernel:
     def cells(self) -> Any:
         """Argument of ``add_cells`` of loops.h; another one once a method changes its arrays."""
         number, of_cell = self._dofs.shape
+        packed = self._packed
         return fill(
             ffi.new("cells *"),
             tabulate=self._form.tabulate, several=self._in_lanes, lanes=self._lanes,
             number=number, of_cell=of_cell, dofs=self._dofs, unknowns=self._unknowns, at=self._at,
-            width=self._packed.shape[1], w=self._packed, constants=self._form.constants,
-            coordinates=self._coordinates, rows=self._entries, row=self._rows,
+            width=packed.strides[0] // (packed.itemsize * self._lanes), w=first_of(packed),
+            constants=self._form.constants, coordinates=self._coordinates, rows=self._entries,
+            row=self._rows,
         )  # fmt: skip
 
     def _change(self) -> None:
@@ -216,12 +221,16 @@ class Kernel:
         rows = np.broadcast_to(values, (len(self._dofs), columns.stop - columns.start))
         self._packed[:, columns] = in_batches(rows, self._lanes)
 
-    def share(self, other: Kernel) -> None:
-        """Use the packed values of ``other``, a form of the same coefficients."""
-        if self._columns != other._columns or self._lanes != other._lanes:
-            raise ValueError("the forms do not have the same coefficients")
-        self._packed = other._packed
+    def share(self, other: Kernel) -> bool:
+        """Use the packed values of ``other``, if those of this form stand side by side there."""
+        mine, others = self._columns, other._columns
+        shifts = {others[f].start - mine[f].start for f in mine.keys() & others.keys()}
+        if not mine.keys() <= others.keys() or len(shifts) != 1 or self._lanes != other._lanes:
+            return False
+        (first,) = shifts
+        self._packed = other._packed[:, first : first + self._form.packed.shape[1]]
         self._change()
+        return True
 
     def place(self, A: Csr) -> None:
         """Let a bilinear form on the degrees of freedom of the cells add to ``A``."""
@@ -240,7 +249,7 @@ class Kernel:
 
     def address_in_lanes(self) -> int | None:
         """Return the address of the SIMD loop, or None."""
-        sizes = (self._entries, self._packed.shape[1], len(self._form.constants))
+        sizes = (self._entries, self._form.packed.shape[1], len(self._form.constants))
         return in_lanes(self._form.source, int(ffi.cast("intptr_t", self._form.tabulate)), sizes)
 
     def compute_in_lanes(self, address: int | None, coordinates: Array) -> None:

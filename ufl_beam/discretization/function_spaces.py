@@ -198,7 +198,8 @@ class CompiledFields(Fields):
         """Kernels that share the values of their coefficients."""
         force, tangent = self._several_at_once(q1, work, derivative(work, q1))
         self._put_sections(force)
-        tangent.share(force)
+        if not tangent.share(force):
+            raise ValueError("force and tangent do not have the same coefficients")
         tangent.place(A)
         return force, tangent
 

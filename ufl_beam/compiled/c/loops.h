@@ -22,8 +22,9 @@ void add_calls(void *self, const double *q, double *out);
 
 enum { MOST_ENTRIES = 144 }; /* of the vector or matrix of a cell: 12 unknowns of degree 3 */
 
-/* A compiled form on some cells. w holds the packed coefficients of a cell, `width` of them, of
- * which those from `at` on are the unknowns of the cell, brought up to date on the way.
+/* A compiled form on some cells. w holds the packed coefficients of a cell, of which those from `at`
+ * on are the unknowns of the cell, brought up to date on the way; `width` numbers further are those of
+ * the next one, as the values may be a part of those of another form.
  *
  * Where a form is computed for several cells at once, `several` does what add_cells does, and numbers
  * of cells (w, coordinates, row) come in batches of as many cells: the first number of each of these
