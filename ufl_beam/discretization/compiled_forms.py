@@ -28,10 +28,6 @@ from ufl_beam.compiled.jit import compiled_form
 from ufl_beam.compiled.simd_kernels import LANES, in_batches, in_lanes
 from ufl_beam.dolfinx_compat import VERSIONS, fem, line_mesh, pack
 
-SOME = 1024 * LANES
-"""Cells whose entries in a matrix are looked up together."""
-
-
 def vectorise(kernels: Sequence[Kernel], coordinates: Array) -> None:
     """Switch kernels on the same cells to SIMD, all or none: they may share numbers."""
     addresses = [kernel.address_in_lanes() for kernel in kernels]
@@ -237,14 +233,7 @@ class Kernel:
         per_cell = self._dofs.shape[1]
         if self._entries != per_cell**2:
             raise ValueError(f"a form of {self._entries} entries on {per_cell} degrees of freedom")
-        lanes, cells = self._lanes, len(self._dofs)
-        self._rows = np.empty((-(-cells // lanes), self._entries, lanes), dtype=np.int32)
-        for begin in range(0, cells, SOME):  # lists of all pairs take more than the matrix
-            dofs = self._dofs[begin : begin + SOME]
-            rows, columns = np.repeat(dofs, per_cell, axis=1), np.tile(dofs, per_cell)
-            positions = A.positions(rows.ravel(), columns.ravel()).reshape(rows.shape)
-            in_order = in_batches(positions, lanes)
-            self._rows[begin // lanes :][: len(in_order)] = in_order
+        self._rows = A.blocks(self._dofs, self._lanes)
         self._change()
 
     def address_in_lanes(self) -> int | None:

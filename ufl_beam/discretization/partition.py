@@ -53,21 +53,19 @@ def bisected(points: Array, number: int) -> Index:
 
     Recursive coordinate bisection: across the longer side of their bounding box, again and again.
     """
-    part = np.zeros(len(points), dtype=np.int64)
-
-    def divide(these: Index, first: int, number: int) -> None:
-        if number == 1 or not len(these):
-            part[these] = first
-            return
-        longer = np.ptp(points[these], axis=0).argmax()
-        half = number // 2
-        before, after = np.split(
-            these[np.argsort(points[these, longer], kind="stable")], [len(these) * half // number]
-        )
-        divide(before, first, half)
-        divide(after, first + half, number - half)
-
-    divide(np.arange(len(points)), 0, number)
+    part = np.zeros(len(points), dtype=np.int32)
+    to_divide = [(np.arange(len(points)), 0, number)]
+    while to_divide:
+        these, first, number = to_divide.pop()
+        part[these] = first
+        if number > 1 and len(these):
+            longer = np.ptp(points[these], axis=0).argmax()
+            half = number // 2
+            before, after = np.split(
+                these[np.argsort(points[these, longer], kind="stable")],
+                [len(these) * half // number],
+            )
+            to_divide += [(before, first, half), (after, first + half, number - half)]
     return part
 
 

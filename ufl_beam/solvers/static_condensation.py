@@ -146,9 +146,12 @@ def _what_is_left(A: Csr, number: Index, ends: Index, size: int) -> tuple[Index,
         Its ``indptr`` and ``indices``; entries of ``A`` that stay, where they are in it, and where
         the blocks of the ``ends`` (num_chains, 6) of the chains are.
     """
-    rows, columns, left = A.rows(), A.indices, number >= 0
-    entries = np.flatnonzero(left[rows] & left[columns])
-    keys = number[rows[entries]].astype(np.int64) * size + number[columns[entries]]
+    rows = np.flatnonzero(number >= 0)
+    entries = A.entries_of(rows)
+    row = np.repeat(number[rows], np.diff(A.indptr)[rows])
+    stay = number[A.indices[entries]] >= 0
+    entries, row = entries[stay], row[stay]
+    keys = row.astype(np.int64) * size + number[A.indices[entries]]
     of_ends = ends.astype(np.int64).reshape(-1, 2, 3)
     of_chains = (of_ends[:, :, None, :, None] * size + of_ends[:, None, :, None, :]).ravel()
     all_ = np.unique(np.concatenate([keys, of_chains]))
