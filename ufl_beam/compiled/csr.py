@@ -8,6 +8,7 @@ from copy import copy
 from petsc4py import PETSc
 
 import numpy as np
+
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, integers, lib, loop
 from ufl_beam.structure_cache import of_structure

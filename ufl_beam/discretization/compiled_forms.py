@@ -28,6 +28,7 @@ from ufl_beam.compiled.jit import compiled_form
 from ufl_beam.compiled.simd_kernels import LANES, in_batches, in_lanes
 from ufl_beam.dolfinx_compat import VERSIONS, fem, line_mesh, pack
 
+
 def vectorise(kernels: Sequence[Kernel], coordinates: Array) -> None:
     """Switch kernels on the same cells to SIMD, all or none: they may share numbers."""
     addresses = [kernel.address_in_lanes() for kernel in kernels]
@@ -177,7 +178,8 @@ class Kernel:
             return in_batches(self._dofs, self._lanes)
         shape = len(self._dofs), self._entries
         if self._is_vector:
-            return in_batches(np.arange(math.prod(shape), dtype=np.int32).reshape(shape), self._lanes)
+            places = np.arange(math.prod(shape), dtype=np.int32)
+            return in_batches(places.reshape(shape), self._lanes)
         return in_batches(np.zeros(shape, dtype=np.int32), self._lanes)
 
     @cached_property

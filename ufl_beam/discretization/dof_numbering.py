@@ -68,7 +68,7 @@ class Grid:
         inner, starts, ends = mesh.nodes[1:-1], vertices[begin], vertices[begin + 1]
         between = starts[:, None] + inner[:, None] * (ends - starts)[:, None]
         self.points = np.concatenate([vertices, between.reshape(-1, 2)])
-        self.nodes_of_cells = np.empty((len(begin), mesh.degree + 1), dtype=np.int32)
+        self.nodes_of_cells: Index = np.empty((len(begin), mesh.degree + 1), dtype=np.int32)
         self.nodes_of_cells[:, 0], self.nodes_of_cells[:, 1] = begin, begin + 1
         inside = np.arange(len(vertices), len(self.points))
         self.nodes_of_cells[:, 2:] = inside.reshape(between.shape[:2])

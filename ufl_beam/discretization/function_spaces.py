@@ -121,8 +121,9 @@ class Fields(ABC):
 
     def __init__(self, share: Share, part: Index | None = None) -> None:
         self.share = share
-        whole = part is None or np.array_equal(part, np.arange(len(share.cells)))
-        self.order: Index = np.arange(len(share.cells)) if part is None else part
+        everywhere = np.arange(len(share.cells), dtype=np.int32)
+        whole = part is None or np.array_equal(part, everywhere)
+        self.order: Index = everywhere if part is None else part
         self.cell_dofs = share.cell_dofs if whole else share.cell_dofs[self.order]
         self._matrix: Csr | None = None
         self.element = self._element()

@@ -53,7 +53,9 @@ class Chains:
         plain = alone & (np.diff(A.indptr) == 9)
         plain &= np.bincount(A.indices, minlength=A.size) == 9
         inside &= plain[end[:-1]].all(axis=1)
-        inside &= np.isin(np.arange(len(inside)), np.unique(end[:-1, 0], return_index=True)[1])
+        first_of_vertex = np.zeros(len(inside), dtype=bool)
+        first_of_vertex[np.unique(end[:-1, 0], return_index=True)[1]] = True
+        inside &= first_of_vertex
         # Beams side by side may make an end of a chain the middle of another.
         middle = np.zeros(A.size, dtype=bool)
         middle[end[:-1][inside]] = True
@@ -93,7 +95,9 @@ class Chains:
         self.ends = np.hstack([np.where(dead[:, None], right, left), right])
         self.dofs, self.spikes = around[:, 1], ~dead
         around = around.reshape(-1, 9)
-        self.order = np.argsort(np.argsort(around, axis=1), axis=1).astype(np.uint8)
+        self.order = np.zeros(around.shape, dtype=np.uint8)
+        for column in around.T:
+            self.order += around > column[:, None]
 
 
 def _runs(mask: npt.NDArray[np.bool_]) -> tuple[Index, Index, Index]:
