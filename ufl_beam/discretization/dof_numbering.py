@@ -82,7 +82,7 @@ class Grid:
         of_kind: dict[object, Array] = {}
         found = []
         for beam, attached in self.scene.attached.items():
-            kind = beam.cells, beam.corners, frozenset(attached)
+            kind = beam.cells, beam.corners, frozenset(attached) - {0.0, 1.0}
             if kind not in of_kind:
                 of_kind[kind] = np.array(self.mesh.vertices(beam, attached))
             found.append(of_kind[kind])
