@@ -333,16 +333,15 @@ def test_matrix_entries_that_do_not_exist_are_refused():
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize(("degree", "shared"), [(1, True), (2, False)])
-def test_energies_share_the_values_of_the_force(degree, shared):
-    """Where those of the stored energy stand side by side in those of the force."""
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_energies_share_the_values_of_the_force(degree):
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=5)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.Gravity()])
     mesh = ub.Mesh(degree=degree)
     simulation = ub.Simulation(scene, scheme := ub.Midpoint(alpha=0.1), mesh=mesh)
     (beams,) = simulation.beams
-    assert np.shares_memory(beams._stored._packed, beams._force._packed) == shared
-    assert all(np.shares_memory(x._packed, beams._force._packed) for x in beams._losses)
+    energies = beams._stored, *beams._losses
+    assert all(np.shares_memory(x._packed, beams._force._packed) for x in energies)
     simulation.step_to(0.01)
     fields = CompiledFields(simulation.share)
     own = fields.kernel(elastic_forms(fields.element, scheme).stored, beams._q1)
