@@ -259,10 +259,11 @@ class Scene(Rich):
 
     def _require_together(self, joint: Joint) -> None:
         here, *others = joint.places
-        for other in others:
-            if other in joint.places[: joint.places.index(other)] or other == here:
+        point = here.point
+        for i, other in enumerate(others, start=1):
+            if other in joint.places[:i]:
                 raise SceneError(f"{joint}: the same place twice")
-            gap = math.dist(here.point, other.point)
+            gap = math.dist(point, other.point)
             if joint.meets and gap > 1e-9 * self.size:
                 raise SceneError(
                     f"{joint.kind}: joint ends lie {gap:.6g} m apart: {here} and {other}; "
