@@ -147,8 +147,10 @@ class Scene(Rich):
 
         It is the same in all axes.  A single point is as large as its radius of gyration.
         """
+        of_kind = {(b.cells, b.corners): b for b in self.beams}  # beams alike have one array
+        vertices = {kind: np.array(b.vertices(())) for kind, b in of_kind.items()}
         curves = [beam.curve for beam in self.beams]
-        on_beams = points_along(curves, [beam.vertices(()) for beam in self.beams])
+        on_beams = points_along(curves, [vertices[b.cells, b.corners] for b in self.beams])
         others = [body.center for body in self.bodies]
         others += [place.point for _, place in self.attachments() if isinstance(place, Spot)]
         points = np.concatenate([on_beams, np.reshape(others, (-1, 2))])
