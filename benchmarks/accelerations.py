@@ -80,7 +80,7 @@ ACCELERATIONS = {
     ),
     "SIMD kernels": Acceleration(
         "Kernels of FFCx compiled a second time with vectors instead of numbers, for the "
-        "processor of the machine: four cells at once. Without it, cells are computed one by one "
+        "processor of the machine: four or eight cells at once. Without it, cells are computed one by one "
         "by FFCx's own kernels.",
         by.SHIPPED, by.SCALAR,
         (

@@ -48,9 +48,3 @@ def test_blocks_of_cells(number, lanes):
     assert np.array_equal(structure.blocks(dofs, lanes), expected)
     with pytest.raises(ValueError, match="no such entry"):
         structure.blocks(dofs + 1, lanes)
-
-
-def test_matrices_of_one_pattern_share_their_space():
-    matrix = coupling(3)
-    assert matrix.space is matrix.space
-    assert matrix.zeros_like().space is matrix.space

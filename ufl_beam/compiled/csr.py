@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from copy import copy
-from functools import cached_property
 
 from petsc4py import PETSc
 
@@ -33,11 +32,6 @@ class Csr:
     def size(self) -> int:
         """Number of rows of the matrix."""
         return len(self.indptr) - 1
-
-    @cached_property
-    def space(self) -> Array:
-        """Array of a number for each row, which loops may overwrite; one for all copies."""
-        return np.empty(self.size)
 
     def rows(self) -> Index:
         """Return the row of each entry."""
@@ -150,7 +144,8 @@ class StepProduct:
         self.c = fill(
             ffi.new("step_product *"),
             size=size, indptr=indptr, indices=indices, data=data, entry=self.A.entries,
-            rotations=len(rotations), rotation=rotations, space=tangent.space,
+            rotations=len(rotations), rotation=rotations, space=np.empty(size),
+            turn=np.full(len(rotations), np.nan), half=np.empty(len(rotations)),
         )  # fmt: skip
 
     def matrix(self) -> Csr:

@@ -23,9 +23,14 @@ from ufl_beam.dolfinx_compat import VERSIONS
 
 LOGGER = logging.getLogger("ufl_beam")
 
-LANES = 4
-"""Cells that are computed at once, as many as AVX has room for; compilers split vectors for less.
-Eight (AVX-512) are hardly faster."""
+_SIMD = np.show_config(mode="dicts").get("SIMD Extensions", {})
+"""Features of the processor that NumPy was compiled for, and those that it found besides."""
+
+_WIDE = {"AVX512F", "X86_V4"} & {*_SIMD.get("baseline", ()), *_SIMD.get("found", ())}
+
+LANES = 8 if _WIDE else 4
+"""Cells that are computed at once, as many as AVX-512 or AVX have room for; compilers split vectors
+for less."""
 
 FUNCTIONS = {"sin", "cos", "sqrt", "fabs", "pow"}
 """Functions that lanes.h has for vectors; powers with integer exponents."""
@@ -110,10 +115,6 @@ def require_agreement(module: ModuleType, kernel: int, sizes: tuple[int, int, in
         raise Refused(why)
 
 
-_CPU = repr(np.show_config(mode="dicts"))
-"""Configuration of NumPy, which includes the features of the processor."""
-
-
 @cache
 def in_lanes(source: Path, kernel: int, sizes: tuple[int, int, int]) -> int | None:
     """Return the address of the SIMD loop of a compiled form, or None; see above for ``sizes``."""
@@ -126,7 +127,7 @@ def in_lanes(source: Path, kernel: int, sizes: tuple[int, int, int]) -> int | No
             INTERFACE,
             lambda: "\n".join([head, in_vectors(written(source)), loop]),
             # FFCx names what it makes by what is in it; NumPy knows what "native" means.
-            made_of=[source.name, head, loop, Path(__file__).read_text(), _CPU],
+            made_of=[source.name, head, loop, Path(__file__).read_text(), repr(_SIMD)],
             flags=["-O2", "-march=native", "-fno-math-errno"],
             check=lambda module: require_agreement(module, kernel, sizes),
         )

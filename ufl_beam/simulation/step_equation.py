@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop, ffi, fill
+from ufl_beam.compiled.c_library import Loop, ffi, fill, lib
 from ufl_beam.compiled.csr import Csr, Product
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
@@ -149,12 +150,23 @@ class StepEquation(Equation):
         supports, entries = self.supports, self.A.data
         loops = [term.loops() or self._in_python(term) for term in self.terms]
         stiffnesses = [stiffness for _, stiffness in loops if stiffness is not None]
+
+        def take(name: str) -> Any:
+            """Data of the first stiffness of a name, which is taken out; null without any."""
+            found = (one for one in stiffnesses if one[0] == ffi.addressof(lib, name))
+            if (one := next(found, None)) is None:
+                return ffi.NULL
+            stiffnesses.remove(one)
+            return one[1]
+
+        product, cells = take("add_step_tangent"), take("add_cells")
         zero, pivot = (x.astype(np.int32) for x in supports.entries)
         fill(
             self.c,
             size=self.share.size, inner=len(self._inner), inner_force=self.force,
             forces=len(loops), force=ffi.new("call[]", [force for force, _ in loops]),
             stiffnesses=len(stiffnesses), stiffness=ffi.new("call[]", stiffnesses),
+            product=product, cells=cells, indptr=self.A.indptr,
             entries=len(entries), tangent=entries, zeros=len(zero), zero=zero, pivot=pivot,
             held=len(supports.dofs), hold=supports.dofs.astype(np.int32),
             reactions=supports.reactions, pivots=supports.pivots,

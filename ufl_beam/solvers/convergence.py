@@ -53,7 +53,7 @@ class Convergence:
             size=share.size, scene=share.grid.scene.size, rtol=newton.rtol, rate=math.inf,
             modified=newton.modified, most=newton.max_iterations, least=least,
             weight=self._weights, residual=r, change=np.empty(share.size),
-            space=equation.A.space, lengths=share.lengths(), moves=self._moves,
+            space=np.empty(share.size), lengths=share.lengths(), moves=self._moves,
             diagonal=self.diagonal,
         )  # fmt: skip
 

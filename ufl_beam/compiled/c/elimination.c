@@ -11,50 +11,13 @@
 /* In the sides of a vertex: what its pivot makes of the coupling to the left end, that from there. */
 enum { TO_LEFT = 0, FROM_LEFT = 9 };
 
-/* D = LU with the largest pivot of each column; the reciprocals of the pivots on the diagonal */
-static void factor_block(double *D, int32_t *swap)
+/* x = D^-1 b */
+static inline void solve_block(const double *D, const int32_t *swap, const double *b, double *x)
 {
-  for (int k = 0; k < 3; ++k) swap[k] = k;
-  for (int k = 0; k < 3; ++k) {
-    int best = k;
-    for (int i = k + 1; i < 3; ++i)
-      if (fabs(D[3 * i + k]) > fabs(D[3 * best + k])) best = i;
-    if (best != k) {
-      int32_t s = swap[k];
-      swap[k] = swap[best], swap[best] = s;
-      for (int j = 0; j < 3; ++j) {
-        double d = D[3 * k + j];
-        D[3 * k + j] = D[3 * best + j], D[3 * best + j] = d;
-      }
-    }
-    D[4 * k] = 1 / D[4 * k]; /* of a singular block not finite, and so all that comes of it */
-    for (int i = k + 1; i < 3; ++i) {
-      D[3 * i + k] *= D[4 * k];
-      for (int j = k + 1; j < 3; ++j) D[3 * i + j] -= D[3 * i + k] * D[3 * k + j];
-    }
-  }
-}
-
-/* X = D^-1 B, of `columns` columns */
-static inline void solve_block(const double *D, const int32_t *swap, int columns, const double *B,
-                               double *X)
-{
-  const double *b0 = B + columns * swap[0], *b1 = B + columns * swap[1], *b2 = B + columns * swap[2];
-  for (int j = 0; j < columns; ++j) {
-    double x0 = b0[j], x1 = b1[j] - D[3] * x0, x2 = b2[j] - D[6] * x0 - D[7] * x1;
-    x2 *= D[8];
-    x1 = (x1 - D[5] * x2) * D[4];
-    X[j] = (x0 - D[1] * x1 - D[2] * x2) * D[0];
-    X[columns + j] = x1, X[2 * columns + j] = x2;
-  }
-}
-
-/* Y -= A X for blocks of 3 x 3 */
-static inline void subtract_product(const double *A, const double *X, double *Y)
-{
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      Y[3 * i + j] -= A[3 * i] * X[j] + A[3 * i + 1] * X[3 + j] + A[3 * i + 2] * X[6 + j];
+  const double x0 = b[swap[0]], x1 = b[swap[1]] - D[3] * x0;
+  x[2] = (b[swap[2]] - D[6] * x0 - D[7] * x1) * D[8];
+  x[1] = (x1 - D[5] * x[2]) * D[4];
+  x[0] = (x0 - D[1] * x[1] - D[2] * x[2]) * D[0];
 }
 
 /* y -= A x */
@@ -73,13 +36,87 @@ static inline void read_block(const chains *c, int vertex, int neighbour, double
   }
 }
 
-/* The block of the one after a vertex with the vertex */
+/* The rows of the block of the one after a vertex with the vertex */
 static inline void read_below(const chains *c, int chain, int vertex, double *block)
 {
   if (vertex + 1 < c->first[chain + 1])
     read_block(c, vertex + 1, 0, block);
   else
     for (int k = 0; k < 9; ++k) block[k] = c->data[c->from_ends[18 * chain + 9 + k]];
+}
+
+/* -- two chains at once ------------------------------------------------------------------------- */
+
+/* Each vertex waits for the one before it, but not for those of another chain: a number of each. */
+enum { PAIR = 2 };
+typedef double pair __attribute__((vector_size(8 * PAIR)));
+typedef int64_t choice __attribute__((vector_size(8 * PAIR)));
+
+/* Two chains on the way: what the vertices so far make of the next one, and of the ends. */
+typedef struct {
+  int next, chain[PAIR], vertex[PAIR], last[PAIR], counts[PAIR];
+  pair pivot[9], f[3];
+  pair to[9], from[9], faded, left[9], left_f[3]; /* where there are spikes */
+} chain_fronts;
+
+static inline pair absolute(pair x) { return (pair)((choice)x & INT64_MAX); }
+
+/* Exchange rows of both chains, or of one of them. */
+static inline void exchange(choice which, int columns, pair *x, pair *y)
+{
+  for (int j = 0; j < columns; ++j) {
+    const choice differs = ((choice)x[j] ^ (choice)y[j]) & which;
+    x[j] = (pair)((choice)x[j] ^ differs), y[j] = (pair)((choice)y[j] ^ differs);
+  }
+}
+
+/* Rows [D | B] become [LU | D^-1 B], with the largest pivot of each column, of which LU has the
+ * reciprocal; `swap` takes the order of the rows. */
+static inline void solve_rows(const int columns, pair *row, choice *swap)
+{
+  pair *a = row, *b = row + columns, *c = row + 2 * columns;
+  for (int k = 0; k < 3; ++k) swap[k] = (choice){k, k};
+#define PIVOT(x, y, k, i) do { \
+    const choice larger = (choice)(absolute(y[k]) > absolute(x[k])); \
+    if (larger[0] | larger[1]) { \
+      exchange(larger, columns, x, y); \
+      exchange(larger, 1, (pair *)(swap + k), (pair *)(swap + i)); \
+    } \
+  } while (0)
+  PIVOT(a, b, 0, 1);
+  PIVOT(a, c, 0, 2);
+  a[0] = 1 / a[0]; /* of a singular block not finite, and so all that comes of it */
+  b[0] *= a[0], c[0] *= a[0];
+  for (int j = 1; j < columns; ++j) b[j] -= b[0] * a[j], c[j] -= c[0] * a[j];
+  PIVOT(b, c, 1, 2);
+#undef PIVOT
+  b[1] = 1 / b[1];
+  c[1] *= b[1];
+  for (int j = 2; j < columns; ++j) c[j] -= c[1] * b[j];
+  c[2] = 1 / c[2];
+  for (int j = 3; j < columns; ++j) {
+    c[j] *= c[2];
+    b[j] = (b[j] - b[2] * c[j]) * b[1];
+    a[j] = (a[j] - a[1] * b[j] - a[2] * c[j]) * a[0];
+  }
+}
+
+/* Y -= A X, of `columns` columns out of rows with `far` numbers */
+static inline void subtract_product(const pair *A, const int columns, const int far, const pair *X,
+                                    pair *Y)
+{
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < columns; ++j)
+      Y[columns * i + j] -= A[3 * i] * X[j] + A[3 * i + 1] * X[far + j] + A[3 * i + 2] * X[2 * far + j];
+}
+
+/* The coupling to the left end fades along a chain. Entries whose product with such others is nothing
+ * beside the first ones become zero: arithmetic with numbers that are less than normal takes a hundred
+ * times as long. */
+static inline void drop_faded(pair *block, pair faded)
+{
+  for (int k = 0; k < 9; ++k)
+    block[k] = (pair)((choice)block[k] & (choice)(absolute(block[k]) >= faded));
 }
 
 static inline double largest_entry(const double *block)
@@ -89,125 +126,156 @@ static inline double largest_entry(const double *block)
   return largest;
 }
 
-/* The coupling to the left end fades along a chain. Entries whose product with such others is nothing
- * beside the first ones become zero: arithmetic with numbers that are less than normal takes a hundred
- * times as long. */
-static inline void drop_faded(double *block, double faded)
+static void begin_chain(const chains *c, chain_fronts *at, int lane, int chain)
 {
-  for (int k = 0; k < 9; ++k)
-    if (fabs(block[k]) < faded) block[k] = 0;
-}
-
-/* A chain on the way: what the vertices so far make of the next one, and of the ends. */
-typedef struct {
-  int chain, vertex;
-  double pivot[9], to[9], from[9], faded;
-  double ends[36], f[3], end_f[6];
-} chain_front;
-
-static inline void begin_chain(const chains *c, int chain, chain_front *at)
-{
-  memset(at, 0, sizeof *at);
-  at->chain = chain, at->vertex = c->first[chain];
-  read_block(c, at->vertex, 1, at->pivot);
+  const int v = c->first[chain];
+  double block[9], from[9];
+  at->chain[lane] = chain, at->vertex[lane] = v, at->last[lane] = c->first[chain + 1] - 1;
+  read_block(c, v, 1, block);
+  for (int k = 0; k < 9; ++k) at->pivot[k][lane] = block[k];
+  for (int k = 0; k < 3; ++k) at->f[k][lane] = at->left_f[k][lane] = 0;
+  at->faded[lane] = 0;
+  for (int k = 0; k < 9; ++k) at->to[k][lane] = at->from[k][lane] = at->left[k][lane] = 0;
   if (!c->spike[chain]) return;
-  read_block(c, at->vertex, 0, at->to);
-  for (int k = 0; k < 9; ++k) at->from[k] = c->data[c->from_ends[18 * chain + k]];
-  at->faded = 0x1p-511 * fmin(largest_entry(at->to), largest_entry(at->from));
-}
-
-/* The next vertex of a chain, and its part of the right-hand side b; without a spike nothing couples
- * to a left end. */
-static inline void eliminate_vertex(const chains *c, chain_front *at, const double *b, const int spike)
-{
-  const int v = at->vertex++;
-  double below[9], after[9], *pivot = at->pivot, *to_next = c->to_next + BLOCK * v, *f = c->f + 3 * v;
-  int32_t *swap = c->swaps + 3 * v;
-  factor_block(pivot, swap);
-  memcpy(c->pivots + BLOCK * v, pivot, sizeof at->pivot);
-  read_block(c, v, 2, after);
-  read_below(c, at->chain, v, below);
-  solve_block(pivot, swap, 3, after, to_next);
-  for (int r = 0; r < 3; ++r) at->f[r] += b[c->row[3 * v + r]];
-  solve_block(pivot, swap, 1, at->f, f);
-  memset(at->f, 0, sizeof at->f);
-  subtract(below, f, at->f);
-  if (spike) {
-    double *sides = c->sides + SIDES * v, next_to[9] = {0}, next_from[9] = {0};
-    memcpy(sides + FROM_LEFT, at->from, sizeof at->from);
-    solve_block(pivot, swap, 3, at->to, sides + TO_LEFT);
-    subtract(at->from, f, at->end_f);
-    subtract_product(at->from, sides + TO_LEFT, at->ends);
-    subtract_product(below, sides + TO_LEFT, next_to);
-    subtract_product(at->from, to_next, next_from);
-    memcpy(at->to, next_to, sizeof at->to);
-    memcpy(at->from, next_from, sizeof at->from);
-    drop_faded(at->to, at->faded);
-    drop_faded(at->from, at->faded);
-  }
-  if (v + 1 < c->first[at->chain + 1]) read_block(c, v + 1, 1, pivot);
-  else memset(pivot, 0, sizeof at->pivot);
-  subtract_product(below, to_next, pivot);
+  read_block(c, v, 0, block);
+  for (int k = 0; k < 9; ++k) from[k] = c->data[c->from_ends[18 * chain + k]];
+  for (int k = 0; k < 9; ++k) at->to[k][lane] = block[k], at->from[k][lane] = from[k];
+  at->faded[lane] = 0x1p-511 * fmin(largest_entry(block), largest_entry(from));
 }
 
 /* What a chain makes of the blocks of its ends, left-left, left-right, right-left and right-right, and
  * of the right-hand side there. */
-static inline void end_chain(const chains *c, chain_front *at)
+static void end_chain(const chains *c, const chain_fronts *at, int lane)
 {
-  const int32_t *places = c->places + 36 * at->chain, *numbers = c->ends + 6 * at->chain;
-  if (c->spike[at->chain]) {
-    memcpy(at->ends + 9, at->from, sizeof at->from);
-    memcpy(at->ends + 18, at->to, sizeof at->to);
-  }
-  memcpy(at->ends + 27, at->pivot, sizeof at->pivot);
-  memcpy(at->end_f + 3, at->f, sizeof at->f);
-  for (int k = 0; k < 36; ++k) c->left_data[places[k]] += at->ends[k];
-  for (int k = 0; k < 6; ++k) c->left_f[numbers[k]] += at->end_f[k];
-}
-
-static inline int to_go(const chains *c, const chain_front *at)
-{
-  return c->first[at->chain + 1] - at->vertex;
-}
-
-/* Two chains at once: each vertex waits for the one before it, but not for those of the other chain. */
-static inline void eliminate_pair(const chains *c, chain_front *one, chain_front *other, const double *b,
-                                  const int spike)
-{
-  int both = to_go(c, one) < to_go(c, other) ? to_go(c, one) : to_go(c, other);
-  for (; both > 0; --both) {
-    eliminate_vertex(c, one, b, spike);
-    eliminate_vertex(c, other, b, spike);
+  const int chain = at->chain[lane];
+  const int32_t *places = c->places + 36 * chain, *numbers = c->ends + 6 * chain;
+  const pair *blocks[] = {at->left, at->from, at->to, at->pivot};
+  for (int i = 0; i < 4; ++i)
+    for (int k = 0; k < 9; ++k) c->left_data[*places++] += blocks[i][k][lane];
+  for (int k = 0; k < 3; ++k) {
+    c->left_f[numbers[k]] += at->left_f[k][lane];
+    c->left_f[numbers[3 + k]] += at->f[k][lane];
   }
 }
 
-static void eliminate_rest(const chains *c, chain_front *at, const double *b)
+/* The block of a vertex of each chain with the one before (0), itself (1) or the one after (2), into
+ * rows with `far` numbers */
+static inline void read_blocks(const chains *c, const int *vertex, int neighbour, const int far,
+                               pair *block)
 {
-  if (c->spike[at->chain])
-    while (to_go(c, at)) eliminate_vertex(c, at, b, 1);
-  else
-    while (to_go(c, at)) eliminate_vertex(c, at, b, 0);
-  end_chain(c, at);
+  for (int r = 0; r < 3; ++r) {
+    const double *row[PAIR];
+    const uint8_t *order[PAIR];
+    for (int l = 0; l < PAIR; ++l) {
+      row[l] = c->data + c->indptr[c->row[3 * vertex[l] + r]];
+      order[l] = c->order + 9 * vertex[l] + 3 * neighbour;
+    }
+    for (int k = 0; k < 3; ++k) block[far * r + k] = (pair){row[0][order[0][k]], row[1][order[1][k]]};
+  }
+}
+
+/* The next vertex of each chain, and its part of the right-hand side b; without a spike nothing couples
+ * to a left end. */
+static inline void eliminate_vertices(const chains *c, chain_fronts *at, const double *b,
+                                      const int spike)
+{
+  /* rows of [pivot | f | after | to] */
+  enum { F = 3, AFTER = 4, TO = 7 };
+  const int far = spike ? 10 : 7;
+  pair row[3 * 10], below[9];
+  choice swap[3];
+  for (int r = 0; r < 3; ++r) {
+    pair b_r;
+    for (int l = 0; l < PAIR; ++l) b_r[l] = b[c->row[3 * at->vertex[l] + r]];
+    for (int k = 0; k < 3; ++k) row[far * r + k] = at->pivot[3 * r + k];
+    row[far * r + F] = at->f[r] + b_r;
+    if (spike)
+      for (int k = 0; k < 3; ++k) row[far * r + TO + k] = at->to[3 * r + k];
+  }
+  read_blocks(c, at->vertex, 2, far, row + AFTER);
+  solve_rows(far, row, swap);
+  for (int l = 0; l < PAIR; ++l) {
+    const int v = at->vertex[l];
+    double *pivot = c->pivots + BLOCK * v, *to_next = c->to_next + BLOCK * v, *f = c->f + 3 * v;
+    for (int r = 0; r < 3; ++r) {
+      c->swaps[3 * v + r] = (int32_t)swap[r][l];
+      f[r] = row[far * r + F][l];
+      for (int k = 0; k < 3; ++k) {
+        pivot[3 * r + k] = row[far * r + k][l];
+        to_next[3 * r + k] = row[far * r + AFTER + k][l];
+      }
+    }
+    if (!spike) continue;
+    double *sides = c->sides + SIDES * v;
+    for (int r = 0; r < 3; ++r)
+      for (int k = 0; k < 3; ++k) {
+        sides[FROM_LEFT + 3 * r + k] = at->from[3 * r + k][l];
+        sides[TO_LEFT + 3 * r + k] = row[far * r + TO + k][l];
+      }
+  }
+  if (at->vertex[0] < at->last[0] && at->vertex[1] < at->last[1]) {
+    const int next[PAIR] = {at->vertex[0] + 1, at->vertex[1] + 1};
+    read_blocks(c, next, 0, 3, below);
+    read_blocks(c, next, 1, 3, at->pivot);
+  } else {
+    double below_l[9], pivot_l[9];
+    for (int l = 0; l < PAIR; ++l) {
+      read_below(c, at->chain[l], at->vertex[l], below_l);
+      memset(pivot_l, 0, sizeof pivot_l);
+      if (at->vertex[l] < at->last[l]) read_block(c, at->vertex[l] + 1, 1, pivot_l);
+      for (int k = 0; k < 9; ++k) below[k][l] = below_l[k], at->pivot[k][l] = pivot_l[k];
+    }
+  }
+  for (int l = 0; l < PAIR; ++l) ++at->vertex[l];
+  memset(at->f, 0, sizeof at->f);
+  subtract_product(below, 1, far, row + F, at->f);
+  subtract_product(below, 3, far, row + AFTER, at->pivot);
+  if (!spike) return;
+  pair to[9] = {0}, from[9] = {0};
+  subtract_product(at->from, 1, far, row + F, at->left_f);
+  subtract_product(at->from, 3, far, row + TO, at->left);
+  subtract_product(below, 3, far, row + TO, to);
+  subtract_product(at->from, 3, far, row + AFTER, from);
+  drop_faded(to, at->faded);
+  drop_faded(from, at->faded);
+  memcpy(at->to, to, sizeof to);
+  memcpy(at->from, from, sizeof from);
+}
+
+static inline int to_go(const chain_fronts *at, int lane)
+{
+  return at->last[lane] - at->vertex[lane] + 1;
+}
+
+/* The next chain; where none is left, the other one again, which changes nothing. */
+static void take_chain(const chains *c, chain_fronts *at, int lane)
+{
+  at->counts[lane] = at->next < c->chains;
+  begin_chain(c, at, lane, at->counts[lane] ? at->next++ : at->chain[1 - lane]);
 }
 
 /* Eliminate all vertices from the matrix, and from the right-hand side b: what is left is what stays
  * as it is, and what the chains make of their ends. */
 void eliminate(const chains *c, const double *b)
 {
-  chain_front one, other;
   memset(c->left_data, 0, c->left * sizeof *c->left_data);
   memset(c->left_f, 0, c->left_size * sizeof *c->left_f);
   for (int k = 0; k < c->stay; ++k) c->left_data[c->place[k]] = c->data[c->entry[k]];
   for (int k = 0; k < c->rows; ++k) c->left_f[c->number[k]] = b[c->dof[k]];
-  for (int chain = 0; chain < c->chains; chain += 2) {
-    begin_chain(c, chain, &one);
-    if (chain + 1 < c->chains) {
-      begin_chain(c, chain + 1, &other);
-      if (c->spike[chain] && c->spike[chain + 1]) eliminate_pair(c, &one, &other, b, 1);
-      else if (!c->spike[chain] && !c->spike[chain + 1]) eliminate_pair(c, &one, &other, b, 0);
+  chain_fronts at = {.next = 0};
+  if (c->chains)
+    for (int l = 0; l < PAIR; ++l) take_chain(c, &at, l);
+  for (int ended = 0; ended < c->chains;) {
+    int both = to_go(&at, 0) < to_go(&at, 1) ? to_go(&at, 0) : to_go(&at, 1);
+    if (c->spike[at.chain[0]] || c->spike[at.chain[1]])
+      for (; both; --both) eliminate_vertices(c, &at, b, 1);
+    else
+      for (; both; --both) eliminate_vertices(c, &at, b, 0);
+    for (int l = 0; l < PAIR; ++l) {
+      if (to_go(&at, l)) continue;
+      if (at.counts[l]) end_chain(c, &at, l), ++ended;
+      take_chain(c, &at, l);
     }
-    eliminate_rest(c, &one, b);
-    if (chain + 1 < c->chains) eliminate_rest(c, &other, b);
   }
 }
 
@@ -222,7 +290,7 @@ void reduce(const chains *c, const double *b)
     for (int v = c->first[chain]; v < c->first[chain + 1]; ++v) {
       double *f = c->f + 3 * v;
       for (int r = 0; r < 3; ++r) next[r] += b[c->row[3 * v + r]];
-      solve_block(c->pivots + BLOCK * v, c->swaps + 3 * v, 1, next, f);
+      solve_block(c->pivots + BLOCK * v, c->swaps + 3 * v, next, f);
       read_below(c, chain, v, below);
       memset(next, 0, sizeof next);
       subtract(below, f, next);

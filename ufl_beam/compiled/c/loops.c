@@ -219,28 +219,52 @@ double step_of_nodes(int size, int rotations, const int32_t *rotation, double *s
   return largest;
 }
 
+/* tan(x/2) for the increment x of rotation k: forces and their tangent are asked at the same. */
+static inline double half_tangent(const step_product *p, int k, double x)
+{
+  if (p->turn[k] != x) p->turn[k] = x, p->half[k] = tan(x / 2);
+  return p->half[k];
+}
+
 /* r += A (factor s - back v), where s is the step of the nodes from q0 to q */
 void add_step_force(void *self, const double *q, double *r)
 {
   const step_product *p = self;
   double *s = p->space;
-  step_of_nodes(p->size, p->rotations, p->rotation, s, p->q0, q);
+  for (int i = 0; i < p->size; ++i) s[i] = q[i] - p->q0[i];
+  for (int k = 0; k < p->rotations; ++k) {
+    double *x = s + p->rotation[k];
+    *x = 2 * half_tangent(p, k, *x);
+  }
   for (int i = 0; i < p->size; ++i) s[i] = p->factor * s[i] - p->back * p->v[i];
   add_product(p->size, p->indptr, p->indices, p->data, s, r);
 }
 
-/* tangent += factor A, column by column times the derivative 1 + half^2 of the step of the nodes */
-void add_step_tangent(void *self, const double *q, double *tangent)
+/* The derivatives, over those of q - q0, of the step of the nodes times the factor: factor (1 + half^2) */
+static void find_growth(const step_product *p, const double *q)
 {
-  const step_product *p = self;
   double *growth = p->space;
   for (int i = 0; i < p->size; ++i) growth[i] = p->factor;
   for (int k = 0; k < p->rotations; ++k) {
-    double half = tan((q[p->rotation[k]] - p->q0[p->rotation[k]]) / 2);
-    growth[p->rotation[k]] += p->factor * half * half;
+    const int32_t at = p->rotation[k];
+    const double half = half_tangent(p, k, q[at] - p->q0[at]);
+    growth[at] += p->factor * half * half;
   }
-  for (int k = 0; k < p->indptr[p->size]; ++k)
+}
+
+/* tangent += A, column by column times these derivatives; some of the rows */
+static void add_rows(const step_product *p, int first, int last, double *tangent)
+{
+  const double *growth = p->space;
+  for (int k = p->indptr[first]; k < p->indptr[last]; ++k)
     tangent[p->entry[k]] += p->data[k] * growth[p->indices[k]];
+}
+
+void add_step_tangent(void *self, const double *q, double *tangent)
+{
+  const step_product *p = self;
+  find_growth(p, q);
+  add_rows(p, 0, p->size, tangent);
 }
 
 /* Euclidean norm of w f, also where its squares are too small or too large to have all digits. */

@@ -67,6 +67,7 @@ typedef struct {
   double factor, back;
   const double *v, *q0;
   double *space;
+  double *turn, *half; /* increments of the rotations asked for last, and tangents of their halves */
 } step_product;
 
 void set_cells(const cells *c, const double *q, int at);
@@ -316,7 +317,10 @@ typedef struct {
 typedef struct {
   int size, inner, forces, stiffnesses;
   const call *force;     /* parts of the residual, the inner forces first */
-  const call *stiffness; /* parts of the tangent */
+  const call *stiffness; /* parts of the tangent besides the next two */
+  const step_product *product; /* or none */
+  const cells *cells;          /* or none */
+  const int32_t *indptr;
   double *inner_force;   /* what the inner ones add up to */
   int entries;
   double *tangent;

@@ -17,11 +17,49 @@ void residual(equation *e, const double *q, double *r)
   }
 }
 
+/* Rows of the tangent with nothing in them but the product. */
+static void begin_rows(const equation *e, int first, int last)
+{
+  const int32_t begin = e->indptr[first];
+  memset(e->tangent + begin, 0, (e->indptr[last] - begin) * sizeof *e->tangent);
+  if (e->product) add_rows(e->product, first, last, e->tangent);
+}
+
+/* Cells whose rows the processor still has at hand when the cells add to them. */
+enum { SOME = 128 };
+
+/* The cells from `first` on */
+static cells some_cells(const cells *c, int first)
+{
+  cells some = *c;
+  some.number = c->number - first < SOME ? c->number - first : SOME;
+  some.dofs += (size_t)first * c->of_cell, some.coordinates += (size_t)first * 6;
+  some.w += (size_t)first * c->width, some.row += (size_t)first * c->rows;
+  return some;
+}
+
+/* The product and the cells; rows are begun shortly before cells need them. */
+static void begin_tangent(const equation *e, const double *q)
+{
+  int begun = 0;
+  if (e->product) find_growth(e->product, q);
+  for (int first = 0; e->cells && first < e->cells->number; first += SOME) {
+    cells some = some_cells(e->cells, first);
+    int last = begun;
+    for (int i = 0; i < some.number * some.of_cell; ++i)
+      last = some.dofs[i] < last ? last : some.dofs[i] + 1;
+    begin_rows(e, begun, last);
+    begun = last;
+    add_cells(&some, q, e->tangent);
+  }
+  begin_rows(e, begun, e->size);
+}
+
 /* The tangent at q. What stands on the diagonal has the right dimension and size for what is held;
  * where material that flows freely leaves nothing, what stood there before does as well. */
 void assemble(equation *e, const double *q)
 {
-  memset(e->tangent, 0, e->entries * sizeof *e->tangent);
+  begin_tangent(e, q);
   for (int k = 0; k < e->stiffnesses; ++k)
     e->stiffness[k].add(e->stiffness[k].self, q, e->tangent);
   for (int k = 0; k < e->held; ++k)
@@ -142,9 +180,10 @@ static int verdict(equation *e, const double *q, int iteration)
   const double now = norm(e->size, e->weight, e->residual);
   if (!isfinite(now)) return DIVERGED;
   const double scale = e->loads + norm(e->size, e->weight, e->inner_force);
+  const int nearly = iteration > 1 && now > e->rtol * scale;
   double floor = 0;
-  if (iteration > 1 || e->demands) e->moved = fmin(largest_motion(e->size, e->weight, q), e->scene);
-  if (iteration > 1 && (now > e->rtol * scale || e->demands)) {
+  if (nearly || e->demands) e->moved = fmin(largest_motion(e->size, e->weight, q), e->scene);
+  if (nearly || (iteration > 1 && e->demands)) {
     find_last_digits(e, q, e->space);
     for (int i = 0; i < e->size; ++i) e->space[i] *= e->tangent[e->diagonal[i]];
     floor = 8 * norm(e->size, e->weight, e->space);
