@@ -8,6 +8,7 @@ import numbers
 import os
 import sys
 import warnings
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -169,6 +170,8 @@ def clip(text: str) -> str:
 
 def as_float(value: object) -> float:
     """Convert a real number, also one of NumPy, to ``float``; text and arrays are refused."""
+    if isinstance(value, float | int):
+        return float(value)
     scalar: Any = value
     if getattr(scalar, "ndim", None) == 0:
         scalar = scalar.item()
@@ -255,13 +258,18 @@ def require_function(value: Any, what: str, of: str) -> None:
         raise SceneError(f"{what} = {shorten(value)} must be a function of {of}")
 
 
+@cache
+def _memory() -> int:
+    """Memory of this machine; B."""
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+
+
 def require_memory(cells: int, what: str) -> None:
     """Raise :class:`SceneError` naming ``what`` if so many cells cannot be held in memory.
 
     Each process has the numbering of the whole scene.
     """
-    needed = cells * BYTES_PER_CELL
-    there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    needed, there = cells * BYTES_PER_CELL, _memory()
     if needed > there:
         raise SceneError(
             f"{what} would take {needed / 1e9:.3g} GB of memory; this machine has "

@@ -20,7 +20,7 @@ KEPT = 64
 """Results that are kept of each function."""
 
 LARGEST = 2**16
-"""Bytes of arguments beyond which results are not kept.
+"""Bytes of arguments, or size that they state, beyond which results are not kept.
 
 That are some 500 cells, of which a hundred steps take longer than all of the building.
 """
@@ -39,7 +39,8 @@ def of_structure(function: Callable[..., T]) -> Callable[..., T]:
 
     @wraps(function)
     def call(*arguments: Any) -> T:
-        if sum(getattr(one, "nbytes", 0) for one in arguments) > LARGEST:
+        sizes = (one.nbytes if isinstance(one, np.ndarray) else one for one in arguments)
+        if sum(sizes) > LARGEST:
             return _locked(function(*arguments))
         return kept(*map(_key, arguments))
 

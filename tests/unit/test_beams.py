@@ -8,6 +8,7 @@ import pytest
 
 import ufl_beam as ub
 from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.model.curves import points_along
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0)
 
@@ -156,3 +157,27 @@ def test_interpolation_between_vertices():
     vertices, weights = Grid(ub.Scene([beam])).weights(beam.at(0.3))
     assert list(vertices) == [1, 2]
     assert weights == pytest.approx([0.8, 0.2])
+
+
+def test_points_along_many_curves():
+    """The same to the last digit as one after the other, straight or not."""
+    section = ub.Section(EA=60.0, GA=40.0, EI=30.0)
+    beams = [
+        ub.Beam((0.1, 0.7), (1.3, 0.2), section),
+        ub.Beam.arc((0, 0), 1.0, (0, 1), section),
+        ub.Beam((1.3, 0.2), (0.1, 0.7), section),
+    ]
+    parameters = [np.linspace(0, 1, n) for n in (4, 3, 7)]
+    found = points_along([beam.curve for beam in beams], parameters)
+    expected = [beam.curve(s) for beam, at in zip(beams, parameters, strict=True) for s in at]
+    assert np.array_equal(found, expected)
+    assert points_along([], []).shape == (0, 2)
+
+
+def test_beams_alike_share_their_parameters():
+    section = ub.Section(EA=60.0, GA=40.0, EI=30.0)
+    one, other, divided = (ub.Beam((0, i), (1, i), section, cells=4) for i in range(3))
+    loads = [ub.PointLoad(divided.at(0.3), force=(0.0, -1.0)), ub.PointLoad(one.end, moment=1.0)]
+    grid = Grid(ub.Scene([one, other, divided], loads=loads))
+    assert grid.parameters(one) is grid.parameters(other)
+    assert grid.parameters(divided).tolist() == [0.0, 0.25, 0.3, 0.5, 0.75, 1.0]

@@ -18,6 +18,7 @@ from ufl_beam.discretization.function_spaces import CompiledFields
 from ufl_beam.discretization.partition import Share
 from ufl_beam.dolfinx_compat import VERSION, cpp, fem, line_mesh
 from ufl_beam.mechanics.kinematics import Axis, strain
+from ufl_beam.terms.beams import elastic_forms
 
 SECTION = ub.Section(EA=60.0, GA=40.0, EI=30.0, rhoA=2.0, rhoI=1.0)
 
@@ -329,3 +330,19 @@ def test_matrix_entries_that_do_not_exist_are_refused():
     for beyond in (-1, matrix.size):
         with pytest.raises(ValueError, match="no such entry"):
             matrix.positions(np.array([beyond]), np.array([0]))
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_energies_share_the_values_of_the_force(degree):
+    beam = ub.Beam((0, 0), (1, 0), SECTION, cells=5)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.Gravity()])
+    mesh = ub.Mesh(degree=degree)
+    simulation = ub.Simulation(scene, scheme := ub.Midpoint(alpha=0.1), mesh=mesh)
+    (beams,) = simulation.beams
+    energies = beams._stored, *beams._losses
+    assert all(np.shares_memory(x._packed, beams._force._packed) for x in energies)
+    simulation.step_to(0.01)
+    fields = CompiledFields(simulation.share)
+    own = fields.kernel(elastic_forms(fields.element, scheme).stored, beams._q1)
+    assert beams._stored.value(simulation.q) == pytest.approx(own.value(simulation.q), rel=1e-13)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from ufl_beam.compiled.csr import coupling
+from ufl_beam.compiled.simd_kernels import in_batches
 
 
 @pytest.mark.parametrize("number", [1, 255, 256, 257])
@@ -16,3 +17,34 @@ def test_a_joint_of_many(number):
     expected = np.eye(number + 1, dtype=bool)
     expected[0], expected[:, 0] = True, True
     assert np.array_equal(np.argwhere(expected), np.column_stack([rows, structure.indices]))
+
+
+@pytest.mark.parametrize("size", [1, 30, 200])
+def test_pattern_of_groups(size):
+    """The diagonal and all pairs of a group, in order; a row of 200 is sorted in another way."""
+    random = np.random.default_rng(size)
+    groups = [random.integers(0, size, (n, width)) for n, width in ((20, 3), (0, 4), (5, 7))]
+    hub = np.column_stack([np.zeros(size, dtype=np.int32), random.permutation(size)])
+    structure = coupling(size, *groups, hub.astype(np.int32))
+    expected = np.eye(size, dtype=bool)
+    for group in (row for rows in (*groups, hub) for row in rows):
+        expected[np.ix_(group, group)] = True
+    found = np.column_stack([structure.rows(), structure.indices])
+    assert np.array_equal(np.argwhere(expected), found)
+    assert np.array_equal(structure.diagonal(np.arange(size)), np.flatnonzero(np.equal(*found.T)))
+    some = random.integers(0, size, 4)
+    entries = [np.flatnonzero(found[:, 0] == row) for row in some]
+    assert np.array_equal(structure.entries_of(some), np.concatenate(entries))
+
+
+@pytest.mark.parametrize("lanes", [1, 4])
+@pytest.mark.parametrize("number", [1, 4, 6])
+def test_blocks_of_cells(number, lanes):
+    """Places of all pairs of a cell, as asked for one by one; the last batch is filled up."""
+    dofs = np.random.default_rng(3).permutation(3 * number).reshape(number, 3).astype(np.int32)
+    structure = coupling(3 * number + 1, dofs)
+    one_by_one = structure.positions(np.repeat(dofs, 3, axis=1).ravel(), np.tile(dofs, 3).ravel())
+    expected = in_batches(one_by_one.reshape(number, 9), lanes)
+    assert np.array_equal(structure.blocks(dofs, lanes), expected)
+    with pytest.raises(ValueError, match="no such entry"):
+        structure.blocks(dofs + 1, lanes)

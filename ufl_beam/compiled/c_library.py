@@ -85,6 +85,11 @@ doubles = partial(ffi.from_buffer, ffi.typeof("double[]"))
 """Pointer to a contiguous array of float64; it keeps the array alive."""
 
 
+def first_of(array: Array) -> Any:
+    """Return a pointer to the first number of a view of float64; it keeps the array alive."""
+    return ffi.gc(ffi.cast("double *", array.ctypes.data), lambda _, kept=array: None)
+
+
 _INT32, _INT32_ARRAY = np.dtype(np.int32), ffi.typeof("int32_t[]")
 
 

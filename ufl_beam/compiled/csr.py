@@ -8,7 +8,6 @@ from copy import copy
 from petsc4py import PETSc
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, integers, lib, loop
@@ -26,7 +25,7 @@ class Csr:
     def zeros_like(self) -> Csr:
         """Return a matrix of the same sparsity pattern, which is stored once."""
         other = copy(self)
-        other.data = np.zeros_like(self.data)
+        other.data = np.zeros(len(self.data))  # zeros_like writes them
         return other
 
     @property
@@ -38,12 +37,34 @@ class Csr:
         """Return the row of each entry."""
         return np.repeat(np.arange(self.size, dtype=np.int32), np.diff(self.indptr))
 
+    def entries_of(self, rows: Index) -> Index:
+        """Return the entries of some rows, one row after the other."""
+        first, number = self.indptr[rows].astype(np.int64), np.diff(self.indptr)[rows]
+        before = np.cumsum(number) - number
+        return np.asarray(np.repeat(first - before, number) + np.arange(number.sum()))
+
+    def diagonal(self, rows: Index) -> Index:
+        """Return the entries on the diagonal of some rows."""
+        return self.positions(rows, rows)
+
     def positions(self, rows: Index, columns: Index) -> Index:
         """Find the entries (rows[k], columns[k]) in :attr:`data`; they must exist."""
         found = np.empty(len(rows), dtype=np.int32)
         structure = (self.size, integers(self.indptr), integers(self.indices))
         pairs = [np.ascontiguousarray(x, dtype=np.int32) for x in (rows, columns)]
         if not lib.find_entries(*structure, len(found), *map(integers, (*pairs, found))):
+            raise ValueError("the matrix has no such entry")
+        return found
+
+    def blocks(self, dofs: Index, lanes: int) -> Index:
+        """Find the entries of all pairs of ``dofs``, int32, of each cell, in batches of cells.
+
+        They must exist; (num_batches, pairs, lanes), see :func:`in_batches`.
+        """
+        cells, of_cell = dofs.shape
+        found = np.empty((-(-cells // lanes), of_cell**2, lanes), dtype=np.int32)
+        structure = (self.size, integers(self.indptr), integers(self.indices))
+        if not lib.find_blocks(*structure, cells, of_cell, lanes, *map(integers, (dofs, found))):
             raise ValueError("the matrix has no such entry")
         return found
 
@@ -65,14 +86,19 @@ def coupling(size: int, *coupled: Index) -> Csr:
 @of_structure
 def _pattern(size: int, *coupled: Index) -> tuple[Index, Index]:
     """Column indices and first entries of the rows of :func:`coupling`."""
-    groups = [np.arange(size, dtype=np.int32)[:, None], *coupled]
-    lengths = np.concatenate([np.full(len(rows), rows.shape[1]) for rows in groups])
-    columns = np.concatenate([rows.ravel() for rows in groups]).astype(np.int32)
-    ends = np.append(0, np.cumsum(lengths))
-    parts = csr_array((np.ones(len(columns), np.bool_), columns, ends), shape=(len(lengths), size))
-    matrix = parts.T.tocsr() @ parts
-    matrix.sort_indices()
-    return matrix.indices.astype(np.int32), matrix.indptr.astype(np.int32)
+    none = np.empty(0, dtype=np.int32)
+    lengths = np.concatenate([none, *(np.full(len(x), x.shape[1], np.int32) for x in coupled)])
+    dofs = np.concatenate([none, *(rows.ravel() for rows in coupled)]).astype(np.int32, copy=False)
+    first = np.append(0, np.cumsum(lengths)).astype(np.int32)
+    begin, seen, indptr = np.empty((3, size + 1), dtype=np.int32)
+    space = map(integers, (first, dofs, begin, np.empty_like(dofs), seen, indptr))
+    arguments = size, len(lengths), *space
+    number = lib.find_pattern(*arguments, ffi.NULL)
+    if number < 0:
+        raise ValueError("the matrix has more entries than indices of 32 bits can number")
+    indices = np.empty(number, dtype=np.int32)
+    lib.find_pattern(*arguments, integers(indices))
+    return indices, indptr.copy()
 
 
 def as_slice(index: Index) -> Index | slice:

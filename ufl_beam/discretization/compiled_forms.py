@@ -22,14 +22,11 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import doubles, ffi, fill, kernel, lib
+from ufl_beam.compiled.c_library import doubles, ffi, fill, first_of, kernel, lib
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.jit import compiled_form
 from ufl_beam.compiled.simd_kernels import LANES, in_batches, in_lanes
 from ufl_beam.dolfinx_compat import VERSIONS, fem, line_mesh, pack
-
-SOME = 1024 * LANES
-"""Cells whose entries in a matrix are looked up together."""
 
 
 def vectorise(kernels: Sequence[Kernel], coordinates: Array) -> None:
@@ -118,6 +115,9 @@ class CellForm(Protocol):
     def put(self, function: fem.Function, values: Array) -> None:
         """Give ``function`` other values in the cells; shape (num_cells, dofs per cell)."""
 
+    def share(self, other: Any) -> bool:
+        """Use the values of another form's coefficients, if it can and they are the same."""
+
     def place(self, A: Csr) -> None:
         """Let a bilinear form on the degrees of freedom of the cells add to ``A``."""
 
@@ -149,37 +149,51 @@ class Kernel:
         self._columns, self._entries = ready.columns, ready.entries
         self._dofs = np.ascontiguousarray(cell_dofs, dtype=np.int32)
         self._lanes, self._in_lanes, num_cells = 1, ffi.NULL, len(cell_dofs)
-        packed = np.tile(ready.packed, (num_cells // len(ready.packed), 1))
         spaces = [argument.ufl_function_space() for argument in form.arguments()]
-        if len(spaces) != 1:  # a functional; a matrix until it is placed
-            rows: Index = np.zeros((num_cells, self._entries), dtype=np.int32)
-        elif spaces[0] is unknown.function_space:
-            rows = self._dofs
-        else:
-            rows = np.arange(num_cells * self._entries, dtype=np.int32).reshape(-1, self._entries)
-        expected = (len(packed), (num_cells, self._entries), (num_cells, 2, 3))
-        if expected != (num_cells, rows.shape, coordinates.shape):
+        self._is_vector = len(spaces) == 1
+        self._to_dofs = self._is_vector and spaces[0] is unknown.function_space
+        per_cell = self._dofs.shape[1] if self._to_dofs else self._entries
+        expected = (0, per_cell, (num_cells, 2, 3))
+        if expected != (num_cells % len(ready.packed), self._entries, coordinates.shape):
             raise ValueError(
                 f"a form with {self._entries} entries of a cell, stated on {len(ready.packed)} "
-                f"cells, got rows of {rows.shape} and coordinates of {coordinates.shape}"
+                f"cells, got rows of {(num_cells, per_cell)} and coordinates of "
+                f"{coordinates.shape}"
             )
-        self._packed, self._coordinates, self._rows = (
-            in_batches(x, 1) for x in (packed, coordinates, rows)
-        )
+        self._coordinates = in_batches(coordinates, 1)
         self._at, self._unknowns = 0, 0
         if self.uses(unknown):
             self._at, self._unknowns = self.position(unknown), self._dofs.shape[1]
 
     @cached_property
+    def _packed(self) -> Array:
+        """Values of the coefficients in the cells, in batches."""
+        stated = self._form.packed
+        return in_batches(np.tile(stated, (len(self._dofs) // len(stated), 1)), self._lanes)
+
+    @cached_property
+    def _rows(self) -> Index:
+        """Places of the entries of the cells, in batches; of a matrix see :meth:`place`."""
+        if self._to_dofs:
+            return in_batches(self._dofs, self._lanes)
+        shape = len(self._dofs), self._entries
+        if self._is_vector:
+            places = np.arange(math.prod(shape), dtype=np.int32)
+            return in_batches(places.reshape(shape), self._lanes)
+        return in_batches(np.zeros(shape, dtype=np.int32), self._lanes)
+
+    @cached_property
     def cells(self) -> Any:
         """Argument of ``add_cells`` of loops.h; another one once a method changes its arrays."""
         number, of_cell = self._dofs.shape
+        packed = self._packed
         return fill(
             ffi.new("cells *"),
             tabulate=self._form.tabulate, several=self._in_lanes, lanes=self._lanes,
             number=number, of_cell=of_cell, dofs=self._dofs, unknowns=self._unknowns, at=self._at,
-            width=self._packed.shape[1], w=self._packed, constants=self._form.constants,
-            coordinates=self._coordinates, rows=self._entries, row=self._rows,
+            width=packed.strides[0] // (packed.itemsize * self._lanes), w=first_of(packed),
+            constants=self._form.constants, coordinates=self._coordinates, rows=self._entries,
+            row=self._rows,
         )  # fmt: skip
 
     def _change(self) -> None:
@@ -205,38 +219,34 @@ class Kernel:
         rows = np.broadcast_to(values, (len(self._dofs), columns.stop - columns.start))
         self._packed[:, columns] = in_batches(rows, self._lanes)
 
-    def share(self, other: Kernel) -> None:
-        """Use the packed values of ``other``, a form of the same coefficients."""
-        if self._columns != other._columns or self._lanes != other._lanes:
-            raise ValueError("the forms do not have the same coefficients")
-        self._packed = other._packed
+    def share(self, other: Kernel) -> bool:
+        """Use the packed values of ``other``, if those of this form stand side by side there."""
+        mine, others = self._columns, other._columns
+        shifts = {others[f].start - mine[f].start for f in mine.keys() & others.keys()}
+        if not mine.keys() <= others.keys() or len(shifts) != 1 or self._lanes != other._lanes:
+            return False
+        (first,) = shifts
+        self._packed = other._packed[:, first : first + self._form.packed.shape[1]]
         self._change()
+        return True
 
     def place(self, A: Csr) -> None:
         """Let a bilinear form on the degrees of freedom of the cells add to ``A``."""
         per_cell = self._dofs.shape[1]
         if self._entries != per_cell**2:
             raise ValueError(f"a form of {self._entries} entries on {per_cell} degrees of freedom")
-        lanes, cells = self._lanes, len(self._dofs)
-        self._rows = np.empty((-(-cells // lanes), self._entries, lanes), dtype=np.int32)
-        for begin in range(0, cells, SOME):  # lists of all pairs take more than the matrix
-            dofs = self._dofs[begin : begin + SOME]
-            rows, columns = np.repeat(dofs, per_cell, axis=1), np.tile(dofs, per_cell)
-            positions = A.positions(rows.ravel(), columns.ravel()).reshape(rows.shape)
-            in_order = in_batches(positions, lanes)
-            self._rows[begin // lanes :][: len(in_order)] = in_order
+        self._rows = A.blocks(self._dofs, self._lanes)
         self._change()
 
     def address_in_lanes(self) -> int | None:
         """Return the address of the SIMD loop, or None."""
-        sizes = (self._entries, self._packed.shape[1], len(self._form.constants))
+        sizes = (self._entries, self._form.packed.shape[1], len(self._form.constants))
         return in_lanes(self._form.source, int(ffi.cast("intptr_t", self._form.tabulate)), sizes)
 
     def compute_in_lanes(self, address: int | None, coordinates: Array) -> None:
         """Use the SIMD loop from now on, with coordinates in batches."""
-        self._packed, self._rows = (
-            in_batches(x[:, :, 0], LANES) for x in (self._packed, self._rows)
-        )
+        for name in {"_packed", "_rows"} & vars(self).keys():
+            setattr(self, name, in_batches(getattr(self, name)[:, :, 0], LANES))
         self._in_lanes = ffi.cast("in_lanes *", address)
         self._lanes, self._coordinates = LANES, coordinates
         self._change()

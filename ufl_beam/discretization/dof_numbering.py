@@ -12,6 +12,7 @@ import struct
 from bisect import bisect_left
 from collections.abc import Sequence
 from functools import cache, cached_property
+from typing import Any
 from zlib import crc32
 
 import numpy as np
@@ -20,7 +21,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.errors import SceneError, require_kind, shorten
 from ufl_beam.model.bodies import Anchor, Body, Member, Node, Place, node
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.curves import Straight
+from ufl_beam.model.curves import points_along
 from ufl_beam.model.material_laws import AnySoftening
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.plastic_hinges import place_of
@@ -55,36 +56,37 @@ class Grid:
         require_kind(mesh, Mesh, "mesh")
         self.scene, self.mesh, beams = scene, mesh, scene.beams
         self._number_of_beam: dict[Member, int] = {beam: i for i, beam in enumerate(beams)}
-        self._parameters = [np.array(mesh.vertices(b, scene.attached[b])) for b in beams]
+        self._parameters = self._divide()
         counts = np.array([len(p) for p in self._parameters], dtype=np.int64)
         self.first_vertices = np.concatenate([[0], np.cumsum(counts)])
         self._first_cells = self.first_vertices - np.arange(len(beams) + 1)
-        vertices = self._vertices(counts)
+        vertices = points_along([beam.curve for beam in beams], self._parameters)
         begins = np.ones(len(vertices), dtype=bool)
         begins[self.first_vertices[1:] - 1] = False
         begin = np.flatnonzero(begins)
-        self.cells = np.column_stack([begin, begin + 1])
-        self.beam_of_cell = np.repeat(np.arange(len(beams)), counts - 1)
+        self.beam_of_cell = np.repeat(np.arange(len(beams), dtype=np.int32), counts - 1)
         inner, starts, ends = mesh.nodes[1:-1], vertices[begin], vertices[begin + 1]
         between = starts[:, None] + inner[:, None] * (ends - starts)[:, None]
         self.points = np.concatenate([vertices, between.reshape(-1, 2)])
-        numbers = len(vertices) + np.arange(between[..., 0].size).reshape(between.shape[:2])
+        self.nodes_of_cells: Index = np.empty((len(begin), mesh.degree + 1), dtype=np.int32)
+        self.nodes_of_cells[:, 0], self.nodes_of_cells[:, 1] = begin, begin + 1
+        inside = np.arange(len(vertices), len(self.points))
+        self.nodes_of_cells[:, 2:] = inside.reshape(between.shape[:2])
+        self.cells = self.nodes_of_cells[:, :2]
         self._require_length()
         self._add_hinges([place_of(hinge) for hinge in scene.hinges])
-        self.nodes_of_cells = np.hstack([self.cells, numbers])
         self._number()
 
-    def _vertices(self, counts: Index) -> Array:
-        """Points of the vertices of all beams, ``counts`` of each; (num_vertices, 2); m."""
-        lines = [b.curve if isinstance(b.curve, Straight) else None for b in self.scene.beams]
-        ends = [(*line.a, *line.b) if line else (0.0,) * 4 for line in lines]
-        of_vertices = np.repeat(np.reshape(ends, (-1, 4)), counts, axis=0).T
-        s = np.concatenate([np.empty(0), *self._parameters])
-        points: Array = np.ascontiguousarray((of_vertices[:2] * (1 - s) + of_vertices[2:] * s).T)
-        for i in (i for i, line in enumerate(lines) if line is None):
-            at = slice(*self.first_vertices[i : i + 2])
-            points[at] = [self.scene.beams[i].curve(x) for x in self._parameters[i]]
-        return points
+    def _divide(self) -> list[Array]:
+        """Return the parameters of the vertices of each beam; beams alike have one array."""
+        of_kind: dict[object, Array] = {}
+        found = []
+        for beam, attached in self.scene.attached.items():
+            kind = beam.cells, beam.corners, frozenset(attached) - {0.0, 1.0}
+            if kind not in of_kind:
+                of_kind[kind] = np.array(self.mesh.vertices(beam, attached))
+            found.append(of_kind[kind])
+        return found
 
     def __str__(self) -> str:
         scene = self.scene
@@ -128,10 +130,11 @@ class Grid:
 
         slots = np.arange(3 * (nodes + len(rigid_bodies)))
         shared = slots >= 3 * nodes
-        for (one, component), (other, _) in self.scene.representatives.items():
-            same = 3 * at(other) + component
-            slots[3 * at(one) + component] = same
-            shared[same] = True
+        same = self.scene.representatives.items()
+        pairs = [(3 * at(one) + c, 3 * at(other) + c) for (one, c), (other, _) in same]
+        ones, others = np.reshape(np.array(pairs, dtype=np.int64), (-1, 2)).T
+        slots[ones] = others
+        shared[others] = True
         kept = slots == np.arange(len(slots))
         inner = self.nodes_of_cells[:, 2:]
         position = np.arange(nodes + len(rigid_bodies), dtype=np.float64)
@@ -164,11 +167,12 @@ class Grid:
 
     def _index(self, beam: Member) -> int:
         """Number of a beam of the scene."""
+        number = self._number_of_beam.get(beam)
+        if number is not None:
+            return number
         if not isinstance(beam, Member):
             raise SceneError(f"beam = {shorten(beam)} is not a Beam")
-        if beam not in self._number_of_beam:
-            raise SceneError(f"{beam.name} is not in the scene")
-        return self._number_of_beam[beam]
+        raise SceneError(f"{beam.name} is not in the scene")
 
     def parameters(self, beam: Member) -> Array:
         """Parameters of the vertices of a beam."""
@@ -195,6 +199,15 @@ class Grid:
         start, end, *between = self.nodes_of_cells.T
         along = np.column_stack([start, *between, end])
         return np.stack([along[:, :-1], along[:, 1:]], axis=2).reshape(-1, 2)
+
+    @cached_property
+    def sections(self) -> tuple[list[Any], Index]:
+        """Sections of the beams, each object once, and the number in them of each beam's."""
+        numbers: dict[int, int] = {}
+        of_beams = [numbers.setdefault(id(b.section), len(numbers)) for b in self.scene.beams]
+        of_beam = np.array(of_beams, dtype=np.int32)
+        firsts = np.unique(of_beam, return_index=True)[1]
+        return [self.scene.beams[i].section for i in firsts], of_beam
 
     def lengths(self, cells: Index) -> Array:
         """Lengths of some cells; (len(cells),); m."""
@@ -233,8 +246,13 @@ class Grid:
         """The vertex at a place that something is attached to."""
         if place.beyond:
             return self._beyond[place]
+        i = self._index(place.beam)
+        if place.s == 0.0:
+            return int(self.first_vertices[i])
+        if place.s == 1.0:
+            return int(self.first_vertices[i + 1]) - 1
         cell, part = self._cell_and_part(place)
-        return cell + self._index(place.beam) + round(part)
+        return cell + i + round(part)
 
     def weights(self, place: Place) -> tuple[Index, Array]:
         """Nodes of the cell at a place, vertices first, and their weights there; (degree + 1,)."""

@@ -67,6 +67,10 @@ class DolfinxForm:
         dofs = dofs_of_cells(function.function_space)
         function.x.array[dofs] = np.broadcast_to(values, dofs.shape)[self._order]
 
+    def share(self, other: object) -> bool:
+        """DOLFINx packs the values of each form anew."""
+        return False
+
     def place(self, A: Csr) -> None:
         """Let a bilinear form on the degrees of freedom of the cells add to ``A``."""
         self._A = A

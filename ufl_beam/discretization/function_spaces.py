@@ -121,8 +121,9 @@ class Fields(ABC):
 
     def __init__(self, share: Share, part: Index | None = None) -> None:
         self.share = share
-        whole = part is None or np.array_equal(part, np.arange(len(share.cells)))
-        self.order: Index = np.arange(len(share.cells)) if part is None else part
+        everywhere = np.arange(len(share.cells), dtype=np.int32)
+        whole = part is None or np.array_equal(part, everywhere)
+        self.order: Index = everywhere if part is None else part
         self.cell_dofs = share.cell_dofs if whole else share.cell_dofs[self.order]
         self._matrix: Csr | None = None
         self.element = self._element()
@@ -170,9 +171,10 @@ class Fields(ABC):
         """Numbers of the sections of the cells, for a coefficient of the element."""
         grid = self.share.grid
         names = ("rhoA", "rhoI") if function is self.element.inertia else ("EA", "GA", "EI")
-        of_beam = [[getattr(beam.section, name) for name in names] for beam in grid.scene.beams]
+        sections, of_beam = grid.sections
+        numbers = [[getattr(section, name) for name in names] for section in sections]
         beams = grid.beam_of_cell[self.share.cells[self.order]]
-        return np.array(of_beam).reshape(-1, len(names))[beams]
+        return np.array(numbers).reshape(-1, len(names))[of_beam[beams]]
 
 
 class CompiledFields(Fields):
@@ -184,24 +186,36 @@ class CompiledFields(Fields):
     def kernel(self, form: ufl.Form, unknown: fem.Function) -> Kernel:
         """A form on the cells, compiled."""
         kernel = Kernel(form, unknown, self.cell_dofs, self._coordinates())
-        for function in (self.element.stiffness, self.element.inertia):
-            if kernel.uses(function):
-                kernel.put(function, self.of_sections(function))
+        self._put_sections(kernel)
         return kernel
 
     def hot_kernel(self, form: ufl.Form, unknown: fem.Function) -> Kernel:
         """Kernel that computes several cells at once."""
-        kernel = self.kernel(form, unknown)
-        vectorise([kernel], self._coordinates_in_lanes)
+        (kernel,) = self._several_at_once(unknown, form)
+        self._put_sections(kernel)
         return kernel
 
     def force_and_tangent(self, work: ufl.Form, q1: fem.Function, A: Csr) -> tuple[Kernel, Kernel]:
         """Kernels that share the values of their coefficients."""
-        force, tangent = self.kernel(work, q1), self.kernel(derivative(work, q1), q1)
-        vectorise([force, tangent], self._coordinates_in_lanes)
-        tangent.share(force)
+        force, tangent = self._several_at_once(q1, work, derivative(work, q1))
+        self._put_sections(force)
+        if not tangent.share(force):
+            raise ValueError("force and tangent do not have the same coefficients")
         tangent.place(A)
         return force, tangent
+
+    def _several_at_once(self, unknown: fem.Function, *forms: ufl.Form) -> list[Kernel]:
+        """Kernels that compute several cells at once, all or none; without values of sections."""
+        coordinates = self._coordinates()
+        kernels = [Kernel(form, unknown, self.cell_dofs, coordinates) for form in forms]
+        vectorise(kernels, self._coordinates_in_lanes)
+        return kernels
+
+    def _put_sections(self, kernel: Kernel) -> None:
+        """Give a kernel the numbers of the sections that its form has."""
+        for function in (self.element.stiffness, self.element.inertia):
+            if kernel.uses(function):
+                kernel.put(function, self.of_sections(function))
 
     def _coordinates(self) -> Array:
         """Vertices of the cells; (num_cells, 2, 3); m."""

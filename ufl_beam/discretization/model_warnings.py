@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import chain
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -92,7 +93,7 @@ def _touching(grid: Grid) -> Index:
     near = tree.query_ball_point(points[ends], reach[ends], return_sorted=False)
     counts = np.array([len(one) for one in near])
     end = np.repeat(ends, counts)
-    other = np.concatenate([np.asarray(one, dtype=np.int64) for one in near])
+    other = np.fromiter(chain.from_iterable(near), dtype=np.int64, count=len(end))
     # A beam touches itself where both of its ends meet.
     apart = (beam_of[end] != beam_of[other]) | (np.isin(other, ends) & (end < other))
     gap = np.linalg.norm(points[end] - points[other], axis=1)

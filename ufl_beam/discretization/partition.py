@@ -35,6 +35,8 @@ class _Numbering(Protocol):
     @property
     def rotations(self) -> Index: ...
     @property
+    def sections(self) -> tuple[list[Any], Index]: ...
+    @property
     def dofs_of_links(self) -> Index: ...
     def node(self, anchor: Anchor) -> Index: ...
     def cell(self, place: Place) -> int: ...
@@ -51,21 +53,19 @@ def bisected(points: Array, number: int) -> Index:
 
     Recursive coordinate bisection: across the longer side of their bounding box, again and again.
     """
-    part = np.zeros(len(points), dtype=np.int64)
-
-    def divide(these: Index, first: int, number: int) -> None:
-        if number == 1 or not len(these):
-            part[these] = first
-            return
-        longer = np.ptp(points[these], axis=0).argmax()
-        half = number // 2
-        before, after = np.split(
-            these[np.argsort(points[these, longer], kind="stable")], [len(these) * half // number]
-        )
-        divide(before, first, half)
-        divide(after, first + half, number - half)
-
-    divide(np.arange(len(points)), 0, number)
+    part = np.zeros(len(points), dtype=np.int32)
+    to_divide = [(np.arange(len(points)), 0, number)]
+    while to_divide:
+        these, first, number = to_divide.pop()
+        part[these] = first
+        if number > 1 and len(these):
+            longer = np.ptp(points[these], axis=0).argmax()
+            half = number // 2
+            before, after = np.split(
+                these[np.argsort(points[these, longer], kind="stable")],
+                [len(these) * half // number],
+            )
+            to_divide += [(before, first, half), (after, first + half, number - half)]
     return part
 
 
@@ -92,15 +92,16 @@ class Share:
     def __init__(self, grid: _Numbering, comm: MPI.Intracomm) -> None:
         self.grid = grid
         self.comm, self.alone = comm, comm.size == 1
-        num_cells = len(grid.cells)
         rank_of_cell = bisected(grid.points[grid.cells].mean(axis=1), comm.size)
-        self.cells = np.flatnonzero(rank_of_cell == comm.rank)
-        self._cells_by_rank = np.argsort(rank_of_cell, kind="stable")
-
-        of_cell = grid.dofs[grid.nodes_of_cells].transpose(0, 2, 1)
-        of_cell = of_cell.reshape(num_cells, 3 * (grid.mesh.degree + 1))
+        self._cells_by_rank = np.argsort(rank_of_cell, kind="stable").astype(np.int32)
+        ends = np.searchsorted(rank_of_cell[self._cells_by_rank], np.arange(comm.size + 1))
         owner = np.full(grid.size, comm.size, dtype=np.int32)
-        np.minimum.at(owner, of_cell, rank_of_cell[:, None])
+        for rank in reversed(range(comm.size)):  # the first of those that have it
+            cells = self._cells_by_rank[ends[rank] : ends[rank + 1]]
+            owner[grid.dofs[grid.nodes_of_cells[cells]]] = rank
+        self.cells = self._cells_by_rank[ends[comm.rank] : ends[comm.rank + 1]]
+        of_cell = grid.dofs[grid.nodes_of_cells[self.cells]].transpose(0, 2, 1)
+        of_cell = of_cell.reshape(len(self.cells), 3 * (grid.mesh.degree + 1))
         of_hinge, cell_of_hinge = grid.dofs[grid.vertices_at_hinges], grid.cells_at_hinges
         np.minimum.at(owner, of_hinge, rank_of_cell[cell_of_hinge][:, None])
         of_link = grid.dofs_of_links
@@ -112,17 +113,18 @@ class Share:
         self._global = np.empty(grid.size, dtype=np.int32)
         self._global[order] = np.arange(grid.size, dtype=np.int32)
 
-        own = np.flatnonzero(owner == comm.rank)
-        at_hinges = of_hinge[rank_of_cell[cell_of_hinge] == comm.rank].ravel()
-        of_links = of_link[self.links].ravel()
-        touched = np.unique(np.r_[own, of_cell[self.cells].ravel(), at_hinges, of_links])
-        mine = owner[touched] == comm.rank
-        self.dofs = np.concatenate([touched[mine], touched[~mine]])
-        self.num_owned = int(mine.sum())
+        own = owner == comm.rank
+        ghost = np.zeros(grid.size, dtype=bool)
+        ghost[of_cell] = True
+        ghost[of_hinge[rank_of_cell[cell_of_hinge] == comm.rank]] = True
+        ghost[of_link[self.links]] = True
+        ghost &= ~own
+        self.dofs = np.concatenate([np.flatnonzero(x).astype(np.int32) for x in (own, ghost)])
+        self.num_owned = int(own.sum())
         self.ghosts = self._global[self.dofs[self.num_owned :]]
         self._local = np.full(grid.size, -1, dtype=np.int32)
         self._local[self.dofs] = np.arange(len(self.dofs))
-        self.cell_dofs = self._local[of_cell[self.cells]]
+        self.cell_dofs = self._local[of_cell]
         self.link_dofs = self._local[of_link[self.links]]
         of_body = self._local[grid.dofs_of_bodies]
         self.body_dofs = of_body[(of_body >= 0).all(axis=1)]

@@ -239,19 +239,24 @@ class Representatives(dict[NodeDof, NodeDof]):
 
 def merged(groups: Iterable[Sequence[NodeDof]]) -> Representatives:
     """Find the representatives of components of motion from groups of equal ones."""
-    parent = Representatives()
+    # Numbers in the place of nodes, whose hashes take longer than all the rest.
+    number: dict[Node, int] = {}
+    dofs: dict[int, NodeDof] = {}
+    parent: dict[int, int] = {}
 
-    def root(dof: NodeDof) -> NodeDof:
-        while dof in parent:
-            dof = parent[dof]
-        return dof
+    def root(k: int) -> int:
+        while (above := parent.get(k)) is not None:
+            k = above
+        return k
 
     for group in groups:
-        for other in group[1:]:
-            a, b = root(group[0]), root(other)
+        numbers = [3 * number.setdefault(of, len(number)) + component for of, component in group]
+        dofs.update(zip(numbers, group, strict=True))
+        for other in numbers[1:]:
+            a, b = root(numbers[0]), root(other)
             if a != b:
                 parent[b] = a
-    return Representatives((dof, root(dof)) for dof in parent)
+    return Representatives((dofs[k], dofs[root(above)]) for k, above in parent.items())
 
 
 def node(anchor: Anchor) -> Node:

@@ -92,6 +92,20 @@ def point_of(curve: Curve, s: float, what: str) -> Point:
     return require_vector(point, f"{what}({s:g})")
 
 
+def points_along(curves: Sequence[Curve], parameters: Sequence[Sequence[float] | Array]) -> Array:
+    """Points of several curves at the parameters of each, one after the other; (n, 2); m."""
+    ends = [(*c.a, *c.b) if isinstance(c, Straight) else (0.0,) * 4 for c in curves]
+    counts = [len(s) for s in parameters]
+    s = np.concatenate([np.empty(0), *parameters])
+    of_points = np.repeat(np.reshape(ends, (-1, 4)), counts, axis=0)
+    points: Array = of_points[:, :2] * (1 - s)[:, None] + of_points[:, 2:] * s[:, None]
+    first = np.append(0, np.cumsum(counts, dtype=np.int64))
+    for i, curve in enumerate(curves):
+        if not isinstance(curve, Straight):
+            points[first[i] : first[i + 1]] = [curve(x) for x in parameters[i]]
+    return points
+
+
 # -- tangents and nearest points ---------------------------------------------------------------
 
 

@@ -27,6 +27,8 @@ def plastic_hinges(
     one never opens.
     """
     laws = {place: law for place, law in may_have.items() if law.opens}
+    if not laws:
+        return ()
     same = merged(rigid)
     members: dict[NodeDof, list[Node]] = {}
     for dof in {*same, *same.values()}:

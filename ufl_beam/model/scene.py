@@ -29,7 +29,7 @@ from ufl_beam.model.bodies import (
 )
 from ufl_beam.model.connector_laws import Actuator, Bearing, Coulomb, Motor
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.curves import enclosing_diameter
+from ufl_beam.model.curves import enclosing_diameter, points_along
 from ufl_beam.model.damping import Damping, KelvinVoigt
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.loads import LineLoad, Load, LoadAtPlace, PointLoad, RotatingFrame
@@ -147,11 +147,15 @@ class Scene(Rich):
 
         It is the same in all axes.  A single point is as large as its radius of gyration.
         """
-        points = [b.curve(s) for b in self.beams for s in b.vertices(())]
-        points += [body.center for body in self.bodies]
-        points += [place.point for _, place in self.attachments() if isinstance(place, Spot)]
+        of_kind = {(b.cells, b.corners): b for b in self.beams}  # beams alike have one array
+        vertices = {kind: np.array(b.vertices(())) for kind, b in of_kind.items()}
+        curves = [beam.curve for beam in self.beams]
+        on_beams = points_along(curves, [vertices[b.cells, b.corners] for b in self.beams])
+        others = [body.center for body in self.bodies]
+        others += [place.point for _, place in self.attachments() if isinstance(place, Spot)]
+        points = np.concatenate([on_beams, np.reshape(others, (-1, 2))])
         gyration = [math.sqrt(b.inertia / b.mass) for b in self.bodies if b.mass > 0]
-        return enclosing_diameter(np.array(points)) or max(gyration, default=0.0) or 1.0
+        return enclosing_diameter(points) or max(gyration, default=0.0) or 1.0
 
     @cached_property
     def links(self) -> tuple[Connector, ...]:
@@ -168,8 +172,8 @@ class Scene(Rich):
     @cached_property
     def hinges(self) -> tuple[Connector, ...]:
         """Plastic hinges of zero length: those of beams, and at ends whose section has a hinge."""
-        loaded = [load.place for load in self.moments]
-        rigid = [joint.equal(2) for joint in self.joints if 2 in joint.shared]
+        loaded = (load.place for load in self.moments)
+        rigid = (joint.equal(2) for joint in self.joints if 2 in joint.shared)
         laws = {place: law for beam in self.beams for place, law in beam.hinge_laws.items()}
         return plastic_hinges(laws, rigid, self._bearing_moments(), loaded)
 
@@ -257,10 +261,11 @@ class Scene(Rich):
 
     def _require_together(self, joint: Joint) -> None:
         here, *others = joint.places
-        for other in others:
-            if other in joint.places[: joint.places.index(other)] or other == here:
+        point = here.point
+        for i, other in enumerate(others, start=1):
+            if other in joint.places[:i]:
                 raise SceneError(f"{joint}: the same place twice")
-            gap = math.dist(here.point, other.point)
+            gap = math.dist(point, other.point)
             if joint.meets and gap > 1e-9 * self.size:
                 raise SceneError(
                     f"{joint.kind}: joint ends lie {gap:.6g} m apart: {here} and {other}; "

@@ -177,6 +177,7 @@ class CompiledSteps:
     def _hand_over(self, state: Stepping) -> None:
         c, (q, before, _) = self.c, self._space
         q[:], before[:] = state.q, state.q_before
+        state.q_before = before  # no second array of what C has
         c.q, c.q_before = doubles(q), doubles(before)
         c.t, c.last_dt, c.iterations = state.t, state.last_dt, 0
         if self._path is not None:

@@ -44,7 +44,7 @@ class Convergence:
         self._norm = (share.size, doubles(self._weights))
         self._moves = np.ones(share.size)
         self.leave_out(np.zeros(share.size, dtype=bool))
-        self.diagonal = np.flatnonzero(self._A.rows() == self._A.indices).astype(np.int32)
+        self.diagonal = self._A.diagonal(np.arange(share.size, dtype=np.int32))
         self._at_r, self._at_forces = doubles(self._r), doubles(equation.force)
         self._last_loads: list[Array] = []
         self._loads = 0.0

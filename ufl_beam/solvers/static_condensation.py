@@ -53,7 +53,9 @@ class Chains:
         plain = alone & (np.diff(A.indptr) == 9)
         plain &= np.bincount(A.indices, minlength=A.size) == 9
         inside &= plain[end[:-1]].all(axis=1)
-        inside &= np.isin(np.arange(len(inside)), np.unique(end[:-1, 0], return_index=True)[1])
+        first_of_vertex = np.zeros(len(inside), dtype=bool)
+        first_of_vertex[np.unique(end[:-1, 0], return_index=True)[1]] = True
+        inside &= first_of_vertex
         # Beams side by side may make an end of a chain the middle of another.
         middle = np.zeros(A.size, dtype=bool)
         middle[end[:-1][inside]] = True
@@ -93,7 +95,9 @@ class Chains:
         self.ends = np.hstack([np.where(dead[:, None], right, left), right])
         self.dofs, self.spikes = around[:, 1], ~dead
         around = around.reshape(-1, 9)
-        self.order = np.argsort(np.argsort(around, axis=1), axis=1).astype(np.uint8)
+        self.order = np.zeros(around.shape, dtype=np.uint8)
+        for column in around.T:
+            self.order += around > column[:, None]
 
 
 def _runs(mask: npt.NDArray[np.bool_]) -> tuple[Index, Index, Index]:
@@ -146,9 +150,12 @@ def _what_is_left(A: Csr, number: Index, ends: Index, size: int) -> tuple[Index,
         Its ``indptr`` and ``indices``; entries of ``A`` that stay, where they are in it, and where
         the blocks of the ``ends`` (num_chains, 6) of the chains are.
     """
-    rows, columns, left = A.rows(), A.indices, number >= 0
-    entries = np.flatnonzero(left[rows] & left[columns])
-    keys = number[rows[entries]].astype(np.int64) * size + number[columns[entries]]
+    rows = np.flatnonzero(number >= 0)
+    entries = A.entries_of(rows)
+    row = np.repeat(number[rows], np.diff(A.indptr)[rows])
+    stay = number[A.indices[entries]] >= 0
+    entries, row = entries[stay], row[stay]
+    keys = row.astype(np.int64) * size + number[A.indices[entries]]
     of_ends = ends.astype(np.int64).reshape(-1, 2, 3)
     of_chains = (of_ends[:, :, None, :, None] * size + of_ends[:, None, :, None, :]).ravel()
     all_ = np.unique(np.concatenate([keys, of_chains]))

@@ -59,6 +59,7 @@ class ElasticBeams(OfForms, Cells):
         super().__init__(forms.work, forms.losses, fields, A, ledger, tangent)
         self._fields, self._work_form, self._held = fields, forms.work, 0.0
         self._stored = fields.hot_kernel(forms.stored, self._q1)
+        self._stored.share(self._force)
         if tangent is not None:
             self._of_step.append(tangent)
 

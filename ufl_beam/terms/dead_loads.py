@@ -35,7 +35,7 @@ class DeadLoads(LoadTerm):
         vectors: dict[int, tuple[Load, Array]] = {}
         for load in loads:
             _, vector = vectors.setdefault(id(load.time), (load, np.zeros(share.size)))
-            vector += _forces(load, share)
+            _add_forces(load, share, vector)
         self._vectors = list(vectors.values())
         self._end: Array = self.force
         self._in_c = struct("vector", size=share.size)
@@ -73,6 +73,7 @@ class DeadLoads(LoadTerm):
 
         def enter(q: Array) -> None:
             forces[2] = self._before
+            self._before = forces[2]  # no second array of what C has
             for k in range(len(owners)):
                 c.factors[k] = math.nan
             self._in_c.values = doubles(forces[0])
@@ -117,39 +118,37 @@ class DeadLoads(LoadTerm):
 
 
 @singledispatch
-def _forces(load: Load, share: Share) -> Array:
-    """Nodal forces of a dead load with factor one, consistent with the displacements of cells."""
+def _add_forces(load: Load, share: Share, forces: Array) -> None:
+    """Add the nodal forces of a dead load, consistent with displacements, with factor one."""
     raise TypeError(f"{type(load).__name__} is not a dead load")
 
 
-@_forces.register
-def _(load: PointLoad, share: Share) -> Array:
-    forces = np.zeros(share.size)
+@_add_forces.register
+def _(load: PointLoad, share: Share, forces: Array) -> None:
     if not carries(load.place):
-        return forces  # Scene.links has connectors for it
+        return  # Scene.links has connectors for it
     dofs = share.at(load.place)
     mine = share.owns(dofs)
-    forces[share.local(dofs[mine])] = np.array([*load.force, load.moment])[mine]
-    return forces
+    forces[share.local(dofs[mine])] += np.array([*load.force, load.moment])[mine]
 
 
-@_forces.register
-def _(load: LineLoad, share: Share) -> Array:
+@_add_forces.register
+def _(load: LineLoad, share: Share, forces: Array) -> None:
     here = [beam is load.beam for beam in share.grid.scene.beams]
-    return _along_beams(np.outer(here, [*load.force, load.moment]), share)
+    forces += _along_beams(np.outer(here, [*load.force, load.moment]), share)
 
 
-@_forces.register
-def _(load: Gravity, share: Share) -> Array:
+@_add_forces.register
+def _(load: Gravity, share: Share, forces: Array) -> None:
     scene = share.grid.scene
     rhoA = [beam.section.rhoA for beam in scene.beams]
-    forces = _along_beams(np.outer(rhoA, [*load.acceleration, 0.0]), share)
+    weight = _along_beams(np.outer(rhoA, [*load.acceleration, 0.0]), share)
     heavy = [(one.place, one.mass) for one in scene.masses]
     heavy += [(one.middle, one.mass) for one in scene.bodies]
     for place, mass in heavy:
         g_x, g_y = load.acceleration
-        forces += _forces(PointLoad(place, force=(mass * g_x, mass * g_y)), share)
-    return forces
+        _add_forces(PointLoad(place, force=(mass * g_x, mass * g_y)), share, weight)
+    forces += weight
 
 
 def _along_beams(per_beam: npt.NDArray[Any], share: Share) -> Array:

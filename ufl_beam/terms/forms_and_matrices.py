@@ -33,6 +33,8 @@ class OfForms(Term):
         else:
             self._force, self._tangent = fields.hot_kernel(work, self._q1), tangent
         self._losses = [fields.hot_kernel(form, self._q1) for form in losses]
+        for loss in self._losses:
+            loss.share(self._force)
         self._of_step = [self._force, *self._losses]
         self._A, self._ledger = A, ledger
         if losses:

@@ -33,24 +33,20 @@ from ufl_beam.terms.tangent_derivatives import Cells
 
 def inelastic_cells(share: Share) -> list[tuple[Layout, Index]]:
     """Layouts of material points, and the cells (numbers of the grid) that have them."""
-    grid = share.grid
-    groups: dict[Layout, list[int]] = {}
-    layouts: dict[object, Layout | None] = {}
-    for beam in grid.scene.beams:
-        laws = grid.hinges(beam)
-        for cell, softening in zip(grid.cells_of(beam), laws, strict=True):
-            key = (beam.section, softening)
-            if key not in layouts:
-                layouts[key] = beam.section.layout(softening)
-            layout = layouts[key]
-            if layout is not None and not layout.elastic:
-                if grid.mesh.degree > 1:
-                    raise SceneError(
-                        f"Mesh: degree = {grid.mesh.degree} is for elastic beams, and {beam.name} "
-                        "may yield or break; use degree=1 with more cells, or an elastic section"
-                    )
-                groups.setdefault(layout, []).append(int(cell))
-    return [(layout, np.array(cells)) for layout, cells in groups.items()]
+    grid, groups = share.grid, dict[Layout, list[int]]()
+    sections, of_beam = grid.sections
+    for number, section in enumerate(sections):
+        layout = section.layout(section.hinge)
+        if layout is not None and not layout.elastic:
+            if grid.mesh.degree > 1:
+                beam = grid.scene.beams[int(np.argmax(of_beam == number))]
+                raise SceneError(
+                    f"Mesh: degree = {grid.mesh.degree} is for elastic beams, and {beam.name} "
+                    "may yield or break; use degree=1 with more cells, or an elastic section"
+                )
+            groups.setdefault(layout, []).append(number)
+    of_cell = of_beam[grid.beam_of_cell]
+    return [(layout, np.flatnonzero(np.isin(of_cell, one))) for layout, one in groups.items()]
 
 
 KEPT_WITHOUT_JUMP = np.array([1.0, 1.0, 1.0, 0.0, 1.0, 1.0])

@@ -90,6 +90,8 @@ class RatesInC:
         moving, now, space = self._moving, *self._space
         for k, rate in enumerate((moving.v, moving.v_before, *moving.more), start=V):
             now[k] = rate
+        # No second arrays of what C has; velocities are asked for between its calls.
+        moving.v_before, moving.more = now[V_BEFORE], tuple(now[MORE:])
         for k in range(self.c.number):
             self.c.rate[k], self.c.new_rate[k] = doubles(now[k]), doubles(space[k])
         self.c.last_dt = moving.last_dt

@@ -76,10 +76,10 @@ class Supports:
         self.dofs = np.array(sorted(held), dtype=np.int64)
         self.moving = np.array([dof for dof, *_ in self._motions], dtype=np.int64)
         self._held = as_slice(self.dofs)
-        rows, columns, is_held = A.rows(), A.indices, np.zeros(A.size, dtype=bool)
+        is_held = np.zeros(A.size, dtype=bool)
         is_held[self.dofs] = True
-        zero = is_held[rows] | is_held[columns]
-        self.entries = np.flatnonzero(zero), np.flatnonzero(zero & (rows == columns))
+        of_columns, of_rows = np.flatnonzero(is_held[A.indices]), A.entries_of(self.dofs)
+        self.entries = np.union1d(of_columns, of_rows), A.diagonal(self.dofs)
         self.pivots: Array = np.ones(len(self.dofs))
         self._owned = self.dofs < share.num_owned
         self._acting, self._ledger = scheme.acting, ledger

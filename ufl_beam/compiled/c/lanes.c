@@ -27,7 +27,7 @@ static void add_in_lanes(const cells *c, const double *q, double *b)
     tabulate(e, w, constants, x);
     if (some == LANES) add_batch(c, e, row, LANES, b);
     else add_batch(c, e, row, some, b);
-    w += WIDTH, x += 6, row += ENTRIES * LANES;
+    w += c->width, x += 6, row += ENTRIES * LANES;
   }
 }
 

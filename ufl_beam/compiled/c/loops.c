@@ -99,22 +99,89 @@ void subtract_vector(void *self, const double *q, double *b)
   for (int i = 0; i < a->size; ++i) b[i] -= a->values[i];
 }
 
+/* Where a matrix holds an entry, -1 if nowhere; columns are in order. */
+static inline int32_t find_entry(int rows, const int32_t *indptr, const int32_t *indices, int32_t row,
+                                 int32_t column)
+{
+  if (row < 0 || row >= rows) return -1;
+  const int32_t *at = indices + indptr[row];
+  int32_t number = indptr[row + 1] - indptr[row];
+  if (number == 0) return -1;
+  for (int32_t half = number / 2; number > 1; number -= half, half = number / 2)
+    at += at[half] <= column ? half : 0;
+  return *at == column ? (int32_t)(at - indices) : -1;
+}
+
 /* Where a matrix holds the entries (row, column); whether it has them all. */
 int find_entries(int rows, const int32_t *indptr, const int32_t *indices, int number,
                  const int32_t *row, const int32_t *column, int32_t *found)
 {
-  for (int k = 0; k < number; ++k) {
-    if (row[k] < 0 || row[k] >= rows) return 0;
-    int32_t low = indptr[row[k]], high = indptr[row[k] + 1];
-    while (high - low > 1) { /* columns are in order */
-      const int32_t middle = low + (high - low) / 2;
-      if (indices[middle] <= column[k]) low = middle;
-      else high = middle;
-    }
-    if (low == high || indices[low] != column[k]) return 0;
-    found[k] = low;
+  for (int k = 0; k < number; ++k)
+    if ((found[k] = find_entry(rows, indptr, indices, row[k], column[k])) < 0) return 0;
+  return 1;
+}
+
+/* Where a matrix holds the entries of all pairs of the `of_cell` unknowns of each cell, row by row, in
+ * batches of `lanes` cells, the last of them filled up with the last cell; whether it has them all. */
+int find_blocks(int rows, const int32_t *indptr, const int32_t *indices, int cells, int of_cell,
+                int lanes, const int32_t *dofs, int32_t *found)
+{
+  for (int64_t k = 0; k < (cells + lanes - 1) / lanes * lanes; ++k) {
+    const int32_t *of = dofs + of_cell * (k < cells ? k : cells - 1);
+    int32_t *batch = found + k / lanes * lanes * of_cell * of_cell + k % lanes;
+    for (int i = 0; i < of_cell; ++i)
+      for (int j = 0; j < of_cell; ++j, batch += lanes)
+        if ((*batch = find_entry(rows, indptr, indices, of[i], of[j])) < 0) return 0;
   }
   return 1;
+}
+
+static int in_order(const void *a, const void *b)
+{
+  const int32_t i = *(const int32_t *)a, j = *(const int32_t *)b;
+  return (i > j) - (i < j);
+}
+
+/* The pattern of a matrix that has its diagonal and all pairs of unknowns of each group: group g is
+ * dof[first[g]...first[g + 1]]. `begin` and `group` take the groups of each unknown, `seen` is space.
+ * Fills indptr and, unless it is null, `indices`; the number of entries, -1 where there are too many. */
+int64_t find_pattern(int size, int groups, const int32_t *first, const int32_t *dof, int32_t *begin,
+                     int32_t *group, int32_t *seen, int32_t *indptr, int32_t *indices)
+{
+  int64_t number = 0;
+  for (int i = 0; i <= size; ++i) begin[i] = 0;
+  for (int k = 0; k < first[groups]; ++k) ++begin[dof[k]];
+  for (int i = 0, sum = 0; i <= size; ++i) sum += begin[i], begin[i] = sum;
+  for (int g = groups - 1; g >= 0; --g)
+    for (int k = first[g]; k < first[g + 1]; ++k) group[--begin[dof[k]]] = g;
+  for (int i = 0; i < size; ++i) seen[i] = -1;
+  for (int i = 0; i < size; ++i) {
+    const int64_t start = number;
+    indptr[i] = (int32_t)number;
+    if (indices) indices[number] = i;
+    seen[i] = i, ++number;
+    for (int l = begin[i]; l < begin[i + 1]; ++l)
+      for (int k = first[group[l]]; k < first[group[l] + 1]; ++k)
+        if (seen[dof[k]] != i) {
+          seen[dof[k]] = i;
+          if (indices) indices[number] = dof[k];
+          ++number;
+        }
+    if (number > INT32_MAX) return -1;
+    if (!indices) continue;
+    if (number - start > 64) {
+      qsort(indices + start, number - start, sizeof *indices, in_order);
+      continue;
+    }
+    for (int64_t k = start + 1; k < number; ++k) {
+      const int32_t column = indices[k];
+      int64_t l = k;
+      for (; l > start && indices[l - 1] > column; --l) indices[l] = indices[l - 1];
+      indices[l] = column;
+    }
+  }
+  indptr[size] = (int32_t)number;
+  return number;
 }
 
 /* y += A x */

@@ -22,8 +22,9 @@ void add_calls(void *self, const double *q, double *out);
 
 enum { MOST_ENTRIES = 144 }; /* of the vector or matrix of a cell: 12 unknowns of degree 3 */
 
-/* A compiled form on some cells. w holds the packed coefficients of a cell, `width` of them, of
- * which those from `at` on are the unknowns of the cell, brought up to date on the way.
+/* A compiled form on some cells. w holds the packed coefficients of a cell, of which those from `at`
+ * on are the unknowns of the cell, brought up to date on the way; `width` numbers further are those of
+ * the next one, as the values may be a part of those of another form.
  *
  * Where a form is computed for several cells at once, `several` does what add_cells does, and numbers
  * of cells (w, coordinates, row) come in batches of as many cells: the first number of each of these
@@ -80,6 +81,10 @@ void add_step_force(void *self, const double *q, double *r);
 void add_step_tangent(void *self, const double *q, double *tangent);
 int find_entries(int rows, const int32_t *indptr, const int32_t *indices, int number,
                  const int32_t *row, const int32_t *column, int32_t *found);
+int find_blocks(int rows, const int32_t *indptr, const int32_t *indices, int cells, int of_cell,
+                int lanes, const int32_t *dofs, int32_t *found);
+int64_t find_pattern(int size, int groups, const int32_t *first, const int32_t *dof, int32_t *begin,
+                     int32_t *group, int32_t *seen, int32_t *indptr, int32_t *indices);
 void add_product(int rows, const int32_t *indptr, const int32_t *indices, const double *data,
                  const double *x, double *y);
 double quadratic_form(int rows, const int32_t *indptr, const int32_t *indices, const double *data,
