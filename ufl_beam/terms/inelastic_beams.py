@@ -10,7 +10,7 @@ import numpy as np
 import ufl
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import Loop, doubles, fill, lib, loop, struct
+from ufl_beam.compiled.c_library import Loop, doubles, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import Kernel, stated
 from ufl_beam.discretization.function_spaces import Element, Fields, Strains
@@ -290,16 +290,14 @@ class CompiledInelasticBeams(InelasticBeams):
     def phases(self, times: TimeFunctions) -> Phases | None:
         """Loops over the points."""
         c = struct(
-            "inelastic_term", cells=self._in_c, begins=self._static, dt=self.points.dt,
-            **self.points.entries(self._ledger),
+            "inelastic_term", cells=self._in_c, begins=self._static,
+            **self.points.in_steps(self._ledger),
         )  # fmt: skip
         begin = [*beginning((self._force, self._tangent), self._q0), loop("begin_inelastic", c)]
 
         def leave(q: Array) -> None:
             self._q = q
 
-        if self._static:
-            fill(c, copy=self.points.copy())
         ends = [loop("accept_inelastic", c)], [loop("add_energy_of_points", c)]
         over = self.over if self.points.softens else None
         return Phases(begin, *ends, loop("change_of_points", c), self._start_at, leave, over)

@@ -468,11 +468,16 @@ typedef struct {
   int dt_of_law;       /* where a rigid-plastic law has the step */
   int32_t *way_before; /* of rigid-plastic ones, after the last step */
   double hardened, loss; /* stored by rigid-plastic ones; part of what backward Euler loses */
-  inelastic_term points; /* of springs: entries of the ledger */
+  const inelastic_term *points; /* of springs: entries of the ledger */
 } coupling_term;
 
-/* Energy that a term would store and dissipate in a step to q1. */
-typedef double (change_of_energy)(void *self, const double *q1);
+/* Energy stored and dissipated in a step, and the sum of the sizes of the works on connectors. */
+typedef struct {
+  double in_beams, in_connectors, effort;
+} energy_change;
+
+/* Adds the part of a term in a step to q1. */
+typedef void (change_of_energy)(void *self, const double *q1, energy_change *sum);
 typedef struct {
   change_of_energy *of;
   void *self;
@@ -539,7 +544,8 @@ void add_energy_of_points(void *self, const time_step *step, const double *q1, c
 void begin_couplings(void *self, const time_step *step, const double *q1, const double *s);
 void accept_couplings(void *self, const time_step *step, const double *q1, const double *s);
 void add_energy_of_couplings(void *self, const time_step *step, const double *q1, const double *s);
-double change_of_form(void *self, const double *q1);
-double change_of_points(void *self, const double *q1);
+void change_of_form(void *self, const double *q1, energy_change *sum);
+void change_of_points(void *self, const double *q1, energy_change *sum);
+void change_of_couplings(void *self, const double *q1, energy_change *sum);
 double value_at(const time_function *f, double t);
 int take_steps(march *m, int steps, const double *ends, double seconds, int keeps, double *rows);

@@ -48,10 +48,10 @@ void add_values(void *self, const time_step *step, const double *q1, const doubl
   *f->entry += f->held = value_of_cells(f->form, q1);
 }
 
-double change_of_form(void *self, const double *q1)
+void change_of_form(void *self, const double *q1, energy_change *sum)
 {
   const form_value *f = self;
-  return value_of_cells(f->form, q1) - f->held;
+  sum->in_beams += value_of_cells(f->form, q1) - f->held;
 }
 
 void begin_static_tangent(void *self, const time_step *step, const double *q1, const double *s)
@@ -238,7 +238,7 @@ void begin_couplings(void *self, const time_step *step, const double *q1, const 
   const coupling_term *t = self;
   const couplings *c = t->links;
   const rigid_plastic *p = c->rigid_plastic;
-  if (c->points) begin_points(c->points, t->points.dt, step->dt);
+  if (c->points) begin_points(c->points, t->points->dt, step->dt);
   for (int i = 0; p && i < p->number; ++i) {
     p->w[i * p->width + t->dt_of_law] = step->dt;
     p->way[i] = t->way_before[i];
@@ -251,18 +251,17 @@ void accept_couplings(void *self, const time_step *step, const double *q1, const
   const couplings *c = t->links;
   commit_couplings(c, q1, step->dt);
   if (c->points) {
-    for (int i = 0; i < c->number; ++i) c->points->e1[3 * i] = c->e1[i];
-    respond(c->points);
+    respond_springs(c);
     commit(c->points);
-    enter_losses(&t->points, c->points->sum);
+    enter_losses(t->points, c->points->sum);
   }
   if (c->rigid_plastic) {
     double sums[3];
     const rigid_plastic *p = c->rigid_plastic;
     commit_rigid_plastic(p, c->e1, sums);
     for (int i = 0; i < p->number; ++i) t->way_before[i] = p->way[i] * p->slipped[i];
-    *t->points.hinges += sums[0];
-    if (t->points.numerical) *t->points.numerical += t->loss * sums[1];
+    *t->points->hinges += sums[0];
+    if (t->points->numerical) *t->points->numerical += t->loss * sums[1];
     t->hardened = sums[2];
   }
 }
@@ -270,23 +269,44 @@ void accept_couplings(void *self, const time_step *step, const double *q1, const
 void add_energy_of_couplings(void *self, const time_step *step, const double *q1, const double *s)
 {
   const coupling_term *t = self;
-  if (t->links->points) enter_stored(&t->points, t->links->points->sum);
-  if (t->links->rigid_plastic && t->points.hardening) *t->points.hardening += t->hardened;
+  if (t->links->points) enter_stored(t->points, t->links->points->sum);
+  if (t->links->rigid_plastic && t->points->hardening) *t->points->hardening += t->hardened;
 }
 
-/* What the end of the step would add to what points have stored and dissipated; see Points.change. */
-double change_of_points(void *self, const double *q1)
+/* What the latest response would add to what points have stored and dissipated; see Points.change. */
+static double change_by_response(const points *p, points *copy)
 {
-  const inelastic_term *t = self;
-  const points *p = t->cells->points;
-  points *copy = t->copy;
-  respond_at(t->cells, q1);
   memcpy(copy->w, p->w, (size_t)p->cells * p->of_cell * p->width * sizeof *p->w);
   memcpy(copy->e0, p->e0, 3 * (size_t)p->cells * sizeof *p->e0);
   memcpy(copy->kept, p->kept, POINT_KEPT * (size_t)p->cells * sizeof *p->kept);
   commit(copy);
   const double *after = copy->sum, *before = p->sum;
   return after[0] + after[1] + (after[3] - before[3]) + (after[4] - before[4]) + after[5] + after[6];
+}
+
+void change_of_points(void *self, const double *q1, energy_change *sum)
+{
+  const inelastic_term *t = self;
+  respond_at(t->cells, q1);
+  sum->in_beams += change_by_response(t->cells->points, t->copy);
+}
+
+void change_of_couplings(void *self, const double *q1, energy_change *sum)
+{
+  const coupling_term *t = self;
+  const couplings *c = t->links;
+  double taken = 0;
+  find_motions(c, q1);
+  for (int i = 0; i < c->number; ++i) {
+    const double work = taken_by(c, i, q1);
+    taken += work;
+    sum->effort += fabs(work);
+  }
+  if (c->points) {
+    respond_springs(c);
+    taken = change_by_response(c->points, t->points->copy);
+  }
+  sum->in_connectors += taken;
 }
 
 /* -- the step ------------------------------------------------------------------------------------ */
@@ -345,12 +365,13 @@ static int followed(const march *m)
   const static_path *p = m->path;
   equation *e = m->equation;
   const double a = p->weight_of_before;
-  double far = 0, work = 0, change = 0, through = 0, round_off = 0;
+  energy_change sum = {0};
+  double far = 0, work = 0, through = 0, round_off = 0;
   for (int i = 0; i < m->size; ++i)
     if (!(fabs(m->s[i]) * p->per_far[i] <= far)) far = fabs(m->s[i]) * p->per_far[i];
   if (!(far <= p->far)) return 0;
   if (isinf(p->slack)) return 1;
-  for (int k = 0; k < p->terms; ++k) change += p->change[k].of(p->change[k].self, m->x);
+  for (int k = 0; k < p->terms; ++k) p->change[k].of(p->change[k].self, m->x, &sum);
   for (int i = 0; i < m->size; ++i)
     work += (a * p->force[i] + (1 - a) * e->inner_force[i]) * m->s[i];
   e->moved = fmin(largest_motion(e->size, e->weight, m->x), e->scene);
@@ -359,7 +380,9 @@ static int followed(const march *m)
     round_off += fabs(e->tangent[e->diagonal[i]] * e->space[i] * m->s[i]);
   for (int k = 0; k < p->accounts; ++k)
     for (int i = 0; i < p->entries[k]; ++i) through += fabs(p->account[k][i]);
-  const double slack = p->slack * (fabs(work) + fabs(change)) + round_off + DBL_MIN;
+  const double change = sum.in_beams + sum.in_connectors;
+  const double size = fabs(work) + fabs(sum.in_beams) + sum.effort;
+  const double slack = p->slack * size + round_off + DBL_MIN;
   return fabs(work - change) <= slack + p->kink * through;
 }
 
