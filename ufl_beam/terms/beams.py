@@ -66,12 +66,12 @@ class ElasticBeams(OfForms, Cells):
         """Remember the configuration at the beginning."""
         super().begin(step)
         if self._static is not None:
-            self._static.begin(step.q0)
+            self._static.predicted.begin(step.q0)
 
     def restart(self, tangents: Tangents) -> None:
         """Begin to iterate anew, with tangents of this kind."""
         if self._static is not None:
-            self._static.restart(tangents)
+            self._static.predicted.restart(tangents)
 
     def loops(self) -> tuple[Loop, Loop | None]:
         """C loops over the cells, of force and tangent."""
@@ -82,7 +82,7 @@ class ElasticBeams(OfForms, Cells):
         """Loops over the cells."""
         begin, accept = self._loops_of_step()
         if self._static is not None:
-            begin.append(self._static.beginning())
+            begin.append(self._static.predicted.beginning())
         state = entering(self._stored, self._ledger.state.pointer("stored"))
         c: Any = state[1]
 

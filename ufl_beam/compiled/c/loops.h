@@ -43,14 +43,21 @@ struct cells {
   const int32_t *row;
 };
 
-/* Tangent of a static step, see static_tangents.py. */
+/* Strains whose forces the tangents of a static step have, see static_tangents.py. */
 typedef struct {
-  const cells *strains, *tangent; /* strains linear about a configuration; tangent that takes them */
-  int at_about, at_e;             /* where they have the configuration, and the strains */
+  const cells *strains;           /* linear about a configuration */
+  int at_about;                   /* where they have it */
   int size, of_cell;              /* of_cell: strains of a cell */
   const double *weight, *q0;      /* of each strain of a cell; beginning of the step */
   int begins, exact;              /* the first forces are those at q0; all are those at the iterate */
-  double *about, *change, *e;     /* configuration of the latest tangent; space */
+  double *about, *change, *e;     /* configuration of the latest tangent; space; the strains */
+} predicted_strains;
+
+/* Tangent of elastic cells in a static step. */
+typedef struct {
+  predicted_strains *predicted;
+  const cells *tangent;
+  int at_e; /* where it has the strains */
 } static_tangent;
 
 typedef struct {
@@ -73,6 +80,7 @@ void add_cells(void *self, const double *q, double *b);
 double value_of_cells(const cells *c, const double *q);
 void combine(int size, double a, const double *x, double b, const double *y, double *out);
 void extrapolate(int size, const double *x, const double *y, double ratio, double *out);
+void predict_strains(predicted_strains *p, const double *q);
 void add_static_tangent(void *self, const double *q, double *tangent);
 void subtract_vector(void *self, const double *q, double *b);
 void add_step_force(void *self, const double *q, double *r);
@@ -136,6 +144,7 @@ typedef struct {
    * see follow_prediction. */
   double *line, *predicted;
   int predicts;
+  const double *linear; /* in statics: strains of cells that the last tangent predicts; or none */
   double *unlike; /* largest (N, V, M) of a point in the latest response that its strain has not */
 } points;
 
@@ -145,7 +154,9 @@ typedef struct {
   points *points;
   const cells *strains, *force, *tangent;
   int at_r, at_b, at_D; /* where the coefficients of `force` and `tangent` have r, b and D */
-  int size, begins;
+  predicted_strains *predicted; /* in statics; or none */
+  double *forces, *last_b, *last_D; /* of the tangent, in statics; b and D about the latest one */
+  int size;
   double scene;   /* size */
   double *latest; /* the unknowns that the points responded to */
 } inelastic;
@@ -456,7 +467,6 @@ typedef struct {
 /* Cells with material points, and entries of the ledger or none. */
 typedef struct {
   inelastic *cells;
-  int begins; /* in statics; see InelasticBeams */
   double alpha, *dt;
   points *copy; /* space for the points as the end of a step would leave them; in statics */
   double *plastic, *hinges, *numerical, *released, *stored, *hardening;
@@ -530,7 +540,7 @@ typedef struct {
 
 void begin_forms(void *self, const time_step *step, const double *q1, const double *s);
 void add_values(void *self, const time_step *step, const double *q1, const double *s);
-void begin_static_tangent(void *self, const time_step *step, const double *q1, const double *s);
+void begin_predicted_strains(void *self, const time_step *step, const double *q1, const double *s);
 void begin_dead_loads(void *self, const time_step *step, const double *q1, const double *s);
 void accept_dead_loads(void *self, const time_step *step, const double *q1, const double *s);
 void begin_inertia(void *self, const time_step *step, const double *q1, const double *s);

@@ -54,10 +54,10 @@ void change_of_form(void *self, const double *q1, energy_change *sum)
   sum->in_beams += value_of_cells(f->form, q1) - f->held;
 }
 
-void begin_static_tangent(void *self, const time_step *step, const double *q1, const double *s)
+void begin_predicted_strains(void *self, const time_step *step, const double *q1, const double *s)
 {
-  static_tangent *t = self;
-  t->q0 = step->q0, t->begins = 1, t->exact = 0;
+  predicted_strains *p = self;
+  p->q0 = step->q0, p->begins = 1, p->exact = 0;
 }
 
 void begin_dead_loads(void *self, const time_step *step, const double *q1, const double *s)
@@ -216,7 +216,6 @@ void begin_inelastic(void *self, const time_step *step, const double *q1, const 
   const inelastic_term *t = self;
   begin_points(t->cells->points, t->dt, step->dt);
   for (int i = 0; i < t->cells->size; ++i) t->cells->latest[i] = NAN;
-  t->cells->begins = t->begins;
 }
 
 void accept_inelastic(void *self, const time_step *step, const double *q1, const double *s)
