@@ -241,6 +241,7 @@ class Simulation(StateView):
 
     def _attempt(self, step: Step) -> Trial:
         """Solve a step; see :meth:`attempt`."""
+        step = step._replace(q_before=self.q_before, ratio=step.dt / self.last_dt)
         guess = self.together(self._begin, step)
         alike = self._dynamic and math.isclose(step.dt, self.last_dt, rel_tol=1e-6)
         return self._steps.solve(step, guess, like_last=alike)
@@ -248,7 +249,7 @@ class Simulation(StateView):
     def _begin(self, step: Step) -> Array:
         """Begin a step; return a guess of its end, in the axes of the supports."""
         self._ask_and_begin(step)
-        guess = extrapolated(self.q, self.q_before, step.dt / self.last_dt)
+        guess = extrapolated(self.q, self.q_before, step.ratio)
         self.supports.enter(guess)
         self.supports.move(guess, self.supports.in_axes(self.q), step)
         return guess

@@ -66,7 +66,7 @@ class ElasticBeams(OfForms, Cells):
         """Remember the configuration at the beginning."""
         super().begin(step)
         if self._static is not None:
-            self._static.predicted.begin(step.q0)
+            self._static.predicted.begin(step)
 
     def restart(self, tangents: Tangents) -> None:
         """Begin to iterate anew, with tangents of this kind."""

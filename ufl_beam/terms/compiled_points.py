@@ -143,7 +143,7 @@ class CompiledPoints(Points):
 
     def respond(self, strains: Array) -> tuple[Array, Array]:
         """Answer strains, whatever the last tangent predicts."""
-        self.points.predicts = 0
+        self.points.predicts, self.points.linear = 0, ffi.NULL
         self.strains[:] = strains
         lib.respond(self.points)
         return self.r, self.D

@@ -104,7 +104,7 @@ class InelasticBeams(Cells, ABC):
         self._start_at(step.q0)
         self.points.begin(step.dt)
         if self._predicted is not None:
-            self._predicted.begin(step.q0)
+            self._predicted.begin(step)
         self._begin()
 
     def restart(self, tangents: Tangents) -> None:

@@ -28,7 +28,7 @@ from ufl_beam.dolfinx_compat import fem
 from ufl_beam.mechanics.functional import virtual_work
 from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.tangents import Tangents
-from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.mechanics.time_schemes import Scheme, Step
 
 
 @stated
@@ -53,20 +53,19 @@ class PredictedStrains:
         self._form: Any = fields.hot_kernel(form, fields.element.q1)
         self._weights = fields.share.grid.mesh.point_weights.repeat(3)
         self._last, change = np.zeros((2, fields.share.size))
-        self._q0, shape = self._last, (len(fields.order), len(self._weights))
+        shape = self._shape = len(fields.order), len(self._weights)
         self.c = struct(
             "predicted_strains", size=len(change), of_cell=shape[1], weight=self._weights,
-            q0=self._q0, about=self._last, change=change, e=np.zeros(shape),
+            about=self._last, change=change, e=np.zeros(shape),
         )  # fmt: skip
-        self._shape = shape
         if self._form.cells:
             fill(self.c, strains=self._form.cells, at_about=self._form.position(self._about))
 
-    def begin(self, q0: Array) -> None:
-        """Begin a step: the first strains are those at its beginning."""
-        self._q0 = q0
-        fill(self.c, q0=q0)
-        self.restart(Tangents.PREDICTED)
+    def begin(self, step: Step) -> None:
+        """Begin a step, with exact tangents until :meth:`restart`."""
+        self._q0, self._q_before = step.q0, step.q0 if step.q_before is None else step.q_before
+        fill(self.c, q0=self._q0, q_before=self._q_before, ratio=step.ratio)
+        self.restart(Tangents.EXACT)
 
     def restart(self, tangents: Tangents) -> None:
         """Begin to iterate anew, with tangents of this kind."""
@@ -75,11 +74,16 @@ class PredictedStrains:
 
     def __call__(self, q: Array) -> Array:
         """Strains at an iterate, in the order of the mesh, point after point; 1, 1, 1/m."""
-        begins = self.c.begins
-        about = self._q0 if begins else q if self.c.exact else self._last
+        if self.c.begins:
+            e, ratio = self._linear(self._q0, self._q0), self.c.ratio
+            return e + ratio * (e - self._linear(self._q_before, self._q_before)) if ratio else e
+        return self._linear(q if self.c.exact else self._last, q)
+
+    def _linear(self, about: Array, q: Array) -> Array:
+        """Strains at ``q`` that are linear about a configuration."""
         e = np.zeros(self._shape)
         self._form.set(self._about, about)
-        self._form.add(np.zeros_like(q) if begins else q - about, e)
+        self._form.add(q - about, e)
         return np.asarray(e / self._weights)
 
     def take(self, q: Array) -> None:

@@ -46,17 +46,29 @@ void add_cells(void *self, const double *q, double *b)
   }
 }
 
-/* Strains at q that are linear about the configuration of the latest tangent; first those at q0. */
+/* e = factor e + strains, with the weights of the points, that are linear about a configuration. */
+static void add_linear_strains(const predicted_strains *p, const double *about, double factor)
+{
+  for (int i = 0; i < p->strains->number * p->of_cell; ++i) p->e[i] *= factor;
+  set_cells(p->strains, about, p->at_about);
+  add_cells((void *)p->strains, p->change, p->e);
+}
+
+/* Strains at q that are linear about the configuration of the latest tangent; first those at the
+ * beginning, extrapolated as the configuration is. */
 void predict_strains(predicted_strains *p, const double *q)
 {
-  double *e = p->e;
-  if (p->begins || p->exact) memcpy(p->about, p->begins ? p->q0 : q, p->size * sizeof *q);
+  double *e = p->e, factor = 1;
+  if (p->exact && !p->begins) memcpy(p->about, q, p->size * sizeof *q);
   for (int i = 0; i < p->size; ++i) p->change[i] = p->begins ? 0 : q[i] - p->about[i];
   memset(e, 0, (size_t)p->strains->number * p->of_cell * sizeof *e);
-  set_cells(p->strains, p->about, p->at_about);
-  add_cells((void *)p->strains, p->change, e);
+  if (p->begins && p->ratio != 0) {
+    factor = 1 + p->ratio;
+    add_linear_strains(p, p->q_before, 1);
+  }
+  add_linear_strains(p, p->begins ? p->q0 : p->about, -p->ratio / factor);
   for (int cell = 0; cell < p->strains->number; ++cell, e += p->of_cell)
-    for (int i = 0; i < p->of_cell; ++i) e[i] /= p->weight[i];
+    for (int i = 0; i < p->of_cell; ++i) e[i] *= factor / p->weight[i];
 }
 
 /* Take q as the configuration of the latest tangent. */

@@ -48,8 +48,10 @@ typedef struct {
   const cells *strains;           /* linear about a configuration */
   int at_about;                   /* where they have it */
   int size, of_cell;              /* of_cell: strains of a cell */
-  const double *weight, *q0;      /* of each strain of a cell; beginning of the step */
-  int begins, exact;              /* the first forces are those at q0; all are those at the iterate */
+  const double *weight;           /* of each strain of a cell */
+  const double *q0, *q_before;    /* beginnings of the step and of the last one */
+  double ratio;                   /* of their lengths */
+  int begins, exact;              /* the first strains are extrapolated; all are those at the iterate */
   double *about, *change, *e;     /* configuration of the latest tangent; space; the strains */
 } predicted_strains;
 
@@ -144,7 +146,7 @@ typedef struct {
    * see follow_prediction. */
   double *line, *predicted;
   int predicts;
-  const double *linear; /* in statics: strains of cells that the last tangent predicts; or none */
+  const double *linear; /* strains of cells that an iteration of statics predicts; or none */
   double *unlike; /* largest (N, V, M) of a point in the latest response that its strain has not */
 } points;
 
@@ -376,8 +378,8 @@ int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int
 
 /* A step, see Step in time_schemes.py. */
 typedef struct {
-  double t0, t1, dt, load_time, motion_time, fraction, at;
-  const double *q0;
+  double t0, t1, dt, load_time, motion_time, fraction, at, ratio;
+  const double *q0, *q_before;
 } time_step;
 
 /* What a term does when a step begins, or is accepted: q1 is its end, s the step of the nodes. When it

@@ -57,7 +57,8 @@ void change_of_form(void *self, const double *q1, energy_change *sum)
 void begin_predicted_strains(void *self, const time_step *step, const double *q1, const double *s)
 {
   predicted_strains *p = self;
-  p->q0 = step->q0, p->begins = 1, p->exact = 0;
+  p->q0 = step->q0, p->q_before = step->q_before, p->ratio = step->ratio;
+  p->begins = 1, p->exact = 0;
 }
 
 void begin_dead_loads(void *self, const time_step *step, const double *q1, const double *s)
@@ -314,7 +315,7 @@ void change_of_couplings(void *self, const double *q1, energy_change *sum)
 static void guess(march *m)
 {
   const moving_supports *p = m->supports;
-  extrapolate(m->size, m->q, m->q_before, m->step.dt / m->last_dt, m->x);
+  extrapolate(m->size, m->q, m->q_before, m->step.ratio, m->x);
   for (int k = 0; k < p->moving; ++k) {
     const double from = m->q[p->dof[k]], to = value_at(p->motion + k, m->step.motion_time);
     m->x[p->dof[k]] = from + m->step.fraction * (to - from);
@@ -401,7 +402,7 @@ static int take_step(march *m, double t1)
   m->step.t0 = t0, m->step.t1 = t1, m->step.dt = t1 - t0, m->step.fraction = 1, m->step.at = m->at;
   m->step.load_time = (1 - m->load_weight) * t0 + m->load_weight * t1;
   m->step.motion_time = (1 - m->motion_weight) * t0 + m->motion_weight * t1;
-  m->step.q0 = m->q;
+  m->step.q0 = m->q, m->step.q_before = m->q_before, m->step.ratio = m->step.dt / m->last_dt;
   if (m->rates && !find_numbers(m->rates, m->step.dt)) return 0;
   run(&m->begin, &m->step, 0, 0);
   guess(m);
