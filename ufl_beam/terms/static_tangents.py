@@ -6,7 +6,8 @@ error of the linearisation, and forces from that send the next iteration astray.
 about forces as well, which strains that are linear in the displacements predict without that
 error: they belong into the tangent, while the residual remains that of the displacements.  That is
 Newton's method for displacements and forces as independent unknowns, as the functional has them,
-with the forces eliminated; it converges in few iterations, whatever the slenderness.
+with the forces eliminated; it converges in few iterations, whatever the slenderness.  The first
+guess of a step strains beams in the same way, so its strains are extrapolated from states.
 
 Magisano, Leonetti and Garcea, Computer Methods in Applied Mechanics and Engineering 313 (2017).
 """
