@@ -66,7 +66,7 @@ class ElasticBeams(OfForms, Cells):
         """Remember the configuration at the beginning."""
         super().begin(step)
         if self._static is not None:
-            self._static.predicted.begin(step)
+            self._static.begin(step)
 
     def restart(self, tangents: Tangents) -> None:
         """Begin to iterate anew, with tangents of this kind."""
@@ -82,7 +82,7 @@ class ElasticBeams(OfForms, Cells):
         """Loops over the cells."""
         begin, accept = self._loops_of_step()
         if self._static is not None:
-            begin.append(self._static.predicted.beginning())
+            begin.append(self._static.beginning())
         state = entering(self._stored, self._ledger.state.pointer("stored"))
         c: Any = state[1]
 

@@ -7,14 +7,14 @@ about forces as well, which strains that are linear in the displacements predict
 error: they belong into the tangent, while the residual remains that of the displacements.  That is
 Newton's method for displacements and forces as independent unknowns, as the functional has them,
 with the forces eliminated; it converges in few iterations, whatever the slenderness.  The first
-guess of a step strains beams in the same way, so its strains are extrapolated from states.
+guess of a step strains beams in the same way, so cells that yield extrapolate strains of states.
 
 Magisano, Leonetti and Garcea, Computer Methods in Applied Mechanics and Engineering 313 (2017).
 """
 
 from __future__ import annotations
 
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -70,7 +70,7 @@ class PredictedStrains:
 
     def restart(self, tangents: Tangents) -> None:
         """Begin to iterate anew, with tangents of this kind."""
-        self.c.begins = tangents is not Tangents.EXACT
+        self.c.begins, self.c.stale = tangents is not Tangents.EXACT, True
         self.c.exact = tangents is not Tangents.PREDICTED
 
     def __call__(self, q: Array) -> Array:
@@ -123,17 +123,28 @@ class StaticTangent:
         self.kernel.place(A)
         self.predicted, self._data = PredictedStrains(fields), A.data
 
+    def begin(self, step: Step) -> None:
+        """Begin a step; elastic cells have no branches to find by extrapolated strains."""
+        self.predicted.begin(step._replace(ratio=0.0))
+
     def add(self, q: Array) -> None:
         """Add the tangent at an iterate to the matrix."""
         self.kernel.put(self._e, self.predicted(q))
         self.kernel.add(q, self._data)
         self.predicted.take(q)
 
-    def loop(self) -> Loop:
-        """The loop of :meth:`add`."""
+    @cached_property
+    def _in_c(self) -> Any:
         kernel: Any = self.kernel
-        self._c = struct(
+        return struct(
             "static_tangent", predicted=self.predicted.c, tangent=kernel.cells,
             at_e=kernel.position(self._e),
         )  # fmt: skip
-        return loop("add_static_tangent", self._c)
+
+    def loop(self) -> Loop:
+        """The loop of :meth:`add`."""
+        return loop("add_static_tangent", self._in_c)
+
+    def beginning(self) -> Loop:
+        """The phase of :meth:`begin`."""
+        return loop("begin_static_tangent", self._in_c)

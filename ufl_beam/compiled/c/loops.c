@@ -69,13 +69,14 @@ void predict_strains(predicted_strains *p, const double *q)
   add_linear_strains(p, p->begins ? p->q0 : p->about, -p->ratio / factor);
   for (int cell = 0; cell < p->strains->number; ++cell, e += p->of_cell)
     for (int i = 0; i < p->of_cell; ++i) e[i] *= factor / p->weight[i];
+  p->stale = 0;
 }
 
 /* Take q as the configuration of the latest tangent. */
 static void predict_from(predicted_strains *p, const double *q)
 {
   memcpy(p->about, q, p->size * sizeof *q);
-  p->begins = 0;
+  p->begins = 0, p->stale = 1;
 }
 
 /* The tangent of a static step at q, with the forces that the latest one has predicted. */

@@ -53,6 +53,7 @@ typedef struct {
   double ratio;                   /* of their lengths */
   int begins, exact;              /* the first strains are extrapolated; all are those at the iterate */
   double *about, *change, *e;     /* configuration of the latest tangent; space; the strains */
+  int stale;                      /* whether there was a tangent since they were computed */
 } predicted_strains;
 
 /* Tangent of elastic cells in a static step. */
@@ -542,6 +543,7 @@ typedef struct {
 
 void begin_forms(void *self, const time_step *step, const double *q1, const double *s);
 void add_values(void *self, const time_step *step, const double *q1, const double *s);
+void begin_static_tangent(void *self, const time_step *step, const double *q1, const double *s);
 void begin_predicted_strains(void *self, const time_step *step, const double *q1, const double *s);
 void begin_dead_loads(void *self, const time_step *step, const double *q1, const double *s);
 void accept_dead_loads(void *self, const time_step *step, const double *q1, const double *s);

@@ -387,7 +387,7 @@ static const double *predict_forces(const inelastic *m, const double *q)
     return f;
   }
   if (s->begins) take_tangent(m);
-  predict_strains(s, q);
+  if (!p->line || s->stale) predict_strains(s, q);
   for (int c = 0; c < p->cells; ++c) {
     multiply(m->last_D + 9 * c, s->e + 3 * c, f + 3 * c);
     for (int k = 3 * c; k < 3 * c + 3; ++k) f[k] += m->last_b[k];
