@@ -10,7 +10,10 @@ SEEDS = range(24)
 
 STEPS, DT = 40, 0.02  # s
 
-SCHEMES = (ub.Midpoint(), ub.Midpoint(0.1, 0.05), ub.Newmark(0.6, 0.36), ub.GeneralizedAlpha(0.5))
+SCHEMES = (
+    ub.Midpoint(), ub.Midpoint(0.1, 0.05), ub.Newmark(0.6, 0.36), ub.GeneralizedAlpha(0.5),
+    ub.Static(), ub.ExactStatic(),
+)  # fmt: skip
 
 pytestmark = [pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning"), pytest.mark.serial]
 

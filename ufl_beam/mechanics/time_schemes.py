@@ -41,6 +41,8 @@ class Step(NamedTuple):
     motion_time: float  # at which prescribed motions are taken; s
     fraction: float  # part of the way to these loads and motions that the step goes; 1: all of it
     at: float = 1.0  # part of the way between loads at both ends, in the equation; 1: at the end
+    q_before: Array | None = None  # configuration at the beginning of the last step, if ratio > 0
+    ratio: float = 0.0  # of the length to that of the last step; 0 if none led to the beginning
 
     def __repr__(self) -> str:
         return one_line(self)

@@ -31,7 +31,8 @@ from ufl_beam.terms.damping import SecondDifferences, damping_forces
 from ufl_beam.terms.dead_loads import DeadLoads
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.guide_curves import guides
-from ufl_beam.terms.inelastic_beams import InelasticBeams, inelastic_cells
+from ufl_beam.terms.inelastic_beams import InelasticBeams
+from ufl_beam.terms.inelastic_cells import inelastic_cells
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.loads import FollowerLoads, FrameForces, LoadTerm
 from ufl_beam.terms.material_points import Points, expect_entries

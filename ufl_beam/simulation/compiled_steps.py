@@ -17,7 +17,6 @@ from ufl_beam.simulation.branch_check import StaticPath
 from ufl_beam.simulation.kept_rows import KeptRows
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.newton import Solver
-from ufl_beam.terms.base import InternalForces
 from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.dead_loads import DeadLoads
 from ufl_beam.terms.energy_ledger import Ledger
@@ -218,8 +217,6 @@ def compiled_steps(
     for term in equation.terms:
         of_term = term.phases(times)
         if of_term is None:
-            return None
-        if path is not None and of_term.change is None and isinstance(term, InternalForces):
             return None
         phases.append(of_term)
     return CompiledSteps(

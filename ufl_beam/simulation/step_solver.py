@@ -161,13 +161,14 @@ class StepSolver:
     def _predict(self, now: Present, step: Step) -> Array:
         """Begin a step; return a guess of its end, in the axes of the supports."""
         self._begin(now, step)
-        guess = extrapolated(now.q, now.q_before, step.dt / now.last_dt)
+        guess = extrapolated(now.q, now.q_before, step.ratio)
         now.supports.enter(guess)
         now.supports.move(guess, now.supports.in_axes(now.q), step)
         return guess
 
     def _attempt(self, now: Present, step: Step) -> Trial:
         """Solve a step from a guess; the tangent of the last step does if that was like it."""
+        step = step._replace(q_before=now.q_before, ratio=step.dt / now.last_dt)
         guess = self._together(self._predict, now, step)
         like_last = self._dynamic and math.isclose(step.dt, now.last_dt, rel_tol=1e-6)
         loads = self._equation.load_forces()

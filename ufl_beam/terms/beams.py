@@ -67,12 +67,12 @@ class ElasticBeams(OfForms, Cells):
         """Remember the configuration at the beginning."""
         super().begin(step)
         if self._static is not None:
-            self._static.begin(step.q0)
+            self._static.begin(step)
 
     def restart(self, tangents: Tangents) -> None:
         """Begin to iterate anew, with tangents of this kind."""
         if self._static is not None:
-            self._static.restart(tangents)
+            self._static.predicted.restart(tangents)
 
     def loops(self) -> tuple[Loop, Loop | None]:
         """C loops over the cells, of force and tangent."""

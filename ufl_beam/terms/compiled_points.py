@@ -19,10 +19,11 @@ from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import ffi, fill, in_order, lib, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.errors import SceneError
-from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model import law_functions
 from ufl_beam.model.fibres import Kind
 from ufl_beam.model.material_laws import SofteningLaw
+from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.material_points import Points
 from ufl_beam.terms.point_equations import End, PointEquations, inputs, prefixed, rows
 
@@ -109,7 +110,7 @@ class CompiledPoints(Points):
         layout, law = self._layout, self._layout.kind.law
         softening = layout.softening and layout.softening.of(1.0, 1.0)
         self._forms = forms = _point_forms(inputs(layout), layout.kind, softening, scheme)
-        self._solves = law.solves
+        self._solves, self._dynamic = law.solves, has_inertia(scheme)
         arrays = {"B": layout.strains, "weight": layout.weights, "rest": layout.rest}
         arrays = {k: np.ascontiguousarray(x, np.float64) for k, x in arrays.items()}
         cells, of_cell, width = self._storage.shape
@@ -142,7 +143,7 @@ class CompiledPoints(Points):
 
     def respond(self, strains: Array) -> tuple[Array, Array]:
         """Answer strains, whatever the last tangent predicts."""
-        self.points.predicts = 0
+        self.points.predicts, self.points.linear = 0, ffi.NULL
         self.strains[:] = strains
         lib.respond(self.points)
         return self.r, self.D
@@ -161,11 +162,16 @@ class CompiledPoints(Points):
 
     def _sums_to_come(self) -> Array:
         """Return :attr:`sums` as :meth:`accept` would leave them."""
-        copy = self.copy()
+        copy = self._copy()
         lib.commit(copy)
         return np.frombuffer(ffi.buffer(copy.sum, self.sums.nbytes)).copy()
 
-    def copy(self) -> Any:
+    def in_steps(self, ledger: Ledger) -> dict[str, Any]:
+        """Fields of ``inelastic_term``; in statics a copy, which tells what a step would change."""
+        copy = {} if self._dynamic else {"copy": self._copy()}
+        return {**super().in_steps(ledger), **copy}
+
+    def _copy(self) -> Any:
         """Points with a copy of the state, which loops may change, and the same response."""
         copy = ffi.new("points *", self.points[0])
         return fill(

@@ -10,7 +10,7 @@ import numpy as np
 import ufl
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, lib, loop, struct
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import CellForm, Kernel, stated
 from ufl_beam.discretization.dolfinx_forms import DolfinxForm
@@ -238,8 +238,9 @@ class CompiledCouplings(Couplings):
             return None
         fields = {name for name, _ in ffi.typeof("coupling_term").fields}
         mine = {name: x for name, x in of_law.items() if name in fields}
-        c = struct("coupling_term", links=self._in_c, **mine)
-        fill(c.points, **{name: x for name, x in of_law.items() if name not in fields})
+        of_points = {name: x for name, x in of_law.items() if name not in fields}
+        points = struct("inelastic_term", **of_points)
+        c = struct("coupling_term", links=self._in_c, points=points, **mine)
 
         def enter(q: Array) -> None:
             if q is not self._q:
@@ -255,7 +256,8 @@ class CompiledCouplings(Couplings):
         phases = ("begin_couplings", "accept_couplings", "add_energy_of_couplings")
         first, accept, state = ([loop(name, c)] for name in phases)
         over = None if response.openable is None else response.openable.over
-        return Phases([*begin, *first], accept, state, None, enter, leave, over)
+        change = loop("change_of_couplings", c)
+        return Phases([*begin, *first], accept, state, change, enter, leave, over)
 
     def demand(self) -> Loop:
         """The loop of :meth:`excess`."""

@@ -14,40 +14,21 @@ from ufl_beam.compiled.c_library import Loop, doubles, fill, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import Kernel, stated
 from ufl_beam.discretization.function_spaces import Element, Fields, Strains
-from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
-from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.functional import virtual_work
 from ufl_beam.mechanics.kinematics import strain
+from ufl_beam.mechanics.tangents import Tangents
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.fibres import Layout
 from ufl_beam.terms.compiled_points import CompiledPoints
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.material_points import Points
-from ufl_beam.terms.openings import SearchFlags
+from ufl_beam.terms.openings import STIFF, SearchFlags
 from ufl_beam.terms.phases import Phases, TimeFunctions, beginning
 from ufl_beam.terms.point_equations import inputs
+from ufl_beam.terms.static_tangents import PredictedStrains
 from ufl_beam.terms.tangent_derivatives import Cells
-
-
-def inelastic_cells(share: Share) -> list[tuple[Layout, Index]]:
-    """Layouts of material points, and the cells (numbers of the grid) that have them."""
-    grid, groups = share.grid, dict[Layout, list[int]]()
-    sections, of_beam = grid.sections
-    for number, section in enumerate(sections):
-        layout = section.layout(section.hinge)
-        if layout is not None and not layout.elastic:
-            if grid.mesh.degree > 1:
-                beam = grid.scene.beams[int(np.argmax(of_beam == number))]
-                raise SceneError(
-                    f"Mesh: degree = {grid.mesh.degree} is for elastic beams, and {beam.name} "
-                    "may yield or break; use degree=1 with more cells, or an elastic section"
-                )
-            groups.setdefault(layout, []).append(number)
-    of_cell = of_beam[grid.beam_of_cell]
-    return [(layout, np.flatnonzero(np.isin(of_cell, one))) for layout, one in groups.items()]
-
 
 KEPT_WITHOUT_JUMP = np.array([1.0, 1.0, 1.0, 0.0, 1.0, 1.0])
 """Factors of :attr:`Points.kept` where its jump is a crack of one fibre, and no hinge."""
@@ -89,7 +70,8 @@ class InelasticBeams(Cells, ABC):
         search: SearchFlags, points: type[Points],
     ) -> None:  # fmt: skip
         self._A, self._ledger = A, ledger
-        self._hinges, self._static = layout.hinges, not has_inertia(scheme)
+        self._hinges, self._search = layout.hinges, search
+        self._predicted = None if has_inertia(scheme) else PredictedStrains(fields)
         self._cells = fields.share.cells[fields.order]
         self._strains = Strains(fields)
         cells, n = len(fields.order), len(layout.weights)
@@ -121,7 +103,14 @@ class InelasticBeams(Cells, ABC):
         self._tangent.set(self._q0, step.q0)
         self._start_at(step.q0)
         self.points.begin(step.dt)
+        if self._predicted is not None:
+            self._predicted.begin(step)
         self._begin()
+
+    def restart(self, tangents: Tangents) -> None:
+        """Begin to iterate anew, with tangents of this kind."""
+        if self._predicted is not None:
+            self._predicted.restart(tangents)
 
     def _start_at(self, q0: Array) -> None:
         """Let the points begin at the strains of a configuration, if they are not there."""
@@ -257,10 +246,13 @@ class CompiledInelasticBeams(InelasticBeams):
             tangent=self._tangent.cells, at_r=self._force.position(forms.r),
             at_b=self._tangent.position(forms.b), at_D=self._tangent.position(forms.D),
         )  # fmt: skip
+        if self._predicted is not None:
+            forces, last_b, last_D = np.zeros((3, len(self._cells), 9))
+            of_tangent = {"forces": forces, "last_b": last_b, "last_D": last_D}
+            fill(self._in_c, predicted=self._predicted.c, **of_tangent)
 
     def _begin(self) -> None:
         self._latest.fill(np.nan)
-        self._in_c.begins = self._static
         self.points.points.predicts = 0
 
     def _forget(self) -> None:
@@ -286,16 +278,15 @@ class CompiledInelasticBeams(InelasticBeams):
     def phases(self, times: TimeFunctions) -> Phases | None:
         """Loops over the points."""
         c = struct(
-            "inelastic_term", cells=self._in_c, begins=self._static, dt=self.points.dt,
-            **self.points.entries(self._ledger),
+            "inelastic_term", cells=self._in_c, **self.points.in_steps(self._ledger)
         )  # fmt: skip
         begin = [*beginning((self._force, self._tangent), self._q0), loop("begin_inelastic", c)]
+        if self._predicted is not None:
+            begin.append(self._predicted.beginning())
 
         def leave(q: Array) -> None:
             self._q = q
 
-        if self._static:
-            fill(c, copy=self.points.copy())
         ends = [loop("accept_inelastic", c)], [loop("add_energy_of_points", c)]
         over = self.over if self.points.softens else None
         return Phases(begin, *ends, loop("change_of_points", c), self._start_at, leave, over)
@@ -313,10 +304,11 @@ class ReferenceInelasticBeams(InelasticBeams):
     """The same equations as :class:`CompiledInelasticBeams`, line by line."""
 
     def _prepare(self, forms: InelasticForms) -> None:
-        self._forms, self._first = forms, False
+        self._forms = forms
+        self._last: tuple[Array, Array] = np.empty(0), np.empty(0)
 
     def _begin(self) -> None:
-        self._first = self._static
+        """Nothing is kept."""
 
     def _respond(self, q1: Array) -> None:
         self.points.respond(self._strains(q1))
@@ -331,13 +323,19 @@ class ReferenceInelasticBeams(InelasticBeams):
         self._force.add(q1, r)
 
     def add_tangent(self, q1: Array) -> None:
-        """Add its derivative; that of the first iterate in statics is of the forces before."""
+        """Add its derivative; in statics with the forces that static_tangents.py explains."""
         self._respond(q1)
-        r: Array = self.points.r
-        D = self.points.D
-        if self._first:
-            self._first, r = False, np.asarray(self.points.kept[:, :3])
-        around = r - np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), self.points.strains)
-        for function, values in ((self._forms.b, around), (self._forms.D, D)):
+        r, D = self.points.r, self.points.D.reshape(-1, 3, 3)
+        elastic = np.einsum("kij,kj->ki", D, self.points.strains)
+        forces: Array = r
+        if (predicted := self._predicted) is not None:
+            if predicted.c.begins:
+                forces = self.points.kept[:, :3]
+            elif not (predicted.c.exact or self._search.flags[STIFF]):
+                b, before = self._last
+                forces = b + np.einsum("kij,kj->ki", before, predicted(q1))
+            self._last = r - elastic, D.copy()
+            predicted.take(q1)
+        for function, values in ((self._forms.b, forces - elastic), (self._forms.D, self.points.D)):
             self._tangent.put(function, values)
         self._tangent.add(q1, self._A.data)

@@ -255,8 +255,8 @@ class Points(ABC):
         if self._yields:
             ledger.state["hardening"] += hardening
 
-    def entries(self, ledger: Ledger) -> dict[str, Any]:
-        """The entries of both methods above, by name in ``inelastic_term`` of loops.h."""
+    def in_steps(self, ledger: Ledger) -> dict[str, Any]:
+        """Fields of ``inelastic_term`` of loops.h, with the entries of both methods above."""
         state, lost = ledger.state, ledger.lost
         kinds = {
             "stored": (True, state, "stored"), "hardening": (self._yields, state, "hardening"),
@@ -265,7 +265,7 @@ class Points(ABC):
             "released": (self._releases, lost, "numerical"),
         }  # fmt: skip
         entries = {k: part.pointer(name) for k, (has, part, name) in kinds.items() if has}
-        return {"alpha": self._alpha, **entries}
+        return {"dt": self.dt, "alpha": self._alpha, **entries}
 
     # -- the state -----------------------------------------------------------------------------
 

@@ -43,7 +43,7 @@ class _Sprung(Response):
         self.openable = self.points if self.points.softens else None
 
     def in_steps(self) -> dict[str, Any] | None:
-        return {"dt": self.points.dt, **self.points.entries(self._setting.ledger)}
+        return self.points.in_steps(self._setting.ledger)
 
     def _at(self, e: Array) -> Array:
         self._strains[:, 0] = e

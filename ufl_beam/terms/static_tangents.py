@@ -6,7 +6,8 @@ error of the linearisation, and forces from that send the next iteration astray.
 about forces as well, which strains that are linear in the displacements predict without that
 error: they belong into the tangent, while the residual remains that of the displacements.  That is
 Newton's method for displacements and forces as independent unknowns, as the functional has them,
-with the forces eliminated; it converges in few iterations, whatever the slenderness.
+with the forces eliminated; it converges in few iterations, whatever the slenderness.  The first
+guess of a step strains beams in the same way, so cells that yield extrapolate strains of states.
 
 Magisano, Leonetti and Garcea, Computer Methods in Applied Mechanics and Engineering 313 (2017).
 """
@@ -28,23 +29,84 @@ from ufl_beam.dolfinx_compat import fem
 from ufl_beam.mechanics.functional import virtual_work
 from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.tangents import Tangents
-from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.mechanics.time_schemes import Scheme, Step
 
 
 @stated
-def _forms(of: Element, scheme: Scheme) -> tuple[ufl.Form, fem.Function, ufl.Form, fem.Function]:
-    """Tangent with given strains in its forces; strains linear in a displacement; the functions."""
-    q0, q1, C, about = of.q0, of.q1, of.stiffness, of.configuration()
+def _linear_strains(of: Element) -> tuple[ufl.Form, fem.Function]:
+    """Strains at the points, linear in a displacement about a configuration; that one."""
+    about = of.configuration()
+    e_about = strain(about, of.axis)
+    linear = e_about + ufl.derivative(e_about, about, of.q1)
+    z = ufl.TestFunction(of.at_points(3).function_space)
+    return ufl.dot(linear, z) / of.axis.h * of.dx(1), about
+
+
+class PredictedStrains:
+    """Strains that an iteration of a static step predicts, by linear kinematics.
+
+    Attributes:
+        c: ``predicted_strains`` of loops.h, with the state of the iteration.
+    """
+
+    def __init__(self, fields: Fields) -> None:
+        form, self._about = _linear_strains(fields.element)
+        self._form: Any = fields.hot_kernel(form, fields.element.q1)
+        self._weights = fields.share.grid.mesh.point_weights.repeat(3)
+        self._last, change = np.zeros((2, fields.share.size))
+        shape = self._shape = len(fields.order), len(self._weights)
+        self.c = struct(
+            "predicted_strains", size=len(change), of_cell=shape[1], weight=self._weights,
+            about=self._last, change=change, e=np.zeros(shape),
+        )  # fmt: skip
+        if self._form.cells:
+            fill(self.c, strains=self._form.cells, at_about=self._form.position(self._about))
+
+    def begin(self, step: Step) -> None:
+        """Begin a step, with exact tangents until :meth:`restart`."""
+        self._q0, self._q_before = step.q0, step.q0 if step.q_before is None else step.q_before
+        fill(self.c, q0=self._q0, q_before=self._q_before, ratio=step.ratio)
+        self.restart(Tangents.EXACT)
+
+    def restart(self, tangents: Tangents) -> None:
+        """Begin to iterate anew, with tangents of this kind."""
+        self.c.begins, self.c.stale = tangents is not Tangents.EXACT, True
+        self.c.exact = tangents is not Tangents.PREDICTED
+
+    def __call__(self, q: Array) -> Array:
+        """Strains at an iterate, in the order of the mesh, point after point; 1, 1, 1/m."""
+        if self.c.begins:
+            e, ratio = self._linear(self._q0, self._q0), self.c.ratio
+            return e + ratio * (e - self._linear(self._q_before, self._q_before)) if ratio else e
+        return self._linear(q if self.c.exact else self._last, q)
+
+    def _linear(self, about: Array, q: Array) -> Array:
+        """Strains at ``q`` that are linear about a configuration."""
+        e = np.zeros(self._shape)
+        self._form.set(self._about, about)
+        self._form.add(q - about, e)
+        return np.asarray(e / self._weights)
+
+    def take(self, q: Array) -> None:
+        """Predict from an iterate on, whose tangent is the latest."""
+        self._last[:], self.c.begins = q, False
+
+    def beginning(self) -> Loop:
+        """The phase of :meth:`begin`."""
+        return loop("begin_predicted_strains", self.c)
+
+
+@stated
+def _tangent(of: Element, scheme: Scheme) -> tuple[ufl.Form, fem.Function]:
+    """Tangent of elastic cells with given strains in its forces; these strains."""
+    q0, q1, C = of.q0, of.q1, of.stiffness
     e0, e1, e = strain(q0, of.axis), strain(q1, of.axis), of.at_points(3)
     w_e = scheme.virtual_strain(q0, q1, of.w, of.axis)
     acting = partial(scheme.resultants, C, e0, constant=of.constant)
     change = ufl.TrialFunction(of.space)
     geometric = virtual_work(acting(e), ufl.derivative(w_e, q1, change))
     material = virtual_work(ufl.derivative(acting(e1), q1, change), w_e)
-    e_about = strain(about, of.axis)
-    linear = e_about + ufl.derivative(e_about, about, q1)
-    z = ufl.TestFunction(e.function_space)
-    return (geometric + material) * of.dx(1), e, ufl.dot(linear, z) / of.axis.h * of.dx(1), about
+    return (geometric + material) * of.dx(1), e
 
 
 class StaticTangent:
@@ -52,55 +114,31 @@ class StaticTangent:
 
     Attributes:
         kernel: The form; it has the configuration at the beginning of the step.
+        predicted: Strains of its forces.
     """
 
     def __init__(self, fields: Fields, scheme: Scheme, A: Csr) -> None:
-        tangent, self._e, strains, self._about = _forms(fields.element, scheme)
-        unknown, size = fields.element.q1, fields.share.size
-        self.kernel, self._strains = (fields.hot_kernel(x, unknown) for x in (tangent, strains))
+        form, self._e = _tangent(fields.element, scheme)
+        self.kernel = fields.hot_kernel(form, fields.element.q1)
         self.kernel.place(A)
-        self._data, self._weights = A.data, fields.share.grid.mesh.point_weights.repeat(3)
-        self._predicted: Array = np.zeros((len(fields.order), len(self._weights)))
-        self._q0: Array = np.zeros(size)
-        self._last: Array = self._q0
-        self._begins = self._exact = False
+        self.predicted, self._data = PredictedStrains(fields), A.data
 
-    def begin(self, q0: Array) -> None:
-        """Begin a step: the first forces are those at its beginning."""
-        self._q0 = q0
-        if self.kernel.cells:
-            fill(self._in_c, q0=q0)
-        self.restart(Tangents.PREDICTED)
-
-    def restart(self, tangents: Tangents) -> None:
-        """Begin to iterate anew, with tangents of this kind."""
-        self._begins = tangents is not Tangents.EXACT
-        self._exact = exact = tangents is not Tangents.PREDICTED
-        if self.kernel.cells:
-            self._in_c.begins, self._in_c.exact = self._begins, exact
+    def begin(self, step: Step) -> None:
+        """Begin a step; elastic cells have no branches to find by extrapolated strains."""
+        self.predicted.begin(step._replace(ratio=0.0))
 
     def add(self, q: Array) -> None:
         """Add the tangent at an iterate to the matrix."""
-        about = self._q0 if self._begins else q if self._exact else self._last
-        self._strains.set(self._about, about)
-        self._predicted.fill(0.0)
-        self._strains.add(q - about if not self._begins else np.zeros_like(q), self._predicted)
-        self.kernel.put(self._e, self._predicted / self._weights)
+        self.kernel.put(self._e, self.predicted(q))
         self.kernel.add(q, self._data)
-        self._last, self._begins = q.copy(), False
-
-    # -- in C ----------------------------------------------------------------------------------
+        self.predicted.take(q)
 
     @cached_property
     def _in_c(self) -> Any:
         kernel: Any = self.kernel
-        strains: Any = self._strains
-        about, change = np.zeros((2, len(self._last)))
         return struct(
-            "static_tangent", size=len(about), of_cell=len(self._weights), weight=self._weights,
-            tangent=kernel.cells, at_e=kernel.position(self._e), strains=strains.cells,
-            at_about=strains.position(self._about), about=about, change=change,
-            e=np.zeros(self._predicted.shape), q0=self._q0,
+            "static_tangent", predicted=self.predicted.c, tangent=kernel.cells,
+            at_e=kernel.position(self._e),
         )  # fmt: skip
 
     def loop(self) -> Loop:

@@ -15,12 +15,18 @@ static void put_row(const couplings *c, int cell, const double *row)
   put_in_cell(c->tangent, cell, c->row_of_tangent, 3, row);
 }
 
+/* Let springs answer their motions e1. */
+static void respond_springs(const couplings *c)
+{
+  for (int i = 0; i < c->number; ++i) c->points->e1[3 * i] = c->e1[i];
+  respond(c->points);
+}
+
 /* The laws of springs around their motions at q. */
 static void set_rows_of_springs(const couplings *c)
 {
-  points *p = c->points;
-  for (int i = 0; i < c->number; ++i) p->e1[3 * i] = c->e1[i];
-  respond(p);
+  const points *p = c->points;
+  respond_springs(c);
   for (int k = 0; k < c->number; ++k) {
     const int i = c->link[k];
     const double D = p->D[9 * i], row[3] = {-D, 1, p->r[3 * i] - D * c->e1[i]};
@@ -73,18 +79,23 @@ double missed_by_couplings(void *self, const double *q, const double *r, double 
   return most;
 }
 
+/* What connector i takes in a step to the motion e1. */
+static double taken_by(const couplings *c, int i, const double *q)
+{
+  const double a = c->weight_of_before, force = a * c->before[i] + (1 - a) * q[c->force[i]];
+  return force * (c->e1[i] - c->e0[i]);
+}
+
 /* Take the end of the step as the new state; what all have taken in it. */
 double commit_couplings(const couplings *c, const double *q, double dt)
 {
-  const double a = c->weight_of_before;
   double sum = 0;
   find_motions(c, q);
   for (int i = 0; i < c->number; ++i) {
-    const double f = q[c->force[i]], change = c->e1[i] - c->e0[i];
-    const double work = (a * c->before[i] + (1 - a) * f) * change;
+    const double work = taken_by(c, i, q);
     c->taken[i] += work;
-    c->rate[i] = change / dt;
-    c->before[i] = f;
+    c->rate[i] = (c->e1[i] - c->e0[i]) / dt;
+    c->before[i] = q[c->force[i]];
     c->e0[i] = c->e1[i];
     sum += work;
   }

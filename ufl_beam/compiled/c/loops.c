@@ -46,23 +46,49 @@ void add_cells(void *self, const double *q, double *b)
   }
 }
 
+/* e = factor e + strains, with the weights of the points, that are linear about a configuration. */
+static void add_linear_strains(const predicted_strains *p, const double *about, double factor)
+{
+  for (int i = 0; i < p->strains->number * p->of_cell; ++i) p->e[i] *= factor;
+  set_cells(p->strains, about, p->at_about);
+  add_cells((void *)p->strains, p->change, p->e);
+}
+
+/* Strains at q that are linear about the configuration of the latest tangent; first those at the
+ * beginning, extrapolated as the configuration is. */
+void predict_strains(predicted_strains *p, const double *q)
+{
+  double *e = p->e, factor = 1;
+  if (p->exact && !p->begins) memcpy(p->about, q, p->size * sizeof *q);
+  for (int i = 0; i < p->size; ++i) p->change[i] = p->begins ? 0 : q[i] - p->about[i];
+  memset(e, 0, (size_t)p->strains->number * p->of_cell * sizeof *e);
+  if (p->begins && p->ratio != 0) {
+    factor = 1 + p->ratio;
+    add_linear_strains(p, p->q_before, 1);
+  }
+  add_linear_strains(p, p->begins ? p->q0 : p->about, -p->ratio / factor);
+  for (int cell = 0; cell < p->strains->number; ++cell, e += p->of_cell)
+    for (int i = 0; i < p->of_cell; ++i) e[i] *= factor / p->weight[i];
+  p->stale = 0;
+}
+
+/* Take q as the configuration of the latest tangent. */
+static void predict_from(predicted_strains *p, const double *q)
+{
+  memcpy(p->about, q, p->size * sizeof *q);
+  p->begins = 0, p->stale = 1;
+}
+
 /* The tangent of a static step at q, with the forces that the latest one has predicted. */
 void add_static_tangent(void *self, const double *q, double *tangent)
 {
   static_tangent *t = self;
-  double *e = t->e;
-  if (t->begins || t->exact) memcpy(t->about, t->begins ? t->q0 : q, t->size * sizeof *q);
-  for (int i = 0; i < t->size; ++i) t->change[i] = t->begins ? 0 : q[i] - t->about[i];
-  memset(e, 0, (size_t)t->strains->number * t->of_cell * sizeof *e);
-  set_cells(t->strains, t->about, t->at_about);
-  add_cells((void *)t->strains, t->change, e);
-  for (int cell = 0; cell < t->tangent->number; ++cell, e += t->of_cell) {
-    for (int i = 0; i < t->of_cell; ++i) e[i] /= t->weight[i];
-    put_in_cell(t->tangent, cell, t->at_e, t->of_cell, e);
-  }
+  predicted_strains *p = t->predicted;
+  predict_strains(p, q);
+  for (int cell = 0; cell < t->tangent->number; ++cell)
+    put_in_cell(t->tangent, cell, t->at_e, p->of_cell, p->e + cell * p->of_cell);
   add_cells((void *)t->tangent, q, tangent);
-  memcpy(t->about, q, t->size * sizeof *q);
-  t->begins = 0;
+  predict_from(p, q);
 }
 
 /* Value of a functional at the unknowns q. */

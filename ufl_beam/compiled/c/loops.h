@@ -44,14 +44,24 @@ struct cells {
   const int32_t *row;
 };
 
-/* Tangent of a static step, see static_tangents.py. */
+/* Strains whose forces the tangents of a static step have, see static_tangents.py. */
 typedef struct {
-  const cells *strains, *tangent; /* strains linear about a configuration; tangent that takes them */
-  int at_about, at_e;             /* where they have the configuration, and the strains */
+  const cells *strains;           /* linear about a configuration */
+  int at_about;                   /* where they have it */
   int size, of_cell;              /* of_cell: strains of a cell */
-  const double *weight, *q0;      /* of each strain of a cell; beginning of the step */
-  int begins, exact;              /* the first forces are those at q0; all are those at the iterate */
-  double *about, *change, *e;     /* configuration of the latest tangent; space */
+  const double *weight;           /* of each strain of a cell */
+  const double *q0, *q_before;    /* beginnings of the step and of the last one */
+  double ratio;                   /* of their lengths */
+  int begins, exact;              /* the first strains are extrapolated; all are those at the iterate */
+  double *about, *change, *e;     /* configuration of the latest tangent; space; the strains */
+  int stale;                      /* whether there was a tangent since they were computed */
+} predicted_strains;
+
+/* Tangent of elastic cells in a static step. */
+typedef struct {
+  predicted_strains *predicted;
+  const cells *tangent;
+  int at_e; /* where it has the strains */
 } static_tangent;
 
 typedef struct {
@@ -75,6 +85,7 @@ void add_cells(void *self, const double *q, double *b);
 double value_of_cells(const cells *c, const double *q);
 void combine(int size, double a, const double *x, double b, const double *y, double *out);
 void extrapolate(int size, const double *x, const double *y, double ratio, double *out);
+void predict_strains(predicted_strains *p, const double *q);
 void add_static_tangent(void *self, const double *q, double *tangent);
 void subtract_vector(void *self, const double *q, double *b);
 void add_step_force(void *self, const double *q, double *r);
@@ -142,6 +153,7 @@ typedef struct {
    * see follow_prediction. */
   double *line, *predicted;
   int predicts;
+  const double *linear; /* strains of cells that an iteration of statics predicts; or none */
   double *unlike; /* largest (N, V, M) of a point in the latest response that its strain has not */
 } points;
 
@@ -151,7 +163,9 @@ typedef struct {
   points *points;
   const cells *strains, *force, *tangent;
   int at_r, at_b, at_D; /* where the coefficients of `force` and `tangent` have r, b and D */
-  int size, begins;
+  predicted_strains *predicted; /* in statics; or none */
+  double *forces, *last_b, *last_D; /* of the tangent, in statics; b and D about the latest one */
+  int size;
   double scene;   /* size */
   double *latest; /* the unknowns that the points responded to */
 } inelastic;
@@ -375,8 +389,8 @@ int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int
 
 /* A step, see Step in time_schemes.py. */
 typedef struct {
-  double t0, t1, dt, load_time, motion_time, fraction, at;
-  const double *q0;
+  double t0, t1, dt, load_time, motion_time, fraction, at, ratio;
+  const double *q0, *q_before;
 } time_step;
 
 /* What a term does when a step begins, or is accepted: q1 is its end, s the step of the nodes. When it
@@ -467,7 +481,6 @@ typedef struct {
 /* Cells with material points, and entries of the ledger or none. */
 typedef struct {
   inelastic *cells;
-  int begins; /* in statics; see InelasticBeams */
   double alpha, *dt;
   points *copy; /* space for the points as the end of a step would leave them; in statics */
   double *plastic, *hinges, *numerical, *released, *stored, *hardening;
@@ -479,11 +492,16 @@ typedef struct {
   int dt_of_law;       /* where a rigid-plastic law has the step */
   int32_t *way_before; /* of rigid-plastic ones, after the last step */
   double hardened, loss; /* stored by rigid-plastic ones; part of what backward Euler loses */
-  inelastic_term points; /* of springs: entries of the ledger */
+  const inelastic_term *points; /* of springs: entries of the ledger */
 } coupling_term;
 
-/* Energy that a term would store and dissipate in a step to q1. */
-typedef double (change_of_energy)(void *self, const double *q1);
+/* Energy stored and dissipated in a step, and the sum of the sizes of the works on connectors. */
+typedef struct {
+  double in_beams, in_connectors, effort;
+} energy_change;
+
+/* Adds the part of a term in a step to q1. */
+typedef void (change_of_energy)(void *self, const double *q1, energy_change *sum);
 typedef struct {
   change_of_energy *of;
   void *self;
@@ -539,6 +557,7 @@ typedef struct {
 void begin_forms(void *self, const time_step *step, const double *q1, const double *s);
 void add_values(void *self, const time_step *step, const double *q1, const double *s);
 void begin_static_tangent(void *self, const time_step *step, const double *q1, const double *s);
+void begin_predicted_strains(void *self, const time_step *step, const double *q1, const double *s);
 void begin_dead_loads(void *self, const time_step *step, const double *q1, const double *s);
 void accept_dead_loads(void *self, const time_step *step, const double *q1, const double *s);
 void begin_inertia(void *self, const time_step *step, const double *q1, const double *s);
@@ -552,7 +571,8 @@ void add_energy_of_points(void *self, const time_step *step, const double *q1, c
 void begin_couplings(void *self, const time_step *step, const double *q1, const double *s);
 void accept_couplings(void *self, const time_step *step, const double *q1, const double *s);
 void add_energy_of_couplings(void *self, const time_step *step, const double *q1, const double *s);
-double change_of_form(void *self, const double *q1);
-double change_of_points(void *self, const double *q1);
+void change_of_form(void *self, const double *q1, energy_change *sum);
+void change_of_points(void *self, const double *q1, energy_change *sum);
+void change_of_couplings(void *self, const double *q1, energy_change *sum);
 double value_at(const time_function *f, double t);
 int take_steps(march *m, int steps, const double *ends, double seconds, int keeps, double *rows);

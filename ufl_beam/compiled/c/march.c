@@ -48,16 +48,25 @@ void add_values(void *self, const time_step *step, const double *q1, const doubl
   *f->entry += f->held = value_of_cells(f->form, q1);
 }
 
-double change_of_form(void *self, const double *q1)
+void change_of_form(void *self, const double *q1, energy_change *sum)
 {
   const form_value *f = self;
-  return value_of_cells(f->form, q1) - f->held;
+  sum->in_beams += value_of_cells(f->form, q1) - f->held;
 }
 
+void begin_predicted_strains(void *self, const time_step *step, const double *q1, const double *s)
+{
+  predicted_strains *p = self;
+  p->q0 = step->q0, p->q_before = step->q_before, p->ratio = step->ratio;
+  p->begins = 1, p->exact = 0;
+}
+
+/* Elastic cells have no branches to find: forces before the step do as well, and cost less. */
 void begin_static_tangent(void *self, const time_step *step, const double *q1, const double *s)
 {
-  static_tangent *t = self;
-  t->q0 = step->q0, t->begins = 1, t->exact = 0;
+  const static_tangent *t = self;
+  begin_predicted_strains(t->predicted, step, q1, s);
+  t->predicted->ratio = 0;
 }
 
 void begin_dead_loads(void *self, const time_step *step, const double *q1, const double *s)
@@ -216,7 +225,6 @@ void begin_inelastic(void *self, const time_step *step, const double *q1, const 
   const inelastic_term *t = self;
   begin_points(t->cells->points, t->dt, step->dt);
   for (int i = 0; i < t->cells->size; ++i) t->cells->latest[i] = NAN;
-  t->cells->begins = t->begins;
 }
 
 void accept_inelastic(void *self, const time_step *step, const double *q1, const double *s)
@@ -238,7 +246,7 @@ void begin_couplings(void *self, const time_step *step, const double *q1, const 
   const coupling_term *t = self;
   const couplings *c = t->links;
   const rigid_plastic *p = c->rigid_plastic;
-  if (c->points) begin_points(c->points, t->points.dt, step->dt);
+  if (c->points) begin_points(c->points, t->points->dt, step->dt);
   for (int i = 0; p && i < p->number; ++i) {
     p->w[i * p->width + t->dt_of_law] = step->dt;
     p->way[i] = t->way_before[i];
@@ -251,18 +259,17 @@ void accept_couplings(void *self, const time_step *step, const double *q1, const
   const couplings *c = t->links;
   commit_couplings(c, q1, step->dt);
   if (c->points) {
-    for (int i = 0; i < c->number; ++i) c->points->e1[3 * i] = c->e1[i];
-    respond(c->points);
+    respond_springs(c);
     commit(c->points);
-    enter_losses(&t->points, c->points->sum);
+    enter_losses(t->points, c->points->sum);
   }
   if (c->rigid_plastic) {
     double sums[3];
     const rigid_plastic *p = c->rigid_plastic;
     commit_rigid_plastic(p, c->e1, sums);
     for (int i = 0; i < p->number; ++i) t->way_before[i] = p->way[i] * p->slipped[i];
-    *t->points.hinges += sums[0];
-    if (t->points.numerical) *t->points.numerical += t->loss * sums[1];
+    *t->points->hinges += sums[0];
+    if (t->points->numerical) *t->points->numerical += t->loss * sums[1];
     t->hardened = sums[2];
   }
 }
@@ -270,17 +277,13 @@ void accept_couplings(void *self, const time_step *step, const double *q1, const
 void add_energy_of_couplings(void *self, const time_step *step, const double *q1, const double *s)
 {
   const coupling_term *t = self;
-  if (t->links->points) enter_stored(&t->points, t->links->points->sum);
-  if (t->links->rigid_plastic && t->points.hardening) *t->points.hardening += t->hardened;
+  if (t->links->points) enter_stored(t->points, t->links->points->sum);
+  if (t->links->rigid_plastic && t->points->hardening) *t->points->hardening += t->hardened;
 }
 
-/* What the end of the step would add to what points have stored and dissipated; see Points.change. */
-double change_of_points(void *self, const double *q1)
+/* What the latest response would add to what points have stored and dissipated; see Points.change. */
+static double change_by_response(const points *p, points *copy)
 {
-  const inelastic_term *t = self;
-  const points *p = t->cells->points;
-  points *copy = t->copy;
-  respond_at(t->cells, q1);
   memcpy(copy->w, p->w, (size_t)p->cells * p->of_cell * p->width * sizeof *p->w);
   memcpy(copy->e0, p->e0, 3 * (size_t)p->cells * sizeof *p->e0);
   memcpy(copy->kept, p->kept, POINT_KEPT * (size_t)p->cells * sizeof *p->kept);
@@ -289,13 +292,38 @@ double change_of_points(void *self, const double *q1)
   return after[0] + after[1] + (after[3] - before[3]) + (after[4] - before[4]) + after[5] + after[6];
 }
 
+void change_of_points(void *self, const double *q1, energy_change *sum)
+{
+  const inelastic_term *t = self;
+  respond_at(t->cells, q1);
+  sum->in_beams += change_by_response(t->cells->points, t->copy);
+}
+
+void change_of_couplings(void *self, const double *q1, energy_change *sum)
+{
+  const coupling_term *t = self;
+  const couplings *c = t->links;
+  double taken = 0;
+  find_motions(c, q1);
+  for (int i = 0; i < c->number; ++i) {
+    const double work = taken_by(c, i, q1);
+    taken += work;
+    sum->effort += fabs(work);
+  }
+  if (c->points) {
+    respond_springs(c);
+    taken = change_by_response(c->points, t->points->copy);
+  }
+  sum->in_connectors += taken;
+}
+
 /* -- the step ------------------------------------------------------------------------------------ */
 
 /* A guess of the end of the step: as the last one went on, and what supports give. */
 static void guess(march *m)
 {
   const moving_supports *p = m->supports;
-  extrapolate(m->size, m->q, m->q_before, m->step.dt / m->last_dt, m->x);
+  extrapolate(m->size, m->q, m->q_before, m->step.ratio, m->x);
   for (int k = 0; k < p->moving; ++k) {
     const double from = m->q[p->dof[k]], to = value_at(p->motion + k, m->step.motion_time);
     m->x[p->dof[k]] = from + m->step.fraction * (to - from);
@@ -345,12 +373,13 @@ static int followed(const march *m)
   const static_path *p = m->path;
   equation *e = m->equation;
   const double a = p->weight_of_before;
-  double far = 0, work = 0, change = 0, through = 0, round_off = 0;
+  energy_change sum = {0};
+  double far = 0, work = 0, through = 0, round_off = 0;
   for (int i = 0; i < m->size; ++i)
     if (!(fabs(m->s[i]) * p->per_far[i] <= far)) far = fabs(m->s[i]) * p->per_far[i];
   if (!(far <= p->far)) return 0;
   if (isinf(p->slack)) return 1;
-  for (int k = 0; k < p->terms; ++k) change += p->change[k].of(p->change[k].self, m->x);
+  for (int k = 0; k < p->terms; ++k) p->change[k].of(p->change[k].self, m->x, &sum);
   for (int i = 0; i < m->size; ++i)
     work += (a * p->force[i] + (1 - a) * e->inner_force[i]) * m->s[i];
   e->moved = fmin(largest_motion(e->size, e->weight, m->x), e->scene);
@@ -359,7 +388,9 @@ static int followed(const march *m)
     round_off += fabs(e->tangent[e->diagonal[i]] * e->space[i] * m->s[i]);
   for (int k = 0; k < p->accounts; ++k)
     for (int i = 0; i < p->entries[k]; ++i) through += fabs(p->account[k][i]);
-  const double slack = p->slack * (fabs(work) + fabs(change)) + round_off + DBL_MIN;
+  const double change = sum.in_beams + sum.in_connectors;
+  const double size = fabs(work) + fabs(sum.in_beams) + sum.effort;
+  const double slack = p->slack * size + round_off + DBL_MIN;
   return fabs(work - change) <= slack + p->kink * through;
 }
 
@@ -379,7 +410,7 @@ static int take_step(march *m, double t1)
   m->step.t0 = t0, m->step.t1 = t1, m->step.dt = t1 - t0, m->step.fraction = 1, m->step.at = m->at;
   m->step.load_time = (1 - m->load_weight) * t0 + m->load_weight * t1;
   m->step.motion_time = (1 - m->motion_weight) * t0 + m->motion_weight * t1;
-  m->step.q0 = m->q;
+  m->step.q0 = m->q, m->step.q_before = m->q_before, m->step.ratio = m->step.dt / m->last_dt;
   if (m->rates && !find_numbers(m->rates, m->step.dt)) return 0;
   run(&m->begin, &m->step, 0, 0);
   guess(m);

@@ -236,23 +236,29 @@ static const double ALIKE = 0.01, DIGITS = 1e-9;
  * cells. So the next line is the tangent at the strain that goes with this stress, and the residual is
  * that of this line: Newton's method for strains and stresses as unknowns, the stresses condensed.
  *
+ * In statics `linear`, the strain that the iteration predicts, takes the place of that of the iterate;
+ * before the first tangent, where there is no line, the point answers as on the branch of this strain.
+ *
  * s, the stress and its derivative, changes; returns how far the stress is from that of the strain.
  */
-static double follow_prediction(const points *p, double *w, const double *line, double *s)
+static double follow_prediction(const points *p, double *w, double linear, const double *line,
+                                double *s)
 {
   double *strain = w + p->strain, *z = strain + 3 + p->variables, now[2], kept[MOST_VARIABLES];
-  const double start = *strain, elastic = strain[2], predicted = line[1] + line[2] * (start - line[0]);
-  const double beside = BESIDE_STRESS * p->theta * elastic, first = s[0] - predicted;
-  if (!(fabs(first) > elastic * (ALIKE * fabs(start - line[0]) + DIGITS * fabs(start)))) return 0;
+  const double start = *strain, elastic = strain[2], beside = BESIDE_STRESS * p->theta * elastic;
+  const double first = line ? s[0] - line[1] - line[2] * (start - line[0]) : 0;
+  if (line && !(fabs(first) > elastic * (ALIKE * fabs(start - line[0]) + DIGITS * fabs(start)))) return 0;
   if (p->solves) memcpy(kept, z, p->variables * sizeof *z);
-  double excess = first;
-  memcpy(now, s, sizeof now);
+  *strain = linear;
+  answer(p, w, now);
+  const double predicted = line ? line[1] + line[2] * (linear - line[0]) : now[0];
+  double excess = now[0] - predicted;
   for (int i = 0; i < 20 && fabs(excess) > 1e-3 * fabs(first); ++i) {
     const double from = *strain, change = excess / (now[1] + beside), before = fabs(excess);
     for (double way = 1; way > 1e-3; way /= 2) {
       *strain = from - way * change;
       answer(p, w, now);
-      excess = now[0] - predicted + beside * (*strain - start);
+      excess = now[0] - predicted + beside * (*strain - linear);
       if (fabs(excess) <= (1 - way / 10) * before) break;
     }
   }
@@ -303,8 +309,11 @@ void respond(points *p)
       } else if (p->search[STIFF]) {
         for (int a = 0; a < d * d; ++a)
           s[d + a] = a % (d + 1) ? 0 : p->theta * strain[2 * d + a / (d + 1)];
-      } else if (p->predicts && !(w[TRACTION] < INFINITY)) {
-        const double unlike = p->weight[i] * follow_prediction(p, w, predicted, s);
+      } else if ((p->predicts || p->linear) && !(w[TRACTION] < INFINITY)) {
+        double linear = *strain;
+        if (p->linear) find_strains(1, p->B + 3 * i, p->linear + 3 * c, &linear);
+        const double *last = p->predicts ? predicted : 0;
+        const double unlike = p->weight[i] * follow_prediction(p, w, linear, last, s);
         for (int k = 0; k < 3 && unlike > 0; ++k)
           p->unlike[k] = fmax(p->unlike[k], unlike * fabs(p->B[3 * i + k]));
       }
@@ -330,18 +339,60 @@ void release(const points *p, double least)
   }
 }
 
-/* Resultants as affine functions b + D e of the strains, for the tangent. */
-static void linearise(const inelastic *m)
+/* x = D e */
+static inline void multiply(const double *D, const double *e, double *x)
 {
-  points *p = m->points;
-  const double *e = p->e1, *r = p->r, *D = p->D;
-  for (int c = 0; c < p->cells; ++c, e += 3, r += 3, D += 9) {
+  for (int k = 0; k < 3; ++k) x[k] = D[3 * k] * e[0] + D[3 * k + 1] * e[1] + D[3 * k + 2] * e[2];
+}
+
+/* Resultants as affine functions b + D e of the strains, for the tangent; at the strains they are the
+ * forces of its geometric part. */
+static void linearise(const inelastic *m, const double *forces)
+{
+  const points *p = m->points;
+  const double *e = p->e1, *D = p->D;
+  for (int c = 0; c < p->cells; ++c, e += 3, forces += 3, D += 9) {
     double b[3];
-    for (int k = 0; k < 3; ++k)
-      b[k] = r[k] - D[3 * k] * e[0] - D[3 * k + 1] * e[1] - D[3 * k + 2] * e[2];
+    multiply(D, e, b);
+    for (int k = 0; k < 3; ++k) b[k] = forces[k] - b[k];
     put_in_cell(m->tangent, c, m->at_b, 3, b);
     put_in_cell(m->tangent, c, m->at_D, 9, D);
   }
+}
+
+/* Take the response as the latest tangent. */
+static void take_tangent(const inelastic *m)
+{
+  const points *p = m->points;
+  memcpy(m->last_D, p->D, 9 * (size_t)p->cells * sizeof *p->D);
+  for (int c = 0; c < p->cells; ++c) {
+    double *b = m->last_b + 3 * c;
+    multiply(p->D + 9 * c, p->e1 + 3 * c, b);
+    for (int k = 0; k < 3; ++k) b[k] = p->r[3 * c + k] - b[k];
+  }
+}
+
+/* Forces for the tangent of a static step: first those before it, or of points that have lines those at
+ * the extrapolated strains; then those that the latest tangent predicts for the strains that it
+ * predicts; see static_tangents.py. Stiff points are no prediction. */
+static const double *predict_forces(const inelastic *m, const double *q)
+{
+  const points *p = m->points;
+  predicted_strains *s = m->predicted;
+  double *f = m->forces;
+  const int stays = s->exact || p->search[STIFF];
+  if (stays && !s->begins) return p->r;
+  if (s->begins && (stays || !p->line)) {
+    for (int c = 0; c < p->cells; ++c) memcpy(f + 3 * c, p->kept + POINT_KEPT * c, 3 * sizeof *f);
+    return f;
+  }
+  if (s->begins) take_tangent(m);
+  if (!p->line || s->stale) predict_strains(s, q);
+  for (int c = 0; c < p->cells; ++c) {
+    multiply(m->last_D + 9 * c, s->e + 3 * c, f + 3 * c);
+    for (int k = 3 * c; k < 3 * c + 3; ++k) f[k] += m->last_b[k];
+  }
+  return f;
 }
 
 /* Resultants and their derivatives at q; nothing is to do if q is the latest.
@@ -355,6 +406,11 @@ void respond_at(const inelastic *m, const double *q)
   memcpy(m->latest, q, m->size * sizeof *q);
   memset(p->e1, 0, 3 * p->cells * sizeof *p->e1);
   add_cells((void *)m->strains, q, p->e1);
+  p->linear = 0;
+  if (m->predicted && p->line && !m->predicted->exact) {
+    predict_strains(m->predicted, q);
+    p->linear = m->predicted->e;
+  }
   respond(p);
   for (int c = 0; c < p->cells; ++c) put_in_cell(m->force, c, m->at_r, 3, p->r + 3 * c);
 }
@@ -366,19 +422,17 @@ void add_inelastic_force(void *self, const double *q, double *r)
   add_cells((void *)m->force, q, r);
 }
 
-/* The first tangent of a static step is of the forces before it, see beams.py. */
 void add_inelastic_tangent(void *self, const double *q, double *tangent)
 {
-  inelastic *m = self;
+  const inelastic *m = self;
   points *p = m->points;
   respond_at(m, q);
-  if (m->begins) {
-    for (int c = 0; c < p->cells; ++c) memcpy(p->r + 3 * c, p->kept + POINT_KEPT * c, 3 * sizeof *p->r);
-    m->latest[0] = NAN;
-  }
-  linearise(m);
+  linearise(m, m->predicted ? predict_forces(m, q) : p->r);
   add_cells((void *)m->tangent, q, tangent);
-  m->begins = 0;
+  if (m->predicted) {
+    take_tangent(m);
+    predict_from(m->predicted, q);
+  }
   if (p->line) {
     memcpy(p->predicted, p->line, LINE * p->cells * p->of_cell * sizeof *p->line);
     p->predicts = 1;
