@@ -149,11 +149,11 @@ int find_entries(int rows, const int32_t *indptr, const int32_t *indices, int nu
 
 /* Where a matrix holds the entries of all pairs of the `of_cell` unknowns of each cell, row by row, in
  * batches of `lanes` cells, the last of them filled up with the last cell; whether it has them all. */
-int find_blocks(int rows, const int32_t *indptr, const int32_t *indices, int cells, int of_cell,
+int find_blocks(int rows, const int32_t *indptr, const int32_t *indices, int number, int of_cell,
                 int lanes, const int32_t *dofs, int32_t *found)
 {
-  for (int64_t k = 0; k < (cells + lanes - 1) / lanes * lanes; ++k) {
-    const int32_t *of = dofs + of_cell * (k < cells ? k : cells - 1);
+  for (int64_t k = 0; k < (number + lanes - 1) / lanes * lanes; ++k) {
+    const int32_t *of = dofs + of_cell * (k < number ? k : number - 1);
     int32_t *batch = found + k / lanes * lanes * of_cell * of_cell + k % lanes;
     for (int i = 0; i < of_cell; ++i)
       for (int j = 0; j < of_cell; ++j, batch += lanes)

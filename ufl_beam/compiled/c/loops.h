@@ -92,7 +92,7 @@ void add_step_force(void *self, const double *q, double *r);
 void add_step_tangent(void *self, const double *q, double *tangent);
 int find_entries(int rows, const int32_t *indptr, const int32_t *indices, int number,
                  const int32_t *row, const int32_t *column, int32_t *found);
-int find_blocks(int rows, const int32_t *indptr, const int32_t *indices, int cells, int of_cell,
+int find_blocks(int rows, const int32_t *indptr, const int32_t *indices, int number, int of_cell,
                 int lanes, const int32_t *dofs, int32_t *found);
 int64_t find_pattern(int size, int groups, const int32_t *first, const int32_t *dof, int32_t *begin,
                      int32_t *group, int32_t *seen, int32_t *indptr, int32_t *indices);
