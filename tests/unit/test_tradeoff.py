@@ -67,7 +67,10 @@ def test_a_tolerance_is_met_and_hardly_more(law, tolerance):
     best = found.best
     error = abs(best.values["value"] - 1.0)
     assert 0.3 * tolerance <= error <= tolerance
-    assert found.effort <= 10
+    assert found.spent <= 10 * best.seconds
+    # Of the steps alone: they are a tenth of the time of the coarsest runs, and choices of about
+    # the same time, up to 1.3 times, differ in them.
+    assert found.effort <= 1.3 * 10
     # The laws are exact powers; where only two levels are run, their order is not known.
     assert abs(found.limit["value"] - 1.0) <= 1.01 * found.uncertainty["value"]
     assert found.uncertainty["value"] < 0.3 * tolerance
@@ -410,7 +413,7 @@ def test_a_vibration():
     assert np.abs(found.best.values["tip"] - history(fine)).max() < 0.02 * size
     order = 2 * found.best.dials.mesh.degree
     assert found.crosses["tip"].cells.method == order
-    assert len({run.refinement for run in found.runs}) == len(found.runs)
+    assert len({str(run.dials) for run in found.runs}) == len(found.runs)
     texts = COMM.allgather(str(found))
     assert len(set(texts)) == 1
     ub.plot_tradeoff(found)

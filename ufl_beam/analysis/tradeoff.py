@@ -10,8 +10,9 @@ from typing import TypeVar
 
 from mpi4py import MPI
 
-from ufl_beam.analysis.refinement_runs import Quantity, RefinementRuns
-from ufl_beam.analysis.refinement_search import Found, RefinementSearch
+from ufl_beam.analysis.found_setting import Found
+from ufl_beam.analysis.refinement_runs import FASTER, Quantity, RefinementRuns
+from ufl_beam.analysis.refinement_search import RefinementSearch
 from ufl_beam.analysis.richardson import size
 from ufl_beam.analysis.targets import Target, target_of
 from ufl_beam.analysis.tradeoff_result import Dials, Run, Tradeoff
@@ -35,7 +36,6 @@ from ufl_beam.simulation.step_control import Adaptive
 from ufl_beam.solvers.newton_options import Newton
 
 NEWTON_SHARE = 0.1  # part of the error that other options of Newton's method may change
-FASTER = 0.9  # part of the time of a run below which another one is not faster by chance
 MESHES = Mesh(degree=2), Mesh()  # that compete unless others are given; the likely best first
 NEWTONS = Newton(), Newton(modified=True)
 BAR = "trade-off: {n} runs [{elapsed}{postfix}]"
@@ -140,10 +140,10 @@ def tradeoff(
             apart = size(cross.limit - crosses[name].limit)
             if apart > cross.uncertainty + crosses[name].uncertainty:
                 notes.append(f"{other.run.dials}: its limit of {name} is {apart:.2g} away")
-    if not target.accepts(run.seconds, best.ratio_of(run)):
+    if not best.accepted(target, run):
         notes.append(_reason(runs, best, target))
     return Tradeoff(
-        runs=tuple(runs.runs.values()), best=run, t=t, crosses=crosses,
+        runs=runs.all, best=run, t=t, crosses=crosses,
         units=dict(best.prediction.units), target=target, families=tuple(map(str, families)),
         notes=tuple(notes), spent=runs.spent,
     )  # fmt: skip
@@ -177,7 +177,7 @@ def _find_all(runs: RefinementRuns, target: Target) -> tuple[list[Found], list[s
     if len(wrong) == len(runs.families):
         raise wrong[0]
     if not found:
-        raise TradeoffError("tradeoff: " + "\n".join(notes), tuple(runs.runs.values()))
+        raise TradeoffError("tradeoff: " + "\n".join(notes), runs.all)
     return found, notes
 
 
@@ -195,14 +195,11 @@ def _reason(runs: RefinementRuns, best: Found, target: Target) -> str:
 
 
 def _other_newton(runs: RefinementRuns, best: Found) -> Run:
-    """The recommended run, or that with another tolerance which is faster and changes little."""
-    chosen = best.run
-    for number in range(1, len(runs.newtons)):
-        one = best.run.refinement._replace(newton=number)
-        if runs.allowed([one]):
-            runs.run([one])
-        if one in runs.runs:
-            run = runs.runs[one]
+    """The recommended run, or that with other options which is faster and changes little."""
+    chosen, one = best.run, best.run.refinement
+    for number in range(len(runs.newtons)):
+        run = runs.run_with(one, number) if runs.may_be_faster(number) else None
+        if run is not None:
             changes = {name: run.values[name] - value for name, value in best.run.values.items()}
             changed = best.prediction.largest(changes)
             faster = run.stepping < FASTER * chosen.stepping
