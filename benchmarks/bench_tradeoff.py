@@ -140,7 +140,8 @@ def main():
             keep("bench_tradeoff", one)
             print(
                 f"{one['case']:20s} {tolerance:6.0e} {one['ratio']:11.2f} {one['estimated']:8.2f} "
-                f"{one['uncertain']:9.2f} {one['effort']:6.1f} {one['work']:6.1f} {one['runs']:4d}  {one['dials']}",
+                f"{one['uncertain']:9.2f} {one['effort']:6.1f} {one['work']:6.1f} "
+                f"{one['runs']:4d}  {one['dials']}",
                 flush=True,
             )
 
