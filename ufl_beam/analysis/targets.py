@@ -30,6 +30,7 @@ ROUNDED = 1e-6  # by which a number of steps may be above a whole number
 MOST_TRIED = 2000  # settings whose errors are looked at with their signs
 MOST_USED = 0.85  # the largest predicted errors that are aimed at, for the same reason
 CANCELLED = 1.3  # times the cost of a setting whose errors may cancel that another one may cost
+CHANCE = 2.0  # the same for one that was run and is more accurate than it must be
 
 
 class Choice(NamedTuple):
@@ -235,11 +236,12 @@ class Tolerance:
     ) -> tuple[bool, float]:
         """Rank by predicted time where accurate enough, else by errors, measured and predicted.
 
-        What is accurate by chance, since errors of cells and steps cancel, does not count.
+        What is accurate by chance, since errors of cells and steps cancel, does not count, or
+        little: others are as accurate in what was not asked.
         """
         if ratio + unsure > 1.0 or expected.ratio > UNSURE:
             return True, ratio + expected.ratio
-        return False, expected.seconds * (1.0 if ratio >= WORST_USED else CANCELLED)
+        return False, expected.seconds * (1.0 if ratio >= WORST_USED else CHANCE)
 
 
 @dataclass(frozen=True)
