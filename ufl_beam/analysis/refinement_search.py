@@ -91,10 +91,9 @@ class RefinementSearch:
         """
         known, base = found.prediction, self._base
         wanted = [self._at(found.family, one) for one in Cross.levels(base, whole=True)]
-        if known.seen or not self._runs.allowed(wanted):
-            return None
         lost = known.unsure > self._target.bounds[1]
-        if not (lost or self._affords(known, found.choice, base, whole=True, part=SEEN)):
+        much = not (lost or self._affords(known, found.choice, base, whole=True, part=SEEN))
+        if known.seen or much or not self._runs.allowed(wanted):
             return None
         prediction, doubt, _ = self._predict(found.family, base, whole=True)
         return None if doubt else prediction
