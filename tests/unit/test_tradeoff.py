@@ -173,6 +173,18 @@ def test_modified_newton_is_proposed_where_it_helps(law):
     for law.part in (0.5, 1.5):
         found = ask(newton=None, tolerance={"value": 1e-4})
         assert found.best.dials.newton.modified == (law.part < 1)
+        # The slower method was tried on coarse runs only.
+        slower = [run for run in found.runs if run.dials.newton.modified != (law.part < 1)]
+        assert slower
+        assert all(run.steps < found.best.steps for run in slower)
+
+
+@pytest.mark.parametrize("tolerance", [3e-3, 1e-3, 1e-4, 1e-5])
+def test_an_order_below_that_in_theory_does_not_exceed_the_tolerance(law, tolerance):
+    """Cells of degree 2 with errors of second order, as of polygons in the place of arcs."""
+    law(lambda h, dt, scheme, newton: CELLS * h**2)
+    found = ask(mesh=ub.Mesh(degree=2), tolerance={"value": tolerance})
+    assert abs(found.best.values["value"] - 1.0) <= tolerance
 
 
 @pytest.mark.parametrize("budget", [0.3, 1.0, 10.0])

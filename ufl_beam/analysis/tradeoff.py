@@ -63,9 +63,9 @@ def tradeoff(
     The scene is run with finer steps, finer cells and both.  From the convergence of the quantities
     the errors of the runs and the required setting are estimated.  That setting is run as well and
     compared with the limit that the others are extrapolated to; if the limit is not known well, it
-    is also compared with a run that is twice as fine.  Its errors shall be 0.3 to 1 times the
-    tolerance, and the steps of all runs take at most 10 times as long as those of the recommended
-    one where one scheme is given.  All settings are arguments of :func:`simulate`; several schemes,
+    is also compared with a finer run.  Its errors shall be 0.3 to 1 times the tolerance, and the
+    steps of all runs are planned to take at most 10 times as long as those of the recommended one
+    where one scheme is given.  All settings are arguments of :func:`simulate`; several schemes,
     steps and meshes compete.
 
     Args:
@@ -82,7 +82,8 @@ def tradeoff(
         mesh: The coarsest cells, or several kinds; by default of degree 1, and of degree 2 where
             the scene allows it.
         newton: How exactly equilibria are found; of several the first is used, and the others are
-            tried in the end.  By default also the modified Newton method.
+            tried in the end.  Those that differ in ``modified`` alone are compared on coarse runs,
+            and the faster one is used from there on.  By default also the modified Newton method.
         most: Wall time of all runs; s.
         progress: Show the number of runs in a terminal or notebook.
         comm: Processes; each run is done by one of them, several at a time.  Runs that go on
