@@ -30,7 +30,7 @@ ROUNDED = 1e-6  # by which a number of steps may be above a whole number
 MOST_TRIED = 2000  # settings whose errors are looked at with their signs
 MOST_USED = 0.85  # the largest predicted errors that are aimed at, for the same reason
 CANCELLED = 1.3  # times the cost of a setting whose errors may cancel that another one may cost
-CHANCE = 2.0  # the same for one that was run and is more accurate than it must be
+CHANCE = 2.0  # the same for one that is, or is predicted to be, much more accurate than it must be
 
 
 class Choice(NamedTuple):
@@ -180,7 +180,8 @@ class Prediction:
             if one.likely > MOST_USED:
                 continue
             accurate = accurate or one
-            if one.seconds > CANCELLED * accurate.seconds:
+            most = CHANCE if accurate.likely < WORST_USED else CANCELLED
+            if one.seconds > most * accurate.seconds:
                 break
             if one.likely >= LEAST_USED:
                 return one
