@@ -9,6 +9,9 @@ The scenes are those of the study and of the other benchmarks, with their coarse
 Each is asked for errors of 1e-2, 1e-3 and 1e-4 of its largest displacement.  The error is that of
 the recommended run against a reference with much finer cells and steps.  Prints a table and writes
 one JSON line per question to ``benchmarks/results/bench_tradeoff.jsonl``.
+
+The effort is that of all runs over that of the recommended one: of the time of the steps, which is
+noise where they take milliseconds, and of their work, iterations times cells.
 """
 
 import argparse
@@ -23,10 +26,12 @@ from records import keep
 import ufl_beam as ub
 
 sys.path.append(str(Path(__file__).parent / "study"))
+sys.path.append(str(Path(__file__).parents[1] / "tests"))
 
+import scenes
 from cases import CASES, Case
 
-STEEL = {"E": 210e9, "nu": 0.3, "rho": 7850.0}  # Pa, -, kg/m^3
+STEP_CELLS = 8  # a step of a chain costs as much as so many cells, and those that it has
 STUDY = {case.name: case for case in CASES}
 
 
@@ -64,29 +69,15 @@ class Question:
         return path(ub.simulate(scene, **run))
 
 
-def frame(hinges):
-    """A steel portal under a blow of half a sine at its corner; 10 cells."""
-    section = ub.Section.rectangle(b=0.1, h=0.2, **STEEL)
-    left = ub.Beam((0, 0), (0, 3), section, cells=3, hinges=hinges)
-    roof = ub.Beam((0, 3), (4, 3), section, cells=4)
-    right = ub.Beam((4, 3), (4, 0), section, cells=3)
-    blow = ub.Table([0, 0.01, 0.02], [0, 1, 0])
-    scene = ub.Scene(
-        [left, roof, right],
-        joints=[ub.Rigid(left.end, roof.start), ub.Rigid(roof.end, right.start)],
-        supports=[ub.Clamped(left.start), ub.Clamped(right.end)],
-        loads=[ub.PointLoad(left.end, force=(200e3, 0), time=blow)],
-    )
-    return scene, left.end
-
-
 def elastic_frame():
-    return frame({})
+    scene = scenes.struck_portal()
+    return scene, scene.beams[0].end
 
 
 def yielding_frame():
     """A hinge at the foot that is struck, which flows at 50 kN m and hardens."""
-    return frame({0.0: ub.Hardening(limit=50e3, modulus=2e5)})
+    scene = scenes.struck_portal(hinges={0.0: ub.Hardening(limit=50e3, modulus=2e5)})
+    return scene, scene.beams[0].end
 
 
 def frame_case(name, make, *, elastic):
@@ -103,6 +94,11 @@ QUESTIONS = (
 )
 
 
+def work(run):
+    """Iterations of all steps, times cells, those of a higher degree as many as their nodes."""
+    return run.steps * run.iterations * (STEP_CELLS + run.cells * run.dials.mesh.degree)
+
+
 def answer(question, reference, tolerance):
     """What is recommended for a tolerance, how far it errs, and what the search took."""
     scene, path, run = question.ask()
@@ -111,10 +107,12 @@ def answer(question, reference, tolerance):
     wall = time.perf_counter() - begin
     best = found.best
     error = np.abs(best.values["path"] - reference).max() / np.abs(reference).max()
+    uncertain = found.uncertainty["path"] / found.units["path"]
     return found, {
         "case": question.case.name, "asked": tolerance, "error": error, "ratio": error / tolerance,
         "estimated": found.ratio(best), "runs": len(found.runs), "spent_s": found.spent,
         "best_s": best.seconds, "effort": found.effort, "wall_s": wall,
+        "work": sum(map(work, found.runs)) / work(best), "uncertain": uncertain,
         "steps": best.steps, "cells": best.cells, "dials": str(best.dials),
         "notes": list(found.notes),
     }  # fmt: skip
@@ -125,7 +123,8 @@ def main():
     parser.add_argument("--only", default="", help="cases whose names contain this")
     parser.add_argument("--say", action="store_true", help="print each trade-off")
     options = parser.parse_args()
-    print(f"{'':20s} {'asked':>6} {'error/asked':>11} {'estimate':>8} {'effort':>6} {'runs':>4}")
+    head = f"{'':20s} {'asked':>6} {'error/asked':>11} {'estimate':>8} {'uncertain':>9}"
+    print(f"{head} {'effort':>6} {'work':>6} {'runs':>4}")
     for question in QUESTIONS:
         if options.only not in question.case.name:
             continue
@@ -141,7 +140,8 @@ def main():
             keep("bench_tradeoff", one)
             print(
                 f"{one['case']:20s} {tolerance:6.0e} {one['ratio']:11.2f} {one['estimated']:8.2f} "
-                f"{one['effort']:6.1f} {one['runs']:4d}  {one['dials']}",
+                f"{one['uncertain']:9.2f} {one['effort']:6.1f} {one['work']:6.1f} "
+                f"{one['runs']:4d}  {one['dials']}",
                 flush=True,
             )
 

@@ -89,6 +89,25 @@ def portal(*, cells=4, H=20e3, V=-40e3, time=GROWING, feet=ub.Clamped):
 # -- dynamics ----------------------------------------------------------------------------------
 
 
+def struck_portal(*, hinges=None):
+    """Steel portal under a blow of half a sine, within 20 ms, at its corner, the end of beam 0.
+
+    Args:
+        hinges: Those of the column that is struck, as of `ub.Beam`.
+    """
+    section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
+    left = ub.Beam((0, 0), (0, 3), section, cells=3, hinges=hinges or {})
+    roof = ub.Beam((0, 3), (4, 3), section, cells=4)
+    right = ub.Beam((4, 3), (4, 0), section, cells=3)
+    blow = ub.Table([0, 0.01, 0.02], [0, 1, 0])
+    return ub.Scene(
+        [left, roof, right],
+        joints=[ub.Rigid(left.end, roof.start), ub.Rigid(roof.end, right.start)],
+        supports=[ub.Clamped(left.start), ub.Clamped(right.end)],
+        loads=[ub.PointLoad(left.end, force=(200e3, 0), time=blow)],
+    )
+
+
 def flying_beam(*, cells=10, time=lambda t: 1.0 * (t < 2.5), mass=1.0):
     """Free beam, thrown by a force and a moment at its lower end (Simo and Vu-Quoc 1986)."""
     section = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=mass, rhoI=10.0 * mass)

@@ -139,11 +139,23 @@ def test_a_finer_run_sharpens_a_limit():
     off = replace(one, limit=one.limit + 1.0)
     sharp = off.sharpened(*values, coarse, fine)
     assert np.abs(sharp.limit - 7.0).max() < 1e-12
-    assert sharp.uncertainty == pytest.approx(size(values[1] - 7.0))
-    # An order that is not believed: at most a half of the error is left by half of the steps.
-    slow = cross((0, 0), cells=(0.3, 0.55), steps=(0.1, 0.55))
-    values = np.array(8.0), np.array(7.6)
-    assert slow.sharpened(*values, (0, 0), (0.1, 0.1)).limit == pytest.approx(7.2)
+    # The prediction of the change was right.
+    assert sharp.uncertainty == pytest.approx((SURE - 1) * size(values[1] - 7.0))
+    # A change that was not predicted is in doubt as a whole.
+    noise = 0.01 * SHAPE
+    doubtful = off.sharpened(values[0], values[1] + noise, coarse, fine)
+    assert doubtful.uncertainty >= size(noise)
+
+
+@pytest.mark.parametrize("order", [1.0, 1.5, 2.0])
+def test_a_finer_run_bounds_the_limit_of_an_order_that_is_not_known(order):
+    """Two levels of steps, which do not show that their order may be half of that in theory."""
+    law = {"cells": (0.0, 2.0), "steps": (0.1, order)}
+    one = cross((0, 0), whole=False, **law)
+    for first, finer in [(0.0, 0.5), (0.0, 1.0), (0.0, 2.0), (0.5, 1.5), (1.0, 1.5), (1.0, 2.0)]:
+        coarse, fine = (0.0, first), (0.0, finer)
+        sharp = one.sharpened(*(manufactured(at, **law) for at in (coarse, fine)), coarse, fine)
+        assert np.abs(sharp.limit - 7.0).max() <= sharp.uncertainty
 
 
 def test_dials_that_depend_on_each_other_are_not_seen():

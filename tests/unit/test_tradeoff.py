@@ -67,7 +67,10 @@ def test_a_tolerance_is_met_and_hardly_more(law, tolerance):
     best = found.best
     error = abs(best.values["value"] - 1.0)
     assert 0.3 * tolerance <= error <= tolerance
-    assert found.effort <= 10
+    assert found.spent <= 10 * best.seconds
+    # Of the steps alone: they are a tenth of the time of the coarsest runs, and choices of about
+    # the same time, up to 1.3 times, differ in them.
+    assert found.effort <= 1.3 * 10
     # The laws are exact powers; where only two levels are run, their order is not known.
     assert abs(found.limit["value"] - 1.0) <= 1.01 * found.uncertainty["value"]
     assert found.uncertainty["value"] < 0.3 * tolerance
@@ -170,6 +173,18 @@ def test_modified_newton_is_proposed_where_it_helps(law):
     for law.part in (0.5, 1.5):
         found = ask(newton=None, tolerance={"value": 1e-4})
         assert found.best.dials.newton.modified == (law.part < 1)
+        # The slower method was tried on coarse runs only.
+        slower = [run for run in found.runs if run.dials.newton.modified != (law.part < 1)]
+        assert slower
+        assert all(run.steps < found.best.steps for run in slower)
+
+
+@pytest.mark.parametrize("tolerance", [3e-3, 1e-3, 1e-4, 1e-5])
+def test_an_order_below_that_in_theory_does_not_exceed_the_tolerance(law, tolerance):
+    """Cells of degree 2 with errors of second order, as of polygons in the place of arcs."""
+    law(lambda h, dt, scheme, newton: CELLS * h**2)
+    found = ask(mesh=ub.Mesh(degree=2), tolerance={"value": tolerance})
+    assert abs(found.best.values["value"] - 1.0) <= tolerance
 
 
 @pytest.mark.parametrize("budget", [0.3, 1.0, 10.0])
@@ -410,7 +425,7 @@ def test_a_vibration():
     assert np.abs(found.best.values["tip"] - history(fine)).max() < 0.02 * size
     order = 2 * found.best.dials.mesh.degree
     assert found.crosses["tip"].cells.method == order
-    assert len({run.refinement for run in found.runs}) == len(found.runs)
+    assert len({str(run.dials) for run in found.runs}) == len(found.runs)
     texts = COMM.allgather(str(found))
     assert len(set(texts)) == 1
     ub.plot_tradeoff(found)

@@ -55,19 +55,8 @@ def softening_cantilever():
 
 def frame():
     """Elastic: a portal that is struck at its corner within 20 ms."""
-    steel = {"E": 210e9, "nu": 0.3, "rho": 7850.0}
-    section = ub.Section.rectangle(b=0.1, h=0.2, **steel)
-    left = ub.Beam((0, 0), (0, 3), section, cells=3)
-    roof = ub.Beam((0, 3), (4, 3), section, cells=4)
-    right = ub.Beam((4, 3), (4, 0), section, cells=3)
-    blow = ub.Table([0, 0.01, 0.02], [0, 1, 0])
-    scene = ub.Scene(
-        [left, roof, right],
-        joints=[ub.Rigid(left.end, roof.start), ub.Rigid(roof.end, right.start)],
-        supports=[ub.Clamped(left.start), ub.Clamped(right.end)],
-        loads=[ub.PointLoad(left.end, force=(200e3, 0), time=blow)],
-    )
-    return scene, left.end, {"t": (0.0, 0.1), "dt": 2e-3}
+    scene = scenes.struck_portal()
+    return scene, scene.beams[0].end, {"t": (0.0, 0.1), "dt": 2e-3}
 
 
 SCENES = [flying_beam, swing, yielding_cantilever, softening_cantilever]

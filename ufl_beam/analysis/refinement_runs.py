@@ -25,12 +25,14 @@ from ufl_beam.solvers.newton_options import Newton
 Quantity = Callable[[Solution], npt.ArrayLike]
 
 MOST_DIVISOR = 8  # cells of a beam are not taken in smaller parts than one by so many
+FASTER = 0.9  # part of the time of a run below which another one is not faster by chance
+MUCH_SLOWER = 1.5  # options of Newton's method that took so much longer are not tried again
 WRONG = "SceneError: "  # how failures of runs begin that finer dials do not help
 
 
 @dataclass(eq=False)
 class RefinementRuns:
-    """Runs of a trade-off, see :func:`tradeoff`; they have the first of ``newtons`` by default."""
+    """Runs of a trade-off, see :func:`tradeoff`."""
 
     scene: Scene
     quantities: Mapping[str, Quantity]
@@ -42,6 +44,8 @@ class RefinementRuns:
     comm: MPI.Intracomm
     bar: Any  # progress bar
     runs: dict[Refinement, Run] = field(default_factory=dict, init=False)
+    others: dict[tuple[Refinement, int], Run] = field(default_factory=dict, init=False)
+    newton: int = field(default=0, init=False)  # number of the options of ``runs`` from now on
     failed: dict[Refinement, str] = field(default_factory=dict, init=False)  # why runs failed
     spent: float = field(default=0.0, init=False)  # wall time of all runs, and of compiling; s
     _shapes: dict[str, tuple[int, ...]] = field(default_factory=dict, init=False)
@@ -53,8 +57,8 @@ class RefinementRuns:
         until = min(self.t[1], self.t[0] + dt) if isinstance(dt, float | int) else self.t[1]
         with alone():
             try:
-                self._simulate(first, until)
-                self._take(first, self._member(**first.case))
+                self._simulate(first, self.newton, until)
+                self.runs[first] = self._taken(first, self.newton, self._member(*first))
                 self.bar.update(1)
             except ConvergenceError as error:
                 self.failed[first] = f"{type(error).__name__}: {error}"  # finer steps may do
@@ -74,37 +78,85 @@ class RefinementRuns:
                 f"the next {len(missing)} runs would take about {needed:.3g} s after "
                 f"{self.spent:.3g} s of runs, more than most = {self.most:g} s; the finest is "
                 f"{self.dials(missing[-1])}",
-                tuple(self.runs.values()),
+                self.all,
             )
         self.bar.set_postfix_str(f"{len(missing)} more up to {self.dials(missing[-1])}")
+        done, failed = self._done(missing, self.newton)
+        self.runs |= done
+        self.failed |= failed
+
+    def run_with(self, one: Refinement, newton: int) -> Run | None:
+        """Do a run with some options of Newton's method; None if it fails or there is no time."""
+        if newton == self.newton:
+            return self.runs.get(one)
+        if (one, newton) not in self.others and self.allowed([one]):
+            done, _ = self._done([one], newton)
+            self.others |= {(done_one, newton): run for done_one, run in done.items()}
+        return self.others.get((one, newton))
+
+    def choose_newton(self, one: Refinement) -> None:
+        """Do a run with all options that only keep tangents longer; use the fastest from now on."""
+        for number in self._of_same_tolerance():
+            before, run = self.runs[one], self.run_with(one, number)
+            if run is not None and run.stepping < FASTER * before.stepping:
+                self.others[one, self.newton] = before
+                self.runs[one], self.newton = self.others.pop((one, number)), number
+
+    def may_be_faster(self, newton: int) -> bool:
+        """Return whether options were not much slower where they were tried last."""
+        tried = [
+            run.stepping / self.runs[one].stepping
+            for (one, number), run in self.others.items()
+            if number == newton
+        ]
+        return not tried or tried[-1] < MUCH_SLOWER
+
+    def _of_same_tolerance(self) -> list[int]:
+        first = self.newtons[0]
+        return [
+            k for k, one in enumerate(self.newtons)
+            if k != self.newton and replace(one, modified=first.modified) == first
+        ]  # fmt: skip
+
+    def _done(
+        self, missing: Sequence[Refinement], newton: int
+    ) -> tuple[dict[Refinement, Run], dict[Refinement, str]]:
+        """Return runs, and the reasons why others failed."""
+        last = str(self.dials(missing[-1], newton))
+        self.bar.set_postfix_str(f"{len(missing)} more up to {last}")
+        cases = [one._asdict() | {"refine": str(one.refine), "newton": newton} for one in missing]
         try:
-            cases = [one.case for one in missing]
             done = study(self._member, cases, progress=False, comm=self.comm)
         except RuntimeError as error:  # all of them failed
             text = str(error)
             if WRONG in text:
                 raise SceneError(text.partition(WRONG)[2]) from None
-            self.failed |= dict.fromkeys(missing, text)
-            return
+            return {}, dict.fromkeys(missing, text)
         finally:
             self.bar.set_postfix_str("", refresh=False)
             self.bar.update(len(missing))
+        runs: dict[Refinement, Run] = {}
         for k, one in enumerate(missing):
             if k not in done.failed:
-                self._take(one, {name: done[name][k] for name in done.results})
-                continue
-            if done.failed[k].startswith(WRONG):
+                found = {name: done[name][k] for name in done.results}
+                runs[one] = self._taken(one, newton, found)
+            elif done.failed[k].startswith(WRONG):
                 raise SceneError(done.failed[k].removeprefix(WRONG))
-            self.failed[one] = done.failed[k]
+        return runs, {missing[k]: text for k, text in done.failed.items()}
 
-    def dials(self, refinement: Refinement) -> Dials:
-        """Return the dials of a refinement."""
-        family, refine, level, newton = refinement
+    def dials(self, refinement: Refinement, newton: int = 0) -> Dials:
+        """Return the dials of a refinement, with options of Newton's method."""
+        family, refine, level = refinement
         finer = self.families[family].finer(refine, level, self.t)
         return replace(finer, newton=self.newtons[newton])
 
+    @property
+    def all(self) -> tuple[Run, ...]:
+        """Runs with all options of Newton's method."""
+        return *self.runs.values(), *self.others.values()
+
     def of(self, family: int) -> list[Run]:
-        """Return the runs of a family."""
+        """Return the runs of a family, each refinement with one of the options."""
         return [run for one, run in self.runs.items() if one.family == family]
 
     def divisor(self, family: int) -> int:
@@ -122,7 +174,7 @@ class RefinementRuns:
 
     def _longest(self, refinement: Refinement) -> float:
         """Wall time at most, by the nearest run; s; 0 if there is none."""
-        _, refine, level, _ = refinement
+        _, refine, level = refinement
         times = (
             run.seconds
             * 2 ** max(0.0, level - run.refinement.level)
@@ -131,8 +183,8 @@ class RefinementRuns:
         )
         return min(times, default=0.0)
 
-    def _simulate(self, refinement: Refinement, until: float) -> Solution:
-        dials, t = self.dials(refinement), (self.t[0], until)
+    def _simulate(self, refinement: Refinement, newton: int, until: float) -> Solution:
+        dials, t = self.dials(refinement, newton), (self.t[0], until)
         return self.simulate(self.scene, t=t, progress=False, **dials.arguments)
 
     def _quantities_of(self, solution: Solution) -> Iterator[tuple[str, Array]]:
@@ -149,10 +201,12 @@ class RefinementRuns:
                 )
             yield name, value
 
-    def _member(self, **case: Any) -> dict[str, Any]:
+    def _member(
+        self, family: int, refine: str | Fraction, level: float, newton: int = 0
+    ) -> dict[str, Any]:
         """Compute one run, as a member of a study."""
-        refinement = Refinement(**case | {"refine": Fraction(case["refine"])})
-        solution = self._simulate(refinement, self.t[1])
+        one = Refinement(family, Fraction(refine), level)
+        solution = self._simulate(one, newton, self.t[1])
         values = {f"quantity {n}": v for n, (_, v) in enumerate(self._quantities_of(solution))}
         return values | {
             "seconds": solution.seconds,
@@ -162,8 +216,8 @@ class RefinementRuns:
             "iterations": solution.iterations / solution.parts,
         }
 
-    def _take(self, one: Refinement, found: Mapping[str, Any]) -> None:
-        """Keep a run, as the first process has measured it."""
+    def _taken(self, one: Refinement, newton: int, found: Mapping[str, Any]) -> Run:
+        """Return a run, as the first process has measured it."""
         found = self.comm.bcast(found)
         values = {
             name: np.asarray(found[f"quantity {n}"]) for n, name in enumerate(self.quantities)
@@ -171,5 +225,5 @@ class RefinementRuns:
         self._shapes |= {name: value.shape for name, value in values.items()}
         measured = ("seconds", "building", "steps", "cells", "iterations")
         took = {name: float(found[name]) for name in measured}
-        self.runs[one] = Run(one, self.dials(one), values, **took)
         self.spent += took["seconds"]
+        return Run(one, self.dials(one, newton), values, **took)

@@ -21,7 +21,8 @@ from ufl_beam.one_line import one_line
 Numbers = TypeVar("Numbers", float, Array)
 Level = tuple[int, int]  # of the cells and of the steps
 Fineness = tuple[float, float]  # the same, not necessarily whole
-FASTEST, SLOWEST = 1 / 16, 1 / 2  # parts of an error that half as long cells and steps leave
+FASTEST = 1 / 16  # part of an error that finer cells and steps leave at least
+SLOWEST = 0.5  # part of the order of the method with which errors fall at least, if it is not seen
 LEAST_ORDER = 0.5  # differences that fall more slowly than with this power show no convergence
 ORDER_TOLERANCE = 0.25  # an order so near to a whole one, up to that of the method, is trusted
 SURE, UNSURE = 1.25, 2.0  # safety factors on errors by a trusted order, and on others
@@ -88,10 +89,21 @@ class Convergence:
         """The coarsest of the levels."""
         return self.finest - len(self.differences)
 
+    def slowest(self, levels: float) -> float:
+        """Return the part of an error that so many finer levels leave at most.
+
+        Where orders are not trusted, errors may fall with half of the order of the method.
+        """
+        order = self.used if self.trusted else SLOWEST * self.method
+        return float(2 ** -(order * levels))
+
     @property
-    def unknown(self) -> bool:
-        """True if there are changes, but only two levels."""
-        return self.used > 0 and math.isnan(self.order)
+    def unsettled(self) -> float:
+        """Uncertainty of the limit; unit of the quantity."""
+        if not (self.used > 0 and math.isnan(self.order)):
+            return self.doubt
+        slow = self.slowest(1.0)
+        return self.differences[0] * slow / (1 - slow) - size(self.rest)
 
     @property
     def seen(self) -> bool:
@@ -119,6 +131,10 @@ class Convergence:
     def at(self, level: float) -> float:
         """Bound the error at a level; unit of the quantity."""
         return size(self.lack(level)) + self.unsure(level)
+
+    def half_sure(self, level: float) -> float:
+        """Predict the error at a level with half of the doubt; unit of the quantity."""
+        return size(self.lack(level)) + self.unsure(level) / 2
 
     def __str__(self) -> str:
         if self.used == 0:
@@ -169,7 +185,8 @@ class Cross:
             mixed = values[i + 1, j + 1] - values[i + 1, j] - values[i, j + 1] + q
             mixed = np.asarray(mixed / math.prod(parts))
         limit = along[0][-1] + cells.rest + along[1][-1] + steps.rest - q + mixed
-        unsure = cells.doubt + steps.doubt + (size(mixed) + size(cells.rest) + size(steps.rest)) / 4
+        unsure = (size(mixed) + size(cells.rest) + size(steps.rest)) / 4
+        unsure += cells.unsettled + steps.unsettled
         return cls(cells, steps, np.asarray(limit), mixed, unsure)
 
     @property
@@ -191,21 +208,31 @@ class Cross:
         return np.asarray(self.cells.lack(i) + self.steps.lack(j) + both)
 
     def error(self, i: float, j: float) -> float:
-        """Bound the error at levels that need not be whole; unit of the quantity."""
-        return self.cells.at(i) + self.steps.at(j)
+        """Predict the error, with half of the doubt, at levels that need not be whole."""
+        return self.cells.half_sure(i) + self.steps.half_sure(j)
 
     def sharpened(self, value: Array, finer: Array, at: Fineness, finer_at: Fineness) -> Cross:
-        """Return it with the limit of two runs of which one is finer, by the predicted orders.
+        """Return it with the limit of two runs of which one is finer.
 
-        Now that the sum of the errors is measured, both are trusted up to a factor.
+        The finer run lacks of the limit what was predicted, and a part of what the prediction of
+        the change was wrong by.  A change that was predicted beyond all levels confirms orders;
+        what it was wrong by may be irregular, as much at all levels, and is in doubt as a whole.
         """
+        dials = (self.cells, at[0], finer_at[0]), (self.steps, at[1], finer_at[1])
+        before = sum(dial.at(a) for dial, a, _ in dials)
+        after = sum(dial.at(b) for dial, _, b in dials)
+        slow = sum(dial.at(a) * dial.slowest(b - a) for dial, a, b in dials) / before
+        left = min(max(after / before, FASTEST), slow)
         change = finer - value
-        left = size(self.lack(*finer_at)) / max(size(self.lack(*at)), np.finfo(float).tiny)
-        left = min(max(left, SLOWEST if self.steps.unknown else FASTEST), SLOWEST)
-        rest = np.asarray(change * left / (1 - left))
+        off = change - (self.lack(*at) - self.lack(*finer_at))
+        rest = self.lack(*finer_at) + off * left / (1 - left)
+        most = slow / (1 - slow)  # part of a change that is to come, at most
+        doubt = max(0.0, most * size(change) - size(rest))
+        if all(b == a or a >= dial.finest for dial, a, b in dials):
+            doubt = min(doubt, most * size(off))
+        doubt += (SURE - 1) * sum(size(dial.lack(b)) for dial, _, b in dials) + size(off)
         cells, steps = self.cells.confirmed(), self.steps.confirmed()
-        limit = np.asarray(finer + rest)
-        return Cross(cells, steps, limit, self.mixed, uncertainty=size(rest))
+        return Cross(cells, steps, np.asarray(finer + rest), self.mixed, uncertainty=doubt)
 
     def __str__(self) -> str:
         more = f"\n    together: {size(self.mixed):.1e} more than one by one"

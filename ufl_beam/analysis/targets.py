@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
 
-from ufl_beam.analysis.richardson import Cost, Cross, size
+from ufl_beam.analysis.richardson import UNSURE, Cost, Cross, size
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_number
 
@@ -24,9 +24,13 @@ NEARLY_BEST = 2.0  # if nothing serves, the cheapest up to so many times the lea
 NEGLIGIBLE = 0.1  # changes up to this part of a tolerance need not converge
 WORST_USED = 0.3  # part of a tolerance that errors of a recommended setting use up, if they can
 LEAST_USED = 0.45  # the same of predicted errors, which may be wrong by a third
+CHECKED = 1.5  # times as many cells and steps show how far a run is from the limit, or
+IRREGULAR = 2.0  # so many times where changes do not fall with a whole order
+ROUNDED = 1e-6  # by which a number of steps may be above a whole number
 MOST_TRIED = 2000  # settings whose errors are looked at with their signs
 MOST_USED = 0.85  # the largest predicted errors that are aimed at, for the same reason
 CANCELLED = 1.3  # times the cost of a setting whose errors may cancel that another one may cost
+CHANCE = 2.0  # the same for one that is, or is predicted to be, much more accurate than it must be
 
 
 class Choice(NamedTuple):
@@ -35,8 +39,11 @@ class Choice(NamedTuple):
     refine: Fraction  # parts of each cell
     level: float  # steps are about 2**level times as many
     seconds: float  # wall time
-    ratio: float  # bound of the largest error, as a part of what is allowed, or of the quantity
+    ratio: float  # largest error with half of its doubt, as a part of what is allowed
     likely: float  # the largest error itself
+
+
+Fineness = tuple[Fraction, float]  # parts of each cell, and level of the steps
 
 
 class Choices(NamedTuple):
@@ -73,7 +80,28 @@ class Prediction:
         """True if all orders are those of theory, or nearly so."""
         return all(cross.cells.trusted and cross.steps.trusted for cross in self.crosses.values())
 
-    def within_reach(self, choice: Choice) -> tuple[Fraction, float]:
+    @property
+    def seen(self) -> bool:
+        """True if three levels of each dial show how changes fall, or they are negligible."""
+        dials = [dial for cross in self.crosses.values() for dial in (cross.cells, cross.steps)]
+        return all(dial.used == 0 or not math.isnan(dial.order) for dial in dials)
+
+    @property
+    def unsure(self) -> float:
+        """Largest uncertainty of a limit, in its unit."""
+        return max(cross.uncertainty / self.units[n] for n, cross in self.crosses.items())
+
+    def with_limits(self, known: Prediction) -> Prediction:
+        """Return it with limits that other runs show."""
+        crosses = {
+            name: replace(
+                cross, limit=known.crosses[name].limit, uncertainty=known.crosses[name].uncertainty
+            )
+            for name, cross in self.crosses.items()
+        }
+        return replace(self, crosses=crosses)
+
+    def within_reach(self, choice: Choice) -> Fineness:
         """Return a choice, or what is nearest to it where orders can be relied on."""
         i, j = (level + 1 for level in self.finest)
         if self.trusted:
@@ -105,6 +133,16 @@ class Prediction:
             return int(worst.cells.used > 0), 0
         return 0, int(worst.steps.used > 0)
 
+    def finer(self, refine: Fraction, level: float, *, cells: bool, steps: bool) -> Fineness:
+        """Return cells or steps, or both, that show how far a run is from the limit."""
+        more = IRREGULAR if self.seen and not self.trusted else CHECKED
+        if cells:
+            refine = Fraction(math.ceil(more * refine * self.divisor), self.divisor)
+        if steps:
+            parts = more * 2**level
+            level = math.log2(math.ceil(parts - ROUNDED) if self.whole_steps else parts)
+        return refine, level
+
     def largest(self, differences: Mapping[str, Array]) -> float:
         """Return the largest of differences of the quantities, in its unit."""
         return max(size(d) / self.units[name] for name, d in differences.items())
@@ -121,7 +159,9 @@ class Prediction:
         along = np.array([math.log2(r) for r in refine])
         each = [(cross, self.larger / self.units[n]) for n, cross in self.crosses.items()]
         ratio = np.max([
-            scale * np.add.outer([*map(cross.cells.at, along)], [*map(cross.steps.at, level)])
+            scale * np.add.outer(
+                [*map(cross.cells.half_sure, along)], [*map(cross.steps.half_sure, level)]
+            )
             for cross, scale in each
         ], axis=0)  # fmt: skip
         cells = self.cells * np.array([float(r) for r in refine])[:, None]
@@ -140,7 +180,8 @@ class Prediction:
             if one.likely > MOST_USED:
                 continue
             accurate = accurate or one
-            if one.seconds > CANCELLED * accurate.seconds:
+            most = CHANCE if accurate.likely < WORST_USED else CANCELLED
+            if one.seconds > most * accurate.seconds:
                 break
             if one.likely >= LEAST_USED:
                 return one
@@ -187,13 +228,21 @@ class Tolerance:
         """Return what is to be small: the wall time; s."""
         return choice.seconds
 
-    def accepts(self, seconds: float, ratio: float) -> bool:
+    def accepts(self, seconds: float, ratio: float, unsure: float) -> bool:
         """Return whether it is accurate enough, and not much more."""
-        return WORST_USED <= ratio <= 1.0
+        return ratio >= WORST_USED and ratio + unsure <= 1.0
 
-    def rank(self, seconds: float, ratio: float, expected: float) -> tuple[bool, float]:
-        """Rank by time where accurate enough, else by error."""
-        return (False, seconds) if ratio <= 1.0 else (True, ratio)
+    def rank(
+        self, seconds: float, ratio: float, unsure: float, expected: Choice
+    ) -> tuple[bool, float]:
+        """Rank by predicted time where accurate enough, else by errors, measured and predicted.
+
+        What is accurate by chance, since errors of cells and steps cancel, does not count, or
+        little: others are as accurate in what was not asked.
+        """
+        if ratio + unsure > 1.0 or expected.ratio > UNSURE:
+            return True, ratio + expected.ratio
+        return False, expected.seconds * (1.0 if ratio >= WORST_USED else CHANCE)
 
 
 @dataclass(frozen=True)
@@ -232,13 +281,15 @@ class Budget:
         """Return what is to be small: the error."""
         return choice.ratio
 
-    def accepts(self, seconds: float, ratio: float) -> bool:
+    def accepts(self, seconds: float, ratio: float, unsure: float) -> bool:
         """Return whether it takes that time, and not much less."""
         return (1 - BUDGET_SLACK) * self.seconds <= seconds <= self.seconds
 
-    def rank(self, seconds: float, ratio: float, expected: float) -> tuple[bool, float]:
+    def rank(
+        self, seconds: float, ratio: float, unsure: float, expected: Choice
+    ) -> tuple[bool, float]:
         """Rank by the expected error where fast enough, as a single one may be small by chance."""
-        return (False, expected) if seconds <= self.seconds else (True, seconds)
+        return (False, expected.ratio) if seconds <= self.seconds else (True, seconds)
 
 
 Target = Tolerance | Budget

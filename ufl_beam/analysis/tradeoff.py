@@ -10,8 +10,9 @@ from typing import TypeVar
 
 from mpi4py import MPI
 
-from ufl_beam.analysis.refinement_runs import Quantity, RefinementRuns
-from ufl_beam.analysis.refinement_search import Found, RefinementSearch
+from ufl_beam.analysis.found_setting import Found
+from ufl_beam.analysis.refinement_runs import FASTER, Quantity, RefinementRuns
+from ufl_beam.analysis.refinement_search import RefinementSearch
 from ufl_beam.analysis.richardson import size
 from ufl_beam.analysis.targets import Target, target_of
 from ufl_beam.analysis.tradeoff_result import Dials, Run, Tradeoff
@@ -35,7 +36,6 @@ from ufl_beam.simulation.step_control import Adaptive
 from ufl_beam.solvers.newton_options import Newton
 
 NEWTON_SHARE = 0.1  # part of the error that other options of Newton's method may change
-FASTER = 0.9  # part of the time of a run below which another one is not faster by chance
 MESHES = Mesh(degree=2), Mesh()  # that compete unless others are given; the likely best first
 NEWTONS = Newton(), Newton(modified=True)
 BAR = "trade-off: {n} runs [{elapsed}{postfix}]"
@@ -63,9 +63,9 @@ def tradeoff(
     The scene is run with finer steps, finer cells and both.  From the convergence of the quantities
     the errors of the runs and the required setting are estimated.  That setting is run as well and
     compared with the limit that the others are extrapolated to; if the limit is not known well, it
-    is also compared with a run that is twice as fine.  Its errors shall be 0.3 to 1 times the
-    tolerance, and the steps of all runs take at most 10 times as long as those of the recommended
-    one where one scheme is given.  All settings are arguments of :func:`simulate`; several schemes,
+    is also compared with a finer run.  Its errors shall be 0.3 to 1 times the tolerance, and the
+    steps of all runs are planned to take at most 10 times as long as those of the recommended one
+    where one scheme is given.  All settings are arguments of :func:`simulate`; several schemes,
     steps and meshes compete.
 
     Args:
@@ -82,7 +82,8 @@ def tradeoff(
         mesh: The coarsest cells, or several kinds; by default of degree 1, and of degree 2 where
             the scene allows it.
         newton: How exactly equilibria are found; of several the first is used, and the others are
-            tried in the end.  By default also the modified Newton method.
+            tried in the end.  Those that differ in ``modified`` alone are compared on coarse runs,
+            and the faster one is used from there on.  By default also the modified Newton method.
         most: Wall time of all runs; s.
         progress: Show the number of runs in a terminal or notebook.
         comm: Processes; each run is done by one of them, several at a time.  Runs that go on
@@ -140,10 +141,10 @@ def tradeoff(
             apart = size(cross.limit - crosses[name].limit)
             if apart > cross.uncertainty + crosses[name].uncertainty:
                 notes.append(f"{other.run.dials}: its limit of {name} is {apart:.2g} away")
-    if not target.accepts(run.seconds, best.ratio_of(run)):
+    if not best.accepted(target, run):
         notes.append(_reason(runs, best, target))
     return Tradeoff(
-        runs=tuple(runs.runs.values()), best=run, t=t, crosses=crosses,
+        runs=runs.all, best=run, t=t, crosses=crosses,
         units=dict(best.prediction.units), target=target, families=tuple(map(str, families)),
         notes=tuple(notes), spent=runs.spent,
     )  # fmt: skip
@@ -177,7 +178,7 @@ def _find_all(runs: RefinementRuns, target: Target) -> tuple[list[Found], list[s
     if len(wrong) == len(runs.families):
         raise wrong[0]
     if not found:
-        raise TradeoffError("tradeoff: " + "\n".join(notes), tuple(runs.runs.values()))
+        raise TradeoffError("tradeoff: " + "\n".join(notes), runs.all)
     return found, notes
 
 
@@ -195,14 +196,11 @@ def _reason(runs: RefinementRuns, best: Found, target: Target) -> str:
 
 
 def _other_newton(runs: RefinementRuns, best: Found) -> Run:
-    """The recommended run, or that with another tolerance which is faster and changes little."""
-    chosen = best.run
-    for number in range(1, len(runs.newtons)):
-        one = best.run.refinement._replace(newton=number)
-        if runs.allowed([one]):
-            runs.run([one])
-        if one in runs.runs:
-            run = runs.runs[one]
+    """The recommended run, or that with other options which is faster and changes little."""
+    chosen, one = best.run, best.run.refinement
+    for number in range(len(runs.newtons)):
+        run = runs.run_with(one, number) if runs.may_be_faster(number) else None
+        if run is not None:
             changes = {name: run.values[name] - value for name, value in best.run.values.items()}
             changed = best.prediction.largest(changes)
             faster = run.stepping < FASTER * chosen.stepping

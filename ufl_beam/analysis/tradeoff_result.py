@@ -67,12 +67,6 @@ class Refinement(NamedTuple):
     family: int  # number of the dials that it begins with
     refine: Fraction  # parts of each cell
     level: float  # steps are about 2**level times as many
-    newton: int = 0  # number of the tolerances
-
-    @property
-    def case(self) -> dict[str, Any]:
-        """Return it as arguments of a member of a study."""
-        return self._asdict() | {"refine": str(self.refine)}
 
 
 @dataclass(frozen=True, eq=False)
