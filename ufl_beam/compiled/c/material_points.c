@@ -436,6 +436,7 @@ void add_inelastic_tangent(void *self, const double *q, double *tangent)
   if (p->line) {
     memcpy(p->predicted, p->line, LINE * p->cells * p->of_cell * sizeof *p->line);
     p->predicts = 1;
+    m->latest[0] = NAN; /* where supports hold all motions, the same q is asked with other lines */
   }
 }
 
