@@ -148,7 +148,7 @@ ACCELERATIONS = {
         by.MODIFIED_STEPS, by.ANEW,
         (
             "solvers/convergence.py~like_last|rate", "solvers/newton.py~like_last",
-            "simulation/step_solver.py~like_last", "simulation/simulation.py~like_last|alike =",
+            "simulation/step_solver.py~like_last",
         ),
         (ELASTIC, LARGE, HINGED, JOINTED),
     ),

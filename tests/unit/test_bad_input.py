@@ -330,6 +330,9 @@ def test_a_place_joined_to_itself():
     one = beam()
     with raises("Rigid(girder.end (1, 0), girder.end (1, 0)): the same place twice"):
         ub.Scene([one], joints=[ub.Rigid(one.end, one.at(1.0))])
+    other = beam(name="other")
+    with raises("the same place twice"):
+        ub.Scene([one, other], joints=[ub.Rigid(one.end, other.end, other.end)])
 
 
 # -- supports in conflict ------------------------------------------------------------------------
