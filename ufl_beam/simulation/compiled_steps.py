@@ -32,6 +32,12 @@ ROOM = 2**20
 LONGEST = 0.05
 """Time after which C returns, so that a run can be interrupted and shows its progress; s."""
 
+MOST_LEFT = 32
+"""Largest number of steps that are left to Python after steps that C cannot take.
+
+Where hinges open one after the other, in step after step, C would try each of them in vain.
+"""
+
 LAST_DIGITS = 1e-14
 """Difference of two numbers from the same formula, relative, that is nothing but round-off."""
 
@@ -51,6 +57,7 @@ class Stepping(Protocol):
     q_before: Array
     last_dt: float
     parts: int
+    left: list[int]  # steps that Python still takes, and how many it was to when C failed last
 
     @property
     def solution(self) -> Keeping:
@@ -130,12 +137,17 @@ class CompiledSteps:
         """Take steps to these times, up to the first that fails, for :data:`LONGEST` at most.
 
         Returns:
-            How many were taken.  With ``keep`` the state after each of them is in the solution.
+            How many were taken; Python takes the next one if there were none.  With ``keep`` the
+            state after each of them is in the solution.
 
         Raises:
             BaseException: What a time function of a user has raised; the steps before are taken.
         """
         if not (self._solver.in_c and (self.ahead or self._begins(state))):
+            return 0
+        still, last = state.left
+        if still:
+            state.left = [still - 1, last]
             return 0
         c, steps = self.c, len(ends)
         rows: Array = np.zeros((0, 0))
@@ -159,6 +171,10 @@ class CompiledSteps:
                     rows = rows[:taken].copy()  # so that the rest does not stay
                 states = kept.states(ends[:taken].copy(), rows)
                 state.solution.keep(states, state.parts, self._solver.iterations)
+        state.left = [0, 0]
+        if c.failed:
+            number = 1 if taken else min(2 * last, MOST_LEFT) or 1
+            state.left = [number - (taken == 0), number]
         if taken < steps:
             self.hand_back(state)
             self._raise()

@@ -115,7 +115,7 @@ class Simulation(StateView):
         self.loads, self.supports, self._has_inelastic = parts.loads, parts.supports, parts.yields
         self.equation, self.terms = parts.equation, parts.equation.terms
 
-        self.t, self.parts, self.last_dt = t0, 0, math.inf
+        self.t, self.parts, self.last_dt, self.left = t0, 0, math.inf, [0, 0]
         self.q: Array = q[share.dofs]
         self.q_before: Array = self.q
         self._continues = start is not None
@@ -154,8 +154,10 @@ class Simulation(StateView):
                 was accepted, which the solution of the error ends with.
         """
         self._end[0] = t1
-        if self._in_c is not None and self._in_c.take(self, self._end):
-            return
+        if self._in_c is None or not self._in_c.take(self, self._end):
+            self._step_in_python(t1)
+
+    def _step_in_python(self, t1: float) -> None:
         fresh = self.parts == 0 and not self._continues
         if fresh and begins_loaded(self.scene, self.scheme, self.t):
             self.take_back()
@@ -188,7 +190,7 @@ class Simulation(StateView):
         ends = np.ascontiguousarray(ends, dtype=np.float64)
         if self._in_c is not None and (taken := self._in_c.take(self, ends, keep=keep)):
             return taken
-        self.step_to(float(ends[0]))
+        self._step_in_python(float(ends[0]))
         if keep:
             self.keep()
         return 1
@@ -331,6 +333,8 @@ class Simulation(StateView):
         self.t = memory.number("t", self.t)
         self.last_dt = memory.number("last dt", self.last_dt)
         self.parts = int(memory.number("parts", self.parts))
+        left = ((f"left to Python {i}", number) for i, number in enumerate(self.left))
+        self.left = [int(memory.number(*one)) for one in left]
         self.solver.remember(memory)
         self.q = memory.at_dofs("q", self.q)
         self.q_before = memory.at_dofs("q before", self.q_before)

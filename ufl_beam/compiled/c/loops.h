@@ -548,7 +548,7 @@ typedef struct {
   phases begin, accept, add_state;
   int states;
   double *state;      /* entries of the ledger that a state has, one after the other */
-  int iterations;
+  int iterations, failed; /* in the latest call; whether its last step failed */
   time_step step;
   int kinds, width; /* of numbers that are kept; of a row */
   const kept_numbers *kept;

@@ -456,8 +456,12 @@ static void keep(const march *m, double *row)
 int take_steps(march *m, int steps, const double *ends, double seconds, int keeps, double *rows)
 {
   const double end = steps > 1 ? seconds_now() + seconds : 0;
+  m->failed = 0;
   for (int k = 0; k < steps; ++k) {
-    if (!take_step(m, ends[k])) return k;
+    if (!take_step(m, ends[k])) {
+      m->failed = 1;
+      return k;
+    }
     if (keeps) keep(m, rows + (size_t)k * m->width);
     if (steps > 1 && seconds_now() > end) return k + 1;
   }
