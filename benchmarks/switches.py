@@ -17,9 +17,9 @@ from ufl_beam.compiled.jit import compiled
 from ufl_beam.discretization import function_spaces
 from ufl_beam.discretization.dolfinx_forms import DolfinxFields
 from ufl_beam.simulation import simulation as stepping
+from ufl_beam.simulation import step_solver
 from ufl_beam.simulation.evaluation import COMPILED
 from ufl_beam.simulation.step_equation import StepEquation
-from ufl_beam.simulation.step_solver import StepSolver
 from ufl_beam.solvers import newton, static_condensation
 from ufl_beam.solvers.direct_solver import DirectSolver
 from ufl_beam.terms.connectors import ReferenceCouplings
@@ -39,11 +39,11 @@ def without_chains(cell_dofs, indptr, indices, alone, *more):
     return plan(cell_dofs, indptr, indices, np.zeros_like(alone), *more)
 
 
-class EachStepAnew(StepSolver):
+class EachStepAnew(newton.Solver):
     """Solver that makes a new tangent in the first iteration of every step."""
 
-    def solve(self, step, guess, *, like_last):
-        return super().solve(step, guess, like_last=False)
+    def solve(self, guess, loads, like_last=False):
+        return super().solve(guess, loads, like_last=False)
 
 
 KEEPS = "e->near = !kept && residual > floor"
@@ -104,7 +104,7 @@ EQUATION_IN_PYTHON = (StepEquation, "leave_to_c", nothing)
 CELL_BY_CELL = (function_spaces, "vectorise", nothing)
 NO_CHAINS = (static_condensation, "_plan", without_chains)
 ALL_TANGENTS = (newton, "loop", loop_without_kept_tangents)
-EACH_STEP_ANEW = (stepping, "StepSolver", EachStepAnew)
+EACH_STEP_ANEW = (step_solver, "Solver", EachStepAnew)
 STEPS_IN_PYTHON = (stepping, "compiled_steps", nothing)
 
 SHIPPED, STEPS, REFERENCE = "as shipped", "steps in Python", "`reference=True`"
