@@ -207,11 +207,16 @@ class Share:
         """
         if self.alone:
             return values
-        parts, result = np.empty((2, self.grid.size))
+        result, parts = np.empty(self.grid.size), self._parts
         owned = np.ascontiguousarray(values[: self.num_owned])
         self.comm.Allgatherv(owned, [parts, self._num_owned_by])
         result[self._all_owned] = parts
         return result
+
+    @cached_property
+    def _parts(self) -> Array:
+        """Array for values of all degrees of freedom, process after process: new memory is slow."""
+        return np.empty(self.grid.size)
 
     def added(self, values: Array) -> Array:
         """Sums over the processes of values at the local degrees of freedom."""
