@@ -80,7 +80,6 @@ class RefinementRuns:
                 f"{self.dials(missing[-1])}",
                 self.all,
             )
-        self.bar.set_postfix_str(f"{len(missing)} more up to {self.dials(missing[-1])}")
         done, failed = self._done(missing, self.newton)
         self.runs |= done
         self.failed |= failed

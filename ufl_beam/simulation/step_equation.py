@@ -48,7 +48,7 @@ class StepEquation(Equation):
         self.others: list[Term] = [*loads, *others]
         self.terms: list[Term] = [*self._inner, *self.others]
         predicted = share.largest(float(any(one.demand() is not None for one in beams)))
-        self._adds_up = False  # in C
+        self._tangent_in_c = False  # in C
         self._demanding = bool(share.grid.scene.links) or predicted > 0.0  # in any process
 
     def begin(self, step: Step) -> None:
@@ -81,8 +81,8 @@ class StepEquation(Equation):
         self.supports.hold_matrix(self.A.data)
 
     def _assemble(self, q1: Array) -> None:
-        if self._adds_up:
-            lib.add_up(self.c, doubles(q1))
+        if self._tangent_in_c:
+            lib.fill_tangent(self.c, doubles(q1))
             return
         self.A.data.fill(0.0)
         for term in self.terms:
@@ -151,7 +151,7 @@ class StepEquation(Equation):
         tangent is added up in C if all terms have loops.
         """
         supports, entries = self.supports, self.A.data
-        self._adds_up = all(term.loops() for term in self.terms)
+        self._tangent_in_c = all(term.loops() for term in self.terms)
         loops = [term.loops() or self._in_python(term) for term in self.terms]
         stiffnesses = [stiffness for _, stiffness in loops if stiffness is not None]
 

@@ -371,7 +371,7 @@ enum {
 };
 
 void residual(equation *e, const double *q, double *r);
-void add_up(const equation *e, const double *q);
+void fill_tangent(const equation *e, const double *q);
 void assemble(equation *e, const double *q);
 void begin_newton(equation *e, int patience, int like_last);
 int factor_tangent(const equation *e, int *failed);

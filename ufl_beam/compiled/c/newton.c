@@ -39,7 +39,7 @@ static cells some_cells(const cells *c, int first)
 }
 
 /* All parts of the tangent at q; rows are begun shortly before cells need them. */
-void add_up(const equation *e, const double *q)
+void fill_tangent(const equation *e, const double *q)
 {
   int begun = 0;
   if (e->product) find_growth(e->product, q);
@@ -61,7 +61,7 @@ void add_up(const equation *e, const double *q)
  * where material that flows freely leaves nothing, what stood there before does as well. */
 void assemble(equation *e, const double *q)
 {
-  add_up(e, q);
+  fill_tangent(e, q);
   for (int k = 0; k < e->held; ++k)
     if (e->tangent[e->pivot[k]] != 0) e->pivots[k] = e->tangent[e->pivot[k]];
   for (int k = 0; k < e->zeros; ++k) e->tangent[e->zero[k]] = 0;
