@@ -25,7 +25,7 @@ T = TypeVar("T")
 
 SOURCES = (
     "loops", "material_points", "rigid_plastic", "connectors", "elimination", "fronts", "newton",
-    "march",
+    "prediction", "march",
 )  # fmt: skip
 """Files of C beside this one; they are one translation unit."""
 
@@ -136,15 +136,8 @@ def in_order(enum: str, values: Mapping[str, T], prefix: str = "") -> list[T]:
     return [values[name] for name in expected]
 
 
-def extrapolated(x: Array, y: Array, ratio: float) -> Array:
-    """Compute ``x + ratio (x - y)``; for short arrays in half the time of NumPy."""
-    out: Array = np.empty(len(x))
-    lib.extrapolate(len(x), doubles(x), doubles(y), ratio, doubles(out))
-    return out
-
-
 def combined(a: float, x: Array, b: float, y: Array) -> Array:
-    """Compute ``a x + b y``, likewise."""
+    """Compute ``a x + b y``; for short arrays in half the time of NumPy."""
     out: Array = np.empty(len(x))
     lib.combine(len(x), a, doubles(x), b, doubles(y), doubles(out))
     return out

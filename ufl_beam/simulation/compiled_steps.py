@@ -15,6 +15,7 @@ from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.simulation.branch_check import StaticPath
 from ufl_beam.simulation.kept_rows import KeptRows
+from ufl_beam.simulation.prediction import Prediction
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.terms.beams import Inertia
@@ -54,8 +55,7 @@ class Stepping(Protocol):
 
     t: float
     q: Array
-    q_before: Array
-    last_dt: float
+    prediction: Prediction
     parts: int
     left: list[int]  # steps that Python still takes, and how many it was to when C failed last
 
@@ -159,7 +159,7 @@ class CompiledSteps:
             self._hand_over(state)
         taken = int(lib.take_steps(c, steps, doubles(ends), LONGEST, keep, doubles(rows)))
         if taken:
-            state.t, state.last_dt = c.t, c.last_dt
+            state.t = c.t
             state.parts += taken
             state.q = self._copy(c.q)
             if self._inertia is not None:
@@ -191,10 +191,9 @@ class CompiledSteps:
 
     def _hand_over(self, state: Stepping) -> None:
         c, (q, before, _) = self.c, self._space
-        q[:], before[:] = state.q, state.q_before
-        state.q_before = before  # no second array of what C has
-        c.q, c.q_before = doubles(q), doubles(before)
-        c.t, c.last_dt, c.iterations = state.t, state.last_dt, 0
+        q[:], before[:] = state.q, state.prediction.q_before
+        state.prediction.q_before = before  # no second array of what C has
+        fill(c, q=q, prediction=state.prediction.c, t=state.t, iterations=0)
         if self._path is not None:
             ffi.memmove(c.path.force, doubles(self._path.force), self._bytes)
         for one in self._phases:
@@ -205,7 +204,7 @@ class CompiledSteps:
         """Let all of Python know the state, so that it may take a step."""
         if self.ahead:
             self.ahead = False
-            state.q_before = self._copy(self.c.q_before)
+            state.prediction.q_before = self._copy(state.prediction.c.q_before)
             if self._path is not None:
                 self._path.force = self._copy(self.c.path.force)
             for one in self._phases:

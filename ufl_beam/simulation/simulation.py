@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import cached_property, partial
 from typing import NoReturn
 
@@ -29,6 +28,7 @@ from ufl_beam.simulation.compiled_steps import CompiledSteps, compiled_steps
 from ufl_beam.simulation.diagnosis import no_equilibrium
 from ufl_beam.simulation.evaluation import COMPILED, REFERENCE
 from ufl_beam.simulation.initial_state import checked_grid, initial_state, mesh_of
+from ufl_beam.simulation.prediction import Prediction
 from ufl_beam.simulation.replicas import Copies, sharing
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_solver import (
@@ -68,7 +68,7 @@ class Simulation(StateView):
         solution: The motion so far.
         parts: Number of parts that steps were cut into, those not cut included.
         together: Calls that raise on all processes of a shared scene what they raise on one.
-        last_dt: Length of the last accepted step; s.
+        prediction: What the guess of the next step needs of the last ones.
 
     Example:
         >>> simulation = ub.Simulation(scene, ub.Midpoint())
@@ -115,9 +115,9 @@ class Simulation(StateView):
         self.loads, self.supports, self._has_inelastic = parts.loads, parts.supports, parts.yields
         self.equation, self.terms = parts.equation, parts.equation.terms
 
-        self.t, self.parts, self.last_dt, self.left = t0, 0, math.inf, [0, 0]
+        self.t, self.parts, self.left = t0, 0, [0, 0]
         self.q: Array = q[share.dofs]
-        self.q_before: Array = self.q
+        self.prediction = Prediction(share, self.q, in_motion=has_inertia(scheme))
         self._continues = start is not None
         loaded: list[Array] = []
         if self._continues or (has_inertia(scheme) and scheme.kept):
@@ -231,6 +231,7 @@ class Simulation(StateView):
     def accept(self, trial: Trial) -> None:
         """Go where the latest :meth:`attempt` went."""
         self.together(self._accept, trial)
+        self.prediction.agree()
         if self._copies is not None:
             self._copies.note(self.t, self.q)
 
@@ -242,7 +243,7 @@ class Simulation(StateView):
             term.accept(q1, s)
         self.supports.enter(s)
         self.supports.accept(s)
-        self.q_before, self.last_dt = self.q, step.dt
+        self.prediction.accept(self.q, q1, step.dt)
         self.q, self.t = q1, step.t1
         self.parts += 1
         self.ledger.begin()
@@ -331,13 +332,12 @@ class Simulation(StateView):
     def _pass_on(self, memory: Memory) -> None:
         self.take_back()
         self.t = memory.number("t", self.t)
-        self.last_dt = memory.number("last dt", self.last_dt)
         self.parts = int(memory.number("parts", self.parts))
         left = ((f"left to Python {i}", number) for i, number in enumerate(self.left))
         self.left = [int(memory.number(*one)) for one in left]
         self.solver.remember(memory)
         self.q = memory.at_dofs("q", self.q)
-        self.q_before = memory.at_dofs("q before", self.q_before)
+        self.prediction.remember(memory)
         self.ledger.remember(memory)
         for term in self.terms:
             term.remember(memory, self.q)

@@ -17,7 +17,6 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.collective_errors import Agreement
-from ufl_beam.compiled.c_library import extrapolated
 from ufl_beam.compiled.csr import as_slice
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
@@ -25,6 +24,7 @@ from ufl_beam.model.constraint_checks import no_number
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.simulation.branch_check import StaticPath
+from ufl_beam.simulation.prediction import Prediction
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.direct_solver import DirectSolver
 from ufl_beam.solvers.equation import Border
@@ -84,8 +84,7 @@ class Present(Protocol):
 
     t: float
     q: Array
-    q_before: Array
-    last_dt: float
+    prediction: Prediction
     inertia: Inertia
     supports: Supports
     couplings: list[Links]
@@ -161,16 +160,16 @@ class StepSolver:
     def _predict(self, now: Present, step: Step) -> Array:
         """Begin a step; return a guess of its end, in the axes of the supports."""
         self._begin(now, step)
-        guess = extrapolated(now.q, now.q_before, step.ratio)
+        guess = now.prediction.guess(now.q, step.dt)
         now.supports.enter(guess)
         now.supports.move(guess, now.supports.in_axes(now.q), step)
         return guess
 
     def _attempt(self, now: Present, step: Step) -> Trial:
         """Solve a step from a guess; the tangent of the last step does if that was like it."""
-        step = step._replace(q_before=now.q_before, ratio=step.dt / now.last_dt)
-        guess = self._together(self._predict, now, step)
-        like_last = self._dynamic and math.isclose(step.dt, now.last_dt, rel_tol=1e-6)
+        past = now.prediction
+        step = step._replace(q_before=past.q_before, ratio=step.dt / past.last_dt)
+        guess, like_last = self._together(self._predict, now, step), past.like_last(step.dt)
         loads = self._equation.load_forces()
         solve = partial(self.newton.solve, loads=loads, like_last=like_last)
         try:

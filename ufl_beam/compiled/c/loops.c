@@ -105,12 +105,6 @@ void combine(int size, double a, const double *x, double b, const double *y, dou
   for (int i = 0; i < size; ++i) out[i] = a * x[i] + b * y[i];
 }
 
-/* out = x + ratio (x - y) */
-void extrapolate(int size, const double *x, const double *y, double ratio, double *out)
-{
-  for (int i = 0; i < size; ++i) out[i] = x[i] + ratio * (x[i] - y[i]);
-}
-
 /* Parts one after the other. */
 void add_calls(void *self, const double *q, double *out)
 {

@@ -84,7 +84,6 @@ void set_cells(const cells *c, const double *q, int at);
 void add_cells(void *self, const double *q, double *b);
 double value_of_cells(const cells *c, const double *q);
 void combine(int size, double a, const double *x, double b, const double *y, double *out);
-void extrapolate(int size, const double *x, const double *y, double ratio, double *out);
 void predict_strains(predicted_strains *p, const double *q);
 void add_static_tangent(void *self, const double *q, double *tangent);
 void subtract_vector(void *self, const double *q, double *b);
@@ -385,6 +384,24 @@ int snes_newton(void *snes, void *x);
 int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int *reason,
               void *self);
 
+/* -- prediction of the end of a step, see prediction.c -------------------------------------------- */
+
+/* The last steps. `bend` is by how much the last one differs from the one before; in dynamics only. */
+typedef struct {
+  int size, equal;   /* equal: steps of the same length that led here, up to three */
+  double dt;         /* length of the last; infinite if there was none */
+  double *q_before;  /* configuration at its beginning */
+  double *bend;
+  const double *metric; /* of products; zero where others count */
+  double both, now, before; /* products: of the last two bends, and of each with itself */
+  double repeated;          /* part of the last bend that repeats itself */
+} prediction;
+
+int as_last(const prediction *p, double dt);
+void predict(const prediction *p, double dt, const double *q, double *out);
+void enter_step(prediction *p, double dt, const double *q, const double *q1);
+void compare_bends(prediction *p);
+
 /* -- steps one after the other, see march.c ----------------------------------------------------- */
 
 /* A step, see Step in time_schemes.py. */
@@ -532,8 +549,8 @@ typedef struct {
   equation *equation;
   void *snes;
   int size;
-  double t, last_dt;
-  double *q, *q_before, *x, *s; /* x: the unknowns of Newton's method */
+  double t, *q, *x, *s; /* x: the unknowns of Newton's method */
+  prediction *prediction;
   double load_weight, motion_weight, at; /* parts of the step; see step */
   int rotations, half_tangents, multipliers;
   const int32_t *rotation, *half_tangent, *multiplier;

@@ -319,11 +319,11 @@ void change_of_couplings(void *self, const double *q1, energy_change *sum)
 
 /* -- the step ------------------------------------------------------------------------------------ */
 
-/* A guess of the end of the step: as the last one went on, and what supports give. */
+/* A guess of the end of the step: as the last ones went on, and what supports give. */
 static void guess(march *m)
 {
   const moving_supports *p = m->supports;
-  extrapolate(m->size, m->q, m->q_before, m->step.ratio, m->x);
+  predict(m->prediction, m->step.dt, m->q, m->x);
   for (int k = 0; k < p->moving; ++k) {
     const double from = m->q[p->dof[k]], to = value_at(p->motion + k, m->step.motion_time);
     m->x[p->dof[k]] = from + m->step.fraction * (to - from);
@@ -334,13 +334,12 @@ static void guess(march *m)
 static int solve(march *m)
 {
   equation *e = m->equation;
-  const double longer = fmax(m->step.dt, m->last_dt);
   if (m->loads && m->loads->changed) {
     m->loads->norm = norm(e->size, e->weight, m->loads->force);
     m->loads->changed = 0;
   }
   e->loads = m->loads ? m->loads->norm : 0;
-  begin_newton(e, 2, fabs(m->step.dt - m->last_dt) <= 1e-6 * longer);
+  begin_newton(e, 2, as_last(m->prediction, m->step.dt));
   if (m->search) {
     memset(m->search, 0, SEARCH_FLAGS * sizeof *m->search);
     m->search[HOLD] = 1;
@@ -406,11 +405,12 @@ static void accept_supports(march *m)
 
 static int take_step(march *m, double t1)
 {
+  prediction *p = m->prediction;
   const double t0 = m->t;
   m->step.t0 = t0, m->step.t1 = t1, m->step.dt = t1 - t0, m->step.fraction = 1, m->step.at = m->at;
   m->step.load_time = (1 - m->load_weight) * t0 + m->load_weight * t1;
   m->step.motion_time = (1 - m->motion_weight) * t0 + m->motion_weight * t1;
-  m->step.q0 = m->q, m->step.q_before = m->q_before, m->step.ratio = m->step.dt / m->last_dt;
+  m->step.q0 = m->q, m->step.q_before = p->q_before, m->step.ratio = m->step.dt / p->dt;
   if (m->rates && !find_numbers(m->rates, m->step.dt)) return 0;
   run(&m->begin, &m->step, 0, 0);
   guess(m);
@@ -423,10 +423,12 @@ static int take_step(march *m, double t1)
   accept_supports(m);
   memset(m->state, 0, m->states * sizeof *m->state);
   run(&m->add_state, &m->step, m->x, m->s);
-  double *spare = m->q_before;
-  m->q_before = m->q, m->q = spare;
+  enter_step(p, m->step.dt, m->q, m->x);
+  compare_bends(p);
+  double *spare = p->q_before;
+  p->q_before = m->q, m->q = spare;
   memcpy(m->q, m->x, m->size * sizeof *m->q);
-  m->t = t1, m->last_dt = m->step.dt;
+  m->t = t1;
   m->iterations += m->equation->iterations;
   return 1;
 }

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: MIT
+"""Prediction of the end of a step: exact for the motions that it knows, careful with others."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import ufl_beam as ub
+from ufl_beam.simulation.prediction import Prediction
+
+
+def prediction_of(scheme):
+    """One of a single beam, and the number of its degrees of freedom."""
+    beam = ub.Beam((0, 0), (2, 0), ub.Section(EA=1, GA=1, EI=1, rhoA=1, rhoI=1), cells=2)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)])
+    simulation = ub.Simulation(scene, scheme)
+    simulation.close()
+    return simulation.prediction, simulation.share.size
+
+
+def follow(prediction: Prediction, motion, times):
+    """Accept the configurations at these times but the last, and predict that."""
+    for t0, t1 in pairwise(times[:-1]):
+        prediction.accept(motion(t0), motion(t1), t1 - t0)
+        prediction.agree()
+    return prediction.guess(motion(times[-2]), times[-1] - times[-2])
+
+
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.Midpoint()])
+def test_uniform_motion(scheme):
+    """[closed] Exact over any steps; round-off of the times is below 1e-12 of them."""
+    prediction, size = prediction_of(scheme)
+    v = np.arange(1.0, size + 1)
+    found = follow(prediction, lambda t: v * t, [0, 1, 2, 3, 3.5, 5])
+    assert found == pytest.approx(5 * v, rel=1e-12)
+
+
+def test_constant_acceleration():
+    """[closed] Exact over equal steps; a longer one is at the velocity of the last."""
+    prediction, size = prediction_of(ub.Midpoint())
+    a = np.arange(1.0, size + 1)
+    times = 0.1 * np.arange(6)
+    found = follow(prediction, lambda t: a * t**2 / 2, times)
+    assert found == pytest.approx(a * times[-1] ** 2 / 2, rel=1e-12)
+    longer = prediction.guess(a * times[-2] ** 2 / 2, 0.2)
+    assert longer == pytest.approx(a * (0.4**2 / 2 + 0.35 * 0.2), rel=1e-12)
+
+
+def test_second_difference_needs_three_equal_steps():
+    """[closed] Two bends of steps of equal length are compared."""
+    prediction, size = prediction_of(ub.Midpoint())
+    a = np.ones(size)
+    found = follow(prediction, lambda t: a * t**2 / 2, [0, 0.5, 0.6, 0.7, 0.8])
+    assert found == pytest.approx(a * (0.7**2 / 2 + 0.065), rel=1e-12)
+
+
+def test_alternating_motion():
+    """Second differences that change their sign say nothing of the next step."""
+    prediction, size = prediction_of(ub.Midpoint())
+    found = follow(prediction, lambda t: np.full(size, (-1.0) ** round(t)), np.arange(6.0))
+    assert found == pytest.approx(np.full(size, 3.0))  # from -1 to 1, and on
+
+
+def test_blow():
+    """After bends of 0.01 and 1 a hundredth of the last one is taken to repeat itself."""
+    prediction, size = prediction_of(ub.Midpoint())
+    steps = [0, 0.01, 1.01]
+    places = np.cumsum([0, *steps])
+    found = follow(prediction, lambda t: np.full(size, places[round(t)]), np.arange(5))
+    assert found == pytest.approx(np.full(size, places[3] + steps[2] + 0.01), rel=1e-12)
+
+
+def test_statics():
+    """Load steps have no inertia: the last one is repeated, and no second difference is kept."""
+    prediction, size = prediction_of(ub.Static())
+    a = np.ones(size)
+    found = follow(prediction, lambda t: a * t**2, np.arange(6.0))
+    assert found == pytest.approx(a * (4**2 + 7), rel=1e-12)
+
+
+def test_state_is_that_of_c():
+    """Steps in C and in Python predict the same, and take the same iterations."""
+    section = ub.Section(EA=1e6, GA=1e6, EI=10, rhoA=1, rhoI=1e-4)
+    found = []
+    for in_c in (True, False):
+        beam = ub.Beam((0, 0), (1, 0), section, cells=8)
+        loads = [ub.Gravity((0, -10))]
+        scene = ub.Scene([beam], supports=[ub.Pinned(beam.start)], loads=loads)
+        simulation = ub.Simulation(scene, ub.Midpoint())
+        for n in range(1, 41):
+            if not in_c or n % 7 == 0:
+                simulation.take_back()
+            simulation.step_to(n * 0.002) if in_c else simulation.accept(
+                simulation.attempt(n * 0.002)
+            )
+        found.append((simulation.iterations, simulation.prediction.c.repeated, simulation.q[-1]))
+        simulation.close()
+    assert found[0][0] == found[1][0]
+    assert found[0][1:] == pytest.approx(found[1][1:], rel=1e-6)

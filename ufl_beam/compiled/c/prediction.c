@@ -1,0 +1,43 @@
+/* SPDX-License-Identifier: MIT */
+/* Prediction of the end of a step, from which Newton's method starts; see prediction.py. */
+
+/* Whether a step is as long as the last one, but for last digits of the times at its ends. */
+int as_last(const prediction *p, double dt)
+{
+  return fabs(dt - p->dt) <= 1e-6 * dt;
+}
+
+/* out: from q on, at the velocity of the last step and, after equal ones, with its acceleration, as
+ * far as that was the one before. */
+void predict(const prediction *p, double dt, const double *q, double *out)
+{
+  const double ratio = dt / p->dt, *before = p->q_before, *bend = p->bend;
+  const double part = p->equal > 2 && as_last(p, dt) ? p->repeated : 0;
+  if (part > 0)
+    for (int i = 0; i < p->size; ++i) out[i] = q[i] + ratio * (q[i] - before[i]) + part * bend[i];
+  else
+    for (int i = 0; i < p->size; ++i) out[i] = q[i] + ratio * (q[i] - before[i]);
+}
+
+/* Enter a step from q to q1; products are sums over the degrees of freedom that this process owns. */
+void enter_step(prediction *p, double dt, const double *q, const double *q1)
+{
+  p->equal = as_last(p, dt) ? p->equal + (p->equal < 3) : 1;
+  p->dt = dt;
+  if (!p->bend) return;
+  double both = 0, now = 0;
+#pragma omp simd reduction(+ : both, now)
+  for (int i = 0; i < p->size; ++i) {
+    const double bend = (q1[i] - q[i]) - (q[i] - p->q_before[i]), measured = p->metric[i] * bend;
+    both += measured * p->bend[i], now += measured * bend;
+    p->bend[i] = bend;
+  }
+  p->before = p->now, p->now = now, p->both = both;
+}
+
+/* Which part of the last bend repeats itself, by the products over all processes. */
+void compare_bends(prediction *p)
+{
+  const double larger = fmax(p->now, p->before);
+  p->repeated = larger > 0 && p->both > 0 ? p->both / larger : 0;
+}

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: MIT
+"""Prediction of the end of a step, from which Newton's method starts; see docs/steps.md."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.compiled.c_library import doubles, fill, lib, struct
+from ufl_beam.discretization.partition import Share
+from ufl_beam.discretization.state_io import Memory
+
+
+class Prediction:
+    """Goes on as the last steps did: at their velocity and, ``in_motion``, with their acceleration.
+
+    The last step differs from the one before by a *bend*.  After equal steps the next is the last
+    with that part of its bend which the one before was like: 1 in smooth motion, 0 where bends
+    change their sign from step to step.
+
+    Attributes:
+        c: ``prediction`` of loops.h.
+    """
+
+    def __init__(self, share: Share, q: Array, *, in_motion: bool) -> None:
+        self._share, self._in_motion = share, in_motion
+        self.c = struct("prediction", size=share.size, dt=math.inf)
+        self.q_before = q
+        if in_motion:
+            self._bend, metric = np.zeros(share.size), np.ones(share.size)
+            metric[share.rotations()] = share.grid.scene.size**2
+            metric[share.multipliers()] = metric[share.num_owned :] = 0.0
+            fill(self.c, bend=self._bend, metric=metric)
+
+    @property
+    def q_before(self) -> Array:
+        """Configuration at the beginning of the last step."""
+        return self._q_before
+
+    @q_before.setter
+    def q_before(self, q: Array) -> None:
+        self._q_before = q
+        fill(self.c, q_before=q)
+
+    @property
+    def last_dt(self) -> float:
+        """Length of the last step, infinite before the first; s."""
+        return float(self.c.dt)
+
+    def like_last(self, dt: float) -> bool:
+        """Return whether a step is as long as the last one in motion."""
+        return self._in_motion and bool(lib.as_last(self.c, dt))
+
+    def guess(self, q: Array, dt: float) -> Array:
+        """Predict the end of a step from ``q``."""
+        out: Array = np.empty(len(q))
+        lib.predict(self.c, dt, doubles(q), doubles(out))
+        return out
+
+    def accept(self, q: Array, q1: Array, dt: float) -> None:
+        """Take over a step from ``q`` to ``q1``; then all processes :meth:`agree`."""
+        lib.enter_step(self.c, dt, doubles(q), doubles(q1))
+        self.q_before = q
+
+    def agree(self) -> None:
+        """Compare the last bends over all processes."""
+        if self._in_motion:
+            self.c.both, self.c.now = map(self._share.total, (self.c.both, self.c.now))
+            lib.compare_bends(self.c)
+
+    def remember(self, memory: Memory) -> None:
+        """State it in numbers of the grid; see state_io.py."""
+        self.c.dt = memory.number("last dt", self.c.dt)
+        self.q_before = memory.at_dofs("q before", self.q_before)
+        if self._in_motion:
+            self.c.equal = int(memory.number("equal steps", self.c.equal))
+            self.c.repeated = memory.number("part that repeats itself", self.c.repeated)
+            self.c.now = memory.number("square of the bend", self.c.now)
+            self._bend[:] = memory.at_dofs("bend", self._bend)
