@@ -34,7 +34,7 @@ def vibration(scheme, dt, viscosity):
         loads=[ub.PointLoad(beam.end, force=(0, 25.0), time=pulse)],
     )
     solution = ub.simulate(
-        scene, scheme, t=(0, DURATION), dt=dt, newton=ub.Newton(rtol=1e-13), progress=False
+        scene, scheme, t=(0, DURATION), dt=dt, newton=ub.Newton(rtol=1e-12), progress=False
     )
     energy = solution.energy
     assert energy.worst <= 1e-9

@@ -192,7 +192,7 @@ class CompiledSteps:
     def _hand_over(self, state: Stepping) -> None:
         c, (q, before, _) = self.c, self._space
         q[:], before[:] = state.q, state.prediction.q_before
-        state.prediction.q_before = before  # no second array of what C has
+        state.prediction.began_at(before)  # no second array of what C has
         fill(c, q=q, prediction=state.prediction.c, t=state.t, iterations=0)
         if self._path is not None:
             ffi.memmove(c.path.force, doubles(self._path.force), self._bytes)
@@ -204,7 +204,7 @@ class CompiledSteps:
         """Let all of Python know the state, so that it may take a step."""
         if self.ahead:
             self.ahead = False
-            state.prediction.q_before = self._copy(state.prediction.c.q_before)
+            state.prediction.began_at(self._copy(state.prediction.c.q_before))
             if self._path is not None:
                 self._path.force = self._copy(self.c.path.force)
             for one in self._phases:

@@ -22,26 +22,22 @@ class Prediction:
 
     Attributes:
         c: ``prediction`` of loops.h.
+        q_before: Configuration at the beginning of the last step.
     """
 
     def __init__(self, share: Share, q: Array, *, in_motion: bool) -> None:
         self._share, self._in_motion = share, in_motion
         self.c = struct("prediction", size=share.size, dt=math.inf)
-        self.q_before = q
+        self.began_at(q)
         if in_motion:
             self._bend, metric = np.zeros(share.size), np.ones(share.size)
             metric[share.rotations()] = share.grid.scene.size**2
             metric[share.multipliers()] = metric[share.num_owned :] = 0.0
             fill(self.c, bend=self._bend, metric=metric)
 
-    @property
-    def q_before(self) -> Array:
-        """Configuration at the beginning of the last step."""
-        return self._q_before
-
-    @q_before.setter
-    def q_before(self, q: Array) -> None:
-        self._q_before = q
+    def began_at(self, q: Array) -> None:
+        """Take ``q`` for the configuration at the beginning of the last step."""
+        self.q_before = q
         fill(self.c, q_before=q)
 
     @property
@@ -62,7 +58,7 @@ class Prediction:
     def accept(self, q: Array, q1: Array, dt: float) -> None:
         """Take over a step from ``q`` to ``q1``; then all processes :meth:`agree`."""
         lib.enter_step(self.c, dt, doubles(q), doubles(q1))
-        self.q_before = q
+        self.began_at(q)
 
     def agree(self) -> None:
         """Compare the last bends over all processes."""
@@ -73,7 +69,7 @@ class Prediction:
     def remember(self, memory: Memory) -> None:
         """State it in numbers of the grid; see state_io.py."""
         self.c.dt = memory.number("last dt", self.c.dt)
-        self.q_before = memory.at_dofs("q before", self.q_before)
+        self.began_at(memory.at_dofs("q before", self.q_before))
         if self._in_motion:
             self.c.equal = int(memory.number("equal steps", self.c.equal))
             self.c.repeated = memory.number("part that repeats itself", self.c.repeated)

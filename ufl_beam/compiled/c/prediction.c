@@ -12,9 +12,9 @@ int as_last(const prediction *p, double dt)
 void predict(const prediction *p, double dt, const double *q, double *out)
 {
   const double ratio = dt / p->dt, *before = p->q_before, *bend = p->bend;
-  const double part = p->equal > 2 && as_last(p, dt) ? p->repeated : 0;
-  if (part > 0)
-    for (int i = 0; i < p->size; ++i) out[i] = q[i] + ratio * (q[i] - before[i]) + part * bend[i];
+  const double again = p->equal > 2 && as_last(p, dt) ? p->repeated : 0;
+  if (again > 0)
+    for (int i = 0; i < p->size; ++i) out[i] = q[i] + ratio * (q[i] - before[i]) + again * bend[i];
   else
     for (int i = 0; i < p->size; ++i) out[i] = q[i] + ratio * (q[i] - before[i]);
 }
