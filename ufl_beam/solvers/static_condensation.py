@@ -188,14 +188,13 @@ class Elimination:
         self.f: Array = np.zeros(len(here))
         self._zero: Array = np.zeros(share.size)
         indices = dict(zip(INDICES, found, strict=True))
-        vertices, spikes = len(indices["row"]), indices["spike"]
+        vertices, chains = len(indices["row"]), len(indices["spike"])
         self.c = fill(
             ffi.new("chains *"),
-            chains=len(spikes), left=len(columns), stay=len(indices["entry"]),
+            chains=chains, left=len(columns), stay=len(indices["entry"]),
             rows=len(indices["dof"]), left_size=len(here), left_data=self.left.data,
-            left_f=self.f, data=A.data, indptr=A.indptr, swaps=np.empty(3 * vertices, np.int32),
+            left_f=self.f, data=A.data, indptr=A.indptr, swaps=ffi.new("uint8_t[]", 3 * vertices),
             pivots=np.empty(lib.BLOCK * vertices), to_next=np.empty(lib.BLOCK * vertices),
-            sides=np.empty(lib.SIDES * vertices if spikes.any() else 0),
             f=np.zeros(3 * vertices), order=ffi.from_buffer("uint8_t[]", order), **indices,
         )  # fmt: skip
 

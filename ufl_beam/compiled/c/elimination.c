@@ -8,11 +8,8 @@
  * vertex before, of v and of the vertex after are among them.
  */
 
-/* In the sides of a vertex: what its pivot makes of the coupling to the left end, that from there. */
-enum { TO_LEFT = 0, FROM_LEFT = 9 };
-
 /* x = D^-1 b */
-static inline void solve_block(const double *D, const int32_t *swap, const double *b, double *x)
+static inline void solve_block(const double *D, const uint8_t *swap, const double *b, double *x)
 {
   const double x0 = b[swap[0]], x1 = b[swap[1]] - D[3] * x0;
   x[2] = (b[swap[2]] - D[6] * x0 - D[7] * x1) * D[8];
@@ -198,20 +195,13 @@ static inline void eliminate_vertices(const chains *c, chain_fronts *at, const d
     const int v = at->vertex[l];
     double *pivot = c->pivots + BLOCK * v, *to_next = c->to_next + BLOCK * v, *f = c->f + 3 * v;
     for (int r = 0; r < 3; ++r) {
-      c->swaps[3 * v + r] = (int32_t)swap[r][l];
+      c->swaps[3 * v + r] = (uint8_t)swap[r][l];
       f[r] = row[far * r + F][l];
       for (int k = 0; k < 3; ++k) {
         pivot[3 * r + k] = row[far * r + k][l];
         to_next[3 * r + k] = row[far * r + AFTER + k][l];
       }
     }
-    if (!spike) continue;
-    double *sides = c->sides + SIDES * v;
-    for (int r = 0; r < 3; ++r)
-      for (int k = 0; k < 3; ++k) {
-        sides[FROM_LEFT + 3 * r + k] = at->from[3 * r + k][l];
-        sides[TO_LEFT + 3 * r + k] = row[far * r + TO + k][l];
-      }
   }
   if (at->vertex[0] < at->last[0] && at->vertex[1] < at->last[1]) {
     const int next[PAIR] = {at->vertex[0] + 1, at->vertex[1] + 1};
@@ -279,25 +269,61 @@ void eliminate(const chains *c, const double *b)
   }
 }
 
-/* The same for another right-hand side; f takes what pivots make of it. */
+/* y = D^-1 b of a vertex, and what that makes of the right-hand side of the next one, or of the right
+ * end */
+static inline void go_on(const chains *c, int chain, int vertex, const double *b, double *y,
+                         double *next)
+{
+  double below[9];
+  solve_block(c->pivots + BLOCK * vertex, c->swaps + 3 * vertex, b, y);
+  read_below(c, chain, vertex, below);
+  memset(next, 0, 3 * sizeof *next);
+  subtract(below, y, next);
+}
+
+/* The same for another right-hand side; f takes what pivots make of it. The left end feels what the
+ * first vertex does while both ends are held. */
 void reduce(const chains *c, const double *b)
 {
   memset(c->left_f, 0, c->left_size * sizeof *c->left_f);
   for (int k = 0; k < c->rows; ++k) c->left_f[c->number[k]] = b[c->dof[k]];
   const int32_t *numbers = c->ends;
   for (int chain = 0; chain < c->chains; ++chain, numbers += 6) {
-    double ends[6] = {0}, next[3] = {0}, below[9];
-    for (int v = c->first[chain]; v < c->first[chain + 1]; ++v) {
-      double *f = c->f + 3 * v;
-      for (int r = 0; r < 3; ++r) next[r] += b[c->row[3 * v + r]];
-      solve_block(c->pivots + BLOCK * v, c->swaps + 3 * v, next, f);
-      read_below(c, chain, v, below);
-      memset(next, 0, sizeof next);
-      subtract(below, f, next);
-      if (c->spike[chain]) subtract(c->sides + SIDES * v + FROM_LEFT, f, ends);
+    const int first = c->first[chain], end = c->first[chain + 1];
+    double left[3] = {0}, next[3] = {0}, from[9], y[3];
+    for (int v = first; v < end; ++v) {
+      for (int r = 0; r < 3; ++r) y[r] = next[r] + b[c->row[3 * v + r]];
+      go_on(c, chain, v, y, c->f + 3 * v, next);
     }
-    memcpy(ends + 3, next, sizeof next);
-    for (int k = 0; k < 6; ++k) c->left_f[numbers[k]] += ends[k];
+    if (c->spike[chain]) {
+      memcpy(y, c->f + 3 * (end - 1), sizeof y);
+      for (int v = end - 2; v >= first; --v) {
+        double x[3];
+        memcpy(x, c->f + 3 * v, sizeof x);
+        subtract(c->to_next + BLOCK * v, y, x);
+        memcpy(y, x, sizeof y);
+      }
+      for (int k = 0; k < 9; ++k) from[k] = c->data[c->from_ends[18 * chain + k]];
+      subtract(from, y, left);
+    }
+    for (int k = 0; k < 3; ++k) {
+      c->left_f[numbers[k]] += left[k];
+      c->left_f[numbers[3 + k]] += next[k];
+    }
+  }
+}
+
+/* Add to f what pivots make of the motion of the left end, as far as it does not fade. */
+static void follow_left_end(const chains *c, int chain, const double *left)
+{
+  double to[9], y[3], next[3] = {0};
+  read_block(c, c->first[chain], 0, to);
+  subtract(to, left, next);
+  const double faded = 0x1p-511 * fmax(fabs(next[0]), fmax(fabs(next[1]), fabs(next[2])));
+  for (int v = c->first[chain]; v < c->first[chain + 1]; ++v) {
+    if (fmax(fabs(next[0]), fmax(fabs(next[1]), fabs(next[2]))) <= faded) return;
+    go_on(c, chain, v, next, y, next);
+    for (int k = 0; k < 3; ++k) c->f[3 * v + k] += y[k];
   }
 }
 
@@ -309,9 +335,9 @@ void expand(const chains *c, const double *left, double *x)
   for (int chain = 0; chain < c->chains; ++chain, numbers += 6) {
     double first[3], next[3], y[3];
     for (int k = 0; k < 3; ++k) first[k] = left[numbers[k]], next[k] = left[numbers[3 + k]];
+    if (c->spike[chain]) follow_left_end(c, chain, first);
     for (int v = c->first[chain + 1] - 1; v >= c->first[chain]; --v) {
       memcpy(y, c->f + 3 * v, sizeof y);
-      if (c->spike[chain]) subtract(c->sides + SIDES * v + TO_LEFT, first, y);
       subtract(c->to_next + BLOCK * v, next, y);
       memcpy(next, y, sizeof y);
       for (int r = 0; r < 3; ++r) x[c->row[3 * v + r]] = y[r];

@@ -224,9 +224,8 @@ void commit(points *p);
 
 /* -- elimination along chains ------------------------------------------------------------------ */
 
-/* What is kept of a vertex: its pivot block as LU, what that makes of the coupling to the vertex after;
- * where there is a spike, the couplings to and from the left end. */
-enum { BLOCK = 9, SIDES = 18 };
+/* What is kept of a vertex: its pivot block as LU, what that makes of the coupling to the vertex after. */
+enum { BLOCK = 9 };
 
 typedef struct {
   int chains;
@@ -238,8 +237,7 @@ typedef struct {
   const int32_t *indptr;
   const double *data;
   double *pivots, *to_next; /* vertices x BLOCK */
-  double *sides;            /* vertices x SIDES, where there are spikes */
-  int32_t *swaps;           /* vertices x 3: rows in the order of the pivots */
+  uint8_t *swaps;           /* vertices x 3: rows in the order of the pivots */
   double *f;                /* vertices x 3: right-hand sides */
 
   /* The system of what is left. */
