@@ -44,7 +44,22 @@ def test_blocks_of_cells(number, lanes):
     dofs = np.random.default_rng(3).permutation(3 * number).reshape(number, 3).astype(np.int32)
     structure = coupling(3 * number + 1, dofs)
     one_by_one = structure.positions(np.repeat(dofs, 3, axis=1).ravel(), np.tile(dofs, 3).ravel())
-    expected = in_batches(one_by_one.reshape(number, 9), lanes)
-    assert np.array_equal(structure.blocks(dofs, lanes), expected)
+    in_rows = one_by_one - structure.indptr[np.repeat(dofs, 3, axis=1).ravel()]
+    found = structure.blocks(dofs, lanes)
+    assert found.dtype == np.uint8
+    assert np.array_equal(found, in_batches(in_rows.reshape(number, 9), lanes))
     with pytest.raises(ValueError, match="no such entry"):
         structure.blocks(dofs + 1, lanes)
+
+
+@pytest.mark.parametrize(("number", "kind"), [(255, np.uint8), (256, np.int32)])
+def test_blocks_of_a_hub_of_many(number, kind):
+    """Rows of more than 256 entries need wider places."""
+    pairs = np.array([[0, i + 1] for i in range(number)], dtype=np.int32)
+    structure = coupling(number + 1, pairs)
+    expected = structure.positions(np.repeat(pairs, 2, axis=1).ravel(), np.tile(pairs, 2).ravel())
+    if kind == np.uint8:
+        expected = expected - structure.indptr[np.repeat(pairs, 2, axis=1).ravel()]
+    found = structure.blocks(pairs, 1)
+    assert found.dtype == kind
+    assert np.array_equal(found[:, :, 0], expected.reshape(number, 4))

@@ -59,12 +59,17 @@ class Csr:
     def blocks(self, dofs: Index, lanes: int) -> Index:
         """Find the entries of all pairs of ``dofs``, int32, of each cell, in batches of cells.
 
-        They must exist; (num_batches, pairs, lanes), see :func:`in_batches`.
+        They must exist; (num_batches, pairs, lanes), see :func:`in_batches`.  If rows have at most
+        256 entries, their places in the row, uint8; else those in :attr:`data`, int32.
         """
         cells, of_cell = dofs.shape
-        found = np.empty((-(-cells // lanes), of_cell**2, lanes), dtype=np.int32)
-        structure = (self.size, integers(self.indptr), integers(self.indices))
-        if not lib.find_blocks(*structure, cells, of_cell, lanes, *map(integers, (dofs, found))):
+        narrow = bool(np.diff(self.indptr).max(initial=0) <= 256)
+        shape = (-(-cells // lanes), of_cell**2, lanes)
+        found = np.empty(shape, dtype=np.uint8 if narrow else np.int32)
+        place = ffi.NULL if narrow else integers(found)
+        column = ffi.from_buffer("uint8_t[]", found) if narrow else ffi.NULL
+        of = (self.size, integers(self.indptr), integers(self.indices), cells, of_cell, lanes)
+        if not lib.find_blocks(*of, integers(dofs), place, column):
             raise ValueError("the matrix has no such entry")
         return found
 

@@ -82,7 +82,8 @@ def in_batches(rows: npt.NDArray[Any], lanes: int) -> npt.NDArray[Any]:
     rows = rows.reshape(len(rows), math.prod(rows.shape[1:]))
     if missing := -len(rows) % lanes:
         rows = np.concatenate([rows, np.repeat(rows[-1:], missing, axis=0)])
-    return np.ascontiguousarray(rows.reshape(-1, lanes, rows.shape[1]).transpose(0, 2, 1))
+    batches = rows.reshape(len(rows) // lanes, lanes, rows.shape[1])
+    return np.ascontiguousarray(batches.transpose(0, 2, 1))
 
 
 AGREEMENT = 1e-10

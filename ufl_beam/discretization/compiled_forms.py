@@ -146,7 +146,7 @@ class Kernel:
         self, form: ufl.Form, unknown: fem.Function, cell_dofs: Index, coordinates: Array
     ) -> None:
         self._form = ready = prepared(form)
-        self._columns, self._entries = ready.columns, ready.entries
+        self._entries = ready.entries
         self._dofs = np.ascontiguousarray(cell_dofs, dtype=np.int32)
         self._lanes, self._in_lanes, num_cells = 1, ffi.NULL, len(cell_dofs)
         spaces = [argument.ufl_function_space() for argument in form.arguments()]
@@ -161,26 +161,40 @@ class Kernel:
                 f"{coordinates.shape}"
             )
         self._coordinates = in_batches(coordinates, 1)
+        self._matrix: Csr | None = None
         self._at, self._unknowns = 0, 0
+        self._stated, self._columns = ready.packed, ready.columns  # without the unknown
         if self.uses(unknown):
-            self._at, self._unknowns = self.position(unknown), self._dofs.shape[1]
+            columns, self._unknowns = dict(ready.columns), self._dofs.shape[1]
+            of_unknown = columns.pop(id(unknown))
+            self._at = of_unknown.start
+            self._stated = np.delete(ready.packed, of_unknown, axis=1)
+            number = np.delete(np.arange(ready.packed.shape[1]), of_unknown).searchsorted
+            self._columns = {of: slice(number(x.start), number(x.stop)) for of, x in columns.items()}
 
     @cached_property
     def _packed(self) -> Array:
-        """Values of the coefficients in the cells, in batches."""
-        stated = self._form.packed
+        """Values of the coefficients in the cells but for the unknown, in batches."""
+        stated = self._stated
         return in_batches(np.tile(stated, (len(self._dofs) // len(stated), 1)), self._lanes)
 
     @cached_property
-    def _rows(self) -> Index:
-        """Places of the entries of the cells, in batches; of a matrix see :meth:`place`."""
-        if self._to_dofs:
-            return in_batches(self._dofs, self._lanes)
+    def _places(self) -> dict[str, Any]:
+        """Fields of ``cells`` of loops.h that say what the entries of the cells are added to."""
         shape = len(self._dofs), self._entries
+        if self._to_dofs:
+            return {}
         if self._is_vector:
-            places = np.arange(math.prod(shape), dtype=np.int32)
-            return in_batches(places.reshape(shape), self._lanes)
-        return in_batches(np.zeros(shape, dtype=np.int32), self._lanes)
+            places = np.arange(math.prod(shape), dtype=np.int32).reshape(shape)
+        elif self._matrix is None:
+            places = np.zeros(shape, dtype=np.int32)
+        else:
+            found = self._matrix.blocks(self._dofs, self._lanes)
+            if found.dtype == np.int32:
+                return {"row": found}
+            column = ffi.from_buffer("uint8_t[]", found)
+            return {"begin": self._matrix.indptr, "column": column}
+        return {"row": in_batches(places, self._lanes)}
 
     @cached_property
     def cells(self) -> Any:
@@ -193,7 +207,7 @@ class Kernel:
             number=number, of_cell=of_cell, dofs=self._dofs, unknowns=self._unknowns, at=self._at,
             width=packed.strides[0] // (packed.itemsize * self._lanes), w=first_of(packed),
             constants=self._form.constants, coordinates=self._coordinates, rows=self._entries,
-            row=self._rows,
+            coefficients=self._form.packed.shape[1], **self._places,
         )  # fmt: skip
 
     def _change(self) -> None:
@@ -202,10 +216,10 @@ class Kernel:
 
     def uses(self, function: fem.Function) -> bool:
         """Return whether a function appears in the form."""
-        return id(function) in self._columns
+        return id(function) in self._form.columns
 
     def position(self, function: fem.Function) -> int:
-        """Return the column of the first value of ``function`` among the coefficients of a cell."""
+        """Return the column of the first value of ``function``, not the unknown, in a cell."""
         return int(self._columns[id(function)].start)
 
     def set(self, function: fem.Function, q: Array) -> None:
@@ -226,7 +240,7 @@ class Kernel:
         if not mine.keys() <= others.keys() or len(shifts) != 1 or self._lanes != other._lanes:
             return False
         (first,) = shifts
-        self._packed = other._packed[:, first : first + self._form.packed.shape[1]]
+        self._packed = other._packed[:, first : first + self._stated.shape[1]]
         self._change()
         return True
 
@@ -235,7 +249,8 @@ class Kernel:
         per_cell = self._dofs.shape[1]
         if self._entries != per_cell**2:
             raise ValueError(f"a form of {self._entries} entries on {per_cell} degrees of freedom")
-        self._rows = A.blocks(self._dofs, self._lanes)
+        self._matrix = A
+        vars(self).pop("_places", None)
         self._change()
 
     def address_in_lanes(self) -> int | None:
@@ -245,8 +260,9 @@ class Kernel:
 
     def compute_in_lanes(self, address: int | None, coordinates: Array) -> None:
         """Use the SIMD loop from now on, with coordinates in batches."""
-        for name in {"_packed", "_rows"} & vars(self).keys():
-            setattr(self, name, in_batches(getattr(self, name)[:, :, 0], LANES))
+        if "_packed" in vars(self):
+            self._packed = in_batches(self._packed[:, :, 0], LANES)
+        vars(self).pop("_places", None)
         self._in_lanes = ffi.cast("in_lanes *", address)
         self._lanes, self._coordinates = LANES, coordinates
         self._change()

@@ -1,33 +1,51 @@
 /* SPDX-License-Identifier: MIT */
 /* What add_cells of loops.c does, for LANES cells at a time; the last ones may be fewer. */
 
-enum { NUMBERS = CONSTANTS + (CONSTANTS == 0) };
+enum { NUMBERS = CONSTANTS + (CONSTANTS == 0), COEFFICIENTS = WIDTH + (WIDTH == 0) };
 
 /* A batch of which `some` are cells. All lanes add one entry, then the next one: cells side by side
  * add to the same places, and would wait for each other. */
-static inline void add_batch(const cells *c, const lanes *e, const int32_t *row, int some, double *b)
+static inline void add_batch(const cells *c, const lanes *e, int first, int some, double *b)
 {
-  for (int i = 0; i < ENTRIES; ++i)
+  const int32_t *dofs = c->dofs + (size_t)first * c->of_cell;
+  if (c->column) {
+    const uint8_t *column = c->column + (size_t)first * ENTRIES;
+    for (int i = 0; i < c->of_cell; ++i) {
+      double *row[LANES] = {0};
+#pragma GCC unroll 8
+      for (int l = 0; l < some; ++l) row[l] = b + c->begin[dofs[l * c->of_cell + i]];
+      for (int j = 0; j < c->of_cell; ++j, ++e, column += LANES)
+#pragma GCC unroll 8
+        for (int l = 0; l < some; ++l) row[l][column[l]] += (*e)[l];
+    }
+  } else if (c->row) {
+    const int32_t *row = c->row + (size_t)first * ENTRIES;
+    for (int i = 0; i < ENTRIES; ++i)
 #pragma GCC unroll 4
-    for (int l = 0; l < some; ++l) b[row[i * LANES + l]] += e[i][l];
+      for (int l = 0; l < some; ++l) b[row[i * LANES + l]] += e[i][l];
+  } else
+    for (int i = 0; i < ENTRIES; ++i)
+#pragma GCC unroll 4
+      for (int l = 0; l < some; ++l) b[dofs[l * ENTRIES + i]] += e[i][l];
 }
 
 static void add_in_lanes(const cells *c, const double *q, double *b)
 {
-  lanes e[ENTRIES], constants[NUMBERS];
+  const int after = c->at + c->unknowns;
+  lanes e[ENTRIES], w[COEFFICIENTS] = {0}, constants[NUMBERS];
   for (int i = 0; i < CONSTANTS; ++i) constants[i] = ALL(c->constants[i]);
-  const int32_t *dofs = c->dofs, *row = c->row;
-  const lanes *x = (const lanes *)c->coordinates;
-  lanes *w = (lanes *)c->w;
-  for (int left = c->number; left > 0; left -= LANES) {
-    const int some = left < LANES ? left : LANES;
+  for (int first = 0; first < c->number; first += LANES) {
+    const int some = c->number - first < LANES ? c->number - first : LANES;
+    const int32_t *dofs = c->dofs + (size_t)first * c->of_cell;
+    const lanes *stored = (const lanes *)(c->w + (size_t)first * c->width);
+    for (int i = 0; i < c->at; ++i) w[i] = stored[i];
     for (int l = 0; l < some; ++l, dofs += c->of_cell)
       for (int i = 0; i < c->unknowns; ++i) w[c->at + i][l] = q[dofs[i]];
+    for (int i = after; i < WIDTH; ++i) w[i] = stored[i - c->unknowns];
     memset(e, 0, sizeof e);
-    tabulate(e, w, constants, x);
-    if (some == LANES) add_batch(c, e, row, LANES, b);
-    else add_batch(c, e, row, some, b);
-    w += c->width, x += 6, row += ENTRIES * LANES;
+    tabulate(e, w, constants, (const lanes *)c->coordinates + (size_t)first / LANES * 6);
+    if (some == LANES) add_batch(c, e, first, LANES, b);
+    else add_batch(c, e, first, some, b);
   }
 }
 

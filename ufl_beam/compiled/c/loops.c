@@ -34,15 +34,24 @@ void add_cells(void *self, const double *q, double *b)
     c->several(c, q, b);
     return;
   }
-  const int32_t *dofs = c->dofs, *row = c->row;
-  const double *coordinates = c->coordinates;
-  double *w = c->w, e[MOST_ENTRIES];
+  const int after = c->at + c->unknowns;
+  double w[c->coefficients + 1], e[MOST_ENTRIES];
   for (int k = 0; k < c->number; ++k) {
+    const int32_t *dofs = c->dofs + (size_t)k * c->of_cell;
+    const double *stored = c->w + (size_t)k * c->width;
+    const size_t first = (size_t)k * c->rows;
+    for (int i = 0; i < c->at; ++i) w[i] = stored[i];
     for (int i = 0; i < c->unknowns; ++i) w[c->at + i] = q[dofs[i]];
+    for (int i = after; i < c->coefficients; ++i) w[i] = stored[i - c->unknowns];
     memset(e, 0, c->rows * sizeof *e);
-    CALL(c->tabulate, e, w, c->constants, coordinates);
-    for (int i = 0; i < c->rows; ++i) b[row[i]] += e[i];
-    dofs += c->of_cell, w += c->width, coordinates += 6, row += c->rows;
+    CALL(c->tabulate, e, w, c->constants, c->coordinates + (size_t)k * 6);
+    if (c->row)
+      for (int i = 0; i < c->rows; ++i) b[c->row[first + i]] += e[i];
+    else if (c->column)
+      for (int i = 0; i < c->rows; ++i)
+        b[c->begin[dofs[i / c->of_cell]] + c->column[first + i]] += e[i];
+    else
+      for (int i = 0; i < c->rows; ++i) b[dofs[i]] += e[i];
   }
 }
 
@@ -142,16 +151,21 @@ int find_entries(int rows, const int32_t *indptr, const int32_t *indices, int nu
 }
 
 /* Where a matrix holds the entries of all pairs of the `of_cell` unknowns of each cell, row by row, in
- * batches of `lanes` cells, the last of them filled up with the last cell; whether it has them all. */
+ * batches of `lanes` cells, the last of them filled up with the last cell; whether it has them all.
+ * The place, or if that is null, how far from the beginning of its row. */
 int find_blocks(int rows, const int32_t *indptr, const int32_t *indices, int number, int of_cell,
-                int lanes, const int32_t *dofs, int32_t *found)
+                int lanes, const int32_t *dofs, int32_t *place, uint8_t *column)
 {
   for (int64_t k = 0; k < (number + lanes - 1) / lanes * lanes; ++k) {
     const int32_t *of = dofs + of_cell * (k < number ? k : number - 1);
-    int32_t *batch = found + k / lanes * lanes * of_cell * of_cell + k % lanes;
+    int64_t at = k / lanes * lanes * of_cell * of_cell + k % lanes;
     for (int i = 0; i < of_cell; ++i)
-      for (int j = 0; j < of_cell; ++j, batch += lanes)
-        if ((*batch = find_entry(rows, indptr, indices, of[i], of[j])) < 0) return 0;
+      for (int j = 0; j < of_cell; ++j, at += lanes) {
+        const int32_t entry = find_entry(rows, indptr, indices, of[i], of[j]);
+        if (entry < 0) return 0;
+        if (place) place[at] = entry;
+        else column[at] = (uint8_t)(entry - indptr[of[i]]);
+      }
   }
   return 1;
 }

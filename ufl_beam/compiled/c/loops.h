@@ -22,13 +22,16 @@ void add_calls(void *self, const double *q, double *out);
 
 enum { MOST_ENTRIES = 144 }; /* of the vector or matrix of a cell: 12 unknowns of degree 3 */
 
-/* A compiled form on some cells. w holds the packed coefficients of a cell, of which those from `at`
- * on are the unknowns of the cell, brought up to date on the way; `width` numbers further are those of
- * the next one, as the values may be a part of those of another form.
+/* A compiled form on some cells. w holds the packed coefficients of a cell but for its unknowns, which
+ * the form has from `at` on; `width` numbers further are those of the next cell, as the values may be a
+ * part of those of another form.
+ *
+ * An entry of a cell is added to the place `row` says; without these, to its entry in the row `begin`
+ * of a matrix, `column` places on; without either, to its degree of freedom.
  *
  * Where a form is computed for several cells at once, `several` does what add_cells does, and numbers
- * of cells (w, coordinates, row) come in batches of as many cells: the first number of each of these
- * cells, then their second numbers, and so on; the last batch is filled up with the last cell. */
+ * of cells (w, coordinates, row, column) come in batches of as many cells: the first number of each of
+ * these cells, then their second numbers, and so on; the last batch is filled up with the last cell. */
 typedef struct cells cells;
 typedef void (in_lanes)(const cells *self, const double *q, double *out);
 struct cells {
@@ -37,11 +40,12 @@ struct cells {
   int lanes; /* cells of a batch, a power of two; else 1 */
   int number, of_cell, unknowns; /* cells, degrees of freedom of each, those the form depends on */
   const int32_t *dofs;
-  int at, width;
+  int at, width, coefficients; /* of a cell, unknowns included */
   double *w;
   const double *constants, *coordinates;
   int rows; /* entries of a cell */
-  const int32_t *row;
+  const int32_t *row, *begin; /* or none */
+  const uint8_t *column;
 };
 
 /* Strains whose forces the tangents of a static step have, see static_tangents.py. */
@@ -92,7 +96,7 @@ void add_step_tangent(void *self, const double *q, double *tangent);
 int find_entries(int rows, const int32_t *indptr, const int32_t *indices, int number,
                  const int32_t *row, const int32_t *column, int32_t *found);
 int find_blocks(int rows, const int32_t *indptr, const int32_t *indices, int number, int of_cell,
-                int lanes, const int32_t *dofs, int32_t *found);
+                int lanes, const int32_t *dofs, int32_t *place, uint8_t *column);
 int64_t find_pattern(int size, int groups, const int32_t *first, const int32_t *dof, int32_t *begin,
                      int32_t *group, int32_t *seen, int32_t *indptr, int32_t *indices);
 void add_product(int rows, const int32_t *indptr, const int32_t *indices, const double *data,
