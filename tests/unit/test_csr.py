@@ -37,6 +37,18 @@ def test_pattern_of_groups(size):
     assert np.array_equal(structure.entries_of(some), np.concatenate(entries))
 
 
+def test_released_indices_are_found_again():
+    structure = coupling(5, np.array([[0, 2], [3, 1]], dtype=np.int32))
+    other, before = structure.zeros_like(), structure.indices.copy()
+    structure.release()
+    assert "indices" not in vars(structure)
+    assert np.array_equal(structure.indices, before)
+    assert np.array_equal(other.indices, before)
+    structure.petsc()
+    structure.release()
+    assert "indices" in vars(structure)  # PETSc has them
+
+
 @pytest.mark.parametrize("lanes", [1, 4])
 @pytest.mark.parametrize("number", [1, 4, 6])
 def test_blocks_of_cells(number, lanes):

@@ -246,6 +246,23 @@ def test_a_history_of_residuals():
     simulation.close()
 
 
+def test_the_matrix_of_snes():
+    """PETSc has it from when it is asked for; before, nobody has its columns."""
+    simulation = ub.Simulation(frame(), ub.Midpoint(0.1))
+    simulation.step_to(0.01)
+    assert "indices" not in vars(simulation.equation.A)
+    snes = simulation.snes
+    simulation.step_to(0.02)
+    if simulation.share.alone:
+        matrix = snes.getJacobian()[0]
+        indptr, indices, data = matrix.getValuesCSR()
+        A = simulation.equation.A
+        assert np.array_equal(indptr, A.indptr)
+        assert np.array_equal(indices, A.indices)
+        assert np.array_equal(data, A.data)
+    simulation.close()
+
+
 class Monitored(ub.Recorder):
     """Iterations of a path."""
 

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import copy
+from functools import cached_property
 
 from petsc4py import PETSc
 
@@ -15,12 +17,29 @@ from ufl_beam.structure_cache import of_structure
 
 
 class Csr:
-    """Compressed sparse rows with indices of 32 bits, as C needs them; SciPy chooses others."""
+    """Compressed sparse rows with indices of 32 bits, as C needs them; SciPy chooses others.
 
-    def __init__(self, data: Array, indices: Index, indptr: Index) -> None:
-        self.data = data
+    ``again`` finds the indices once more where :meth:`release` gives them back.
+    """
+
+    def __init__(
+        self, data: Array, indices: Index, indptr: Index,
+        again: Callable[[], Index] | None = None,
+    ) -> None:  # fmt: skip
+        self.data, self._again = data, again
         self.indices = indices.astype(np.int32, copy=False)
         self.indptr = indptr.astype(np.int32, copy=False)
+
+    @cached_property
+    def indices(self) -> Index:
+        """Column of each entry."""
+        assert self._again is not None
+        return self._again()
+
+    def release(self) -> None:
+        """Give back the memory of :attr:`indices`, until they are asked for again."""
+        if self._again is not None:
+            vars(self).pop("indices", None)
 
     def zeros_like(self) -> Csr:
         """Return a matrix of the same sparsity pattern, which is stored once."""
@@ -74,8 +93,9 @@ class Csr:
         return found
 
     def petsc(self) -> PETSc.Mat:
-        """Return a PETSc matrix on this process that shares the arrays."""
+        """Return a PETSc matrix on this process that shares the arrays, and keeps them."""
         indptr, indices = (x.astype(PETSc.IntType, copy=False) for x in (self.indptr, self.indices))
+        self._again = None
         arrays = (indptr, indices, self.data)
         matrix = PETSc.Mat().createAIJWithArrays(self.size, arrays, comm=PETSc.COMM_SELF)
         matrix.assemble()
@@ -85,7 +105,7 @@ class Csr:
 def coupling(size: int, *coupled: Index) -> Csr:
     """Return a matrix of zeros whose pattern has the diagonal and all pairs of coupled dofs."""
     indices, indptr = _pattern(size, *coupled)
-    return Csr(np.zeros(len(indices)), indices, indptr)
+    return Csr(np.zeros(len(indices)), indices, indptr, lambda: _pattern(size, *coupled)[0])
 
 
 @of_structure

@@ -170,7 +170,9 @@ class Kernel:
             self._at = of_unknown.start
             self._stated = np.delete(ready.packed, of_unknown, axis=1)
             number = np.delete(np.arange(ready.packed.shape[1]), of_unknown).searchsorted
-            self._columns = {of: slice(number(x.start), number(x.stop)) for of, x in columns.items()}
+            self._columns = {
+                of: slice(number(x.start), number(x.stop)) for of, x in columns.items()
+            }
 
     @cached_property
     def _packed(self) -> Array:

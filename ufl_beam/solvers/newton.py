@@ -60,6 +60,7 @@ class Solver:
         self.convergence = Convergence(share, equation, self._q, r, newton, least)
         equation.c.x = opaque(self._x)
         self._callbacks = SnesCallbacks(equation, self._vectors, self.convergence.test)
+        self.in_c = equation.in_c and not self._chosen()
         self._matrix = self._make_matrix()
         self._factors = factors
         self._ksp = PETSc.KSP().create(self._x.comm)
@@ -69,7 +70,6 @@ class Solver:
         self._ksp.getPC().setPythonContext(self._factors)
         self._bordered: BorderedNewton | None = None
         self._snes = self._make_snes()
-        self.in_c = equation.in_c and not self._chosen()
         if self.in_c:
             self._leave_newton_to_c()
         self.iterations = self._done = 0
@@ -77,9 +77,10 @@ class Solver:
     # -- PETSc ---------------------------------------------------------------------------------
 
     def _make_matrix(self) -> PETSc.Mat:
-        if not self._vectors.parallel:
+        if not (self._vectors.parallel or self.in_c):
             return self._equation.A.petsc()
         # Nothing but the preconditioner, which has its own, asks for the matrix.
+        self._equation.A.release()
         sizes = (self._share.num_owned, self._share.grid.size)
         matrix = PETSc.Mat().createPython([sizes, sizes], object(), comm=self._share.comm)
         matrix.setUp()
@@ -94,8 +95,7 @@ class Solver:
         snes.setOptionsPrefix(PREFIX)
         if self._equation.in_c:
             petsc("SNESSetFunction", snes, self._f, *loop("snes_function", self._equation.c))
-            matrices = self._matrix, self._matrix
-            petsc("SNESSetJacobian", snes, *matrices, *loop("snes_jacobian", self._equation.c))
+            self._let_c_fill(snes)
             petsc("SNESSetConvergenceTest", snes, *loop("snes_test", self._equation.c), ffi.NULL)
         else:
             snes.setFunction(self._callbacks.function, self._f)
@@ -106,6 +106,10 @@ class Solver:
         snes.setKSP(self._ksp)
         take_options(snes, {**FULL_STEPS, **self._chosen()})
         return snes
+
+    def _let_c_fill(self, snes: PETSc.SNES) -> None:
+        matrices = self._matrix, self._matrix
+        petsc("SNESSetJacobian", snes, *matrices, *loop("snes_jacobian", self._equation.c))
 
     def _leave_newton_to_c(self) -> None:
         self._factors.drive(self._equation.c)
@@ -119,6 +123,8 @@ class Solver:
         """SNES of the steps; from when it is asked for, their method is PETSc's ``newtonls``."""
         if self.in_c:
             self.in_c = False
+            self._matrix = self._make_matrix()
+            self._let_c_fill(self._snes)
             self._snes.setType("newtonls")
             take_options(self._snes, FULL_STEPS)  # SNES has forgotten its line search
         return self._snes

@@ -297,8 +297,8 @@ typedef struct {
   int (*VecRestoreArray)(void *vec, double **values);
   int (*VecLockGet)(void *vec, petsc_int *state);
   int (*VecLockReadPop)(void *vec);
-  int (*MatSeqAIJGetArray)(void *mat, double **values);
-  int (*MatSeqAIJRestoreArray)(void *mat, double **values);
+  int (*PetscObjectStateGet)(void *object, int64_t *state);
+  int (*PetscObjectStateSet)(void *object, int64_t state);
   int (*PCSetUp)(void *pc);
   int (*PCGetFailedReason)(void *pc, int *reason);
   int (*PCApply)(void *pc, void *b, void *x);

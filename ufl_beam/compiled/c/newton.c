@@ -163,16 +163,22 @@ int snes_function(void *snes, void *x, void *f, void *self)
   return petsc.VecRestoreArrayRead(x, &q);
 }
 
+/* Tell PETSc that entries of a matrix have changed. */
+static int note_change(void *matrix)
+{
+  int64_t state;
+  TRY(petsc.PetscObjectStateGet(matrix, &state));
+  return petsc.PetscObjectStateSet(matrix, state + 1);
+}
+
 int snes_jacobian(void *snes, void *x, void *A, void *P, void *self)
 {
   equation *e = self;
   const double *q;
-  double *entries; /* they are those of e; asking for them tells PETSc that they change */
   if (e->near) return 0;
   TRY(petsc.VecGetArrayRead(x, &q));
-  TRY(petsc.MatSeqAIJGetArray(P, &entries));
   assemble(e, q);
-  TRY(petsc.MatSeqAIJRestoreArray(P, &entries));
+  TRY(note_change(P));
   return petsc.VecRestoreArrayRead(x, &q);
 }
 
@@ -205,10 +211,8 @@ int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int
 /* Factors of the tangent, and what they make of the residual on the way; *failed if it is singular. */
 int factor_tangent(const equation *e, int *failed)
 {
-  double *entries; /* asking for them tells PETSc that they change */
-  TRY(petsc.MatSeqAIJGetArray(e->left, &entries));
   eliminate(e->chains, e->residual);
-  TRY(petsc.MatSeqAIJRestoreArray(e->left, &entries));
+  TRY(note_change(e->left));
   if ((*failed = !all_finite(e->chains->left, e->chains->left_data))) return 0;
   const int error = petsc.PCSetUp(e->factors);
   if (!error) return petsc.PCGetFailedReason(e->factors, failed);
