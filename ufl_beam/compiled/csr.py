@@ -160,16 +160,17 @@ class Product:
 class StepProduct:
     """Forces ``A (factor s - back v)``, s being (Δu, 2 tan(Δψ/2)), and their derivative.
 
-    ``A`` is constant; the derivative is added to ``tangent``, of the same structure.
+    ``A`` is constant; the derivative is added to ``tangent``, of the same structure.  ``scratch``
+    is space for as many numbers as there are rows, which others may use too.
     """
 
-    def __init__(self, A: Csr, rotations: Index, tangent: Csr) -> None:
+    def __init__(self, A: Csr, rotations: Index, tangent: Csr, scratch: Array) -> None:
         self.A, self._tangent = Product(A), tangent
         size, indptr, indices, data = self.A.arrays
         self.c = fill(
             ffi.new("step_product *"),
             size=size, indptr=indptr, indices=indices, data=data, entry=self.A.entries,
-            rotations=len(rotations), rotation=rotations, space=np.empty(size),
+            rotations=len(rotations), rotation=rotations, space=scratch,
             turn=np.full(len(rotations), np.nan), half=np.empty(len(rotations)),
         )  # fmt: skip
 

@@ -110,7 +110,7 @@ class Share:
         owner[owner == comm.size] = 0  # bodies that nothing is attached to
         self.links = np.flatnonzero(rank_of_link == comm.rank)
         order = np.argsort(owner, kind="stable").astype(np.int32)
-        self._global = np.empty(grid.size, dtype=np.int32)
+        self._global: Index = np.empty(grid.size, dtype=np.int32)
         self._global[order] = np.arange(grid.size, dtype=np.int32)
 
         own = owner == comm.rank
@@ -122,19 +122,26 @@ class Share:
         self.dofs = np.concatenate([np.flatnonzero(x).astype(np.int32) for x in (own, ghost)])
         self.num_owned = int(own.sum())
         self.ghosts = self._global[self.dofs[self.num_owned :]]
-        self._local = np.full(grid.size, -1, dtype=np.int32)
+        self._local: Index = np.full(grid.size, -1, dtype=np.int32)
         self._local[self.dofs] = np.arange(len(self.dofs))
         self.cell_dofs = self._local[of_cell]
         self.link_dofs = self._local[of_link[self.links]]
         of_body = self._local[grid.dofs_of_bodies]
         self.body_dofs = of_body[(of_body >= 0).all(axis=1)]
-        self._all_owned = order
+        self._all_owned: Index = order
+        if self.alone:  # all numbers are the same
+            self._global = self._local = self._all_owned = self.dofs
         self._num_owned_by = np.bincount(owner, minlength=comm.size).tolist()
 
     @property
     def size(self) -> int:
         """Number of local degrees of freedom, ghosts included."""
         return len(self.dofs)
+
+    @cached_property
+    def scratch(self) -> Array:
+        """Space for a number of each degree of freedom that no loop in C needs once it is over."""
+        return np.empty(self.size)
 
     def at(self, anchor: Anchor) -> Index:
         """Degrees of freedom (numbers of the grid) of what an anchor moves with; shape (3,)."""

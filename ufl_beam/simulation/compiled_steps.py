@@ -84,7 +84,7 @@ class CompiledSteps:
         self._phases, self._times, self.ahead = phases, times, False
         self._applies_loads = applies_loads
         share = equation.share
-        self._space, rotations = np.zeros((3, share.size)), share.rotations()
+        self._space, rotations = np.zeros((2, share.size)), share.rotations()
         limited, half_tangents = (rotations[: len(rotations) * has] for has in turns)
         self._bytes, self._end = 8 * share.size, np.zeros(1)
         loads = [term.steps_in_c for term in equation.terms if isinstance(term, DeadLoads)]
@@ -93,7 +93,7 @@ class CompiledSteps:
         self.c = fill(
             ffi.new("march *"),
             equation=equation.c, snes=solver.in_petsc(), size=share.size, x=solver.unknowns,
-            s=self._space[2], load_weight=load_weight, motion_weight=motion_weight, at=at,
+            s=equation.c.change, load_weight=load_weight, motion_weight=motion_weight, at=at,
             largest_turn=largest_turn, rotations=len(limited), rotation=limited,
             half_tangents=len(half_tangents), half_tangent=half_tangents,
             multipliers=len(multipliers), multiplier=multipliers,
@@ -190,7 +190,7 @@ class CompiledSteps:
         return np.frombuffer(ffi.buffer(values, self._bytes)).copy()
 
     def _hand_over(self, state: Stepping) -> None:
-        c, (q, before, _) = self.c, self._space
+        c, (q, before) = self.c, self._space
         q[:], before[:] = state.q, state.prediction.q_before
         state.prediction.began_at(before)  # no second array of what C has
         fill(c, q=q, prediction=state.prediction.c, t=state.t, iterations=0)

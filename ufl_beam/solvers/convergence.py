@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import doubles, fill, lib
+from ufl_beam.compiled.c_library import doubles, ffi, fill, lib
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
 from ufl_beam.solvers.equation import Equation
@@ -42,7 +42,7 @@ class Convergence:
         self._weights[share.multipliers()] = 0.0
         self._weights[share.num_owned :] = 0.0
         self._norm = (share.size, doubles(self._weights))
-        self._moves = np.ones(share.size)
+        self._moves = np.ones(share.size, dtype=np.uint8)
         self.leave_out(np.zeros(share.size, dtype=bool))
         self.diagonal = self._A.diagonal(np.arange(share.size, dtype=np.int32))
         self._at_r, self._at_forces = doubles(self._r), doubles(equation.force)
@@ -53,8 +53,8 @@ class Convergence:
             size=share.size, scene=share.grid.scene.size, rtol=newton.rtol, rate=math.inf,
             modified=newton.modified, most=newton.max_iterations, least=least,
             weight=self._weights, residual=r, change=np.empty(share.size),
-            space=np.empty(share.size), lengths=share.lengths(), moves=self._moves,
-            diagonal=self.diagonal,
+            space=share.scratch, lengths=share.lengths(), diagonal=self.diagonal,
+            moves=ffi.from_buffer("uint8_t[]", self._moves),
         )  # fmt: skip
 
     # -- sizes ---------------------------------------------------------------------------------
@@ -77,7 +77,7 @@ class Convergence:
     def leave_out(self, idle: npt.NDArray[np.bool_]) -> None:
         """Expect no round-off where supports hold, and where a stiffness holds idle motions."""
         self._moves[:] = ~idle
-        self._moves[self._held] = 0.0
+        self._moves[self._held] = 0
 
     def scale(self) -> float:
         """Size of the loads and of the internal forces in the latest residual; N."""

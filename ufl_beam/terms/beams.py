@@ -121,7 +121,7 @@ class Inertia(OfMatrix):
         self, fields: Fields, scheme: DynamicScheme, A: Csr, ledger: Ledger, v: Array
     ) -> None:
         rotations = scheme.half_tangents(fields.share.rotations())
-        self._times = StepProduct(mass_matrix(fields), rotations, A)
+        self._times = StepProduct(mass_matrix(fields), rotations, A, fields.share.scratch)
         self.ledger = ledger
         if scheme.slips:
             ledger.lost["numerical"] += 0.0

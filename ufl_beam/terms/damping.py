@@ -100,7 +100,7 @@ class RayleighForces(OfMatrix):
         K = fields.assembled(_reference_stiffness(fields.element))
         C.data[:] = damping.mass * M.data + damping.stiffness * K.data  # P(92)
         rotations = inertia.scheme.half_tangents(fields.share.rotations())
-        self._times = StepProduct(C, rotations, A)
+        self._times = StepProduct(C, rotations, A, fields.share.scratch)
         self._ledger, self._inertia = ledger, inertia
 
     def phases(self, times: TimeFunctions) -> Phases | None:

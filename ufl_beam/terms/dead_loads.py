@@ -40,6 +40,7 @@ class DeadLoads(LoadTerm):
         self._end: Array = self.force
         self._in_c = struct("vector", size=share.size)
         self._factors: list[float] = []
+        self._scheme = scheme
 
     def begin(self, step: Step) -> None:
         """The loads of the step; nothing is to do for those that stay."""
@@ -62,24 +63,26 @@ class DeadLoads(LoadTerm):
     def phases(self, times: TimeFunctions) -> Phases | None:
         """Loops over the vectors."""
         owners = [(load.time, load) for load, _ in self._vectors]
-        forces = np.zeros((3, len(self.force)))  # now, at the end of the step, before
+        weight, size = weight_of_before(self._acting), len(self.force)
+        alike = weight == 0.0 and self._scheme.step(0.0, 1.0, 1.0, np.zeros(0)).at == 1.0
+        forces = np.zeros((1 if alike else 3, size))
+        now, end, before = (forces[k % len(forces)] for k in range(3))
         c = self.steps_in_c = struct(
-            "dead_loads", size=len(self.force), vectors=len(owners), force=forces[0], end=forces[1],
-            before=forces[2], factors=np.empty(len(owners)), factor=times.in_c(owners),
+            "dead_loads", size=size, vectors=len(owners), force=now, end=end, before=before,
+            factors=np.empty(len(owners)), factor=times.in_c(owners),
             vector=ffi.new("double *[]", [doubles(vector) for _, vector in self._vectors]),
-            work=self._ledger.supplied.pointer("loads"),
-            weight_of_before=weight_of_before(self._acting),
+            work=self._ledger.supplied.pointer("loads"), weight_of_before=weight,
         )  # fmt: skip
 
         def enter(q: Array) -> None:
-            forces[2] = self._before
-            self._before = forces[2]  # no second array of what C has
+            before[:] = self._before
+            self._before = before  # no second array of what C has
             for k in range(len(owners)):
                 c.factors[k] = math.nan
-            self._in_c.values = doubles(forces[0])
+            self._in_c.values = doubles(now)
 
         def leave(q: Array) -> None:
-            self.force, self._end, self._before = forces.copy()
+            self.force, self._end, self._before = now.copy(), end.copy(), before.copy()
             self._factors = []
 
         begin, accept = [loop("begin_dead_loads", c)], [loop("accept_dead_loads", c)]

@@ -350,12 +350,14 @@ typedef struct {
   const chains *chains;
   void *x, *left, *factors, *left_f, *left_x; /* in PETSc: the unknowns; what chains leave of the */
                                               /* tangent, its factors, two vectors */
-  double *residual, *change;                  /* at an iterate, and what it is changed by */
+  double *residual, *change;                  /* at an iterate, and what it is changed by; between
+                                               * solutions others use this */
   const double *found, *weight;               /* entries of left_x; see Solver */
   int least, most;                             /* iterations */
   const int32_t *diagonal;
   double *space;
-  const double *lengths, *moves; /* see Solver */
+  const double *lengths; /* see Solver */
+  const uint8_t *moves;
   double scene, moved; /* size of the scene; largest motion of the latest iterate, at most that size */
   int demands;
   const demand *demand; /* of connectors */
@@ -450,7 +452,7 @@ typedef struct {
   const double *const *vector;
   const time_function *factor;
   double *factors; /* of the latest step; not numbers before the first */
-  double *force, *end, *before;
+  double *force, *end, *before; /* one array where a scheme asks for the force at the end only */
   double norm, weight_of_before;
   int acts; /* whether a force, now or before, is not zero */
   double *work; /* entry of the ledger */

@@ -102,7 +102,7 @@ void accept_dead_loads(void *self, const time_step *step, const double *q1, cons
   double work = 0;
   for (int i = 0; i < l->size; ++i) work += (a * l->before[i] + (1 - a) * l->force[i]) * s[i];
   *l->work += work;
-  memcpy(l->before, l->end, l->size * sizeof *l->end);
+  if (l->before != l->end) memcpy(l->before, l->end, l->size * sizeof *l->end);
 }
 
 /* out = sum of numbers times rates, from the one with number `first` on */
