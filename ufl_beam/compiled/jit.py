@@ -33,6 +33,9 @@ HEADERS = f"""\
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 #define CALL(f, e, w, c, x) f(e, w, c, x, 0, 0{TABULATE[1]})"""
 """Head of all files of C; CALL calls a kernel of FFCx."""
 

@@ -211,8 +211,9 @@ class Grid:
 
     def lengths(self, cells: Index) -> Array:
         """Lengths of some cells; (len(cells),); m."""
-        ends = self.points[self.cells[cells]]
-        return np.asarray(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
+        start, end = self.cells[cells].T
+        x, y = (self.points[end] - self.points[start]).T
+        return np.asarray(np.sqrt(x * x + y * y))
 
     def hinges(self, beam: Member) -> list[AnySoftening | None]:
         """Law of the hinge that may open in the middle of each cell of a beam."""

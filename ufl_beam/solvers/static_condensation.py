@@ -9,6 +9,7 @@ vertices at the border between processes, whatever else couples to more than two
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 from petsc4py import PETSc
@@ -186,7 +187,7 @@ class Elimination:
         self.numbers, self.shared = share.dofs[here], ~alone[here]
         self.left = Csr(np.zeros(len(columns)), columns, indptr)
         self.f: Array = np.zeros(len(here))
-        self._zero: Array = np.zeros(share.size)
+        self._size = share.size
         indices = dict(zip(INDICES, found, strict=True))
         vertices, chains = len(indices["row"]), len(indices["spike"])
         self.c = fill(
@@ -197,6 +198,10 @@ class Elimination:
             pivots=np.empty(lib.BLOCK * vertices), to_next=np.empty(lib.BLOCK * vertices),
             f=np.zeros(3 * vertices), order=ffi.from_buffer("uint8_t[]", order), **indices,
         )  # fmt: skip
+
+    @cached_property
+    def _zero(self) -> Array:
+        return np.zeros(self._size)
 
     def factor(self) -> bool:
         """Eliminate the chains and fill :attr:`left`; whether all of it is finite."""

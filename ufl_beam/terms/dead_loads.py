@@ -76,7 +76,7 @@ class DeadLoads(LoadTerm):
 
         def enter(q: Array) -> None:
             before[:] = self._before
-            self._before = before  # no second array of what C has
+            self.force, self._end, self._before = now, end, before  # no second arrays
             for k in range(len(owners)):
                 c.factors[k] = math.nan
             self._in_c.values = doubles(now)

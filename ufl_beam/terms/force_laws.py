@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy  # its parts are loaded when they are used
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_returned, shorten
@@ -127,7 +127,7 @@ class Asked:
         here, there = excess(e), excess(last.at)
         if not (here < 0.0 < there or there < 0.0 < here):
             return e
-        return float(brentq(excess, e, last.at, xtol=1e-300, maxiter=2000))
+        return float(scipy.optimize.brentq(excess, e, last.at, xtol=1e-300, maxiter=2000))
 
     def _slope(self, e: float, force: float) -> float:
         """Derivative of the force at ``e``, by central differences.

@@ -52,7 +52,9 @@ class RatesInC:
     def __init__(self, moving: Moving) -> None:
         self._moving, self._scheme = moving, moving.scheme
         size, number = len(moving.v), MORE + len(self._scheme.kept)
-        self._space = np.zeros((2, number, size))
+        # Changes are elsewhere; of velocities before the last ones new ones are not computed.
+        self._now, self._next = np.zeros((number - V, size)), np.zeros((number - V_BEFORE, size))
+        self._slip = np.zeros(size if self._scheme.slips else 0)
         self._handle = ffi.new_handle(self)
         self.c = fill(ffi.new("rates *"), size=size, number=number, find=lib.numbers_in_python)
         self.c.handle = self._handle  # what `fill` keeps must not keep this object
@@ -79,7 +81,7 @@ class RatesInC:
 
     def times(self, product: StepProduct, **entries: Any) -> Any:
         """Return ``matrix_of_rates`` of loops.h for a matrix, with entries of the ledger."""
-        v, momentum = np.zeros((2, self.c.size))
+        v, momentum = np.zeros(self.c.size), np.zeros(len(self._slip))
         of = struct("matrix_of_rates", product=product.c, v=v, momentum=momentum, **entries)
         return fill(of, rates=self.c)
 
@@ -87,13 +89,14 @@ class RatesInC:
 
     def enter(self, q: Array) -> None:
         """Take the rates from Python."""
-        moving, now, space = self._moving, *self._space
-        for k, rate in enumerate((moving.v, moving.v_before, *moving.more), start=V):
+        moving, now = self._moving, self._now
+        for k, rate in enumerate((moving.v, moving.v_before, *moving.more)):
             now[k] = rate
         # No second arrays of what C has; velocities are asked for between its calls.
-        moving.v_before, moving.more = now[V_BEFORE], tuple(now[MORE:])
-        for k in range(self.c.number):
-            self.c.rate[k], self.c.new_rate[k] = doubles(now[k]), doubles(space[k])
+        moving.v_before, moving.more = now[1], tuple(now[2:])
+        v, *more = self._next
+        for k, (rate, new) in enumerate(zip(now, (v, self._slip, *more), strict=True), start=V):
+            self.c.rate[k], self.c.new_rate[k] = doubles(rate), doubles(new)
         self.c.last_dt = moving.last_dt
 
     def leave(self, q: Array) -> None:

@@ -301,6 +301,14 @@ void add_step_tangent(void *self, const double *q, double *tangent)
   add_rows(p, 0, p->size, tangent);
 }
 
+/* Give memory that was used and is free to the system: the C library of GNU keeps it otherwise. */
+void give_back_memory(void)
+{
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
+}
+
 /* Euclidean norm of w f, also where its squares are too small or too large to have all digits. */
 double norm(int rows, const double *w, const double *f)
 {

@@ -105,6 +105,7 @@ double quadratic_form(int rows, const int32_t *indptr, const int32_t *indices, c
                       const double *x);
 double step_of_nodes(int size, int rotations, const int32_t *rotation, double *s,
                      const double *q0, const double *q1);
+void give_back_memory(void);
 double norm(int rows, const double *w, const double *f);
 double largest_motion(int rows, const double *w, const double *q);
 
