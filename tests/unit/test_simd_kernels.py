@@ -25,7 +25,7 @@ def pointwise(expression, values):
     space = fem.functionspace(mesh, ("DG", 0))
     f, z = fem.Function(space), ufl.TestFunction(space)
     form = expression(f) * z * ufl.dx(domain=mesh, metadata={"quadrature_degree": 0})
-    kernel = Kernel(form, f, np.asarray(space.dofmap.list), cell_coordinates(mesh))
+    kernel = Kernel(form, f, np.asarray(space.dofmap.list), cell_coordinates(mesh)[:, :, :2])
     by_cell = np.empty(n)
     by_cell[np.asarray(space.dofmap.list)[:, 0]] = values
     return kernel, by_cell

@@ -139,7 +139,7 @@ class Kernel:
         form: Cell integrals with one quadrature rule.
         unknown: The configuration that most calls change; it need not appear in the form.
         cell_dofs: Its degrees of freedom; shape (num_cells, 6).
-        coordinates: Vertices of the cells; shape (num_cells, 2, 3); m.
+        coordinates: Vertices of the cells; shape (num_cells, 2, 2); m.
     """
 
     def __init__(
@@ -153,7 +153,7 @@ class Kernel:
         self._is_vector = len(spaces) == 1
         self._to_dofs = self._is_vector and spaces[0] is unknown.function_space
         per_cell = self._dofs.shape[1] if self._to_dofs else self._entries
-        expected = (0, per_cell, (num_cells, 2, 3))
+        expected = (0, per_cell, (num_cells, 2, 2))
         if expected != (num_cells % len(ready.packed), self._entries, coordinates.shape):
             raise ValueError(
                 f"a form with {self._entries} entries of a cell, stated on {len(ready.packed)} "

@@ -76,6 +76,7 @@ class Grid:
         self._require_length()
         self._add_hinges([place_of(hinge) for hinge in scene.hinges])
         self._number()
+        scene.release()
 
     def _divide(self) -> list[Array]:
         """Return the parameters of the vertices of each beam; beams alike have one array."""

@@ -218,10 +218,10 @@ class CompiledFields(Fields):
                 kernel.put(function, self.of_sections(function))
 
     def _coordinates(self) -> Array:
-        """Vertices of the cells; (num_cells, 2, 3); m."""
-        grid, coordinates = self.share.grid, np.zeros((len(self.order), 2, 3))
-        coordinates[:, :, :2] = grid.points[grid.cells[self.share.cells[self.order]]]
-        return coordinates
+        """Vertices of the cells; (num_cells, 2, 2); m."""
+        grid = self.share.grid
+        vertices = grid.cells.take(self.share.cells[self.order], axis=0)
+        return grid.points.take(vertices, axis=0)
 
     @cached_property
     def _coordinates_in_lanes(self) -> Array:

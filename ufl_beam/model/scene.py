@@ -289,6 +289,11 @@ class Scene(Rich):
         """Groups of components of motion that joints make equal."""
         return [joint.equal(component) for joint in self.joints for component in joint.shared]
 
+    def release(self) -> None:
+        """Give back the memory of what only numbering asks for, until it is asked for again."""
+        for name in ("attached", "representatives"):
+            vars(self).pop(name, None)
+
     @cached_property
     def representatives(self) -> Representatives:
         """Which component of a node stands for it, for all components that joints share."""

@@ -203,7 +203,7 @@ class CompiledCouplings(Couplings):
         return _one_cell()
 
     def _evaluated(self, form: ufl.Form) -> Kernel:
-        unit = np.tile([[0.0, 0, 0], [1.0, 0, 0]], (len(self.links), 1, 1))
+        unit = np.tile([[0.0, 0.0], [1.0, 0.0]], (len(self.links), 1, 1))
         return Kernel(form, self._forms.q1, self._dofs, unit)
 
     def _prepare(self) -> None:

@@ -32,7 +32,7 @@ static inline void add_batch(const cells *c, const lanes *e, int first, int some
 static void add_in_lanes(const cells *c, const double *q, double *b)
 {
   const int after = c->at + c->unknowns;
-  lanes e[ENTRIES], w[COEFFICIENTS] = {0}, constants[NUMBERS];
+  lanes e[ENTRIES], w[COEFFICIENTS] = {0}, x[6] = {0}, constants[NUMBERS];
   for (int i = 0; i < CONSTANTS; ++i) constants[i] = ALL(c->constants[i]);
   for (int first = 0; first < c->number; first += LANES) {
     const int some = c->number - first < LANES ? c->number - first : LANES;
@@ -42,8 +42,10 @@ static void add_in_lanes(const cells *c, const double *q, double *b)
     for (int l = 0; l < some; ++l, dofs += c->of_cell)
       for (int i = 0; i < c->unknowns; ++i) w[c->at + i][l] = q[dofs[i]];
     for (int i = after; i < WIDTH; ++i) w[i] = stored[i - c->unknowns];
+    const lanes *at = (const lanes *)(c->coordinates + (size_t)first * 4);
+    x[0] = at[0], x[1] = at[1], x[3] = at[2], x[4] = at[3];
     memset(e, 0, sizeof e);
-    tabulate(e, w, constants, (const lanes *)c->coordinates + (size_t)first / LANES * 6);
+    tabulate(e, w, constants, x);
     if (some == LANES) add_batch(c, e, first, LANES, b);
     else add_batch(c, e, first, some, b);
   }

@@ -35,16 +35,18 @@ void add_cells(void *self, const double *q, double *b)
     return;
   }
   const int after = c->at + c->unknowns;
-  double w[c->coefficients + 1], e[MOST_ENTRIES];
+  double w[c->coefficients + 1], e[MOST_ENTRIES], x[6] = {0};
   for (int k = 0; k < c->number; ++k) {
     const int32_t *dofs = c->dofs + (size_t)k * c->of_cell;
     const double *stored = c->w + (size_t)k * c->width;
+    const double *at = c->coordinates + (size_t)k * 4;
     const size_t first = (size_t)k * c->rows;
     for (int i = 0; i < c->at; ++i) w[i] = stored[i];
     for (int i = 0; i < c->unknowns; ++i) w[c->at + i] = q[dofs[i]];
     for (int i = after; i < c->coefficients; ++i) w[i] = stored[i - c->unknowns];
     memset(e, 0, c->rows * sizeof *e);
-    CALL(c->tabulate, e, w, c->constants, c->coordinates + (size_t)k * 6);
+    x[0] = at[0], x[1] = at[1], x[3] = at[2], x[4] = at[3];
+    CALL(c->tabulate, e, w, c->constants, x);
     if (c->row)
       for (int i = 0; i < c->rows; ++i) b[c->row[first + i]] += e[i];
     else if (c->column)

@@ -42,7 +42,7 @@ struct cells {
   const int32_t *dofs;
   int at, width, coefficients; /* of a cell, unknowns included */
   double *w;
-  const double *constants, *coordinates;
+  const double *constants, *coordinates; /* coordinates: x and y of both vertices */
   int rows; /* entries of a cell */
   const int32_t *row, *begin; /* or none */
   const uint8_t *column;
