@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ufl_beam.errors import SceneError, clip, require_kind, require_sequence
+from ufl_beam.garbage_collection import no_garbage_collection
 from ufl_beam.model.beams import Beam
 from ufl_beam.model.bodies import (
     GROUND,
@@ -80,6 +81,7 @@ class Scene(Rich):
     connectors: Sequence[Connector] = ()
     works: Sequence[Work] = ()
 
+    @no_garbage_collection()
     def __post_init__(self) -> None:
         kinds: dict[str, type | tuple[type, ...]] = {
             "beams": Beam, "joints": Joint, "supports": Support, "loads": Load.__args__,

@@ -19,6 +19,7 @@ from ufl_beam.discretization.model_warnings import (
 from ufl_beam.discretization.state_io import State
 from ufl_beam.discretization.state_transfer import Transfer, same_unknowns
 from ufl_beam.errors import SceneError, require_kind, shorten, warn
+from ufl_beam.garbage_collection import no_garbage_collection
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, has_inertia
 from ufl_beam.model.connector_laws import HELD
 from ufl_beam.model.constraint_checks import (
@@ -36,6 +37,7 @@ from ufl_beam.simulation.solution import Solution
 from ufl_beam.terms.work_forms import require_works
 
 
+@no_garbage_collection()
 def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh) -> Grid:
     """Make the grid of a scene, once the scheme is known to be able to compute it."""
     require_kind(scene, Scene, "scene")
