@@ -66,6 +66,7 @@ typedef struct {
 
 typedef struct {
   int size;
+  const int32_t *dof;
   const double *values;
 } vector;
 
@@ -442,10 +443,11 @@ typedef struct {
   double *entry, held;
 } form_value;
 
-/* Vectors times functions of time, see DeadLoads. */
+/* Vectors times functions of time at some degrees of freedom, see DeadLoads. */
 typedef struct {
   int size, vectors, changed; /* changed: since norm was computed */
-  const double *const *vector;
+  const int32_t *dof;
+  const double *const *vector, *weight; /* weight: as of residuals */
   const time_function *factor;
   double *factors; /* of the latest step; not numbers before the first */
   double *force, *end, *before;
