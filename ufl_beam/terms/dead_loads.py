@@ -15,6 +15,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, loop, struct
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
+from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.bodies import carries
 from ufl_beam.model.loads import Gravity, LineLoad, Load, PointLoad
@@ -45,15 +46,22 @@ class DeadLoads(LoadTerm):
         self.dofs = np.flatnonzero(share.added(np.any(whole, axis=0) * 1.0)).astype(np.int32)
         self._vectors = [(load, vector[self.dofs]) for load, vector in vectors.values()]
         self._size = share.size
-        self._end = self._before = self._acts = np.zeros(len(self.dofs))
+        self._acts: Array = np.zeros(len(self.dofs))
+        self._end = self._before = self._acts
         self._in_c = struct("vector", size=len(self.dofs), dof=self.dofs)
         self._factors: list[float] = []
 
     def begin(self, step: Step) -> None:
-        """The loads of the step; nothing is to do for those that stay."""
+        """The loads of the step; nothing is to do for those that stay.
+
+        Raises:
+            StepFailed: A time function is not finite.
+        """
         factors = self._factors_at(step.load_time)
         if factors == self._factors and step.fraction == step.at == 1:
             return
+        if not all(map(math.isfinite, factors)):  # perhaps with no loaded place in this process
+            raise StepFailed("a load is no finite number")
         self._acts = self._end = self._times(factors)
         self._factors = factors
         if step.fraction < 1 or step.at < 1:
@@ -113,7 +121,7 @@ class DeadLoads(LoadTerm):
 
     def _whole(self, forces: Array) -> Array:
         """Forces at all local degrees of freedom, from those that are loaded."""
-        whole = np.zeros(self._size)
+        whole: Array = np.zeros(self._size)
         whole[self.dofs] = forces
         return whole
 
