@@ -46,8 +46,10 @@ class DeadLoads(LoadTerm):
         self.dofs = np.flatnonzero(share.added(np.any(whole, axis=0) * 1.0)).astype(np.int32)
         self._vectors = [(load, vector[self.dofs]) for load, vector in vectors.values()]
         self._size = share.size
-        self._acts: Array = np.zeros(len(self.dofs))
-        self._end = self._before = self._acts
+        nothing: Array = np.zeros(len(self.dofs))
+        self._acts: Array = nothing  # now; also at the end of the step, and at that of the last one
+        self._end: Array = nothing
+        self._before = nothing
         self._in_c = struct("vector", size=len(self.dofs), dof=self.dofs)
         self._factors: list[float] = []
 
