@@ -87,7 +87,9 @@ class CompiledSteps:
         self._space, rotations = np.zeros((2, share.size)), share.rotations()
         limited, half_tangents = (rotations[: len(rotations) * has] for has in turns)
         self._bytes, self._end = 8 * share.size, np.zeros(1)
-        loads = [term.steps_in_c for term in equation.terms if isinstance(term, DeadLoads)]
+        loads = [term for term in equation.terms if isinstance(term, DeadLoads)]
+        for term in loads:
+            fill(term.steps_in_c, weight=solver.convergence.weights[term.dofs])
         multipliers = share.multipliers().astype(np.int32)
         load_weight, motion_weight, at = whole
         self.c = fill(
@@ -97,7 +99,7 @@ class CompiledSteps:
             largest_turn=largest_turn, rotations=len(limited), rotation=limited,
             half_tangents=len(half_tangents), half_tangent=half_tangents,
             multipliers=len(multipliers), multiplier=multipliers,
-            loads=loads[0] if loads else ffi.NULL,
+            loads=loads[0].steps_in_c if loads else ffi.NULL,
             supports=equation.supports.in_c(times),
             search=ffi.NULL if search is None else integers(search.flags),
             states=len(ledger.state), state=ledger.state.numbers,

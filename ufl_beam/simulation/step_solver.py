@@ -169,10 +169,10 @@ class StepSolver:
         """Solve a step from a guess; the tangent of the last step does if that was like it."""
         past = now.prediction
         step = step._replace(q_before=past.q_before, ratio=step.dt / past.last_dt)
-        guess, like_last = self._together(self._predict, now, step), past.like_last(step.dt)
-        loads = self._equation.load_forces()
-        solve = partial(self.newton.solve, loads=loads, like_last=like_last)
         try:
+            guess, like_last = self._together(self._predict, now, step), past.like_last(step.dt)
+            loads = self._equation.load_forces()
+            solve = partial(self.newton.solve, loads=loads, like_last=like_last)
             if self._openings is None:
                 q1 = solve(guess)
             else:

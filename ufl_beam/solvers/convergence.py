@@ -29,19 +29,23 @@ REASONS = {
 
 
 class Convergence:
-    """Sizes of residuals and motions, and the decision to stop; ``c``: ``judge`` of newton.c."""
+    """Sizes of residuals and motions, and the decision to stop; ``c``: ``judge`` of newton.c.
+
+    Attributes:
+        weights: Of the residuals: 1 for forces, 1 over the size of the scene for moments, 0 for
+            ghosts and forces of connectors.
+    """
 
     def __init__(
         self, share: Share, equation: Equation, x: Array, r: Array, newton: Newton, least: int
     ) -> None:
         self._share, self._A, self._x, self._r = share, equation.A, x, r
         self._held, self._owned = equation.held, slice(share.num_owned)
-        # Residuals count 1 if forces, 1 over the size of the scene if moments; ghosts nothing.
-        self._weights = np.ones(share.size)
-        self._weights[share.rotations()] = 1 / share.grid.scene.size
-        self._weights[share.multipliers()] = 0.0
-        self._weights[share.num_owned :] = 0.0
-        self._norm = (share.size, doubles(self._weights))
+        self.weights = np.ones(share.size)
+        self.weights[share.rotations()] = 1 / share.grid.scene.size
+        self.weights[share.multipliers()] = 0.0
+        self.weights[share.num_owned :] = 0.0
+        self._norm = (share.size, doubles(self.weights))
         self._moves = np.ones(share.size, dtype=np.uint8)
         self.leave_out(np.zeros(share.size, dtype=bool))
         self.diagonal = self._A.diagonal(np.arange(share.size, dtype=np.int32))
@@ -52,7 +56,7 @@ class Convergence:
             equation.c,
             size=share.size, scene=share.grid.scene.size, rtol=newton.rtol, rate=math.inf,
             modified=newton.modified, most=newton.max_iterations, least=least,
-            weight=self._weights, residual=r, change=np.empty(share.size),
+            weight=self.weights, residual=r, change=np.empty(share.size),
             space=share.scratch, lengths=share.lengths(), diagonal=self.diagonal,
             moves=ffi.from_buffer("uint8_t[]", self._moves),
         )  # fmt: skip
@@ -85,7 +89,7 @@ class Convergence:
 
     def residuals(self) -> Array:
         """Sizes of the latest residual, moments over the size of the scene, ghosts zero; N."""
-        return np.asarray(np.abs(self._r) * self._weights)
+        return np.asarray(np.abs(self._r) * self.weights)
 
     def work(self, step: Array) -> float:
         """Work of the latest residual on a step; J."""

@@ -15,6 +15,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, loop, struct
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
+from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.bodies import carries
 from ufl_beam.model.loads import Gravity, LineLoad, Load, PointLoad
@@ -25,7 +26,11 @@ from ufl_beam.terms.phases import Phases, TimeFunctions, weight_of_before
 
 
 class DeadLoads(LoadTerm):
-    """Forces and moments that keep their direction: vectors times functions of time."""
+    """Forces and moments that keep their direction: vectors times functions of time.
+
+    Attributes:
+        dofs: Local degrees of freedom that are loaded; other arrays here are at these alone.
+    """
 
     _name = "dead loads"
 
@@ -36,25 +41,38 @@ class DeadLoads(LoadTerm):
         for load in loads:
             _, vector = vectors.setdefault(id(load.time), (load, np.zeros(share.size)))
             _add_forces(load, share, vector)
-        self._vectors = list(vectors.values())
-        self._end: Array = self.force
-        self._in_c = struct("vector", size=share.size)
+        whole = [vector for _, vector in vectors.values()]
+        # A process may own degrees of freedom that others load.
+        self.dofs = np.flatnonzero(share.added(np.any(whole, axis=0) * 1.0)).astype(np.int32)
+        self._vectors = [(load, vector[self.dofs]) for load, vector in vectors.values()]
+        self._size = share.size
+        nothing: Array = np.zeros(len(self.dofs))
+        self._acts: Array = nothing  # now; also at the end of the step, and at that of the last one
+        self._end: Array = nothing
+        self._before = nothing
+        self._in_c = struct("vector", size=len(self.dofs), dof=self.dofs)
         self._factors: list[float] = []
-        self._scheme = scheme
 
     def begin(self, step: Step) -> None:
-        """The loads of the step; nothing is to do for those that stay."""
+        """The loads of the step; nothing is to do for those that stay.
+
+        Raises:
+            StepFailed: A time function is not finite.
+        """
         factors = self._factors_at(step.load_time)
         if factors == self._factors and step.fraction == step.at == 1:
             return
-        self.force = self._end = self._times(factors)
+        if not all(map(math.isfinite, factors)):  # perhaps with no loaded place in this process
+            raise StepFailed("a load is no finite number")
+        self._acts = self._end = self._times(factors)
         self._factors = factors
         if step.fraction < 1 or step.at < 1:
             change = step.fraction * (self._end - self._before)
             self._end = self._before + change
-            self.force = self._end if step.at == 1 else self._before + step.at * change
+            self._acts = self._end if step.at == 1 else self._before + step.at * change
             self._factors = []
-        self._values = self._in_c.values = doubles(self.force)
+        self.force = self._whole(self._acts)
+        self._in_c.values = doubles(self._acts)
 
     def loops(self) -> tuple[Loop, Loop | None]:
         """C loop that subtracts the load vector; no tangent."""
@@ -63,26 +81,25 @@ class DeadLoads(LoadTerm):
     def phases(self, times: TimeFunctions) -> Phases | None:
         """Loops over the vectors."""
         owners = [(load.time, load) for load, _ in self._vectors]
-        weight, size = weight_of_before(self._acting), len(self.force)
-        alike = weight == 0.0 and self._scheme.step(0.0, 1.0, 1.0, np.zeros(0)).at == 1.0
-        forces = np.zeros((1 if alike else 3, size))
-        now, end, before = (forces[k % len(forces)] for k in range(3))
+        forces = np.zeros((3, len(self.dofs)))  # now, at the end of the step, before
         c = self.steps_in_c = struct(
-            "dead_loads", size=size, vectors=len(owners), force=now, end=end, before=before,
+            "dead_loads", size=len(self.dofs), dof=self.dofs, vectors=len(owners),
+            force=forces[0], end=forces[1], before=forces[2],
             factors=np.empty(len(owners)), factor=times.in_c(owners),
             vector=ffi.new("double *[]", [doubles(vector) for _, vector in self._vectors]),
-            work=self._ledger.supplied.pointer("loads"), weight_of_before=weight,
+            work=self._ledger.supplied.pointer("loads"),
+            weight_of_before=weight_of_before(self._acting),
         )  # fmt: skip
 
         def enter(q: Array) -> None:
-            before[:] = self._before
-            self.force, self._end, self._before = now, end, before  # no second arrays
+            forces[2] = self._before
+            self._before = forces[2]  # no second array of what C has
             for k in range(len(owners)):
                 c.factors[k] = math.nan
-            self._in_c.values = doubles(now)
+            self._in_c.values = doubles(forces[0])
 
         def leave(q: Array) -> None:
-            self.force, self._end, self._before = now.copy(), end.copy(), before.copy()
+            self._acts, self._end, self._before = forces.copy()
             self._factors = []
 
         begin, accept = [loop("begin_dead_loads", c)], [loop("accept_dead_loads", c)]
@@ -91,7 +108,7 @@ class DeadLoads(LoadTerm):
     def carry_on(self, t: float, q: Array) -> Array:
         """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them."""
         self._before = self._times(self._factors_at(t))
-        return self._before
+        return self._whole(self._before)
 
     def _factors_at(self, t: float) -> list[float]:
         """Factors of the vectors; a vector belongs to its first load for messages."""
@@ -104,20 +121,28 @@ class DeadLoads(LoadTerm):
             force += factor * vector
         return force
 
+    def _whole(self, forces: Array) -> Array:
+        """Forces at all local degrees of freedom, from those that are loaded."""
+        whole: Array = np.zeros(self._size)
+        whole[self.dofs] = forces
+        return whole
+
     def add_residual(self, q1: Array, r: Array) -> None:
         """Subtract the loads from the residual."""
-        r -= self.force
+        r[self.dofs] -= self._acts
 
     def accept(self, q1: Array, s: Array) -> None:
         """Enter the work of the loads, if there are any."""
-        if any(self._factors) or self._before is not self.force:
-            self._ledger.supplied["loads"] += float(self._acting(self._before, self.force) @ s)
+        if any(self._factors) or self._before is not self._acts:
+            work = float(self._acting(self._before, self._acts) @ s[self.dofs])
+            self._ledger.supplied["loads"] += work
             self._before = self._end
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The forces at the end of the last step."""
-        super().remember(memory, q)
-        self._end, self._factors = self._before, []
+        self._before = memory.added(self._name, self._whole(self._before))[self.dofs]
+        self._acts = self._end = self._before
+        self._factors = []
 
 
 @singledispatch

@@ -123,11 +123,11 @@ void add_calls(void *self, const double *q, double *out)
   for (int i = 0; i < c->number; ++i) c->part[i].add(c->part[i].self, q, out);
 }
 
-/* b -= a */
+/* b -= a, which has some of its numbers */
 void subtract_vector(void *self, const double *q, double *b)
 {
   const vector *a = self;
-  for (int i = 0; i < a->size; ++i) b[i] -= a->values[i];
+  for (int i = 0; i < a->size; ++i) b[a->dof[i]] -= a->values[i];
 }
 
 /* Where a matrix holds an entry, -1 if nowhere; columns are in order. */

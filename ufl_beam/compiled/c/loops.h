@@ -70,6 +70,7 @@ typedef struct {
 
 typedef struct {
   int size;
+  const int32_t *dof;
   const double *values;
 } vector;
 
@@ -447,13 +448,14 @@ typedef struct {
   double *entry, held;
 } form_value;
 
-/* Vectors times functions of time, see DeadLoads. */
+/* Vectors times functions of time at some degrees of freedom, see DeadLoads. */
 typedef struct {
   int size, vectors, changed; /* changed: since norm was computed */
-  const double *const *vector;
+  const int32_t *dof;
+  const double *const *vector, *weight; /* weight: as of residuals */
   const time_function *factor;
   double *factors; /* of the latest step; not numbers before the first */
-  double *force, *end, *before; /* one array where a scheme asks for the force at the end only */
+  double *force, *end, *before;
   double norm, weight_of_before;
   int acts; /* whether a force, now or before, is not zero */
   double *work; /* entry of the ledger */

@@ -100,9 +100,9 @@ void accept_dead_loads(void *self, const time_step *step, const double *q1, cons
   if (!l->acts) return;
   const double a = l->weight_of_before;
   double work = 0;
-  for (int i = 0; i < l->size; ++i) work += (a * l->before[i] + (1 - a) * l->force[i]) * s[i];
+  for (int i = 0; i < l->size; ++i) work += (a * l->before[i] + (1 - a) * l->force[i]) * s[l->dof[i]];
   *l->work += work;
-  if (l->before != l->end) memcpy(l->before, l->end, l->size * sizeof *l->end);
+  memcpy(l->before, l->end, l->size * sizeof *l->end);
 }
 
 /* out = sum of numbers times rates, from the one with number `first` on */
@@ -335,7 +335,7 @@ static int solve(march *m)
 {
   equation *e = m->equation;
   if (m->loads && m->loads->changed) {
-    m->loads->norm = norm(e->size, e->weight, m->loads->force);
+    m->loads->norm = norm(m->loads->size, m->loads->weight, m->loads->force);
     m->loads->changed = 0;
   }
   e->loads = m->loads ? m->loads->norm : 0;

@@ -77,6 +77,9 @@ enum { MORE = 3 };
 /* Part of the tolerance that is met by no luck, before the least number of iterations. */
 static const double SURE = 1e-4;
 
+/* Times the tolerance that are about as good, unless laws of connectors may be steep. */
+static const double CLOSE = 8;
+
 static int demands_met(const equation *e, const double *q, double scale)
 {
   for (int k = 0; k < e->demands; ++k)
@@ -101,12 +104,14 @@ int judge(equation *e, const double *q, int iteration, double residual, double s
   e->near = 0;
   if (iteration > 1) {
     /* A fraction of the last digit is luck; a few of them that Newton's method no longer halves are
-     * all that can be had: it may go round between two such states for ever. */
-    const int stays = !kept && e->last / 2 < residual && residual <= floor;
+     * all that can be had: it may go round between two such states for ever. With the tangent of the
+     * iterate before that is no proof, but does close to what is wanted. */
+    const int close = residual <= CLOSE * wanted && !e->demands;
+    const int stays = e->last / 2 < residual && residual <= floor && (!kept || close);
     if ((stays || residual <= floor / 80) && demands_met(e, q, scale)) return AT_ROUND_OFF;
-    /* With the tangent of the iterate before, the residual falls by twice the last factor; works are
-     * to come out as with a new one, so it must be far enough. */
-    e->near = !kept && residual > floor && 2000 * residual * (residual / e->last) <= wanted;
+    /* With that tangent, the residual falls by twice the last factor; works are to come out as with a
+     * new one, so it must be far enough. */
+    e->near = !kept && 2000 * residual * (residual / e->last) <= wanted && (close || residual > floor);
   }
   if (e->modified) {
     /* The residual goes on to fall as it did, if the tangent is kept; from step to step too. */
