@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -163,9 +163,9 @@ class CompiledSteps:
         if taken:
             state.t = c.t
             state.parts += taken
-            state.q = self._copy(c.q)
+            state.q = self._on_demand(c.q)
             if self._inertia is not None:
-                self._inertia.v = self._copy(c.rates.rate[V])
+                self._inertia.v = self._on_demand(c.rates.rate[V])
             self._solver.iterations += c.iterations
             c.iterations = 0
             if keep:
@@ -187,6 +187,10 @@ class CompiledSteps:
         if self._inertia is not None:
             return len(self._inertia.more) == len(self._inertia.scheme.kept)
         return not (self._applies_loads and state.parts == 0)
+
+    def _on_demand(self, values: Any) -> Any:
+        """A copy of values that C leaves alone until others take their place."""
+        return partial(self._copy, values)
 
     def _copy(self, values: Any) -> Array:
         return np.frombuffer(ffi.buffer(values, self._bytes)).copy()
