@@ -125,12 +125,22 @@ ACCELERATIONS = {
             "solvers/static_condensation.py:Elimination",
         ),
     ),
+    "guess with the acceleration": Acceleration(
+        "Adds to the guess of a step that part of the last second difference of the configuration "
+        "which repeats itself. Without it, a step begins at the velocity of the last one.",
+        by.SHIPPED, by.VELOCITY,
+        (
+            "compiled/c/prediction.c:enter_step", "compiled/c/prediction.c:compare_bends",
+            "simulation/prediction.py:Prediction.agree",
+        ),
+        (ELASTIC, LARGE, HINGED, JOINTED),
+    ),
     "tangent kept in the last iteration": Acceleration(
         "Keeps the tangent of the previous iterate if the residual then decreases far below the "
         "tolerance, at most once in a row. Without it, every iteration assembles and factors a "
         "tangent.",
         by.SHIPPED, by.TANGENTS,
-        ("compiled/c/newton.c~kept|near",),
+        ("compiled/c/newton.c~kept|near|close|CLOSE",),
         (ELASTIC, LARGE, HINGED, JOINTED),
     ),
     "`Newton(modified=True)`": Acceleration(
@@ -148,7 +158,7 @@ ACCELERATIONS = {
         by.MODIFIED_STEPS, by.ANEW,
         (
             "solvers/convergence.py~like_last|rate", "solvers/newton.py~like_last",
-            "simulation/step_solver.py~like_last",
+            "simulation/step_solver.py~like_last", "simulation/prediction.py~like_last",
         ),
         (ELASTIC, LARGE, HINGED, JOINTED),
     ),

@@ -19,6 +19,7 @@ from ufl_beam.discretization.dolfinx_forms import DolfinxFields
 from ufl_beam.simulation import simulation as stepping
 from ufl_beam.simulation import step_solver
 from ufl_beam.simulation.evaluation import COMPILED
+from ufl_beam.simulation.prediction import Prediction
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers import newton, static_condensation
 from ufl_beam.solvers.direct_solver import DirectSolver
@@ -44,6 +45,14 @@ class EachStepAnew(newton.Solver):
 
     def solve(self, guess, loads, like_last=False):
         return super().solve(guess, loads, like_last=False)
+
+
+class AtVelocity(Prediction):
+    """Prediction that goes on at the velocity of the last step, without its acceleration."""
+
+    def __init__(self, share, q, *, in_motion):
+        super().__init__(share, q, in_motion=in_motion)
+        self.c.bend = c_library.ffi.NULL
 
 
 KEEPS = "e->near = !kept &&"
@@ -105,6 +114,7 @@ CELL_BY_CELL = (function_spaces, "vectorise", nothing)
 NO_CHAINS = (static_condensation, "_plan", without_chains)
 ALL_TANGENTS = (newton, "loop", loop_without_kept_tangents)
 EACH_STEP_ANEW = (step_solver, "Solver", EachStepAnew)
+AT_VELOCITY = (stepping, "Prediction", AtVelocity)
 STEPS_IN_PYTHON = (stepping, "compiled_steps", nothing)
 
 SHIPPED, STEPS, REFERENCE = "as shipped", "steps in Python", "`reference=True`"
@@ -116,7 +126,7 @@ SCALAR, WHOLE, KLU = (
     "LU of the whole tangent",
     "`newtonls`, KLU of the whole tangent",
 )
-TANGENTS = "a tangent in each iteration"
+TANGENTS, VELOCITY = "a tangent in each iteration", "guess at the last velocity"
 ANEW = "`modified=True`, steps in Python, a tangent in each"
 POINTS, NUMPY = "cells with points in Python", "cells and return map in Python"
 CONNECTORS = "connectors in Python"
@@ -133,6 +143,7 @@ VARIANTS = {
     WHOLE: Variant((NO_CHAINS,)),
     KLU: Variant((STEPS_IN_PYTHON, NEWTON_OF_PETSC, classes(factors=DirectSolver))),
     TANGENTS: Variant((ALL_TANGENTS,)),
+    VELOCITY: Variant((AT_VELOCITY,)),
     MODIFIED: Variant((), {"modified": True}),
     MODIFIED_STEPS: Variant((STEPS_IN_PYTHON,), {"modified": True}),
     ANEW: Variant((STEPS_IN_PYTHON, EACH_STEP_ANEW), {"modified": True}),

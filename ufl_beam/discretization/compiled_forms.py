@@ -202,14 +202,14 @@ class Kernel:
     def cells(self) -> Any:
         """Argument of ``add_cells`` of loops.h; another one once a method changes its arrays."""
         number, of_cell = self._dofs.shape
-        packed = self._packed
+        packed, coefficients = self._packed, self._form.packed.shape[1]
         return fill(
             ffi.new("cells *"),
             tabulate=self._form.tabulate, several=self._in_lanes, lanes=self._lanes,
             number=number, of_cell=of_cell, dofs=self._dofs, unknowns=self._unknowns, at=self._at,
             width=packed.strides[0] // (packed.itemsize * self._lanes), w=first_of(packed),
             constants=self._form.constants, coordinates=self._coordinates, rows=self._entries,
-            coefficients=self._form.packed.shape[1], **self._places,
+            coefficients=coefficients, all=np.empty(coefficients), **self._places,
         )  # fmt: skip
 
     def _change(self) -> None:

@@ -35,7 +35,7 @@ void add_cells(void *self, const double *q, double *b)
     return;
   }
   const int after = c->at + c->unknowns;
-  double w[c->coefficients + 1], e[MOST_ENTRIES], x[6] = {0};
+  double *w = c->all, e[MOST_ENTRIES], x[6] = {0};
   for (int k = 0; k < c->number; ++k) {
     const int32_t *dofs = c->dofs + (size_t)k * c->of_cell;
     const double *stored = c->w + (size_t)k * c->width;

@@ -40,8 +40,8 @@ struct cells {
   int lanes; /* cells of a batch, a power of two; else 1 */
   int number, of_cell, unknowns; /* cells, degrees of freedom of each, those the form depends on */
   const int32_t *dofs;
-  int at, width, coefficients; /* of a cell, unknowns included */
-  double *w;
+  int at, width, coefficients; /* coefficients: of a cell, unknowns included */
+  double *w, *all; /* all: space for these */
   const double *constants, *coordinates; /* coordinates: x and y of both vertices */
   int rows; /* entries of a cell */
   const int32_t *row, *begin; /* or none */
