@@ -122,7 +122,7 @@ class Share:
         self.dofs = np.concatenate([np.flatnonzero(x).astype(np.int32) for x in (own, ghost)])
         self.num_owned = int(own.sum())
         self._numbers: Index = number[self.dofs]
-        self.ghosts = self._numbers[self.num_owned :]
+        self.ghosts = self._numbers[self.num_owned :].copy()
         self._local: Index = np.full(grid.size, -1, dtype=np.int32)
         self._local[self.dofs] = np.arange(len(self.dofs))
         self.cell_dofs = self._local[of_cell]
