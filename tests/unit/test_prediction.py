@@ -19,6 +19,10 @@ def prediction_of(scheme):
     return simulation.prediction, simulation.share.size
 
 
+SMALL = 1e-3
+"""Of the size of the scene, so that steps do not go far in it."""
+
+
 def follow(prediction: Prediction, motion, times):
     """Accept the configurations at these times but the last, and predict that."""
     for t0, t1 in pairwise(times[:-1]):
@@ -39,7 +43,7 @@ def test_uniform_motion(scheme):
 def test_constant_acceleration():
     """[closed] Exact over equal steps; a longer one is at the velocity of the last."""
     prediction, size = prediction_of(ub.Midpoint())
-    a = np.arange(1.0, size + 1)
+    a = SMALL * np.arange(1.0, size + 1)
     times = 0.1 * np.arange(6)
     found = follow(prediction, lambda t: a * t**2 / 2, times)
     assert found == pytest.approx(a * times[-1] ** 2 / 2, rel=1e-12)
@@ -50,25 +54,35 @@ def test_constant_acceleration():
 def test_second_difference_needs_three_equal_steps():
     """[closed] Two bends of steps of equal length are compared."""
     prediction, size = prediction_of(ub.Midpoint())
-    a = np.ones(size)
+    a = np.full(size, SMALL)
     found = follow(prediction, lambda t: a * t**2 / 2, [0, 0.5, 0.6, 0.7, 0.8])
     assert found == pytest.approx(a * (0.7**2 / 2 + 0.065), rel=1e-12)
 
 
-def test_alternating_motion():
-    """Second differences that change their sign say nothing of the next step."""
+@pytest.mark.parametrize("part", [0.01, 0.2])
+def test_part_of_a_bend(part):
+    """That part of the last bend is taken to repeat itself which the one before was."""
     prediction, size = prediction_of(ub.Midpoint())
-    found = follow(prediction, lambda t: np.full(size, (-1.0) ** round(t)), np.arange(6.0))
-    assert found == pytest.approx(np.full(size, 3.0))  # from -1 to 1, and on
-
-
-def test_blow():
-    """After bends of 0.01 and 1 a hundredth of the last one is taken to repeat itself."""
-    prediction, size = prediction_of(ub.Midpoint())
-    steps = [0, 0.01, 1.01]
+    steps = SMALL * np.array([10, 10 + part, 11 + part])
     places = np.cumsum([0, *steps])
     found = follow(prediction, lambda t: np.full(size, places[round(t)]), np.arange(5))
-    assert found == pytest.approx(np.full(size, places[3] + steps[2] + 0.01), rel=1e-12)
+    expected = places[3] + steps[2] + part * SMALL
+    assert found == pytest.approx(np.full(size, expected), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "places",
+    [
+        SMALL * np.array([0, 10, 19, 29, 38]),  # bends change their sign
+        SMALL * np.array([0, 1, 3, 6, 10]) ** 2,  # bends are as large as steps
+        np.array([0, 1.0, 2.1, 3.3, 4.6]),  # steps go further than the scene
+    ],
+)
+def test_motion_that_steps_do_not_resolve(places):
+    """[closed] It is taken to go on at the velocity of the last step."""
+    prediction, size = prediction_of(ub.Midpoint())
+    found = follow(prediction, lambda t: np.full(size, places[round(t)]), np.arange(6))
+    assert found == pytest.approx(np.full(size, 2 * places[4] - places[3]), rel=1e-12)
 
 
 def test_statics():

@@ -18,7 +18,7 @@ class Prediction:
 
     The last step differs from the one before by a *bend*.  After equal steps the next is the last
     with that part of its bend which the one before was like: 1 in smooth motion, 0 where bends
-    change their sign from step to step.
+    change their sign from step to step, or where steps do not resolve the motion.
 
     Attributes:
         c: ``prediction`` of loops.h.
@@ -30,8 +30,9 @@ class Prediction:
         self.c = struct("prediction", size=share.size, dt=math.inf)
         self.began_at(q)
         if in_motion:
-            self._bend, metric = np.zeros(share.size), np.ones(share.size)
-            metric[share.rotations()] = share.grid.scene.size**2
+            size, number = share.grid.scene.size, share.grid.size
+            self._bend, metric = np.zeros(share.size), np.full(share.size, 1 / (size**2 * number))
+            metric[share.rotations()] = 1 / number
             metric[share.multipliers()] = metric[share.num_owned :] = 0.0
             fill(self.c, bend=self._bend, metric=metric)
 
@@ -63,7 +64,8 @@ class Prediction:
     def agree(self) -> None:
         """Compare the last bends over all processes."""
         if self._in_motion:
-            self.c.both, self.c.now = map(self._share.total, (self.c.both, self.c.now))
+            c, total = self.c, self._share.total
+            c.both, c.now, c.step = map(total, (c.both, c.now, c.step))
             lib.compare_bends(self.c)
 
     def remember(self, memory: Memory) -> None:

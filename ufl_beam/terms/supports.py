@@ -32,8 +32,9 @@ class TurnedAxes:
 
     def turn(self, x: Array, way: int) -> None:
         """Transform to the turned axes (1) or to the axes of the plane (-1), in place."""
-        i, j, c, s = self._i, self._j, self._c, way * self._s
-        x[i], x[j] = c * x[i] + s * x[j], c * x[j] - s * x[i]
+        c, s = self._c, way * self._s
+        a, b = float(x[self._i]), float(x[self._j])  # Python's: infinite ones warn of nothing
+        x[self._i], x[self._j] = c * a + s * b, c * b - s * a
 
     def turn_matrix(self, data: Array) -> None:
         """Transform rows and columns of a matrix to the turned axes, in place."""

@@ -401,8 +401,9 @@ typedef struct {
   double dt;         /* length of the last; infinite if there was none */
   double *q_before;  /* configuration at its beginning */
   double *bend;
-  const double *metric; /* of products; zero where others count */
+  const double *metric; /* makes products mean squares of parts of the scene's size; others' zero */
   double both, now, before; /* products: of the last two bends, and of each with itself */
+  double step;              /* of the last step with itself */
   double repeated;          /* part of the last bend that repeats itself */
 } prediction;
 

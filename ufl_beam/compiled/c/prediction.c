@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Prediction of the end of a step, from which Newton's method starts; see prediction.py. */
 
+/* Mean square root of the motions in a step, as a part of the size of the scene. */
+static const double FAR = 1. / 8;
+
 /* Whether a step is as long as the last one, but for last digits of the times at its ends. */
 int as_last(const prediction *p, double dt)
 {
@@ -25,19 +28,22 @@ void enter_step(prediction *p, double dt, const double *q, const double *q1)
   p->equal = as_last(p, dt) ? p->equal + (p->equal < 3) : 1;
   p->dt = dt;
   if (!p->bend) return;
-  double both = 0, now = 0;
-#pragma omp simd reduction(+ : both, now)
+  double both = 0, now = 0, step = 0;
+#pragma omp simd reduction(+ : both, now, step)
   for (int i = 0; i < p->size; ++i) {
-    const double bend = (q1[i] - q[i]) - (q[i] - p->q_before[i]), measured = p->metric[i] * bend;
-    both += measured * p->bend[i], now += measured * bend;
+    const double change = q1[i] - q[i], bend = change - (q[i] - p->q_before[i]);
+    both += p->metric[i] * bend * p->bend[i], now += p->metric[i] * bend * bend;
+    step += p->metric[i] * change * change;
     p->bend[i] = bend;
   }
-  p->before = p->now, p->now = now, p->both = both;
+  p->before = p->now, p->now = now, p->both = both, p->step = step;
 }
 
-/* Which part of the last bend repeats itself, by the products over all processes. */
+/* Which part of the last bend repeats itself, by the products over all processes. None where steps do
+ * not resolve the motion: bends are hardly smaller than steps, or a step goes far in the scene. */
 void compare_bends(prediction *p)
 {
   const double larger = fmax(p->now, p->before);
-  p->repeated = larger > 0 && p->both > 0 ? p->both / larger : 0;
+  const int resolved = 4 * larger < p->step && p->step < FAR * FAR;
+  p->repeated = resolved && p->both > 0 ? p->both / larger : 0;
 }
