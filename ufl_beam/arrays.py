@@ -23,6 +23,26 @@ State: TypeAlias = dict[str, Array]
 """Arrays of a state, by name."""
 
 
+def on_demand() -> Any:
+    """Attribute that is an array; set to a function, it becomes its result once it is asked for."""
+    return _OnDemand()
+
+
+class _OnDemand:
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = f"_{name}"
+
+    def __get__(self, of: object, owner: type) -> Array:
+        value = vars(of)[self._name]
+        if callable(value):
+            value = vars(of)[self._name] = value()
+        array: Array = value
+        return array
+
+    def __set__(self, of: object, value: Array | Callable[[], Array]) -> None:
+        vars(of)[self._name] = value
+
+
 class Snapshot(NamedTuple):
     """State of a scene at one time, the same on every process."""
 

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from ufl_beam.compiled.csr import coupling
+from ufl_beam.compiled.csr import StepProduct, coupling
 from ufl_beam.compiled.simd_kernels import in_batches
 
 
@@ -75,3 +75,17 @@ def test_blocks_of_a_hub_of_many(number, kind):
     found = structure.blocks(pairs, 1)
     assert found.dtype == kind
     assert np.array_equal(found[:, :, 0], expected.reshape(number, 4))
+
+
+@pytest.mark.parametrize("number", [255, 256])
+def test_a_constant_matrix_with_a_hub(number):
+    """Its zeros are not kept, and its entries are found in the tangent, also in long rows."""
+    A = coupling(number + 1, np.array([[0, i + 1] for i in range(number)], dtype=np.int32))
+    A.data[:] = np.random.default_rng(1).choice([0.0, 1.0, 3.0], len(A.data))
+    tangent, nothing = A.zeros_like(), np.zeros(A.size)
+    product = StepProduct(A, np.array([2], dtype=np.int32), tangent, np.empty(A.size))
+    product.begin(nothing, 2.0, 0.0, nothing)
+    product.add_tangent(nothing)  # the derivative of a rotation from rest is one
+    assert np.array_equal(tangent.data, 2 * A.data)
+    assert np.array_equal(product.matrix().data, A.data)
+    assert len(product.A.data) == np.count_nonzero(A.data)

@@ -122,6 +122,27 @@ def test_the_same_as_in_python(make, scheme):
         assert np.allclose(one.astype(float), other.astype(float), rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.parametrize("make", [elastic, connected])
+def test_states_that_were_asked_for_stay(make):
+    """They are copied once they are asked for, and later steps do not write to them."""
+    watched, alone = (ub.Simulation(make(), ub.Midpoint()) for _ in range(2))
+    seen = []
+    for n in range(6):
+        for simulation in (watched, alone):
+            simulation.step_to(0.02 * (n + 1))
+        assert watched.q is watched.q
+        seen.append((watched.q, watched.inertia.v, watched.q.copy(), watched.inertia.v.copy()))
+    for q, v, q_then, v_then in seen:
+        assert np.array_equal(q, q_then)
+        assert np.array_equal(v, v_then)
+    assert not np.array_equal(seen[0][0], seen[-1][0])
+    assert np.array_equal(alone.q, watched.q)
+    assert np.array_equal(alone.inertia.v, watched.inertia.v)
+    watched.take_back(), alone.take_back()
+    assert np.array_equal(alone.q, watched.q)
+    assert np.array_equal(seen[-1][1], watched.inertia.v)
+
+
 def test_static_steps_with_connectors_run_in_c():
     """All but the three in which a hinge or a spring opens, which Python lets open."""
     simulation, taken = ub.Simulation(jointed(), ub.Static()), 0

@@ -52,6 +52,10 @@ class Csr:
         """Number of rows of the matrix."""
         return len(self.indptr) - 1
 
+    def narrow(self) -> bool:
+        """Return whether a byte can tell all entries of a row apart."""
+        return bool(np.diff(self.indptr).max(initial=0) <= 256)
+
     def rows(self) -> Index:
         """Return the row of each entry."""
         return np.repeat(np.arange(self.size, dtype=np.int32), np.diff(self.indptr))
@@ -82,7 +86,7 @@ class Csr:
         256 entries, their places in the row, uint8; else those in :attr:`data`, int32.
         """
         cells, of_cell = dofs.shape
-        narrow = bool(np.diff(self.indptr).max(initial=0) <= 256)
+        narrow = self.narrow()
         shape = (-(-cells // lanes), of_cell**2, lanes)
         found = np.empty(shape, dtype=np.uint8 if narrow else np.int32)
         place = ffi.NULL if narrow else integers(found)
@@ -140,10 +144,10 @@ class Product:
     """Operator ``x -> A x`` on this process, without the zeros that ``A`` stores."""
 
     def __init__(self, A: Csr) -> None:
-        self.entries = np.flatnonzero(A.data).astype(np.int32)
-        indptr = np.searchsorted(self.entries, A.indptr).astype(np.int32)
-        self.data, columns = A.data[self.entries], A.indices[self.entries]
-        self.arrays = (A.size, integers(indptr), integers(columns), doubles(self.data))
+        entries = np.flatnonzero(A.data).astype(np.int32)
+        self.indptr = np.searchsorted(entries, A.indptr).astype(np.int32)
+        self.data, columns = A.data[entries], A.indices[entries]
+        self.arrays = (A.size, integers(self.indptr), integers(columns), doubles(self.data))
 
     def __call__(self, x: Array) -> Array:
         """Return the product, a new array."""
@@ -167,9 +171,15 @@ class StepProduct:
     def __init__(self, A: Csr, rotations: Index, tangent: Csr, scratch: Array) -> None:
         self.A, self._tangent = Product(A), tangent
         size, indptr, indices, data = self.A.arrays
+        entries = np.flatnonzero(A.data).astype(np.int32)
+        entries -= np.repeat(A.indptr[:-1], np.diff(self.A.indptr))  # places in the rows
+        place, self._places = {"far": entries}, entries
+        if A.narrow():
+            self._places = entries.astype(np.uint8)
+            place = {"place": ffi.from_buffer("uint8_t[]", self._places)}
         self.c = fill(
             ffi.new("step_product *"),
-            size=size, indptr=indptr, indices=indices, data=data, entry=self.A.entries,
+            size=size, indptr=indptr, indices=indices, data=data, begin=tangent.indptr, **place,
             rotations=len(rotations), rotation=rotations, space=scratch,
             turn=np.full(len(rotations), np.nan), half=np.empty(len(rotations)),
         )  # fmt: skip
@@ -177,7 +187,8 @@ class StepProduct:
     def matrix(self) -> Csr:
         """Return the matrix, a new one."""
         A = self._tangent.zeros_like()
-        A.data[self.A.entries] = self.A.data
+        rows = np.repeat(A.indptr[:-1], np.diff(self.A.indptr))
+        A.data[rows + self._places] = self.A.data
         return A
 
     def begin(self, q0: Array, factor: float, back: float, v: Array) -> None:

@@ -119,8 +119,9 @@ def require_agreement(module: ModuleType, kernel: int, sizes: tuple[int, int, in
 @cache
 def in_lanes(source: Path, kernel: int, sizes: tuple[int, int, int]) -> int | None:
     """Return the address of the SIMD loop of a compiled form, or None; see above for ``sizes``."""
-    names = ("LANES", "ENTRIES", "WIDTH", "CONSTANTS")
-    defined = [f"#define {x} {n}" for x, n in zip(names, (LANES, *sizes), strict=True)]
+    names = ("LANES", "SIDE", "ENTRIES", "WIDTH", "CONSTANTS")
+    numbers = LANES, math.isqrt(sizes[0]), *sizes
+    defined = [f"#define {x} {n}" for x, n in zip(names, numbers, strict=True)]
     head, loop = "\n".join([HEADERS, DECLARATIONS, *defined, text("lanes.h")]), text("lanes.c")
     try:
         module = compiled(

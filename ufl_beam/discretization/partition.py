@@ -110,8 +110,8 @@ class Share:
         owner[owner == comm.size] = 0  # bodies that nothing is attached to
         self.links = np.flatnonzero(rank_of_link == comm.rank)
         order = np.argsort(owner, kind="stable").astype(np.int32)
-        self._global: Index = np.empty(grid.size, dtype=np.int32)
-        self._global[order] = np.arange(grid.size, dtype=np.int32)
+        number = np.empty(grid.size, dtype=np.int32)  # of PETSc
+        number[order] = np.arange(grid.size, dtype=np.int32)
 
         own = owner == comm.rank
         ghost = np.zeros(grid.size, dtype=bool)
@@ -121,7 +121,8 @@ class Share:
         ghost &= ~own
         self.dofs = np.concatenate([np.flatnonzero(x).astype(np.int32) for x in (own, ghost)])
         self.num_owned = int(own.sum())
-        self.ghosts = self._global[self.dofs[self.num_owned :]]
+        self._numbers: Index = number[self.dofs]
+        self.ghosts = self._numbers[self.num_owned :].copy()
         self._local: Index = np.full(grid.size, -1, dtype=np.int32)
         self._local[self.dofs] = np.arange(len(self.dofs))
         self.cell_dofs = self._local[of_cell]
@@ -130,7 +131,7 @@ class Share:
         self.body_dofs = of_body[(of_body >= 0).all(axis=1)]
         self._all_owned: Index = order
         if self.alone:  # all numbers are the same
-            self._global = self._local = self._all_owned = self.dofs
+            self._numbers = self._local = self._all_owned = self.dofs
         self._num_owned_by = np.bincount(owner, minlength=comm.size).tolist()
 
     @property
@@ -195,7 +196,7 @@ class Share:
 
     def numbers(self) -> Index:
         """Numbers in PETSc's vectors of the local degrees of freedom."""
-        return np.asarray(self._global[self.dofs])
+        return self._numbers
 
     def local(self, dofs: Index) -> Index:
         """Local numbers of those ``dofs`` (numbers of the grid) that this process has."""

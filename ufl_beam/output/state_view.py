@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Index, Snapshot
+from ufl_beam.arrays import Array, Index, Snapshot, on_demand
 from ufl_beam.compiled.csr import as_slice
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import Fields, SectionForces
@@ -47,7 +47,7 @@ class StateView(ABC):
     share: Share  # degrees of freedom of this process
     fields: Fields
     t: float  # s
-    q: Array  # configuration at the local degrees of freedom
+    q: Array = on_demand()  # configuration at the local degrees of freedom
     parts: int  # steps so far, parts of cut steps counted each
     ledger: Ledger
     supports: Supports

@@ -4,13 +4,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, partial
 from typing import Any, Protocol
 
 import numpy as np
 
 from ufl_beam.arrays import Array, Index, Snapshots
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, integers, lib
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, give_back_memory, integers, lib
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.simulation.branch_check import StaticPath
@@ -163,9 +163,7 @@ class CompiledSteps:
         if taken:
             state.t = c.t
             state.parts += taken
-            state.q = self._copy(c.q)
-            if self._inertia is not None:
-                self._inertia.v = self._copy(c.rates.rate[V])
+            self._lend(state)
             self._solver.iterations += c.iterations
             c.iterations = 0
             if keep:
@@ -188,6 +186,9 @@ class CompiledSteps:
             return len(self._inertia.more) == len(self._inertia.scheme.kept)
         return not (self._applies_loads and state.parts == 0)
 
+    def _on_demand(self, values: Any) -> Any:
+        return partial(self._copy, values)
+
     def _copy(self, values: Any) -> Array:
         return np.frombuffer(ffi.buffer(values, self._bytes)).copy()
 
@@ -200,7 +201,15 @@ class CompiledSteps:
             ffi.memmove(c.path.force, doubles(self._path.force), self._bytes)
         for one in self._phases:
             one.enter(state.q)
+        self._lend(state)
+        give_back_memory(len(q))
         self.ahead = True
+
+    def _lend(self, state: Stepping) -> None:
+        """Let Python copy the state when it asks for it; C leaves it alone until the next one."""
+        state.q = self._on_demand(self.c.q)
+        if self._inertia is not None:
+            self._inertia.v = self._on_demand(self.c.rates.rate[V])
 
     def hand_back(self, state: Stepping) -> None:
         """Let all of Python know the state, so that it may take a step."""

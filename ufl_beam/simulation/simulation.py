@@ -116,7 +116,7 @@ class Simulation(StateView):
         self.equation, self.terms = parts.equation, parts.equation.terms
 
         self.t, self.parts, self.left = t0, 0, [0, 0]
-        self.q: Array = q[share.dofs]
+        self.q = q[share.dofs]
         self.prediction = Prediction(share, self.q, in_motion=has_inertia(scheme))
         self._continues = start is not None
         loaded: list[Array] = []

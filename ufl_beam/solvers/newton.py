@@ -10,7 +10,7 @@ from petsc4py import PETSc
 
 from ufl_beam.arrays import Array
 from ufl_beam.collective_errors import Agreement
-from ufl_beam.compiled.c_library import ffi, fill, lib, loop, opaque, petsc
+from ufl_beam.compiled.c_library import ffi, fill, give_back_memory, lib, loop, opaque, petsc
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
@@ -34,10 +34,6 @@ PATIENCE = 10
 
 Those that wander longer find a solution by luck: the last digits of the data would decide.
 """
-
-
-LARGE = 2**16
-"""Unknowns from which on what building a scene has used is worth giving back: that takes 0.1 ms."""
 
 
 class Solver:
@@ -85,8 +81,7 @@ class Solver:
             return self._equation.A.petsc()
         # Nothing but the preconditioner, which has its own, asks for the matrix.
         self._equation.A.release()
-        if self._share.size > LARGE:
-            lib.give_back_memory()
+        give_back_memory(self._share.size)
         sizes = (self._share.num_owned, self._share.grid.size)
         matrix = PETSc.Mat().createPython([sizes, sizes], object(), comm=self._share.comm)
         matrix.setUp()

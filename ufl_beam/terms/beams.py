@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import ufl
 
-from ufl_beam.arrays import Array
+from ufl_beam.arrays import Array, on_demand
 from ufl_beam.compiled.c_library import Loop, ffi, loop
 from ufl_beam.compiled.csr import Csr, StepProduct
 from ufl_beam.discretization.compiled_forms import stated
@@ -116,6 +116,7 @@ class Inertia(OfMatrix):
     """Inertia of beams and point masses: a constant matrix, P(18); satisfies :class:`Rates`."""
 
     kind = "inertia"
+    v: Array = on_demand()
 
     def __init__(
         self, fields: Fields, scheme: DynamicScheme, A: Csr, ledger: Ledger, v: Array

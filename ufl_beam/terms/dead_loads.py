@@ -50,6 +50,7 @@ class DeadLoads(LoadTerm):
         self._acts: Array = nothing  # now; also at the end of the step, and at that of the last one
         self._end: Array = nothing
         self._before = nothing
+        self.force = np.broadcast_to(0.0, share.size)  # which takes no room
         self._in_c = struct("vector", size=len(self.dofs), dof=self.dofs)
         self._factors: list[float] = []
 

@@ -3,18 +3,18 @@
 
 enum { NUMBERS = CONSTANTS + (CONSTANTS == 0), COEFFICIENTS = WIDTH + (WIDTH == 0) };
 
-/* A batch of which `some` are cells. All lanes add one entry, then the next one: cells side by side
- * add to the same places, and would wait for each other. */
+/* A batch of which `some` are cells; if entries are a matrix, it has SIDE rows. All lanes add one entry,
+ * then the next one: cells side by side add to the same places, and would wait for each other. */
 static inline void add_batch(const cells *c, const lanes *e, int first, int some, double *b)
 {
   const int32_t *dofs = c->dofs + (size_t)first * c->of_cell;
   if (c->column) {
     const uint8_t *column = c->column + (size_t)first * ENTRIES;
-    for (int i = 0; i < c->of_cell; ++i) {
+    for (int i = 0; i < SIDE; ++i) {
       double *row[LANES] = {0};
 #pragma GCC unroll 8
-      for (int l = 0; l < some; ++l) row[l] = b + c->begin[dofs[l * c->of_cell + i]];
-      for (int j = 0; j < c->of_cell; ++j, ++e, column += LANES)
+      for (int l = 0; l < some; ++l) row[l] = b + c->begin[dofs[l * SIDE + i]];
+      for (int j = 0; j < SIDE; ++j, ++e, column += LANES)
 #pragma GCC unroll 8
         for (int l = 0; l < some; ++l) row[l][column[l]] += (*e)[l];
     }

@@ -292,8 +292,15 @@ static void find_growth(const step_product *p, const double *q)
 static void add_rows(const step_product *p, int first, int last, double *tangent)
 {
   const double *growth = p->space;
-  for (int k = p->indptr[first]; k < p->indptr[last]; ++k)
-    tangent[p->entry[k]] += p->data[k] * growth[p->indices[k]];
+  for (int i = first; i < last; ++i) {
+    double *row = tangent + p->begin[i];
+    if (p->place)
+      for (int k = p->indptr[i]; k < p->indptr[i + 1]; ++k)
+        row[p->place[k]] += p->data[k] * growth[p->indices[k]];
+    else
+      for (int k = p->indptr[i]; k < p->indptr[i + 1]; ++k)
+        row[p->far[k]] += p->data[k] * growth[p->indices[k]];
+  }
 }
 
 void add_step_tangent(void *self, const double *q, double *tangent)

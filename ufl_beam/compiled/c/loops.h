@@ -77,7 +77,10 @@ typedef struct {
 /* A constant matrix A times the step of the nodes from q0, see StepProduct. */
 typedef struct {
   int size, rotations;
-  const int32_t *rotation, *indptr, *indices, *entry; /* entry: where those of A are in the tangent */
+  const int32_t *rotation, *indptr, *indices;
+  const int32_t *begin;  /* of the rows of the tangent; where entries of A are in them: `place`, of */
+  const uint8_t *place;  /* one byte each, or */
+  const int32_t *far;    /* if that is not enough, this */
   const double *data;
   double factor, back;
   const double *v, *q0;
