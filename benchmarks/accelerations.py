@@ -11,7 +11,7 @@ import switches as by
 import ufl_beam as ub
 
 PACKAGE = Path(ub.__file__).parent
-ELASTIC, LARGE, HINGED, JOINTED = "elastic", "large", "hinged", "jointed"
+ELASTIC, LARGE, SWING, HINGED, JOINTED = "elastic", "large", "swing", "hinged", "jointed"
 
 
 class Acceleration(NamedTuple):
@@ -133,7 +133,7 @@ ACCELERATIONS = {
             "compiled/c/prediction.c:enter_step", "compiled/c/prediction.c:compare_bends",
             "simulation/prediction.py:Prediction.agree",
         ),
-        (ELASTIC, LARGE, HINGED, JOINTED),
+        (ELASTIC, LARGE, SWING, HINGED, JOINTED),
     ),
     "tangent kept in the last iteration": Acceleration(
         "Keeps the tangent of the previous iterate if the residual then decreases far below the "

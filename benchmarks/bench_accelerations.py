@@ -28,6 +28,7 @@ from accelerations import (
     HINGED,
     JOINTED,
     LARGE,
+    SWING,
     count,
     files,
     variants,
@@ -55,6 +56,24 @@ def pushed(beams, **parts):
     """Beams that a force and a small moment push at the start of the first one."""
     load = ub.PointLoad(beams[0].start, force=(8, 0), moment=-4, time=lambda t: float(t < 2.5))
     return ub.Scene(beams, loads=[load], **parts)
+
+
+def swing(cells):
+    """A beam with a heavy middle, half of the cells, on two stiff links, pushed for 0.256 s."""
+    numbers = {"b": 5e-3, "nu": 0.3}  # m, -
+    thin = ub.Section.rectangle(h=1e-3, E=73e9, rho=2700, **numbers)
+    stiff = ub.Section.rectangle(h=1e-2, E=73e9, rho=270, **numbers)  # of the same mass
+    beam = ub.Beam((0, 0), (0.72, 0), thin, cells=cells // 2)
+    ends = beam.start, beam.end
+    links = [ub.Beam((x, 0), (x, 0.36), stiff, cells=cells // 4) for x in (0, 0.72)]
+    push = ub.Table([0, 0.128, 0.256], [0, 1, 0])
+    return ub.Scene(
+        [beam, *links],
+        joints=[ub.Revolute(link.start, end) for link, end in zip(links, ends, strict=True)],
+        supports=[ub.Pinned(link.end) for link in links],
+        masses=[ub.PointMass(beam.at(0.5), 0.5)],
+        loads=[ub.PointLoad(beam.at(0.5), force=(2, 0), time=push)],
+    )
 
 
 def hinged_beam(cells):
@@ -95,6 +114,7 @@ SMALL = {8: (40, 25), 64: (40, 10), 512: (30, 4), 4096: (12, 2)}
 SCENES = {
     ELASTIC: Case(flying_beam, 0.01, 2, SMALL | {100_000: (7, 1)}),
     LARGE: Case(flying_beam, 0.1, 23, SMALL | {100_000: (7, 1)}),
+    SWING: Case(swing, 2e-3, 2, {8: (24, 25), 64: (24, 10), 512: (30, 4)}),
     HINGED: Case(hinged_beam, 0.01, 2, SMALL | {20_000: (3, 1)}),
     JOINTED: Case(jointed_beams, 0.01, 2, SMALL),
 }

@@ -42,7 +42,7 @@ def advanced(bench):
         run.simulation.close()
 
 
-@pytest.mark.parametrize("scene", ["elastic", "large", "hinged", "jointed"])
+@pytest.mark.parametrize("scene", ["elastic", "large", "swing", "hinged", "jointed"])
 def test_all_variants_reach_the_same_state(bench, scene):
     runs = bench.compared(scene, 8)
     assert list(runs) == bench.variants(scene)
