@@ -130,7 +130,7 @@ ACCELERATIONS = {
         "which repeats itself. Without it, a step begins at the velocity of the last one.",
         by.SHIPPED, by.VELOCITY,
         (
-            "compiled/c/prediction.c:enter_step", "compiled/c/prediction.c:compare_bends",
+            "compiled/c/prediction.c:enter_step", "compiled/c/prediction.c:compare_differences",
             "simulation/prediction.py:Prediction.agree",
         ),
         (ELASTIC, LARGE, SWING, HINGED, JOINTED),

@@ -52,7 +52,7 @@ class AtVelocity(Prediction):
 
     def __init__(self, share, q, *, in_motion):
         super().__init__(share, q, in_motion=in_motion)
-        self.c.bend = c_library.ffi.NULL
+        self.c.second = c_library.ffi.NULL
 
 
 KEEPS = "e->near = !kept &&"

@@ -52,7 +52,7 @@ def test_constant_acceleration():
 
 
 def test_second_difference_needs_three_equal_steps():
-    """[closed] Two bends of steps of equal length are compared."""
+    """[closed] Two second differences over equal steps are compared."""
     prediction, size = prediction_of(ub.Midpoint())
     a = np.full(size, SMALL)
     found = follow(prediction, lambda t: a * t**2 / 2, [0, 0.5, 0.6, 0.7, 0.8])
@@ -60,8 +60,8 @@ def test_second_difference_needs_three_equal_steps():
 
 
 @pytest.mark.parametrize("part", [0.01, 0.2])
-def test_part_of_a_bend(part):
-    """That part of the last bend is taken to repeat itself which the one before was."""
+def test_part_of_a_second_difference(part):
+    """That part of the last second difference is added which the one before was."""
     prediction, size = prediction_of(ub.Midpoint())
     steps = SMALL * np.array([10, 10 + part, 11 + part])
     places = np.cumsum([0, *steps])
@@ -73,8 +73,8 @@ def test_part_of_a_bend(part):
 @pytest.mark.parametrize(
     "places",
     [
-        SMALL * np.array([0, 10, 19, 29, 38]),  # bends change their sign
-        SMALL * np.array([0, 1, 3, 6, 10]) ** 2,  # bends are as large as steps
+        SMALL * np.array([0, 10, 19, 29, 38]),  # second differences change their sign
+        SMALL * np.array([0, 1, 3, 6, 10]) ** 2,  # they are as large as steps
         np.array([0, 1.0, 2.1, 3.3, 4.6]),  # steps go further than the scene
     ],
 )

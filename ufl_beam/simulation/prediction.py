@@ -16,8 +16,8 @@ from ufl_beam.discretization.state_io import Memory
 class Prediction:
     """Goes on as the last steps did: at their velocity and, ``in_motion``, with their acceleration.
 
-    The last step differs from the one before by a *bend*.  After equal steps the next is the last
-    with that part of its bend which the one before was like: 1 in smooth motion, 0 where bends
+    After steps of equal length, a part of the last second difference of the configuration is added:
+    that which the one before was like.  It is 1 in smooth motion, and 0 where second differences
     change their sign from step to step, or where steps do not resolve the motion.
 
     Attributes:
@@ -31,10 +31,10 @@ class Prediction:
         self.began_at(q)
         if in_motion:
             size, number = share.grid.scene.size, share.grid.size
-            self._bend, metric = np.zeros(share.size), np.full(share.size, 1 / (size**2 * number))
+            self._second, metric = np.zeros(share.size), np.full(share.size, 1 / (size**2 * number))
             metric[share.rotations()] = 1 / number
             metric[share.multipliers()] = metric[share.num_owned :] = 0.0
-            fill(self.c, bend=self._bend, metric=metric)
+            fill(self.c, second=self._second, metric=metric)
 
     def began_at(self, q: Array) -> None:
         """Take ``q`` for the configuration at the beginning of the last step."""
@@ -62,11 +62,11 @@ class Prediction:
         self.began_at(q)
 
     def agree(self) -> None:
-        """Compare the last bends over all processes."""
+        """Compare the last second differences over all processes."""
         if self._in_motion:
             c, total = self.c, self._share.total
             c.both, c.now, c.step = map(total, (c.both, c.now, c.step))
-            lib.compare_bends(self.c)
+            lib.compare_differences(self.c)
 
     def remember(self, memory: Memory) -> None:
         """State it in numbers of the grid; see state_io.py."""
@@ -75,5 +75,5 @@ class Prediction:
         if self._in_motion:
             self.c.equal = int(memory.number("equal steps", self.c.equal))
             self.c.repeated = memory.number("part that repeats itself", self.c.repeated)
-            self.c.now = memory.number("square of the bend", self.c.now)
-            self._bend[:] = memory.at_dofs("bend", self._bend)
+            self.c.now = memory.number("square of the second difference", self.c.now)
+            self._second[:] = memory.at_dofs("second difference", self._second)

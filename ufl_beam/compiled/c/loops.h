@@ -395,22 +395,22 @@ int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int
 
 /* -- prediction of the end of a step, see prediction.c -------------------------------------------- */
 
-/* The last steps. `bend` is by how much the last one differs from the one before; in dynamics only. */
+/* The last steps. `second` is the second difference of the configuration; in dynamics only. */
 typedef struct {
   int size, equal;   /* equal: steps of the same length that led here, up to three */
   double dt;         /* length of the last; infinite if there was none */
   double *q_before;  /* configuration at its beginning */
-  double *bend;
+  double *second;
   const double *metric; /* makes products mean squares of parts of the scene's size; others' zero */
-  double both, now, before; /* products: of the last two bends, and of each with itself */
-  double step;              /* of the last step with itself */
-  double repeated;          /* part of the last bend that repeats itself */
+  double both, now, before; /* products of the last two second differences, and squares of each */
+  double step;              /* square of the last step */
+  double repeated;          /* part of `second` that repeats itself */
 } prediction;
 
 int as_last(const prediction *p, double dt);
 void predict(const prediction *p, double dt, const double *q, double *out);
 void enter_step(prediction *p, double dt, const double *q, const double *q1);
-void compare_bends(prediction *p);
+void compare_differences(prediction *p);
 
 /* -- steps one after the other, see march.c ----------------------------------------------------- */
 

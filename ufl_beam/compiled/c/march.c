@@ -424,7 +424,7 @@ static int take_step(march *m, double t1)
   memset(m->state, 0, m->states * sizeof *m->state);
   run(&m->add_state, &m->step, m->x, m->s);
   enter_step(p, m->step.dt, m->q, m->x);
-  compare_bends(p);
+  compare_differences(p);
   double *spare = p->q_before;
   p->q_before = m->q, m->q = spare;
   memcpy(m->q, m->x, m->size * sizeof *m->q);
