@@ -11,7 +11,8 @@ import ufl_beam as ub
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import bisected
-from ufl_beam.solvers.substructuring import Substructure, Summed
+from ufl_beam.solvers.multifrontal import Multifrontal
+from ufl_beam.solvers.substructuring import Summed
 
 
 class Whole:
@@ -83,7 +84,7 @@ def test_solutions_are_those_of_the_whole(name, n, part):
     random = np.random.default_rng(1)
     stays = np.repeat(random.uniform(size=size // 2) < part, 2)
     whole = Whole(matrix, np.arange(size))
-    condensed = Substructure(whole, stays)
+    condensed = Multifrontal(whole, stays)
     assert condensed.left.size == np.count_nonzero(stays)
     for factor in (1.0, -3.0):
         whole.left.data[:] = factor * csr_array(matrix).data
@@ -97,7 +98,7 @@ def test_the_schur_complement():
     """Of the unknowns that stay, in their order."""
     matrix, stays = matrix_of("a square", 49), np.zeros(98, dtype=bool)
     stays[[2, 3, 50, 51]] = True
-    condensed = Substructure(Whole(matrix, np.arange(98)), stays)
+    condensed = Multifrontal(Whole(matrix, np.arange(98)), stays)
     assert condensed.factor()
     K = matrix.toarray()
     cut = (K[np.ix_(a, b)] for a in (stays, ~stays) for b in (stays, ~stays))
@@ -112,7 +113,7 @@ def test_a_singular_part_is_said(value):
     """Even where nothing that stays couples to it."""
     matrix = matrix_of("nothing coupled", 9)
     whole, stays = Whole(matrix, np.arange(18)), np.arange(18) < 4
-    condensed = Substructure(whole, stays)
+    condensed = Multifrontal(whole, stays)
     assert condensed.factor()
     whole.left.data[-4:] = value
     assert not condensed.factor()
@@ -125,7 +126,7 @@ def test_sums_over_processes():
     part = np.array([[2.0, -1.0, 0.0], [-1.0, 3.0, -1.0], [0.0, -1.0, 2.0]])
     whole = Whole(part, here)
     stays = np.array([comm.rank > 0, False, comm.rank < comm.size - 1])
-    summed = Summed(Substructure(whole, stays), comm)
+    summed = Summed(Multifrontal(whole, stays), comm)
     K, b = np.zeros((size, size)), np.arange(1.0, size + 1)
     for rank in range(comm.size):
         K[2 * rank :, 2 * rank :][:3, :3] += part

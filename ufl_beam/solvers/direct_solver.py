@@ -11,7 +11,7 @@ import numpy as np
 
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Share
-from ufl_beam.solvers.static_condensation import BAD_PIVOT, GOOD, succeeds
+from ufl_beam.solvers.klu import BAD_PIVOT, GOOD, succeeds
 
 
 class DirectSolver:

@@ -8,7 +8,6 @@ vertices at the border between processes, whatever else couples to more than two
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -18,14 +17,13 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, opaque
+from ufl_beam.compiled.c_library import doubles, ffi, fill, lib
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Share
-from ufl_beam.solvers.substructuring import Condensed, Substructure, Summed
+from ufl_beam.solvers.klu import BAD_PIVOT, GOOD, Klu, succeeds
+from ufl_beam.solvers.multifrontal import Multifrontal
+from ufl_beam.solvers.substructuring import Condensed, Summed
 from ufl_beam.structure_cache import of_structure
-
-GOOD = int(PETSc.PC.FailedReason.NOERROR)
-BAD_PIVOT = int(PETSc.PC.FailedReason.FACTOR_NUMERIC_ZEROPIVOT)
 
 
 class Chains:
@@ -217,17 +215,6 @@ class Elimination:
         lib.expand(self.c, doubles(small), doubles(x))
 
 
-def succeeds(function: Callable[..., None], *vectors: PETSc.Vec) -> bool:
-    """Return False if KLU finds that the matrix is singular; its next factorisation works."""
-    try:
-        function(*vectors)
-    except PETSc.Error as error:
-        if error.ierr != lib.OF_LIBRARY:
-            raise
-        return False
-    return True
-
-
 class ChainsFirst:
     """Direct solver: condensation along the beams, then factorization of the rest.
 
@@ -236,50 +223,34 @@ class ChainsFirst:
     """
 
     def __init__(self, share: Share, A: Csr) -> None:
-        # A connector alone may hold a part whose own stiffness leaves zeros, or nothing but
-        # round-off, on the diagonal; PETSc's factorisation does not exchange rows, KLU's does.
-        package = "klu" if len(share.grid.multipliers) else "petsc"
         self._elimination, self._good = Elimination(share, A), False
-        self._rest: Condensed = self._elimination
+        # A connector alone may hold a part whose own stiffness leaves zeros, or nothing but
+        # round-off, on the diagonal; fronts exchange too few rows for that, KLU does not.
+        fronts = not len(share.grid.multipliers)
+        rest: Condensed = self._elimination
         if not share.alone:
-            if package == "petsc":
-                self._rest = Substructure(self._rest, self._elimination.shared)
-            self._rest = Summed(self._rest, share.comm)
-        self._matrix = self._rest.left.petsc()
-        self._factors = PETSc.PC().create(PETSc.COMM_SELF)
-        self._factors.setOperators(self._matrix)
-        self._factors.setType("lu")
-        self._factors.setFactorSolverType(package)
-        self._factors.setFactorPivot(0.0)  # PETSc takes 2e-14 for zero, whatever the units
-        if package == "petsc":
-            # Of narrow and wide lattices it fills in least: 0.55 and 0.9 of the time of "nd".
-            self._factors.setFactorOrdering("amd")
-        self._rhs = PETSc.Vec().createWithArray(self._rest.f, comm=PETSc.COMM_SELF)
-        self._solution = self._rhs.duplicate()
-        self._found = doubles(self._solution.array_r)
+            if fronts:
+                rest = Multifrontal(rest, self._elimination.shared)
+            rest = Summed(rest, share.comm)
+        none = np.zeros(len(rest.numbers), dtype=bool)
+        self._solved = Multifrontal(rest, none) if fronts else Klu(rest)
 
     def drive(self, c: Any) -> None:
         """Let Newton's method in C do the same; ``c`` is its ``equation`` of loops.h."""
-        c.chains, c.found = self._elimination.c, self._found
-        c.factors, c.left, c.left_f, c.left_x = map(
-            opaque, (self._factors, self._matrix, self._rhs, self._solution)
-        )
+        c.chains = self._elimination.c
+        self._solved.drive(c)
 
     def setUp(self, pc: PETSc.PC) -> None:
         """Factor; PETSc asks for it where the matrix has changed."""
-        self._matrix.stateIncrease()
-        self._good = self._rest.factor() and succeeds(self._factors.setUp)
-        self._good = self._good and int(self._factors.getFailedReason()) == GOOD
+        self._good = self._solved.factor()
         pc.setFailedReason(GOOD if self._good else BAD_PIVOT)
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, x: PETSc.Vec) -> None:
         """Solve; zero after a failure, where an error would leave objects of PETSc half done."""
         if self._good:
-            self._rest.reduce(b.array_r)
-            self._rhs.stateIncrease()
-            self._good = succeeds(self._factors.apply, self._rhs, self._solution)
+            self._good = succeeds(self._solved.reduce, b.array_r)
         if self._good:
-            self._rest.expand(self._solution.array_r, x.array_w)
+            self._solved.expand(self._solved.f, x.array_w)
         else:
             x.array_w[:] = 0.0
             pc.setFailedReason(BAD_PIVOT)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Multifrontal elimination of the first unknowns of a sparse system; see subdomains.py.
+/* Multifrontal elimination of the first unknowns of a sparse system; see multifrontal.py.
  *
  * A front is a dense matrix: the rows and columns of some pivots, which are eliminated in it, and of
  * the later unknowns that these couple to. What elimination makes of the latter is added to the front
@@ -245,15 +245,15 @@ int factor_fronts(const fronts *c, const double *data)
   return finite;
 }
 
-/* The right-hand side b, in the order of elimination: what pivots make of it, then that of the Schur
- * complement. */
-void reduce_fronts(const fronts *c, double *b)
+/* The right-hand side b in x: what pivots make of it, then that of the Schur complement. */
+void reduce_fronts(const fronts *c, const double *b)
 {
+  for (int i = 0; i < c->size; ++i) c->x[i] = b[c->unknown[i]];
   for (int k = 0; k < c->fronts - 1; ++k) {
     const int s = c->order[k], pivots = c->first[s + 1] - c->first[s], size = front_size(c, s);
     const int32_t *rest = c->rest + c->begin[s] - pivots, *swap = c->swap + c->first[s];
     const double *F = c->values + c->at[s];
-    double *x = b + c->first[s];
+    double *x = c->x + c->first[s];
     for (int i = 0; i < pivots; ++i) {
       const double y = x[swap[i]];
       x[swap[i]] = x[i], x[i] = y;
@@ -264,25 +264,26 @@ void reduce_fronts(const fronts *c, double *b)
     for (int i = pivots; i < size; ++i, row += pivots) {
       double y = 0;
       for (int j = 0; j < pivots; ++j) y += row[j] * x[j];
-      b[rest[i]] -= y;
+      c->x[rest[i]] -= y;
     }
   }
 }
 
-/* The solution, from that of what stays at the end of b. */
-void expand_fronts(const fronts *c, double *b)
+/* The solution, from that of what stays at the end of x. */
+void expand_fronts(const fronts *c, double *found)
 {
   for (int k = c->fronts - 2; k >= 0; --k) {
     const int s = c->order[k], pivots = c->first[s + 1] - c->first[s], size = front_size(c, s);
     const int32_t *rest = c->rest + c->begin[s] - pivots;
     const double *F = c->values + c->at[s];
-    double *x = b + c->first[s];
+    double *x = c->x + c->first[s];
     for (int i = pivots - 1; i >= 0; --i) {
       const double *row = F + (int64_t)i * size;
       double y = x[i];
       for (int j = i + 1; j < pivots; ++j) y -= row[j] * x[j];
-      for (int j = pivots; j < size; ++j) y -= row[j] * b[rest[j]];
+      for (int j = pivots; j < size; ++j) y -= row[j] * c->x[rest[j]];
       x[i] = y * row[i];
     }
   }
+  for (int i = 0; i < c->size; ++i) found[c->unknown[i]] = c->x[i];
 }

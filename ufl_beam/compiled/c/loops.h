@@ -267,7 +267,8 @@ int all_finite(int size, const double *values);
 /* -- multifrontal elimination, see fronts.c ------------------------------------------------------ */
 
 typedef struct {
-  int fronts;
+  int size, fronts;
+  const int32_t *unknown;       /* unknowns of the system in the order of elimination */
   const int32_t *first, *begin; /* of each front, and of one more: pivot, other unknown */
   const int32_t *rest;          /* unknowns of a front that are not its pivots */
   const int32_t *parent, *up;   /* front that the rest is in; where it is there */
@@ -277,6 +278,7 @@ typedef struct {
   double *values;               /* rows of the pivots, then columns of the rest */
   double *schur, *stack, *space; /* space: for the largest front */
   int32_t *swap;                /* of the pivots: row that each is exchanged with */
+  double *x;                    /* right-hand side and solution, in the order of elimination */
 } fronts;
 
 int find_fronts(int unknowns, int eliminated, const int32_t *indptr, const int32_t *indices,
@@ -286,8 +288,8 @@ void place_in_fronts(const fronts *c, int entries, const int32_t *row, const int
                      const int32_t *front_of, int32_t *place, int32_t *parent, int32_t *up);
 int64_t order_fronts(const fronts *c, int32_t *order, int32_t *before, int32_t *children);
 int factor_fronts(const fronts *c, const double *data);
-void reduce_fronts(const fronts *c, double *b);
-void expand_fronts(const fronts *c, double *b);
+void reduce_fronts(const fronts *c, const double *b);
+void expand_fronts(const fronts *c, double *found);
 
 /* -- Newton's method, see newton.c ------------------------------------------------------------- */
 
@@ -353,11 +355,13 @@ typedef struct {
 
   double rtol, loads; /* tolerance; size of the loads */
   const chains *chains;
-  void *x, *left, *factors, *left_f, *left_x; /* in PETSc: the unknowns; what chains leave of the */
-                                              /* tangent, its factors, two vectors */
+  const fronts *fronts;  /* factors of what chains leave; or none: then PETSc has these */
+  void *left, *factors, *left_f, *left_x; /* in PETSc: what chains leave, its factors, two vectors */
+  void *x;               /* in PETSc: the unknowns */
   double *residual, *change;                  /* at an iterate, and what it is changed by; between
                                                * solutions others use this */
-  const double *found, *weight;               /* entries of left_x; see Solver */
+  double *found;         /* solution of what chains leave; in PETSc the entries of left_x */
+  const double *weight;  /* see Solver */
   int least, most;                             /* iterations */
   const int32_t *diagonal;
   double *space;

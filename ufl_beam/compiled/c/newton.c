@@ -217,8 +217,12 @@ int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int
 int factor_tangent(const equation *e, int *failed)
 {
   eliminate(e->chains, e->residual);
-  TRY(note_change(e->left));
   if ((*failed = !all_finite(e->chains->left, e->chains->left_data))) return 0;
+  if (e->fronts) {
+    *failed = !factor_fronts(e->fronts, e->chains->left_data);
+    return 0;
+  }
+  TRY(note_change(e->left));
   const int error = petsc.PCSetUp(e->factors);
   if (!error) return petsc.PCGetFailedReason(e->factors, failed);
   *failed = 1;
@@ -229,7 +233,10 @@ int factor_tangent(const equation *e, int *failed)
 int solve_tangent(const equation *e, int reduced)
 {
   if (!reduced) reduce(e->chains, e->residual);
-  TRY(petsc.PCApply(e->factors, e->left_f, e->left_x));
+  if (e->fronts) {
+    reduce_fronts(e->fronts, e->chains->left_f);
+    expand_fronts(e->fronts, e->found);
+  } else TRY(petsc.PCApply(e->factors, e->left_f, e->left_x));
   expand(e->chains, e->found, e->change);
   return 0;
 }

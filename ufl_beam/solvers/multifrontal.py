@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: MIT
+"""Multifrontal elimination of what the elimination along chains leaves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from petsc4py import PETSc
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import csr_array
+
+from ufl_beam.arrays import Array, Index
+from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib
+from ufl_beam.compiled.csr import Csr
+from ufl_beam.solvers.substructuring import Condensed
+from ufl_beam.structure_cache import of_structure
+
+
+class Multifrontal:
+    """Multifrontal elimination of all unknowns of a system, or of all but some.
+
+    The order is that of approximate minimum degree.  Each front exchanges rows among its pivots
+    only, so the matrix must not have structural zeros on the diagonal; see fronts.c.  Satisfies
+    :class:`Condensed`.
+
+    Args:
+        inner: The system.
+        stays: Which of its unknowns stay.
+
+    Attributes:
+        numbers: Unknowns that stay.
+        left: Matrix of what stays, with all entries.
+        f: Right-hand side of what stays.
+        c: All of it in C, see loops.h.
+    """
+
+    def __init__(self, inner: Condensed, stays: npt.NDArray[np.bool_]) -> None:
+        self._inner, A = inner, inner.left
+        self.numbers = inner.numbers[stays]
+        *found, at, space = _structure(A.indptr, A.indices, stays)
+        arrays = dict(zip(STRUCTURE, found, strict=True))
+        n, eliminated = len(self.numbers), A.size - len(self.numbers)
+        schur, x = np.zeros(n * n), np.zeros(A.size)
+        self.left = Csr(schur, np.tile(np.arange(n), n), n * np.arange(n + 1))
+        self.f = x[eliminated:]
+        of_front, of_stack = space
+        self.c = fill(
+            ffi.new("fronts *"),
+            size=A.size, fronts=len(arrays["parent"]), at=ffi.from_buffer("int64_t[]", at),
+            values=np.empty(at[-1]), schur=schur, stack=np.empty(of_stack), x=x,
+            space=np.empty(of_front), swap=np.zeros(eliminated, np.int32), **arrays,
+        )  # fmt: skip
+
+    def drive(self, c: Any) -> None:
+        """Let Newton's method in C do the same; ``c`` is its ``equation`` of loops.h."""
+        fill(c, fronts=self.c, found=np.zeros(self.c.size))
+
+    def factor(self) -> bool:
+        """Eliminate; whether all of it is finite."""
+        good = self._inner.factor()
+        return bool(lib.factor_fronts(self.c, doubles(self._inner.left.data))) and good
+
+    def reduce(self, b: Array) -> None:
+        """Fill :attr:`f`; ``b`` at the degrees of freedom owned here."""
+        self._inner.reduce(b)
+        lib.reduce_fronts(self.c, doubles(self._inner.f))
+
+    def expand(self, small: Array, x: Array) -> None:
+        """The solution at the degrees of freedom owned here, after that of what is left."""
+        self.f[:] = small
+        of_inner = np.empty(self.c.size)
+        lib.expand_fronts(self.c, doubles(of_inner))
+        self._inner.expand(of_inner, x)
+
+
+STRUCTURE = (
+    "unknown", "first", "begin", "rest", "parent", "up", "order", "before", "children", "entries",
+    "entry", "place",
+)  # fmt: skip
+"""Arrays of ``fronts`` of loops.h that follow from the structure of a matrix."""
+
+
+@of_structure
+def _structure(
+    indptr: Index, indices: Index, stays: npt.NDArray[np.bool_]
+) -> tuple[npt.NDArray[np.integer], ...]:
+    """Find the fronts of a matrix.
+
+    Returns:
+        :data:`STRUCTURE`; where the factors of each front begin, int64; numbers that the largest
+        front has, and the stack at most.
+    """
+    A = Csr(np.empty(0), indices, indptr)
+    unknown = np.concatenate([_minimum_degree(A, ~stays), np.flatnonzero(stays)]).astype(np.int32)
+    n = np.count_nonzero(stays)
+    number = np.empty(A.size, dtype=np.int32)
+    number[unknown] = np.arange(A.size)
+    first, begin, rest = _fronts(A, unknown, A.size - n)
+    pivots, others = (np.diff(x).astype(np.int64) for x in (first, begin))
+    fronts = len(pivots)
+    front_of = np.repeat(np.arange(fronts, dtype=np.int32), np.append(pivots[:-1], n))
+    rows, columns = number[A.rows()], number[A.indices]
+    of_entry = front_of[np.minimum(rows, columns)]
+    entry = np.argsort(of_entry, kind="stable").astype(np.int32)
+    entries = np.searchsorted(of_entry[entry], np.arange(fronts + 1)).astype(np.int32)
+    place, up = np.empty(len(entry), np.int32), np.empty(len(rest), np.int32)
+    parent, order, before, children = np.zeros((4, fronts), dtype=np.int32)
+    c = fill(
+        ffi.new("fronts *"), fronts=fronts, first=first, begin=begin, rest=rest, parent=parent, up=up
+    )
+    of_entries = rows[entry], columns[entry], front_of, place, parent, up
+    lib.place_in_fronts(c, len(entry), *map(integers, of_entries))
+    stack = lib.order_fronts(c, *map(integers, (order, before, children)))
+    at = np.append(0, np.cumsum(pivots * (pivots + 2 * others)))
+    space = np.array([(pivots + others)[:-1].max(initial=0) ** 2, stack])
+    return (
+        unknown, first, begin, rest, parent, up, order, before, children, entries, entry, place,
+        at, space,
+    )  # fmt: skip
+
+
+def _pattern(A: Csr) -> csr_array:
+    ones = np.ones(len(A.indices), np.bool_)
+    return csr_array((ones, A.indices, A.indptr), shape=(A.size, A.size))
+
+
+def _minimum_degree(A: Csr, of: npt.NDArray[np.bool_]) -> Index:
+    """Return some unknowns in the order of approximate minimum degree."""
+    these = np.flatnonzero(of)
+    if not len(these):
+        return these
+    part = _pattern(A)[these][:, these].astype(np.float64)
+    _, order = Csr(part.data, part.indices, part.indptr).petsc().getOrdering("amd")
+    return np.asarray(these[order.indices])
+
+
+def _fronts(A: Csr, order: Index, eliminated: int) -> tuple[Index, Index, Index]:
+    """Return ``first``, ``begin`` and ``rest`` of the fronts, see loops.h."""
+    pattern = csr_array(_pattern(A)[order][:, order])
+    first, begin = np.empty((2, eliminated + 2), dtype=np.int32)
+    room, space = 2 * len(A.indices) + 2 * A.size, np.empty(3 * A.size, dtype=np.int32)
+    while True:
+        rest = np.empty(room, dtype=np.int32)
+        arrays = (first, begin, rest, space[: A.size], space[A.size :])
+        structure = (pattern.indptr.astype(np.int32), pattern.indices.astype(np.int32))
+        fronts = lib.find_fronts(
+            A.size, eliminated, *map(integers, structure), room, *map(integers, arrays)
+        )
+        if fronts >= 0:
+            break
+        room *= 2
+    first, begin = (x[: fronts + 1].copy() for x in (first, begin))
+    return first, begin, rest[: begin[-1]].copy()
