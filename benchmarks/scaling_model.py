@@ -44,8 +44,8 @@ def count_traffic(simulation):
         return count
     simulation.share.comm = Counted(simulation.share.comm, count)
     simulation.together._comm = Counted(simulation.together._comm, count)
-    rest = solver._factors._rest
-    rest._comm = Counted(rest._comm, count)
+    summed = solver._factors._solved._inner
+    summed._comm = Counted(summed._comm, count)
     ghosts = 8 * len(simulation.share.ghosts)
 
     def counted(update):
@@ -69,22 +69,21 @@ def front_flops(pivots, others):
 def work(simulation):
     """Sizes of the part of this process: cells, unknowns of joints, operations, entries."""
     factors = simulation.solver._factors
+    fronts, entries = factors._solved, factors._elimination.left
     found = {
         "cells_here": len(simulation.share.cells),
-        "joints_here": factors._elimination.left.size,
+        "joints_here": entries.size,
         "ghosts": len(simulation.share.ghosts),
     }
     if not simulation.share.alone:
-        inner, left = factors._rest._inner, factors._rest.left
-        c, data = inner._c, factors._elimination.left.data
-        sizes = (np.diff(list(x[0 : c.fronts])) for x in (c.first, c.begin))
-        begin = time.perf_counter()
-        for _ in range(3):
-            lib.factor_fronts(c, doubles(data))
-        found |= {
-            "flops": front_flops(*sizes), "s_of_flops": (time.perf_counter() - begin) / 3,
-            "border_here": inner.left.size, "border": left.size, "border_entries": len(left.data),
-        }  # fmt: skip
+        summed, fronts = fronts._inner.left, fronts._inner._inner
+        sizes = {"border": summed.size, "border_entries": len(summed.data)}
+        found |= {"border_here": fronts.left.size, **sizes}
+    c, begin = fronts.c, time.perf_counter()
+    for _ in range(3):
+        lib.factor_fronts(c, doubles(entries.data))
+    found["s_of_flops"] = (time.perf_counter() - begin) / 3
+    found["flops"] = front_flops(*(np.diff(list(x[0 : c.fronts])) for x in (c.first, c.begin)))
     return found
 
 
@@ -100,7 +99,7 @@ def borders(grid, ranks):
 
 def fitted(whole, half, shared):
     """Numbers of the model, from one process with all cells and with half, and from two."""
-    flops, rate = 2 * shared["flops"], shared["flops"] / shared["s_of_flops"]
+    flops, rate = whole["flops"], whole["flops"] / whole["s_of_flops"]
     cells, fewer = whole["cells"], half["cells"]
     bytes_whole, bytes_half, bytes_shared = (
         1e6 * max(one["memory_mb"]) for one in (whole, half, shared)

@@ -49,7 +49,8 @@ class StepEquation(Equation):
         self.terms: list[Term] = [*self._inner, *self.others]
         predicted = share.largest(float(any(one.demand() is not None for one in beams)))
         self._tangent_in_c = False  # in C
-        self._demanding = bool(share.grid.scene.links) or predicted > 0.0  # in any process
+        if not share.grid.scene.links and predicted == 0.0:  # in any process
+            self.demand([])
 
     def begin(self, step: Step) -> None:
         """Let all terms begin a step."""
@@ -128,8 +129,6 @@ class StepEquation(Equation):
 
     def missed(self, x: Array, r: Array, scale: float, moved: float) -> float:
         """Return the largest residual of the laws of connectors and points, without dimension."""
-        if not self._demanding:
-            return 0.0
         q1 = self.supports.in_plane(x)
         here = max((c.excess(q1, r, scale, moved) for c in self._couplings), default=0.0)
         return self.share.largest(max([here, *(one.missed(q1, scale) for one in self._beams)]))
@@ -150,7 +149,7 @@ class StepEquation(Equation):
         where supports are at an angle, SNES calls Python: the same terms, in the same order; the
         tangent is added up in C if all terms have loops.
         """
-        supports, entries = self.supports, self.A.data
+        supports = self.supports
         self._tangent_in_c = all(term.loops() for term in self.terms)
         loops = [term.loops() or self._in_python(term) for term in self.terms]
         stiffnesses = [stiffness for _, stiffness in loops if stiffness is not None]
@@ -171,7 +170,7 @@ class StepEquation(Equation):
             forces=len(loops), force=ffi.new("call[]", [force for force, _ in loops]),
             stiffnesses=len(stiffnesses), stiffness=ffi.new("call[]", stiffnesses),
             product=product, cells=cells, indptr=self.A.indptr,
-            entries=len(entries), tangent=entries, zeros=len(zero), zero=zero, pivot=pivot,
+            zeros=len(zero), zero=zero, pivot=pivot,
             held=len(supports.dofs), hold=supports.dofs.astype(np.int32),
             reactions=supports.reactions, pivots=supports.pivots,
         )  # fmt: skip

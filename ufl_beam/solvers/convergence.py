@@ -39,7 +39,7 @@ class Convergence:
     def __init__(
         self, share: Share, equation: Equation, x: Array, r: Array, newton: Newton, least: int
     ) -> None:
-        self._share, self._A, self._x, self._r = share, equation.A, x, r
+        self._share, self._x, self._r = share, x, r
         self._held, self._owned = equation.held, slice(share.num_owned)
         self.weights = np.ones(share.size)
         self.weights[share.rotations()] = 1 / share.grid.scene.size
@@ -48,7 +48,7 @@ class Convergence:
         self._norm = (share.size, doubles(self.weights))
         self._moves = np.ones(share.size, dtype=np.uint8)
         self.leave_out(np.zeros(share.size, dtype=bool))
-        self.diagonal = self._A.diagonal(np.arange(share.size, dtype=np.int32))
+        self.diagonal = equation.A.diagonal(np.arange(share.size, dtype=np.int32))
         self._at_r, self._at_forces = doubles(self._r), doubles(equation.force)
         self._last_loads: list[Array] = []
         self._loads = 0.0
@@ -58,6 +58,7 @@ class Convergence:
             modified=newton.modified, most=newton.max_iterations, least=least,
             weight=self.weights, residual=r, change=np.empty(share.size),
             space=share.scratch, lengths=share.lengths(), diagonal=self.diagonal,
+            tangent=equation.A.data,
             moves=ffi.from_buffer("uint8_t[]", self._moves),
         )  # fmt: skip
 
@@ -103,12 +104,15 @@ class Convergence:
 
     def test(self, iteration: int) -> int:
         """Return why to stop after an iteration, or zero."""
-        residual = self._size(self._at_r)
+        residual, floor = self._size(self._at_r), 0.0
         if not math.isfinite(residual):
             return int(lib.DIVERGED)
         scale = self.scale()
-        self._find_motion(self._x)
-        floor = 8 * self.size(self._round_off(self._x)) if iteration > 1 else 0.0
+        nearly = iteration > 1 and residual > self.c.rtol * scale
+        if nearly or self.c.demands:
+            self._find_motion(self._x)
+        if nearly or (iteration > 1 and self.c.demands):
+            floor = 8 * self.size(self._round_off(self._x))
         return int(lib.judge(self.c, doubles(self._x), iteration, residual, scale, floor))
 
     def failure(self, reason: int, iterations: int) -> StepFailed:
@@ -133,9 +137,9 @@ class Convergence:
 
         Stiff or finely divided beams cannot be solved any better, however small the forces are.
         """
-        digits = np.empty(self._share.size)
-        lib.find_last_digits(self.c, doubles(x), doubles(digits))
-        return np.asarray(self._A.data[self.diagonal] * digits)
+        forces = np.empty(self._share.size)
+        lib.find_round_off(self.c, doubles(x), doubles(forces))
+        return forces
 
     def _find_motion(self, x: Array) -> None:
         """Note the largest motion in any process, at most the size of the scene."""

@@ -344,7 +344,6 @@ typedef struct {
   const cells *cells;          /* or none */
   const int32_t *indptr;
   double *inner_force;   /* what the inner ones add up to */
-  int entries;
   double *tangent;
   int held, zeros; /* degrees of freedom and entries that supports hold */
   const int32_t *hold, *zero, *pivot; /* pivot: the entry of each that is held on the diagonal */
@@ -388,7 +387,7 @@ void assemble(equation *e, const double *q);
 void begin_newton(equation *e, int patience, int like_last);
 int factor_tangent(const equation *e, int *failed);
 int solve_tangent(const equation *e, int reduced);
-void find_last_digits(const equation *e, const double *q, double *digits);
+void find_round_off(const equation *e, const double *q, double *forces);
 int judge(equation *e, const double *q, int iteration, double residual, double scale,
           double floor);
 int snes_function(void *snes, void *x, void *f, void *self);

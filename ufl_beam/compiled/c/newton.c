@@ -130,7 +130,7 @@ int judge(equation *e, const double *q, int iteration, double residual, double s
 /* Spacing of the numbers around displacements and rotations: the last digits of what they are part
  * of. Strains are computed from them to their own relative precision, as long as rotations are small.
  * The next number has the next pattern of bits. */
-void find_last_digits(const equation *e, const double *q, double *digits)
+static void find_last_digits(const equation *e, const double *q, double *digits)
 {
   const double amplitude = e->moved / e->scene;
   for (int i = 0; i < e->size; ++i) {
@@ -139,6 +139,13 @@ void find_last_digits(const equation *e, const double *q, double *digits)
     next.bits += 1;
     digits[i] = e->moves[i] * (next.number - far);
   }
+}
+
+/* Forces that the last digits make. */
+void find_round_off(const equation *e, const double *q, double *forces)
+{
+  find_last_digits(e, q, forces);
+  for (int i = 0; i < e->size; ++i) forces[i] *= e->tangent[e->diagonal[i]];
 }
 
 /* Before the first iterate; `like_last` says that a modified tangent may be that of the last step. */
@@ -197,8 +204,7 @@ static int verdict(equation *e, const double *q, int iteration)
   double floor = 0;
   if (nearly || e->demands) e->moved = fmin(largest_motion(e->size, e->weight, q), e->scene);
   if (nearly || (iteration > 1 && e->demands)) {
-    find_last_digits(e, q, e->space);
-    for (int i = 0; i < e->size; ++i) e->space[i] *= e->tangent[e->diagonal[i]];
+    find_round_off(e, q, e->space);
     floor = 8 * norm(e->size, e->weight, e->space);
   }
   return judge(e, q, iteration, now, scale, floor);
