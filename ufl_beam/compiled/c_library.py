@@ -18,7 +18,7 @@ from petsc4py import PETSc
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.jit import DECLARATIONS, HEADERS, compiled, text
+from ufl_beam.compiled.jit import DECLARATIONS, HEADERS, NATIVE, compiled, text
 from ufl_beam.dolfinx_compat import VERSIONS
 
 T = TypeVar("T")
@@ -29,7 +29,7 @@ SOURCES = (
 )  # fmt: skip
 """Files of C beside this one; they are one translation unit."""
 
-FLAGS = ["-O3", "-fopenmp-simd"]
+FLAGS = ["-O3", NATIVE, "-fopenmp-simd"]
 """Flags for the compiler; sums may be in the order of vectors."""
 
 _CALLBACKS = """

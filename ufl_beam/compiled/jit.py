@@ -63,6 +63,14 @@ EXTRA = SANITIZERS if os.environ.get("UFL_BEAM_SANITIZE", "0") != "0" else []
 """Flags after those of each library: the sanitizers if ``UFL_BEAM_SANITIZE=1``, else none."""
 
 
+NATIVE = "-march=native"
+"""Flag that lets the compiler use all instructions of the processor."""
+
+PROCESSOR = np.show_config(mode="dicts").get("SIMD Extensions", {})
+"""Its features that NumPy was compiled for, and those that it found besides: what is compiled for
+this processor may be of no use to another one with the same cache."""
+
+
 class CompilerError(RuntimeError):
     """The C compiler is missing, or refuses the code."""
 
@@ -91,7 +99,7 @@ def compiled(
         check: Called with the module once it has been compiled; may raise :class:`Refused`.
     """
     flags = [*flags, "-fvisibility=hidden", *EXTRA]
-    name = f"{stem}_{_digest(declarations, *made_of, *flags, sys.version)}"
+    name = f"{stem}_{_digest(declarations, *made_of, *flags, sys.version, repr(PROCESSOR))}"
 
     def build(directory: Path) -> ModuleType | Refused:
         builder = cffi.FFI()

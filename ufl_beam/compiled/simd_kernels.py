@@ -18,15 +18,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ufl_beam.compiled.jit import DECLARATIONS, HEADERS, CompilerError, Refused, compiled, text
+from ufl_beam.compiled.jit import (
+    DECLARATIONS, HEADERS, NATIVE, PROCESSOR, CompilerError, Refused, compiled, text,
+)  # fmt: skip
 from ufl_beam.dolfinx_compat import VERSIONS
 
 LOGGER = logging.getLogger("ufl_beam")
 
-_SIMD = np.show_config(mode="dicts").get("SIMD Extensions", {})
-"""Features of the processor that NumPy was compiled for, and those that it found besides."""
-
-_WIDE = {"AVX512F", "X86_V4"} & {*_SIMD.get("baseline", ()), *_SIMD.get("found", ())}
+_WIDE = {"AVX512F", "X86_V4"} & {*PROCESSOR.get("baseline", ()), *PROCESSOR.get("found", ())}
 
 LANES = 8 if _WIDE else 4
 """Cells that are computed at once, as many as AVX-512 or AVX have room for; compilers split vectors
@@ -128,9 +127,9 @@ def in_lanes(source: Path, kernel: int, sizes: tuple[int, int, int]) -> int | No
             "ufl_beam_lanes",
             INTERFACE,
             lambda: "\n".join([head, in_vectors(written(source)), loop]),
-            # FFCx names what it makes by what is in it; NumPy knows what "native" means.
-            made_of=[source.name, head, loop, Path(__file__).read_text(), repr(_SIMD)],
-            flags=["-O2", "-march=native", "-fno-math-errno"],
+            # FFCx names what it makes by what is in it.
+            made_of=[source.name, head, loop, Path(__file__).read_text()],
+            flags=["-O2", NATIVE, "-fno-math-errno"],
             check=lambda module: require_agreement(module, kernel, sizes),
         )
     except (Refused, CompilerError) as why:
