@@ -114,7 +114,8 @@ def _structure(
     lib.place_in_fronts(c, len(entry), *map(integers, of_entries))
     stack = lib.order_fronts(c, *map(integers, (order, before, children)))
     at = np.append(0, np.cumsum(pivots * (pivots + 2 * others)))
-    space = np.array([(pivots + others)[:-1].max(initial=0) ** 2, stack])
+    # Products read a few numbers beyond the last one.
+    space = np.array([(pivots + others)[:-1].max(initial=0) ** 2 + 2 * lib.WIDE, stack])
     return (
         unknown, first, begin, rest, parent, up, order, before, children, entries, entry, place,
         at, space,

@@ -139,57 +139,101 @@ int64_t order_fronts(const fronts *c, int32_t *order, int32_t *before, int32_t *
   return most;
 }
 
-/* row -= a X, of four rows of X */
-static inline void subtract_rows(int size, const double *a, const double *X, int stride, double *row)
-{
-  const double a0 = a[0], a1 = a[1], a2 = a[2], a3 = a[3];
-  const double *x1 = X + stride, *x2 = x1 + stride, *x3 = x2 + stride;
-  for (int j = 0; j < size; ++j) row[j] -= a0 * X[j] + a1 * x1[j] + a2 * x2[j] + a3 * x3[j];
-}
+/* -- dense elimination -------------------------------------------------------------------------- */
 
-/* Eliminate the first k pivots from a row: multipliers in their place */
-static inline void eliminate_row(int size, int pivots, const double *F, double *row)
+/* Pivots that are eliminated from all of a front at once; rows of a product that stay in registers. */
+enum { PANEL = 24, ROWS = 4 };
+typedef double numbers __attribute__((vector_size(8 * WIDE), aligned(8), may_alias));
+
+/* C -= A B, of so many rows and vectors of columns, the last of which may have fewer; rows of all three
+ * have `stride` numbers. Beyond the last column there are numbers, too. */
+static inline __attribute__((always_inline)) void subtract_block(
+    const int rows, const int vectors, int columns, int depth, int stride, const double *A,
+    const double *B, double *C)
 {
-  int k = 0;
-  for (; k + 4 <= pivots; k += 4) {
-    const double *X = F + (int64_t)k * size;
-    for (int i = k; i < k + 4; ++i) {
-      row[i] *= F[(int64_t)i * size + i];
-      for (int j = i + 1; j < k + 4; ++j) row[j] -= row[i] * F[(int64_t)i * size + j];
+  numbers sum[ROWS][2];
+  for (int i = 0; i < rows; ++i)
+    for (int v = 0; v < vectors; ++v) sum[i][v] = (numbers){0};
+  for (int k = 0; k < depth; ++k, B += stride)
+    for (int i = 0; i < rows; ++i)
+      for (int v = 0; v < vectors; ++v)
+        sum[i][v] += A[(int64_t)i * stride + k] * ((const numbers *)B)[v];
+  for (int i = 0; i < rows; ++i, C += stride)
+    if (columns == vectors * WIDE)
+      for (int v = 0; v < vectors; ++v) ((numbers *)C)[v] -= sum[i][v];
+    else {
+      double part[2 * WIDE];
+      memcpy(part, sum[i], vectors * sizeof *sum[i]);
+      for (int j = 0; j < columns; ++j) C[j] -= part[j];
     }
-    subtract_rows(size - k - 4, row + k, X + k + 4, size, row + k + 4);
+}
+
+static inline __attribute__((always_inline)) void subtract_columns(
+    const int vectors, int rows, int columns, int depth, int stride, const double *A, const double *B,
+    double *C)
+{
+  for (; rows >= ROWS; rows -= ROWS, A += (int64_t)ROWS * stride, C += (int64_t)ROWS * stride)
+    subtract_block(ROWS, vectors, columns, depth, stride, A, B, C);
+  for (; rows; --rows, A += stride, C += stride)
+    subtract_block(1, vectors, columns, depth, stride, A, B, C);
+}
+
+/* C -= A B, C of rows x columns */
+static void subtract_dense(int rows, int columns, int depth, int stride, const double *A,
+                           const double *B, double *C)
+{
+  int j = 0;
+  for (; columns - j > WIDE; j += 2 * WIDE) {
+    const int some = columns - j < 2 * WIDE ? columns - j : 2 * WIDE;
+    subtract_columns(2, rows, some, depth, stride, A, B + j, C + j);
   }
-  for (; k < pivots; ++k) {
-    const double *X = F + (int64_t)k * size, a = row[k] *= X[k];
-    for (int j = k + 1; j < size; ++j) row[j] -= a * X[j];
+  if (j < columns) subtract_columns(1, rows, columns - j, depth, stride, A, B + j, C + j);
+}
+
+static void exchange_rows(int size, double *a, double *b)
+{
+  for (int j = 0; j < size; ++j) {
+    const double x = a[j];
+    a[j] = b[j], b[j] = x;
   }
 }
 
-/* Factor the pivots of a front, rows exchanged; reciprocals of the pivots on the diagonal; whether
- * they are finite */
-static int factor_pivots(int size, int pivots, double *F, int32_t *swap)
+/* Eliminate the pivots of a front, rows exchanged among them; reciprocals of the pivots on the
+ * diagonal, multipliers below it; whether they are finite */
+static int eliminate_pivots(int size, int pivots, double *F, int32_t *swap)
 {
   int finite = 1;
-  for (int k = 0; k < pivots; ++k) {
-    int best = k;
-    for (int i = k + 1; i < pivots; ++i)
-      if (fabs(F[(int64_t)i * size + k]) > fabs(F[(int64_t)best * size + k])) best = i;
-    double *pivot = F + (int64_t)k * size, *other = F + (int64_t)best * size;
-    swap[k] = best;
-    if (best != k)
-      for (int j = 0; j < size; ++j) {
-        const double x = pivot[j];
-        pivot[j] = other[j], other[j] = x;
+  for (int first = 0; first < pivots; first += PANEL) {
+    const int next = pivots - first < PANEL ? pivots : first + PANEL;
+    for (int k = first; k < next; ++k) {
+      int best = k;
+      for (int i = k + 1; i < pivots; ++i)
+        if (fabs(F[(int64_t)i * size + k]) > fabs(F[(int64_t)best * size + k])) best = i;
+      double *pivot = F + (int64_t)k * size;
+      swap[k] = best;
+      if (best != k) exchange_rows(size, pivot, F + (int64_t)best * size);
+      pivot[k] = 1 / pivot[k];
+      finite &= isfinite(pivot[k]) != 0;
+      for (int i = k + 1; i < size; ++i) {
+        double *row = F + (int64_t)i * size, a = row[k] *= pivot[k];
+        for (int j = k + 1; j < next; ++j) row[j] -= a * pivot[j];
       }
-    pivot[k] = 1 / pivot[k];
-    finite &= isfinite(pivot[k]) != 0;
-    for (int i = k + 1; i < pivots; ++i) {
-      double *row = F + (int64_t)i * size, a = row[k] *= pivot[k];
-      for (int j = k + 1; j < size; ++j) row[j] -= a * pivot[j];
     }
+    for (int k = first + 1; k < next; ++k) {
+      double *row = F + (int64_t)k * size;
+      for (int i = first; i < k; ++i) {
+        const double a = row[i], *pivot = F + (int64_t)i * size;
+        for (int j = next; j < size; ++j) row[j] -= a * pivot[j];
+      }
+    }
+    double *rest = F + (int64_t)next * size;
+    subtract_dense(size - next, size - next, next - first, size, rest + first,
+                   F + (int64_t)first * size + next, rest + next);
   }
   return finite;
 }
+
+/* -- the fronts --------------------------------------------------------------------------------- */
 
 /* Add what a front makes of the rest of its unknowns, a matrix with rows of `stride`, to the parent. */
 static void add_to_parent(const fronts *c, int front, const double *made, int stride, double *to)
@@ -229,13 +273,10 @@ int factor_fronts(const fronts *c, const double *data)
       add_to_parent(c, of, top -= (int64_t)made * made, made, F);
       child = c->before[child];
     }
-    finite &= factor_pivots(size, pivots, F, c->swap + c->first[s]);
+    finite &= eliminate_pivots(size, pivots, F, c->swap + c->first[s]);
     memcpy(rows, F, (int64_t)pivots * size * sizeof *F);
-    for (int i = pivots; i < size; ++i) {
-      double *row = F + (int64_t)i * size;
-      eliminate_row(size, pivots, F, row);
-      memcpy(columns + (int64_t)(i - pivots) * pivots, row, pivots * sizeof *F);
-    }
+    for (int i = pivots; i < size; ++i)
+      memcpy(columns + (int64_t)(i - pivots) * pivots, F + (int64_t)i * size, pivots * sizeof *F);
     const double *made = F + (int64_t)pivots * size + pivots;
     if (c->parent[s] == last) add_to_parent(c, s, made, size, c->schur);
     else

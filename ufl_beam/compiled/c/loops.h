@@ -266,6 +266,8 @@ int all_finite(int size, const double *values);
 
 /* -- multifrontal elimination, see fronts.c ------------------------------------------------------ */
 
+enum { WIDE = 8 }; /* columns of a product that are computed at once */
+
 typedef struct {
   int size, fronts;
   const int32_t *unknown;       /* unknowns of the system in the order of elimination */
@@ -276,7 +278,7 @@ typedef struct {
   const int32_t *entries, *entry, *place;   /* of the fronts: in the data, and in the front */
   const int64_t *at;            /* where the factors of each front begin in values */
   double *values;               /* rows of the pivots, then columns of the rest */
-  double *schur, *stack, *space; /* space: for the largest front */
+  double *schur, *stack, *space; /* space: for the largest front, and 2 WIDE numbers more */
   int32_t *swap;                /* of the pivots: row that each is exchanged with */
   double *x;                    /* right-hand side and solution, in the order of elimination */
 } fronts;
