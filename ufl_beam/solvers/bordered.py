@@ -52,12 +52,14 @@ class BorderedNewton:
         """Factor; PETSc asks for it where the matrix has changed."""
         self._factors.setOperators(*pc.getOperators())
         self._factors.setUp()
-        pc.setFailedReason(self._factors.getFailedReason())
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, y: PETSc.Vec) -> None:
         """Solve the bordered system for a right-hand side."""
         self._factors.apply(b, y)
         self._factors.apply(self._rate, self._z)
+        pc.setFailedReason(failed := self._factors.getFailedReason())
+        if failed:
+            return
         y.copy(self._y)
         self._vectors.update_ghosts(self._y)
         self._vectors.update_ghosts(self._z)

@@ -53,19 +53,24 @@ class Klu:
         c.factors, c.left, c.left_f, c.left_x = map(opaque, of_petsc)
         fill(c, found=doubles(self._solution.array_r))
 
-    def factor(self) -> bool:
-        """Eliminate; whether that succeeds."""
+    def factor(self, b: Array) -> bool:
+        """Eliminate from matrix and right-hand side; whether that succeeds."""
+        good = self._inner.factor(b)
         self._matrix.stateIncrease()
-        good = self._inner.factor() and succeeds(self._factors.setUp)
-        return good and int(self._factors.getFailedReason()) == GOOD
+        good = good and succeeds(self._factors.setUp)
+        good = good and int(self._factors.getFailedReason()) == GOOD
+        return good and succeeds(self._solve)
 
     def reduce(self, b: Array) -> None:
-        """Solve.
+        """Eliminate from another right-hand side; ``b`` at the degrees of freedom owned here.
 
         Raises:
             PETSc.Error: The matrix is singular after all.
         """
         self._inner.reduce(b)
+        self._solve()
+
+    def _solve(self) -> None:
         self._rhs.stateIncrease()
         self._factors.apply(self._rhs, self._solution)
 

@@ -57,13 +57,15 @@ class Multifrontal:
         """Let Newton's method in C do the same; ``c`` is its ``equation`` of loops.h."""
         fill(c, fronts=self.c, found=np.zeros(self.c.size))
 
-    def factor(self) -> bool:
-        """Eliminate; whether all of it is finite."""
-        good = self._inner.factor()
-        return bool(lib.factor_fronts(self.c, doubles(self._inner.left.data))) and good
+    def factor(self, b: Array) -> bool:
+        """Eliminate from matrix and right-hand side; whether all of it is finite."""
+        good = self._inner.factor(b)
+        good &= bool(lib.factor_fronts(self.c, doubles(self._inner.left.data)))
+        lib.reduce_fronts(self.c, doubles(self._inner.f))
+        return good
 
     def reduce(self, b: Array) -> None:
-        """Fill :attr:`f`; ``b`` at the degrees of freedom owned here."""
+        """Eliminate from another right-hand side; ``b`` at the degrees of freedom owned here."""
         self._inner.reduce(b)
         lib.reduce_fronts(self.c, doubles(self._inner.f))
 

@@ -8,7 +8,6 @@ vertices at the border between processes, whatever else couples to more than two
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any
 
 from petsc4py import PETSc
@@ -185,7 +184,6 @@ class Elimination:
         self.numbers, self.shared = share.dofs[here], ~alone[here]
         self.left = Csr(np.zeros(len(columns)), columns, indptr)
         self.f: Array = np.zeros(len(here))
-        self._size = share.size
         indices = dict(zip(INDICES, found, strict=True))
         vertices, chains = len(indices["row"]), len(indices["spike"])
         self.c = fill(
@@ -197,17 +195,13 @@ class Elimination:
             f=np.zeros(3 * vertices), order=ffi.from_buffer("uint8_t[]", order), **indices,
         )  # fmt: skip
 
-    @cached_property
-    def _zero(self) -> Array:
-        return np.zeros(self._size)
-
-    def factor(self) -> bool:
-        """Eliminate the chains and fill :attr:`left`; whether all of it is finite."""
-        lib.eliminate(self.c, doubles(self._zero))
+    def factor(self, b: Array) -> bool:
+        """Eliminate the chains from matrix and right-hand side; whether all of it is finite."""
+        lib.eliminate(self.c, doubles(b))
         return bool(lib.all_finite(len(self.left.data), doubles(self.left.data)))
 
     def reduce(self, b: Array) -> None:
-        """Fill :attr:`f`; ``b`` at the degrees of freedom owned here."""
+        """Eliminate from another right-hand side; ``b`` at the degrees of freedom owned here."""
         lib.reduce(self.c, doubles(b))
 
     def expand(self, small: Array, x: Array) -> None:
@@ -223,7 +217,7 @@ class ChainsFirst:
     """
 
     def __init__(self, share: Share, A: Csr) -> None:
-        self._elimination, self._good = Elimination(share, A), False
+        self._elimination, self._is_new, self._good = Elimination(share, A), False, False
         # A connector alone may hold a part whose own stiffness leaves zeros, or nothing but
         # round-off, on the diagonal; fronts exchange too few rows for that, KLU does not.
         fronts = not len(share.grid.multipliers)
@@ -241,14 +235,17 @@ class ChainsFirst:
         self._solved.drive(c)
 
     def setUp(self, pc: PETSc.PC) -> None:
-        """Factor; PETSc asks for it where the matrix has changed."""
-        self._good = self._solved.factor()
-        pc.setFailedReason(GOOD if self._good else BAD_PIVOT)
+        """Factor with the next right-hand side; PETSc asks for it where the matrix has changed."""
+        self._is_new, self._good = True, True
+        pc.setFailedReason(GOOD)
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, x: PETSc.Vec) -> None:
         """Solve; zero after a failure, where an error would leave objects of PETSc half done."""
-        if self._good:
+        if self._is_new:
+            self._good = self._solved.factor(b.array_r)
+        elif self._good:
             self._good = succeeds(self._solved.reduce, b.array_r)
+        self._is_new = False
         if self._good:
             self._solved.expand(self._solved.f, x.array_w)
         else:

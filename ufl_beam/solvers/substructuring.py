@@ -21,24 +21,27 @@ from ufl_beam.compiled.csr import Csr
 class Condensed(Protocol):
     """A linear system of which some unknowns are eliminated.
 
-    The call is :meth:`factor`, and for each right-hand side :meth:`reduce`, the solution of the
+    The call is :meth:`factor`, for other right-hand sides :meth:`reduce`, then the solution of the
     system that is left by the caller, and :meth:`expand`.
 
     Attributes:
         numbers: Unknowns that are left, in numbers of the grid, ascending.
         left: Matrix of what is left, of :meth:`factor`.
-        f: Right-hand side of what is left, of :meth:`reduce`.
+        f: Right-hand side of what is left.
     """
 
     numbers: Index
     left: Csr
     f: Array
 
-    def factor(self) -> bool:
-        """Eliminate; whether all of it is finite."""
+    def factor(self, b: Array) -> bool:
+        """Eliminate from the matrix and a right-hand side; whether all of the matrix is finite.
+
+        ``b`` is at the degrees of freedom owned here.
+        """
 
     def reduce(self, b: Array) -> None:
-        """Fill :attr:`f`; ``b`` at the degrees of freedom owned here."""
+        """Eliminate from another right-hand side."""
 
     def expand(self, small: Array, x: Array) -> None:
         """The solution at the degrees of freedom owned here, after that of what is left."""
@@ -56,23 +59,24 @@ class Summed:
         mine = self._number[A.rows()].astype(np.int64) * size + self._number[A.indices]
         keys = np.unique(np.concatenate(comm.allgather(mine)))
         self._place = np.searchsorted(keys, mine)
-        # One more number says how many processes have failed.
-        self._sums = np.zeros(len(keys) + 1)
+        # Entries, right-hand side, and how many processes have failed.
+        self._sums = np.zeros(len(keys) + size + 1)
+        entries, self.f, self._failed = np.split(self._sums, [len(keys), len(keys) + size])
         indptr = np.searchsorted(keys, np.arange(size + 1) * size)
-        self.left = Csr(self._sums[:-1], keys % size if size else keys, indptr)
-        self.f: Array = np.zeros(size)
+        self.left = Csr(entries, keys % size if size else keys, indptr)
 
-    def factor(self) -> bool:
+    def factor(self, b: Array) -> bool:
         """Eliminate on all processes; whether all of it is finite on each of them."""
-        good = self._inner.factor()
+        good = self._inner.factor(b)
         self._sums[:] = 0.0
-        self._sums[self._place] = self._inner.left.data
-        self._sums[-1] = not good
+        self.left.data[self._place] = self._inner.left.data
+        self.f[self._number] = self._inner.f
+        self._failed[:] = not good
         self._comm.Allreduce(MPI.IN_PLACE, self._sums)
-        return self._sums[-1] == 0.0 and bool(lib.all_finite(len(self._sums), doubles(self._sums)))
+        return self._failed == 0.0 and bool(lib.all_finite(len(self._sums), doubles(self._sums)))
 
     def reduce(self, b: Array) -> None:
-        """Fill :attr:`f`; ``b`` at the degrees of freedom owned here."""
+        """Eliminate from another right-hand side; ``b`` at the degrees of freedom owned here."""
         self._inner.reduce(b)
         self.f[:] = 0.0
         self.f[self._number] = self._inner.f
