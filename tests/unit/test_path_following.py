@@ -3,11 +3,14 @@
 
 import itertools
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import ufl_beam as ub
+from ufl_beam.analysis.critical_points import Direction
+from ufl_beam.analysis.path_stepper import Candidate, PathStepper
 from ufl_beam.parallel import active_comm
 from ufl_beam.plotting.drawing import evenly
 
@@ -470,3 +473,34 @@ def test_loads_that_stop_growing():
     with pytest.raises(ub.ConvergenceError, match="nothing moves with the load factor") as failure:
         ub.follow(scene, ub.LoadControl(0.4))
     assert failure.value.solution.factor[-1] > 0.9
+
+
+# -- steps that leap to another branch ------------------------------------------------------------
+
+
+class Turns(PathStepper):
+    """A path of one unknown whose load factor turns at 0.4, where it may leap to another branch."""
+
+    def __init__(self, leap):
+        self._corrector = SimpleNamespace(
+            start=Direction(np.zeros(1), 0.0), direction=Direction(np.ones(1), 1.0),
+            length=lambda way: math.hypot(*way.q, way.t), size=lambda way: abs(float(way.q[0])),
+        )  # fmt: skip
+        self._leap = leap
+
+    def _seek(self, part):
+        beyond = part > 0.4
+        q, way = np.array([part + self._leap * beyond]), Direction(np.ones(1), 0.4 - part)
+        stiffness = SimpleNamespace(passed=lambda other: False)
+        return Candidate(SimpleNamespace(q1=q, step=SimpleNamespace(t1=0.0)), stiffness, way)
+
+
+@pytest.mark.parametrize("leap", [0.0, 0.5])
+def test_a_leap_is_no_critical_point(leap):
+    """From the last state before it, steps become shorter."""
+    path = Turns(leap)
+    before = path._seek(0.0)
+    found, reached = path._locate(before, path._seek(1.0), 1.0)
+    assert reached == pytest.approx(0.4, abs=2e-7)
+    assert found.passed(before) == (leap == 0)
+    assert leap == 0 or path._part == (1.0 - reached) / 2

@@ -23,6 +23,7 @@ LEAST_COSINE = 0.5  # cosine of the angle by which a step may leave the directio
 LARGEST_LENGTH_RATIO = 10.0  # ratio by which a step may be longer than its predictor
 UNCHECKED_PART = 2.0**-6  # shorter parts of a step may leave it: a law may have a kink
 SAME_POINT_PART = 1e-3  # within this part of a step a critical point is the one just reached
+LEAP_PART = 0.1  # part of a step by which states before and at a critical point never differ
 SINGULAR_RATIO = 1e-3  # what is below this part of its size at the ends of a step vanishes
 
 
@@ -32,6 +33,11 @@ class Candidate(NamedTuple):
     trial: Trial
     stiffness: Stiffness
     way: Direction
+
+    @property
+    def end(self) -> Direction:
+        """State and load factor."""
+        return Direction(self.trial.q1, self.trial.step.t1)
 
     def passed(self, before: Candidate) -> bool:
         """Return whether an eigenvalue passed zero, or the load factor turned, since ``before``."""
@@ -161,10 +167,12 @@ class PathStepper:
     def _locate(self, before: Candidate, after: Candidate, part: float) -> tuple[Candidate, float]:
         """The first state whose signs have changed, and the part of the step that leads there.
 
-        By false position with halved weights (Illinois).  Where a step in between fails, the
-        last state before, for shorter steps from there.
+        By false position with halved weights (Illinois).  Where a step in between fails, or the
+        signs change in a leap to another branch, the last state before, for shorter steps from
+        there.
         """
         measure = self._slope if self._turned(after) else self._softness
+        below = self._corrector.start
         low, high, here, there = 0.0, part, measure(before), -measure(after)
         last = failed = 0
         for _ in range(MOST_LOCATION_STEPS):
@@ -186,13 +194,18 @@ class PathStepper:
                 break
             side = -1 if found.passed(before) else 1
             if side > 0:
-                low, here = middle, measure(found)
+                low, here, below = middle, measure(found), found.end
                 there /= 2 if last == side else 1
             else:
                 high, there = middle, -measure(found)
                 here /= 2 if last == side else 1
             last = side
-        return self._seek(high), high
+        found, start = self._seek(high), self._corrector.start
+        leap, whole = (self._corrector.length(found.end + -one) for one in (below, start))
+        if low > 0 and leap > LEAP_PART * whole:
+            self._part = (part - low) / 2
+            return self._seek(low), low
+        return found, high
 
     def _turned(self, found: Candidate) -> bool:
         """Return whether the load factor goes the other way than before the step."""

@@ -19,8 +19,15 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.compiled.jit import (
-    DECLARATIONS, HEADERS, NATIVE, PROCESSOR, CompilerError, Refused, compiled, text,
-)  # fmt: skip
+    DECLARATIONS,
+    HEADERS,
+    NATIVE,
+    PROCESSOR,
+    CompilerError,
+    Refused,
+    compiled,
+    text,
+)
 from ufl_beam.dolfinx_compat import VERSIONS
 
 LOGGER = logging.getLogger("ufl_beam")

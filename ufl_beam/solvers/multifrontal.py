@@ -5,14 +5,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from petsc4py import PETSc
-
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib
+from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.solvers.substructuring import Condensed
 from ufl_beam.structure_cache import of_structure
@@ -46,8 +44,8 @@ class Multifrontal:
         self.left = Csr(schur, np.tile(np.arange(n), n), n * np.arange(n + 1))
         self.f = x[eliminated:]
         of_front, of_stack = space
-        self.c = fill(
-            ffi.new("fronts *"),
+        self.c = struct(
+            "fronts",
             size=A.size, fronts=len(arrays["parent"]), at=ffi.from_buffer("int64_t[]", at),
             values=np.empty(at[-1]), schur=schur, stack=np.empty(of_stack), x=x,
             space=np.empty(of_front), swap=np.zeros(eliminated, np.int32), **arrays,
@@ -109,9 +107,7 @@ def _structure(
     entries = np.searchsorted(of_entry[entry], np.arange(fronts + 1)).astype(np.int32)
     place, up = np.empty(len(entry), np.int32), np.empty(len(rest), np.int32)
     parent, order, before, children = np.zeros((4, fronts), dtype=np.int32)
-    c = fill(
-        ffi.new("fronts *"), fronts=fronts, first=first, begin=begin, rest=rest, parent=parent, up=up
-    )
+    c = struct("fronts", fronts=fronts, first=first, begin=begin, rest=rest, parent=parent, up=up)
     of_entries = rows[entry], columns[entry], front_of, place, parent, up
     lib.place_in_fronts(c, len(entry), *map(integers, of_entries))
     stack = lib.order_fronts(c, *map(integers, (order, before, children)))
