@@ -29,8 +29,9 @@ SOURCES = (
 )  # fmt: skip
 """Files of C beside this one; they are one translation unit."""
 
-FLAGS = ["-O3", NATIVE, "-fopenmp-simd"]
-"""Flags for the compiler; sums may be in the order of vectors."""
+FLAGS = ["-O3", NATIVE, "-fopenmp-simd", "-ffp-contract=off"]
+"""Flags for the compiler; sums may be in the order of vectors, but each product is rounded, as in
+NumPy."""
 
 _CALLBACKS = """
 extern "Python" void add_in_python(void *self, const double *q, double *out);

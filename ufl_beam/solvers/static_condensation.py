@@ -192,7 +192,7 @@ class Elimination:
             rows=len(indices["dof"]), left_size=len(here), left_data=self.left.data,
             left_f=self.f, data=A.data, indptr=A.indptr, swaps=ffi.new("uint8_t[]", 3 * vertices),
             pivots=np.empty(lib.BLOCK * vertices), to_next=np.empty(lib.BLOCK * vertices),
-            f=np.zeros(3 * vertices), order=ffi.from_buffer("uint8_t[]", order), **indices,
+            f=np.empty(share.size), order=ffi.from_buffer("uint8_t[]", order), **indices,
         )  # fmt: skip
 
     def factor(self, b: Array) -> bool:
@@ -231,7 +231,7 @@ class ChainsFirst:
 
     def drive(self, c: Any) -> None:
         """Let Newton's method in C do the same; ``c`` is its ``equation`` of loops.h."""
-        c.chains = self._elimination.c
+        c.chains, self._elimination.c.f = self._elimination.c, c.change
         self._solved.drive(c)
 
     def setUp(self, pc: PETSc.PC) -> None:

@@ -193,10 +193,10 @@ static inline void eliminate_vertices(const chains *c, chain_fronts *at, const d
   solve_rows(far, row, swap);
   for (int l = 0; l < PAIR; ++l) {
     const int v = at->vertex[l];
-    double *pivot = c->pivots + BLOCK * v, *to_next = c->to_next + BLOCK * v, *f = c->f + 3 * v;
+    double *pivot = c->pivots + BLOCK * v, *to_next = c->to_next + BLOCK * v;
     for (int r = 0; r < 3; ++r) {
       c->swaps[3 * v + r] = (uint8_t)swap[r][l];
-      f[r] = row[far * r + F][l];
+      c->f[c->row[3 * v + r]] = row[far * r + F][l];
       for (int k = 0; k < 3; ++k) {
         pivot[3 * r + k] = row[far * r + k][l];
         to_next[3 * r + k] = row[far * r + AFTER + k][l];
@@ -269,6 +269,16 @@ void eliminate(const chains *c, const double *b)
   }
 }
 
+static inline void read_vertex(const chains *c, const double *f, int vertex, double *y)
+{
+  for (int r = 0; r < 3; ++r) y[r] = f[c->row[3 * vertex + r]];
+}
+
+static inline void write_vertex(const chains *c, const double *y, int vertex, double *f)
+{
+  for (int r = 0; r < 3; ++r) f[c->row[3 * vertex + r]] = y[r];
+}
+
 /* y = D^-1 b of a vertex, and what that makes of the right-hand side of the next one, or of the right
  * end */
 static inline void go_on(const chains *c, int chain, int vertex, const double *b, double *y,
@@ -290,16 +300,17 @@ void reduce(const chains *c, const double *b)
   const int32_t *numbers = c->ends;
   for (int chain = 0; chain < c->chains; ++chain, numbers += 6) {
     const int first = c->first[chain], end = c->first[chain + 1];
-    double left[3] = {0}, next[3] = {0}, from[9], y[3];
+    double left[3] = {0}, next[3] = {0}, from[9], x[3], y[3];
     for (int v = first; v < end; ++v) {
-      for (int r = 0; r < 3; ++r) y[r] = next[r] + b[c->row[3 * v + r]];
-      go_on(c, chain, v, y, c->f + 3 * v, next);
+      read_vertex(c, b, v, x);
+      for (int r = 0; r < 3; ++r) x[r] += next[r];
+      go_on(c, chain, v, x, y, next);
+      write_vertex(c, y, v, c->f);
     }
     if (c->spike[chain]) {
-      memcpy(y, c->f + 3 * (end - 1), sizeof y);
+      read_vertex(c, c->f, end - 1, y);
       for (int v = end - 2; v >= first; --v) {
-        double x[3];
-        memcpy(x, c->f + 3 * v, sizeof x);
+        read_vertex(c, c->f, v, x);
         subtract(c->to_next + BLOCK * v, y, x);
         memcpy(y, x, sizeof y);
       }
@@ -323,11 +334,11 @@ static void follow_left_end(const chains *c, int chain, const double *left)
   for (int v = c->first[chain]; v < c->first[chain + 1]; ++v) {
     if (fmax(fabs(next[0]), fmax(fabs(next[1]), fabs(next[2]))) <= faded) return;
     go_on(c, chain, v, next, y, next);
-    for (int k = 0; k < 3; ++k) c->f[3 * v + k] += y[k];
+    for (int r = 0; r < 3; ++r) c->f[c->row[3 * v + r]] += y[r];
   }
 }
 
-/* The unknowns of all vertices into x, from those that are left; f as reduce left it. */
+/* The unknowns of all vertices into x, from those that are left; f as reduce left it, which may be x. */
 void expand(const chains *c, const double *left, double *x)
 {
   for (int k = 0; k < c->rows; ++k) x[c->dof[k]] = left[c->number[k]];
@@ -337,10 +348,10 @@ void expand(const chains *c, const double *left, double *x)
     for (int k = 0; k < 3; ++k) first[k] = left[numbers[k]], next[k] = left[numbers[3 + k]];
     if (c->spike[chain]) follow_left_end(c, chain, first);
     for (int v = c->first[chain + 1] - 1; v >= c->first[chain]; --v) {
-      memcpy(y, c->f + 3 * v, sizeof y);
+      read_vertex(c, c->f, v, y);
       subtract(c->to_next + BLOCK * v, next, y);
       memcpy(next, y, sizeof y);
-      for (int r = 0; r < 3; ++r) x[c->row[3 * v + r]] = y[r];
+      write_vertex(c, y, v, x);
     }
   }
 }

@@ -105,28 +105,34 @@ void place_in_fronts(const fronts *c, int entries, const int32_t *row, const int
 
 /* Put the fronts in an order in which the children of a front are together before it: order; before:
  * the place before the first front that one place depends on; children: of each front, but for those of
- * the last. Returns how many numbers the stack has at most. */
+ * the last. Of the children, that which depends on most comes first, so that little waits on the stack
+ * meanwhile. Returns how many numbers the stack has at most. */
 int64_t order_fronts(const fronts *c, int32_t *order, int32_t *before, int32_t *children)
 {
   const int last = c->fronts - 1;
-  int place = last;
+  int32_t place = 0;
   int64_t most = 0, stack = 0;
-  int32_t *below = before, *end = order; /* what a front depends on; where that ends, for now */
+  int32_t *below = before, *from = order; /* what a front depends on; where that begins, for now */
   for (int s = 0; s < last; ++s) below[s] = 1, children[s] = 0;
   for (int s = 0; s < last; ++s)
     if (c->parent[s] < last) below[c->parent[s]] += below[s], ++children[c->parent[s]];
-  int32_t *found = malloc(2 * (size_t)last * sizeof *found + 1);
-  if (!found) return -1;
-  for (int s = last - 1; s >= 0; --s) {
-    int32_t *free_end = c->parent[s] < last ? end + c->parent[s] : &place;
-    const int here = *free_end - 1;
-    *free_end -= below[s];
-    end[s] = here;
+  int32_t *space = calloc(4 * (size_t)last + 1, sizeof *space);
+  if (!space) return -1;
+  /* Those that depend on most come first, and so parents before their children. */
+  int32_t *found = space, *first = space + 2 * last, *sorted = first + last + 1;
+  for (int s = 0; s < last; ++s) ++first[last - below[s] + 1];
+  for (int k = 0; k < last; ++k) first[k + 1] += first[k];
+  for (int s = 0; s < last; ++s) sorted[first[last - below[s]]++] = s;
+  for (int k = 0; k < last; ++k) {
+    const int s = sorted[k];
+    int32_t *begin = c->parent[s] < last ? from + c->parent[s] : &place;
+    from[s] = *begin, *begin += below[s];
+    const int here = *begin - 1;
     found[here] = s, found[last + here] = here - below[s];
   }
   memcpy(order, found, last * sizeof *found);
   memcpy(before, found + last, last * sizeof *found);
-  free(found);
+  free(space);
   for (int k = 0; k < last; ++k) {
     for (int child = k - 1, left = children[order[k]]; left; --left, child = before[child]) {
       const int64_t rest = c->begin[order[child] + 1] - c->begin[order[child]];
@@ -143,7 +149,7 @@ int64_t order_fronts(const fronts *c, int32_t *order, int32_t *before, int32_t *
 
 /* Pivots that are eliminated from all of a front at once; rows of a product that stay in registers. */
 enum { PANEL = 24, ROWS = 4 };
-typedef double numbers __attribute__((vector_size(8 * WIDE), aligned(8), may_alias));
+typedef double wide __attribute__((vector_size(8 * WIDE), aligned(8), may_alias));
 
 /* C -= A B, of so many rows and vectors of columns, the last of which may have fewer; rows of all three
  * have `stride` numbers. Beyond the last column there are numbers, too. */
@@ -151,20 +157,20 @@ static inline __attribute__((always_inline)) void subtract_block(
     const int rows, const int vectors, int columns, int depth, int stride, const double *A,
     const double *B, double *C)
 {
-  numbers sum[ROWS][2];
+  wide sum[ROWS][2];
   for (int i = 0; i < rows; ++i)
-    for (int v = 0; v < vectors; ++v) sum[i][v] = (numbers){0};
+    for (int v = 0; v < vectors; ++v) sum[i][v] = (wide){0};
   for (int k = 0; k < depth; ++k, B += stride)
     for (int i = 0; i < rows; ++i)
       for (int v = 0; v < vectors; ++v)
-        sum[i][v] += A[(int64_t)i * stride + k] * ((const numbers *)B)[v];
+        sum[i][v] += A[(int64_t)i * stride + k] * ((const wide *)B)[v];
   for (int i = 0; i < rows; ++i, C += stride)
     if (columns == vectors * WIDE)
-      for (int v = 0; v < vectors; ++v) ((numbers *)C)[v] -= sum[i][v];
+      for (int v = 0; v < vectors; ++v) ((wide *)C)[v] -= sum[i][v];
     else {
-      double part[2 * WIDE];
-      memcpy(part, sum[i], vectors * sizeof *sum[i]);
-      for (int j = 0; j < columns; ++j) C[j] -= part[j];
+      double ends[2 * WIDE];
+      memcpy(ends, sum[i], vectors * sizeof *sum[i]);
+      for (int j = 0; j < columns; ++j) C[j] -= ends[j];
     }
 }
 

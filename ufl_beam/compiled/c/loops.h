@@ -247,7 +247,7 @@ typedef struct {
   const double *data;
   double *pivots, *to_next; /* vertices x BLOCK */
   uint8_t *swaps;           /* vertices x 3: rows in the order of the pivots */
-  double *f;                /* vertices x 3: right-hand sides */
+  double *f;                /* at the degrees of freedom of vertices: what pivots make of those of b */
 
   /* The system of what is left. */
   int left, stay, rows;          /* its entries; those of data that stay; degrees of freedom that do */

@@ -121,6 +121,19 @@ static void combine_rates(const rates *r, const double *numbers, int first, doub
   if (!begun) memset(out, 0, r->size * sizeof *out);
 }
 
+/* The same: a rate itself where that is all, else in `space`. */
+static const double *sum_of_rates(const rates *r, const double *numbers, int first, double *space)
+{
+  const double *only = 0;
+  int more = 0;
+  for (int j = first; j < r->number; ++j)
+    if (numbers[j] == 1 && !only) only = r->rate[j];
+    else more |= numbers[j] != 0;
+  if (only && !more) return only;
+  combine_rates(r, numbers, first, space);
+  return space;
+}
+
 static int find_numbers(rates *r, double dt)
 {
   for (int k = 0; k < r->known; ++k) {
@@ -142,9 +155,9 @@ static int find_numbers(rates *r, double dt)
 void begin_inertia(void *self, const time_step *step, const double *q1, const double *s)
 {
   const matrix_of_rates *m = self;
-  combine_rates(m->rates, m->rates->now->inertia, 1, m->v);
+  m->product->v = sum_of_rates(m->rates, m->rates->now->inertia, 1, m->v);
   m->product->factor = m->rates->now->factor, m->product->back = m->rates->now->back;
-  m->product->v = m->v, m->product->q0 = step->q0;
+  m->product->q0 = step->q0;
 }
 
 void accept_inertia(void *self, const time_step *step, const double *q1, const double *s)
@@ -183,10 +196,10 @@ void add_kinetic_energy(void *self, const time_step *step, const double *q1, con
 void begin_rayleigh(void *self, const time_step *step, const double *q1, const double *s)
 {
   const matrix_of_rates *m = self;
-  combine_rates(m->rates, m->rates->now->velocity, 1, m->v);
+  m->product->v = sum_of_rates(m->rates, m->rates->now->velocity, 1, m->v);
   m->product->factor = m->rates->now->factor_of_velocity;
   m->product->back = m->rates->now->back_of_velocity;
-  m->product->v = m->v, m->product->q0 = step->q0;
+  m->product->q0 = step->q0;
 }
 
 void accept_rayleigh(void *self, const time_step *step, const double *q1, const double *s)
@@ -382,9 +395,8 @@ static int followed(const march *m)
   for (int i = 0; i < m->size; ++i)
     work += (a * p->force[i] + (1 - a) * e->inner_force[i]) * m->s[i];
   e->moved = fmin(largest_motion(e->size, e->weight, m->x), e->scene);
-  find_last_digits(e, m->x, e->space);
-  for (int i = 0; i < m->size; ++i)
-    round_off += fabs(e->tangent[e->diagonal[i]] * e->space[i] * m->s[i]);
+  find_round_off(e, m->x, e->space);
+  for (int i = 0; i < m->size; ++i) round_off += fabs(e->space[i] * m->s[i]);
   for (int k = 0; k < p->accounts; ++k)
     for (int i = 0; i < p->entries[k]; ++i) through += fabs(p->account[k][i]);
   const double change = sum.in_beams + sum.in_connectors;
