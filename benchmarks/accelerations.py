@@ -102,10 +102,10 @@ ACCELERATIONS = {
         ),
     ),
     "elimination along beams": Acceleration(
-        "Eliminates the vertices between the ends of beams in blocks of three; PETSc factors the "
-        "remaining matrix. Without it, PETSc's LU with the ordering \"amd\" factors the whole "
-        "tangent, called from the same Newton's method in C. On several processes this work is "
-        "shared, the factorization is not.",
+        "Eliminates the vertices between the ends of beams in blocks of three; dense fronts factor "
+        "the remaining matrix. Without it, such fronts with the ordering \"amd\" factor the whole "
+        "tangent, called from the same Newton's method in C. Several processes share all of this "
+        "but what is at their borders.",
         by.SHIPPED, by.WHOLE,
         (
             "compiled/c/elimination.c", "solvers/static_condensation.py:Chains",
@@ -124,6 +124,13 @@ ACCELERATIONS = {
             "solvers/static_condensation.py:_what_is_left",
             "solvers/static_condensation.py:Elimination",
         ),
+    ),
+    "dense fronts": Acceleration(
+        "Eliminate what the elimination along beams leaves, in dense matrices whose products stay "
+        "in registers. Without it, KLU does so, called by PETSc. The more joints a scene has, the "
+        "more of them are worth: see docs/ranks.md.",
+        by.SHIPPED, by.LEFT,
+        ("compiled/c/fronts.c", "solvers/multifrontal.py"),
     ),
     "guess with the acceleration": Acceleration(
         "Adds to the guess of a step that part of the last second difference of the configuration "

@@ -23,6 +23,7 @@ from ufl_beam.simulation.prediction import Prediction
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers import newton, static_condensation
 from ufl_beam.solvers.direct_solver import DirectSolver
+from ufl_beam.solvers.klu import Klu
 from ufl_beam.terms.connectors import ReferenceCouplings
 from ufl_beam.terms.inelastic_beams import ReferenceInelasticBeams
 from ufl_beam.terms.reference_points import ReferencePoints
@@ -36,8 +37,13 @@ def nothing(*_):
 
 
 def without_chains(cell_dofs, indptr, indices, alone, *more):
-    """Chains of no vertices: the whole tangent remains for PETSc."""
+    """Chains of no vertices: the whole tangent remains for the fronts."""
     return plan(cell_dofs, indptr, indices, np.zeros_like(alone), *more)
+
+
+def klu(inner, _):
+    """KLU, called by PETSc, in the place of fronts."""
+    return Klu(inner)
 
 
 class EachStepAnew(newton.Solver):
@@ -112,6 +118,7 @@ NEWTON_OF_PETSC = (newton.Solver, "_leave_newton_to_c", nothing)
 EQUATION_IN_PYTHON = (StepEquation, "leave_to_c", nothing)
 CELL_BY_CELL = (function_spaces, "vectorise", nothing)
 NO_CHAINS = (static_condensation, "_plan", without_chains)
+NO_FRONTS = (static_condensation, "Multifrontal", klu)
 ALL_TANGENTS = (newton, "loop", loop_without_kept_tangents)
 EACH_STEP_ANEW = (step_solver, "Solver", EachStepAnew)
 AT_VELOCITY = (stepping, "Prediction", AtVelocity)
@@ -121,10 +128,11 @@ SHIPPED, STEPS, REFERENCE = "as shipped", "steps in Python", "`reference=True`"
 MODIFIED, MODIFIED_STEPS = "`modified=True`", "`modified=True`, steps in Python"
 PETSC, PYTHON = "PETSc's `newtonls`", "`newtonls`, equation in Python"
 ASSEMBLERS = "`newtonls`, equation in Python, assemblers of DOLFINx"
-SCALAR, WHOLE, KLU = (
+SCALAR, WHOLE, KLU, LEFT = (
     "cell by cell",
-    "LU of the whole tangent",
+    "fronts of the whole tangent",
     "`newtonls`, KLU of the whole tangent",
+    "KLU in the place of fronts",
 )
 TANGENTS, VELOCITY = "a tangent in each iteration", "guess at the last velocity"
 ANEW = "`modified=True`, steps in Python, a tangent in each"
@@ -142,6 +150,7 @@ VARIANTS = {
     SCALAR: Variant((CELL_BY_CELL,)),
     WHOLE: Variant((NO_CHAINS,)),
     KLU: Variant((STEPS_IN_PYTHON, NEWTON_OF_PETSC, classes(factors=DirectSolver))),
+    LEFT: Variant((NO_FRONTS,)),
     TANGENTS: Variant((ALL_TANGENTS,)),
     VELOCITY: Variant((AT_VELOCITY,)),
     MODIFIED: Variant((), {"modified": True}),

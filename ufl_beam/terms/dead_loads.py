@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, loop, struct
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop, struct
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
@@ -130,7 +130,7 @@ class DeadLoads(LoadTerm):
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Subtract the loads from the residual."""
-        r[self.dofs] -= self._acts
+        lib.subtract_vector(self._in_c, doubles(q1), doubles(r))
 
     def accept(self, q1: Array, s: Array) -> None:
         """Enter the work of the loads, if there are any."""
