@@ -42,7 +42,9 @@ def test_units_in_statics(seed):
     assert difference(one, other) < SAME
     assert one.solution.parts == other.solution.parts
     if one.solution.parts <= 6:  # else iterations wandered before a step was cut
-        assert one.solution.iterations == other.solution.iterations
+        # Before the least number of iterations a residual must be below 1e-14 of the forces: of a
+        # step in which next to nothing changes, its last digits decide.
+        assert abs(one.solution.iterations - other.solution.iterations) <= 1
 
 
 def test_axes(seed):
