@@ -127,25 +127,18 @@ int judge(equation *e, const double *q, int iteration, double residual, double s
   return e->slow == e->patience ? STALLED : ITERATING;
 }
 
-/* Spacing of the numbers around displacements and rotations: the last digits of what they are part
- * of. Strains are computed from them to their own relative precision, as long as rotations are small.
- * The next number has the next pattern of bits. */
-static void find_last_digits(const equation *e, const double *q, double *digits)
+/* Forces that the last digits of displacements and rotations make: of the numbers that they are part of.
+ * Strains are computed from them to their own relative precision, as long as rotations are small. The
+ * next number has the next pattern of bits. */
+void find_round_off(const equation *e, const double *q, double *forces)
 {
   const double amplitude = e->moved / e->scene;
   for (int i = 0; i < e->size; ++i) {
     const double far = fabs(q[i]) + amplitude * e->lengths[i];
     union { double number; int64_t bits; } next = {far};
     next.bits += 1;
-    digits[i] = e->moves[i] * (next.number - far);
+    forces[i] = e->moves[i] * (next.number - far) * e->tangent[e->diagonal[i]];
   }
-}
-
-/* Forces that the last digits make. */
-void find_round_off(const equation *e, const double *q, double *forces)
-{
-  find_last_digits(e, q, forces);
-  for (int i = 0; i < e->size; ++i) forces[i] *= e->tangent[e->diagonal[i]];
 }
 
 /* Before the first iterate; `like_last` says that a modified tangent may be that of the last step. */
