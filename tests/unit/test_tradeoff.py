@@ -179,6 +179,22 @@ def test_modified_newton_is_proposed_where_it_helps(law):
         assert all(run.steps < found.best.steps for run in slower)
 
 
+@pytest.mark.parametrize("seed", range(40))
+def test_no_run_is_done_twice(law, seed):
+    """Whatever the times of the runs, by which options of Newton's method are chosen."""
+    law(smooth)
+    simulate, random = tradeoff.simulate, np.random.default_rng(seed)
+
+    def by_chance(scene, **others):
+        one = simulate(scene, **others)
+        one.seconds = BUILDING + (one.seconds - BUILDING) * random.uniform(0.5, 1.5)
+        return one
+
+    tradeoff.simulate = by_chance  # the fixture restores it
+    found = ask(mesh=None, newton=None, tolerance={"value": 1e-4})
+    assert len({str(run.dials) for run in found.runs}) == len(found.runs)
+
+
 @pytest.mark.parametrize("tolerance", [3e-3, 1e-3, 1e-4, 1e-5])
 def test_an_order_below_that_in_theory_does_not_exceed_the_tolerance(law, tolerance):
     """Cells of degree 2 with errors of second order, as of polygons in the place of arcs."""

@@ -86,8 +86,9 @@ class RefinementRuns:
 
     def run_with(self, one: Refinement, newton: int) -> Run | None:
         """Do a run with some options of Newton's method; None if it fails or there is no time."""
-        if newton == self.newton:
-            return self.runs.get(one)
+        run = self.runs.get(one)  # perhaps done before other options were chosen
+        if run is not None and run.dials.newton == self.newtons[newton]:
+            return run
         if (one, newton) not in self.others and self.allowed([one]):
             done, _ = self._done([one], newton)
             self.others |= {(done_one, newton): run for done_one, run in done.items()}
@@ -98,7 +99,7 @@ class RefinementRuns:
         for number in self._of_same_tolerance():
             before, run = self.runs[one], self.run_with(one, number)
             if run is not None and run.stepping < FASTER * before.stepping:
-                self.others[one, self.newton] = before
+                self.others[one, self.newtons.index(before.dials.newton)] = before
                 self.runs[one], self.newton = self.others.pop((one, number)), number
 
     def may_be_faster(self, newton: int) -> bool:
