@@ -81,13 +81,14 @@ def test_errors_of_petsc_that_python_meets():
 @pytest.fixture
 def simulation():
     section = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
-    beam = ub.Beam((0, 0), (4, 3), section, cells=6)
-    loads = [ub.PointLoad(beam.end, force=(3.0, 5.0))]
-    # A joint with a multiplier: KLU factors what the chains leave.
-    brace = ub.Beam((4, 0), (4, 3), section, cells=2)
-    pin = ub.Revolute(beam.end, brace.end, measured=True)
-    clamps = [ub.Clamped(beam.start), ub.Clamped(brace.start)]
-    scene = ub.Scene([beam, brace], joints=[pin], supports=clamps, loads=loads)
+    beam = ub.Beam((0, 0), (4, 3), section, cells=8)
+    loads = [ub.PointLoad(beam.end, force=(300.0, 500.0))]
+    # Joints with multipliers, more than fit into one front: KLU factors what the chains leave.
+    places = [beam.at(s) for s in (0.25, 0.5, 0.75, 1.0)]
+    braces = [ub.Beam((p.point[0], 0), p.point, section, cells=2) for p in places]
+    pins = [ub.Revolute(p, b.end, measured=True) for p, b in zip(places, braces, strict=True)]
+    clamps = [ub.Clamped(one.start) for one in (beam, *braces)]
+    scene = ub.Scene([beam, *braces], joints=pins, supports=clamps, loads=loads)
     return ub.Simulation(scene, ub.Static())
 
 

@@ -111,6 +111,22 @@ def test_the_schur_complement():
     assert condensed.numbers.tolist() == [2, 3, 50, 51]
 
 
+@pytest.mark.parametrize("units", [1.0, 1e-20, 1e20])
+def test_a_small_system_with_forces_of_joints(units):
+    """Two bars that only the forces of joints hold: their stiffness is singular, with zeros on the
+    diagonal of the forces, and of any size beside them."""
+    bar = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    K = units * np.kron(np.eye(2), bar)
+    B = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, -1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+    matrix = np.block([[K, B.T], [B, np.zeros((3, 3))]])
+    matrix[-1, -1] = -1.0 / units  # the last joint gives way
+    b = np.array([0.0, units, 0.0, units, 0.0, 0.0, 0.0])
+    x = solve(Multifrontal(Whole(matrix, np.arange(7)), np.zeros(7, dtype=bool)), b)
+    # Motions are of the size 1, and forces of that of the stiffness.
+    assert np.abs((matrix @ x - b) / np.array([units] * 4 + [1.0] * 3)).max() < 1e-14
+    assert np.abs(x[:4]).max() < 10.0
+
+
 @pytest.mark.parametrize("value", [0.0, np.nan])
 def test_a_singular_part_is_said(value):
     """Even where nothing that stays couples to it."""

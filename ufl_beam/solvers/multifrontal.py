@@ -15,13 +15,16 @@ from ufl_beam.compiled.csr import Csr
 from ufl_beam.solvers.substructuring import Condensed
 from ufl_beam.structure_cache import of_structure
 
+ONE_FRONT = int(lib.ONE_FRONT)
+"""Unknowns of a system that is one dense front at most."""
+
 
 class Multifrontal:
     """Multifrontal elimination of all unknowns of a system, or of all but some.
 
     The order is that of approximate minimum degree.  Each front exchanges rows among its pivots
-    only, so the matrix must not have structural zeros on the diagonal; see fronts.c.  Satisfies
-    :class:`Condensed`.
+    only, see fronts.c: all rows of systems of :data:`ONE_FRONT` unknowns, else few, so that the
+    matrix must not have structural zeros on the diagonal.  Satisfies :class:`Condensed`.
 
     Args:
         inner: The system.
@@ -43,12 +46,13 @@ class Multifrontal:
         schur, x = np.zeros(n * n), np.zeros(A.size)
         self.left = Csr(schur, np.tile(np.arange(n), n), n * np.arange(n + 1))
         self.f = x[eliminated:]
-        of_front, of_stack = space
+        of_front, of_pivots, of_stack = space
         self.c = struct(
             "fronts",
             size=A.size, fronts=len(arrays["parent"]), at=ffi.from_buffer("int64_t[]", at),
             values=np.empty(at[-1]), schur=schur, stack=np.empty(of_stack), x=x,
-            space=np.empty(of_front), swap=np.zeros(eliminated, np.int32), **arrays,
+            space=np.empty(of_front), unit=np.empty(of_pivots),
+            swap=np.zeros(eliminated, np.int32), **arrays,
         )  # fmt: skip
 
     def drive(self, c: Any) -> None:
@@ -89,8 +93,8 @@ def _structure(
     """Find the fronts of a matrix.
 
     Returns:
-        :data:`STRUCTURE`; where the factors of each front begin, int64; numbers that the largest
-        front has, and the stack at most.
+        :data:`STRUCTURE`; where the factors of each front begin, int64; numbers in the largest
+        front, pivots of a front and numbers on the stack at most.
     """
     A = Csr(np.empty(0), indices, indptr)
     unknown = np.concatenate([_minimum_degree(A, ~stays), np.flatnonzero(stays)]).astype(np.int32)
@@ -113,7 +117,8 @@ def _structure(
     stack = lib.order_fronts(c, *map(integers, (order, before, children)))
     at = np.append(0, np.cumsum(pivots * (pivots + 2 * others)))
     # Products read a few numbers beyond the last one.
-    space = np.array([(pivots + others)[:-1].max(initial=0) ** 2 + 2 * lib.WIDE, stack])
+    largest = [x[:-1].max(initial=0) for x in (pivots + others, pivots)]
+    space = np.array([largest[0] ** 2 + 2 * lib.WIDE, largest[1], stack])
     return (
         unknown, first, begin, rest, parent, up, order, before, children, entries, entry, place,
         at, space,

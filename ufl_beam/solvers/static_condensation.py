@@ -20,7 +20,7 @@ from ufl_beam.compiled.c_library import doubles, ffi, fill, lib
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Share
 from ufl_beam.solvers.klu import BAD_PIVOT, GOOD, Klu, succeeds
-from ufl_beam.solvers.multifrontal import Multifrontal
+from ufl_beam.solvers.multifrontal import ONE_FRONT, Multifrontal
 from ufl_beam.solvers.substructuring import Condensed, Summed
 from ufl_beam.structure_cache import of_structure
 
@@ -219,14 +219,15 @@ class ChainsFirst:
     def __init__(self, share: Share, A: Csr) -> None:
         self._elimination, self._is_new, self._good = Elimination(share, A), False, False
         # A connector alone may hold a part whose own stiffness leaves zeros, or nothing but
-        # round-off, on the diagonal; fronts exchange too few rows for that, KLU does not.
-        fronts = not len(share.grid.multipliers)
+        # round-off, on the diagonal; several fronts exchange too few rows for that, KLU does not.
+        few_rows = not len(share.grid.multipliers)
         rest: Condensed = self._elimination
         if not share.alone:
-            if fronts:
+            if few_rows:
                 rest = Multifrontal(rest, self._elimination.shared)
             rest = Summed(rest, share.comm)
         none = np.zeros(len(rest.numbers), dtype=bool)
+        fronts = few_rows or len(none) <= ONE_FRONT
         self._solved = Multifrontal(rest, none) if fronts else Klu(rest)
 
     def drive(self, c: Any) -> None:

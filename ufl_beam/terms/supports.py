@@ -147,10 +147,12 @@ class Supports:
             axes.turn_matrix(data)
         if len(self.dofs):
             # What stands on the diagonal has the right dimension and size for what is held.
-            # Where material that flows freely leaves nothing, what stood there before does as well.
+            # Where material that flows freely leaves nothing, or the digits of motions that fade,
+            # what stood there before does as well.
             zero, pivots = self.entries
             diagonal = data[pivots]
-            np.copyto(self.pivots, diagonal, where=diagonal != 0.0)
+            normal = np.abs(diagonal) >= np.finfo(float).tiny
+            np.copyto(self.pivots, diagonal, where=normal)
             data[zero] = 0.0
             data[pivots] = self.pivots
 

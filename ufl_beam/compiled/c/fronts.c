@@ -4,7 +4,7 @@
  * A front is a dense matrix: the rows and columns of some pivots, which are eliminated in it, and of
  * the later unknowns that these couple to. What elimination makes of the latter is added to the front
  * of the first of them. The last front has no pivots: it is the Schur complement of the unknowns that
- * stay. Rows are exchanged among the pivots of a front.
+ * stay. Rows are exchanged among the pivots of a front; a small system is one front.
  */
 
 enum { FEW = 64 }; /* entries by which a front may grow for each pivot, so that it takes one more */
@@ -31,7 +31,13 @@ int find_fronts(int unknowns, int eliminated, const int32_t *indptr, const int32
   for (int j = 0; j < 2 * unknowns; ++j) next[j] = -1;
   for (int j = 0; j < unknowns; ++j) mark[j] = -1;
   begin[0] = 0;
-  for (int j = 0; j < eliminated; ++j) {
+  const int all = unknowns <= ONE_FRONT && eliminated;
+  if (all) {
+    first[count++] = 0;
+    for (int j = eliminated; j < unknowns; ++j) rest[j - eliminated] = j;
+    begin[count] = unknowns - eliminated;
+  }
+  for (int j = all ? eliminated : 0; j < eliminated; ++j) {
     int32_t *found = rest + begin[count];
     int number = 0;
     if (room - begin[count] < unknowns) return -1;
@@ -205,18 +211,26 @@ static void exchange_rows(int size, double *a, double *b)
 }
 
 /* Eliminate the pivots of a front, rows exchanged among them; reciprocals of the pivots on the
- * diagonal, multipliers below it; whether they are finite */
-static int eliminate_pivots(int size, int pivots, double *F, int32_t *swap)
+ * diagonal, multipliers below it; whether they are finite. `unit` is space for the largest number of
+ * each row, by which those of rows with other dimensions are compared. */
+static int eliminate_pivots(int size, int pivots, double *F, int32_t *swap, double *unit)
 {
   int finite = 1;
+  for (int i = 0; i < pivots; ++i) {
+    double largest = 0;
+    for (int j = 0; j < size; ++j) largest = fmax(largest, fabs(F[(int64_t)i * size + j]));
+    unit[i] = 1 / largest;
+  }
   for (int first = 0; first < pivots; first += PANEL) {
     const int next = pivots - first < PANEL ? pivots : first + PANEL;
     for (int k = first; k < next; ++k) {
       int best = k;
       for (int i = k + 1; i < pivots; ++i)
-        if (fabs(F[(int64_t)i * size + k]) > fabs(F[(int64_t)best * size + k])) best = i;
+        if (fabs(F[(int64_t)i * size + k]) * unit[i] > fabs(F[(int64_t)best * size + k]) * unit[best])
+          best = i;
       double *pivot = F + (int64_t)k * size;
       swap[k] = best;
+      unit[best] = unit[k];
       if (best != k) exchange_rows(size, pivot, F + (int64_t)best * size);
       pivot[k] = 1 / pivot[k];
       finite &= isfinite(pivot[k]) != 0;
@@ -279,7 +293,7 @@ int factor_fronts(const fronts *c, const double *data)
       add_to_parent(c, of, top -= (int64_t)made * made, made, F);
       child = c->before[child];
     }
-    finite &= eliminate_pivots(size, pivots, F, c->swap + c->first[s]);
+    finite &= eliminate_pivots(size, pivots, F, c->swap + c->first[s], c->unit);
     memcpy(rows, F, (int64_t)pivots * size * sizeof *F);
     for (int i = pivots; i < size; ++i)
       memcpy(columns + (int64_t)(i - pivots) * pivots, F + (int64_t)i * size, pivots * sizeof *F);

@@ -266,7 +266,8 @@ int all_finite(int size, const double *values);
 
 /* -- multifrontal elimination, see fronts.c ------------------------------------------------------ */
 
-enum { WIDE = 8 }; /* columns of a product that are computed at once */
+enum { WIDE = 8, ONE_FRONT = 24 }; /* columns of a product that are computed at once; unknowns of a
+                                      * system that are one front at most */
 
 typedef struct {
   int size, fronts;
@@ -281,6 +282,7 @@ typedef struct {
   double *schur, *stack, *space; /* space: for the largest front, and 2 WIDE numbers more */
   int32_t *swap;                /* of the pivots: row that each is exchanged with */
   double *x;                    /* right-hand side and solution, in the order of elimination */
+  double *unit;                 /* space for a number of each pivot of a front */
 } fronts;
 
 int find_fronts(int unknowns, int eliminated, const int32_t *indptr, const int32_t *indices,

@@ -60,12 +60,13 @@ void fill_tangent(const equation *e, const double *q)
 }
 
 /* The tangent at q. What stands on the diagonal has the right dimension and size for what is held;
- * where material that flows freely leaves nothing, what stood there before does as well. */
+ * where material that flows freely leaves nothing, or the digits of motions that fade, what stood there
+ * before does as well. */
 void assemble(equation *e, const double *q)
 {
   fill_tangent(e, q);
   for (int k = 0; k < e->held; ++k)
-    if (e->tangent[e->pivot[k]] != 0) e->pivots[k] = e->tangent[e->pivot[k]];
+    if (isnormal(e->tangent[e->pivot[k]])) e->pivots[k] = e->tangent[e->pivot[k]];
   for (int k = 0; k < e->zeros; ++k) e->tangent[e->zero[k]] = 0;
   for (int k = 0; k < e->held; ++k) e->tangent[e->pivot[k]] = e->pivots[k];
   for (int k = 0; k < e->idle; ++k) e->tangent[e->idle_entry[k]] += e->idle_stiffness[k];
