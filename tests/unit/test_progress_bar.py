@@ -29,11 +29,11 @@ CALLS = {
     "simulate": (simulate, r"100%\|.*\n$"),
     "follow": (
         lambda **more: ub.follow(SCENE, ub.LoadControl(0.5), steps=2, **more),
-        r"2/2 \[.*\]\n$",
+        r"2/2 \[.*\] *\n$",
     ),
     "study": (
         lambda **more: ub.study(lambda n: {"t": simulate().times}, [{"n": 1}, {"n": 2}], **more),
-        r"2/2 \[.*\]\n$",
+        r"2/2 \[.*\] *\n$",
     ),
     "tradeoff": (
         lambda **more: ub.tradeoff(
