@@ -266,8 +266,10 @@ int all_finite(int size, const double *values);
 
 /* -- multifrontal elimination, see fronts.c ------------------------------------------------------ */
 
-enum { WIDE = 8, ONE_FRONT = 24 }; /* columns of a product that are computed at once; unknowns of a
-                                      * system that are one front at most */
+enum {
+  WIDE = 8,      /* columns of a product that are computed at once */
+  ONE_FRONT = 24 /* unknowns of a system that is one front, at most */
+};
 
 typedef struct {
   int size, fronts;
