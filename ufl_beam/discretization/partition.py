@@ -194,6 +194,14 @@ class Share:
         lengths[self.multipliers()] = 0.0
         return lengths
 
+    def weights(self) -> Array:
+        """Factors that make forces and moments comparable, see ``Equation``; a new array."""
+        weights = np.ones(self.size)
+        weights[self.rotations()] = 1 / self.grid.scene.size
+        weights[self.multipliers()] = 0.0
+        weights[self.num_owned :] = 0.0
+        return weights
+
     def numbers(self) -> Index:
         """Numbers in PETSc's vectors of the local degrees of freedom."""
         return self._numbers

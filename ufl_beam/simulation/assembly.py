@@ -201,7 +201,8 @@ def assemble(
     supports = Supports(share, scheme, ledger, A)
     if inertia:
         supports.stop(inertia.v)
-    equation = StepEquation(share, A, beams, coupled, loads, others, supports, search)
+    of = share, A, beams, coupled, loads, others, supports, search
+    equation = StepEquation(*of, in_motion=inertia is not None)
     if by.in_c:
         equation.leave_to_c()
     return Assembly(

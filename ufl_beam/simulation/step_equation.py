@@ -40,8 +40,12 @@ class StepEquation(Equation):
         others: Sequence[Term],
         supports: Supports,
         search: SearchFlags,
+        *,
+        in_motion: bool,
     ) -> None:
-        super().__init__(A, np.zeros(share.size), supports.dofs)
+        # Where nothing has inertia, the work of the internal forces is compared with energies.
+        force = np.zeros(0 if in_motion else share.size)
+        super().__init__(A, share.weights(), force, supports.dofs)
         self.share, self.supports, self._search = share, supports, search
         self._beams, self._couplings, self._loads = beams, couplings, loads
         self._inner: list[InternalForces] = [*beams, *couplings]
@@ -64,10 +68,10 @@ class StepEquation(Equation):
     def residual(self, x: Array, r: Array) -> None:
         """Write the local part of the residual at ``x`` into ``r``."""
         q1 = self.supports.in_plane(x)
-        self.force.fill(0.0)
+        r.fill(0.0)
         for inner in self._inner:
-            inner.add_residual(q1, self.force)
-        r[:] = self.force
+            inner.add_residual(q1, r)
+        lib.note_inner_forces(self.c, doubles(r))
         for term in self.others:
             term.add_residual(q1, r)
         self.supports.enter(r)
@@ -166,8 +170,7 @@ class StepEquation(Equation):
         zero, pivot = (x.astype(np.int32) for x in supports.entries)
         fill(
             self.c,
-            size=self.share.size, inner=len(self._inner), inner_force=self.force,
-            forces=len(loops), force=ffi.new("call[]", [force for force, _ in loops]),
+            inner=len(self._inner), forces=len(loops), force=ffi.new("call[]", [force for force, _ in loops]),
             stiffnesses=len(stiffnesses), stiffness=ffi.new("call[]", stiffnesses),
             product=product, cells=cells, indptr=self.A.indptr,
             zeros=len(zero), zero=zero, pivot=pivot,

@@ -31,9 +31,6 @@ REASONS = {
 class Convergence:
     """Sizes of residuals and motions, and the decision to stop; ``c``: ``judge`` of newton.c.
 
-    Attributes:
-        weights: Of the residuals: 1 for forces, 1 over the size of the scene for moments, 0 for
-            ghosts and forces of connectors.
     """
 
     def __init__(
@@ -41,22 +38,19 @@ class Convergence:
     ) -> None:
         self._share, self._x, self._r = share, x, r
         self._held, self._owned = equation.held, slice(share.num_owned)
-        self.weights = np.ones(share.size)
-        self.weights[share.rotations()] = 1 / share.grid.scene.size
-        self.weights[share.multipliers()] = 0.0
-        self.weights[share.num_owned :] = 0.0
-        self._norm = (share.size, doubles(self.weights))
+        self._weights = equation.weights
+        self._norm = (share.size, doubles(self._weights))
         self._moves = np.ones(share.size, dtype=np.uint8)
         self.leave_out(np.zeros(share.size, dtype=bool))
         self.diagonal = equation.A.diagonal(np.arange(share.size, dtype=np.int32))
-        self._at_r, self._at_forces = doubles(self._r), doubles(equation.force)
+        self._at_r = doubles(self._r)
         self._last_loads: list[Array] = []
         self._loads = 0.0
         self.c = fill(
             equation.c,
-            size=share.size, scene=share.grid.scene.size, rtol=newton.rtol, rate=math.inf,
+            scene=share.grid.scene.size, rtol=newton.rtol, rate=math.inf,
             modified=newton.modified, most=newton.max_iterations, least=least,
-            weight=self.weights, residual=r, change=np.empty(share.size),
+            residual=r, change=np.empty(share.size),
             space=share.scratch, lengths=share.lengths(), diagonal=self.diagonal,
             tangent=equation.A.data,
             moves=ffi.from_buffer("uint8_t[]", self._moves),
@@ -69,7 +63,10 @@ class Convergence:
         return self._size(doubles(forces))
 
     def _size(self, forces: Any) -> float:
-        here: float = lib.norm(*self._norm, forces)
+        return self._over_processes(lib.norm(*self._norm, forces))
+
+    def _over_processes(self, here: float) -> float:
+        """Norm over the scene, from that of the part of this process."""
         return here if self._share.alone else math.hypot(*self._share.comm.allgather(here))
 
     def take_loads(self, loads: list[Array]) -> None:
@@ -86,11 +83,11 @@ class Convergence:
 
     def scale(self) -> float:
         """Size of the loads and of the internal forces in the latest residual; N."""
-        return self._loads + self._size(self._at_forces)
+        return self._loads + self._over_processes(self.c.inner_size)
 
     def residuals(self) -> Array:
         """Sizes of the latest residual, moments over the size of the scene, ghosts zero; N."""
-        return np.asarray(np.abs(self._r) * self.weights)
+        return np.asarray(np.abs(self._r) * self._weights)
 
     def work(self, step: Array) -> float:
         """Work of the latest residual on a step; J."""

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import Loop, ffi, lib
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.mechanics.tangents import Tangents
 from ufl_beam.solvers.vectors import Vectors
@@ -26,17 +26,21 @@ class Equation(ABC):
 
     Attributes:
         A: Matrix that takes the tangent.
-        force: Internal forces in the latest residual; with the loads, the scale of convergence.
+        weights: Of the residuals: 1 for forces, 1 over the size of the scene for moments, 0 for
+            ghosts and forces of connectors.
+        force: Internal forces in the latest residual; none where nobody asks for them.
         held: Degrees of freedom that supports hold; what stands for them in A means nothing.
         error: First exception of a user's function since this was last set to None.
         c: ``equation`` of loops.h, which a solver completes with its own numbers.
         in_c: Whether ``c`` has all parts of the equation, so that SNES need not call Python.
     """
 
-    def __init__(self, A: Csr, force: Array, held: Index) -> None:
-        self.A, self.force, self.held = A, force, held
+    def __init__(self, A: Csr, weights: Array, force: Array, held: Index) -> None:
+        self.A, self.weights, self.force, self.held = A, weights, force, held
         self.error: BaseException | None = None
-        self.c, self.in_c, self._handles = ffi.new("equation *"), False, list[Any]()
+        self.in_c, self._handles = False, list[Any]()
+        self.c = struct("equation", size=A.size, weight=weights)
+        self.c.inner_force = doubles(force) if len(force) else ffi.NULL
         self.demand([self.demand_in_python(self.missed)])
 
     def note(self, error: BaseException) -> None:
@@ -87,7 +91,7 @@ class Equation(ABC):
 
     def demand_in_python(self, missed: Callable[[Array, Array, float, float], float]) -> Loop:
         """C function that calls :meth:`missed`, or the like; not a number if that fails."""
-        return lib.missed_in_python, self._handle(InPython(self, missed, len(self.force)))
+        return lib.missed_in_python, self._handle(InPython(self, missed, self.A.size))
 
     def _handle(self, function: InPython) -> Any:
         self._handles.append(ffi.new_handle(function))
@@ -120,7 +124,7 @@ def _note(kind: type, error: BaseException, traceback: Any) -> None:
 def add_in_python(handle: Any, q: Any, out: Any) -> None:
     """Callback of C, declared in c_library.py."""
     of = ffi.from_handle(handle)
-    of.function(_lent(q, len(of.equation.force)), _lent(out, of.size))
+    of.function(_lent(q, of.equation.A.size), _lent(out, of.size))
 
 
 @ffi.def_extern(error=math.nan, onerror=_note)  # type: ignore[misc, untyped-decorator, unused-ignore]

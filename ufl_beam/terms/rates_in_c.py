@@ -52,13 +52,16 @@ class RatesInC:
     def __init__(self, moving: Moving) -> None:
         self._moving, self._scheme = moving, moving.scheme
         size, number = len(moving.v), MORE + len(self._scheme.kept)
-        # Changes are elsewhere; of velocities before the last ones new ones are not computed.
-        self._now, self._next = np.zeros((number - V, size)), np.zeros((number - V_BEFORE, size))
+        # Changes are elsewhere; of velocities before the last ones new ones are not computed, and
+        # new velocities take their place where nothing asks for them.
+        scheme: Any = self._scheme
+        self._asks = self._scheme.slips or _asks_for_before(scheme)
+        self._now = np.zeros((number - V, size))
+        self._next = np.zeros((number - V_BEFORE - (not self._asks), size))
         self._slip = np.zeros(size if self._scheme.slips else 0)
         self._handle = ffi.new_handle(self)
         self.c = fill(ffi.new("rates *"), size=size, number=number, find=lib.numbers_in_python)
         self.c.handle = self._handle  # what `fill` keeps must not keep this object
-        scheme: Any = self._scheme
         self.c.after_any = _after_any(scheme)
 
     @classmethod
@@ -94,7 +97,7 @@ class RatesInC:
             now[k] = rate
         # No second arrays of what C has; velocities are asked for between its calls.
         moving.v_before, moving.more = now[1], tuple(now[2:])
-        v, *more = self._next
+        v, *more = self._next if self._asks else (now[1], *self._next)
         for k, (rate, new) in enumerate(zip(now, (v, self._slip, *more), strict=True), start=V):
             self.c.rate[k], self.c.new_rate[k] = doubles(rate), doubles(new)
         self.c.last_dt = moving.last_dt
@@ -132,6 +135,14 @@ def _after_any(scheme: Any) -> bool:
     n = MORE + len(scheme.kept)
     one, *others = (_numbers(scheme, n, 0.1, last_dt) for last_dt in (0.1, 0.07, 0.4))
     return all(other == one for other in others)
+
+
+@cache
+def _asks_for_before(scheme: Any) -> bool:
+    """Return whether what a scheme keeps depends on the velocities before the last ones."""
+    n = MORE + len(scheme.kept)
+    answers = [_numbers(scheme, n, 0.1, last_dt) for last_dt in (0.1, 0.07, 0.4)]
+    return any(row[V_BEFORE] != 0.0 for _, _, _, *rates, _ in answers for row in rates)
 
 
 @cache

@@ -349,7 +349,8 @@ typedef struct {
   const step_product *product; /* or none */
   const cells *cells;          /* or none */
   const int32_t *indptr;
-  double *inner_force;   /* what the inner ones add up to */
+  double *inner_force;   /* what the inner ones add up to; or none */
+  double inner_size;     /* norm of that */
   double *tangent;
   int held, zeros; /* degrees of freedom and entries that supports hold */
   const int32_t *hold, *zero, *pivot; /* pivot: the entry of each that is held on the diagonal */
@@ -387,6 +388,7 @@ enum {
   SINGULAR = -3, TOO_MANY = -5, STALLED = -6, DIVERGED = -9
 };
 
+void note_inner_forces(equation *e, const double *r);
 void residual(equation *e, const double *q, double *r);
 void fill_tangent(const equation *e, const double *q);
 void assemble(equation *e, const double *q);
@@ -487,7 +489,7 @@ typedef struct {
 typedef struct {
   int size, number;            /* of the rates, that first of which is a step or a change */
   double *rate[MOST_RATES];
-  double *new_rate[MOST_RATES]; /* space, as many */
+  double *new_rate[MOST_RATES]; /* space, as many; of velocities perhaps that of those before */
   double last_dt;
   int after_any; /* whether numbers are the same after steps of any length */
   int known, oldest;

@@ -177,7 +177,7 @@ void accept_inertia(void *self, const time_step *step, const double *q1, const d
     combine_rates(r, r->now->slip, 0, r->new_rate[2]);
     *m->lost += dot(r->size, r->new_rate[2], m->momentum);
   }
-  double *last = r->rate[2]; /* v becomes that before */
+  double *last = r->rate[2] == r->new_rate[1] ? r->rate[1] : r->rate[2]; /* v becomes that before */
   r->rate[2] = r->rate[1], r->rate[1] = r->new_rate[1], r->new_rate[1] = last;
   for (int j = 3; j < r->number; ++j) {
     last = r->rate[j];

@@ -4,12 +4,19 @@
  * What has no loop in C is a part all the same: a function that calls Python.
  */
 
+/* What is asked of the internal forces, which r consists of so far. */
+void note_inner_forces(equation *e, const double *r)
+{
+  e->inner_size = norm(e->size, e->weight, r);
+  if (e->inner_force) memcpy(e->inner_force, r, e->size * sizeof *r);
+}
+
 /* The residual at q; what supports carry is noted and removed. */
 void residual(equation *e, const double *q, double *r)
 {
-  memset(e->inner_force, 0, e->size * sizeof *r);
-  for (int k = 0; k < e->inner; ++k) e->force[k].add(e->force[k].self, q, e->inner_force);
-  memcpy(r, e->inner_force, e->size * sizeof *r);
+  memset(r, 0, e->size * sizeof *r);
+  for (int k = 0; k < e->inner; ++k) e->force[k].add(e->force[k].self, q, r);
+  note_inner_forces(e, r);
   for (int k = e->inner; k < e->forces; ++k) e->force[k].add(e->force[k].self, q, r);
   for (int k = 0; k < e->held; ++k) {
     e->reactions[k] = r[e->hold[k]];
@@ -193,7 +200,7 @@ static int verdict(equation *e, const double *q, int iteration)
 {
   const double now = norm(e->size, e->weight, e->residual);
   if (!isfinite(now)) return DIVERGED;
-  const double scale = e->loads + norm(e->size, e->weight, e->inner_force);
+  const double scale = e->loads + e->inner_size;
   const int nearly = iteration > 1 && now > e->rtol * scale;
   double floor = 0;
   if (nearly || e->demands) e->moved = fmin(largest_motion(e->size, e->weight, q), e->scene);
