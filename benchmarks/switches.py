@@ -56,8 +56,8 @@ class EachStepAnew(newton.Solver):
 class AtVelocity(Prediction):
     """Prediction that goes on at the velocity of the last step, without its acceleration."""
 
-    def __init__(self, share, q, *, in_motion):
-        super().__init__(share, q, in_motion=in_motion)
+    def __init__(self, share, q, weights, *, in_motion):
+        super().__init__(share, q, weights, in_motion=in_motion)
         self.c.second = c_library.ffi.NULL
 
 

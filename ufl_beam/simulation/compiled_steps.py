@@ -88,8 +88,6 @@ class CompiledSteps:
         limited, half_tangents = (rotations[: len(rotations) * has] for has in turns)
         self._bytes, self._end = 8 * share.size, np.zeros(1)
         loads = [term for term in equation.terms if isinstance(term, DeadLoads)]
-        for term in loads:
-            fill(term.steps_in_c, weight=equation.weights[term.dofs])
         multipliers = share.multipliers().astype(np.int32)
         load_weight, motion_weight, at = whole
         self.c = fill(

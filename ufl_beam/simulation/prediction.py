@@ -20,21 +20,22 @@ class Prediction:
     that which the one before was like.  It is 1 in smooth motion, and 0 where second differences
     change their sign from step to step, or where steps do not resolve the motion.
 
+    Args:
+        weights: Of residuals, see :class:`Equation`.
+
     Attributes:
         c: ``prediction`` of loops.h.
         q_before: Configuration at the beginning of the last step.
     """
 
-    def __init__(self, share: Share, q: Array, *, in_motion: bool) -> None:
+    def __init__(self, share: Share, q: Array, weights: Array, *, in_motion: bool) -> None:
         self._share, self._in_motion = share, in_motion
         self.c = struct("prediction", size=share.size, dt=math.inf)
         self.began_at(q)
         if in_motion:
-            size, number = share.grid.scene.size, share.grid.size
-            self._second, metric = np.zeros(share.size), np.full(share.size, 1 / (size**2 * number))
-            metric[share.rotations()] = 1 / number
-            metric[share.multipliers()] = metric[share.num_owned :] = 0.0
-            fill(self.c, second=self._second, metric=metric)
+            self._second = np.zeros(share.size)
+            size = {"scene": share.grid.scene.size, "unknowns": share.grid.size}
+            fill(self.c, second=self._second, weight=weights, **size)
 
     def began_at(self, q: Array) -> None:
         """Take ``q`` for the configuration at the beginning of the last step."""

@@ -117,7 +117,8 @@ class Simulation(StateView):
 
         self.t, self.parts, self.left = t0, 0, [0, 0]
         self.q = q[share.dofs]
-        self.prediction = Prediction(share, self.q, in_motion=has_inertia(scheme))
+        weights, in_motion = self.equation.weights, has_inertia(scheme)
+        self.prediction = Prediction(share, self.q, weights, in_motion=in_motion)
         self._continues = start is not None
         loaded: list[Array] = []
         if self._continues or (has_inertia(scheme) and scheme.kept):

@@ -46,13 +46,14 @@ class Convergence:
         self._at_r = doubles(self._r)
         self._last_loads: list[Array] = []
         self._loads = 0.0
+        # Only statics needs sizes of round-off beside a step.
+        change = np.empty(share.size) if len(equation.force) else share.scratch
         self.c = fill(
             equation.c,
             scene=share.grid.scene.size, rtol=newton.rtol, rate=math.inf,
             modified=newton.modified, most=newton.max_iterations, least=least,
-            residual=r, change=np.empty(share.size),
-            space=share.scratch, lengths=share.lengths(), diagonal=self.diagonal,
-            tangent=equation.A.data,
+            residual=r, change=change, space=share.scratch, lengths=share.lengths(),
+            diagonal=self.diagonal, tangent=equation.A.data,
             moves=ffi.from_buffer("uint8_t[]", self._moves),
         )  # fmt: skip
 

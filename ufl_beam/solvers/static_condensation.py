@@ -229,6 +229,8 @@ class ChainsFirst:
         none = np.zeros(len(rest.numbers), dtype=bool)
         fronts = few_rows or len(none) <= ONE_FRONT
         self._solved = Multifrontal(rest, none) if fronts else Klu(rest)
+        if fronts:
+            del self._elimination.left.indices  # nobody asks for them again
 
     def drive(self, c: Any) -> None:
         """Let Newton's method in C do the same; ``c`` is its ``equation`` of loops.h."""

@@ -319,17 +319,27 @@ void give_back_memory(void)
 }
 
 /* Euclidean norm of w f, also where its squares are too small or too large to have all digits. */
-double norm(int rows, const double *w, const double *f)
+static inline double norm_at(int rows, const int32_t *at, const double *w, const double *f)
 {
   double sum = 0, largest = 0, scaled = 0;
+#define W(i) w[at ? at[i] : i]
 #pragma omp simd reduction(+ : sum)
-  for (int i = 0; i < rows; ++i) sum += w[i] * f[i] * (w[i] * f[i]);
+  for (int i = 0; i < rows; ++i) sum += W(i) * f[i] * (W(i) * f[i]);
   if (isnan(sum) || (1e-250 < sum && sum < 1e250)) return sqrt(sum);
-  for (int i = 0; i < rows; ++i) largest = fmax(largest, w[i] * fabs(f[i]));
+  for (int i = 0; i < rows; ++i) largest = fmax(largest, W(i) * fabs(f[i]));
   if (largest == 0 || !isfinite(largest)) return largest;
   for (int i = 0; i < rows; ++i)
-    scaled += w[i] * (f[i] / largest) * (w[i] * (f[i] / largest));
+    scaled += W(i) * (f[i] / largest) * (W(i) * (f[i] / largest));
+#undef W
   return largest * sqrt(scaled);
+}
+
+double norm(int rows, const double *w, const double *f) { return norm_at(rows, 0, w, f); }
+
+/* The same of some of the rows: f has their numbers, w those of all. */
+double norm_of_some(int rows, const int32_t *at, const double *w, const double *f)
+{
+  return norm_at(rows, at, w, f);
 }
 
 /* Largest displacement in q, and rotation times the size of the scene; w as for forces. */

@@ -111,6 +111,7 @@ double step_of_nodes(int size, int rotations, const int32_t *rotation, double *s
                      const double *q0, const double *q1);
 void give_back_memory(void);
 double norm(int rows, const double *w, const double *f);
+double norm_of_some(int rows, const int32_t *at, const double *w, const double *f);
 double largest_motion(int rows, const double *w, const double *q);
 
 /* -- material points --------------------------------------------------------------------------- */
@@ -412,8 +413,11 @@ typedef struct {
   double dt;         /* length of the last; infinite if there was none */
   double *q_before;  /* configuration at its beginning */
   double *second;
-  const double *metric; /* makes products mean squares of parts of the scene's size; others' zero */
-  double both, now, before; /* products of the last two second differences, and squares of each */
+  const double *weight; /* as of residuals */
+  double scene, unknowns; /* size of the scene; unknowns on all processes */
+  /* Product of the last two second differences, square of each: mean values of motions as parts of the
+   * size of the scene, and of rotations. */
+  double both, now, before;
   double step;              /* square of the last step */
   double repeated;          /* part of `second` that repeats itself */
 } prediction;
@@ -467,7 +471,7 @@ typedef struct {
 typedef struct {
   int size, vectors, changed; /* changed: since norm was computed */
   const int32_t *dof;
-  const double *const *vector, *weight; /* weight: as of residuals */
+  const double *const *vector;
   const time_function *factor;
   double *factors; /* of the latest step; not numbers before the first */
   double *force, *end, *before;

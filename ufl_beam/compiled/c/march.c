@@ -348,7 +348,7 @@ static int solve(march *m)
 {
   equation *e = m->equation;
   if (m->loads && m->loads->changed) {
-    m->loads->norm = norm(m->loads->size, m->loads->weight, m->loads->force);
+    m->loads->norm = norm_of_some(m->loads->size, m->loads->dof, e->weight, m->loads->force);
     m->loads->changed = 0;
   }
   e->loads = m->loads ? m->loads->norm : 0;

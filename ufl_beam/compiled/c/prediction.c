@@ -29,13 +29,16 @@ void enter_step(prediction *p, double dt, const double *q, const double *q1)
   p->dt = dt;
   if (!p->second) return;
   double both = 0, now = 0, step = 0;
+  const double of_size = 1 / (p->scene * p->scene);
 #pragma omp simd reduction(+ : both, now, step)
   for (int i = 0; i < p->size; ++i) {
     const double change = q1[i] - q[i], second = change - (q[i] - p->q_before[i]);
-    both += p->metric[i] * second * p->second[i], now += p->metric[i] * second * second;
-    step += p->metric[i] * change * change;
+    const double w = p->weight[i], square = w == 1 ? of_size : w > 0; /* of displacements; of rotations */
+    both += square * second * p->second[i], now += square * second * second;
+    step += square * change * change;
     p->second[i] = second;
   }
+  both /= p->unknowns, now /= p->unknowns, step /= p->unknowns;
   p->before = p->now, p->now = now, p->both = both, p->step = step;
 }
 
