@@ -68,9 +68,18 @@ def lattice(cells, bays):
     )
 
 
+def touch_memory(megabytes):
+    """Take memory and give it back: the host of a virtual machine hands it out the first time.
+
+    Memory is then 20 times as slow as later; kept states are new memory in each step.
+    """
+    np.ones(megabytes << 17)
+
+
 def measure(cells, bays, steps):
     """One time loop on the processes of this ``mpirun``; a record, on the first of them."""
     comm = MPI.COMM_WORLD
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     one_process_below.SMALLEST_SHARE = 1
     begin = time.perf_counter()
     scene = lattice(cells, bays)

@@ -116,6 +116,12 @@ void combine(int size, double a, const double *x, double b, const double *y, dou
   for (int i = 0; i < size; ++i) out[i] = a * x[i] + b * y[i];
 }
 
+/* out[at] = x */
+void scatter(int size, const int32_t *at, const double *x, double *out)
+{
+  for (int i = 0; i < size; ++i) out[at[i]] = x[i];
+}
+
 /* Parts one after the other. */
 void add_calls(void *self, const double *q, double *out)
 {

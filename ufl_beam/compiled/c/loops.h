@@ -109,6 +109,7 @@ double quadratic_form(int rows, const int32_t *indptr, const int32_t *indices, c
                       const double *x);
 double step_of_nodes(int size, int rotations, const int32_t *rotation, double *s,
                      const double *q0, const double *q1);
+void scatter(int size, const int32_t *at, const double *x, double *out);
 void give_back_memory(void);
 double norm(int rows, const double *w, const double *f);
 double norm_of_some(int rows, const int32_t *at, const double *w, const double *f);
