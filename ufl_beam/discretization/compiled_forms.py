@@ -150,7 +150,7 @@ class Kernel:
         self._dofs = np.ascontiguousarray(cell_dofs, dtype=np.int32)
         self._lanes, self._in_lanes, num_cells = 1, ffi.NULL, len(cell_dofs)
         spaces = [argument.ufl_function_space() for argument in form.arguments()]
-        self._is_vector = len(spaces) == 1
+        self._is_functional, self._is_vector = not spaces, len(spaces) == 1
         self._to_dofs = self._is_vector and spaces[0] is unknown.function_space
         per_cell = self._dofs.shape[1] if self._to_dofs else self._entries
         expected = (0, per_cell, (num_cells, 2, 2))
@@ -184,7 +184,7 @@ class Kernel:
     def _places(self) -> dict[str, Any]:
         """Fields of ``cells`` of loops.h that say what the entries of the cells are added to."""
         shape = len(self._dofs), self._entries
-        if self._to_dofs:
+        if self._to_dofs or self._is_functional:
             return {}
         if self._is_vector:
             places = np.arange(math.prod(shape), dtype=np.int32).reshape(shape)

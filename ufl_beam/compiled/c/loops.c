@@ -52,6 +52,8 @@ void add_cells(void *self, const double *q, double *b)
     else if (c->column)
       for (int i = 0; i < c->rows; ++i)
         b[c->begin[dofs[i / c->of_cell]] + c->column[first + i]] += e[i];
+    else if (c->rows == 1)
+      *b += *e;
     else
       for (int i = 0; i < c->rows; ++i) b[dofs[i]] += e[i];
   }
@@ -242,8 +244,11 @@ double quadratic_form(int rows, const int32_t *indptr, const int32_t *indices, c
                       const double *x)
 {
   double sum = 0;
-  for (int i = 0; i < rows; ++i)
-    for (int k = indptr[i]; k < indptr[i + 1]; ++k) sum += x[i] * data[k] * x[indices[k]];
+  for (int i = 0; i < rows; ++i) {
+    double row = 0;
+    for (int k = indptr[i]; k < indptr[i + 1]; ++k) row += data[k] * x[indices[k]];
+    sum += x[i] * row;
+  }
   return sum;
 }
 

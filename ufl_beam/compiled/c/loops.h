@@ -27,7 +27,8 @@ enum { MOST_ENTRIES = 144 }; /* of the vector or matrix of a cell: 12 unknowns o
  * part of those of another form.
  *
  * An entry of a cell is added to the place `row` says; without these, to its entry in the row `begin`
- * of a matrix, `column` places on; without either, to its degree of freedom.
+ * of a matrix, `column` places on; without either, to its degree of freedom, or if it is the only one,
+ * to the sum of the cells.
  *
  * Where a form is computed for several cells at once, `several` does what add_cells does, and numbers
  * of cells (w, coordinates, row, column) come in batches of as many cells: the first number of each of
