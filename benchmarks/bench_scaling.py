@@ -23,6 +23,7 @@ from collections import defaultdict
 
 from mpi4py import MPI
 
+import numpy as np
 from records import keep
 from scaling_model import count_traffic, work
 from scaling_page import write_page
@@ -68,18 +69,9 @@ def lattice(cells, bays):
     )
 
 
-def touch_memory(megabytes):
-    """Take memory and give it back: the host of a virtual machine hands it out the first time.
-
-    Memory is then 20 times as slow as later; kept states are new memory in each step.
-    """
-    np.ones(megabytes << 17)
-
-
 def measure(cells, bays, steps):
     """One time loop on the processes of this ``mpirun``; a record, on the first of them."""
     comm = MPI.COMM_WORLD
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     one_process_below.SMALLEST_SHARE = 1
     begin = time.perf_counter()
     scene = lattice(cells, bays)
@@ -106,8 +98,17 @@ def measure(cells, bays, steps):
     }  # fmt: skip
 
 
+MEMORY = 4 << 30
+"""More than all processes of a measurement take; bytes."""
+
+
 def run(processes, cells, bays, steps):
-    """The record of a measurement in an ``mpirun`` of its own."""
+    """The record of a measurement in an ``mpirun`` of its own.
+
+    A virtual machine gets memory from its host when it is touched first, which takes twenty times
+    as long as later; kept states are new memory in each step.  So it is touched before.
+    """
+    np.ones(MEMORY // 8)
     command = [
         "mpirun", "-n", str(processes), sys.executable, __file__, "--here",
         "--cells", str(cells), "--bays", str(bays), "--steps", str(steps),

@@ -209,7 +209,8 @@ class Kernel:
             number=number, of_cell=of_cell, dofs=self._dofs, unknowns=self._unknowns, at=self._at,
             width=packed.strides[0] // (packed.itemsize * self._lanes), w=first_of(packed),
             constants=self._form.constants, coordinates=self._coordinates, rows=self._entries,
-            coefficients=coefficients, all=np.empty(coefficients), **self._places,
+            coefficients=coefficients, all=np.empty(coefficients),
+            is_functional=self._is_functional, **self._places,
         )  # fmt: skip
 
     def _change(self) -> None:

@@ -13,7 +13,6 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import doubles, integers, lib
 from ufl_beam.model.bodies import Anchor, Member, Place, Spot
 
 
@@ -227,7 +226,7 @@ class Share:
         result, parts = np.empty(self.grid.size), self._parts
         owned = np.ascontiguousarray(values[: self.num_owned])
         self.comm.Allgatherv(owned, [parts, self._num_owned_by])
-        lib.scatter(len(result), integers(self._all_owned), doubles(parts), doubles(result))
+        result[self._all_owned] = parts
         return result
 
     @cached_property

@@ -75,7 +75,7 @@ class Member(ABC):
         return kept
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Place:
     """A point of a beam; made by ``beam.start``, ``beam.end`` and ``beam.at(s)``.
 

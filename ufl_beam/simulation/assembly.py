@@ -201,8 +201,8 @@ def assemble(
     supports = Supports(share, scheme, ledger, A)
     if inertia:
         supports.stop(inertia.v)
-    of = share, A, beams, coupled, loads, others, supports, search
-    equation = StepEquation(*of, in_motion=inertia is not None)
+    parts = share, A, beams, coupled, loads, others, supports, search
+    equation = StepEquation(*parts, in_motion=inertia is not None)
     if by.in_c:
         equation.leave_to_c()
     return Assembly(

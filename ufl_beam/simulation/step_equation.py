@@ -170,7 +170,8 @@ class StepEquation(Equation):
         zero, pivot = (x.astype(np.int32) for x in supports.entries)
         fill(
             self.c,
-            inner=len(self._inner), forces=len(loops), force=ffi.new("call[]", [force for force, _ in loops]),
+            inner=len(self._inner), forces=len(loops),
+            force=ffi.new("call[]", [force for force, _ in loops]),
             stiffnesses=len(stiffnesses), stiffness=ffi.new("call[]", stiffnesses),
             product=product, cells=cells, indptr=self.A.indptr,
             zeros=len(zero), zero=zero, pivot=pivot,

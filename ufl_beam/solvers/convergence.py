@@ -29,9 +29,7 @@ REASONS = {
 
 
 class Convergence:
-    """Sizes of residuals and motions, and the decision to stop; ``c``: ``judge`` of newton.c.
-
-    """
+    """Sizes of residuals and motions, and the decision to stop; ``c``: ``judge`` of newton.c."""
 
     def __init__(
         self, share: Share, equation: Equation, x: Array, r: Array, newton: Newton, least: int

@@ -23,7 +23,7 @@ static inline void add_batch(const cells *c, const lanes *e, int first, int some
     for (int i = 0; i < ENTRIES; ++i)
 #pragma GCC unroll 4
       for (int l = 0; l < some; ++l) b[row[i * LANES + l]] += e[i][l];
-  } else if (ENTRIES == 1) {
+  } else if (c->is_functional) {
     double sum = 0;
     for (int l = 0; l < some; ++l) sum += (*e)[l];
     *b += sum;

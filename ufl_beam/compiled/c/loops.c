@@ -52,7 +52,7 @@ void add_cells(void *self, const double *q, double *b)
     else if (c->column)
       for (int i = 0; i < c->rows; ++i)
         b[c->begin[dofs[i / c->of_cell]] + c->column[first + i]] += e[i];
-    else if (c->rows == 1)
+    else if (c->is_functional)
       *b += *e;
     else
       for (int i = 0; i < c->rows; ++i) b[dofs[i]] += e[i];
@@ -116,12 +116,6 @@ double value_of_cells(const cells *c, const double *q)
 void combine(int size, double a, const double *x, double b, const double *y, double *out)
 {
   for (int i = 0; i < size; ++i) out[i] = a * x[i] + b * y[i];
-}
-
-/* out[at] = x */
-void scatter(int size, const int32_t *at, const double *x, double *out)
-{
-  for (int i = 0; i < size; ++i) out[at[i]] = x[i];
 }
 
 /* Parts one after the other. */

@@ -27,8 +27,8 @@ enum { MOST_ENTRIES = 144 }; /* of the vector or matrix of a cell: 12 unknowns o
  * part of those of another form.
  *
  * An entry of a cell is added to the place `row` says; without these, to its entry in the row `begin`
- * of a matrix, `column` places on; without either, to its degree of freedom, or if it is the only one,
- * to the sum of the cells.
+ * of a matrix, `column` places on; without either, to its degree of freedom; of a functional, to its
+ * value.
  *
  * Where a form is computed for several cells at once, `several` does what add_cells does, and numbers
  * of cells (w, coordinates, row, column) come in batches of as many cells: the first number of each of
@@ -47,6 +47,7 @@ struct cells {
   int rows; /* entries of a cell */
   const int32_t *row, *begin; /* or none */
   const uint8_t *column;
+  int is_functional;
 };
 
 /* Strains whose forces the tangents of a static step have, see static_tangents.py. */
@@ -110,7 +111,6 @@ double quadratic_form(int rows, const int32_t *indptr, const int32_t *indices, c
                       const double *x);
 double step_of_nodes(int size, int rotations, const int32_t *rotation, double *s,
                      const double *q0, const double *q1);
-void scatter(int size, const int32_t *at, const double *x, double *out);
 void give_back_memory(void);
 double norm(int rows, const double *w, const double *f);
 double norm_of_some(int rows, const int32_t *at, const double *w, const double *f);
