@@ -22,7 +22,7 @@ ONE_FRONT = int(lib.ONE_FRONT)
 class Multifrontal:
     """Multifrontal elimination of all unknowns of a system, or of all but some.
 
-    The order is that of approximate minimum degree.  Each front exchanges rows among its pivots
+    The order is that of :data:`ORDERINGS` which takes the fewest operations.  Each front exchanges rows among its pivots
     only, see fronts.c: all rows of systems of :data:`ONE_FRONT` unknowns, else few, so that the
     matrix must not have structural zeros on the diagonal.  Satisfies :class:`Condensed`.
 
@@ -79,6 +79,10 @@ class Multifrontal:
         self._inner.expand(of_inner, x)
 
 
+ORDERINGS = ("amd", "nd")
+"""Orderings of PETSc: approximate minimum degree, which knows nothing of unknowns that stay, and
+nested dissection, which suits what many of them are next to."""
+
 STRUCTURE = (
     "unknown", "first", "begin", "rest", "parent", "up", "order", "before", "children", "entries",
     "entry", "place",
@@ -97,11 +101,12 @@ def _structure(
         front, pivots of a front and numbers on the stack at most.
     """
     A = Csr(np.empty(0), indices, indptr)
-    unknown = np.concatenate([_minimum_degree(A, ~stays), np.flatnonzero(stays)]).astype(np.int32)
     n = np.count_nonzero(stays)
+    orders = [_order(A, stays, kind) for kind in ORDERINGS[: 1 + (A.size > ONE_FRONT)]]
+    found = [(order, *_fronts(A, order, A.size - n)) for order in orders]
+    unknown, first, begin, rest = min(found, key=lambda one: _operations(*one[1:3]))
     number = np.empty(A.size, dtype=np.int32)
     number[unknown] = np.arange(A.size)
-    first, begin, rest = _fronts(A, unknown, A.size - n)
     pivots, others = (np.diff(x).astype(np.int64) for x in (first, begin))
     fronts = len(pivots)
     front_of = np.repeat(np.arange(fronts, dtype=np.int32), np.append(pivots[:-1], n))
@@ -130,14 +135,28 @@ def _pattern(A: Csr) -> csr_array:
     return csr_array((ones, A.indices, A.indptr), shape=(A.size, A.size))
 
 
-def _minimum_degree(A: Csr, of: npt.NDArray[np.bool_]) -> Index:
-    """Return some unknowns in the order of approximate minimum degree."""
-    these = np.flatnonzero(of)
-    if not len(these):
-        return these
-    part = _pattern(A)[these][:, these].astype(np.float64)
-    _, order = Csr(part.data, part.indices, part.indptr).petsc().getOrdering("amd")
-    return np.asarray(these[order.indices])
+def _order(A: Csr, stays: npt.NDArray[np.bool_], kind: str) -> Index:
+    """Return all unknowns in an order of elimination, those that stay at the end."""
+    these, last = np.flatnonzero(~stays), np.flatnonzero(stays)
+    if kind == "nd":
+        these = _ordered(A, np.arange(A.size), kind)
+        these = these[~stays[these]]
+    elif len(these):
+        these = _ordered(A, these, kind)
+    return np.concatenate([these, last]).astype(np.int32)
+
+
+def _ordered(A: Csr, unknowns: Index, kind: str) -> Index:
+    """Return some unknowns in an order of PETSc."""
+    part = _pattern(A)[unknowns][:, unknowns].astype(np.float64)
+    _, order = Csr(part.data, part.indices, part.indptr).petsc().getOrdering(kind)
+    return np.asarray(unknowns[order.indices])
+
+
+def _operations(first: Index, begin: Index) -> float:
+    """Return the number of multiplications in fronts; see loops.h for their structure."""
+    pivots, others = (np.diff(x).astype(np.float64) for x in (first, begin))
+    return float(np.sum(pivots * (pivots**2 / 3 + pivots * others + others**2)))
 
 
 def _fronts(A: Csr, order: Index, eliminated: int) -> tuple[Index, Index, Index]:
