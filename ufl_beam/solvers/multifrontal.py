@@ -22,9 +22,10 @@ ONE_FRONT = int(lib.ONE_FRONT)
 class Multifrontal:
     """Multifrontal elimination of all unknowns of a system, or of all but some.
 
-    The order is that of :data:`ORDERINGS` which takes the fewest operations.  Each front exchanges rows among its pivots
-    only, see fronts.c: all rows of systems of :data:`ONE_FRONT` unknowns, else few, so that the
-    matrix must not have structural zeros on the diagonal.  Satisfies :class:`Condensed`.
+    The order is that of :data:`ORDERINGS` which takes the fewest operations.  Each front exchanges
+    rows among its pivots only, see fronts.c: all rows of systems of :data:`ONE_FRONT` unknowns,
+    else few, so that the matrix must not have structural zeros on the diagonal.  Satisfies
+    :class:`Condensed`.
 
     Args:
         inner: The system.
