@@ -122,6 +122,19 @@ def test_the_same_as_in_python(make, scheme):
         assert np.allclose(one.astype(float), other.astype(float), rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.parametrize("steps", [2, 3])
+@pytest.mark.parametrize("scheme", SCHEMES[:5], ids=str)
+def test_velocities_before_the_last_step(scheme, steps):
+    """C writes new velocities over the oldest, where nothing asks for those."""
+    simulation = end(ub.Simulation(elastic(), scheme), steps)
+    before = simulation.gather().v
+    simulation.step_to((steps + 1) * 0.02)
+    assert simulation._in_c.ahead
+    simulation.take_back()
+    assert np.array_equal(simulation.inertia.v_before, before)
+    assert not np.array_equal(simulation.inertia.v, before)
+
+
 @pytest.mark.parametrize("make", [elastic, connected])
 def test_states_that_were_asked_for_stay(make):
     """They are copied once they are asked for, and later steps do not write to them."""

@@ -11,6 +11,7 @@ import ufl_beam as ub
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import bisected
+from ufl_beam.solvers import multifrontal
 from ufl_beam.solvers.multifrontal import Multifrontal
 from ufl_beam.solvers.substructuring import Summed
 
@@ -109,6 +110,18 @@ def test_the_schur_complement():
     expected = kk - ki @ np.linalg.solve(ii, ik)
     assert np.allclose(dense(condensed.left), expected, rtol=0, atol=1e-12 * np.abs(kk).max())
     assert condensed.numbers.tolist() == [2, 3, 50, 51]
+
+
+@pytest.mark.parametrize(("stays", "best"), [(0, "amd"), (20, "nd")])
+def test_the_order_of_fewest_operations(monkeypatch, stays, best):
+    """Of a square of 20 nodes a side, one side of which may stay."""
+    matrix, operations = matrix_of("a square", 400), {}
+    structure = multifrontal._structure.__wrapped__  # what it finds is kept otherwise
+    for kinds in [("amd",), ("nd",), multifrontal.ORDERINGS]:
+        monkeypatch.setattr(multifrontal, "ORDERINGS", kinds)
+        _, first, begin, *_ = structure(matrix.indptr, matrix.indices, np.arange(800) < 2 * stays)
+        operations[kinds] = multifrontal._operations(first, begin)
+    assert operations[("amd", "nd")] == operations[(best,)] == min(operations.values())
 
 
 @pytest.mark.parametrize("units", [1.0, 1e-20, 1e20])
