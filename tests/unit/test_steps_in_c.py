@@ -122,7 +122,7 @@ def test_the_same_as_in_python(make, scheme):
         assert np.allclose(one.astype(float), other.astype(float), rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize("steps", [2, 3])
+@pytest.mark.parametrize("steps", [1, 2, 3])
 @pytest.mark.parametrize("scheme", SCHEMES[:5], ids=str)
 def test_velocities_before_the_last_step(scheme, steps):
     """C writes new velocities over the oldest, where nothing asks for those."""
