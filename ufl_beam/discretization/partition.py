@@ -141,7 +141,7 @@ class Share:
 
     @cached_property
     def scratch(self) -> Array:
-        """Space for a number of each degree of freedom that no loop in C needs once it is over."""
+        """Space for a number of each degree of freedom, which loops in C leave to others after them."""
         return np.empty(self.size)
 
     def at(self, anchor: Anchor) -> Index:

@@ -155,7 +155,7 @@ def _ordered(A: Csr, unknowns: Index, kind: str) -> Index:
 
 
 def _operations(first: Index, begin: Index) -> float:
-    """Return the number of multiplications in fronts; see loops.h for their structure."""
+    """Return the number of multiplications in fronts; ``first`` and ``begin`` as in loops.h."""
     pivots, others = (np.diff(x).astype(np.float64) for x in (first, begin))
     return float(np.sum(pivots * (pivots**2 / 3 + pivots * others + others**2)))
 
