@@ -141,7 +141,7 @@ class Share:
 
     @cached_property
     def scratch(self) -> Array:
-        """Space for a number of each degree of freedom, which loops in C leave to others after them."""
+        """Space for a number of each degree of freedom; loops in C leave it to what comes after."""
         return np.empty(self.size)
 
     def at(self, anchor: Anchor) -> Index:

@@ -44,7 +44,7 @@ class Convergence:
         self._at_r = doubles(self._r)
         self._last_loads: list[Array] = []
         self._loads = 0.0
-        # Only statics needs round-off and a step at once; loops over matrices are over before either.
+        # Only statics needs round-off and a step at once; loops over matrices are over before.
         change = np.empty(share.size) if len(equation.force) else share.scratch
         self.c = fill(
             equation.c,
