@@ -37,8 +37,8 @@ class Chains:
         ends: Degrees of freedom of the left and the right end of each chain; (num_chains, 6).
         spikes: Which chains have a left end, so that all their vertices come to couple to it; the
             others begin at a vertex with one neighbour, and have their right end twice in ``ends``.
-        order: Where in the rows of a vertex the columns of the vertex before, of itself and of the
-            vertex after stand; (num_vertices, 9).
+        at: Where in the rows of a vertex the columns of the vertex before, of itself and of the
+            vertex after begin; (num_vertices, 3).
     """
 
     def __init__(self, cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -> None:
@@ -50,7 +50,7 @@ class Chains:
         # With nine entries in rows and columns, these nine are all.
         plain = alone & (np.diff(A.indptr) == 9)
         plain &= np.bincount(A.indices, minlength=A.size) == 9
-        inside &= plain[end[:-1]].all(axis=1)
+        inside &= plain[end[:-1]].all(axis=1) & in_turn(end[:-1])
         first_of_vertex = np.zeros(len(inside), dtype=bool)
         first_of_vertex[np.unique(end[:-1, 0], return_index=True)[1]] = True
         inside &= first_of_vertex
@@ -65,15 +65,15 @@ class Chains:
         narrow = alone & (np.diff(A.indptr) == 6)
         narrow &= np.bincount(A.indices, minlength=A.size) == 6
         _, first, last = _runs(inside)
-        free = narrow[start[:-1][first]].all(axis=1) & narrow[end[1:][last]].all(axis=1)
-        free &= last - first > 1
+        free = in_turn(start[:-1][first]) & narrow[start[:-1][first]].all(axis=1)
+        free &= in_turn(end[1:][last]) & narrow[end[1:][last]].all(axis=1) & (last - first > 1)
         inside[(first + last)[free] // 2] = False
 
         chain, first, last = _runs(inside)
         left, middle_, right = start[:-1][first], end[:-1][inside], end[1:][last]
         before, after = start[:-1][inside], end[1:][inside]
         # A vertex with six entries has no neighbour but the first or last of its chain.
-        dead_left, dead_right = (narrow[dofs].all(axis=1) for dofs in (left, right))
+        dead_left, dead_right = (narrow[of].all(axis=1) & in_turn(of) for of in (left, right))
         backward = dead_right & ~dead_left
         dead = dead_left | dead_right
         long = last - first + 1
@@ -92,10 +92,14 @@ class Chains:
         right = np.where(backward[:, None], left, right)
         self.ends = np.hstack([np.where(dead[:, None], right, left), right])
         self.dofs, self.spikes = around[:, 1], ~dead
-        around = around.reshape(-1, 9)
-        self.order = np.zeros(around.shape, dtype=np.uint8)
-        for column in around.T:
-            self.order += around > column[:, None]
+        self.at = np.zeros(around.shape[:2], dtype=np.uint8)
+        for column in around.reshape(-1, 9).T:
+            self.at += around[:, :, 0] > column[:, None]
+
+
+def in_turn(dofs: Index) -> npt.NDArray[np.bool_]:
+    """Whether the three degrees of freedom of each vertex follow each other."""
+    return (np.diff(dofs, axis=1) == 1).all(axis=1)
 
 
 def _runs(mask: npt.NDArray[np.bool_]) -> tuple[Index, Index, Index]:
@@ -106,7 +110,8 @@ def _runs(mask: npt.NDArray[np.bool_]) -> tuple[Index, Index, Index]:
 
 
 INDICES = (
-    "first", "spike", "row", "from_ends", "entry", "place", "places", "dof", "number", "ends",
+    "first", "spike", "dof", "begin", "with_ends", "entry", "place", "places", "kept", "number",
+    "ends",
 )  # fmt: skip
 """Arrays of ``chains`` of loops.h that follow from the structure of a matrix."""
 
@@ -118,7 +123,7 @@ def _plan(
     """Find what can be eliminated, and where entries go.
 
     Returns:
-        Degrees of freedom that are left, in the order of the grid; :attr:`Chains.order`;
+        Degrees of freedom that are left, in the order of the grid; :attr:`Chains.at`;
         ``indptr`` and ``indices`` of the matrix of what is left; :data:`INDICES`.
     """
     A = Csr(np.empty(0), indices, indptr)
@@ -132,13 +137,16 @@ def _plan(
     ends, owned = number[chains.ends], here[here < num_owned]
     first, last = (chains.dofs[k] for k in (chains.first[:-1], chains.first[1:] - 1))
     next_to = np.stack([np.where(chains.spikes[:, None], first, last), last], axis=1)
-    of_ends = np.broadcast_arrays(chains.ends.reshape(-1, 2, 3, 1), next_to[:, :, None, :])
+    of_ends = chains.ends.reshape(-1, 2, 3)
+    rows = np.stack([of_ends, next_to], axis=1)[..., None]
+    columns = np.stack([next_to, of_ends], axis=1)[..., None, :]
+    with_ends = A.positions(*map(np.ravel, np.broadcast_arrays(rows, columns)))
     *structure, entry, place, places = _what_is_left(A, number, ends, len(here))
     found = (
-        chains.first, chains.spikes, chains.dofs, A.positions(*map(np.ravel, of_ends)),
+        chains.first, chains.spikes, chains.dofs[:, 0], A.indptr[chains.dofs[:, 0]], with_ends,
         entry, place, places, owned, number[owned], ends,
     )  # fmt: skip
-    return here, chains.order, *structure, *(np.ascontiguousarray(x, np.int32) for x in found)
+    return here, chains.at, *structure, *(np.ascontiguousarray(x, np.int32) for x in found)
 
 
 def _what_is_left(A: Csr, number: Index, ends: Index, size: int) -> tuple[Index, ...]:
@@ -180,19 +188,19 @@ class Elimination:
         ghosts = np.concatenate(share.comm.allgather(share.dofs[share.num_owned :]))
         alone = ~np.isin(share.dofs, ghosts)
         of = share.cell_dofs, A.indptr, A.indices, alone, share.dofs, share.num_owned
-        here, order, indptr, columns, *found = _plan(*of)
+        here, at, indptr, columns, *found = _plan(*of)
         self.numbers, self.shared = share.dofs[here], ~alone[here]
         self.left = Csr(np.zeros(len(columns)), columns, indptr)
         self.f: Array = np.zeros(len(here))
         indices = dict(zip(INDICES, found, strict=True))
-        vertices, chains = len(indices["row"]), len(indices["spike"])
+        vertices, chains = len(indices["dof"]), len(indices["spike"])
         self.c = fill(
             ffi.new("chains *"),
             chains=chains, left=len(columns), stay=len(indices["entry"]),
-            rows=len(indices["dof"]), left_size=len(here), left_data=self.left.data,
-            left_f=self.f, data=A.data, indptr=A.indptr, swaps=ffi.new("uint8_t[]", 3 * vertices),
+            rows=len(indices["kept"]), left_size=len(here), left_data=self.left.data,
+            left_f=self.f, data=A.data, swaps=ffi.new("uint8_t[]", 3 * vertices),
             pivots=np.empty(lib.BLOCK * vertices), to_next=np.empty(lib.BLOCK * vertices),
-            f=np.empty(share.size), order=ffi.from_buffer("uint8_t[]", order), **indices,
+            f=np.empty(share.size), at=ffi.from_buffer("uint8_t[]", at), **indices,
         )  # fmt: skip
 
     def factor(self, b: Array) -> bool:

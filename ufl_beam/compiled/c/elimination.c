@@ -3,9 +3,10 @@
  *
  * A chain is left end - vertices - right end. Its vertices are eliminated from left to right, so that
  * each couples to the left end and to the next vertex when its turn comes. A chain that begins at a
- * vertex with one neighbour has no left end. Row r of vertex v is
- * data[indptr[row[3 v + r]]...], nine entries; order[9 v...] says where those of the columns of the
- * vertex before, of v and of the vertex after are among them.
+ * vertex with one neighbour has no left end. Vertex v has the rows dof[v], dof[v] + 1 and dof[v] + 2 of
+ * the matrix, one after the other from data[begin[v]] on. Each has nine entries, or six where there is
+ * one neighbour; from at[3 v + n] on, three of them are the columns of the vertex before (n = 0), of v
+ * (1) and of the vertex after (2). The degrees of freedom of an end may have any numbers.
  */
 
 /* x = D^-1 b */
@@ -23,23 +24,40 @@ static inline void subtract(const double *A, const double *x, double *y)
   for (int i = 0; i < 3; ++i) y[i] -= A[3 * i] * x[0] + A[3 * i + 1] * x[1] + A[3 * i + 2] * x[2];
 }
 
-/* The block of a vertex with the one before (0), itself (1) or the one after (2) */
-static inline void read_block(const chains *c, int vertex, int neighbour, double *block)
+/* The block of a vertex, whose rows have `width` entries, with a neighbour in its chain or itself; its
+ * numbers are written `apart` from each other. */
+static inline void read_block(const chains *c, int vertex, int neighbour, int width, double *block,
+                              int apart)
 {
-  const uint8_t *order = c->order + 9 * vertex + 3 * neighbour;
-  for (int r = 0; r < 3; ++r) {
-    const double *row = c->data + c->indptr[c->row[3 * vertex + r]];
-    for (int k = 0; k < 3; ++k) block[3 * r + k] = row[order[k]];
-  }
+  const double *row = c->data + c->begin[vertex] + c->at[3 * vertex + neighbour];
+  for (int r = 0; r < 3; ++r, row += width)
+    for (int k = 0; k < 3; ++k, block += apart) *block = row[k];
+}
+
+/* One of the blocks of a chain with its ends, see `with_ends` */
+static inline void read_block_of_end(const chains *c, int chain, int which, double *block, int apart)
+{
+  const int32_t *entry = c->with_ends + 36 * chain + 9 * which;
+  for (int k = 0; k < 9; ++k, block += apart) *block = c->data[entry[k]];
 }
 
 /* The rows of the block of the one after a vertex with the vertex */
-static inline void read_below(const chains *c, int chain, int vertex, double *block)
+static inline void read_below(const chains *c, int chain, int vertex, double *block, int apart)
 {
   if (vertex + 1 < c->first[chain + 1])
-    read_block(c, vertex + 1, 0, block);
+    read_block(c, vertex + 1, 0, 9, block, apart);
   else
-    for (int k = 0; k < 9; ++k) block[k] = c->data[c->from_ends[18 * chain + 9 + k]];
+    read_block_of_end(c, chain, RIGHT_LAST, block, apart);
+}
+
+/* The block of a vertex, whose rows have `width` entries, with the one after it */
+static inline void read_after(const chains *c, int chain, int vertex, int width, double *block,
+                              int apart)
+{
+  if (vertex + 1 < c->first[chain + 1])
+    read_block(c, vertex, 2, width, block, apart);
+  else
+    read_block_of_end(c, chain, LAST_RIGHT, block, apart);
 }
 
 /* -- two chains at once ------------------------------------------------------------------------- */
@@ -52,7 +70,7 @@ typedef int64_t choice __attribute__((vector_size(8 * PAIR)));
 /* Two chains on the way: what the vertices so far make of the next one, and of the ends. */
 typedef struct {
   int next, chain[PAIR], vertex[PAIR], last[PAIR], counts[PAIR];
-  pair pivot[9], f[3];
+  pair pivot[9], after[9], f[3];
   pair to[9], from[9], faded, left[9], left_f[3]; /* where there are spikes */
 } chain_fronts;
 
@@ -67,9 +85,9 @@ static inline void exchange(choice which, int columns, pair *x, pair *y)
   }
 }
 
-/* Rows [D | B] become [LU | D^-1 B], with the largest pivot of each column, of which LU has the
+/* Rows [D | B] become [LU | L^-1 B], with the largest pivot of each column, of which LU has the
  * reciprocal; `swap` takes the order of the rows. */
-static inline void solve_rows(const int columns, pair *row, choice *swap)
+static inline void factor_rows(const int columns, pair *row, choice *swap)
 {
   pair *a = row, *b = row + columns, *c = row + 2 * columns;
   for (int k = 0; k < 3; ++k) swap[k] = (choice){k, k};
@@ -91,20 +109,38 @@ static inline void solve_rows(const int columns, pair *row, choice *swap)
   c[1] *= b[1];
   for (int j = 2; j < columns; ++j) c[j] -= c[1] * b[j];
   c[2] = 1 / c[2];
-  for (int j = 3; j < columns; ++j) {
+}
+
+/* [LU | L^-1 B] becomes [LU | D^-1 B] in the columns up to `end`. */
+static inline void solve_rows(const int columns, const int end, pair *row)
+{
+  pair *a = row, *b = row + columns, *c = row + 2 * columns;
+  for (int j = 3; j < end; ++j) {
     c[j] *= c[2];
     b[j] = (b[j] - b[2] * c[j]) * b[1];
     a[j] = (a[j] - a[1] * b[j] - a[2] * c[j]) * a[0];
   }
 }
 
-/* Y -= A X, of `columns` columns out of rows with `far` numbers */
+/* A becomes A U^-1. */
+static inline void divide_by_rows(const int columns, const pair *row, pair *A)
+{
+  const pair *a = row, *b = row + columns, *c = row + 2 * columns;
+  for (int i = 0; i < 9; i += 3) {
+    A[i] *= a[0];
+    A[i + 1] = (A[i + 1] - A[i] * a[1]) * b[1];
+    A[i + 2] = (A[i + 2] - A[i] * a[2] - A[i + 1] * b[2]) * c[2];
+  }
+}
+
+/* Y -= A X, of `columns` columns out of rows with `far` numbers; what is found last comes last */
 static inline void subtract_product(const pair *A, const int columns, const int far, const pair *X,
                                     pair *Y)
 {
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < columns; ++j)
-      Y[columns * i + j] -= A[3 * i] * X[j] + A[3 * i + 1] * X[far + j] + A[3 * i + 2] * X[2 * far + j];
+      Y[columns * i + j] = Y[columns * i + j] - A[3 * i] * X[j] - A[3 * i + 1] * X[far + j]
+                           - A[3 * i + 2] * X[2 * far + j];
 }
 
 /* The coupling to the left end fades along a chain. Entries whose product with such others is nothing
@@ -116,28 +152,27 @@ static inline void drop_faded(pair *block, pair faded)
     block[k] = (pair)((choice)block[k] & (choice)(absolute(block[k]) >= faded));
 }
 
-static inline double largest_entry(const double *block)
+/* Largest entry of the block of one chain */
+static inline double largest_entry(const pair *block, int lane)
 {
   double largest = 0;
-  for (int k = 0; k < 9; ++k) largest = fmax(largest, fabs(block[k]));
+  for (int k = 0; k < 9; ++k) largest = fmax(largest, fabs(block[k][lane]));
   return largest;
 }
 
 static void begin_chain(const chains *c, chain_fronts *at, int lane, int chain)
 {
-  const int v = c->first[chain];
-  double block[9], from[9];
+  const int v = c->first[chain], width = c->spike[chain] ? 9 : 6;
   at->chain[lane] = chain, at->vertex[lane] = v, at->last[lane] = c->first[chain + 1] - 1;
-  read_block(c, v, 1, block);
-  for (int k = 0; k < 9; ++k) at->pivot[k][lane] = block[k];
+  read_block(c, v, 1, width, (double *)at->pivot + lane, PAIR);
+  read_after(c, chain, v, width, (double *)at->after + lane, PAIR);
   for (int k = 0; k < 3; ++k) at->f[k][lane] = at->left_f[k][lane] = 0;
-  at->faded[lane] = 0;
   for (int k = 0; k < 9; ++k) at->to[k][lane] = at->from[k][lane] = at->left[k][lane] = 0;
+  at->faded[lane] = 0;
   if (!c->spike[chain]) return;
-  read_block(c, v, 0, block);
-  for (int k = 0; k < 9; ++k) from[k] = c->data[c->from_ends[18 * chain + k]];
-  for (int k = 0; k < 9; ++k) at->to[k][lane] = block[k], at->from[k][lane] = from[k];
-  at->faded[lane] = 0x1p-511 * fmin(largest_entry(block), largest_entry(from));
+  read_block_of_end(c, chain, FIRST_LEFT, (double *)at->to + lane, PAIR);
+  read_block_of_end(c, chain, LEFT_FIRST, (double *)at->from + lane, PAIR);
+  at->faded[lane] = 0x1p-511 * fmin(largest_entry(at->to, lane), largest_entry(at->from, lane));
 }
 
 /* What a chain makes of the blocks of its ends, left-left, left-right, right-left and right-right, and
@@ -155,26 +190,43 @@ static void end_chain(const chains *c, const chain_fronts *at, int lane)
   }
 }
 
-/* The block of a vertex of each chain with the one before (0), itself (1) or the one after (2), into
- * rows with `far` numbers */
-static inline void read_blocks(const chains *c, const int *vertex, int neighbour, const int far,
-                               pair *block)
+/* The block of the vertex after that of each chain with the one before (0), itself (1) or the one after
+ * (2), inside of the chains */
+static inline void read_blocks(const chains *c, const chain_fronts *at, int neighbour, pair *block)
 {
-  for (int r = 0; r < 3; ++r) {
-    const double *row[PAIR];
-    const uint8_t *order[PAIR];
-    for (int l = 0; l < PAIR; ++l) {
-      row[l] = c->data + c->indptr[c->row[3 * vertex[l] + r]];
-      order[l] = c->order + 9 * vertex[l] + 3 * neighbour;
-    }
-    for (int k = 0; k < 3; ++k) block[far * r + k] = (pair){row[0][order[0][k]], row[1][order[1][k]]};
+  const double *row[PAIR];
+  for (int l = 0; l < PAIR; ++l) {
+    const int next = at->vertex[l] + 1;
+    row[l] = c->data + c->begin[next] + c->at[3 * next + neighbour];
+  }
+  for (int r = 0; r < 3; ++r)
+    for (int k = 0; k < 3; ++k) block[3 * r + k] = (pair){row[0][9 * r + k], row[1][9 * r + k]};
+}
+
+/* All three of them, the first into `below`. */
+static inline void read_next(const chains *c, chain_fronts *at, pair *below, const int inside)
+{
+  if (inside) {
+    read_blocks(c, at, 0, below);
+    read_blocks(c, at, 1, at->pivot);
+    read_blocks(c, at, 2, at->after);
+    return;
+  }
+  for (int l = 0; l < PAIR; ++l) {
+    const int chain = at->chain[l], v = at->vertex[l];
+    read_below(c, chain, v, (double *)below + l, PAIR);
+    if (v < at->last[l]) {
+      read_block(c, v + 1, 1, 9, (double *)at->pivot + l, PAIR);
+      read_after(c, chain, v + 1, 9, (double *)at->after + l, PAIR);
+    } else
+      for (int k = 0; k < 9; ++k) at->pivot[k][l] = at->after[k][l] = 0;
   }
 }
 
 /* The next vertex of each chain, and its part of the right-hand side b; without a spike nothing couples
- * to a left end. */
+ * to a left end, and inside of chains the next two vertices are none. */
 static inline void eliminate_vertices(const chains *c, chain_fronts *at, const double *b,
-                                      const int spike)
+                                      const int spike, const int inside)
 {
   /* rows of [pivot | f | after | to] */
   enum { F = 3, AFTER = 4, TO = 7 };
@@ -183,53 +235,46 @@ static inline void eliminate_vertices(const chains *c, chain_fronts *at, const d
   choice swap[3];
   for (int r = 0; r < 3; ++r) {
     pair b_r;
-    for (int l = 0; l < PAIR; ++l) b_r[l] = b[c->row[3 * at->vertex[l] + r]];
-    for (int k = 0; k < 3; ++k) row[far * r + k] = at->pivot[3 * r + k];
+    for (int l = 0; l < PAIR; ++l) b_r[l] = b[c->dof[at->vertex[l]] + r];
     row[far * r + F] = at->f[r] + b_r;
-    if (spike)
-      for (int k = 0; k < 3; ++k) row[far * r + TO + k] = at->to[3 * r + k];
+    for (int k = 0; k < 3; ++k) {
+      row[far * r + k] = at->pivot[3 * r + k];
+      row[far * r + AFTER + k] = at->after[3 * r + k];
+      if (spike) row[far * r + TO + k] = at->to[3 * r + k];
+    }
   }
-  read_blocks(c, at->vertex, 2, far, row + AFTER);
-  solve_rows(far, row, swap);
+  factor_rows(far, row, swap);
+  read_next(c, at, below, inside);
+  divide_by_rows(far, row, below);
+  memset(at->f, 0, sizeof at->f);
+  subtract_product(below, 1, far, row + F, at->f);
+  subtract_product(below, 3, far, row + AFTER, at->pivot);
+  if (spike) {
+    pair to[9] = {0}, from[9] = {0};
+    divide_by_rows(far, row, at->from);
+    subtract_product(at->from, 1, far, row + F, at->left_f);
+    subtract_product(at->from, 3, far, row + TO, at->left);
+    subtract_product(below, 3, far, row + TO, to);
+    subtract_product(at->from, 3, far, row + AFTER, from);
+    drop_faded(to, at->faded);
+    drop_faded(from, at->faded);
+    memcpy(at->to, to, sizeof to);
+    memcpy(at->from, from, sizeof from);
+  }
+  solve_rows(far, TO, row);
   for (int l = 0; l < PAIR; ++l) {
-    const int v = at->vertex[l];
-    double *pivot = c->pivots + BLOCK * v, *to_next = c->to_next + BLOCK * v;
+    const int v = at->vertex[l]++;
+    double *pivot = c->pivots + BLOCK * v, *to_next = c->to_next + BLOCK * v, *f = c->f + c->dof[v];
+    uint8_t *order = c->swaps + 3 * v;
     for (int r = 0; r < 3; ++r) {
-      c->swaps[3 * v + r] = (uint8_t)swap[r][l];
-      c->f[c->row[3 * v + r]] = row[far * r + F][l];
+      order[r] = (uint8_t)swap[r][l];
+      f[r] = row[far * r + F][l];
       for (int k = 0; k < 3; ++k) {
         pivot[3 * r + k] = row[far * r + k][l];
         to_next[3 * r + k] = row[far * r + AFTER + k][l];
       }
     }
   }
-  if (at->vertex[0] < at->last[0] && at->vertex[1] < at->last[1]) {
-    const int next[PAIR] = {at->vertex[0] + 1, at->vertex[1] + 1};
-    read_blocks(c, next, 0, 3, below);
-    read_blocks(c, next, 1, 3, at->pivot);
-  } else {
-    double below_l[9], pivot_l[9];
-    for (int l = 0; l < PAIR; ++l) {
-      read_below(c, at->chain[l], at->vertex[l], below_l);
-      memset(pivot_l, 0, sizeof pivot_l);
-      if (at->vertex[l] < at->last[l]) read_block(c, at->vertex[l] + 1, 1, pivot_l);
-      for (int k = 0; k < 9; ++k) below[k][l] = below_l[k], at->pivot[k][l] = pivot_l[k];
-    }
-  }
-  for (int l = 0; l < PAIR; ++l) ++at->vertex[l];
-  memset(at->f, 0, sizeof at->f);
-  subtract_product(below, 1, far, row + F, at->f);
-  subtract_product(below, 3, far, row + AFTER, at->pivot);
-  if (!spike) return;
-  pair to[9] = {0}, from[9] = {0};
-  subtract_product(at->from, 1, far, row + F, at->left_f);
-  subtract_product(at->from, 3, far, row + TO, at->left);
-  subtract_product(below, 3, far, row + TO, to);
-  subtract_product(at->from, 3, far, row + AFTER, from);
-  drop_faded(to, at->faded);
-  drop_faded(from, at->faded);
-  memcpy(at->to, to, sizeof to);
-  memcpy(at->from, from, sizeof from);
 }
 
 static inline int to_go(const chain_fronts *at, int lane)
@@ -251,16 +296,19 @@ void eliminate(const chains *c, const double *b)
   memset(c->left_data, 0, c->left * sizeof *c->left_data);
   memset(c->left_f, 0, c->left_size * sizeof *c->left_f);
   for (int k = 0; k < c->stay; ++k) c->left_data[c->place[k]] = c->data[c->entry[k]];
-  for (int k = 0; k < c->rows; ++k) c->left_f[c->number[k]] = b[c->dof[k]];
+  for (int k = 0; k < c->rows; ++k) c->left_f[c->number[k]] = b[c->kept[k]];
   chain_fronts at = {.next = 0};
   if (c->chains)
     for (int l = 0; l < PAIR; ++l) take_chain(c, &at, l);
   for (int ended = 0; ended < c->chains;) {
     int both = to_go(&at, 0) < to_go(&at, 1) ? to_go(&at, 0) : to_go(&at, 1);
-    if (c->spike[at.chain[0]] || c->spike[at.chain[1]])
-      for (; both; --both) eliminate_vertices(c, &at, b, 1);
-    else
-      for (; both; --both) eliminate_vertices(c, &at, b, 0);
+    if (c->spike[at.chain[0]] || c->spike[at.chain[1]]) {
+      for (; both > 2; --both) eliminate_vertices(c, &at, b, 1, 1);
+      for (; both; --both) eliminate_vertices(c, &at, b, 1, 0);
+    } else {
+      for (; both > 2; --both) eliminate_vertices(c, &at, b, 0, 1);
+      for (; both; --both) eliminate_vertices(c, &at, b, 0, 0);
+    }
     for (int l = 0; l < PAIR; ++l) {
       if (to_go(&at, l)) continue;
       if (at.counts[l]) end_chain(c, &at, l), ++ended;
@@ -271,12 +319,12 @@ void eliminate(const chains *c, const double *b)
 
 static inline void read_vertex(const chains *c, const double *f, int vertex, double *y)
 {
-  for (int r = 0; r < 3; ++r) y[r] = f[c->row[3 * vertex + r]];
+  for (int r = 0; r < 3; ++r) y[r] = f[c->dof[vertex] + r];
 }
 
 static inline void write_vertex(const chains *c, const double *y, int vertex, double *f)
 {
-  for (int r = 0; r < 3; ++r) f[c->row[3 * vertex + r]] = y[r];
+  for (int r = 0; r < 3; ++r) f[c->dof[vertex] + r] = y[r];
 }
 
 /* y = D^-1 b of a vertex, and what that makes of the right-hand side of the next one, or of the right
@@ -286,7 +334,7 @@ static inline void go_on(const chains *c, int chain, int vertex, const double *b
 {
   double below[9];
   solve_block(c->pivots + BLOCK * vertex, c->swaps + 3 * vertex, b, y);
-  read_below(c, chain, vertex, below);
+  read_below(c, chain, vertex, below, 1);
   memset(next, 0, 3 * sizeof *next);
   subtract(below, y, next);
 }
@@ -296,7 +344,7 @@ static inline void go_on(const chains *c, int chain, int vertex, const double *b
 void reduce(const chains *c, const double *b)
 {
   memset(c->left_f, 0, c->left_size * sizeof *c->left_f);
-  for (int k = 0; k < c->rows; ++k) c->left_f[c->number[k]] = b[c->dof[k]];
+  for (int k = 0; k < c->rows; ++k) c->left_f[c->number[k]] = b[c->kept[k]];
   const int32_t *numbers = c->ends;
   for (int chain = 0; chain < c->chains; ++chain, numbers += 6) {
     const int first = c->first[chain], end = c->first[chain + 1];
@@ -314,7 +362,7 @@ void reduce(const chains *c, const double *b)
         subtract(c->to_next + BLOCK * v, y, x);
         memcpy(y, x, sizeof y);
       }
-      for (int k = 0; k < 9; ++k) from[k] = c->data[c->from_ends[18 * chain + k]];
+      read_block_of_end(c, chain, LEFT_FIRST, from, 1);
       subtract(from, y, left);
     }
     for (int k = 0; k < 3; ++k) {
@@ -328,20 +376,20 @@ void reduce(const chains *c, const double *b)
 static void follow_left_end(const chains *c, int chain, const double *left)
 {
   double to[9], y[3], next[3] = {0};
-  read_block(c, c->first[chain], 0, to);
+  read_block_of_end(c, chain, FIRST_LEFT, to, 1);
   subtract(to, left, next);
   const double faded = 0x1p-511 * fmax(fabs(next[0]), fmax(fabs(next[1]), fabs(next[2])));
   for (int v = c->first[chain]; v < c->first[chain + 1]; ++v) {
     if (fmax(fabs(next[0]), fmax(fabs(next[1]), fabs(next[2]))) <= faded) return;
     go_on(c, chain, v, next, y, next);
-    for (int r = 0; r < 3; ++r) c->f[c->row[3 * v + r]] += y[r];
+    for (int r = 0; r < 3; ++r) c->f[c->dof[v] + r] += y[r];
   }
 }
 
 /* The unknowns of all vertices into x, from those that are left; f as reduce left it, which may be x. */
 void expand(const chains *c, const double *left, double *x)
 {
-  for (int k = 0; k < c->rows; ++k) x[c->dof[k]] = left[c->number[k]];
+  for (int k = 0; k < c->rows; ++k) x[c->kept[k]] = left[c->number[k]];
   const int32_t *numbers = c->ends;
   for (int chain = 0; chain < c->chains; ++chain, numbers += 6) {
     double first[3], next[3], y[3];

@@ -239,14 +239,16 @@ void commit(points *p);
 /* What is kept of a vertex: its pivot block as LU, what that makes of the coupling to the vertex after. */
 enum { BLOCK = 9 };
 
+/* Rows and columns of the blocks that the first and last vertex of a chain have with its ends. */
+enum end_block { LEFT_FIRST, RIGHT_LAST, FIRST_LEFT, LAST_RIGHT };
+
 typedef struct {
   int chains;
   const int32_t *first;     /* first vertex of each chain, and their number */
   const int32_t *spike;     /* whether a chain has a left end */
-  const int32_t *row;       /* vertices x 3 */
-  const uint8_t *order;     /* vertices x 9 */
-  const int32_t *from_ends; /* chains x 18: entries of the ends' rows, left and right */
-  const int32_t *indptr;
+  const int32_t *dof, *begin; /* of each vertex: first degree of freedom; where its rows begin */
+  const uint8_t *at;        /* vertices x 3: where blocks begin in rows, see elimination.c */
+  const int32_t *with_ends; /* chains x 4 x 9: entries of blocks with the ends, see end_block */
   const double *data;
   double *pivots, *to_next; /* vertices x BLOCK */
   uint8_t *swaps;           /* vertices x 3: rows in the order of the pivots */
@@ -258,7 +260,7 @@ typedef struct {
   int left_size;
   const int32_t *entry, *place;  /* of those that stay: in data, in left_data */
   const int32_t *places;         /* chains x 36: where in left_data the blocks of the ends are */
-  const int32_t *dof, *number;   /* of those that stay: here, and among those left */
+  const int32_t *kept, *number;  /* of those that stay: here, and among those left */
   const int32_t *ends;           /* chains x 6: numbers of the ends among those left */
 } chains;
 
