@@ -12,7 +12,7 @@ from petsc4py import PETSc
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, integers, lib, loop
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, integers, lib, loop, struct
 from ufl_beam.structure_cache import of_structure
 
 
@@ -141,23 +141,48 @@ def as_slice(index: Index) -> Index | slice:
 
 
 class Product:
-    """Operator ``x -> A x`` on this process, without the zeros that ``A`` stores."""
+    """Operator ``x -> A x`` on this process, without the zeros that ``A`` stores.
+
+    Rows whose entries are equally far from the diagonal are a run, as most are along beams.
+    """
 
     def __init__(self, A: Csr) -> None:
         entries = np.flatnonzero(A.data).astype(np.int32)
-        self.indptr = np.searchsorted(entries, A.indptr).astype(np.int32)
-        self.data, columns = A.data[entries], A.indices[entries]
-        self.arrays = (A.size, integers(self.indptr), integers(columns), doubles(self.data))
+        indptr = np.searchsorted(entries, A.indptr).astype(np.int32)
+        width = np.diff(indptr)
+        row = np.repeat(np.arange(A.size, dtype=np.int32), width)
+        away = A.indices[entries] - row
+        begins = np.append(True, width[1:] != width[:-1])
+        more = np.flatnonzero(~begins[row])
+        begins[row[more[away[more] != away[more - width[row[more]]]]]] = True
+        first = np.flatnonzero(begins)
+        self._rows, self._widths = np.diff(np.append(first, A.size)), width[first]
+        self._away = away[begins[row]]
+        self._first = np.append(first, A.size).astype(np.int32)
+        self.data = A.data[A.positions(*self.pairs())]
+        self.c = struct(
+            "constant_matrix", runs=len(first), first=self._first, away=self._away,
+            begin=np.append(0, np.cumsum(self._widths)).astype(np.int32), at=indptr[first],
+            data=self.data,
+        )  # fmt: skip
+
+    def pairs(self) -> tuple[Index, Index]:
+        """Return row and column of each entry, in their order in :attr:`data`."""
+        rows = np.repeat(self._rows, self._widths)
+        first = np.repeat(self._first[:-1], self._widths)
+        before = np.cumsum(rows) - rows
+        row = np.arange(rows.sum(), dtype=np.int32) + np.repeat(first - before, rows)
+        return row, row + np.repeat(self._away, rows)
 
     def __call__(self, x: Array) -> Array:
         """Return the product, a new array."""
         y = np.zeros(len(x))
-        lib.add_product(*self.arrays, doubles(x), doubles(y))
+        lib.add_product(self.c, doubles(x), doubles(y))
         return y
 
     def square(self, x: Array) -> float:
         """Return ``x A x``."""
-        square: float = lib.quadratic_form(*self.arrays, doubles(x))
+        square: float = lib.quadratic_form(self.c, doubles(x))
         return square
 
 
@@ -170,16 +195,13 @@ class StepProduct:
 
     def __init__(self, A: Csr, rotations: Index, tangent: Csr, scratch: Array) -> None:
         self.A, self._tangent = Product(A), tangent
-        size, indptr, indices, data = self.A.arrays
-        entries = np.flatnonzero(A.data).astype(np.int32)
-        entries -= np.repeat(A.indptr[:-1], np.diff(self.A.indptr))  # places in the rows
-        place, self._places = {"far": entries}, entries
+        row, column = self.A.pairs()
+        places = A.positions(row, column) - A.indptr[row]
+        place = {"far": places}
         if A.narrow():
-            self._places = entries.astype(np.uint8)
-            place = {"place": ffi.from_buffer("uint8_t[]", self._places)}
-        self.c = fill(
-            ffi.new("step_product *"),
-            size=size, indptr=indptr, indices=indices, data=data, begin=tangent.indptr, **place,
+            place = {"place": ffi.from_buffer("uint8_t[]", places.astype(np.uint8))}
+        self.c = struct(
+            "step_product", size=A.size, A=self.A.c, begin=tangent.indptr, **place,
             rotations=len(rotations), rotation=rotations, space=scratch,
             turn=np.full(len(rotations), np.nan), half=np.empty(len(rotations)),
         )  # fmt: skip
@@ -187,8 +209,7 @@ class StepProduct:
     def matrix(self) -> Csr:
         """Return the matrix, a new one."""
         A = self._tangent.zeros_like()
-        rows = np.repeat(A.indptr[:-1], np.diff(self.A.indptr))
-        A.data[rows + self._places] = self.A.data
+        A.data[A.positions(*self.A.pairs())] = self.A.data
         return A
 
     def begin(self, q0: Array, factor: float, back: float, v: Array) -> None:

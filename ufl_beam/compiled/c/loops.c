@@ -222,26 +222,64 @@ int64_t find_pattern(int size, int groups, const int32_t *first, const int32_t *
   return number;
 }
 
-/* y += A x */
-void add_product(int rows, const int32_t *indptr, const int32_t *indices, const double *data,
-                 const double *x, double *y)
+/* CALL of the number of entries in a row, which the compiler knows where it is usual: matrices of masses
+ * at vertices, and along beams. */
+#define FOR_WIDTH(width, CALL) \
+  switch (width) { \
+  case 1: CALL(1); break; \
+  case 3: CALL(3); break; \
+  default: CALL(width); \
+  }
+
+/* y += A x in a run of rows; all but `away` from its first row on */
+static inline void add_rows_times(const int width, int rows, const double *data, const int32_t *away,
+                                  const double *x, double *restrict y)
 {
   for (int i = 0; i < rows; ++i) {
     double sum = 0;
-    for (int k = indptr[i]; k < indptr[i + 1]; ++k) sum += data[k] * x[indices[k]];
+    for (int k = 0; k < width; ++k) sum += data[(size_t)k * rows + i] * x[i + away[k]];
     y[i] += sum;
   }
 }
 
-/* x A x */
-double quadratic_form(int rows, const int32_t *indptr, const int32_t *indices, const double *data,
-                      const double *x)
+/* y += A x */
+void add_product(const constant_matrix *A, const double *x, double *y)
+{
+  for (int g = 0; g < A->runs; ++g) {
+    const int first = A->first[g], rows = A->first[g + 1] - first;
+    const int32_t *away = A->away + A->begin[g];
+    const double *data = A->data + A->at[g];
+#define ADD(width) add_rows_times(width, rows, data, away, x + first, y + first)
+    FOR_WIDTH(A->begin[g + 1] - A->begin[g], ADD)
+#undef ADD
+  }
+}
+
+/* x A x of a run of rows */
+static inline double square_of_rows(const int width, int rows, const double *data,
+                                    const int32_t *away, const double *x)
 {
   double sum = 0;
+#pragma omp simd reduction(+ : sum)
   for (int i = 0; i < rows; ++i) {
     double row = 0;
-    for (int k = indptr[i]; k < indptr[i + 1]; ++k) row += data[k] * x[indices[k]];
+    for (int k = 0; k < width; ++k) row += data[(size_t)k * rows + i] * x[i + away[k]];
     sum += x[i] * row;
+  }
+  return sum;
+}
+
+/* x A x */
+double quadratic_form(const constant_matrix *A, const double *x)
+{
+  double sum = 0;
+  for (int g = 0; g < A->runs; ++g) {
+    const int first = A->first[g], rows = A->first[g + 1] - first;
+    const int32_t *away = A->away + A->begin[g];
+    const double *data = A->data + A->at[g];
+#define ADD(width) sum += square_of_rows(width, rows, data, away, x + first)
+    FOR_WIDTH(A->begin[g + 1] - A->begin[g], ADD)
+#undef ADD
   }
   return sum;
 }
@@ -278,7 +316,7 @@ void add_step_force(void *self, const double *q, double *r)
     *x = 2 * half_tangent(p, k, *x);
   }
   for (int i = 0; i < p->size; ++i) s[i] = p->factor * s[i] - p->back * p->v[i];
-  add_product(p->size, p->indptr, p->indices, p->data, s, r);
+  add_product(p->A, s, r);
 }
 
 /* The derivatives, over those of q - q0, of the step of the nodes times the factor: factor (1 + half^2) */
@@ -296,15 +334,30 @@ static void find_growth(const step_product *p, const double *q)
 /* tangent += A, column by column times these derivatives; some of the rows */
 static void add_rows(const step_product *p, int first, int last, double *tangent)
 {
-  const double *growth = p->space;
-  for (int i = first; i < last; ++i) {
-    double *row = tangent + p->begin[i];
-    if (p->place)
-      for (int k = p->indptr[i]; k < p->indptr[i + 1]; ++k)
-        row[p->place[k]] += p->data[k] * growth[p->indices[k]];
-    else
-      for (int k = p->indptr[i]; k < p->indptr[i + 1]; ++k)
-        row[p->far[k]] += p->data[k] * growth[p->indices[k]];
+  const constant_matrix *A = p->A;
+  int g = 0;
+  for (int end = A->runs; end - g > 1;) {
+    const int middle = (g + end) / 2;
+    if (A->first[middle] <= first) g = middle;
+    else end = middle;
+  }
+  for (; first < last; ++g) {
+    const int rows = A->first[g + 1] - A->first[g];
+    const int end = A->first[g + 1] < last ? A->first[g + 1] : last;
+    const int32_t *away = A->away + A->begin[g];
+    const size_t at = A->at[g] - A->first[g];
+#define ADD(width, place) \
+  for (; first < end; ++first) \
+    for (int k = 0; k < (width); ++k) \
+      tangent[p->begin[first] + place[at + (size_t)k * rows + first]] += \
+        A->data[at + (size_t)k * rows + first] * p->space[first + away[k]]
+#define ADD_NEAR(width) ADD(width, p->place)
+#define ADD_FAR(width) ADD(width, p->far)
+    if (p->place) FOR_WIDTH(A->begin[g + 1] - A->begin[g], ADD_NEAR)
+    else FOR_WIDTH(A->begin[g + 1] - A->begin[g], ADD_FAR)
+#undef ADD
+#undef ADD_NEAR
+#undef ADD_FAR
   }
 }
 

@@ -76,14 +76,23 @@ typedef struct {
   const double *values;
 } vector;
 
+/* A constant matrix, by runs of rows whose entries are equally far from the diagonal. */
+typedef struct {
+  int runs;
+  const int32_t *first;        /* row of each run, and the number of rows */
+  const int32_t *begin, *away; /* of each run and of one more: its part of `away`, columns less row */
+  const int32_t *at;           /* where the entries of each run begin: the first one of each of its */
+  const double *data;          /* rows, then the second ones, and so on */
+} constant_matrix;
+
 /* A constant matrix A times the step of the nodes from q0, see StepProduct. */
 typedef struct {
   int size, rotations;
-  const int32_t *rotation, *indptr, *indices;
+  const int32_t *rotation;
+  const constant_matrix *A;
   const int32_t *begin;  /* of the rows of the tangent; where entries of A are in them: `place`, of */
   const uint8_t *place;  /* one byte each, or */
   const int32_t *far;    /* if that is not enough, this */
-  const double *data;
   double factor, back;
   const double *v, *q0;
   double *space;
@@ -105,10 +114,8 @@ int find_blocks(int rows, const int32_t *indptr, const int32_t *indices, int num
                 int lanes, const int32_t *dofs, int32_t *place, uint8_t *column);
 int64_t find_pattern(int size, int groups, const int32_t *first, const int32_t *dof, int32_t *begin,
                      int32_t *group, int32_t *seen, int32_t *indptr, int32_t *indices);
-void add_product(int rows, const int32_t *indptr, const int32_t *indices, const double *data,
-                 const double *x, double *y);
-double quadratic_form(int rows, const int32_t *indptr, const int32_t *indices, const double *data,
-                      const double *x);
+void add_product(const constant_matrix *A, const double *x, double *y);
+double quadratic_form(const constant_matrix *A, const double *x);
 double step_of_nodes(int size, int rotations, const int32_t *rotation, double *s,
                      const double *q0, const double *q1);
 void give_back_memory(void);

@@ -172,7 +172,7 @@ void accept_inertia(void *self, const time_step *step, const double *q1, const d
     double *change = m->v;
     for (int i = 0; i < r->size; ++i) change[i] = r->new_rate[1][i] - r->rate[1][i];
     memset(m->momentum, 0, r->size * sizeof *m->momentum);
-    add_product(p->size, p->indptr, p->indices, p->data, change, m->momentum);
+    add_product(p->A, change, m->momentum);
     r->rate[0] = change;
     combine_rates(r, r->now->slip, 0, r->new_rate[2]);
     *m->lost += dot(r->size, r->new_rate[2], m->momentum);
@@ -190,7 +190,7 @@ void add_kinetic_energy(void *self, const time_step *step, const double *q1, con
 {
   const matrix_of_rates *m = self;
   const step_product *p = m->product;
-  *m->kept += quadratic_form(p->size, p->indptr, p->indices, p->data, m->rates->rate[1]) / 2;
+  *m->kept += quadratic_form(p->A, m->rates->rate[1]) / 2;
 }
 
 void begin_rayleigh(void *self, const time_step *step, const double *q1, const double *s)
@@ -206,7 +206,7 @@ void accept_rayleigh(void *self, const time_step *step, const double *q1, const 
 {
   const matrix_of_rates *m = self;
   const step_product *p = m->product;
-  *m->lost += quadratic_form(p->size, p->indptr, p->indices, p->data, s) / step->dt;
+  *m->lost += quadratic_form(p->A, s) / step->dt;
 }
 
 static void begin_points(points *p, double *dt, double new_dt)
