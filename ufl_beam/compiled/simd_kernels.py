@@ -10,6 +10,7 @@ from __future__ import annotations
 import logging
 import math
 import re
+from collections import Counter
 from functools import cache, partial
 from pathlib import Path
 from types import ModuleType
@@ -61,9 +62,14 @@ def in_vectors(kernel: str) -> str:
         missing.append("pow with a fractional exponent")
     if missing:
         raise Refused(f"lanes.h has no {', '.join(missing)}")
+    divisors = Counter(re.findall(r"/ (sp_\w+);", body))
+    often = "|".join(name for name, number in divisors.items() if number > 1) or "(?!)"
     lines = []
     for line in body.splitlines():
         if not line.startswith("static const"):
+            line = re.sub(rf"/ ({_NUMBER});", r"* (1.0 / \1);", line)
+            line = re.sub(rf"/ ({often});", r"* over_\1;", line)
+            line = re.sub(rf"^double ({often}) = .*;", r"\g<0> double over_\1 = 1 / \1;", line)
             line = re.sub(rf"\bdouble (\w+) = ({_NUMBER});", r"lanes \1 = ALL(\2);", line)
             line = re.sub(rf"= ({_NUMBER} \* weights_\w+\[iq\]);", r"= ALL(\1);", line)
             line = re.sub(r"\bdouble\b", "lanes", line)
@@ -136,7 +142,7 @@ def in_lanes(source: Path, kernel: int, sizes: tuple[int, int, int]) -> int | No
             lambda: "\n".join([head, in_vectors(written(source)), loop]),
             # FFCx names what it makes by what is in it.
             made_of=[source.name, head, loop, Path(__file__).read_text()],
-            flags=["-O2", NATIVE, "-fno-math-errno"],
+            flags=["-O2", NATIVE, "-fno-math-errno", "-mprefer-vector-width=512"],
             check=lambda module: require_agreement(module, kernel, sizes),
         )
     except (Refused, CompilerError) as why:

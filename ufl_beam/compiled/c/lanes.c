@@ -3,20 +3,65 @@
 
 enum { NUMBERS = CONSTANTS + (CONSTANTS == 0), COEFFICIENTS = WIDTH + (WIDTH == 0) };
 
+/* Two and four numbers anywhere */
+typedef double two __attribute__((vector_size(16), aligned(8)));
+typedef double four __attribute__((vector_size(32), aligned(8)));
+
+/* Rows of a matrix whose entries stand side by side: fewer and wider additions than one by one. */
+static inline void add_rows_of_six(const cells *c, const lanes *e, const int32_t *dofs,
+                                   const uint8_t *pattern, double *b)
+{
+  /* Rows of the second vertices last: cells side by side add to the same, and would wait. */
+  for (int k = 0; k < 6; ++k) {
+    const int i = k % 3 * 2 + k / 3;
+    double *row[LANES];
+    for (int l = 0; l < LANES; ++l)
+      row[l] = b + c->begin[dofs[l * 6 + i]] + pattern[6 * LANES * i + l];
+#define FOUR(j) (*(const four *)((const double *)(e + 6 * i + j) + l))
+#define EVEN(a, b) __builtin_shufflevector(a, b, 0, 4, 2, 6)
+#define ODD(a, b) __builtin_shufflevector(a, b, 1, 5, 3, 7)
+#define LOWER(a, b) __builtin_shufflevector(a, b, 0, 1, 4, 5)
+#define UPPER(a, b) __builtin_shufflevector(a, b, 2, 3, 6, 7)
+    for (int l = 0; l < LANES; l += 4) {
+      const four u = EVEN(FOUR(0), FOUR(2)), U = ODD(FOUR(0), FOUR(2));
+      const four v = EVEN(FOUR(4), FOUR(1)), V = ODD(FOUR(4), FOUR(1));
+      const four w = EVEN(FOUR(3), FOUR(5)), W = ODD(FOUR(3), FOUR(5));
+      *(four *)row[l] += LOWER(u, v);
+      *(four *)row[l + 1] += LOWER(U, V);
+      *(four *)row[l + 2] += UPPER(u, v);
+      *(four *)row[l + 3] += UPPER(U, V);
+      *(two *)(row[l] + 4) += __builtin_shufflevector(w, w, 0, 1);
+      *(two *)(row[l + 1] + 4) += __builtin_shufflevector(W, W, 0, 1);
+      *(two *)(row[l + 2] + 4) += __builtin_shufflevector(w, w, 2, 3);
+      *(two *)(row[l + 3] + 4) += __builtin_shufflevector(W, W, 2, 3);
+    }
+#undef FOUR
+#undef EVEN
+#undef ODD
+#undef LOWER
+#undef UPPER
+  }
+}
+
 /* A batch of which `some` are cells; if entries are a matrix, it has SIDE rows. All lanes add one entry,
  * then the next one: cells side by side add to the same places, and would wait for each other. */
 static inline void add_batch(const cells *c, const lanes *e, int first, int some, double *b)
 {
   const int32_t *dofs = c->dofs + (size_t)first * c->of_cell;
-  if (c->column) {
-    const uint8_t *column = c->column + (size_t)first * ENTRIES;
+  if (c->pattern) {
+    const int has = c->has[first / LANES];
+    const uint8_t *pattern = c->pattern + (size_t)has * ENTRIES * LANES;
+    if (SIDE == 6 && some == LANES && has < c->in_rows) {
+      add_rows_of_six(c, e, dofs, pattern, b);
+      return;
+    }
     for (int i = 0; i < SIDE; ++i) {
       double *row[LANES] = {0};
 #pragma GCC unroll 8
       for (int l = 0; l < some; ++l) row[l] = b + c->begin[dofs[l * SIDE + i]];
-      for (int j = 0; j < SIDE; ++j, ++e, column += LANES)
+      for (int j = 0; j < SIDE; ++j, ++e, pattern += LANES)
 #pragma GCC unroll 8
-        for (int l = 0; l < some; ++l) row[l][column[l]] += (*e)[l];
+        for (int l = 0; l < some; ++l) row[l][pattern[l]] += (*e)[l];
     }
   } else if (c->row) {
     const int32_t *row = c->row + (size_t)first * ENTRIES;
@@ -40,11 +85,14 @@ static void add_in_lanes(const cells *c, const double *q, double *b)
   for (int i = 0; i < CONSTANTS; ++i) constants[i] = ALL(c->constants[i]);
   for (int first = 0; first < c->number; first += LANES) {
     const int some = c->number - first < LANES ? c->number - first : LANES;
-    const int32_t *dofs = c->dofs + (size_t)first * c->of_cell;
+    const int32_t *dofs[LANES];
     const lanes *stored = (const lanes *)(c->w + (size_t)first * c->width);
+    for (int l = 0; l < LANES; ++l)
+      dofs[l] = c->dofs + (size_t)(first + (l < some ? l : 0)) * c->of_cell;
     for (int i = 0; i < c->at; ++i) w[i] = stored[i];
-    for (int l = 0; l < some; ++l, dofs += c->of_cell)
-      for (int i = 0; i < c->unknowns; ++i) w[c->at + i][l] = q[dofs[i]];
+#define Q(l) q[dofs[l][i]]
+    for (int i = 0; i < c->unknowns; ++i) w[c->at + i] = (lanes){EACH(Q)};
+#undef Q
     for (int i = after; i < WIDTH; ++i) w[i] = stored[i - c->unknowns];
     const lanes *at = (const lanes *)(c->coordinates + (size_t)first * 4);
     x[0] = at[0], x[1] = at[1], x[3] = at[2], x[4] = at[3];

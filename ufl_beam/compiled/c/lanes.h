@@ -8,6 +8,11 @@ typedef double lanes __attribute__((vector_size(8 * LANES), aligned(8), may_alia
 typedef int64_t mask __attribute__((vector_size(8 * LANES), aligned(8), may_alias));
 
 #define ALL(x) ((lanes){0} + (x))
+#if LANES == 8
+#define EACH(f) f(0), f(1), f(2), f(3), f(4), f(5), f(6), f(7)
+#else
+#define EACH(f) f(0), f(1), f(2), f(3)
+#endif
 #define PICK(m, a, b) ((lanes)(((m) & (mask)ALL(a)) | (~(m) & (mask)ALL(b))))
 
 /* The polynomials of sine and cosine are those of fdlibm, k_sin.c and k_cos.c:

@@ -49,10 +49,10 @@ void add_cells(void *self, const double *q, double *b)
     CALL(c->tabulate, e, w, c->constants, x);
     if (c->row)
       for (int i = 0; i < c->rows; ++i) b[c->row[first + i]] += e[i];
-    else if (c->column)
-      for (int i = 0; i < c->rows; ++i)
-        b[c->begin[dofs[i / c->of_cell]] + c->column[first + i]] += e[i];
-    else if (c->is_functional)
+    else if (c->pattern) {
+      const uint8_t *pattern = c->pattern + (size_t)c->has[k] * c->rows;
+      for (int i = 0; i < c->rows; ++i) b[c->begin[dofs[i / c->of_cell]] + pattern[i]] += e[i];
+    } else if (c->is_functional)
       *b += *e;
     else
       for (int i = 0; i < c->rows; ++i) b[dofs[i]] += e[i];

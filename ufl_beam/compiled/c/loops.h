@@ -27,11 +27,11 @@ enum { MOST_ENTRIES = 144 }; /* of the vector or matrix of a cell: 12 unknowns o
  * part of those of another form.
  *
  * An entry of a cell is added to the place `row` says; without these, to its entry in the row `begin`
- * of a matrix, `column` places on; without either, to its degree of freedom; of a functional, to its
- * value.
+ * of a matrix, as many places on as the `pattern` says that the cell has; without either, to its degree
+ * of freedom; of a functional, to its value.
  *
  * Where a form is computed for several cells at once, `several` does what add_cells does, and numbers
- * of cells (w, coordinates, row, column) come in batches of as many cells: the first number of each of
+ * of cells (w, coordinates, row, patterns) come in batches of as many cells: the first number of each of
  * these cells, then their second numbers, and so on; the last batch is filled up with the last cell. */
 typedef struct cells cells;
 typedef void (in_lanes)(const cells *self, const double *q, double *out);
@@ -46,7 +46,9 @@ struct cells {
   const double *constants, *coordinates; /* coordinates: x and y of both vertices */
   int rows; /* entries of a cell */
   const int32_t *row, *begin; /* or none */
-  const uint8_t *column;
+  const uint8_t *pattern;
+  const int32_t *has; /* number of the pattern of each batch */
+  int in_rows; /* number of patterns, the first ones, that have the rows of a cell side by side */
   int is_functional;
 };
 

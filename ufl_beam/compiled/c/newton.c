@@ -43,7 +43,7 @@ static cells some_cells(const cells *c, int first)
   some.dofs += (size_t)first * c->of_cell, some.coordinates += (size_t)first * 4;
   some.w += (size_t)first * c->width;
   if (c->row) some.row += (size_t)first * c->rows;
-  if (c->column) some.column += (size_t)first * c->rows;
+  if (c->pattern) some.has += first / c->lanes;
   return some;
 }
 
