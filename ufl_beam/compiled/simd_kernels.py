@@ -68,7 +68,7 @@ def in_vectors(kernel: str) -> str:
     for line in body.splitlines():
         if not line.startswith("static const"):
             line = re.sub(rf"/ ({_NUMBER});", r"* (1.0 / \1);", line)
-            line = re.sub(rf"/ ({often});", r"* over_\1;", line)
+            line = re.sub(rf"= ([a-z]\w*) / ({often});", r"= quotient(\1, \2, over_\2);", line, flags=re.I)
             line = re.sub(rf"^double ({often}) = .*;", r"\g<0> double over_\1 = 1 / \1;", line)
             line = re.sub(rf"\bdouble (\w+) = ({_NUMBER});", r"lanes \1 = ALL(\2);", line)
             line = re.sub(rf"= ({_NUMBER} \* weights_\w+\[iq\]);", r"= ALL(\1);", line)
