@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from ufl_beam.compiled.csr import StepProduct, coupling
+from ufl_beam.compiled.csr import Product, StepProduct, coupling
 from ufl_beam.compiled.simd_kernels import in_batches
 
 
@@ -89,3 +89,60 @@ def test_a_constant_matrix_with_a_hub(number):
     assert np.array_equal(tangent.data, 2 * A.data)
     assert np.array_equal(product.matrix().data, A.data)
     assert len(product.A.data) == np.count_nonzero(A.data)
+
+
+def masses(*, lumped, size=60):
+    """Masses along a chain of vertices, with a hub and rows of nothing; the matrix also dense."""
+    cells = np.arange(size).reshape(-1, 3)
+    pairs = np.hstack([cells[:-1], cells[1:]])
+    A = coupling(size, pairs.astype(np.int32), np.array([[0, 31, 7, 50]], dtype=np.int32))
+    rows, columns = A.rows(), A.indices
+    random, away = np.random.default_rng(4), np.abs(columns - rows)
+    A.data[:] = random.uniform(1, 2, len(rows)) * (away == 0 if lumped else away % 3 == 0)
+    A.data[(rows >= 21) & (rows < 24)] = 0.0
+    dense = np.zeros((size, size))
+    dense[rows, columns] = A.data
+    return A, dense
+
+
+@pytest.mark.parametrize("lumped", [False, True])
+def test_products_with_runs_of_rows(lumped):
+    A, dense = masses(lumped=lumped)
+    product, x = Product(A), np.random.default_rng(5).normal(size=A.size)
+    assert product.c.runs <= (3 if lumped else 12)
+    assert np.allclose(product(x), dense @ x, rtol=1e-14, atol=1e-14)
+    assert product.square(x) == pytest.approx(x @ dense @ x, rel=1e-13)
+    row, column = product.pairs()
+    assert np.array_equal(np.sort(row * A.size + column), np.flatnonzero(dense))
+    assert np.array_equal(product.data, dense[row, column])
+
+
+def test_an_empty_constant_matrix():
+    product = Product(coupling(0))
+    assert len(product(np.empty(0))) == product.square(np.empty(0)) == 0
+
+
+@pytest.mark.parametrize("lumped", [False, True])
+def test_the_tangent_of_a_constant_matrix(lumped):
+    """Of forces A (factor s - back v) at some rotations, by differences."""
+    A, dense = masses(lumped=lumped)
+    rotations, random = np.arange(2, A.size, 3, dtype=np.int32), np.random.default_rng(6)
+    tangent = A.zeros_like()
+    product = StepProduct(A, rotations, tangent, np.empty(A.size))
+    q0, q1, v = random.normal(size=(3, A.size))
+    product.begin(q0, 3.0, 2.0, v)
+
+    def force(q):
+        r = np.zeros(A.size)
+        product.add_force(q, r)
+        return r
+
+    step = q1 - q0
+    step[rotations] = 2 * np.tan(step[rotations] / 2)
+    assert np.allclose(force(q1), dense @ (3 * step - 2 * v), rtol=1e-13, atol=1e-12)
+    product.add_tangent(q1)
+    found = np.zeros_like(dense)
+    found[A.rows(), A.indices] = tangent.data
+    differences = [(force(q1 + h) - force(q1 - h)) / 2e-6 for h in 1e-6 * np.eye(A.size)]
+    # Second differences of tan, which are large where a node turns far: a digit fewer than 1e-12.
+    assert np.allclose(found.T, differences, rtol=1e-6, atol=1e-6)

@@ -105,6 +105,22 @@ def test_held_degrees_of_freedom():
     assert np.allclose(solve(elimination, b), np.linalg.solve(dense, b), rtol=1e-10, atol=1e-10)
 
 
+@pytest.mark.parametrize("scattered", [(0,), (11,), (0, 11), (5,), (5, 6), (0, 5, 11)])
+def test_vertices_whose_degrees_of_freedom_do_not_follow_each_other(scattered):
+    """They are left, and may be ends of chains."""
+    number, firsts = np.arange(36), [3 * v for v in scattered]
+    if len(firsts) > 1:
+        number[firsts] = np.roll(firsts, 1)
+    else:
+        number[firsts[0] + np.arange(3)] = firsts[0] + np.array([1, 2, 0])
+    share, A, dense = system(number[cells_of(range(12))])
+    elimination = Elimination(share, A)
+    assert elimination.left.size == 3 * len(scattered)
+    for again, b in enumerate(np.random.default_rng(1).uniform(-1, 1, (2, share.size))):
+        x = solve(elimination, b, again)
+        assert np.allclose(x, np.linalg.solve(dense, b), rtol=1e-9, atol=1e-10)
+
+
 @pytest.mark.parametrize("pair", [(12, 60), (12, 30), (13, 17)])
 def test_what_couples_to_more_is_left(pair):
     """A further unknown, another vertex far away, the next but one."""

@@ -152,7 +152,8 @@ class Product:
         width = np.diff(indptr)
         row = np.repeat(np.arange(A.size, dtype=np.int32), width)
         away = A.indices[entries] - row
-        begins = np.append(True, width[1:] != width[:-1])
+        begins = np.ones(A.size, dtype=bool)
+        begins[1:] = width[1:] != width[:-1]
         more = np.flatnonzero(~begins[row])
         begins[row[more[away[more] != away[more - width[row[more]]]]]] = True
         first = np.flatnonzero(begins)

@@ -39,6 +39,9 @@ LANES = 8 if _WIDE else 4
 """Cells that are computed at once, as many as AVX-512 or AVX have room for; compilers split vectors
 for less."""
 
+FLAGS = ["-O2", NATIVE, "-fno-math-errno", *(["-mprefer-vector-width=512"] if _WIDE else [])]
+"""Flags for the compiler, which otherwise takes square roots in halves of a vector."""
+
 FUNCTIONS = {"sin", "cos", "sqrt", "fabs", "pow"}
 """Functions that lanes.h has for vectors; powers with integer exponents."""
 
@@ -53,7 +56,10 @@ _NUMBER = r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?"
 
 
 def in_vectors(kernel: str) -> str:
-    """Rewrite the C of a kernel of FFCx with vectors in the place of numbers, if lanes.h can."""
+    """Rewrite the C of a kernel of FFCx with vectors in the place of numbers, if lanes.h can.
+
+    Numbers, and what divides more than once, become factors.
+    """
     body = kernel[kernel.index("{") :]
     called = re.findall(r"\b(?!for\b)([a-z_]\w*)\(", body)
     whole = re.findall(r"\bpow\([\w\[\]]+, -?\d+\)", body)
@@ -68,7 +74,7 @@ def in_vectors(kernel: str) -> str:
     for line in body.splitlines():
         if not line.startswith("static const"):
             line = re.sub(rf"/ ({_NUMBER});", r"* (1.0 / \1);", line)
-            line = re.sub(rf"= ([a-z]\w*) / ({often});", r"= quotient(\1, \2, over_\2);", line, flags=re.I)
+            line = re.sub(rf"= ([a-zA-Z]\w*) / ({often});", r"= quotient(\1, \2, over_\2);", line)
             line = re.sub(rf"^double ({often}) = .*;", r"\g<0> double over_\1 = 1 / \1;", line)
             line = re.sub(rf"\bdouble (\w+) = ({_NUMBER});", r"lanes \1 = ALL(\2);", line)
             line = re.sub(rf"= ({_NUMBER} \* weights_\w+\[iq\]);", r"= ALL(\1);", line)
@@ -142,7 +148,7 @@ def in_lanes(source: Path, kernel: int, sizes: tuple[int, int, int]) -> int | No
             lambda: "\n".join([head, in_vectors(written(source)), loop]),
             # FFCx names what it makes by what is in it.
             made_of=[source.name, head, loop, Path(__file__).read_text()],
-            flags=["-O2", NATIVE, "-fno-math-errno", "-mprefer-vector-width=512"],
+            flags=FLAGS,
             check=lambda module: require_agreement(module, kernel, sizes),
         )
     except (Refused, CompilerError) as why:

@@ -99,7 +99,7 @@ class Chains:
 
 def in_turn(dofs: Index) -> npt.NDArray[np.bool_]:
     """Whether the three degrees of freedom of each vertex follow each other."""
-    return (np.diff(dofs, axis=1) == 1).all(axis=1)
+    return np.asarray((np.diff(dofs, axis=1) == 1).all(axis=1))
 
 
 def _runs(mask: npt.NDArray[np.bool_]) -> tuple[Index, Index, Index]:

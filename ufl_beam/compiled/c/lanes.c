@@ -4,8 +4,8 @@
 enum { NUMBERS = CONSTANTS + (CONSTANTS == 0), COEFFICIENTS = WIDTH + (WIDTH == 0) };
 
 /* Two and four numbers anywhere */
-typedef double two __attribute__((vector_size(16), aligned(8)));
-typedef double four __attribute__((vector_size(32), aligned(8)));
+typedef double two __attribute__((vector_size(16), aligned(8), may_alias));
+typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
 
 /* Rows of a matrix whose entries stand side by side: fewer and wider additions than one by one. */
 static inline void add_rows_of_six(const cells *c, const lanes *e, const int32_t *dofs,
