@@ -351,6 +351,7 @@ def test_energies_share_the_values_of_the_force(degree):
     assert beams._stored.value(simulation.q) == pytest.approx(own.value(simulation.q), rel=1e-13)
 
 
+@pytest.mark.serial
 def test_batches_alike_have_one_pattern():
     """A beam has those of both ends and of what is between, in rows but for the free end."""
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=1000)
