@@ -153,9 +153,11 @@ class Product:
         row = np.repeat(np.arange(A.size, dtype=np.int32), width)
         away = A.indices[entries] - row
         begins = np.ones(A.size, dtype=bool)
-        begins[1:] = width[1:] != width[:-1]
-        more = np.flatnonzero(~begins[row])
-        begins[row[more[away[more] != away[more - width[row[more]]]]]] = True
+        for number in np.unique(width):
+            rows = np.flatnonzero(width == number).astype(np.int32)
+            of_rows = away[indptr[rows, None] + np.arange(number, dtype=np.int32)]
+            alike = (of_rows[1:] == of_rows[:-1]).all(axis=1) & (np.diff(rows) == 1)
+            begins[rows[1:][alike]] = False
         first = np.flatnonzero(begins)
         self._rows, self._widths = np.diff(np.append(first, A.size)), width[first]
         self._away = away[begins[row]]
