@@ -159,7 +159,7 @@ class Product:
             alike = (of_rows[1:] == of_rows[:-1]).all(axis=1) & (np.diff(rows) == 1)
             begins[rows[1:][alike]] = False
         first = np.flatnonzero(begins)
-        self._rows, self._widths = np.diff(np.append(first, A.size)), width[first]
+        self._rows, self._widths = np.diff(np.append(first, A.size)).astype(np.int32), width[first]
         self._away = away[begins[row]]
         self._first = np.append(first, A.size).astype(np.int32)
         self.data = A.data[A.positions(*self.pairs())]

@@ -130,7 +130,10 @@ class CellForm(Protocol):
 
 
 def patterns(places: npt.NDArray[np.uint8]) -> dict[str, Any]:
-    """Fields of ``cells`` of loops.h for :meth:`Csr.blocks`: batches alike have one pattern."""
+    """Fields of ``cells`` of loops.h for :meth:`Csr.blocks`: batches alike have one pattern.
+
+    The first ones are those of cells of degree 1 with all entries of a row side by side.
+    """
     batches, entries, lanes = places.shape
     as_one = places.reshape(batches, entries * lanes).view(f"V{entries * lanes}")[:, 0]
     _, first, has = np.unique(as_one, return_index=True, return_inverse=True)

@@ -50,7 +50,7 @@ class Chains:
         # With nine entries in rows and columns, these nine are all.
         plain = alone & (np.diff(A.indptr) == 9)
         plain &= np.bincount(A.indices, minlength=A.size) == 9
-        inside &= plain[end[:-1]].all(axis=1) & in_turn(end[:-1])
+        inside &= plain[end[:-1]].all(axis=1) & _in_turn(end[:-1])
         first_of_vertex = np.zeros(len(inside), dtype=bool)
         first_of_vertex[np.unique(end[:-1, 0], return_index=True)[1]] = True
         inside &= first_of_vertex
@@ -64,16 +64,20 @@ class Chains:
         # A chain with one neighbour at both ends is eliminated from both, up to its middle.
         narrow = alone & (np.diff(A.indptr) == 6)
         narrow &= np.bincount(A.indices, minlength=A.size) == 6
+
+        def has_one_neighbour(of: Index) -> npt.NDArray[np.bool_]:
+            return np.asarray(narrow[of].all(axis=1) & _in_turn(of))
+
         _, first, last = _runs(inside)
-        free = in_turn(start[:-1][first]) & narrow[start[:-1][first]].all(axis=1)
-        free &= in_turn(end[1:][last]) & narrow[end[1:][last]].all(axis=1) & (last - first > 1)
+        free = has_one_neighbour(start[:-1][first]) & has_one_neighbour(end[1:][last])
+        free &= last - first > 1
         inside[(first + last)[free] // 2] = False
 
         chain, first, last = _runs(inside)
         left, middle_, right = start[:-1][first], end[:-1][inside], end[1:][last]
         before, after = start[:-1][inside], end[1:][inside]
         # A vertex with six entries has no neighbour but the first or last of its chain.
-        dead_left, dead_right = (narrow[of].all(axis=1) & in_turn(of) for of in (left, right))
+        dead_left, dead_right = map(has_one_neighbour, (left, right))
         backward = dead_right & ~dead_left
         dead = dead_left | dead_right
         long = last - first + 1
@@ -97,8 +101,8 @@ class Chains:
             self.at += around[:, :, 0] > column[:, None]
 
 
-def in_turn(dofs: Index) -> npt.NDArray[np.bool_]:
-    """Whether the three degrees of freedom of each vertex follow each other."""
+def _in_turn(dofs: Index) -> npt.NDArray[np.bool_]:
+    """Return whether the three degrees of freedom of each vertex follow each other."""
     return np.asarray((np.diff(dofs, axis=1) == 1).all(axis=1))
 
 
