@@ -339,35 +339,59 @@ static inline void go_on(const chains *c, int chain, int vertex, const double *b
   subtract(below, y, next);
 }
 
-/* The same for another right-hand side; f takes what pivots make of it. The left end feels what the
- * first vertex does while both ends are held. */
+/* Vertices of the longest of PAIR chains, or of one that is the last: those take turns, as a processor
+ * would wait for each vertex of a chain. */
+static inline int most_vertices(const chains *c, int chain)
+{
+  int most = 0;
+  for (int l = 0; l < PAIR && chain + l < c->chains; ++l) {
+    const int number = c->first[chain + l + 1] - c->first[chain + l];
+    if (number > most) most = number;
+  }
+  return most;
+}
+
+/* What the left end of a chain feels of the first vertex while both ends are held, from f. */
+static void feel_first_vertex(const chains *c, int chain, double *left)
+{
+  const int end = c->first[chain + 1];
+  double from[9], x[3], y[3];
+  read_vertex(c, c->f, end - 1, y);
+  for (int v = end - 2; v >= c->first[chain]; --v) {
+    read_vertex(c, c->f, v, x);
+    subtract(c->to_next + BLOCK * v, y, x);
+    memcpy(y, x, sizeof y);
+  }
+  read_block_of_end(c, chain, LEFT_FIRST, from, 1);
+  subtract(from, y, left);
+}
+
+/* Eliminate all vertices from another right-hand side; f takes what pivots make of it. */
 void reduce(const chains *c, const double *b)
 {
   memset(c->left_f, 0, c->left_size * sizeof *c->left_f);
   for (int k = 0; k < c->rows; ++k) c->left_f[c->number[k]] = b[c->kept[k]];
-  const int32_t *numbers = c->ends;
-  for (int chain = 0; chain < c->chains; ++chain, numbers += 6) {
-    const int first = c->first[chain], end = c->first[chain + 1];
-    double left[3] = {0}, next[3] = {0}, from[9], x[3], y[3];
-    for (int v = first; v < end; ++v) {
-      read_vertex(c, b, v, x);
-      for (int r = 0; r < 3; ++r) x[r] += next[r];
-      go_on(c, chain, v, x, y, next);
-      write_vertex(c, y, v, c->f);
-    }
-    if (c->spike[chain]) {
-      read_vertex(c, c->f, end - 1, y);
-      for (int v = end - 2; v >= first; --v) {
-        read_vertex(c, c->f, v, x);
-        subtract(c->to_next + BLOCK * v, y, x);
-        memcpy(y, x, sizeof y);
+  for (int chain = 0; chain < c->chains; chain += PAIR) {
+    double next[PAIR][3] = {0};
+    const int most = most_vertices(c, chain);
+    for (int k = 0; k < most; ++k)
+      for (int l = 0; l < PAIR && chain + l < c->chains; ++l) {
+        const int v = c->first[chain + l] + k;
+        double x[3], y[3];
+        if (v >= c->first[chain + l + 1]) continue;
+        read_vertex(c, b, v, x);
+        for (int r = 0; r < 3; ++r) x[r] += next[l][r];
+        go_on(c, chain + l, v, x, y, next[l]);
+        write_vertex(c, y, v, c->f);
       }
-      read_block_of_end(c, chain, LEFT_FIRST, from, 1);
-      subtract(from, y, left);
-    }
-    for (int k = 0; k < 3; ++k) {
-      c->left_f[numbers[k]] += left[k];
-      c->left_f[numbers[3 + k]] += next[k];
+    for (int l = 0; l < PAIR && chain + l < c->chains; ++l) {
+      const int32_t *numbers = c->ends + 6 * (chain + l);
+      double left[3] = {0};
+      if (c->spike[chain + l]) feel_first_vertex(c, chain + l, left);
+      for (int k = 0; k < 3; ++k) {
+        c->left_f[numbers[k]] += left[k];
+        c->left_f[numbers[3 + k]] += next[l][k];
+      }
     }
   }
 }
@@ -390,17 +414,24 @@ static void follow_left_end(const chains *c, int chain, const double *left)
 void expand(const chains *c, const double *left, double *x)
 {
   for (int k = 0; k < c->rows; ++k) x[c->kept[k]] = left[c->number[k]];
-  const int32_t *numbers = c->ends;
-  for (int chain = 0; chain < c->chains; ++chain, numbers += 6) {
-    double first[3], next[3], y[3];
-    for (int k = 0; k < 3; ++k) first[k] = left[numbers[k]], next[k] = left[numbers[3 + k]];
-    if (c->spike[chain]) follow_left_end(c, chain, first);
-    for (int v = c->first[chain + 1] - 1; v >= c->first[chain]; --v) {
-      read_vertex(c, c->f, v, y);
-      subtract(c->to_next + BLOCK * v, next, y);
-      memcpy(next, y, sizeof y);
-      write_vertex(c, y, v, x);
+  for (int chain = 0; chain < c->chains; chain += PAIR) {
+    double first[3], next[PAIR][3];
+    const int most = most_vertices(c, chain);
+    for (int l = 0; l < PAIR && chain + l < c->chains; ++l) {
+      const int32_t *numbers = c->ends + 6 * (chain + l);
+      for (int k = 0; k < 3; ++k) first[k] = left[numbers[k]], next[l][k] = left[numbers[3 + k]];
+      if (c->spike[chain + l]) follow_left_end(c, chain + l, first);
     }
+    for (int k = 1; k <= most; ++k)
+      for (int l = 0; l < PAIR && chain + l < c->chains; ++l) {
+        const int v = c->first[chain + l + 1] - k;
+        double y[3];
+        if (v < c->first[chain + l]) continue;
+        read_vertex(c, c->f, v, y);
+        subtract(c->to_next + BLOCK * v, next[l], y);
+        memcpy(next[l], y, sizeof y);
+        write_vertex(c, y, v, x);
+      }
   }
 }
 
