@@ -40,7 +40,7 @@ LANES = 8 if _WIDE else 4
 for less."""
 
 FLAGS = ["-O2", NATIVE, "-fno-math-errno", *(["-mprefer-vector-width=512"] if _WIDE else [])]
-"""Flags for the compiler, which otherwise takes square roots in halves of a vector."""
+"""Flags for the compiler; without the last it takes square roots in halves of a vector."""
 
 FUNCTIONS = {"sin", "cos", "sqrt", "fabs", "pow"}
 """Functions that lanes.h has for vectors; powers with integer exponents."""
@@ -58,7 +58,7 @@ _NUMBER = r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?"
 def in_vectors(kernel: str) -> str:
     """Rewrite the C of a kernel of FFCx with vectors in the place of numbers, if lanes.h can.
 
-    Numbers, and what divides more than once, become factors.
+    Divisions by numbers, and by what divides more than once, become multiplications.
     """
     body = kernel[kernel.index("{") :]
     called = re.findall(r"\b(?!for\b)([a-z_]\w*)\(", body)
@@ -69,13 +69,15 @@ def in_vectors(kernel: str) -> str:
     if missing:
         raise Refused(f"lanes.h has no {', '.join(missing)}")
     divisors = Counter(re.findall(r"/ (sp_\w+);", body))
-    often = "|".join(name for name, number in divisors.items() if number > 1) or "(?!)"
+    repeated = "|".join(name for name, number in divisors.items() if number > 1) or "(?!)"
     lines = []
     for line in body.splitlines():
         if not line.startswith("static const"):
             line = re.sub(rf"/ ({_NUMBER});", r"* (1.0 / \1);", line)
-            line = re.sub(rf"= ([a-zA-Z]\w*) / ({often});", r"= quotient(\1, \2, over_\2);", line)
-            line = re.sub(rf"^double ({often}) = .*;", r"\g<0> double over_\1 = 1 / \1;", line)
+            line = re.sub(
+                rf"= ([a-zA-Z]\w*) / ({repeated});", r"= quotient(\1, \2, over_\2);", line
+            )
+            line = re.sub(rf"^double ({repeated}) = .*;", r"\g<0> double over_\1 = 1 / \1;", line)
             line = re.sub(rf"\bdouble (\w+) = ({_NUMBER});", r"lanes \1 = ALL(\2);", line)
             line = re.sub(rf"= ({_NUMBER} \* weights_\w+\[iq\]);", r"= ALL(\1);", line)
             line = re.sub(r"\bdouble\b", "lanes", line)

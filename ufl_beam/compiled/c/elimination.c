@@ -339,8 +339,8 @@ static inline void go_on(const chains *c, int chain, int vertex, const double *b
   subtract(below, y, next);
 }
 
-/* Vertices of the longest of PAIR chains, or of one that is the last: those take turns, as a processor
- * would wait for each vertex of a chain. */
+/* Vertices of the longest of PAIR chains, or of the last one alone. Chains take turns: in each a vertex
+ * waits for the one before it. */
 static inline int most_vertices(const chains *c, int chain)
 {
   int most = 0;

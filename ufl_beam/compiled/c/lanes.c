@@ -7,8 +7,8 @@ enum { NUMBERS = CONSTANTS + (CONSTANTS == 0), COEFFICIENTS = WIDTH + (WIDTH == 
 typedef double two __attribute__((vector_size(16), aligned(8), may_alias));
 typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
 
-/* What add_batch does for cells with two vertices whose six entries of a row stand side by side, vertex by vertex:
- * those of a cell come in the order u u v v ψ ψ. Additions are fewer and wider than one by one. */
+/* What add_batch does for cells with two vertices whose six entries of a row stand side by side, vertex
+ * by vertex; a cell has them in the order u u v v ψ ψ. Additions are fewer and wider than one by one. */
 static inline void add_rows_of_six(const cells *c, const lanes *e, const int32_t *dofs,
                                    const uint8_t *pattern, double *b)
 {

@@ -222,8 +222,8 @@ int64_t find_pattern(int size, int groups, const int32_t *first, const int32_t *
   return number;
 }
 
-/* CALL of the number of entries in a row, which the compiler knows where it is usual: matrices of masses
- * at vertices, and along beams. */
+/* CALL of the number of entries in a row, which the compiler knows where it is usual: one of lumped
+ * masses, three of consistent ones. */
 #define FOR_WIDTH(width, CALL) \
   switch (width) { \
   case 1: CALL(1); break; \
@@ -231,7 +231,7 @@ int64_t find_pattern(int size, int groups, const int32_t *first, const int32_t *
   default: CALL(width); \
   }
 
-/* y += A x in a run of rows; all but `away` from its first row on */
+/* y += A x in a run of rows; data, x and y begin at its first row */
 static inline void add_rows_times(const int width, int rows, const double *data, const int32_t *away,
                                   const double *x, double *restrict y)
 {
@@ -345,12 +345,12 @@ static void add_rows(const step_product *p, int first, int last, double *tangent
     const int rows = A->first[g + 1] - A->first[g];
     const int end = A->first[g + 1] < last ? A->first[g + 1] : last;
     const int32_t *away = A->away + A->begin[g];
-    const size_t at = A->at[g] - A->first[g];
+    const int64_t at = A->at[g] - A->first[g]; /* of the row 0, as if it were in this run */
 #define ADD(width, place) \
   for (; first < end; ++first) \
     for (int k = 0; k < (width); ++k) \
-      tangent[p->begin[first] + place[at + (size_t)k * rows + first]] += \
-        A->data[at + (size_t)k * rows + first] * p->space[first + away[k]]
+      tangent[p->begin[first] + place[at + (int64_t)k * rows + first]] += \
+        A->data[at + (int64_t)k * rows + first] * p->space[first + away[k]]
 #define ADD_NEAR(width) ADD(width, p->place)
 #define ADD_FAR(width) ADD(width, p->far)
     if (p->place) FOR_WIDTH(A->begin[g + 1] - A->begin[g], ADD_NEAR)

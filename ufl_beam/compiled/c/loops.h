@@ -48,7 +48,7 @@ struct cells {
   const int32_t *row, *begin; /* or none */
   const uint8_t *pattern;
   const int32_t *has; /* number of the pattern of each batch */
-  int in_rows; /* number of patterns, the first ones, that have the entries of each row side by side */
+  int in_rows; /* number of the patterns, the first ones, whose rows stand side by side */
   int is_functional;
 };
 
