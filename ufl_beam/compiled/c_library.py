@@ -39,6 +39,8 @@ extern "Python" double missed_in_python(void *self, const double *q, const doubl
                                         double moved);
 extern "Python" double time_in_python(void *handle, double t);
 extern "Python" int numbers_in_python(void *handle, scheme_numbers *numbers);
+extern "Python" int open_in_python(void *handle, int times);
+extern "Python" void close_in_python(void *handle);
 """
 
 

@@ -88,7 +88,6 @@ class Assembly:
     supports: Supports
     openings: Openings | None  # search for what opens; None if nothing can
     equation: StepEquation
-    search: SearchFlags | None  # None if nothing can open
 
     @property
     def remembering(self) -> list[InelasticBeams | Links]:
@@ -207,7 +206,7 @@ def assemble(
         equation.leave_to_c()
     return Assembly(
         fields, ledger, asked, rates, beams, inelastic, bool(groups), coupled, loads, inertia,
-        supports, openings, equation, search if places else None,
+        supports, openings, equation,
     )  # fmt: skip
 
 

@@ -10,8 +10,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from ufl_beam.arrays import Array, Index, Snapshots
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, give_back_memory, integers, lib
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, give_back_memory, lib
 from ufl_beam.errors import StepFailed
+from ufl_beam.mechanics.tangents import Tangents
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.simulation.branch_check import StaticPath
 from ufl_beam.simulation.kept_rows import KeptRows
@@ -23,7 +24,7 @@ from ufl_beam.terms.dead_loads import DeadLoads
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.inelastic_beams import InelasticBeams
 from ufl_beam.terms.links import Links
-from ufl_beam.terms.openings import SearchFlags
+from ufl_beam.terms.openings import Openings
 from ufl_beam.terms.phases import Phases, TimeFunctions
 from ufl_beam.terms.rates_in_c import V
 
@@ -36,7 +37,7 @@ LONGEST = 0.05
 MOST_LEFT = 32
 """Largest number of steps that are left to Python after steps that C cannot take.
 
-Where hinges open one after the other, in step after step, C would try each of them in vain.
+Where Newton's method needs a line search, in step after step, C would try each of them in vain.
 """
 
 LAST_DIGITS = 1e-14
@@ -76,7 +77,7 @@ class CompiledSteps:
 
     def __init__(
         self, equation: StepEquation, solver: Solver, ledger: Ledger, inertia: Inertia | None,
-        path: StaticPath | None, search: SearchFlags | None, largest_turn: float,
+        path: StaticPath | None, openings: Openings | None, largest_turn: float,
         phases: list[Phases], times: TimeFunctions, whole: tuple[float, float, float],
         turns: tuple[bool, bool], applies_loads: bool, support_dofs: Index,
     ) -> None:  # fmt: skip
@@ -99,14 +100,18 @@ class CompiledSteps:
             multipliers=len(multipliers), multiplier=multipliers,
             loads=loads[0].steps_in_c if loads else ffi.NULL,
             supports=equation.supports.in_c(times),
-            search=ffi.NULL if search is None else integers(search.flags),
             states=len(ledger.state), state=ledger.state.numbers,
         )  # fmt: skip
         over = [
             doubles(one.over) + i
             for one in phases if one.over is not None for i in range(len(one.over))
         ]  # fmt: skip
-        fill(self.c, places=len(over), over=ffi.new("double *[]", over))
+        if openings is not None:
+            self._handle = ffi.new_handle((equation, openings))
+            fill(
+                self.c, search=openings.flags, places=len(over), over=ffi.new("double *[]", over),
+                open=lib.open_in_python, close=lib.close_in_python, openings=self._handle,
+            )  # fmt: skip
         if inertia is not None and inertia.in_c is not None:
             fill(self.c, rates=inertia.in_c.c)
         if path is not None:
@@ -229,7 +234,7 @@ class CompiledSteps:
 
 def compiled_steps(
     scheme: Scheme, equation: StepEquation, solver: Solver, ledger: Ledger,
-    inertia: Inertia | None, path: StaticPath | None, search: SearchFlags | None,
+    inertia: Inertia | None, path: StaticPath | None, openings: Openings | None,
     largest_turn: float, applies_loads: bool, support_dofs: Index,
 ) -> CompiledSteps | None:  # fmt: skip
     """Make the steps of a scene in C, if all that takes part in them has loops there."""
@@ -244,9 +249,31 @@ def compiled_steps(
             return None
         phases.append(of_term)
     return CompiledSteps(
-        equation, solver, ledger, inertia, path, search, largest_turn, phases, times, whole, turns,
-        applies_loads, support_dofs,
+        equation, solver, ledger, inertia, path, openings, largest_turn, phases, times, whole,
+        turns, applies_loads, support_dofs,
     )  # fmt: skip
+
+
+def _note(kind: type, error: BaseException, traceback: Any) -> None:
+    """Note an exception in a callback; an interrupt may come before its first line has run."""
+    equation, _ = ffi.from_handle(traceback.tb_frame.f_locals["handle"])
+    equation.note(error.with_traceback(traceback))
+
+
+@ffi.def_extern(error=0, onerror=_note)  # type: ignore[misc, untyped-decorator, unused-ignore]
+def open_in_python(handle: Any, times: int) -> int:
+    """Callback of C, declared in c_library.py."""
+    equation, openings = ffi.from_handle(handle)
+    opens = openings.open(times)
+    equation.restart(Tangents.PREDICTED)
+    return int(opens)
+
+
+@ffi.def_extern(onerror=_note)  # type: ignore[misc, untyped-decorator, unused-ignore]
+def close_in_python(handle: Any) -> None:
+    """Callback of C, declared in c_library.py."""
+    _, openings = ffi.from_handle(handle)
+    openings.close()
 
 
 @cache

@@ -201,7 +201,7 @@ class Simulation(StateView):
         fresh = not self._continues and begins_loaded(self.scene, self.scheme, self.t)
         return compiled_steps(
             self.scheme, self.equation, self.solver, self.ledger, parts.inertia, self._branch,
-            parts.search, LARGEST_TURN, fresh, self.support_dofs,
+            parts.openings, LARGEST_TURN, fresh, self.support_dofs,
         )  # fmt: skip
 
     def take_back(self) -> None:

@@ -102,6 +102,11 @@ class Openings:
         self._search, self._places, self._share = search, places, share
         self._released = False
 
+    @property
+    def flags(self) -> Index:
+        """:attr:`SearchFlags.flags` of the places."""
+        return self._search.flags
+
     def solve(
         self, guess: Array, solve: Callable[[Array], Array], again: Callable[[], None]
     ) -> Array:
@@ -121,19 +126,35 @@ class Openings:
                 raise  # nothing would open
         finally:
             search.begin(hold=False)
-            if self._released:
-                self._released = False
-                for one in self._places:
-                    one.hold()
+            self.close()
         again()
         return solve(guess)
 
     def _open_few(self, q: Array, solve: Callable[[Array], Array]) -> Array:
-        """Let places open that bear too much, those with the largest excess first."""
-        part = 1.0
-        while excess := self._share.largest(max((x.excess for x in self._places), default=0.0)):
+        """Let places open, in turn, until none bears too much."""
+        times = 0
+        while self.open(times):
+            q, times = solve(q), times + 1
+        return q
+
+    def open(self, times: int) -> bool:
+        """Let places open that bear too much, those with the largest excess first.
+
+        ``times`` it was called before in the step.
+
+        Returns:
+            Whether there are such places.
+        """
+        excess = self._share.largest(max((one.excess for one in self._places), default=0.0))
+        if excess:
             self._released = True
             for one in self._places:
-                one.release(part * excess - TIE)
-            q, part = solve(q), part * FALL
-        return q
+                one.release(FALL**times * excess - TIE)
+        return bool(excess)
+
+    def close(self) -> None:
+        """Close again what :meth:`open` opened, before the step is accepted."""
+        if self._released:
+            self._released = False
+            for one in self._places:
+                one.hold()

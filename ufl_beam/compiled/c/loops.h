@@ -601,10 +601,14 @@ typedef struct {
   int32_t *search;    /* flags of points that may open; or none */
   int places;         /* that may open, and their largest excess, see points */
   double *const *over;
+  int (*open)(void *handle, int times); /* lets places open that bear too much, see Openings.open */
+  void (*close)(void *handle);          /* ends that */
+  void *openings;
   phases begin, accept, add_state;
   int states;
   double *state;      /* entries of the ledger that a state has, one after the other */
   int iterations, failed; /* in the latest call; whether its last step failed */
+  int tried;              /* iterations of the step */
   time_step step;
   int kinds, width; /* of numbers that are kept; of a row */
   const kept_numbers *kept;

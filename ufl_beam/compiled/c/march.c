@@ -343,7 +343,26 @@ static void guess(march *m)
   }
 }
 
-/* Whether Newton's method finds the end of the step, with what does not flow held closed. */
+/* Whether Newton's method finds the end of the step from the unknowns that it has. */
+static int iterate(march *m)
+{
+  equation *e = m->equation;
+  begin_newton(e, 2, as_last(m->prediction, m->step.dt));
+  const int error = petsc.SNESSolve(m->snes, 0, e->x);
+  m->tried += e->iterations;
+  return !error && e->reason > 0;
+}
+
+/* Whether a place that is held closed bears too much. */
+static int must_open(const march *m)
+{
+  int over = 0;
+  for (int k = 0; k < m->places; ++k) over |= *m->over[k] != 0;
+  return over && m->search[OVER];
+}
+
+/* Whether the end of the step is found; what does not flow is held closed, but for what must open, as
+ * Openings.solve has it. */
 static int solve(march *m)
 {
   equation *e = m->equation;
@@ -352,16 +371,13 @@ static int solve(march *m)
     m->loads->changed = 0;
   }
   e->loads = m->loads ? m->loads->norm : 0;
-  begin_newton(e, 2, as_last(m->prediction, m->step.dt));
-  if (m->search) {
-    memset(m->search, 0, SEARCH_FLAGS * sizeof *m->search);
-    m->search[HOLD] = 1;
-  }
-  const int error = petsc.SNESSolve(m->snes, 0, e->x);
-  int found = !error && e->reason > 0;
-  if (m->search && m->search[OVER])
-    for (int k = 0; k < m->places; ++k) found &= *m->over[k] == 0; /* none that must open */
-  if (m->search) memset(m->search, 0, SEARCH_FLAGS * sizeof *m->search);
+  if (!m->search) return iterate(m);
+  memset(m->search, 0, SEARCH_FLAGS * sizeof *m->search);
+  m->search[HOLD] = 1;
+  int found = iterate(m), opened = 0;
+  while (found && must_open(m)) found = m->open(m->openings, opened++) && iterate(m);
+  if (opened) m->close(m->openings);
+  memset(m->search, 0, SEARCH_FLAGS * sizeof *m->search);
   return found;
 }
 
@@ -419,6 +435,7 @@ static int take_step(march *m, double t1)
 {
   prediction *p = m->prediction;
   const double t0 = m->t;
+  m->tried = 0;
   m->step.t0 = t0, m->step.t1 = t1, m->step.dt = t1 - t0, m->step.fraction = 1, m->step.at = m->at;
   m->step.load_time = (1 - m->load_weight) * t0 + m->load_weight * t1;
   m->step.motion_time = (1 - m->motion_weight) * t0 + m->motion_weight * t1;
@@ -441,7 +458,7 @@ static int take_step(march *m, double t1)
   p->q_before = m->q, m->q = spare;
   memcpy(m->q, m->x, m->size * sizeof *m->q);
   m->t = t1;
-  m->iterations += m->equation->iterations;
+  m->iterations += m->tried;
   return 1;
 }
 
