@@ -65,6 +65,27 @@ def test_angles(function):
     assert np.all(np.abs(several - one) <= 2 * np.spacing(np.abs(one)))
 
 
+@pytest.mark.parametrize("flag", ["-O2", "-ffp-contract=off", "-U__FP_FAST_FMA"])
+def test_quotients(flag):
+    """To the last digit but rarely, and 1 for equal numbers, also where products are rounded."""
+    divide = "void divide(int n, const double *a, const double *b, double *c)"
+    loop = (
+        "{ for (int i = 0; i < n; i += LANES) *(lanes *)(c + i) = "
+        "quotient(*(lanes *)(a + i), *(lanes *)(b + i), 1 / *(lanes *)(b + i)); }"
+    )
+    head = f"#define LANES {simd_kernels.LANES}\n{jit.text('lanes.h')}"
+    source = "\n".join([jit.HEADERS, head, divide, loop])
+    flags = [*simd_kernels.FLAGS, flag]
+    module = jit.compiled("quotients", f"{divide};", lambda: source, made_of=[source], flags=flags)
+    a, b = np.random.default_rng(6).normal(size=(2, 8000)) * 1e3
+    a[:4000] = b[:4000]
+    c = np.empty_like(a)
+    module.lib.divide(len(a), *(module.ffi.from_buffer("double[]", x) for x in (a, b, c)))
+    assert np.array_equal(c[:4000], np.ones(4000))
+    assert np.all(np.abs(c - a / b) <= np.spacing(np.abs(a / b)))
+    assert np.mean(c != a / b) < 1e-3
+
+
 def test_far_angles_lose_what_they_do_not_have():
     x = np.random.default_rng(3).uniform(1e6, 1e9, size=200)
     one, several = both(ufl.sin, x)

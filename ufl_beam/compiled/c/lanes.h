@@ -57,11 +57,18 @@ static inline lanes lanes_sqrt(lanes x)
   return x;
 }
 
-/* a / b to the last digit but rarely, from 1 / b: a division takes as long as sixteen products. */
+/* a / b to the last digit but rarely, from 1 / b: a division takes as long as sixteen products. The rest
+ * must not be rounded: without it, cells at rest are strained by a last digit. */
 static inline lanes quotient(lanes a, lanes b, lanes over_b)
 {
+#ifdef __FP_FAST_FMA
   const lanes near = a * over_b;
-  return near + over_b * (a - near * b);
+  lanes rest;
+  for (int l = 0; l < LANES; ++l) rest[l] = __builtin_fma(-near[l], b[l], a[l]);
+  return near + over_b * rest;
+#else
+  return a / b;
+#endif
 }
 
 static inline lanes lanes_pow(lanes x, int n)
