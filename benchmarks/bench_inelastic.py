@@ -57,6 +57,7 @@ PAIRS = {  # name: (scene without, scene with, steps, dt)
     "8 cells, all yield": (flying_beam(8), flying_beam(8, bending=LAW), 500, 0.01),
     "512 cells, all yield": (flying_beam(512), flying_beam(512, bending=LAW), 60, 0.01),
     "4096 cells, all yield": (flying_beam(4096), flying_beam(4096, bending=LAW), 30, 0.01),
+    "4096 cells, all yield, longer": (flying_beam(4096), flying_beam(4096, bending=LAW), 300, 0.01),
     "1 of 50 cells can hinge, stays closed": (frame(0), frame(1e9), 300, 1e-3),
     "1 of 50 cells can hinge, opens": (frame(1e9), frame(50e3), 300, 1e-3),
     "100 cells of 200 fibres beside resultants": (
