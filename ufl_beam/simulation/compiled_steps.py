@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache, partial
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from ufl_beam.simulation.branch_check import StaticPath
 from ufl_beam.simulation.kept_rows import KeptRows
 from ufl_beam.simulation.prediction import Prediction
 from ufl_beam.simulation.step_equation import StepEquation
+from ufl_beam.solvers.equation import note_exception
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.dead_loads import DeadLoads
@@ -107,7 +108,7 @@ class CompiledSteps:
             for one in phases if one.over is not None for i in range(len(one.over))
         ]  # fmt: skip
         if openings is not None:
-            self._handle = ffi.new_handle((equation, openings))
+            self._handle = ffi.new_handle(OpeningsOfStep(equation, openings))
             fill(
                 self.c, search=openings.flags, places=len(over), over=ffi.new("double *[]", over),
                 open=lib.open_in_python, close=lib.close_in_python, openings=self._handle,
@@ -254,13 +255,14 @@ def compiled_steps(
     )  # fmt: skip
 
 
-def _note(kind: type, error: BaseException, traceback: Any) -> None:
-    """Note an exception in a callback; an interrupt may come before its first line has run."""
-    equation, _ = ffi.from_handle(traceback.tb_frame.f_locals["handle"])
-    equation.note(error.with_traceback(traceback))
+class OpeningsOfStep(NamedTuple):
+    """Search for what opens, and the equation of the step, as callbacks of C have them."""
+
+    equation: StepEquation
+    openings: Openings
 
 
-@ffi.def_extern(error=0, onerror=_note)  # type: ignore[misc, untyped-decorator, unused-ignore]
+@ffi.def_extern(error=0, onerror=note_exception)  # type: ignore[misc, untyped-decorator, unused-ignore]
 def open_in_python(handle: Any, times: int) -> int:
     """Callback of C, declared in c_library.py."""
     equation, openings = ffi.from_handle(handle)
@@ -269,11 +271,10 @@ def open_in_python(handle: Any, times: int) -> int:
     return int(opens)
 
 
-@ffi.def_extern(onerror=_note)  # type: ignore[misc, untyped-decorator, unused-ignore]
+@ffi.def_extern(onerror=note_exception)  # type: ignore[misc, untyped-decorator, unused-ignore]
 def close_in_python(handle: Any) -> None:
     """Callback of C, declared in c_library.py."""
-    _, openings = ffi.from_handle(handle)
-    openings.close()
+    ffi.from_handle(handle).openings.close()
 
 
 @cache

@@ -111,8 +111,11 @@ def _lent(pointer: Any, size: int) -> Array:
     return np.frombuffer(ffi.buffer(pointer, 8 * size))
 
 
-def _note(kind: type, error: BaseException, traceback: Any) -> None:
-    """Note an exception in a callback; an interrupt may come before its first line has run."""
+def note_exception(kind: type, error: BaseException, traceback: Any) -> None:
+    """Note an exception in a callback whose handle has the equation.
+
+    An interrupt may come before the first line of the callback has run.
+    """
     arguments = traceback.tb_frame.f_locals
     of = ffi.from_handle(arguments["handle"])
     of.equation.note(error.with_traceback(traceback))
@@ -120,14 +123,14 @@ def _note(kind: type, error: BaseException, traceback: Any) -> None:
         _lent(arguments["out"], of.size).fill(np.nan)
 
 
-@ffi.def_extern(onerror=_note)  # type: ignore[misc, untyped-decorator, unused-ignore]
+@ffi.def_extern(onerror=note_exception)  # type: ignore[misc, untyped-decorator, unused-ignore]
 def add_in_python(handle: Any, q: Any, out: Any) -> None:
     """Callback of C, declared in c_library.py."""
     of = ffi.from_handle(handle)
     of.function(_lent(q, of.equation.A.size), _lent(out, of.size))
 
 
-@ffi.def_extern(error=math.nan, onerror=_note)  # type: ignore[misc, untyped-decorator, unused-ignore]
+@ffi.def_extern(error=math.nan, onerror=note_exception)  # type: ignore[misc, untyped-decorator, unused-ignore]
 def missed_in_python(handle: Any, q: Any, r: Any, scale: float, moved: float) -> float:
     """Callback of C, declared in c_library.py."""
     of = ffi.from_handle(handle)

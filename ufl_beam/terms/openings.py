@@ -140,10 +140,11 @@ class Openings:
     def open(self, times: int) -> bool:
         """Let places open that bear too much, those with the largest excess first.
 
-        ``times`` it was called before in the step.
+        Args:
+            times: Number of earlier calls in the step.
 
         Returns:
-            Whether there are such places.
+            True if there are such places.
         """
         excess = self._share.largest(max((one.excess for one in self._places), default=0.0))
         if excess:

@@ -602,7 +602,7 @@ typedef struct {
   int places;         /* that may open, and their largest excess, see points */
   double *const *over;
   int (*open)(void *handle, int times); /* lets places open that bear too much, see Openings.open */
-  void (*close)(void *handle);          /* ends that */
+  void (*close)(void *handle);          /* see Openings.close */
   void *openings;
   phases begin, accept, add_state;
   int states;
