@@ -104,7 +104,7 @@ class Probe:
         inertia.last_dt = 0.2
         numerical = (one for one in simulation.terms if isinstance(one, SecondDifferences))
         for term in numerical:
-            term._change, term._last_dt = random.uniform(-1, 1, term._change.shape), 0.2
+            term._change[:], term._last_dt[0] = random.uniform(-1, 1, term._change.shape), 0.2
 
     @staticmethod
     def at_random(inelastic, random):

@@ -255,16 +255,20 @@ def _weighted_strains(of: Element) -> ufl.Form:
 
 
 class Strains:
-    """(Σ, Γ, K) in the points of the cells of some fields; the kernel weights them."""
+    """(Σ, Γ, K) in the points of the cells of some fields; the kernel weights them.
+
+    Attributes:
+        weights: Of the numbers of a cell.
+    """
 
     def __init__(self, fields: Fields) -> None:
         self.kernel = fields.hot_kernel(_weighted_strains(fields.element), fields.element.q1)
-        self._weights = np.repeat(fields.share.grid.mesh.point_weights, 3)
-        self.shape = (len(fields.order), len(self._weights))
+        self.weights = np.repeat(fields.share.grid.mesh.point_weights, 3)
+        self.shape = (len(fields.order), len(self.weights))
 
     def __call__(self, q: Array) -> Array:
         """Strains at ``q``, in the order of the mesh, point after point; 1, 1, 1/m."""
-        return np.asarray(self._weighted(q) / self._weights)
+        return np.asarray(self._weighted(q) / self.weights)
 
     def mean(self, q: Array) -> Array:
         """Means of the cells at ``q``, in the order of the mesh; (num_cells, 3); 1, 1, 1/m."""

@@ -11,7 +11,7 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import loop
+from ufl_beam.compiled.c_library import loop, struct
 from ufl_beam.compiled.csr import Csr, StepProduct
 from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.function_spaces import Element, Fields, Strains, mass_matrix
@@ -26,7 +26,7 @@ from ufl_beam.model.damping import KelvinVoigt, Rayleigh
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.forms_and_matrices import OfForms, OfMatrix
-from ufl_beam.terms.phases import Phases, TimeFunctions
+from ufl_beam.terms.phases import Phases, TimeFunctions, knowing
 from ufl_beam.terms.rates_in_c import RatesInC
 
 
@@ -67,17 +67,20 @@ class KelvinVoigtForces(OfForms):
     ) -> None:
         work, lost, self._rate = _viscous_forms(fields.element, scheme)
         super().__init__(work, [lost], fields, A, ledger)
-        self._time, self._dt = damping.time, 0.0
+        self._time, self._dt = damping.time, np.zeros(1)
 
     def phases(self, times: TimeFunctions) -> Phases | None:
-        """None: the step is a number of the forms."""
-        return None
+        """Loops over the cells; the step is a number of the forms."""
+        begin, accept = self._loops_of_step()
+        forms = knowing(self._of_step, self._rate)
+        c = struct("viscous_forms", **forms, time=self._time, dt=self._dt)
+        return Phases([*begin, loop("begin_viscous_forms", c)], accept)
 
     def begin(self, step: Step) -> None:
         """Remember the configuration at the beginning."""
         super().begin(step)
-        if step.dt != self._dt:
-            self._dt = step.dt
+        if step.dt != self._dt[0]:
+            self._dt[0] = step.dt
             for kernel in self._of_step:
                 kernel.put(self._rate, np.array([self._time / step.dt]))
 
@@ -163,31 +166,46 @@ class SecondDifferences(OfForms):
         self._cells = fields.share.cells[fields.order]
         self._q: Array = np.empty(0)
         self._e, self._change = np.zeros((2, *self._strains.shape))
-        self._dt = self._last_dt = math.inf
+        self._dt, self._last_dt = math.inf, np.full(1, math.inf)
 
     def phases(self, times: TimeFunctions) -> Phases | None:
-        """None: strains are kept in Python."""
-        return None
+        """Loops over the cells and their strains."""
+        begin, accept = self._loops_of_step()
+        c = struct(
+            "second_differences", strains=self._strains.kernel.cells, weight=self._strains.weights,
+            of_cell=len(self._strains.weights), **knowing(self._of_step, self._before), e=self._e,
+            change=self._change, space=np.zeros(self._e.shape), last_dt=self._last_dt,
+        )  # fmt: skip
+        before, after = (loop(f"{name}_second_differences", c) for name in ("begin", "accept"))
+
+        def leave(q: Array) -> None:
+            self._q = q
+
+        return Phases([*begin, before], [*accept, after], enter=self._start_at, leave=leave)
+
+    def _start_at(self, q0: Array) -> None:
+        if q0 is not self._q:
+            self._q, self._e[:] = q0, self._strains(q0)
 
     def begin(self, step: Step) -> None:
         """Remember the configuration at the beginning, and the changes in the step before."""
-        if step.q0 is not self._q:
-            self._q, self._e = step.q0, self._strains(step.q0)
+        self._start_at(step.q0)
         self._dt = step.dt
         super().begin(step)
         for kernel in self._of_step:
-            kernel.put(self._before, min(1.0, step.dt / self._last_dt) * self._change)
+            kernel.put(self._before, min(1.0, step.dt / self._last_dt[0]) * self._change)
 
     def accept(self, q1: Array, s: Array) -> None:
         """Enter the energy that was lost, and keep the changes of the strains."""
         super().accept(q1, s)
         e1 = self._strains(q1)
-        self._change, self._q, self._e, self._last_dt = e1 - self._e, q1, e1, self._dt
+        self._change[:], self._e[:] = e1 - self._e, e1
+        self._q, self._last_dt[0] = q1, self._dt
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The changes of the strains in the last step, and its length."""
         # The length is in the rows: the process that says numbers for all may have no such cells.
         rows = np.column_stack([self._change, np.full(len(self._change), self._last_dt)])
         rows = memory.rows("changes of strains", self._cells, rows)
-        self._change, self._last_dt = rows[:, :-1].copy(), float(rows[0, -1])
-        self._q, self._e = q, self._strains(q)
+        self._change[:], self._last_dt[0] = rows[:, :-1], rows[0, -1]
+        self._q, self._e[:] = q, self._strains(q)

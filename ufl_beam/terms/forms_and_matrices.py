@@ -33,9 +33,8 @@ class OfForms(Term):
         else:
             self._force, self._tangent = fields.hot_kernel(work, self._q1), tangent
         self._losses = [fields.hot_kernel(form, self._q1) for form in losses]
-        for loss in self._losses:
-            loss.share(self._force)
-        self._of_step = [self._force, *self._losses]
+        alone = [loss for loss in self._losses if not loss.share(self._force)]
+        self._of_step = [self._force, *alone]
         self._A, self._ledger = A, ledger
         if losses:
             ledger.lost[self._entry] += 0.0

@@ -83,6 +83,12 @@ def beginning(kernels: Iterable[Any], q0: fem.Function) -> list[Loop]:
     ]  # fmt: skip
 
 
+def knowing(kernels: Sequence[Any], function: fem.Function) -> dict[str, Any]:
+    """Fields of a struct for forms that know values of a function, which a phase gives them."""
+    forms = [(one.cells, one.position(function)) for one in kernels]
+    return {"forms": len(forms), "form": ffi.new("form_of_step[]", forms)}
+
+
 def entering(kernel: Any, entry: Any) -> Loop:
     """Loop that adds the value of a kernel to an entry of the ledger."""
     return loop("add_values", struct("form_value", form=kernel.cells, entry=entry))

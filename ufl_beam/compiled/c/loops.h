@@ -474,6 +474,24 @@ typedef struct {
   int at;
 } form_of_step;
 
+/* Forms that know a time over that of the step, which they have from `at` on. */
+typedef struct {
+  int forms;
+  const form_of_step *form;
+  double time, *dt; /* dt: of the latest step */
+} viscous_forms;
+
+/* Forms that know the changes of the strains in the step before, see SecondDifferences. */
+typedef struct {
+  const cells *strains; /* which weights them */
+  int of_cell, forms;
+  const double *weight; /* of_cell */
+  const form_of_step *form;
+  double *e, *change; /* strains at the beginning of the step, their changes in the step before; each
+                       * cells * of_cell */
+  double *space, *last_dt;
+} second_differences;
+
 /* The value of a form, added to an entry of the ledger, and as it was when it was added last. */
 typedef struct {
   const cells *form;
@@ -620,6 +638,9 @@ void begin_static_tangent(void *self, const time_step *step, const double *q1, c
 void begin_predicted_strains(void *self, const time_step *step, const double *q1, const double *s);
 void begin_dead_loads(void *self, const time_step *step, const double *q1, const double *s);
 void accept_dead_loads(void *self, const time_step *step, const double *q1, const double *s);
+void begin_viscous_forms(void *self, const time_step *step, const double *q1, const double *s);
+void begin_second_differences(void *self, const time_step *step, const double *q1, const double *s);
+void accept_second_differences(void *self, const time_step *step, const double *q1, const double *s);
 void begin_inertia(void *self, const time_step *step, const double *q1, const double *s);
 void accept_inertia(void *self, const time_step *step, const double *q1, const double *s);
 void add_kinetic_energy(void *self, const time_step *step, const double *q1, const double *s);
